@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "ist_proximity/geometry/triangle_mesh.h"
+
+namespace ist {
+
+/// Reads the triangles of an STL, DAE or OBJ file (anything assimp reads).
+///
+/// Node transforms and the file's unit are applied; Collada's up-axis is ignored, as rviz does;
+/// lines and points are dropped; vertices with the same coordinates are merged; triangles with a
+/// NaN or infinite corner are an error. `scale` multiplies each axis; a mirroring scale flips the
+/// triangles so that outside stays outside.
+/// @param path   a file on disk
+/// @param scale  dimensionless, finite and not 0 in any axis
+/// @throws ModelError naming the file and what is wrong: missing, empty, unreadable, no triangle,
+///         a zero or non-finite scale, a non-finite vertex.
+/// Thread safe.
+TriangleMesh load_mesh(const std::string& path,
+                       const Eigen::Vector3d& scale = Eigen::Vector3d::Ones());
+
+}  // namespace ist

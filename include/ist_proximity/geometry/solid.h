@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "ist_proximity/geometry/shapes.h"
+#include "ist_proximity/geometry/triangle_bvh.h"
+
+namespace ist {
+
+/// Exact signed distance from a point to a solid.
+struct SignedDistance {
+  double distance = std::numeric_limits<double>::infinity();  ///< [m] negative inside
+  Eigen::Vector3d witness = Eigen::Vector3d::Zero();  ///< nearest surface point, query frame
+  /// Unit vector from the surface's outside away from the solid: the way the *point* would go to
+  /// get away from (or out of) the solid. Defined at distance 0 too.
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+};
+
+/// The exact geometry of one link: the union of its elements, primitives evaluated in closed form
+/// and meshes through a BVH in double precision.
+///
+/// Outside, the distance is the one to the nearest element. Inside it is minus the depth in the
+/// element that holds the point deepest (each element's depth is measured to its own surface). A
+/// mesh's inside is where its generalized winding number exceeds 0.5.
+/// Immutable; const members are thread safe and allocate nothing.
+class Solid {
+ public:
+  Solid() = default;
+  explicit Solid(const LinkGeometry& geometry);
+
+  /// Signed distance of p_L (link frame).
+  SignedDistance signed_distance(const Eigen::Vector3d& p_L) const;
+
+  /// As signed_distance, for a point known to be outside (no inside test is made), and only if it
+  /// is nearer than `max_distance` [m]; otherwise `distance` is inf.
+  SignedDistance distance_outside(const Eigen::Vector3d& p_L, double max_distance) const;
+
+  /// Whether p_L is inside any element.
+  bool is_inside(const Eigen::Vector3d& p_L) const;
+
+  bool empty() const { return elements_.empty(); }
+  std::size_t triangle_count() const;
+
+ private:
+  struct Element {
+    Shape primitive;  ///< Box, Cylinder or Sphere; an empty mesh when `bvh` is used
+    TriangleBvh bvh;
+    std::vector<Eigen::Vector3d> normals;  ///< unit, by triangle; zero for triangles without area
+    Eigen::Isometry3d X_LE;
+    Eigen::Isometry3d X_EL;
+  };
+
+  std::vector<Element> elements_;
+};
+
+}  // namespace ist

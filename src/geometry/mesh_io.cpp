@@ -1,0 +1,219 @@
+#include "ist_proximity/geometry/mesh_io.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <tinyxml2.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <assimp/Importer.hpp>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <locale>
+#include <sstream>
+#include <unordered_map>
+#include <utility>
+
+#include "ist_proximity/geometry/error.h"
+
+namespace ist {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string& path, const std::string& what) {
+  throw ModelError("mesh file '" + path + "' " + what);
+}
+
+void check_file(const std::string& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) {
+    fail(path, "does not exist; check the URDF's mesh filename and the package it names");
+  }
+  if (fs::is_directory(status)) fail(path, "is a directory; name the mesh file itself");
+  if (!std::ifstream(path, std::ios::binary)) {
+    fail(path, std::string("cannot be opened (") + std::strerror(errno) + ")");
+  }
+  if (fs::file_size(path, error) == 0 && !error) {
+    fail(path, "is empty (0 bytes); export or download it again");
+  }
+}
+
+void check_scale(const std::string& path, const Eigen::Vector3d& scale) {
+  if (scale.allFinite() && (scale.array() != 0.0).all()) return;
+  std::ostringstream text;
+  text << "has the scale (" << scale.transpose()
+       << "); each axis must be finite and not 0 (1 leaves the size as it is)";
+  fail(path, text.str());
+}
+
+bool is_collada(const std::string& path) {
+  std::string extension = fs::path(path).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".dae";
+}
+
+// Metres per unit of a Collada file. Read here, as rviz does, and the root node into which assimp
+// puts unit and up-axis is skipped: what it does there has changed from version to version.
+double collada_unit(const std::string& path) {
+  tinyxml2::XMLDocument document;
+  if (document.LoadFile(path.c_str()) != tinyxml2::XML_SUCCESS) return 1.0;  // assimp will tell
+  const tinyxml2::XMLElement* root = document.FirstChildElement("COLLADA");
+  const tinyxml2::XMLElement* asset = root != nullptr ? root->FirstChildElement("asset") : nullptr;
+  const tinyxml2::XMLElement* unit = asset != nullptr ? asset->FirstChildElement("unit") : nullptr;
+  const char* text = unit != nullptr ? unit->Attribute("meter") : nullptr;
+  if (text == nullptr) return 1.0;
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double meter = 0.0;
+  if (!(stream >> meter) || !std::isfinite(meter) || meter <= 0.0) {
+    fail(path, "has <unit meter=\"" + std::string(text) +
+                   "\">; it must be a number of metres > 0, such as 0.001 for millimetres");
+  }
+  return meter;
+}
+
+const aiScene& read_scene(const std::string& path, Assimp::Importer* importer) {
+  // A Collada file's up-axis is not applied to links (REP 103 is Z up, and so rviz shows it).
+  importer->SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+  importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+  const aiScene* scene = nullptr;
+  std::string reason;
+  try {
+    scene = importer->ReadFile(path, aiProcess_Triangulate | aiProcess_SortByPType);
+    reason = importer->GetErrorString();
+  } catch (const std::exception& error) {
+    reason = error.what();
+  }
+  if (scene == nullptr || scene->mRootNode == nullptr) {
+    fail(path, "cannot be read as a mesh (" + reason + "); STL, DAE and OBJ are known to work");
+  }
+  return *scene;
+}
+
+Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
+  Eigen::Affine3d X = Eigen::Affine3d::Identity();
+  X.linear() << m.a1, m.a2, m.a3, m.b1, m.b2, m.b3, m.c1, m.c2, m.c3;
+  X.translation() << m.a4, m.b4, m.c4;
+  return X;
+}
+
+// Collects triangles, with one vertex for all corners at the same coordinates.
+class MeshBuilder {
+ public:
+  MeshBuilder(const std::string& path, const Eigen::Vector3d& scale) : path_(path), scale_(scale) {}
+
+  void add_node(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& X_MP) {
+    const Eigen::Affine3d X_MN = X_MP * to_eigen(node.mTransformation);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) add_mesh(*scene.mMeshes[node.mMeshes[i]], X_MN);
+    add_children(scene, node, X_MN);
+  }
+
+  void add_children(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& X_MN) {
+    for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(scene, *node.mChildren[i], X_MN);
+  }
+
+  TriangleMesh take() { return std::move(mesh_); }
+
+ private:
+  struct Hash {
+    std::size_t operator()(const std::array<double, 3>& p) const {
+      const std::hash<double> hash;
+      return (hash(p[0]) * 31 + hash(p[1])) * 31 + hash(p[2]);
+    }
+  };
+
+  void add_mesh(const aiMesh& mesh, const Eigen::Affine3d& X_MN) {
+    // A mirror turns the corners' order round; outside stays outside if they are turned back.
+    const bool mirrored = (scale_.prod() < 0.0) != (X_MN.linear().determinant() < 0.0);
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      if (face.mNumIndices != 3) continue;
+      TriangleMesh::Triangle triangle;
+      for (unsigned k = 0; k < 3; ++k) {
+        triangle[k] = vertex(mesh.mVertices[face.mIndices[k]], X_MN);
+      }
+      if (mirrored) std::swap(triangle[1], triangle[2]);
+      mesh_.triangles.push_back(triangle);
+    }
+  }
+
+  std::uint32_t vertex(const aiVector3D& v, const Eigen::Affine3d& X_MN) {
+    const Eigen::Vector3d p = scale_.cwiseProduct(X_MN * Eigen::Vector3d(v.x, v.y, v.z));
+    if (!p.allFinite()) {
+      std::ostringstream text;
+      text << "has a vertex at (" << p.transpose() << ") after its transforms and scale ("
+           << scale_.transpose() << "); repair the mesh: coordinates must be finite";
+      fail(path_, text.str());
+    }
+    // + 0.0 makes one of the two zeros.
+    const auto [entry, is_new] =
+        vertices_.insert({{p.x() + 0.0, p.y() + 0.0, p.z() + 0.0},
+                          static_cast<std::uint32_t>(mesh_.vertices.size())});
+    if (is_new) mesh_.vertices.push_back(p);
+    return entry->second;
+  }
+
+  const std::string& path_;
+  const Eigen::Vector3d scale_;
+  TriangleMesh mesh_;
+  std::unordered_map<std::array<double, 3>, std::uint32_t, Hash> vertices_;
+};
+
+// Some exporters write whole meshes inside out; taken at its word, such a link would have no
+// inside. Open meshes, where outside cannot be told like this, are left alone: their directed areas
+// do not cancel (an open box: 0.2 of its area; the worst of the Panda's meshes, with all their
+// holes: 0.08).
+void turn_outside_out(TriangleMesh* mesh) {
+  constexpr double kMaxOpening = 0.1;
+  Eigen::Vector3d directed_area = Eigen::Vector3d::Zero(), moment = Eigen::Vector3d::Zero();
+  double area = 0.0, volume = 0.0;
+  for (std::size_t t = 0; t < mesh->triangles.size(); ++t) {
+    const Eigen::Vector3d &a = mesh->corner(t, 0), &b = mesh->corner(t, 1), &c = mesh->corner(t, 2);
+    const Eigen::Vector3d n = (b - a).cross(c - a);
+    directed_area += n;
+    moment += n.norm() * (a + b + c) / 3.0;
+    area += n.norm();
+    volume += a.dot(n);
+  }
+  if (area <= 0.0 || directed_area.norm() > kMaxOpening * area) return;
+  volume -= directed_area.dot(moment / area);  // about the centroid, or holes count by their place
+  if (volume >= 0.0) return;
+  for (TriangleMesh::Triangle& triangle : mesh->triangles) std::swap(triangle[1], triangle[2]);
+}
+
+}  // namespace
+
+TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
+  check_scale(path, scale);
+  check_file(path);
+  Assimp::Importer importer;
+  const aiScene& scene = read_scene(path, &importer);
+  const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
+  TriangleMesh mesh;
+  if (is_collada(path)) {
+    // The root holds nothing but assimp's idea of unit and up-axis.
+    MeshBuilder builder(path, collada_unit(path) * scale);
+    builder.add_children(scene, *scene.mRootNode, X_MR);
+    mesh = builder.take();
+  } else {
+    MeshBuilder builder(path, scale);
+    builder.add_node(scene, *scene.mRootNode, X_MR);
+    mesh = builder.take();
+  }
+  if (mesh.triangles.empty()) {
+    fail(path, "holds no triangle; export the surface as triangles or polygons");
+  }
+  turn_outside_out(&mesh);
+  return mesh;
+}
+
+}  // namespace ist

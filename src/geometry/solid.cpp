@@ -1,0 +1,197 @@
+#include "ist_proximity/geometry/solid.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ist {
+namespace {
+
+// Below this distance [m] the line from surface to point has no direction worth having.
+constexpr double kTouch = 1e-12;
+
+SignedDistance to_box(const Box& box, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d half = 0.5 * box.size;
+  const Eigen::Vector3d outside = p.cwiseAbs() - half;
+  Eigen::Index axis;
+  const double largest = outside.maxCoeff(&axis);
+  SignedDistance result;
+  result.witness = p.cwiseMax(-half).cwiseMin(half);
+  const Eigen::Vector3d away = p - result.witness;
+  result.distance = away.norm();
+  if (largest > 0.0 && result.distance > kTouch) {
+    result.normal = away / result.distance;
+    return result;
+  }
+  const double side = std::copysign(1.0, p[axis]);
+  result.witness[axis] = side * half[axis];
+  result.distance = largest;
+  result.normal = side * Eigen::Vector3d::Unit(axis);
+  return result;
+}
+
+SignedDistance to_cylinder(const Cylinder& cylinder, const Eigen::Vector3d& p) {
+  const double half = 0.5 * cylinder.length;
+  const double radial = std::hypot(p.x(), p.y());
+  const Eigen::Vector3d outward = radial > kTouch ? Eigen::Vector3d(p.x() / radial, p.y() / radial, 0)
+                                                  : Eigen::Vector3d::UnitX();
+  const double side = std::copysign(1.0, p.z());
+  const double over_wall = radial - cylinder.radius, over_cap = std::abs(p.z()) - half;
+  SignedDistance result;
+  if (over_wall <= 0.0 && over_cap <= 0.0) {
+    if (over_wall > over_cap) {
+      result.witness = cylinder.radius * outward + p.z() * Eigen::Vector3d::UnitZ();
+      result.normal = outward;
+      result.distance = over_wall;
+    } else {
+      result.witness = {p.x(), p.y(), side * half};
+      result.normal = side * Eigen::Vector3d::UnitZ();
+      result.distance = over_cap;
+    }
+    return result;
+  }
+  result.witness = std::min(radial, cylinder.radius) * outward;
+  if (radial <= kTouch) result.witness.setZero();
+  result.witness.z() = std::clamp(p.z(), -half, half);
+  const Eigen::Vector3d away = p - result.witness;
+  result.distance = away.norm();
+  if (result.distance > kTouch) {
+    result.normal = away / result.distance;
+  } else {
+    result.normal = over_wall > over_cap ? outward : Eigen::Vector3d(side * Eigen::Vector3d::UnitZ());
+  }
+  return result;
+}
+
+SignedDistance to_sphere(const Sphere& sphere, const Eigen::Vector3d& p) {
+  const double norm = p.norm();
+  SignedDistance result;
+  result.normal = norm > kTouch ? Eigen::Vector3d(p / norm) : Eigen::Vector3d::UnitZ();
+  result.witness = sphere.radius * result.normal;
+  result.distance = norm - sphere.radius;
+  return result;
+}
+
+SignedDistance to_primitive(const Shape& shape, const Eigen::Vector3d& p) {
+  if (const auto* box = std::get_if<Box>(&shape)) return to_box(*box, p);
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) return to_cylinder(*cylinder, p);
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return to_sphere(*sphere, p);
+  return {};
+}
+
+std::vector<Eigen::Vector3d> face_normals(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> normals;
+  normals.reserve(mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Eigen::Vector3d n =
+        (mesh.corner(t, 1) - mesh.corner(t, 0)).cross(mesh.corner(t, 2) - mesh.corner(t, 0));
+    const double norm = n.norm();
+    normals.push_back(norm > 0.0 ? Eigen::Vector3d(n / norm) : Eigen::Vector3d::Zero());
+  }
+  return normals;
+}
+
+// At the surface itself the face's normal speaks; where the mesh has it inside out, reversed.
+Eigen::Vector3d normal_at_touch(const TriangleBvh& bvh, const Eigen::Vector3d& face_normal,
+                                const Eigen::Vector3d& witness) {
+  if (face_normal.isZero()) return Eigen::Vector3d::UnitZ();
+  const double step = 1e-6 * (1.0 + bvh.bounds().sizes().norm());
+  const double front = bvh.winding_number(witness + step * face_normal);
+  const double back = bvh.winding_number(witness - step * face_normal);
+  return front <= back ? face_normal : Eigen::Vector3d(-face_normal);
+}
+
+SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
+                       const Eigen::Vector3d& p, double max_distance, bool inside) {
+  const double bound =
+      std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
+  const ClosestPoint closest = bvh.closest(p, bound);
+  SignedDistance result;
+  if (!std::isfinite(closest.distance_sq)) return result;
+  const double distance = std::sqrt(closest.distance_sq);
+  result.witness = closest.point;
+  result.distance = inside ? -distance : distance;
+  if (distance > kTouch) {
+    result.normal = (inside ? closest.point - p : p - closest.point) / distance;
+  } else {
+    result.normal = normal_at_touch(bvh, normals[closest.triangle], closest.point);
+  }
+  return result;
+}
+
+}  // namespace
+
+Solid::Solid(const LinkGeometry& geometry) {
+  elements_.reserve(geometry.size());
+  for (const GeometryElement& source : geometry) {
+    Element element;
+    element.X_LE = source.X_LE;
+    element.X_EL = source.X_LE.inverse();
+    if (const auto* mesh = std::get_if<TriangleMesh>(&source.shape)) {
+      element.primitive = TriangleMesh{};
+      element.bvh = TriangleBvh(*mesh);
+      element.normals = face_normals(*mesh);
+    } else {
+      element.primitive = source.shape;
+    }
+    elements_.push_back(std::move(element));
+  }
+}
+
+SignedDistance Solid::signed_distance(const Eigen::Vector3d& p_L) const {
+  SignedDistance best;
+  for (const Element& element : elements_) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    SignedDistance candidate;
+    if (element.bvh.size() > 0) {
+      const bool inside =
+          element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
+      const double limit = inside || best.distance < 0.0
+                               ? (inside ? std::numeric_limits<double>::infinity() : 0.0)
+                               : best.distance;
+      candidate = to_mesh(element.bvh, element.normals, p_E, limit, inside);
+    } else {
+      candidate = to_primitive(element.primitive, p_E);
+    }
+    if (candidate.distance < best.distance) {
+      best.distance = candidate.distance;
+      best.witness = element.X_LE * candidate.witness;
+      best.normal = element.X_LE.linear() * candidate.normal;
+    }
+  }
+  return best;
+}
+
+SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_distance) const {
+  SignedDistance best;
+  if (!(max_distance > 0.0)) return best;
+  double bound = max_distance;
+  for (const Element& element : elements_) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    const SignedDistance candidate =
+        element.bvh.size() > 0 ? to_mesh(element.bvh, element.normals, p_E, bound, false)
+                               : to_primitive(element.primitive, p_E);
+    if (candidate.distance < bound) {
+      bound = candidate.distance;
+      best.distance = candidate.distance;
+      best.witness = element.X_LE * candidate.witness;
+      best.normal = element.X_LE.linear() * candidate.normal;
+    }
+  }
+  return best;
+}
+
+bool Solid::is_inside(const Eigen::Vector3d& p_L) const {
+  return std::any_of(elements_.begin(), elements_.end(), [&](const Element& element) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    if (element.bvh.size() == 0) return to_primitive(element.primitive, p_E).distance < 0.0;
+    return element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
+  });
+}
+
+std::size_t Solid::triangle_count() const {
+  std::size_t count = 0;
+  for (const Element& element : elements_) count += element.bvh.size();
+  return count;
+}
+
+}  // namespace ist

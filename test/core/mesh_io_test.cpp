@@ -1,0 +1,272 @@
+#include "ist_proximity/geometry/mesh_io.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "ist_proximity/geometry/error.h"
+#include "support/data_dir.h"
+#include "support/mesh_files.h"
+#include "support/meshes.h"
+#include "support/temp_dir.h"
+
+namespace ist {
+namespace {
+
+using test::ascii_stl;
+using test::binary_stl;
+using test::bounds;
+using test::collada;
+using test::ColladaOptions;
+using test::obj;
+using test::open_edges;
+using test::signed_volume;
+
+// A box off the origin, so that rotations, mirrors and scales about it all show.
+const Eigen::Vector3d kMin(0.1, -0.2, 0.3), kMax(0.2, 0.1, 0.7);
+const double kVolume = (kMax - kMin).prod();
+
+TriangleMesh sample_box() {
+  TriangleMesh mesh = test::box(kMax - kMin);
+  for (Eigen::Vector3d& v : mesh.vertices) v += 0.5 * (kMin + kMax);
+  return mesh;
+}
+
+void expect_box(const TriangleMesh& mesh, const Eigen::Vector3d& min, const Eigen::Vector3d& max) {
+  EXPECT_EQ(mesh.triangles.size(), 12U);
+  EXPECT_EQ(mesh.vertices.size(), 8U) << "equal vertices were not merged";
+  EXPECT_TRUE(bounds(mesh).min().isApprox(min, 1e-6)) << bounds(mesh).min().transpose();
+  EXPECT_TRUE(bounds(mesh).max().isApprox(max, 1e-6)) << bounds(mesh).max().transpose();
+  EXPECT_EQ(open_edges(mesh), 0U);
+  EXPECT_NEAR(signed_volume(mesh), (max - min).prod(), 1e-6 * (max - min).prod());
+}
+
+std::string error_of(const std::string& path, const Eigen::Vector3d& scale = {1, 1, 1}) {
+  try {
+    load_mesh(path, scale);
+  } catch (const ModelError& error) {
+    EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
+    return error.what();
+  }
+  return "(no error)";
+}
+
+void expect_says(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << text;
+}
+
+class MeshIo : public testing::Test {
+ protected:
+  TriangleMesh load(const std::string& name, const std::string& content,
+                    const Eigen::Vector3d& scale = {1, 1, 1}) {
+    return load_mesh(dir_.write(name, content), scale);
+  }
+  TriangleMesh load(const ColladaOptions& options) {
+    return load("mesh.dae", collada(sample_box(), options));
+  }
+
+  test::TempDir dir_;
+};
+
+TEST_F(MeshIo, readsStlObjAndCollada) {
+  expect_box(load("mesh.stl", ascii_stl(sample_box())), kMin, kMax);
+  expect_box(load("mesh.stl", binary_stl(sample_box())), kMin, kMax);
+  expect_box(load("MESH.STL", binary_stl(sample_box())), kMin, kMax);
+  expect_box(load("mesh.obj", obj(sample_box())), kMin, kMax);
+  expect_box(load("mesh.dae", collada(sample_box())), kMin, kMax);
+}
+
+TEST_F(MeshIo, readsBinaryStlWhoseHeaderSaysSolid) {
+  expect_box(load("mesh.stl", binary_stl(sample_box(), "solid exported by a CAD program")), kMin,
+             kMax);
+}
+
+TEST_F(MeshIo, triangulatesPolygons) {
+  const TriangleMesh mesh =
+      load("mesh.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.7 0\nf 1 2 3 5 4\n");
+  EXPECT_EQ(mesh.triangles.size(), 3U);
+  EXPECT_NEAR(test::surface_area(mesh), 0.85, 1e-6);  // the concave corner is cut out
+}
+
+TEST_F(MeshIo, appliesTheColladaUnit) {
+  ColladaOptions options;
+  options.unit = "<unit name=\"inch\" meter=\"0.0254\"/>";
+  expect_box(load(options), 0.0254 * kMin, 0.0254 * kMax);
+  options.unit = "<unit name=\"millimeter\" meter=\"0.001\"/>";
+  expect_box(load(options), 0.001 * kMin, 0.001 * kMax);
+  options.unit = "<unit name=\"meter\"/>";
+  expect_box(load(options), kMin, kMax);
+  options.unit = "";
+  expect_box(load(options), kMin, kMax);
+}
+
+TEST_F(MeshIo, appliesTheColladaUnitToTranslationsToo) {
+  ColladaOptions options;
+  options.unit = "<unit name=\"millimeter\" meter=\"0.001\"/>";
+  options.transform = "<translate>1 2 3</translate>";
+  const Eigen::Vector3d shift(1, 2, 3);
+  expect_box(load(options), 0.001 * (kMin + shift), 0.001 * (kMax + shift));
+}
+
+TEST_F(MeshIo, saysWhatIsWrongWithAColladaUnit) {
+  for (const char* meter : {"0", "-1", "inch", "nan"}) {
+    ColladaOptions options;
+    options.unit = std::string("<unit meter=\"") + meter + "\"/>";
+    expect_says(error_of(dir_.write("mesh.dae", collada(sample_box(), options))),
+                std::string("<unit meter=\"") + meter + "\">");
+  }
+}
+
+// assimp turns Z_UP and X_UP files to Y_UP at the root node: every link would be off by 90 degrees
+// from what rviz shows.
+TEST_F(MeshIo, ignoresTheColladaUpAxis) {
+  for (const char* axis : {"X_UP", "Y_UP", "Z_UP"}) {
+    ColladaOptions options;
+    options.up_axis = axis;
+    expect_box(load(options), kMin, kMax);
+  }
+}
+
+TEST_F(MeshIo, appliesNodeTransforms) {
+  ColladaOptions options;
+  options.transform = "<translate>1 0 0</translate><rotate>0 0 1 90</rotate>";
+  expect_box(load(options), Eigen::Vector3d(1.0 - kMax.y(), kMin.x(), kMin.z()),
+             Eigen::Vector3d(1.0 - kMin.y(), kMax.x(), kMax.z()));
+}
+
+TEST_F(MeshIo, dropsLinesAmongTriangles) {
+  ColladaOptions options;
+  options.with_line = true;
+  expect_box(load(options), kMin, kMax);
+}
+
+TEST_F(MeshIo, scales) {
+  expect_box(load("mesh.stl", binary_stl(sample_box()), {0.001, 0.002, 0.003}),
+             kMin.cwiseProduct(Eigen::Vector3d(0.001, 0.002, 0.003)),
+             kMax.cwiseProduct(Eigen::Vector3d(0.001, 0.002, 0.003)));
+}
+
+// An open mesh, whose winding nothing but the mirror's sign can set right.
+TEST_F(MeshIo, keepsOutsideOutsideUnderMirrors) {
+  const TriangleMesh open = test::open_box({0.3, 0.2, 0.1});
+  const double volume = signed_volume(open);
+  ASSERT_GT(volume, 0.0);
+  EXPECT_NEAR(signed_volume(load("m.stl", binary_stl(open), {1, -1, 1})), volume, 1e-8);
+  EXPECT_NEAR(signed_volume(load("m.stl", binary_stl(open), {-1, -1, 1})), volume, 1e-8);
+  EXPECT_NEAR(signed_volume(load("m.stl", binary_stl(open), {-1, -1, -1})), volume, 1e-8);
+
+  ColladaOptions options;
+  options.transform = "<scale>-1 1 1</scale>";
+  const std::string mirrored = collada(open, options);
+  EXPECT_NEAR(signed_volume(load("m.dae", mirrored)), volume, 1e-8);
+  EXPECT_NEAR(signed_volume(load("m.dae", mirrored, {1, 1, -1})), volume, 1e-8);
+}
+
+TEST_F(MeshIo, turnsClosedMeshesThatAreInsideOut) {
+  expect_box(load("mesh.stl", binary_stl(test::inside_out(sample_box()))), kMin, kMax);
+  // Of an open one nobody knows.
+  const TriangleMesh open = test::inside_out(test::open_box({0.3, 0.2, 0.1}));
+  EXPECT_LT(signed_volume(load("mesh.stl", binary_stl(open))), 0.0);
+  // Parts that are inside out are a hole, as long as the whole is not.
+  const TriangleMesh hollow =
+      test::joined(test::box({0.3, 0.3, 0.3}), test::inside_out(test::box({0.1, 0.1, 0.1})));
+  EXPECT_NEAR(signed_volume(load("mesh.stl", binary_stl(hollow))), 0.027 - 0.001, 1e-8);
+}
+
+TEST_F(MeshIo, keepsDuplicatedAndDegenerateFaces) {
+  TriangleMesh mesh = sample_box();
+  mesh.triangles.push_back(mesh.triangles.front());
+  mesh.triangles.push_back({0, 1, 1});
+  EXPECT_EQ(load("mesh.stl", binary_stl(mesh)).triangles.size(), 14U);
+}
+
+TEST_F(MeshIo, saysWhatIsWrongWithAFile) {
+  expect_says(error_of(dir_.file("none.stl")), "does not exist");
+  expect_says(error_of(dir_.path().string()), "is a directory");
+  expect_says(error_of(dir_.write("empty.stl", "")), "empty (0 bytes)");
+  expect_says(error_of(dir_.write("mesh.txt", "hello")), "cannot be read as a mesh");
+  expect_says(error_of(dir_.write("mesh.dae", "<COLLADA")), "cannot be read as a mesh");
+  const std::string whole = binary_stl(sample_box());
+  expect_says(error_of(dir_.write("cut.stl", whole.substr(0, whole.size() - 60))),
+              "cannot be read as a mesh");
+}
+
+TEST_F(MeshIo, saysWhenThereIsNoTriangle) {
+  const TriangleMesh none;
+  for (const auto& [name, content] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"none.stl", ascii_stl(none)},
+           {"zero.stl", binary_stl(none)},
+           {"points.obj", "v 0 0 0\nv 1 0 0\n"},
+           {"line.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"}}) {
+    const std::string text = error_of(dir_.write(name, content));
+    EXPECT_TRUE(text.find("no triangle") != std::string::npos ||
+                text.find("cannot be read") != std::string::npos)
+        << text;
+  }
+}
+
+TEST_F(MeshIo, refusesAZeroOrNonFiniteScale) {
+  const std::string path = dir_.write("mesh.stl", binary_stl(sample_box()));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  expect_says(error_of(path, {1, 0, 1}), "(1 0 1)");
+  expect_says(error_of(path, {nan, 1, 1}), "scale");
+  expect_says(error_of(path, {1, 1, inf}), "scale");
+}
+
+TEST_F(MeshIo, refusesNonFiniteVertices) {
+  TriangleMesh mesh = sample_box();
+  mesh.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
+  expect_says(error_of(dir_.write("nan.stl", binary_stl(mesh))), "must be finite");
+  mesh.vertices[3].y() = std::numeric_limits<double>::infinity();
+  expect_says(error_of(dir_.write("inf.stl", binary_stl(mesh))), "must be finite");
+  mesh.vertices[3].y() = 3e38;
+  expect_says(error_of(dir_.write("big.stl", binary_stl(mesh)), {1e300, 1e300, 1e300}),
+              "must be finite");
+}
+
+TEST_F(MeshIo, printsNothing) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  error_of(dir_.write("mesh.dae", "<COLLADA"));
+  error_of(dir_.write("mesh.dae", "<COLLADA><library_geometries/></COLLADA>"));
+  error_of(dir_.write("mesh.stl", "solid x\nfacet normal 0 0\nvertex a b c\n"));
+  error_of(dir_.write("mesh.obj", "mtllib none.mtl\nv 0 0\nf 1 2 3\n"));
+  error_of(dir_.file("none.stl"));
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+// The visual meshes of a real robot: line primitives among the triangles, Z_UP, many nodes. The
+// collision meshes are coarse hulls of the same links in the same frames.
+TEST(MeshIoPanda, visualMeshesMatchTheirCollisionMeshes) {
+  const auto data = test::data_dir();
+  if (!data) GTEST_SKIP() << test::kNoData;
+  const std::string meshes = test::franka_package(*data) + "/meshes/";
+  for (const char* name :
+       {"link0", "link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand"}) {
+    const TriangleMesh visual = load_mesh(meshes + "visual/" + name + ".dae");
+    const TriangleMesh collision = load_mesh(meshes + "collision/" + name + ".stl");
+    EXPECT_GT(visual.triangles.size(), 7000U) << name;
+    EXPECT_LT((bounds(visual).min() - bounds(collision).min()).cwiseAbs().maxCoeff(), 0.006)
+        << name;
+    EXPECT_LT((bounds(visual).max() - bounds(collision).max()).cwiseAbs().maxCoeff(), 0.006)
+        << name;
+    EXPECT_GT(signed_volume(visual), 0.0) << name;
+    EXPECT_GT(signed_volume(collision), 0.0) << name;
+  }
+}
+
+TEST(MeshIoPanda, triangleCountsAreThoseOfTheFiles) {
+  const auto data = test::data_dir();
+  if (!data) GTEST_SKIP() << test::kNoData;
+  const std::string meshes = test::franka_package(*data) + "/meshes/";
+  EXPECT_EQ(load_mesh(meshes + "visual/link6.dae").triangles.size(), 21620U);
+  EXPECT_EQ(load_mesh(meshes + "visual/finger.dae").triangles.size(), 624U);
+  EXPECT_EQ(load_mesh(meshes + "collision/link1.stl").triangles.size(), 300U);
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,104 @@
+#include "ist_proximity/geometry/solid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+Solid solid_of(const Shape& shape, const Eigen::Isometry3d& X_LE = Eigen::Isometry3d::Identity()) {
+  return Solid({GeometryElement{shape, X_LE, "test"}});
+}
+
+void expect_consistent(const SignedDistance& result, const Eigen::Vector3d& p) {
+  EXPECT_NEAR(result.normal.norm(), 1.0, 1e-9);
+  EXPECT_TRUE((p - result.witness).isApprox(result.distance * result.normal, 1e-9) ||
+              std::abs(result.distance) < 1e-9)
+      << p.transpose();
+}
+
+TEST(Solid, BoxAndItsMeshAgree) {
+  test::Rng rng(3);
+  const Eigen::Isometry3d X = test::random_pose(&rng, 0.2);
+  const Eigen::Vector3d size(0.2, 0.1, 0.4);
+  const Solid primitive = solid_of(Box{size}, X), mesh = solid_of(test::box(size), X);
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 0.4);
+    const SignedDistance a = primitive.signed_distance(p), b = mesh.signed_distance(p);
+    ASSERT_NEAR(a.distance, b.distance, 1e-12);
+    ASSERT_EQ(primitive.is_inside(p), a.distance < 0.0);
+    expect_consistent(a, p);
+    expect_consistent(b, p);
+  }
+}
+
+TEST(Solid, CylinderIsTheCylinder) {
+  test::Rng rng(4);
+  const Cylinder cylinder{0.1, 0.3};
+  const Solid solid = solid_of(cylinder);
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
+    const double wall = std::hypot(p.x(), p.y()) - 0.1, cap = std::abs(p.z()) - 0.15;
+    const double expected = wall < 0 && cap < 0
+                                ? std::max(wall, cap)
+                                : std::hypot(std::max(wall, 0.0), std::max(cap, 0.0));
+    const SignedDistance result = solid.signed_distance(p);
+    ASSERT_NEAR(result.distance, expected, 1e-12);
+    expect_consistent(result, p);
+  }
+  EXPECT_NEAR(solid.signed_distance({0, 0, 0.2}).distance, 0.05, 1e-15) << "on the axis";
+  EXPECT_NEAR(solid.signed_distance({0, 0, 0}).distance, -0.1, 1e-15);
+}
+
+TEST(Solid, NormalIsDefinedOnTheSurfaceAndAtCentres) {
+  for (const Shape& shape : {Shape(Box{{0.2, 0.2, 0.2}}), Shape(Cylinder{0.1, 0.2}),
+                             Shape(Sphere{0.1}), Shape(test::box({0.2, 0.2, 0.2})),
+                             Shape(test::inside_out(test::box({0.2, 0.2, 0.2})))}) {
+    const Solid solid = solid_of(shape);
+    for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.1, 0, 0), Eigen::Vector3d(0, 0, 0)}) {
+      const SignedDistance result = solid.signed_distance(p);
+      EXPECT_NEAR(result.normal.norm(), 1.0, 1e-12);
+      EXPECT_TRUE(result.witness.allFinite());
+    }
+    if (shape.index() != 3) {
+      EXPECT_NEAR(solid.signed_distance({0.1, 0, 0}).normal.x(), 1.0, 1e-9);
+    }
+  }
+}
+
+TEST(Solid, UnionTakesTheNearestOutsideAndTheDeepestInside) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation().x() = 0.15;
+  const Solid solid({GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "a"},
+                     GeometryElement{Sphere{0.1}, X, "b"}});
+  EXPECT_NEAR(solid.signed_distance({0.35, 0, 0}).distance, 0.1, 1e-15);
+  EXPECT_NEAR(solid.signed_distance({0.06, 0, 0}).distance, -0.04, 1e-15);
+  EXPECT_NEAR(solid.signed_distance({0.15, 0, 0}).distance, -0.1, 1e-15);
+}
+
+TEST(Solid, MeshEqualsBruteForceInsideAndOut) {
+  test::Rng rng(5);
+  for (const TriangleMesh& mesh :
+       {test::l_shape(0.3, 0.06), test::torus(0.2, 0.06, 30, 16), test::open_box({0.2, 0.2, 0.3})}) {
+    const Solid solid = solid_of(mesh);
+    for (int i = 0; i < 500; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
+      if (std::abs(test::oracle_winding(mesh, p) - 0.5) < 0.005) continue;
+      const SignedDistance result = solid.signed_distance(p);
+      ASSERT_NEAR(result.distance, test::oracle_signed_distance(mesh, p), 1e-12);
+      expect_consistent(result, p);
+      if (result.distance > 0.0) {
+        EXPECT_EQ(solid.distance_outside(p, 2.0 * result.distance).distance, result.distance);
+        EXPECT_TRUE(std::isinf(solid.distance_outside(p, 0.9 * result.distance).distance));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

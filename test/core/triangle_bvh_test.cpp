@@ -1,0 +1,76 @@
+#include "ist_proximity/geometry/triangle_bvh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+std::vector<TriangleMesh> meshes() {
+  return {test::box({0.1, 0.2, 0.3}),
+          test::icosphere(0.2, 3),
+          test::torus(0.3, 0.05, 40, 20),
+          test::open_box({0.2, 0.2, 0.4}),
+          test::thin_plate(0.4, 0.0005),
+          test::sheet(0.3),
+          test::l_shape(0.3, 0.06),
+          test::joined(test::icosphere(0.1, 2), test::box({0.3, 0.05, 0.05}))};
+}
+
+TEST(TriangleBvh, ClosestPointEqualsBruteForce) {
+  test::Rng rng(1);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 300; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, i % 3 == 0 ? 2.0 : 0.3);
+      const ClosestPoint closest = bvh.closest(p);
+      const double expected = test::oracle_distance(mesh, p);
+      ASSERT_NEAR(std::sqrt(closest.distance_sq), expected, 1e-12);
+      ASSERT_NEAR((closest.point - p).norm(), expected, 1e-12);
+      ASSERT_LT(test::oracle_triangle(closest.point, mesh.corner(closest.triangle, 0),
+                                      mesh.corner(closest.triangle, 1),
+                                      mesh.corner(closest.triangle, 2)),
+                1e-9)
+          << "the witness lies on the triangle that is named";
+    }
+  }
+}
+
+TEST(TriangleBvh, ClosestPointKeepsToItsRange) {
+  const TriangleBvh bvh(test::box({2, 2, 2}));
+  EXPECT_TRUE(std::isinf(bvh.closest({3, 0, 0}, 3.9).distance_sq));
+  EXPECT_DOUBLE_EQ(bvh.closest({3, 0, 0}, 4.0).distance_sq, 4.0);
+  EXPECT_TRUE(std::isinf(TriangleBvh().closest({0, 0, 0}).distance_sq));
+}
+
+TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {
+  test::Rng rng(2);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 300; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
+      const double expected = test::oracle_winding(mesh, p);
+      ASSERT_NEAR(bvh.winding_number(p), expected, 0.01);
+      ASSERT_NEAR(bvh.quick_winding_number(p), expected, TriangleBvh::kQuickWindingError);
+      if (std::abs(expected - 0.5) > 0.01) {
+        ASSERT_EQ(bvh.is_inside(p), expected > 0.5);
+      }
+    }
+  }
+}
+
+TEST(TriangleBvh, TrianglesWithoutAreaAreSurfaceToo) {
+  const TriangleMesh needle{{{0, 0, 0}, {1, 0, 0}, {0.5, 0, 0}}, {{0, 1, 2}, {0, 0, 0}}};
+  const TriangleBvh bvh(needle);
+  EXPECT_DOUBLE_EQ(bvh.closest({0.7, 0.3, 0}).distance_sq, 0.09);
+  EXPECT_DOUBLE_EQ(bvh.winding_number({0.7, 0.3, 0}), 0.0);
+}
+
+}  // namespace
+}  // namespace ist
