@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace ist {
+
+/// How a link is packed. The error that is wanted decides how many balls it takes.
+struct PackingConfig {
+  /// [m] largest allowed distance from the link's surface to its packing; > 0.
+  double max_error = 0.005;
+  /// Balls per link; reached first, the packing is still valid, with a larger error. >= 1.
+  int max_spheres = 20000;
+};
+
+/// One ball of a packing, twice: an inner ball of `radius` inside the link, and an outer ball of
+/// `cover_radius` about the same centre. The outer balls of a packing cover the link's surface.
+struct Ball {
+  Eigen::Vector3d center;  ///< [m] in the link's frame
+  double radius;           ///< [m] >= 0; 0 where no inner ball reaches the surface (sheets, flaps)
+  double cover_radius;     ///< [m] >= radius; the difference is this ball's gap
+};
+
+/// What is known for certain about a packing.
+struct PackingCertificate {
+  double max_gap = 0.0;        ///< [m] proven: no surface point is farther from the inner balls
+  double mean_gap = 0.0;       ///< [m] area-weighted mean of the per-patch bounds
+  double interior_gap = 0.0;   ///< [m] proven: no interior point is farther from the outer balls
+  double unreachable_area = 0.0;  ///< [m^2] surface only balls of radius 0 reach (sheets, flaps)
+  double surface_area = 0.0;   ///< [m^2]
+  bool reached = false;        ///< max_gap <= max_error
+};
+
+/// Inner and outer balls of one link or element.
+///
+/// For every point p outside, with d_in(p) = min(|p - c| - radius) and d_out(p) likewise with
+/// cover_radius: d_out(p) <= distance(p, surface). A point with d_out(p) > interior_gap is outside
+/// for certain.
+/// d_in(p) >= distance(p, surface) where the mesh has no holes.
+struct Packing {
+  std::vector<Ball> balls;  ///< in the order of insertion: every prefix is a coarser packing
+  PackingCertificate certificate;
+};
+
+/// Called now and then from the packing thread with the share of the work done, 0 to 1.
+/// Returning false stops the packing early.
+using PackingProgress = std::function<bool(double)>;
+
+}  // namespace ist

@@ -1,0 +1,103 @@
+#include "interior_cover.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "ball_search.h"
+
+namespace ist {
+namespace {
+
+enum class Cell { kOutside, kInside, kBoundary };
+
+class InteriorCover {
+ public:
+  InteriorCover(const TriangleBvh& bvh, const MedialBallFinder& finder, const PackingConfig& config,
+                Packing* packing)
+      : bvh_(bvh), finder_(finder), config_(config), packing_(*packing) {
+    for (const Ball& ball : packing_.balls) search_.add(ball.center, ball.cover_radius);
+  }
+
+  void run() {
+    packing_.certificate.interior_gap = config_.max_error;
+    const Eigen::AlignedBox3d box = bvh_.bounds();
+    if (box.sizes().minCoeff() <= 0.0) return;  // flat: no interior
+    // Nearly cubic cells, for a long thin link too.
+    const double side = std::max(box.sizes().minCoeff(), box.sizes().maxCoeff() / 64.0);
+    const Eigen::Array3i n = (box.sizes().array() / side).ceil().cast<int>();
+    const Eigen::Vector3d half = 0.5 * (box.sizes().array() / n.cast<double>()).matrix();
+    for (int i = 0; i < n.x(); ++i) {
+      for (int j = 0; j < n.y(); ++j) {
+        for (int k = 0; k < n.z(); ++k) {
+          const Eigen::Vector3d cell(2.0 * i + 1.0, 2.0 * j + 1.0, 2.0 * k + 1.0);
+          visit(box.min() + cell.cwiseProduct(half), half, 0);
+        }
+      }
+    }
+  }
+
+ private:
+  void visit(const Eigen::Vector3d& center, const Eigen::Vector3d& half, std::uint32_t hint) {
+    std::array<Eigen::Vector3d, 8> corners;
+    for (std::size_t k = 0; k < 8; ++k) {
+      corners[k] = center + Eigen::Vector3d((k & 1) != 0U ? half.x() : -half.x(),
+                                            (k & 2) != 0U ? half.y() : -half.y(),
+                                            (k & 4) != 0U ? half.z() : -half.z());
+    }
+    const BallSearch::Match match = search_.best(corners.data(), 8, hint);
+    if (match.cost <= config_.max_error) return;
+    const double radius = half.norm();
+    const Cell kind = classify(center, radius);
+    if (kind == Cell::kOutside) return;
+    if (kind == Cell::kBoundary && 2.0 * radius <= config_.max_error) return;
+    if (kind == Cell::kInside && fill(center, radius, match)) return;
+    for (const Eigen::Vector3d& corner : corners) {
+      visit(0.5 * (center + corner), 0.5 * half, match.ball);
+    }
+  }
+
+  // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
+  bool fill(const Eigen::Vector3d& center, double radius, const BallSearch::Match& match) {
+    const double uncovered = search_.best(&center, 1, match.ball).cost;
+    if (uncovered <= 0.5 * config_.max_error && 2.0 * radius > 0.5 * config_.max_error) return false;
+    if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
+      packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
+      return true;
+    }
+    const MedialBallFinder::InnerBall ball = finder_.around(center, 0.1 * config_.max_error);
+    packing_.balls.push_back({ball.center, ball.radius, ball.radius});
+    search_.add(ball.center, ball.radius);
+    return false;
+  }
+
+  // A cell that no triangle touches is inside or outside as its centre is. In an open mesh the
+  // winding number changes smoothly instead: Harnack's inequality for positive harmonic functions
+  // bounds its rise from the centre to the cell's corners.
+  Cell classify(const Eigen::Vector3d& center, double radius) const {
+    const double distance = std::sqrt(bvh_.closest(center).distance_sq);
+    if (distance <= radius) return Cell::kBoundary;
+    if (finder_.is_closed()) return bvh_.is_inside(center) ? Cell::kInside : Cell::kOutside;
+    const double q = radius / distance;
+    const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
+    const double w = bvh_.quick_winding_number(center) + TriangleBvh::kQuickWindingError;
+    if (std::max(w, 0.0) * rise < 0.5) return Cell::kOutside;
+    return w > 0.5 ? Cell::kInside : Cell::kBoundary;
+  }
+
+  const TriangleBvh& bvh_;
+  const MedialBallFinder& finder_;
+  const PackingConfig& config_;
+  Packing& packing_;
+  BallSearch search_;
+};
+
+}  // namespace
+
+void cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
+                    const PackingConfig& config, Packing* packing) {
+  InteriorCover(bvh, finder, config, packing).run();
+}
+
+}  // namespace ist

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "ist_proximity/geometry/triangle_bvh.h"
+#include "ist_proximity/packing/packing.h"
+#include "medial_ball.h"
+
+namespace ist {
+
+/// Extends the cover to the interior: afterwards no point inside the mesh is farther than
+/// `interior_gap` from the outer balls, so that a point farther away is outside for certain.
+///
+/// An octree over the mesh's box. A cell that the surface crosses is done once its diagonal is at
+/// most the gap wanted (its interior points are that near to the surface, which is covered); an
+/// empty cell is outside, or near enough to an outer ball, or gets a ball of its own.
+/// @param packing  certified by SurfaceCover; balls are added, `interior_gap` is set to max_error
+///                 (larger where max_spheres leaves interior cells uncovered)
+void cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
+                    const PackingConfig& config, Packing* packing);
+
+}  // namespace ist

@@ -1,0 +1,170 @@
+#include "medial_ball.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <tuple>
+#include <vector>
+
+namespace ist {
+namespace {
+
+constexpr int kMaxShrinks = 40;
+constexpr int kMaxTurns = 6;
+
+// Corners, edge middles and faces of a cube: enough directions to notice a bulge through a hole.
+std::vector<Eigen::Vector3d> probe_directions() {
+  std::vector<Eigen::Vector3d> directions;
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      for (int k = -1; k <= 1; ++k) {
+        if (i != 0 || j != 0 || k != 0) {
+          directions.push_back(Eigen::Vector3d(i, j, k).normalized());
+        }
+      }
+    }
+  }
+  return directions;
+}
+
+}  // namespace
+
+MedialBallFinder::MedialBallFinder(const TriangleBvh& bvh, bool is_closed)
+    : bvh_(bvh), is_closed_(is_closed), size_(bvh.bounds().sizes().norm()) {}
+
+MedialBallFinder::InnerBall MedialBallFinder::along(const Eigen::Vector3d& s,
+                                                    const Eigen::Vector3d& direction, double slack,
+                                                    Eigen::Vector3d* contact) const {
+  // Every surface point q bounds t: the ball about s + t d that reaches to within slack of s must
+  // not hold q. Taking the nearest q again and again shrinks t to the largest that all allow.
+  double t = size_ + slack;
+  const double accuracy = 1e-3 * slack;
+  for (int i = 0; i < kMaxShrinks; ++i) {
+    const Eigen::Vector3d center = s + t * direction;
+    const ClosestPoint nearest = bvh_.closest(center);
+    const double radius = std::sqrt(nearest.distance_sq);
+    *contact = nearest.point;
+    if (radius >= t - slack - accuracy) return {center, radius};
+    const Eigen::Vector3d to_contact = nearest.point - s;
+    const double along_ray = direction.dot(to_contact) - slack;
+    if (along_ray <= 0.0) return {center, radius};
+    t = std::max(slack, (to_contact.squaredNorm() - slack * slack) / (2.0 * along_ray));
+  }
+  const Eigen::Vector3d center = s + t * direction;
+  const ClosestPoint nearest = bvh_.closest(center);
+  *contact = nearest.point;
+  return {center, std::sqrt(nearest.distance_sq)};
+}
+
+MedialBallFinder::InnerBall MedialBallFinder::turned(const Eigen::Vector3d& s,
+                                                     const Eigen::Vector3d& direction,
+                                                     double slack) const {
+  Eigen::Vector3d contact;
+  InnerBall best = along(s, direction, slack, &contact);
+  Eigen::Vector3d best_contact = contact;
+  double turn = 1.0;
+  for (int i = 0; i < kMaxTurns; ++i) {
+    const Eigen::Vector3d from_s = best.center - s, from_contact = best.center - best_contact;
+    if (from_contact.norm() < 1e-12 || from_s.norm() < 1e-12) break;
+    const Eigen::Vector3d ray = from_s.normalized() + turn * from_contact.normalized();
+    if (ray.norm() < 1e-3) break;  // contacts face each other: already as large as it gets
+    const InnerBall ball = along(s, ray.normalized(), slack, &contact);
+    if (ball.radius > 1.02 * best.radius) {
+      best = ball;
+      best_contact = contact;
+    } else {
+      turn *= 0.4;
+      if (turn < 0.1) break;
+    }
+  }
+  return best;
+}
+
+MedialBallFinder::InnerBall MedialBallFinder::at_surface(const Eigen::Vector3d& s,
+                                                         const Eigen::Vector3d& normal,
+                                                         double slack) const {
+  const InnerBall nothing{s, 0.0};
+  if (normal.isZero()) return nothing;
+  // Which side is inside is asked of the winding number: faces may be inside out.
+  const double step = 1e-3 * slack;
+  const bool behind = bvh_.is_inside(s - step * normal);
+  const bool before = bvh_.is_inside(s + step * normal);
+  InnerBall best = nothing;
+  // A slack beyond the part's thickness can lead to the other side of it.
+  for (int i = 0; i < 6 && best.radius == 0.0; ++i, slack *= 0.4) {
+    if (behind) best = pulled_inside(s, turned(s, -normal, slack));
+    if (before) {
+      const InnerBall ball = pulled_inside(s, turned(s, normal, slack));
+      if (ball.radius > best.radius) best = ball;
+    }
+    // Better the point itself than a ball that ends short of it: each call must close its gap.
+    if ((best.center - s).norm() - best.radius > 1.01 * slack) best = nothing;
+  }
+  return best;
+}
+
+MedialBallFinder::InnerBall MedialBallFinder::around(const Eigen::Vector3d& x, double slack) const {
+  const ClosestPoint nearest = bvh_.closest(x);
+  const double depth = std::sqrt(nearest.distance_sq);
+  if (depth < 1e-9) return {x, 0.0};
+  Eigen::Vector3d contact;
+  const InnerBall grown = along(nearest.point, (x - nearest.point) / depth, slack, &contact);
+  if (grown.radius > (grown.center - x).norm() && bvh_.is_inside(grown.center) && is_inner(grown)) {
+    return grown;
+  }
+  return {x, is_closed_ ? depth : 0.5 * depth};
+}
+
+// Through a hole in the mesh a ball may bulge out; smaller ones on the same ray do less.
+MedialBallFinder::InnerBall MedialBallFinder::pulled_inside(const Eigen::Vector3d& s,
+                                                            InnerBall ball) const {
+  const double gap = std::max(0.0, (ball.center - s).norm() - ball.radius);
+  if (!bvh_.is_inside(ball.center)) return {s, 0.0};
+  for (int i = 0; i < 20 && ball.radius > 0.0; ++i) {
+    if (is_inner(ball)) return ball;
+    const double radius = 0.75 * ball.radius;
+    ball.center = s + (ball.center - s) * ((radius + gap) / (ball.radius + gap));
+    ball.radius = std::min(radius, std::sqrt(bvh_.closest(ball.center).distance_sq));
+  }
+  return {s, 0.0};
+}
+
+bool MedialBallFinder::is_inner(const InnerBall& ball) const {
+  if (is_closed_) return true;
+  // No triangle is in the ball, so the winding number is harmonic there: near 1 at the centre, it
+  // is near 1 in most of the ball (Harnack's inequality for 1 - w).
+  const double w = bvh_.winding_number(ball.center);
+  if (w > 0.98) return true;
+  if (w <= 0.5) return false;
+  static const std::vector<Eigen::Vector3d> kDirections = probe_directions();
+  return std::all_of(kDirections.begin(), kDirections.end(), [&](const Eigen::Vector3d& d) {
+    return bvh_.is_inside(ball.center + 0.98 * ball.radius * d);
+  });
+}
+
+std::size_t count_boundary_edges(const TriangleMesh& mesh) {
+  using Key = std::tuple<double, double, double>;
+  std::map<Key, std::uint32_t> unique;
+  std::vector<std::uint32_t> id(mesh.vertices.size());
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    const Eigen::Vector3d& p = mesh.vertices[v];
+    id[v] = unique.emplace(Key(p.x(), p.y(), p.z()), static_cast<std::uint32_t>(unique.size()))
+                .first->second;
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> balance;  // forward minus backward
+  for (const TriangleMesh::Triangle& t : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = id[t[k]], b = id[t[(k + 1) % 3]];
+      if (a != b) balance[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
+    }
+  }
+  std::size_t open = 0;
+  for (const auto& edge : balance) open += static_cast<std::size_t>(std::abs(edge.second));
+  return open;
+}
+
+bool is_closed_mesh(const TriangleMesh& mesh) { return count_boundary_edges(mesh) == 0; }
+
+}  // namespace ist

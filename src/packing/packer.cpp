@@ -1,0 +1,70 @@
+#include "ist_proximity/packing/packer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "interior_cover.h"
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/geometry/tessellation.h"
+#include "medial_ball.h"
+#include "surface_cover.h"
+
+namespace ist {
+namespace {
+
+// The share of the wanted error that an inscribed prism may take.
+constexpr double kTessellationShare = 0.1;
+
+Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& config,
+                         const PackingProgress& progress) {
+  PackingConfig inner = config;
+  inner.max_error = config.max_error - tessellation.deviation;
+  Packing packing = pack_mesh(tessellation.mesh, inner, progress);
+  for (Ball& ball : packing.balls) ball.cover_radius += tessellation.deviation;
+  PackingCertificate& certificate = packing.certificate;
+  certificate.max_gap += tessellation.deviation;
+  certificate.mean_gap += tessellation.deviation;
+  certificate.interior_gap += tessellation.deviation;
+  certificate.reached = certificate.max_gap <= config.max_error;
+  return packing;
+}
+
+Packing pack_sphere(const Sphere& sphere) {
+  Packing packing;
+  packing.balls.push_back({Eigen::Vector3d::Zero(), sphere.radius, sphere.radius});
+  packing.certificate.surface_area = 4.0 * EIGEN_PI * sphere.radius * sphere.radius;
+  packing.certificate.reached = true;
+  return packing;
+}
+
+}  // namespace
+
+Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
+                  const PackingProgress& progress) {
+  if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
+  const TriangleBvh bvh(mesh);
+  const MedialBallFinder finder(bvh, is_closed_mesh(mesh));
+  SurfaceCover cover(mesh, finder);
+  cover.refine(config, progress);
+  Packing packing;
+  cover.certify(&packing);
+  cover_interior(bvh, finder, config, &packing);
+  packing.certificate.reached = packing.certificate.max_gap <= config.max_error;
+  if (progress) progress(1.0);
+  return packing;
+}
+
+Packing pack_element(const Shape& shape, const PackingConfig& config,
+                     const PackingProgress& progress) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return pack_sphere(*sphere);
+  if (const auto* box = std::get_if<Box>(&shape)) {
+    return pack_tessellated(tessellate(*box), config, progress);
+  }
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
+    return pack_tessellated(tessellate(*cylinder, kTessellationShare * config.max_error), config,
+                            progress);
+  }
+  return pack_mesh(std::get<TriangleMesh>(shape), config, progress);
+}
+
+}  // namespace ist

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "ball_search.h"
+#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/packing/packing.h"
+#include "medial_ball.h"
+
+namespace ist {
+
+/// The surface as patches, each with the ball that covers it best and a proven bound of its gap.
+/// Refines, worst first: a patch is split where the bound is loose and gets a ball where it is not.
+class SurfaceCover {
+ public:
+  SurfaceCover(const TriangleMesh& mesh, const MedialBallFinder& finder);
+
+  /// Adds balls until every patch's bound is at most `config.max_error`, or max_spheres is reached.
+  void refine(const PackingConfig& config, const PackingProgress& progress);
+
+  /// Adds a ball found elsewhere (the interior's).
+  void add_ball(const MedialBallFinder::InnerBall& ball);
+
+  /// Gives every ball its gap, from the patches it covers best, and fills the certificate.
+  void certify(Packing* packing);
+
+  const std::vector<MedialBallFinder::InnerBall>& balls() const { return balls_; }
+
+ private:
+  struct Patch {
+    Eigen::Vector3d corner[3];
+    double bound;            ///< [m] no point of the patch is farther from `ball`
+    std::uint32_t ball;
+    std::uint32_t triangle;
+  };
+  struct Looser {
+    bool operator()(const Patch& a, const Patch& b) const { return a.bound < b.bound; }
+  };
+
+  void seed();
+  void push(const Patch& patch);
+  bool tighten(Patch* patch) const;
+  void split_or_fill(const Patch& patch, double target);
+  void split(const Patch& patch);
+  Eigen::Vector3d normal(std::uint32_t triangle) const;
+
+  const TriangleMesh& mesh_;
+  const MedialBallFinder& finder_;
+  std::vector<Patch> heap_;
+  std::vector<MedialBallFinder::InnerBall> balls_;
+  BallSearch search_;
+  double smallest_patch_;  ///< [m] edges below it are not split: rounding would decide
+};
+
+}  // namespace ist

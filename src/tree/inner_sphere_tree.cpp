@@ -1,0 +1,236 @@
+#include "ist_proximity/tree/inner_sphere_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace ist {
+namespace {
+
+// Slots without a child: at the origin, with a radius that makes them farther than anything.
+constexpr float kNoRadius = -1e30F;
+constexpr int kEnclosingSteps = 48;
+
+float round_up(double value) {
+  const auto nearest = static_cast<float>(value);
+  return nearest >= value ? nearest : std::nextafter(nearest, std::numeric_limits<float>::max());
+}
+
+float round_down(double value) { return -round_up(-value); }
+
+struct Enclosing {
+  Eigen::Vector3f center;
+  double radius;
+};
+
+using Range = std::pair<std::uint32_t, std::uint32_t>;
+
+class Builder {
+ public:
+  Builder(const std::vector<Ball>& balls, std::vector<SphereNode>* nodes,
+          std::vector<SphereLeaf>* leaves)
+      : balls_(balls), nodes_(*nodes), leaves_(*leaves), order_(balls.size()) {
+    std::iota(order_.begin(), order_.end(), 0U);
+  }
+
+  // The root is always a node, so that a query starts the same way for every link.
+  void run() { add_node({0, static_cast<std::uint32_t>(order_.size())}); }
+
+  Enclosing enclose(const Range& range) const;
+
+ private:
+  std::int32_t add_node(const Range& range);
+  std::int32_t add_leaf(const Range& range);
+  std::vector<Range> partition(const Range& range);
+  std::uint32_t split(const Range& range);
+
+  const std::vector<Ball>& balls_;
+  std::vector<SphereNode>& nodes_;
+  std::vector<SphereLeaf>& leaves_;
+  std::vector<std::uint32_t> order_;
+};
+
+// A small sphere about the outer balls: start at the box's middle and step toward the farthest
+// ball with ever shorter steps (Badoiu and Clarkson 2003), then measure the radius in full.
+Enclosing Builder::enclose(const Range& range) const {
+  Eigen::AlignedBox3d box;
+  for (std::uint32_t i = range.first; i < range.second; ++i) {
+    const Ball& ball = balls_[order_[i]];
+    box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
+    box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
+  }
+  const auto farthest = [&](const Eigen::Vector3d& center, const Ball** ball) {
+    double largest = -1.0;
+    for (std::uint32_t i = range.first; i < range.second; ++i) {
+      const Ball& candidate = balls_[order_[i]];
+      const double reach = (candidate.center - center).norm() + candidate.cover_radius;
+      if (reach > largest) {
+        largest = reach;
+        *ball = &candidate;
+      }
+    }
+    return largest;
+  };
+  const Ball* ball = nullptr;
+  Eigen::Vector3d center = box.center(), best = center;
+  double smallest = farthest(center, &ball);
+  for (int step = 1; step <= kEnclosingSteps && range.second - range.first > 1; ++step) {
+    const Eigen::Vector3d to_ball = ball->center - center;
+    const double distance = to_ball.norm();
+    const double reach = distance + ball->cover_radius;
+    if (distance > 0.0) center += to_ball / distance * (0.5 * reach / (step + 1));
+    const double radius = farthest(center, &ball);
+    if (radius < smallest) {
+      smallest = radius;
+      best = center;
+    }
+  }
+  const Eigen::Vector3f rounded = best.cast<float>();
+  return {rounded, farthest(rounded.cast<double>(), &ball)};
+}
+
+// Median along the longest axis of the centres.
+std::uint32_t Builder::split(const Range& range) {
+  Eigen::AlignedBox3d box;
+  for (std::uint32_t i = range.first; i < range.second; ++i) box.extend(balls_[order_[i]].center);
+  Eigen::Index axis;
+  box.sizes().maxCoeff(&axis);
+  const std::uint32_t middle = range.first + (range.second - range.first) / 2;
+  std::nth_element(order_.begin() + range.first, order_.begin() + middle,
+                   order_.begin() + range.second, [&](std::uint32_t a, std::uint32_t b) {
+                     const double ca = balls_[a].center[axis], cb = balls_[b].center[axis];
+                     return ca < cb || (ca == cb && a < b);
+                   });
+  return middle;
+}
+
+// Up to eight groups: the one with the most balls is halved until there are enough.
+std::vector<Range> Builder::partition(const Range& range) {
+  std::vector<Range> groups{range};
+  while (groups.size() < static_cast<std::size_t>(kSphereWidth)) {
+    const auto largest =
+        std::max_element(groups.begin(), groups.end(), [](const Range& a, const Range& b) {
+          return a.second - a.first < b.second - b.first;
+        });
+    if (largest->second - largest->first <= static_cast<std::uint32_t>(kSphereWidth)) break;
+    const std::uint32_t middle = split(*largest);
+    const Range upper{middle, largest->second};
+    largest->second = middle;
+    groups.insert(largest + 1, upper);
+  }
+  return groups;
+}
+
+std::int32_t Builder::add_node(const Range& range) {
+  const auto index = static_cast<std::int32_t>(nodes_.size());
+  nodes_.emplace_back();
+  const std::vector<Range> groups = partition(range);
+  SphereNode node{};
+  node.count = static_cast<std::int32_t>(groups.size());
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
+    node.radius[k] = node.max_inner[k] = kNoRadius;
+    if (k >= groups.size()) continue;
+    const Enclosing sphere = enclose(groups[k]);
+    node.x[k] = sphere.center.x();
+    node.y[k] = sphere.center.y();
+    node.z[k] = sphere.center.z();
+    node.radius[k] = round_up(sphere.radius);
+    for (std::uint32_t i = groups[k].first; i < groups[k].second; ++i) {
+      node.max_inner[k] = std::max(node.max_inner[k], round_up(balls_[order_[i]].radius));
+    }
+    const bool is_leaf = groups[k].second - groups[k].first <= static_cast<std::uint32_t>(kSphereWidth);
+    node.child[k] = is_leaf ? ~add_leaf(groups[k]) : add_node(groups[k]);
+  }
+  nodes_[static_cast<std::size_t>(index)] = node;
+  return index;
+}
+
+std::int32_t Builder::add_leaf(const Range& range) {
+  SphereLeaf leaf{};
+  leaf.count = static_cast<std::int32_t>(range.second - range.first);
+  for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(kSphereWidth); ++k) {
+    leaf.inner[k] = leaf.outer[k] = kNoRadius;
+    if (range.first + k >= range.second) continue;
+    const Ball& ball = balls_[order_[range.first + k]];
+    const Eigen::Vector3f center = ball.center.cast<float>();
+    const double moved = (center.cast<double>() - ball.center).norm();
+    leaf.x[k] = center.x();
+    leaf.y[k] = center.y();
+    leaf.z[k] = center.z();
+    leaf.inner[k] = round_down(ball.radius - moved);
+    leaf.outer[k] = round_up(ball.cover_radius + moved);
+  }
+  leaves_.push_back(leaf);
+  return static_cast<std::int32_t>(leaves_.size()) - 1;
+}
+
+}  // namespace
+
+InnerSphereTree::InnerSphereTree(const Packing& packing)
+    : interior_gap_(packing.certificate.interior_gap), ball_count_(packing.balls.size()) {
+  if (packing.balls.empty()) return;
+  Builder builder(packing.balls, &nodes_, &leaves_);
+  const Enclosing all = builder.enclose({0, static_cast<std::uint32_t>(packing.balls.size())});
+  center_ = all.center.cast<double>();
+  radius_ = round_up(all.radius);
+  builder.run();
+}
+
+double InnerSphereTree::inner_distance(const Eigen::Vector3d& p_L) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const SphereLeaf& leaf : leaves_) {
+    for (int k = 0; k < leaf.count; ++k) {
+      const Eigen::Vector3d center(leaf.x[k], leaf.y[k], leaf.z[k]);
+      nearest = std::min(nearest, (p_L - center).norm() - static_cast<double>(leaf.inner[k]));
+    }
+  }
+  return nearest;
+}
+
+double InnerSphereTree::outer_distance(const Eigen::Vector3d& p_L, double stop_below) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  if (nodes_.empty()) return nearest;
+  const Eigen::Vector3f p = p_L.cast<float>();
+  // Rounding of p, of the differences and of the root, in units of the numbers involved.
+  const double rounding = 1e-6 * (p_L.cwiseAbs().maxCoeff() + radius_ + center_.norm());
+  struct Entry {
+    std::int32_t child;
+    float bound;
+  };
+  std::array<Entry, 512> stack;  // 8 children on each of the levels that 2^31 balls can have
+  std::size_t top = 0;
+  stack[top++] = {0, -std::numeric_limits<float>::max()};
+  std::array<float, kSphereWidth> distance{};
+  const auto distances = [&p, &distance](const float* x, const float* y, const float* z,
+                                         const float* radius) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
+      const float dx = x[k] - p.x(), dy = y[k] - p.y(), dz = z[k] - p.z();
+      distance[k] = std::sqrt(dx * dx + dy * dy + dz * dz) - radius[k];
+    }
+  };
+  while (top > 0) {
+    const Entry entry = stack[--top];
+    if (entry.bound >= nearest) continue;
+    if (entry.child < 0) {
+      const SphereLeaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
+      distances(leaf.x, leaf.y, leaf.z, leaf.outer);
+      for (const float d : distance) nearest = std::min(nearest, static_cast<double>(d));
+      if (nearest - rounding < stop_below) break;
+      continue;
+    }
+    const SphereNode& node = nodes_[static_cast<std::size_t>(entry.child)];
+    distances(node.x, node.y, node.z, node.radius);
+    const std::size_t begin = top;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(node.count); ++k) {
+      if (distance[k] >= nearest) continue;
+      std::size_t at = top++;  // nearest child on top
+      for (; at > begin && stack[at - 1].bound < distance[k]; --at) stack[at] = stack[at - 1];
+      stack[at] = {node.child[k], distance[k]};
+    }
+  }
+  return nearest - rounding;
+}
+
+}  // namespace ist

@@ -1,0 +1,199 @@
+#include "ist_proximity/packing/packer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/geometry/solid.h"
+#include "ist_proximity/tree/inner_sphere_tree.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+struct NamedMesh {
+  std::string name;
+  TriangleMesh mesh;
+};
+
+TriangleMesh scaled(TriangleMesh mesh, double scale) {
+  for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
+  return mesh;
+}
+
+TriangleMesh shifted(const TriangleMesh& mesh, const Eigen::Vector3d& by) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = by;
+  return test::moved(mesh, X);
+}
+
+std::vector<NamedMesh> hostile_meshes() {
+  const TriangleMesh ball = test::icosphere(0.1, 2);
+  return {{"box", test::box({0.1, 0.2, 0.3})},
+          {"icosphere", test::icosphere(0.1, 3)},
+          {"torus", test::torus(0.1, 0.03, 32, 16)},
+          {"L", test::l_shape(0.2, 0.05)},
+          {"open box", test::open_box({0.1, 0.1, 0.2})},
+          {"thin plate", test::thin_plate(0.1, 0.0005)},
+          {"sheet", test::sheet(0.05)},
+          {"inside out", test::inside_out(ball)},
+          {"duplicated faces", test::joined(ball, ball)},
+          {"two shells", test::joined(ball, shifted(ball, {0.3, 0, 0}))},
+          {"overlapping shells", test::joined(ball, shifted(ball, {0.1, 0, 0}))},
+          {"nested cavity", test::joined(ball, test::inside_out(scaled(ball, 0.5)))},
+          {"ball with a fin", test::joined(ball, shifted(test::sheet(0.05), {0.12, 0, 0}))},
+          {"one triangle", {{{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}}, {{0, 1, 2}}}},
+          {"needle", {{{0, 0, 0}, {0.1, 1e-9, 0}, {0.05, 0, 0}}, {{0, 1, 2}}}},
+          {"a point", {{{1, 2, 3}}, {{0, 0, 0}}}}};
+}
+
+// d_out <= distance everywhere outside, and a point beyond interior_gap of d_out is outside.
+void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, int points,
+                              double* worst_excess) {
+  test::Rng rng(6);
+  const Eigen::AlignedBox3d box = test::bounds(mesh);
+  const double margin = 0.2 * box.sizes().norm() + 0.01;
+  const InnerSphereTree tree(packing);
+  *worst_excess = 0.0;
+  for (int i = 0; i < points; ++i) {
+    const Eigen::Vector3d p =
+        box.center() + (0.5 * box.sizes() + Eigen::Vector3d::Constant(margin))
+                           .cwiseProduct(test::random_vector(&rng, 1.0));
+    const double truth = test::oracle_signed_distance(mesh, p);
+    double outer = 1e9;
+    for (const Ball& ball : packing.balls) {
+      outer = std::min(outer, (p - ball.center).norm() - ball.cover_radius);
+    }
+    const double tree_outer = tree.outer_distance(p);
+    ASSERT_LE(tree_outer, outer) << "the float tree may only be more careful";
+    ASSERT_GT(tree_outer, outer - 1e-5 * (1.0 + p.norm()));
+    if (truth < 0.0) {
+      ASSERT_LE(outer, packing.certificate.interior_gap) << p.transpose();
+    } else {
+      ASSERT_LE(outer, truth + 1e-9) << p.transpose();
+      *worst_excess = std::max(*worst_excess, tree.inner_distance(p) - truth);
+    }
+  }
+}
+
+TEST(PackMesh, CertificateHoldsOnAnyMesh) {
+  for (const auto& [name, mesh] : hostile_meshes()) {
+    SCOPED_TRACE(name);
+    for (const double max_error : {0.01, 0.003}) {
+      PackingConfig config;
+      config.max_error = max_error;
+      const Packing packing = pack_mesh(mesh, config);
+      EXPECT_TRUE(packing.certificate.reached);
+      EXPECT_LE(packing.certificate.max_gap, max_error);
+      double excess = 0.0;
+      expect_certificate_holds(mesh, packing, 400, &excess);
+      EXPECT_LE(excess, packing.certificate.max_gap + 1e-6);
+    }
+  }
+}
+
+TEST(PackMesh, InnerBallsOfClosedMeshesStayInside) {
+  for (const TriangleMesh& mesh : {test::box({0.1, 0.2, 0.3}), test::l_shape(0.2, 0.05),
+                                   test::torus(0.1, 0.03, 32, 16)}) {
+    PackingConfig config;
+    config.max_error = 0.004;
+    for (const Ball& ball : pack_mesh(mesh, config).balls) {
+      if (ball.radius > 0.0) EXPECT_GT(test::oracle_winding(mesh, ball.center), 0.5);
+      EXPECT_LE(ball.radius, test::oracle_distance(mesh, ball.center) + 1e-9);
+      EXPECT_GE(ball.cover_radius, ball.radius);
+    }
+  }
+}
+
+TEST(PackMesh, SmallerErrorsTakeMoreBallsAndLessGap) {
+  const TriangleMesh mesh = test::l_shape(0.2, 0.05);
+  std::size_t balls = 0;
+  double mean_gap = 1.0;
+  for (const double max_error : {0.02, 0.01, 0.005, 0.0025}) {
+    PackingConfig config;
+    config.max_error = max_error;
+    const Packing packing = pack_mesh(mesh, config);
+    EXPECT_GT(packing.balls.size(), balls);
+    EXPECT_LT(packing.certificate.mean_gap, mean_gap);
+    balls = packing.balls.size();
+    mean_gap = packing.certificate.mean_gap;
+  }
+}
+
+TEST(PackMesh, MaxSpheresReachedFirstIsSaidAndStillHolds) {
+  const TriangleMesh mesh = test::torus(0.1, 0.03, 32, 16);
+  PackingConfig config;
+  config.max_error = 0.001;
+  config.max_spheres = 30;
+  const Packing packing = pack_mesh(mesh, config);
+  EXPECT_LE(packing.balls.size(), 30U);
+  EXPECT_FALSE(packing.certificate.reached);
+  EXPECT_GT(packing.certificate.max_gap, 0.001);
+  double excess = 0.0;
+  expect_certificate_holds(mesh, packing, 400, &excess);
+  EXPECT_LE(excess, packing.certificate.max_gap);
+}
+
+TEST(PackMesh, SameInputSameBalls) {
+  const TriangleMesh mesh = test::l_shape(0.2, 0.05);
+  const Packing a = pack_mesh(mesh, {}), b = pack_mesh(mesh, {});
+  ASSERT_EQ(a.balls.size(), b.balls.size());
+  for (std::size_t i = 0; i < a.balls.size(); ++i) {
+    EXPECT_EQ(a.balls[i].center, b.balls[i].center);
+    EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
+    EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+  }
+}
+
+TEST(PackMesh, ReportsProgressAndStopsWhenTold) {
+  double last = 0.0;
+  pack_mesh(test::l_shape(0.2, 0.05), {}, [&](double fraction) {
+    EXPECT_GE(fraction, last);
+    EXPECT_LE(fraction, 1.0);
+    last = fraction;
+    return true;
+  });
+  EXPECT_EQ(last, 1.0);
+  PackingConfig fine;
+  fine.max_error = 1e-4;
+  const Packing stopped =
+      pack_mesh(test::l_shape(0.2, 0.05), fine, [](double fraction) { return fraction < 0.02; });
+  EXPECT_FALSE(stopped.certificate.reached);
+}
+
+TEST(PackMesh, RefusesAMeshWithoutTriangles) {
+  EXPECT_THROW(pack_mesh(TriangleMesh{}, {}), ModelError);
+}
+
+TEST(PackElement, PrimitivesAreCoveredAsTheyAre) {
+  test::Rng rng(8);
+  for (const Shape& shape : {Shape(Sphere{0.07}), Shape(Cylinder{0.05, 0.2}),
+                             Shape(Box{{0.1, 0.05, 0.2}})}) {
+    PackingConfig config;
+    config.max_error = 0.004;
+    const Packing packing = pack_element(shape, config);
+    EXPECT_TRUE(packing.certificate.reached);
+    const InnerSphereTree tree(packing);
+    const Solid solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), ""}});
+    for (int i = 0; i < 20000; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.15);
+      const double truth = solid.signed_distance(p).distance;
+      const double outer = tree.outer_distance(p);
+      if (truth < 0.0) {
+        ASSERT_LE(outer, tree.interior_gap());
+      } else {
+        ASSERT_LE(outer, truth);
+        ASSERT_LE(tree.inner_distance(p), truth + packing.certificate.max_gap + 1e-6);
+        ASSERT_GE(tree.inner_distance(p), truth - 1e-6);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,252 @@
+#include "ist_proximity/packing/packing_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "support/meshes.h"
+#include "support/temp_dir.h"
+
+namespace ist {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kKey = "0123456789abcdef0123456789abcdef";
+
+Packing sample_packing() {
+  Packing packing;
+  for (int i = 0; i < 50; ++i) {
+    packing.balls.push_back({{0.1 * i, -1.0 / (i + 1), 1e-9 * i}, 0.01 * i, 0.01 * i + 0.003});
+  }
+  packing.certificate = {0.003, 0.001, 0.002, 1e-4, 0.5, true};
+  return packing;
+}
+
+void expect_equal(const Packing& a, const Packing& b) {
+  ASSERT_EQ(a.balls.size(), b.balls.size());
+  for (std::size_t i = 0; i < a.balls.size(); ++i) {
+    EXPECT_EQ(a.balls[i].center, b.balls[i].center);
+    EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
+    EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+  }
+  EXPECT_EQ(a.certificate.max_gap, b.certificate.max_gap);
+  EXPECT_EQ(a.certificate.mean_gap, b.certificate.mean_gap);
+  EXPECT_EQ(a.certificate.interior_gap, b.certificate.interior_gap);
+  EXPECT_EQ(a.certificate.unreachable_area, b.certificate.unreachable_area);
+  EXPECT_EQ(a.certificate.surface_area, b.certificate.surface_area);
+  EXPECT_EQ(a.certificate.reached, b.certificate.reached);
+}
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class PackingCacheTest : public testing::Test {
+ protected:
+  PackingCacheTest() : cache_(dir_.file("deep/cache")) {}
+
+  // Stores the packing and returns its file, the only one in the folder.
+  fs::path store(const Packing& packing) {
+    std::string warning;
+    EXPECT_TRUE(cache_.store(kKey, packing, &warning)) << warning;
+    EXPECT_EQ(warning, "");
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(dir_.file("deep/cache"))) {
+      files.push_back(entry.path());
+    }
+    EXPECT_EQ(files.size(), 1U);
+    return files.front();
+  }
+
+  void expect_refused(const fs::path& file, const std::string& bytes, const std::string& why) {
+    std::ofstream(file, std::ios::binary) << bytes;
+    std::string warning;
+    EXPECT_FALSE(cache_.load(kKey, &warning).has_value()) << why;
+    EXPECT_NE(warning.find(file.string()), std::string::npos) << why << ": " << warning;
+    EXPECT_NE(warning.find(why), std::string::npos) << why << ": " << warning;
+  }
+
+  test::TempDir dir_;
+  PackingCache cache_;
+};
+
+TEST_F(PackingCacheTest, returnsWhatWasStored) {
+  store(sample_packing());
+  std::string warning;
+  const auto loaded = cache_.load(kKey, &warning);
+  ASSERT_TRUE(loaded.has_value()) << warning;
+  expect_equal(*loaded, sample_packing());
+  EXPECT_EQ(warning, "");
+}
+
+TEST_F(PackingCacheTest, storingAgainReplaces) {
+  store(sample_packing());
+  Packing other = sample_packing();
+  other.balls.resize(3);
+  store(other);
+  std::string warning;
+  expect_equal(cache_.load(kKey, &warning).value(), other);
+}
+
+TEST_F(PackingCacheTest, anAbsentFileIsNoWarning) {
+  std::string warning;
+  EXPECT_FALSE(cache_.load(kKey, &warning).has_value());
+  EXPECT_EQ(warning, "");
+}
+
+TEST_F(PackingCacheTest, noDirectoryTurnsItOff) {
+  const PackingCache off("");
+  std::string warning;
+  EXPECT_TRUE(off.store(kKey, sample_packing(), &warning));
+  EXPECT_FALSE(off.load(kKey, &warning).has_value());
+  EXPECT_EQ(warning, "");
+  EXPECT_FALSE(fs::exists(kKey + ".istpack"));
+}
+
+TEST_F(PackingCacheTest, refusesEveryTruncation) {
+  const fs::path file = store(sample_packing());
+  const std::string whole = content(file);
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    expect_refused(file, whole.substr(0, size), "not used");
+  }
+  expect_refused(file, whole + '\0', "not used");
+  expect_refused(file, whole + whole, "not used");
+}
+
+TEST_F(PackingCacheTest, refusesEveryFlippedBit) {
+  const fs::path file = store(sample_packing());
+  const std::string whole = content(file);
+  for (std::size_t byte = 0; byte < whole.size(); ++byte) {
+    std::string damaged = whole;
+    damaged[byte] = static_cast<char>(damaged[byte] ^ (1 << (byte % 8)));
+    expect_refused(file, damaged, "not used");
+  }
+}
+
+TEST_F(PackingCacheTest, saysWhyAFileIsRefused) {
+  const fs::path file = store(sample_packing());
+  const std::string whole = content(file);
+  expect_refused(file, "", "too short");
+  expect_refused(file, std::string(5000, 'x'), "no such file");
+  std::string changed = whole;
+  changed[8] = 99;  // format version
+  expect_refused(file, changed, "version is 99");
+  changed = whole;
+  changed[12] = 'f';  // key
+  expect_refused(file, changed, "another packing");
+  changed = whole;
+  std::memset(&changed[44], 0x7F, 8);  // count: must not be allocated
+  expect_refused(file, changed, "does not fit");
+  changed = whole;
+  changed[whole.size() - 20] ^= 1;
+  expect_refused(file, changed, "checksum");
+}
+
+// A sound checksum is no proof that the numbers are.
+TEST_F(PackingCacheTest, refusesNumbersThatAreNoPacking) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  std::vector<Packing> bad(8, sample_packing());
+  bad[0].balls[7].center.y() = nan;
+  bad[1].balls[7].radius = inf;
+  bad[2].balls[7].radius = -0.1;
+  bad[3].balls[7].cover_radius = 0.0;  // below the radius
+  bad[4].certificate.max_gap = nan;
+  bad[5].certificate.surface_area = -1.0;
+  bad[6].certificate.interior_gap = inf;
+  bad[7].balls.clear();
+  for (std::size_t i = 0; i < bad.size(); ++i) {
+    std::string warning;
+    ASSERT_TRUE(cache_.store(kKey, bad[i], &warning));
+    EXPECT_FALSE(cache_.load(kKey, &warning).has_value()) << i;
+    EXPECT_NE(warning, "") << i;
+  }
+}
+
+TEST_F(PackingCacheTest, saysWhenTheDiskRefuses) {
+  const std::string in_the_way = dir_.write("file", "no folder");
+  const PackingCache cache(in_the_way);
+  std::string warning;
+  EXPECT_FALSE(cache.store(kKey, sample_packing(), &warning));
+  EXPECT_NE(warning.find(in_the_way), std::string::npos) << warning;
+  EXPECT_EQ(content(in_the_way), "no folder");
+
+  fs::create_directories(dir_.file("deep/cache/" + kKey + ".istpack/occupied"));
+  warning.clear();
+  EXPECT_FALSE(cache_.store(kKey, sample_packing(), &warning));
+  EXPECT_NE(warning, "");
+  warning.clear();
+  EXPECT_FALSE(cache_.load(kKey, &warning).has_value());
+  EXPECT_NE(warning, "");
+  // No temporary file is left behind.
+  EXPECT_EQ(std::distance(fs::directory_iterator(dir_.file("deep/cache")), {}), 1);
+}
+
+// Every reader sees a whole file or none, whoever writes meanwhile.
+TEST_F(PackingCacheTest, writersAndReadersDoNotMeetHalfAFile) {
+  Packing big = sample_packing();
+  for (int i = 0; i < 6; ++i) big.balls.insert(big.balls.end(), big.balls.begin(), big.balls.end());
+  store(big);
+  std::vector<std::thread> threads;
+  std::vector<std::string> warnings(4);
+  for (std::size_t t = 0; t < 4; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 30 && warnings[t].empty(); ++i) {
+        if (t < 2) {
+          cache_.store(kKey, big, &warnings[t]);
+        } else if (!cache_.load(kKey, &warnings[t]) && warnings[t].empty()) {
+          warnings[t] = "the file was gone for a moment";
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const std::string& warning : warnings) EXPECT_EQ(warning, "");
+}
+
+TEST(PackingKey, differsWhereTheShapeOrTheConfigurationDoes) {
+  const PackingConfig config;
+  PackingConfig finer = config, fewer = config;
+  finer.max_error = 0.004;
+  fewer.max_spheres = 100;
+  TriangleMesh mesh = test::box({0.1, 0.2, 0.3});
+  TriangleMesh moved = mesh;
+  moved.vertices[3].x() += 1e-12;
+  TriangleMesh flipped = mesh;
+  std::swap(flipped.triangles[0][0], flipped.triangles[0][1]);
+  const std::set<std::string> keys = {packing_key(Box{{0.1, 0.2, 0.3}}, config),
+                                      packing_key(Box{{0.2, 0.1, 0.3}}, config),
+                                      packing_key(Box{{0.1, 0.2, 0.3}}, finer),
+                                      packing_key(Box{{0.1, 0.2, 0.3}}, fewer),
+                                      packing_key(Cylinder{0.1, 0.2}, config),
+                                      packing_key(Cylinder{0.2, 0.1}, config),
+                                      packing_key(Sphere{0.1}, config),
+                                      packing_key(mesh, config),
+                                      packing_key(moved, config),
+                                      packing_key(flipped, config)};
+  EXPECT_EQ(keys.size(), 10U);
+  for (const std::string& key : keys) EXPECT_EQ(key.size(), 32U);
+}
+
+TEST(PackingKey, isTheSameForTheSameNumbers) {
+  const PackingConfig config;
+  EXPECT_EQ(packing_key(test::box({1, 2, 3}), config), packing_key(test::box({1, 2, 3}), config));
+  TriangleMesh zero{{{0.0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  TriangleMesh minus_zero = zero;
+  minus_zero.vertices[0].x() = -0.0;
+  EXPECT_EQ(packing_key(zero, config), packing_key(minus_zero, config));
+}
+
+}  // namespace
+}  // namespace ist
