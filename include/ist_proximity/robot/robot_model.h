@@ -1,0 +1,67 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/solid.h"
+#include "ist_proximity/packing/packing.h"
+#include "ist_proximity/robot/robot_description.h"
+#include "ist_proximity/tree/inner_sphere_tree.h"
+
+namespace ist {
+
+/// One monitored link, ready for queries.
+struct LinkModel {
+  std::string name;
+  std::string error;  ///< not empty: no geometry, the link is UNKNOWN for ever
+  Packing packing;    ///< of the whole link, in the link's frame
+  InnerSphereTree tree;
+  Solid solid;  ///< the exact geometry, for refinement
+  bool from_cache = false;
+  double packing_time = 0.0;  ///< [s]
+
+  bool usable() const { return error.empty(); }
+};
+
+/// All monitored links, in URDF order. Immutable once built; share it by pointer.
+struct RobotModel {
+  std::string name;
+  std::string root_link;
+  std::vector<LinkModel> links;
+};
+
+/// How far the model is.
+struct ModelProgress {
+  std::string link;       ///< the link at work
+  std::size_t index = 0;  ///< of that link
+  std::size_t count = 0;  ///< how many links
+  double fraction = 0.0;  ///< of the whole robot, 0 to 1
+};
+
+struct RobotModelConfig {
+  PackingConfig packing;
+  std::string cache_directory;     ///< empty: no cache
+  std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
+  int threads = 0;                 ///< packing threads; 0: as many as there are cores
+};
+
+/// Any may be empty. Called one at a time; `progress` and `cancelled` from packing threads too,
+/// `warning` at the end. What they throw comes out of build_robot_model.
+struct RobotModelCallbacks {
+  std::function<void(const ModelProgress&)> progress;
+  std::function<void(const std::string&)> warning;
+  std::function<bool()> cancelled;
+};
+
+/// Packs (or reads from the cache) every monitored link. Links with the same shapes are packed
+/// once. A configured link that the URDF lacks, or that has no geometry, becomes a link with an
+/// `error`. Deterministic for any number of threads.
+/// @returns null when cancelled.
+/// @throws ModelError when the packing configuration is out of range.
+std::shared_ptr<const RobotModel> build_robot_model(const RobotDescription& description,
+                                                    const RobotModelConfig& config,
+                                                    const RobotModelCallbacks& callbacks = {});
+
+}  // namespace ist

@@ -1,0 +1,95 @@
+#include "packing_jobs.h"
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "ist_proximity/packing/packer.h"
+
+namespace ist {
+
+PackingJobs::PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cache, Report report)
+    : jobs_(*jobs),
+      cache_(cache),
+      report_(std::move(report)),
+      order_(jobs->size()),
+      done_(jobs->size(), 0.0) {
+  std::iota(order_.begin(), order_.end(), 0);
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](std::size_t a, std::size_t b) { return jobs_[a].work > jobs_[b].work; });
+}
+
+bool PackingJobs::run(int threads) {
+  std::size_t count = threads > 0 ? static_cast<std::size_t>(threads)
+                                  : std::max(1U, std::thread::hardware_concurrency());
+  count = std::min(count, jobs_.size());
+  std::vector<std::thread> others;
+  try {
+    while (others.size() + 1 < count) others.emplace_back([this] { work(); });
+  } catch (const std::system_error&) {
+    // No more threads to be had: fewer do the same.
+  }
+  work();
+  for (std::thread& thread : others) thread.join();
+  if (failure_) std::rethrow_exception(failure_);
+  return !stopped_;
+}
+
+void PackingJobs::work() {
+  for (std::size_t index; take(&index);) pack(index);
+}
+
+bool PackingJobs::take(std::size_t* index) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (stopped_ || next_ == order_.size()) return false;
+  *index = order_[next_++];
+  return true;
+}
+
+void PackingJobs::pack(std::size_t index) {
+  PackingJob& job = jobs_[index];
+  if (!report(index, 0.0)) return;
+  const auto start = std::chrono::steady_clock::now();
+  bool stopped = false;
+  try {
+    std::optional<Packing> cached = cache_.load(job.key, &job.load_warning);
+    job.from_cache = cached.has_value();
+    if (job.from_cache) {
+      job.packing = std::move(*cached);
+    } else {
+      job.packing = pack_element(*job.shape, job.config, [&](double fraction) {
+        stopped = stopped || !report(index, fraction);
+        return !stopped;
+      });
+      if (!stopped) cache_.store(job.key, job.packing, &job.store_warning);
+    }
+  } catch (const std::exception& error) {
+    job.error = error.what();
+  }
+  job.time = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!stopped) report(index, 1.0);
+}
+
+bool PackingJobs::report(std::size_t index, double fraction) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (stopped_) return false;
+  done_[index] = std::max(done_[index], std::min(fraction, 1.0));
+  double done = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < jobs_.size(); ++i) {
+    done += jobs_[i].work * done_[i];
+    all += jobs_[i].work;
+  }
+  try {
+    stopped_ = !report_(jobs_[index], done / all);
+  } catch (...) {
+    failure_ = std::current_exception();
+    stopped_ = true;
+  }
+  return !stopped_;
+}
+
+}  // namespace ist

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/shapes.h"
+#include "ist_proximity/packing/packing.h"
+#include "ist_proximity/packing/packing_cache.h"
+
+namespace ist {
+
+/// One distinct shape to pack, and what came of it.
+struct PackingJob {
+  const Shape* shape = nullptr;
+  PackingConfig config;
+  std::string key;
+  std::size_t link = 0;  ///< the first link that needs it
+  double work = 1.0;     ///< relative to other jobs
+
+  Packing packing;
+  bool from_cache = false;
+  double time = 0.0;  ///< [s]
+  std::string error;  ///< why there is no packing
+  std::string load_warning, store_warning;
+};
+
+/// Packs shapes on several threads, the most work first, through the cache.
+class PackingJobs {
+ public:
+  /// Called from any thread, one call at a time: the job at work, and how much of all is done
+  /// (0 to 1). Returning false stops everything soon.
+  using Report = std::function<bool(const PackingJob& job, double fraction)>;
+
+  PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cache, Report report);
+
+  /// @param threads  0: as many as there are cores
+  /// @returns false when `report` stopped it. What `report` throws comes out here.
+  bool run(int threads);
+
+ private:
+  void work();
+  void pack(std::size_t index);
+  bool report(std::size_t index, double fraction);
+  bool take(std::size_t* index);
+
+  std::vector<PackingJob>& jobs_;
+  const PackingCache& cache_;
+  const Report report_;
+  std::vector<std::size_t> order_;
+
+  std::mutex mutex_;  // guards all below
+  std::size_t next_ = 0;
+  std::vector<double> done_;  // by job, 0 to 1
+  bool stopped_ = false;
+  std::exception_ptr failure_;
+};
+
+}  // namespace ist

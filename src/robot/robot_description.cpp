@@ -1,0 +1,309 @@
+#include "ist_proximity/robot/robot_description.h"
+
+#include <console_bridge/console.h>
+#include <tinyxml2.h>
+#include <urdf_model/model.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/geometry/mesh_io.h"
+
+namespace ist {
+namespace {
+
+// Takes urdfdom's messages while it lives; other threads' messages go on to where they went.
+class MessageCapture : public console_bridge::OutputHandler {
+ public:
+  MessageCapture()
+      : lock_(mutex()),
+        previous_(console_bridge::getOutputHandler()),
+        thread_(std::this_thread::get_id()) {
+    console_bridge::useOutputHandler(this);
+  }
+
+  ~MessageCapture() override {
+    // Twice, because console_bridge remembers one previous handler, which would be this one.
+    console_bridge::useOutputHandler(previous_);
+    console_bridge::useOutputHandler(previous_);
+  }
+
+  MessageCapture(const MessageCapture&) = delete;
+  MessageCapture& operator=(const MessageCapture&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char* file,
+           int line) override {
+    if (std::this_thread::get_id() != thread_) {
+      if (previous_ != nullptr) previous_->log(text, level, file, line);
+    } else if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) {
+      errors_.push_back(text);
+    }
+  }
+
+  const std::vector<std::string>& errors() const { return errors_; }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex mutex;
+    return mutex;
+  }
+
+  const std::lock_guard<std::mutex> lock_;
+  console_bridge::OutputHandler* const previous_;
+  const std::thread::id thread_;
+  std::vector<std::string> errors_;
+};
+
+// What urdfdom makes of a URDF. After an error inside a link it goes on without the faulty part, so
+// a model may come with errors.
+struct ParsedUrdf {
+  urdf::ModelInterfaceSharedPtr model;
+  std::vector<std::string> errors;  // the cause first, then what it led to
+};
+
+ParsedUrdf parse(const tinyxml2::XMLDocument& document) {
+  tinyxml2::XMLPrinter printer(nullptr, true);
+  document.Print(&printer);
+  ParsedUrdf parsed;
+  const MessageCapture capture;
+  try {
+    parsed.model = urdf::parseURDF(printer.CStr());
+    parsed.errors = capture.errors();
+  } catch (const std::exception& error) {
+    parsed.errors = {error.what()};
+  }
+  if (parsed.model == nullptr && parsed.errors.empty()) {
+    parsed.errors = {"urdfdom gives no reason"};
+  }
+  return parsed;
+}
+
+const tinyxml2::XMLElement& robot_element(const std::string& urdf_xml,
+                                          tinyxml2::XMLDocument* document) {
+  if (urdf_xml.find_first_not_of(" \t\r\n") == std::string::npos) {
+    throw ModelError("robot description is empty; load a URDF into it");
+  }
+  if (document->Parse(urdf_xml.c_str(), urdf_xml.size()) != tinyxml2::XML_SUCCESS) {
+    throw ModelError(std::string("robot description is not well-formed XML: ") +
+                     document->ErrorStr());
+  }
+  const tinyxml2::XMLElement* root = document->RootElement();
+  if (root == nullptr) throw ModelError("robot description is no URDF: it holds no element");
+  if (root->Name() != std::string("robot")) {
+    throw ModelError(std::string("robot description is no URDF: its root element is <") +
+                     root->Name() + ">, not <robot>");
+  }
+  for (const auto* child = root->FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    if (std::string(child->Name()).compare(0, 6, "xacro:") == 0) {
+      throw ModelError(std::string("robot description holds <") + child->Name() +
+                       ">; it must be processed by xacro first");
+    }
+  }
+  return *root;
+}
+
+void copy_attributes(const tinyxml2::XMLElement& from, tinyxml2::XMLElement* to) {
+  for (const auto* a = from.FirstAttribute(); a != nullptr; a = a->Next()) {
+    to->SetAttribute(a->Name(), a->Value());
+  }
+}
+
+// Links and joints alone: what stands inside a link is parsed element by element, so that one
+// faulty element does not cost the others.
+urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot) {
+  tinyxml2::XMLDocument skeleton;
+  tinyxml2::XMLElement* root = skeleton.NewElement("robot");
+  skeleton.InsertEndChild(root);
+  copy_attributes(robot, root);
+  for (const auto* child = robot.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    if (child->Name() == std::string("link")) {
+      const char* name = child->Attribute("name");
+      if (name == nullptr || *name == '\0') {
+        throw ModelError("robot description has a <link> without a name (line " +
+                         std::to_string(child->GetLineNum()) + ")");
+      }
+      tinyxml2::XMLElement* link = skeleton.NewElement("link");
+      root->InsertEndChild(link);
+      copy_attributes(*child, link);
+    } else if (child->Name() == std::string("joint")) {
+      root->InsertEndChild(child->DeepClone(&skeleton));
+    }
+  }
+  const ParsedUrdf parsed = parse(skeleton);
+  if (parsed.model != nullptr) return parsed.model;
+  std::string reasons;
+  for (const std::string& error : parsed.errors) reasons += (reasons.empty() ? "" : ": ") + error;
+  throw ModelError("robot description is no valid URDF: " + reasons);
+}
+
+// urdfdom lets pass a link with two parents and rings of joints beside the root's tree.
+void check_tree(const urdf::ModelInterface& model) {
+  std::map<std::string, const urdf::Joint*> joint_to;
+  for (const auto& [name, joint] : model.joints_) {
+    const auto [other, is_new] = joint_to.insert({joint->child_link_name, joint.get()});
+    if (is_new) continue;
+    throw ModelError("robot description is no tree: link '" + joint->child_link_name +
+                     "' is the child of joint '" + other->second->name + "' and of joint '" + name +
+                     "'; a link may have one parent");
+  }
+  for (const auto& [name, link] : model.links_) {
+    const std::string* at = &name;
+    for (std::size_t steps = 0; joint_to.count(*at) > 0; ++steps) {
+      at = &joint_to.at(*at)->parent_link_name;
+      if (steps > model.links_.size()) {
+        throw ModelError("robot description is no tree: the joints above link '" + name +
+                         "' form a ring");
+      }
+    }
+  }
+}
+
+void check_size(const char* what, double value) {
+  if (std::isfinite(value) && value > 0.0) return;
+  std::ostringstream text;
+  text << "its " << what << " is " << value << " m; it must be > 0";
+  throw ModelError(text.str());
+}
+
+Shape to_shape(const urdf::Geometry& geometry, const PackageFinder& find_package) {
+  switch (geometry.type) {
+    case urdf::Geometry::BOX: {
+      const urdf::Vector3& size = static_cast<const urdf::Box&>(geometry).dim;
+      check_size("size along x", size.x);
+      check_size("size along y", size.y);
+      check_size("size along z", size.z);
+      return Box{{size.x, size.y, size.z}};
+    }
+    case urdf::Geometry::CYLINDER: {
+      const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
+      check_size("radius", cylinder.radius);
+      check_size("length", cylinder.length);
+      return Cylinder{cylinder.radius, cylinder.length};
+    }
+    case urdf::Geometry::SPHERE: {
+      const double radius = static_cast<const urdf::Sphere&>(geometry).radius;
+      check_size("radius", radius);
+      return Sphere{radius};
+    }
+    case urdf::Geometry::MESH: {
+      const auto& mesh = static_cast<const urdf::Mesh&>(geometry);
+      return load_mesh(resolve_uri(mesh.filename, find_package),
+                       {mesh.scale.x, mesh.scale.y, mesh.scale.z});
+    }
+    default:  // newer versions of urdfdom know more shapes
+      throw ModelError("its shape is not supported; use box, cylinder, sphere or mesh");
+  }
+}
+
+Eigen::Isometry3d to_isometry(const urdf::Pose& pose) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() << pose.position.x, pose.position.y, pose.position.z;
+  const urdf::Rotation& q = pose.rotation;
+  X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix();
+  if (!X.matrix().allFinite()) throw ModelError("its <origin> is not finite");
+  return X;
+}
+
+// A <collision> or <visual>, as urdfdom reads it, alone in a robot of one link.
+GeometryElement parse_element(const tinyxml2::XMLElement& xml, const PackageFinder& find_package) {
+  tinyxml2::XMLDocument document;
+  document.Parse("<robot name='r'><link name='l'/></robot>");
+  tinyxml2::XMLNode* copy = xml.DeepClone(&document);
+  while (auto* material = copy->FirstChildElement("material")) copy->DeleteChild(material);
+  document.RootElement()->FirstChildElement("link")->InsertEndChild(copy);
+  if (copy->FirstChildElement("geometry") == nullptr) {
+    throw ModelError("it has no <geometry>; add one or remove the element");
+  }
+
+  const ParsedUrdf parsed = parse(document);
+  const urdf::LinkConstSharedPtr link = parsed.model ? parsed.model->getLink("l") : nullptr;
+  if (link == nullptr || !parsed.errors.empty()) {
+    throw ModelError(parsed.errors.front() + "; correct the element in the URDF");
+  }
+  urdf::GeometrySharedPtr geometry;
+  urdf::Pose origin;
+  if (!link->collision_array.empty()) {
+    geometry = link->collision_array.front()->geometry;
+    origin = link->collision_array.front()->origin;
+  } else if (!link->visual_array.empty()) {
+    geometry = link->visual_array.front()->geometry;
+    origin = link->visual_array.front()->origin;
+  }
+  if (geometry == nullptr) throw ModelError("its <geometry> cannot be read");
+
+  GeometryElement element;
+  element.X_LE = to_isometry(origin);
+  element.shape = to_shape(*geometry, find_package);
+  return element;
+}
+
+// The element's shape for messages: a mesh's URI, or the name of the shape.
+std::string source_name(const tinyxml2::XMLElement& xml) {
+  const auto* geometry = xml.FirstChildElement("geometry");
+  const auto* shape = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
+  if (shape == nullptr) return "no shape";
+  const char* file = shape->Attribute("filename");
+  return file != nullptr && *file != '\0' ? file : shape->Name();
+}
+
+void parse_geometry(const tinyxml2::XMLElement& link_xml, const char* tag,
+                    const PackageFinder& find_package, LinkDescription* link) {
+  int number = 0;
+  for (const auto* xml = link_xml.FirstChildElement(tag); xml != nullptr;
+       xml = xml->NextSiblingElement(tag)) {
+    ++number;
+    const std::string source = source_name(*xml);
+    try {
+      link->geometry.push_back(parse_element(*xml, find_package));
+      link->geometry.back().source = source;
+    } catch (const ModelError& error) {
+      link->error += link->error.empty() ? "link '" + link->name + "', " : "; and ";
+      link->error += std::string(tag) + " element " + std::to_string(number) + " (" + source +
+                     "): " + error.what();
+    }
+  }
+  if (!link->error.empty()) link->geometry.clear();  // part of a link would be an unsafe link
+}
+
+}  // namespace
+
+RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
+                            const PackageFinder& find_package) {
+  tinyxml2::XMLDocument document;
+  const tinyxml2::XMLElement& robot = robot_element(urdf_xml, &document);
+  const urdf::ModelInterfaceSharedPtr model = parse_structure(robot);
+  check_tree(*model);
+
+  RobotDescription description;
+  description.name = model->getName();
+  description.root_link = model->getRoot()->name;
+  for (const auto* xml = robot.FirstChildElement("link"); xml != nullptr;
+       xml = xml->NextSiblingElement("link")) {
+    LinkDescription link;
+    link.name = xml->Attribute("name");
+    description.link_order.push_back(link.name);
+    const bool has_collision = xml->FirstChildElement("collision") != nullptr;
+    const bool has_visual = xml->FirstChildElement("visual") != nullptr;
+    link.used_visual_fallback =
+        source == GeometrySource::kCollision && !has_collision && has_visual;
+    const bool use_visual = source == GeometrySource::kVisual || link.used_visual_fallback;
+    if (use_visual ? !has_visual : !has_collision) {
+      description.links_without_geometry.push_back(link.name);
+      continue;
+    }
+    parse_geometry(*xml, use_visual ? "visual" : "collision", find_package, &link);
+    description.links.push_back(std::move(link));
+  }
+  return description;
+}
+
+}  // namespace ist

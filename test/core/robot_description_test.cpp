@@ -1,0 +1,291 @@
+#include "ist_proximity/robot/robot_description.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "ist_proximity/geometry/error.h"
+#include "support/data_dir.h"
+#include "support/mesh_files.h"
+#include "support/meshes.h"
+#include "support/temp_dir.h"
+
+namespace ist {
+namespace {
+
+std::string robot(const std::string& content) {
+  return "<?xml version=\"1.0\"?>\n<robot name=\"test\">" + content + "</robot>";
+}
+
+std::string fixed_joint(const std::string& parent, const std::string& child) {
+  return "<joint name=\"" + parent + "_" + child + "\" type=\"fixed\"><parent link=\"" + parent +
+         "\"/><child link=\"" + child + "\"/></joint>";
+}
+
+std::string collision(const std::string& shape, const std::string& origin = "") {
+  return "<collision>" + origin + "<geometry>" + shape + "</geometry></collision>";
+}
+
+// A sound link and, below it, one to be tried.
+std::string with_link(const std::string& content) {
+  return robot("<link name=\"good\">" + collision("<sphere radius=\"0.1\"/>") +
+               "</link><link name=\"tried\">" + content + "</link>" + fixed_joint("good", "tried"));
+}
+
+RobotDescription parse(const std::string& urdf,
+                       GeometrySource source = GeometrySource::kCollision) {
+  return parse_urdf(urdf, source, {});
+}
+
+std::string structure_error(const std::string& urdf) {
+  try {
+    parse(urdf);
+  } catch (const ModelError& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+// The error of the link that is tried; the sound one must come through.
+std::string link_error(const std::string& content) {
+  const RobotDescription description = parse(with_link(content));
+  EXPECT_EQ(description.links.size(), 2U);
+  EXPECT_EQ(description.links[0].error, "");
+  EXPECT_EQ(description.links[0].geometry.size(), 1U);
+  EXPECT_EQ(description.links[1].name, "tried");
+  EXPECT_TRUE(description.links[1].geometry.empty());
+  const std::string error = description.links[1].error;
+  EXPECT_NE(error.find("link 'tried'"), std::string::npos) << error;
+  return error;
+}
+
+void expect_says(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
+}
+
+TEST(RobotDescription, readsShapesAndOrigins) {
+  const RobotDescription description = parse(
+      robot("<link name=\"a\">" +
+            collision("<box size=\"0.1 0.2 0.3\"/>",
+                      "<origin xyz=\"1 2 3\" rpy=\"0 0 1.5707963267948966\"/>") +
+            collision("<cylinder radius=\"0.4\" length=\"0.5\"/>", "<origin xyz=\"4 5 6\"/>") +
+            collision("<sphere radius=\"0.6\"/>") + "</link>"));
+  EXPECT_EQ(description.name, "test");
+  EXPECT_EQ(description.root_link, "a");
+  ASSERT_EQ(description.links.size(), 1U);
+  const LinkGeometry& geometry = description.links[0].geometry;
+  ASSERT_EQ(geometry.size(), 3U);
+  EXPECT_EQ(std::get<Box>(geometry[0].shape).size, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(geometry[0].source, "box");
+  const Eigen::Vector3d tip = geometry[0].X_LE * Eigen::Vector3d(1, 0, 0);
+  EXPECT_TRUE(tip.isApprox(Eigen::Vector3d(1, 3, 3), 1e-12)) << tip.transpose();
+  EXPECT_EQ(std::get<Cylinder>(geometry[1].shape).radius, 0.4);
+  EXPECT_EQ(std::get<Cylinder>(geometry[1].shape).length, 0.5);
+  EXPECT_EQ(geometry[1].X_LE.translation(), Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(std::get<Sphere>(geometry[2].shape).radius, 0.6);
+  EXPECT_TRUE(geometry[2].X_LE.isApprox(Eigen::Isometry3d::Identity()));
+}
+
+// roll, then pitch, then yaw, about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll).
+TEST(RobotDescription, appliesRollPitchYawInThatOrder) {
+  const RobotDescription description = parse(
+      robot("<link name=\"a\">" +
+            collision("<sphere radius=\"1\"/>", "<origin rpy=\"0.3 -0.5 0.7\"/>") + "</link>"));
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  const Eigen::Matrix3d expected =
+      (AngleAxisd(0.7, Vector3d::UnitZ()) * AngleAxisd(-0.5, Vector3d::UnitY()) *
+       AngleAxisd(0.3, Vector3d::UnitX()))
+          .toRotationMatrix();
+  EXPECT_TRUE(description.links[0].geometry[0].X_LE.linear().isApprox(expected, 1e-12));
+}
+
+// urdfdom's map would give a, m, z.
+TEST(RobotDescription, keepsTheOrderOfTheDocument) {
+  const std::string shape = collision("<sphere radius=\"0.1\"/>");
+  const RobotDescription description =
+      parse(robot("<link name=\"m\">" + shape + "</link>" + fixed_joint("m", "z") +
+                  "<link name=\"z\">" + shape + "</link><link name=\"none\"/><link name=\"a\">" +
+                  shape + "</link>" + fixed_joint("z", "a") + fixed_joint("a", "none")));
+  ASSERT_EQ(description.links.size(), 3U);
+  EXPECT_EQ(description.links[0].name, "m");
+  EXPECT_EQ(description.links[1].name, "z");
+  EXPECT_EQ(description.links[2].name, "a");
+  EXPECT_EQ(description.links_without_geometry, std::vector<std::string>{"none"});
+  EXPECT_EQ(description.link_order, (std::vector<std::string>{"m", "z", "none", "a"}));
+  EXPECT_EQ(description.root_link, "m");
+}
+
+TEST(RobotDescription, fallsBackToVisualGeometry) {
+  const std::string visual = "<visual><geometry><sphere radius=\"0.2\"/></geometry></visual>";
+  const std::string urdf = with_link(visual);
+  const RobotDescription as_collision = parse(urdf, GeometrySource::kCollision);
+  ASSERT_EQ(as_collision.links.size(), 2U);
+  EXPECT_FALSE(as_collision.links[0].used_visual_fallback);
+  EXPECT_TRUE(as_collision.links[1].used_visual_fallback);
+  EXPECT_EQ(std::get<Sphere>(as_collision.links[1].geometry.at(0).shape).radius, 0.2);
+
+  const RobotDescription as_visual = parse(urdf, GeometrySource::kVisual);
+  ASSERT_EQ(as_visual.links.size(), 1U);
+  EXPECT_EQ(as_visual.links[0].name, "tried");
+  EXPECT_FALSE(as_visual.links[0].used_visual_fallback);
+  EXPECT_EQ(as_visual.links_without_geometry, std::vector<std::string>{"good"});
+}
+
+TEST(RobotDescription, aFaultyCollisionElementIsNotReplacedByTheVisual) {
+  expect_says(link_error(collision("<sphere radius=\"0\"/>") +
+                         "<visual><geometry><sphere radius=\"0.2\"/></geometry></visual>"),
+              "radius is 0 m");
+}
+
+TEST(RobotDescription, ignoresWhatGeometryDoesNotNeed) {
+  const RobotDescription description = parse(robot(
+      "<material/><material name=\"x\"><color rgba=\"red\"/></material><gazebo><link/></gazebo>"
+      "<link name=\"a\"><inertial><mass value=\"heavy\"/></inertial><visual><geometry>"
+      "<sphere radius=\"0.2\"/></geometry><material name=\"undefined\"/></visual></link>"));
+  ASSERT_EQ(description.links.size(), 1U);
+  EXPECT_EQ(description.links[0].error, "");
+}
+
+TEST(RobotDescription, saysWhatIsWrongWithAnElement) {
+  expect_says(link_error("<collision/>"), "no <geometry>");
+  expect_says(link_error("<collision><geometry/></collision>"), "collision element 1");
+  expect_says(link_error(collision("<capsule radius=\"1\"/>")), "'capsule'");
+  expect_says(link_error(collision("<box/>")), "size");
+  expect_says(link_error(collision("<box size=\"1 2\"/>")), "[1 2]");
+  expect_says(link_error(collision("<box size=\"1 2 wide\"/>")), "[wide]");
+  expect_says(link_error(collision("<box size=\"1 -2 3\"/>")), "size along y is -2 m");
+  expect_says(link_error(collision("<sphere radius=\"big\"/>")), "[big]");
+  expect_says(link_error(collision("<sphere radius=\"nan\"/>")), "nan");
+  expect_says(link_error(collision("<sphere radius=\"1e999\"/>")), "link 'tried'");
+  expect_says(link_error(collision("<cylinder radius=\"1\"/>")), "length");
+  expect_says(link_error(collision("<cylinder radius=\"0\" length=\"1\"/>")), "radius is 0 m");
+  expect_says(link_error(collision("<sphere radius=\"1\"/>", "<origin xyz=\"0 here 0\"/>")),
+              "[here]");
+  expect_says(link_error(collision("<sphere radius=\"1\"/>", "<origin rpy=\"0 0\"/>")), "[0 0]");
+}
+
+TEST(RobotDescription, saysWhatIsWrongWithAMesh) {
+  expect_says(link_error(collision("<mesh/>")), "filename");
+  expect_says(link_error(collision("<mesh filename=\"\"/>")), "URI is empty");
+  expect_says(link_error(collision("<mesh filename=\"a.stl\"/>")), "relative");
+  expect_says(link_error(collision("<mesh filename=\"package://nope/a.stl\"/>")), "package 'nope'");
+  expect_says(link_error(collision("<mesh filename=\"file:///nope/a.stl\"/>")),
+              "'/nope/a.stl' does not exist");
+  expect_says(link_error(collision("<mesh filename=\"/a.stl\" scale=\"1 1\"/>")), "[1 1]");
+  expect_says(link_error(collision("<mesh filename=\"/a.stl\" scale=\"1 0 1\"/>")), "(1 0 1)");
+}
+
+TEST(RobotDescription, namesEveryFaultyElement) {
+  const std::string error =
+      link_error(collision("<sphere radius=\"-1\"/>") + collision("<sphere radius=\"1\"/>") +
+                 collision("<mesh filename=\"/nope.stl\"/>"));
+  expect_says(error, "collision element 1 (sphere)");
+  expect_says(error, "collision element 3 (/nope.stl)");
+}
+
+TEST(RobotDescription, loadsMeshesWithTheirScale) {
+  const test::TempDir dir;
+  dir.write("arm/meshes/a b.stl", test::binary_stl(test::box({1, 2, 3})));
+  const PackageFinder finder = [&](const std::string& name) {
+    return name == "arm" ? dir.file("arm") : "";
+  };
+  const RobotDescription description =
+      parse_urdf(robot("<link name=\"a\">" +
+                       collision("<mesh filename=\"package://arm/meshes/a%20b.stl\" "
+                                 "scale=\"0.1 0.1 -0.1\"/>") +
+                       "</link>"),
+                 GeometrySource::kCollision, finder);
+  ASSERT_EQ(description.links.at(0).error, "");
+  const GeometryElement& element = description.links[0].geometry.at(0);
+  EXPECT_EQ(element.source, "package://arm/meshes/a%20b.stl");
+  EXPECT_NEAR(test::signed_volume(std::get<TriangleMesh>(element.shape)), 0.006, 1e-9);
+}
+
+TEST(RobotDescription, refusesWhatIsNoUrdf) {
+  expect_says(structure_error(""), "empty");
+  expect_says(structure_error(" \n"), "empty");
+  expect_says(structure_error("not XML"), "not well-formed");
+  expect_says(structure_error("<robot name=\"a\"><link name=\"b\">"), "not well-formed");
+  expect_says(structure_error("<sdf/>"), "<sdf>");
+  expect_says(structure_error("<?xml version=\"1.0\"?>"), "no element");
+  expect_says(structure_error("<robot/>"), "name");
+  expect_says(structure_error(robot("")), "No link");
+  expect_says(structure_error(robot("<link/>")), "without a name");
+  expect_says(structure_error(robot("<xacro:macro xmlns:xacro=\"x\"/><link name=\"a\"/>")),
+              "xacro");
+  std::string deep;
+  for (int i = 0; i < 100000; ++i) deep += "<a>";  // must not exhaust the stack
+  expect_says(structure_error(robot(deep)), "not well-formed");
+}
+
+TEST(RobotDescription, refusesJointsThatFormNoTree) {
+  const std::string links = "<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>";
+  expect_says(structure_error(robot(links)), "root");
+  expect_says(structure_error(robot("<link name=\"a\"/><link name=\"a\"/>")), "'a' is not unique");
+  expect_says(structure_error(robot("<link name=\"a\"/>" + fixed_joint("a", "z"))), "[z]");
+  expect_says(structure_error(robot("<link name=\"a\"/>" + fixed_joint("a", "a"))), "tree");
+  expect_says(structure_error(robot(links + fixed_joint("b", "c") + fixed_joint("c", "b"))),
+              "ring");
+  expect_says(structure_error(robot(links + fixed_joint("a", "b") + fixed_joint("a", "c") +
+                                    fixed_joint("b", "c"))),
+              "'c' is the child of joint 'a_c' and of joint 'b_c'");
+  expect_says(structure_error(robot(links + fixed_joint("a", "b") +
+                                    "<joint name=\"j\" type=\"hinge\"><parent link=\"b\"/>"
+                                    "<child link=\"c\"/></joint>")),
+              "[hinge]");
+}
+
+TEST(RobotDescription, printsNothing) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  link_error(collision("<box size=\"1 2 wide\"/>"));
+  link_error(collision("<sphere radius=\"1\"/>", "<origin xyz=\"0 here 0\"/>"));
+  structure_error(robot("<link name=\"a\"/><link name=\"b\"/>"));
+  structure_error(robot("<link name=\"a\"/>" + fixed_joint("a", "z")));
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+class PandaDescription : public testing::Test {
+ protected:
+  RobotDescription load(GeometrySource source) {
+    const auto data = test::data_dir();
+    const std::string package = test::franka_package(*data);
+    std::ifstream file(package + "/robots/panda.urdf");
+    std::stringstream text;
+    text << file.rdbuf();
+    return parse_urdf(text.str(), source, [&](const std::string& name) {
+      return name == "franka_description" ? package : "";
+    });
+  }
+};
+
+TEST_F(PandaDescription, everyLinkLoads) {
+  if (!test::data_dir()) GTEST_SKIP() << test::kNoData;
+  const std::vector<std::string> names = {"panda_link0",      "panda_link1",      "panda_link2",
+                                          "panda_link3",      "panda_link4",      "panda_link5",
+                                          "panda_link6",      "panda_link7",      "panda_hand",
+                                          "panda_leftfinger", "panda_rightfinger"};
+  for (const GeometrySource source : {GeometrySource::kCollision, GeometrySource::kVisual}) {
+    const RobotDescription description = load(source);
+    EXPECT_EQ(description.name, "panda");
+    EXPECT_EQ(description.root_link, "panda_link0");
+    EXPECT_EQ(description.links_without_geometry, std::vector<std::string>{"panda_link8"});
+    ASSERT_EQ(description.links.size(), names.size());
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      EXPECT_EQ(description.links[i].name, names[i]);
+      EXPECT_EQ(description.links[i].error, "");
+      EXPECT_FALSE(description.links[i].geometry.empty());
+      EXPECT_FALSE(description.links[i].used_visual_fallback);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist
