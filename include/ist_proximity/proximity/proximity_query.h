@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// How a query answers.
+struct QueryConfig {
+  /// [m] what is farther is CLEAR; > 0.
+  double max_distance = 1.0;
+  /// [m] how wide `distance - lower_bound` may be; 0 asks for the exact distance. >= 0.
+  double tolerance = 0.001;
+  /// [s] from the start of run(); 0: none. A query that reaches it returns bounds that hold.
+  double deadline = 0.0;
+  /// [m] taken off every lower bound: for what geometry does not know (sensor noise, calibration,
+  /// latency). >= 0.
+  double margin = 0.0;
+};
+
+enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kContact = 3 };
+
+/// Answer for one link; vectors and points in the fixed frame F unless said.
+struct LinkProximity {
+  LinkState state = LinkState::kUnknown;
+  double distance;     ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
+  double lower_bound;  ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
+  Eigen::Vector3d p_FL;       ///< [m] witness on the link; NaN unless NEAR or CONTACT
+  Eigen::Vector3d p_LL;       ///< [m] the same in the link's own frame
+  Eigen::Vector3d p_FO;       ///< [m] witness on the obstacle
+  Eigen::Vector3d direction;  ///< unit, the way the link should go: p_FL - p_FO = distance * direction
+  std::int32_t source = -1;   ///< index of the snapshot the nearest point is in
+  std::uint32_t point = 0;    ///< id of that point in its message
+
+  LinkProximity() { reset(); }
+  void reset();  ///< to UNKNOWN
+};
+
+/// What a query cost, for tuning and tests.
+struct QueryStatistics {
+  std::uint64_t node_pairs = 0;   ///< pairs of tree node and box expanded
+  std::uint64_t leaf_pairs = 0;   ///< ball leaf against point tile
+  std::uint64_t exact_evaluations = 0;  ///< point against the link's exact geometry
+};
+
+/// Distances from the links of a robot to point clouds.
+///
+/// Each link's Inner Sphere Tree descends against the boxes of every cloud; pairs that survive its
+/// bounds are evaluated against the exact geometry until `tolerance` is met, so `distance` is
+/// always the exact distance of one obstacle point. Points that may lie inside the link are a
+/// query of their own (branch and bound on the exact signed distance).
+///
+/// run() allocates nothing, locks nothing and never throws; one object per thread. The last answer
+/// starts the next query's bound (warm start) and never changes the result.
+class ProximityQuery {
+ public:
+  ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config);
+  ~ProximityQuery();
+  ProximityQuery(ProximityQuery&&) noexcept;
+  ProximityQuery& operator=(ProximityQuery&&) noexcept;
+
+  /// @param X_FL    by link: link frame -> fixed frame, rigid to 1e-6 (see is_rigid); ignored
+  ///                where `known` is false
+  /// @param known   by link: false makes the link UNKNOWN
+  /// @param clouds  the snapshots of all usable sources; none makes every link UNKNOWN
+  /// @param results one per link, overwritten
+  /// @returns false when the deadline passed before every link met its tolerance
+  bool run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+           const std::vector<const CloudSnapshot*>& clouds, std::vector<LinkProximity>* results);
+
+  /// Takes effect at the next run().
+  void set_config(const QueryConfig& config);
+  const QueryConfig& config() const;
+  const QueryStatistics& statistics() const;  ///< of the last run()
+  const RobotModel& model() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Whether X is a rotation and a translation to within `tolerance`, and finite.
+bool is_rigid(const Eigen::Isometry3d& X, double tolerance = 1e-6);
+
+}  // namespace ist

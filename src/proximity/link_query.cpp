@@ -1,0 +1,215 @@
+#include "proximity/link_query.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Posing a centre takes seven roundings, a distance five more, each of 2^-24 of the numbers
+// involved; this is above their sum.
+constexpr double kFloatError = 1e-6;
+// A stored point is within half a unit in the last place of the measured one, in each coordinate.
+constexpr double kPointError = 1.1e-7;
+
+float round_up(double value) {
+  const auto nearest = static_cast<float>(value);
+  return nearest >= value ? nearest : std::nextafter(nearest, std::numeric_limits<float>::max());
+}
+
+}  // namespace
+
+Deadline::Deadline(double seconds) : limited_(seconds > 0.0) {
+  if (!limited_) return;
+  end_ = std::chrono::steady_clock::now() +
+         std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+             std::chrono::duration<double>(std::min(seconds, 1e6)));
+}
+
+bool Deadline::passed() {
+  if (limited_ && !passed_) passed_ = std::chrono::steady_clock::now() >= end_;
+  return passed_;
+}
+
+void LinkQuery::start(const Eigen::Isometry3d& X_FL,
+                      const std::vector<const CloudSnapshot*>& clouds, const QueryConfig& config) {
+  X_FL_ = X_FL;
+  config_ = config;
+  nearest_ = Nearest{};
+  nearest_.exact.distance = kInfinity;
+  complete_ = false;
+  ++epoch_;
+  // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
+  dropped_ = -link_->tree.radius();
+  rounding_ = 0.0;
+  for (std::size_t i = 0; i < clouds.size(); ++i) {
+    if (last_generation_ == 0 || clouds[i]->index.generation() != last_generation_) continue;
+    enter(*clouds[i], static_cast<std::int32_t>(i));
+    consider(last_tile_, last_lane_, false);
+  }
+}
+
+void LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index) {
+  index_ = &cloud.index;
+  cloud_ = index;
+  const Eigen::Vector3d p_OL = X_FL_.translation() - index_->origin();
+  Eigen::Isometry3d X_OL = X_FL_;
+  X_OL.translation() = p_OL;
+  X_LO_ = X_OL.inverse();
+  const double scale = p_OL.cwiseAbs().maxCoeff() + link_->tree.center().norm() +
+                       link_->tree.radius() + config_.max_distance + config_.margin;
+  rounding_ = std::max(rounding_, kFloatError * scale);
+}
+
+Eigen::Vector3d LinkQuery::point_O(std::int32_t tile, int lane) const {
+  const PointTile& points = index_->tiles()[static_cast<std::size_t>(tile)];
+  return {points.x[lane], points.y[lane], points.z[lane]};
+}
+
+double LinkQuery::threshold() const {
+  const double distance = nearest_.exact.distance;
+  if (distance > range()) return range();
+  // Whether any point is inside is always decided, however wide the tolerance.
+  const double wanted = distance - config_.tolerance;
+  return distance > 0.0 ? std::max(wanted, 0.0) : wanted;
+}
+
+bool LinkQuery::first_visit(std::int32_t tile, int lane) {
+  const std::uint32_t key = static_cast<std::uint32_t>(tile) * kPointWidth +
+                            static_cast<std::uint32_t>(lane);
+  Visit& visit = visited_[(key * 2654435761U) >> 23U];
+  if (visit.epoch == epoch_ && visit.key == key) return false;
+  visit = {epoch_, key};
+  return true;
+}
+
+void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside) {
+  const Eigen::Vector3d p_L = X_LO_ * point_O(tile, lane);
+  if (statistics_ != nullptr) ++statistics_->exact_evaluations;
+  if (!is_outside) {
+    const double interior = link_->tree.interior_gap();
+    is_outside = link_->tree.outer_distance(p_L, interior) > interior;
+  }
+  const SignedDistance exact =
+      is_outside ? link_->solid.distance_outside(
+                       p_L, std::min(nearest_.exact.distance, range() + rounding_))
+                 : link_->solid.signed_distance(p_L);
+  take(exact, p_L, tile, lane);
+}
+
+void LinkQuery::take(const SignedDistance& exact, const Eigen::Vector3d& p_L, std::int32_t tile,
+                     int lane) {
+  // A point out of range is no answer, though a bound.
+  if (!(exact.distance < nearest_.exact.distance)) return;
+  nearest_.exact = exact;
+  nearest_.p_L = p_L;
+  nearest_.p_F = index_->origin() + point_O(tile, lane);
+  nearest_.cloud = cloud_;
+  nearest_.tile = tile;
+  nearest_.lane = lane;
+  if (traversal_ != nullptr) {
+    traversal_->threshold = std::min(traversal_->threshold, round_up(threshold() + rounding_));
+  }
+}
+
+void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float /*bound*/) {
+  auto* self = static_cast<LinkQuery*>(context);
+  if (self->first_visit(tile, lane)) self->consider(tile, lane, true);
+}
+
+bool LinkQuery::on_expired(void* context) {
+  return static_cast<LinkQuery*>(context)->deadline_->passed();
+}
+
+// Without a last answer: the inner balls find a point that is near, its exact distance is a bound.
+void LinkQuery::find_first(Traversal* traversal) {
+  Traversal inner = *traversal;
+  inner.expired = nullptr;
+  descend_inner(&inner);
+  if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false);
+  traversal->node_pairs += inner.node_pairs;
+  traversal->leaf_pairs += inner.leaf_pairs;
+}
+
+bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
+                       QueryStatistics* statistics) {
+  if (deadline->passed()) return false;
+  deadline_ = deadline;
+  statistics_ = statistics;
+  dropped_ = kInfinity;
+  const double interior = link_->tree.interior_gap();
+  bool stopped = false;
+  for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
+    if (clouds[i]->index.empty()) continue;
+    enter(*clouds[i], static_cast<std::int32_t>(i));
+    if (i > 0) ++epoch_;  // keys are per cloud
+    Traversal traversal;
+    traversal.sphere_nodes = link_->tree.nodes().data();
+    traversal.sphere_leaves = link_->tree.leaves().data();
+    traversal.box_nodes = index_->nodes().data();
+    traversal.tiles = index_->tiles().data();
+    traversal.box_root = index_->root();
+    const Eigen::Isometry3d X_OL = X_LO_.inverse();
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        traversal.R_OL[3 * row + column] = static_cast<float>(X_OL.linear()(row, column));
+      }
+      traversal.p_OL[row] = static_cast<float>(X_OL.translation()[row]);
+    }
+    traversal.threshold = round_up(threshold() + rounding_);
+    traversal.interior = round_up(interior + rounding_);
+    traversal.candidate = &LinkQuery::on_candidate;
+    traversal.expired = &LinkQuery::on_expired;
+    traversal.context = this;
+    traversal_ = &traversal;
+    if (nearest_.exact.distance == kInfinity) find_first(&traversal);
+    descend_exact(&traversal);
+    traversal_ = nullptr;
+    statistics->node_pairs += traversal.node_pairs;
+    statistics->leaf_pairs += traversal.leaf_pairs;
+    drop(static_cast<double>(traversal.dropped) - rounding_);
+    stopped = traversal.stopped;
+    if (traversal.may_be_inside && !stopped) find_depth(deadline);
+    stopped = stopped || deadline->passed();
+    // A pair that was left may hold a point inside.
+    if (stopped && dropped_ <= interior + rounding_) drop(-link_->tree.radius());
+  }
+  if (stopped) drop(-link_->tree.radius());  // clouds that were not reached
+  complete_ = !stopped;
+  return complete_;
+}
+
+void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result) {
+  result->reset();
+  statistics_ = nullptr;
+  last_generation_ = 0;
+  const double point_error = rounding_ * (kPointError / kFloatError);
+  const double proven = std::min(nearest_.exact.distance, dropped_) - point_error - config_.margin;
+  if (nearest_.exact.distance > range()) {
+    if (!complete_) return;  // UNKNOWN: nothing was measured, and not all was seen
+    result->state = LinkState::kClear;
+    result->distance = kInfinity;
+    result->lower_bound = config_.max_distance;
+    return;
+  }
+  const Nearest& nearest = nearest_;
+  last_generation_ = clouds[static_cast<std::size_t>(nearest.cloud)]->index.generation();
+  last_tile_ = nearest.tile;
+  last_lane_ = nearest.lane;
+  result->state = nearest.exact.distance < 0.0 ? LinkState::kContact : LinkState::kNear;
+  result->distance = nearest.exact.distance;
+  result->lower_bound = proven;
+  result->p_LL = nearest.exact.witness;
+  result->p_FL = X_FL_ * nearest.exact.witness;
+  result->p_FO = nearest.p_F;
+  result->direction = -(X_FL_.linear() * nearest.exact.normal);
+  result->source = nearest.cloud;
+  result->point = clouds[static_cast<std::size_t>(nearest.cloud)]
+                      ->index.tiles()[static_cast<std::size_t>(nearest.tile)]
+                      .id[nearest.lane];
+}
+
+}  // namespace ist

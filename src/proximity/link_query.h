@@ -1,0 +1,100 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "proximity/traversal.h"
+
+namespace ist {
+
+/// When a query has to end.
+class Deadline {
+ public:
+  explicit Deadline(double seconds);
+  bool passed();  ///< once true, always true
+
+ private:
+  std::chrono::steady_clock::time_point end_;
+  bool limited_;
+  bool passed_ = false;
+};
+
+/// The query of one link: warm start, descent against every cloud, exact refinement, depth.
+class LinkQuery {
+ public:
+  explicit LinkQuery(const LinkModel& link) : link_(&link) {}
+
+  /// Sets the pose and evaluates the last answer's point at it, if that point is still there.
+  void start(const Eigen::Isometry3d& X_FL, const std::vector<const CloudSnapshot*>& clouds,
+             const QueryConfig& config);
+
+  /// The descent. False: the deadline passed first; what is known by then still holds.
+  bool refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
+              QueryStatistics* statistics);
+
+  /// The answer as it stands after start() or refine().
+  void answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result);
+
+  void forget() { last_generation_ = 0; }
+
+ private:
+  struct Nearest {
+    SignedDistance exact;  ///< in the link's frame
+    Eigen::Vector3d p_L = Eigen::Vector3d::Zero();  ///< the obstacle point, in the link's frame
+    Eigen::Vector3d p_F = Eigen::Vector3d::Zero();  ///< the same in the fixed frame
+    std::int32_t cloud = -1, tile = 0;
+    int lane = 0;
+  };
+
+  void enter(const CloudSnapshot& cloud, std::int32_t index);
+  Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
+  void consider(std::int32_t tile, int lane, bool is_outside);
+  void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, std::int32_t tile, int lane);
+  void find_first(Traversal* traversal);
+  void find_depth(Deadline* deadline);
+  void find_depth_in_tile(std::int32_t tile);
+  void drop(double bound) { dropped_ = std::min(dropped_, bound); }
+  double range() const { return config_.max_distance + config_.margin + rounding_; }
+  /// [m] bounds from here on cannot change the answer by more than the tolerance.
+  double threshold() const;
+  bool first_visit(std::int32_t tile, int lane);
+  static void on_candidate(void* context, std::int32_t tile, int lane, float bound);
+  static bool on_expired(void* context);
+
+  const LinkModel* link_;
+  QueryConfig config_;
+  Eigen::Isometry3d X_FL_ = Eigen::Isometry3d::Identity();
+  Nearest nearest_;
+  double dropped_ = 0.0;   ///< [m] smallest bound of all that was not evaluated
+  double rounding_ = 0.0;  ///< [m] largest error of a float bound
+  bool complete_ = false;
+
+  // The cloud at work.
+  const PointIndex* index_ = nullptr;
+  std::int32_t cloud_ = -1;
+  Eigen::Isometry3d X_LO_ = Eigen::Isometry3d::Identity();
+  Traversal* traversal_ = nullptr;
+  Deadline* deadline_ = nullptr;
+  QueryStatistics* statistics_ = nullptr;
+
+  // The last answer's point, for the next warm start.
+  std::uint64_t last_generation_ = 0;
+  std::int32_t last_tile_ = 0;
+  int last_lane_ = 0;
+
+  // Points evaluated in this descent: several ball leaves meet the same point.
+  static constexpr std::size_t kVisitedSize = 512;
+  struct Visit {
+    std::uint32_t epoch = 0, key = 0;
+  };
+  std::array<Visit, kVisitedSize> visited_{};
+  std::uint32_t epoch_ = 0;
+};
+
+}  // namespace ist

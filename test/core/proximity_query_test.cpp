@@ -1,0 +1,294 @@
+#include "ist_proximity/proximity/proximity_query.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::vector<TriangleMesh> link_meshes() {
+  return {test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 24, 12), test::box({0.05, 0.1, 0.2}),
+          test::thin_plate(0.1, 0.001), test::icosphere(0.08, 2)};
+}
+
+std::vector<Shape> shapes_of(const std::vector<TriangleMesh>& meshes) {
+  return {meshes.begin(), meshes.end()};
+}
+
+std::vector<Eigen::Vector3d> random_cloud(test::Rng* rng, int kind, int count) {
+  std::vector<Eigen::Vector3d> points;
+  const Eigen::Vector3d middle = test::random_vector(rng, 0.4);
+  const Eigen::Vector3d a = test::random_vector(rng, 0.5), b = test::random_vector(rng, 0.5);
+  for (int i = 0; i < count; ++i) {
+    const double s = test::uniform(rng, -1, 1), t = test::uniform(rng, -1, 1);
+    switch (kind % 4) {
+      case 0: points.push_back(test::random_vector(rng, 0.6)); break;      // a volume
+      case 1: points.push_back(middle + s * a + t * b); break;             // a plane
+      case 2: points.push_back(middle + s * a); break;                     // a line
+      default: points.push_back(middle + test::random_vector(rng, 0.05));  // a cluster
+    }
+  }
+  return points;
+}
+
+// Points as the index holds them: what a query can be exact about.
+std::vector<Eigen::Vector3d> stored_points(const CloudSnapshot& snapshot,
+                                           const Eigen::Isometry3d& X_LF) {
+  std::vector<Eigen::Vector3d> points;
+  for (const PointTile& tile : snapshot.index.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      points.push_back(X_LF * (snapshot.index.origin() +
+                               Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k])));
+    }
+  }
+  return points;
+}
+
+void expect_consistent(const LinkProximity& result, const Eigen::Isometry3d& X_FL) {
+  if (result.state < LinkState::kNear) return;
+  EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
+  EXPECT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
+  EXPECT_LT((X_FL * result.p_LL - result.p_FL).norm(), 1e-12);
+  EXPECT_EQ(result.state == LinkState::kContact, result.distance < 0.0);
+  EXPECT_LE(result.lower_bound, result.distance);
+}
+
+class AgainstOracle : public ::testing::TestWithParam<double> {};
+
+TEST_P(AgainstOracle, RandomScenes) {
+  const double tolerance = GetParam();
+  test::Rng rng(11);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  const auto model = test::make_model(shapes_of(meshes), 0.005);
+  QueryConfig config;
+  config.tolerance = tolerance;
+  config.max_distance = 0.3;
+  ProximityQuery query(model, config);
+  std::vector<LinkProximity> results;
+  std::vector<Eigen::Isometry3d> X_FL(meshes.size());
+  const std::vector<bool> known(meshes.size(), true);
+  int clear = 0, near = 0, contact = 0;
+  for (int scene = 0; scene < 60; ++scene) {
+    const CloudSnapshot snapshot =
+        test::make_snapshot(random_cloud(&rng, scene, 1 + scene * 7), test::random_vector(&rng, 1));
+    for (int step = 0; step < 4; ++step) {  // later steps start warm
+      for (Eigen::Isometry3d& X : X_FL) {
+        X = step == 0 ? test::random_pose(&rng, 0.4) : Eigen::Isometry3d(X * test::random_pose(&rng, 0.01));
+      }
+      ASSERT_TRUE(query.run(X_FL, known, {&snapshot}, &results));
+      for (std::size_t i = 0; i < meshes.size(); ++i) {
+        const double truth =
+            test::oracle_minimum(meshes[i], stored_points(snapshot, X_FL[i].inverse()));
+        const LinkProximity& result = results[i];
+        expect_consistent(result, X_FL[i]);
+        if (result.state == LinkState::kClear) {
+          ++clear;
+          ASSERT_GE(truth, config.max_distance);
+          ASSERT_EQ(result.distance, kInfinity);
+          ASSERT_GE(result.lower_bound, config.max_distance);
+          continue;
+        }
+        result.state == LinkState::kNear ? ++near : ++contact;
+        ASSERT_LE(result.lower_bound, truth);
+        ASSERT_GE(result.distance, truth - 1e-9);
+        ASSERT_EQ(truth < 0.0, result.state == LinkState::kContact);
+        ASSERT_LE(result.distance - result.lower_bound, tolerance + 2e-6);
+      }
+    }
+  }
+  EXPECT_GT(clear, 50);
+  EXPECT_GT(near, 200);
+  EXPECT_GT(contact, 50);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, AgainstOracle, ::testing::Values(0.0, 0.001, 0.02));
+
+TEST(ProximityQuery, WarmStartNeverChangesTheAnswer) {
+  test::Rng rng(12);
+  const auto model = test::make_model(shapes_of(link_meshes()), 0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  config.max_distance = 5.0;
+  ProximityQuery warm(model, config);
+  const CloudSnapshot snapshot = test::make_snapshot(random_cloud(&rng, 0, 2000));
+  std::vector<Eigen::Isometry3d> X_FL(model->links.size(), Eigen::Isometry3d::Identity());
+  const std::vector<bool> known(model->links.size(), true);
+  std::vector<LinkProximity> a, b;
+  for (int step = 0; step < 300; ++step) {
+    for (Eigen::Isometry3d& X : X_FL) X = X * test::random_pose(&rng, 0.003);
+    ProximityQuery cold(model, config);
+    warm.run(X_FL, known, {&snapshot}, &a);
+    cold.run(X_FL, known, {&snapshot}, &b);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].state, b[i].state);
+      ASSERT_NEAR(a[i].distance, b[i].distance, 1e-9);
+    }
+  }
+}
+
+TEST(ProximityQuery, SeveralCloudsAreOneObstacle) {
+  test::Rng rng(13);
+  const auto model = test::make_model({Sphere{0.1}, Box{{0.1, 0.1, 0.1}}}, 0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  const CloudSnapshot far = test::make_snapshot({{0.9, 0, 0}}), near = test::make_snapshot({{0, 0.5, 0}}),
+                      nothing = test::make_snapshot({});
+  const std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results;
+  query.run(X_FL, {true, true}, {&far, &nothing, &near}, &results);
+  EXPECT_NEAR(results[0].distance, 0.4, 1e-6);
+  EXPECT_NEAR(results[1].distance, 0.45, 1e-6);
+  EXPECT_EQ(results[0].source, 2);
+  query.run(X_FL, {true, true}, {&far}, &results);
+  EXPECT_NEAR(results[0].distance, 0.8, 1e-6) << "the point of the other cloud is gone";
+  query.run(X_FL, {true, true}, {&nothing}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kClear);
+  EXPECT_EQ(results[0].lower_bound, config.max_distance);
+}
+
+TEST(ProximityQuery, WhatIsNotKnownIsUnknown) {
+  const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}}, 0.005);
+  model->links[1].error = "mesh is missing";
+  ProximityQuery query(model, {});
+  const CloudSnapshot snapshot = test::make_snapshot({{0.3, 0, 0}});
+  const std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results;
+  const auto expect_unknown = [](const LinkProximity& result) {
+    EXPECT_EQ(result.state, LinkState::kUnknown);
+    EXPECT_TRUE(std::isnan(result.distance));
+    EXPECT_EQ(result.lower_bound, -kInfinity);
+    EXPECT_TRUE(result.p_FL.array().isNaN().all() && result.direction.array().isNaN().all());
+  };
+  query.run(X_FL, {true, true}, {&snapshot}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kNear);
+  expect_unknown(results[1]);
+  query.run(X_FL, {false, true}, {&snapshot}, &results);
+  expect_unknown(results[0]);
+  query.run(X_FL, {true, true}, {}, &results);
+  expect_unknown(results[0]);
+}
+
+TEST(ProximityQuery, MarginLowersTheBoundAndWidensTheSearch) {
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  config.margin = 0.05;
+  ProximityQuery query(model, config);
+  const std::vector<Eigen::Isometry3d> X_FL(1, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results;
+  const CloudSnapshot near = test::make_snapshot({{0.5, 0, 0}});
+  query.run(X_FL, {true}, {&near}, &results);
+  EXPECT_NEAR(results[0].distance, 0.4, 1e-6);
+  EXPECT_NEAR(results[0].lower_bound, 0.35, 1e-5);
+  const CloudSnapshot edge = test::make_snapshot({{1.12, 0, 0}});
+  query.run(X_FL, {true}, {&edge}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kNear) << "1.02 m less the margin is not proven to be 1 m";
+  const CloudSnapshot far = test::make_snapshot({{1.2, 0, 0}});
+  query.run(X_FL, {true}, {&far}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kClear);
+}
+
+TEST(ProximityQuery, BoundsHoldWheneverTheDeadlinePasses) {
+  test::Rng rng(14);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  const auto model = test::make_model(shapes_of(meshes), 0.005);
+  QueryConfig config;
+  config.max_distance = 2.0;
+  const std::vector<bool> known(meshes.size(), true);
+  std::vector<Eigen::Isometry3d> X_FL(meshes.size());
+  std::vector<LinkProximity> results;
+  ProximityQuery query(model, config);
+  int unfinished = 0;
+  for (int i = 0; i < 200; ++i) {
+    const CloudSnapshot snapshot = test::make_snapshot(random_cloud(&rng, i, 1500));
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.3);
+    config.deadline = 1e-7 * std::pow(10.0, test::uniform(&rng, 0.0, 4.0));
+    query.set_config(config);
+    if (!query.run(X_FL, known, {&snapshot}, &results)) ++unfinished;
+    for (std::size_t k = 0; k < meshes.size(); ++k) {
+      if (results[k].state == LinkState::kUnknown) continue;
+      const double truth =
+          test::oracle_minimum(meshes[k], stored_points(snapshot, X_FL[k].inverse()));
+      expect_consistent(results[k], X_FL[k]);
+      ASSERT_LE(results[k].lower_bound, std::min(truth, config.max_distance));
+      ASSERT_GE(results[k].distance, std::min(truth, config.max_distance) - 1e-9);
+    }
+  }
+  EXPECT_GT(unfinished, 20);
+}
+
+TEST(ProximityQuery, FarFromTheOriginNothingIsLost) {
+  test::Rng rng(15);
+  const auto model = test::make_model(shapes_of(link_meshes()), 0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  config.max_distance = 5.0;
+  const Eigen::Vector3d far(1e6, -2e6, 5e5);
+  const std::vector<Eigen::Vector3d> points = random_cloud(&rng, 0, 500);
+  std::vector<Eigen::Vector3d> far_points;
+  for (const Eigen::Vector3d& p : points) far_points.push_back(p + far);
+  const CloudSnapshot here = test::make_snapshot(points), there = test::make_snapshot(far_points, far);
+  std::vector<Eigen::Isometry3d> X_here(model->links.size()), X_there;
+  for (Eigen::Isometry3d& X : X_here) {
+    X = test::random_pose(&rng, 0.5);
+    X_there.push_back(Eigen::Translation3d(far) * X);
+  }
+  const std::vector<bool> known(model->links.size(), true);
+  std::vector<LinkProximity> a, b;
+  ProximityQuery(model, config).run(X_here, known, {&here}, &a);
+  ProximityQuery(model, config).run(X_there, known, {&there}, &b);
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i].distance, b[i].distance, 1e-6);
+}
+
+TEST(ProximityQuery, PointsOnTheSurfaceAndAtCentres) {
+  const auto model =
+      test::make_model({Sphere{0.1}, Box{{0.2, 0.2, 0.2}}, Shape(test::box({0.2, 0.2, 0.2}))}, 0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  const std::vector<Eigen::Isometry3d> X_FL(3, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results;
+  for (const Eigen::Vector3d& p :
+       {Eigen::Vector3d(0.1, 0, 0), Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.1, 0.1, 0.1),
+        Eigen::Vector3d(0.1, 0.1, 0), Eigen::Vector3d(1e-300, 0, 0)}) {
+    const CloudSnapshot snapshot = test::make_snapshot(std::vector<Eigen::Vector3d>(40, p));
+    query.run(X_FL, {true, true, true}, {&snapshot}, &results);
+    for (const LinkProximity& result : results) {
+      ASSERT_GE(result.state, LinkState::kNear);
+      EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
+      expect_consistent(result, Eigen::Isometry3d::Identity());
+    }
+    const Eigen::Vector3d outside = p.cwiseAbs() - Eigen::Vector3d::Constant(0.1);
+    EXPECT_NEAR(results[1].distance, outside.maxCoeff(), 1e-7);
+    EXPECT_NEAR(results[2].distance, results[1].distance, 1e-7);
+  }
+}
+
+TEST(IsRigid, RefusesWhatIsNoRotation) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  EXPECT_TRUE(is_rigid(X));
+  X.linear() *= 1.001;
+  EXPECT_FALSE(is_rigid(X)) << "scaled";
+  X.setIdentity();
+  X.linear()(2, 2) = -1.0;
+  EXPECT_FALSE(is_rigid(X)) << "mirrored";
+  X.setIdentity();
+  X.translation().y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(is_rigid(X));
+  X.setIdentity();
+  X.linear()(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(is_rigid(X));
+}
+
+}  // namespace
+}  // namespace ist
