@@ -22,14 +22,9 @@ struct ClosestPoint {
 Eigen::Vector3d closest_point_on_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                           const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 
-/// Solid angle of triangle abc seen from p, divided by 4 pi (van Oosterom and Strackee, 1983);
-/// positive when p sees the back of a counter-clockwise triangle.
-double winding_of_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
-                           const Eigen::Vector3d& b, const Eigen::Vector3d& c);
-
-/// Bounding volume hierarchy over the triangles of one mesh: exact closest point, and the
-/// generalized winding number (Jacobson et al. 2013) by a hierarchical expansion (Barill et al.
-/// 2018). Immutable after construction; const members are thread safe and allocate nothing.
+/// Bounding volume hierarchy over the triangles of one mesh: exact closest point, and generalized
+/// winding number. Eight children or triangles are tested at a time in float; what survives is
+/// evaluated in double. Immutable; const members are thread safe and allocate nothing.
 class TriangleBvh {
  public:
   TriangleBvh() = default;
@@ -43,41 +38,71 @@ class TriangleBvh {
       const Eigen::Vector3d& p_M,
       double max_distance_sq = std::numeric_limits<double>::infinity()) const;
 
-  /// Generalized winding number at p_M: about 1 inside, 0 outside, in between near holes.
-  /// Error below 0.01.
+  /// Generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
+  /// between near holes. By a hierarchical expansion of second order (Barill et al. 2018); error
+  /// below 0.01.
   double winding_number(const Eigen::Vector3d& p_M) const;
 
   /// As winding_number, several times faster; error below kQuickWindingError.
   double quick_winding_number(const Eigen::Vector3d& p_M) const;
   static constexpr double kQuickWindingError = 0.06;
 
-  /// winding_number(p_M) > 0.5; evaluated without expansion where it would decide.
+  /// winding_number(p_M) > 0.5; evaluated with care where the quick one could be wrong.
   bool is_inside(const Eigen::Vector3d& p_M) const;
 
   std::size_t size() const { return triangles_.size(); }
-  Eigen::AlignedBox3d bounds() const { return nodes_.empty() ? Eigen::AlignedBox3d() : nodes_[0].box; }
+  const Eigen::AlignedBox3d& bounds() const { return bounds_; }
 
- private:
+  static constexpr std::size_t kWidth = 8;
+
+  /// Boxes of up to eight children, rounded outward; unused slots are far away.
+  struct alignas(32) Boxes {
+    float min[3][kWidth], max[3][kWidth];  ///< [m] from the middle of the mesh's box
+    std::int32_t child[kWidth];            ///< >= 0: node; < 0: leaf ~child
+    std::int32_t count;                    ///< used slots, at the front
+  };
+
+  /// Expansions of the same children's winding numbers about their own centres.
+  struct alignas(32) Moments {
+    float x[kWidth], y[kWidth], z[kWidth];     ///< [m] centre
+    float radius_sq[kWidth];                   ///< [m^2] of the triangles about the centre
+    float nx[kWidth], ny[kWidth], nz[kWidth];  ///< [m^2] sum of area-weighted normals
+    /// [m^3] symmetric part of the sum of (centroid - centre) normal^T
+    float qxx[kWidth], qyy[kWidth], qzz[kWidth], qxy[kWidth], qxz[kWidth], qyz[kWidth];
+  };
+
+  /// Corners of up to eight triangles; unused slots repeat a corner.
+  struct alignas(32) Leaf {
+    float corner[9][kWidth];  ///< [m] ax ay az bx by bz cx cy cz
+    std::uint32_t first;      ///< triangle of slot 0; the others follow
+    std::uint32_t count;
+  };
+
+  /// The same triangles in double.
   struct Triangle {
     Eigen::Vector3d a, b, c;
-    std::uint32_t index;
-  };
-  struct Node {
-    Eigen::AlignedBox3d box;
-    std::uint32_t first = 0;  ///< leaf: first triangle; inner: index of the right child
-    std::uint32_t count = 0;  ///< leaf: how many; inner: 0 (the left child is the next node)
-    Eigen::Vector3d dipole_center = Eigen::Vector3d::Zero();
-    Eigen::Vector3d dipole = Eigen::Vector3d::Zero();  ///< sum of area-weighted normals [m^2]
-    Eigen::Matrix3d quadrupole = Eigen::Matrix3d::Zero();  ///< sum of (centroid - center) n^T [m^3]
-    double radius = 0.0;  ///< [m] of the triangles about dipole_center
+    std::uint32_t index;  ///< in the mesh
   };
 
-  std::uint32_t build(std::uint32_t first, std::uint32_t last, int depth);
-  void sum_moments(std::uint32_t node);
-  double winding(const Eigen::Vector3d& p_M, double beta) const;
+  /// What the kernels read.
+  struct View {
+    const Boxes* boxes;
+    const Moments* moments;
+    const Leaf* leaves;
+    const Triangle* triangles;
+    Eigen::Vector3d origin;  ///< middle of the mesh's box
+    double radius;           ///< [m] half its diagonal
+  };
 
+ private:
+  friend class TriangleBvhBuilder;
+  View view() const;
+
+  std::vector<Boxes> boxes_;      // by node; node 0 is the root
+  std::vector<Moments> moments_;  // by node
+  std::vector<Leaf> leaves_;
   std::vector<Triangle> triangles_;
-  std::vector<Node> nodes_;
+  Eigen::AlignedBox3d bounds_;
 };
 
 }  // namespace ist

@@ -1,0 +1,174 @@
+#include "geometry/triangle_bvh_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace ist {
+namespace {
+
+constexpr float kFar = 1e9F;
+
+Eigen::Vector3d centroid(const TriangleBvh::Triangle& t) { return (t.a + t.b + t.c) / 3.0; }
+
+Eigen::Vector3d area_normal(const TriangleBvh::Triangle& t) {
+  return 0.5 * (t.b - t.a).cross(t.c - t.a);
+}
+
+float round_up(double value) {
+  const auto nearest = static_cast<float>(value);
+  return nearest >= value ? nearest : std::nextafter(nearest, std::numeric_limits<float>::max());
+}
+
+}  // namespace
+
+void TriangleBvhBuilder::run() {
+  bvh_.triangles_.reserve(mesh_.triangles.size());
+  for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+    bvh_.triangles_.push_back({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2), t});
+    for (int k = 0; k < 3; ++k) bvh_.bounds_.extend(mesh_.corner(t, k));
+  }
+  if (bvh_.triangles_.empty()) return;
+  origin_ = bvh_.bounds_.center();
+  add_node({0, static_cast<std::uint32_t>(bvh_.triangles_.size())});
+}
+
+// Median along the longest axis of the centroids.
+std::uint32_t TriangleBvhBuilder::split(const Range& range) {
+  std::vector<TriangleBvh::Triangle>& triangles = bvh_.triangles_;
+  Eigen::AlignedBox3d box;
+  for (std::uint32_t t = range.first; t < range.second; ++t) box.extend(centroid(triangles[t]));
+  Eigen::Index axis;
+  box.sizes().maxCoeff(&axis);
+  const std::uint32_t middle = range.first + (range.second - range.first) / 2;
+  const auto key = [axis](const TriangleBvh::Triangle& t) {
+    return t.a[axis] + t.b[axis] + t.c[axis];
+  };
+  std::nth_element(triangles.begin() + range.first, triangles.begin() + middle,
+                   triangles.begin() + range.second,
+                   [&](const TriangleBvh::Triangle& s, const TriangleBvh::Triangle& t) {
+                     const double ks = key(s), kt = key(t);
+                     return ks < kt || (ks == kt && s.index < t.index);
+                   });
+  return middle;
+}
+
+std::int32_t TriangleBvhBuilder::add_node(const Range& range) {
+  constexpr auto kWidth = static_cast<std::uint32_t>(TriangleBvh::kWidth);
+  const std::size_t index = bvh_.boxes_.size();
+  bvh_.boxes_.emplace_back();
+  bvh_.moments_.emplace_back();
+  std::vector<Range> groups{range};
+  for (int level = 0; level < 3; ++level) {
+    std::vector<Range> halves;
+    for (const Range& group : groups) {
+      if (group.second - group.first <= kWidth) {
+        halves.push_back(group);
+        continue;
+      }
+      const std::uint32_t middle = split(group);
+      halves.push_back({group.first, middle});
+      halves.push_back({middle, group.second});
+    }
+    groups = std::move(halves);
+  }
+  TriangleBvh::Boxes boxes{};
+  TriangleBvh::Moments moments{};
+  boxes.count = static_cast<std::int32_t>(groups.size());
+  for (std::size_t slot = 0; slot < kWidth; ++slot) {
+    if (slot >= groups.size()) {
+      // Far from everything: never nearest, and adds nothing to a winding number.
+      for (int axis = 0; axis < 3; ++axis) boxes.min[axis][slot] = boxes.max[axis][slot] = kFar;
+      moments.x[slot] = moments.y[slot] = moments.z[slot] = kFar;
+      continue;
+    }
+    const Range& group = groups[slot];
+    set_box(group, &boxes, slot);
+    set_moments(group, &moments, slot);
+    boxes.child[slot] = group.second - group.first <= kWidth ? ~add_leaf(group) : add_node(group);
+  }
+  bvh_.boxes_[index] = boxes;
+  bvh_.moments_[index] = moments;
+  return static_cast<std::int32_t>(index);
+}
+
+std::int32_t TriangleBvhBuilder::add_leaf(const Range& range) {
+  TriangleBvh::Leaf leaf{};
+  leaf.first = range.first;
+  leaf.count = range.second - range.first;
+  for (std::uint32_t slot = 0; slot < TriangleBvh::kWidth; ++slot) {
+    // Unused slots: three times the same corner of the last triangle, which has no solid angle.
+    const bool used = slot < leaf.count;
+    const TriangleBvh::Triangle& t = bvh_.triangles_[range.first + std::min(slot, leaf.count - 1)];
+    const Eigen::Vector3d corners[3] = {t.a, used ? t.b : t.a, used ? t.c : t.a};
+    for (int corner = 0; corner < 3; ++corner) {
+      for (int axis = 0; axis < 3; ++axis) {
+        leaf.corner[3 * corner + axis][slot] =
+            static_cast<float>(corners[corner][axis] - origin_[axis]);
+      }
+    }
+  }
+  bvh_.leaves_.push_back(leaf);
+  return static_cast<std::int32_t>(bvh_.leaves_.size()) - 1;
+}
+
+void TriangleBvhBuilder::set_box(const Range& range, TriangleBvh::Boxes* boxes,
+                                 std::size_t slot) const {
+  Eigen::AlignedBox3d box;
+  for (std::uint32_t t = range.first; t < range.second; ++t) {
+    const TriangleBvh::Triangle& triangle = bvh_.triangles_[t];
+    box.extend(triangle.a).extend(triangle.b).extend(triangle.c);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    boxes->min[axis][slot] = -round_up(origin_[axis] - box.min()[axis]);
+    boxes->max[axis][slot] = round_up(box.max()[axis] - origin_[axis]);
+  }
+}
+
+// About the area-weighted centroid (Barill et al. 2018, section 3.2).
+void TriangleBvhBuilder::set_moments(const Range& range, TriangleBvh::Moments* moments,
+                                     std::size_t slot) const {
+  double area = 0.0;
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero(), plain = Eigen::Vector3d::Zero();
+  Eigen::Vector3d dipole = Eigen::Vector3d::Zero();
+  for (std::uint32_t i = range.first; i < range.second; ++i) {
+    const Eigen::Vector3d n = area_normal(bvh_.triangles_[i]);
+    const Eigen::Vector3d middle = centroid(bvh_.triangles_[i]) - origin_;
+    area += n.norm();
+    weighted += n.norm() * middle;
+    plain += middle;
+    dipole += n;
+  }
+  const double count = range.second - range.first;
+  const Eigen::Vector3d center = Eigen::Vector3d(area > 0.0 ? weighted / area : plain / count)
+                                     .cast<float>()
+                                     .cast<double>();
+  Eigen::Matrix3d quadrupole = Eigen::Matrix3d::Zero();
+  double radius_sq = 0.0;
+  for (std::uint32_t i = range.first; i < range.second; ++i) {
+    const TriangleBvh::Triangle& t = bvh_.triangles_[i];
+    quadrupole += (centroid(t) - origin_ - center) * area_normal(t).transpose();
+    for (const Eigen::Vector3d& corner : {t.a, t.b, t.c}) {
+      radius_sq = std::max(radius_sq, (corner - origin_ - center).squaredNorm());
+    }
+  }
+  const auto set = [slot](float* values, double value) {
+    values[slot] = static_cast<float>(value);
+  };
+  set(moments->x, center.x());
+  set(moments->y, center.y());
+  set(moments->z, center.z());
+  set(moments->radius_sq, radius_sq);
+  set(moments->nx, dipole.x());
+  set(moments->ny, dipole.y());
+  set(moments->nz, dipole.z());
+  set(moments->qxx, quadrupole(0, 0));
+  set(moments->qyy, quadrupole(1, 1));
+  set(moments->qzz, quadrupole(2, 2));
+  set(moments->qxy, 0.5 * (quadrupole(0, 1) + quadrupole(1, 0)));
+  set(moments->qxz, 0.5 * (quadrupole(0, 2) + quadrupole(2, 0)));
+  set(moments->qyz, 0.5 * (quadrupole(1, 2) + quadrupole(2, 1)));
+}
+
+}  // namespace ist

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+
+#include "ist_proximity/geometry/triangle_bvh.h"
+
+namespace ist {
+
+/// Sorts a mesh's triangles into an 8-wide tree: three median splits a level.
+class TriangleBvhBuilder {
+ public:
+  TriangleBvhBuilder(const TriangleMesh& mesh, TriangleBvh* bvh) : mesh_(mesh), bvh_(*bvh) {}
+  void run();
+
+ private:
+  using Range = std::pair<std::uint32_t, std::uint32_t>;
+
+  std::int32_t add_node(const Range& range);
+  std::int32_t add_leaf(const Range& range);
+  std::uint32_t split(const Range& range);
+  void set_box(const Range& range, TriangleBvh::Boxes* boxes, std::size_t slot) const;
+  void set_moments(const Range& range, TriangleBvh::Moments* moments, std::size_t slot) const;
+
+  const TriangleMesh& mesh_;
+  TriangleBvh& bvh_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace ist

@@ -1,0 +1,166 @@
+// Compiled once per instruction set; the best one there is gets chosen at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "geometry/winding_kernel.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <cmath>
+
+#include "geometry/triangle_kernels.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr std::size_t kWindingWidth = TriangleBvh::kWidth;
+using WindingTag = hn::CappedTag<float, kWindingWidth>;
+
+// Lane by lane, adds angles by multiplying their phasors: one arctangent for many small angles.
+struct Angles {
+  alignas(32) float re[kWindingWidth], im[kWindingWidth];
+  double sum = 0.0;  // of what was put aside
+
+  Angles() {
+    for (std::size_t k = 0; k < kWindingWidth; ++k) {
+      re[k] = 1.0F;
+      im[k] = 0.0F;
+    }
+  }
+};
+
+template <class V>
+HWY_INLINE V Dot(V ax, V ay, V az, V bx, V by, V bz) {
+  return hn::MulAdd(ax, bx, hn::MulAdd(ay, by, hn::Mul(az, bz)));
+}
+
+// Half the solid angle of each triangle, as a phasor (van Oosterom and Strackee 1983).
+HWY_INLINE void AddTriangles(const TriangleBvh::Leaf& leaf, const float* p, Angles* angles) {
+  const WindingTag d;
+  for (std::size_t k = 0; k < kWindingWidth; k += hn::Lanes(d)) {
+    const auto px = hn::Set(d, p[0]), py = hn::Set(d, p[1]), pz = hn::Set(d, p[2]);
+    const auto load = [&](int row) { return hn::Load(d, leaf.corner[row] + k); };
+    const auto ax = hn::Sub(load(0), px), ay = hn::Sub(load(1), py), az = hn::Sub(load(2), pz);
+    const auto bx = hn::Sub(load(3), px), by = hn::Sub(load(4), py), bz = hn::Sub(load(5), pz);
+    const auto cx = hn::Sub(load(6), px), cy = hn::Sub(load(7), py), cz = hn::Sub(load(8), pz);
+    const auto la = hn::Sqrt(Dot(ax, ay, az, ax, ay, az));
+    const auto lb = hn::Sqrt(Dot(bx, by, bz, bx, by, bz));
+    const auto lc = hn::Sqrt(Dot(cx, cy, cz, cx, cy, cz));
+    // b x c
+    const auto nx = hn::Sub(hn::Mul(by, cz), hn::Mul(bz, cy));
+    const auto ny = hn::Sub(hn::Mul(bz, cx), hn::Mul(bx, cz));
+    const auto nz = hn::Sub(hn::Mul(bx, cy), hn::Mul(by, cx));
+    const auto det = Dot(ax, ay, az, nx, ny, nz);
+    const auto side = hn::MulAdd(
+        hn::Mul(la, lb), lc,
+        hn::MulAdd(Dot(ax, ay, az, bx, by, bz), lc,
+                   hn::MulAdd(Dot(bx, by, bz, cx, cy, cz), la,
+                              hn::Mul(Dot(cx, cy, cz, ax, ay, az), lb))));
+    // Unit phasors, so that products stay in range; nothing where the point is in the plane.
+    const auto zero = hn::Zero(d);
+    const auto size = hn::Add(hn::Abs(det), hn::Abs(side));
+    const auto is_something = hn::Ne(det, zero);
+    const auto scale = hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(is_something, size, hn::Set(d, 1.0F)));
+    const auto re = hn::IfThenElse(is_something, hn::Mul(side, scale), hn::Set(d, 1.0F));
+    const auto im = hn::IfThenElse(is_something, hn::Mul(det, scale), zero);
+    const auto old_re = hn::Load(d, angles->re + k), old_im = hn::Load(d, angles->im + k);
+    auto new_re = hn::Sub(hn::Mul(old_re, re), hn::Mul(old_im, im));
+    auto new_im = hn::MulAdd(old_re, im, hn::Mul(old_im, re));
+    // Both below a right angle: the sum cannot wrap. Past it, both are put aside.
+    const auto fits = hn::And(hn::Gt(re, zero), hn::Gt(new_re, zero));
+    if (!hn::AllTrue(d, fits)) {
+      alignas(64) float r[kWindingWidth], i[kWindingWidth], keep[kWindingWidth];
+      hn::Store(re, d, r);
+      hn::Store(im, d, i);
+      hn::Store(hn::IfThenElse(fits, hn::Set(d, 1.0F), zero), d, keep);
+      for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+        if (keep[lane] != 0.0F) continue;
+        angles->sum += std::atan2(static_cast<double>(i[lane]), static_cast<double>(r[lane])) +
+                       std::atan2(static_cast<double>(angles->im[k + lane]),
+                                  static_cast<double>(angles->re[k + lane]));
+      }
+      new_re = hn::IfThenElse(fits, new_re, hn::Set(d, 1.0F));
+      new_im = hn::IfThenElse(fits, new_im, zero);
+    }
+    const auto norm = hn::Div(hn::Set(d, 1.0F), hn::Add(hn::Abs(new_re), hn::Abs(new_im)));
+    hn::Store(hn::Mul(new_re, norm), d, angles->re + k);
+    hn::Store(hn::Mul(new_im, norm), d, angles->im + k);
+  }
+}
+
+double SumWinding(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, float beta) {
+  const Eigen::Vector3d local = p_M - tree.origin;
+  const float p[3] = {static_cast<float>(local.x()), static_cast<float>(local.y()),
+                      static_cast<float>(local.z())};
+  const float beta_sq = beta * beta;
+  const WindingTag d;
+  std::int32_t stack[256];
+  std::size_t top = 0;
+  stack[top++] = 0;
+  Angles angles;
+  alignas(32) float far_sums[kWindingWidth] = {};
+  while (top > 0) {
+    const std::int32_t index = stack[--top];
+    const TriangleBvh::Moments& node = tree.moments[index];
+    alignas(64) float near[kWindingWidth];
+    for (std::size_t k = 0; k < kWindingWidth; k += hn::Lanes(d)) {
+      const auto dx = hn::Sub(hn::Load(d, node.x + k), hn::Set(d, p[0]));
+      const auto dy = hn::Sub(hn::Load(d, node.y + k), hn::Set(d, p[1]));
+      const auto dz = hn::Sub(hn::Load(d, node.z + k), hn::Set(d, p[2]));
+      const auto distance_sq = Dot(dx, dy, dz, dx, dy, dz);
+      const auto is_far =
+          hn::Gt(distance_sq, hn::Mul(hn::Set(d, beta_sq), hn::Load(d, node.radius_sq + k)));
+      const auto inverse = hn::Div(hn::Set(d, 1.0F), hn::Sqrt(distance_sq));
+      const auto inverse_sq = hn::Mul(inverse, inverse);
+      const auto qxx = hn::Load(d, node.qxx + k), qyy = hn::Load(d, node.qyy + k),
+                 qzz = hn::Load(d, node.qzz + k);
+      const auto qxy = hn::Load(d, node.qxy + k), qxz = hn::Load(d, node.qxz + k),
+                 qyz = hn::Load(d, node.qyz + k);
+      const auto dipole = Dot(dx, dy, dz, hn::Load(d, node.nx + k), hn::Load(d, node.ny + k),
+                              hn::Load(d, node.nz + k));
+      const auto qdx = Dot(qxx, qxy, qxz, dx, dy, dz);
+      const auto qdy = Dot(qxy, qyy, qyz, dx, dy, dz);
+      const auto qdz = Dot(qxz, qyz, qzz, dx, dy, dz);
+      const auto dqd = Dot(dx, dy, dz, qdx, qdy, qdz);
+      const auto trace = hn::Add(qxx, hn::Add(qyy, qzz));
+      const auto moments = hn::Add(
+          dipole, hn::NegMulAdd(hn::Mul(hn::Set(d, 3.0F), inverse_sq), dqd, trace));
+      const auto term = hn::Mul(moments, hn::Mul(inverse, inverse_sq));
+      const auto kept = hn::IfThenElse(is_far, term, hn::Zero(d));
+      hn::Store(hn::Add(hn::Load(d, far_sums + k), kept), d, far_sums + k);
+      hn::Store(hn::IfThenElse(is_far, hn::Zero(d), hn::Set(d, 1.0F)), d, near + k);
+    }
+    for (std::size_t k = 0; k < kWindingWidth; ++k) {
+      if (near[k] == 0.0F) continue;
+      const std::int32_t child = tree.boxes[index].child[k];
+      if (child < 0) {
+        AddTriangles(tree.leaves[~child], p, &angles);
+      } else {
+        stack[top++] = child;
+      }
+    }
+  }
+  double near_sum = angles.sum, far_sum = 0.0;
+  for (std::size_t k = 0; k < kWindingWidth; ++k) {
+    near_sum += std::atan2(static_cast<double>(angles.im[k]), static_cast<double>(angles.re[k]));
+    far_sum += static_cast<double>(far_sums[k]);
+  }
+  constexpr double kFourPi = 12.566370614359172;
+  return (far_sum + 2.0 * near_sum) / kFourPi;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace ist
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(SumWinding);
+
+double sum_winding(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, float beta) {
+  return HWY_DYNAMIC_DISPATCH(SumWinding)(tree, p_M, beta);
+}
+
+}  // namespace ist
+#endif
