@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace ist {
@@ -44,19 +45,24 @@ std::uint32_t BallSearch::build(std::uint32_t first, std::uint32_t last) {
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   Eigen::AlignedBox3d box;
-  double max_weight = 0.0;
+  double max_weight = 0.0, min_weight = std::numeric_limits<double>::infinity();
   for (std::uint32_t i = first; i < last; ++i) {
     box.extend(balls_[order_[i]].center);
     max_weight = std::max(max_weight, balls_[order_[i]].weight);
+    min_weight = std::min(min_weight, balls_[order_[i]].weight);
   }
   nodes_[index] = {box, max_weight, first, last - first};
   if (last - first <= kLeafSize) return index;
+  // The radius is a fourth axis: large balls among small ones would loosen the bound of all.
   Eigen::Index axis;
-  box.sizes().maxCoeff(&axis);
+  const bool by_weight = max_weight - min_weight > box.sizes().maxCoeff(&axis);
+  const auto key = [&](std::uint32_t ball) {
+    return by_weight ? balls_[ball].weight : balls_[ball].center[axis];
+  };
   const std::uint32_t middle = first + (last - first) / 2;
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last,
                    [&](std::uint32_t a, std::uint32_t b) {
-                     const double ca = balls_[a].center[axis], cb = balls_[b].center[axis];
+                     const double ca = key(a), cb = key(b);
                      return ca < cb || (ca == cb && a < b);
                    });
   build(first, middle);

@@ -44,7 +44,7 @@ void LinkQuery::start(const Eigen::Isometry3d& X_FL,
   ++epoch_;
   // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
   dropped_ = -link_->tree.radius();
-  rounding_ = 0.0;
+  rounding_ = reach_ = 0.0;
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     if (last_generation_ == 0 || clouds[i]->index.generation() != last_generation_) continue;
     enter(*clouds[i], static_cast<std::int32_t>(i));
@@ -59,9 +59,10 @@ void LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index) {
   Eigen::Isometry3d X_OL = X_FL_;
   X_OL.translation() = p_OL;
   X_LO_ = X_OL.inverse();
-  const double scale = p_OL.cwiseAbs().maxCoeff() + link_->tree.center().norm() +
-                       link_->tree.radius() + config_.max_distance + config_.margin;
-  rounding_ = std::max(rounding_, kFloatError * scale);
+  const double reach =
+      p_OL.cwiseAbs().maxCoeff() + link_->tree.center().norm() + link_->tree.radius();
+  reach_ = std::max(reach_, reach);
+  rounding_ = std::max(rounding_, kFloatError * (reach + config_.max_distance + config_.margin));
 }
 
 Eigen::Vector3d LinkQuery::point_O(std::int32_t tile, int lane) const {
@@ -186,8 +187,6 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   result->reset();
   statistics_ = nullptr;
   last_generation_ = 0;
-  const double point_error = rounding_ * (kPointError / kFloatError);
-  const double proven = std::min(nearest_.exact.distance, dropped_) - point_error - config_.margin;
   if (nearest_.exact.distance > range()) {
     if (!complete_) return;  // UNKNOWN: nothing was measured, and not all was seen
     result->state = LinkState::kClear;
@@ -196,12 +195,15 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
     return;
   }
   const Nearest& nearest = nearest_;
+  // Points that could be nearer have coordinates no larger than this one's bound.
+  const double point_error = kPointError * (reach_ + std::abs(nearest.exact.distance));
   last_generation_ = clouds[static_cast<std::size_t>(nearest.cloud)]->index.generation();
   last_tile_ = nearest.tile;
   last_lane_ = nearest.lane;
   result->state = nearest.exact.distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = nearest.exact.distance;
-  result->lower_bound = proven;
+  result->lower_bound =
+      std::min(nearest.exact.distance, dropped_) - point_error - config_.margin;
   result->p_LL = nearest.exact.witness;
   result->p_FL = X_FL_ * nearest.exact.witness;
   result->p_FO = nearest.p_F;

@@ -73,6 +73,7 @@ class LinkQuery {
   Nearest nearest_;
   double dropped_ = 0.0;   ///< [m] smallest bound of all that was not evaluated
   double rounding_ = 0.0;  ///< [m] largest error of a float bound
+  double reach_ = 0.0;     ///< [m] largest coordinate of the link in the index's frame
   bool complete_ = false;
 
   // The cloud at work.

@@ -1,0 +1,112 @@
+// Error of the published distances against exact truth, as a Markdown table.
+//
+// Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: accuracy [max_error_mm ...]
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/data_dir.h"
+#include "support/truth.h"
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Tally {
+  std::vector<double> error, width, free_us, contact_us;  // [m], [m], [us], [us]
+  int violations = 0, wrong_state = 0;
+};
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  const auto at = std::min(values.size() - 1, static_cast<std::size_t>(q * static_cast<double>(values.size())));
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
+  return values[at];
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+}
+
+void measure(const std::shared_ptr<const ist::RobotModel>& model, const ist::QueryConfig& config,
+             const ist::CloudSnapshot& snapshot, const std::vector<ist::test::TruthCase>& cases,
+             Tally* tally) {
+  const std::vector<bool> known(ist::test::kPandaLinks, true);
+  ist::ProximityQuery query(model, config);
+  std::vector<ist::LinkProximity> results;
+  for (const ist::test::TruthCase& truth : cases) {
+    const Clock::time_point start = Clock::now();
+    query.run(truth.X_FL, known, {&snapshot}, &results);
+    const double us = 1e6 * seconds_since(start);
+    bool any_contact = false;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      const bool contact = truth.links[i].points_inside > 0;
+      any_contact = any_contact || contact;
+      tally->wrong_state += contact != (results[i].state == ist::LinkState::kContact) ? 1 : 0;
+      if (contact) continue;
+      const double exact = truth.links[i].distance;
+      tally->error.push_back(results[i].distance - exact);
+      tally->width.push_back(results[i].distance - results[i].lower_bound);
+      const bool holds = results[i].lower_bound <= exact + 1e-6 && exact <= results[i].distance + 1e-6;
+      tally->violations += holds ? 0 : 1;
+    }
+    (any_contact ? tally->contact_us : tally->free_us).push_back(us);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto data = ist::test::data_dir();
+  if (!data) {
+    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
+    return 1;
+  }
+  std::vector<double> max_errors;
+  for (int i = 1; i < argc; ++i) max_errors.push_back(1e-3 * std::atof(argv[i]));
+  if (max_errors.empty()) max_errors = {0.005, 0.002};
+  std::vector<std::pair<std::string, ist::CloudSnapshot>> clouds;
+  for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
+    clouds.emplace_back(name, ist::test::truth_cloud(*data, name));
+  }
+  std::printf("| max_error | balls | packing | tolerance | cases | violations | wrong state | "
+              "error mean / p99 / max | width mean | query free median / p99 | in contact |\n"
+              "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (const double max_error : max_errors) {
+    const Clock::time_point start = Clock::now();
+    const auto model = ist::test::panda_model(*data, max_error);
+    const double packing = seconds_since(start);
+    std::size_t balls = 0;
+    for (const ist::LinkModel& link : model->links) balls += link.tree.ball_count();
+    for (const double tolerance : {0.001, 0.0}) {
+      ist::QueryConfig config;
+      config.max_distance = 10.0;
+      config.tolerance = tolerance;
+      Tally tally;
+      for (const auto& [name, snapshot] : clouds) {
+        for (const char* motion : {"traj", "rand"}) {
+          measure(model, config, snapshot, ist::test::truth_cases(*data, name, motion), &tally);
+        }
+      }
+      std::printf("| %.0f mm | %zu | %.1f s | %.0f mm | %zu | %d | %d | %.4f / %.4f / %.4f mm | "
+                  "%.3f mm | %.0f / %.0f us | %.0f / %.0f us |\n",
+                  1e3 * max_error, balls, packing, 1e3 * tolerance, tally.error.size(),
+                  tally.violations, tally.wrong_state, 1e3 * mean(tally.error),
+                  1e3 * quantile(tally.error, 0.99), 1e3 * quantile(tally.error, 1.0),
+                  1e3 * mean(tally.width), quantile(tally.free_us, 0.5),
+                  quantile(tally.free_us, 0.99), quantile(tally.contact_us, 0.5),
+                  quantile(tally.contact_us, 0.99));
+    }
+  }
+  return 0;
+}
