@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "proximity/link_query.h"
 
@@ -10,16 +11,18 @@ namespace ist {
 namespace {
 
 struct Entry {
-  double bound;  ///< [m] no point below has a smaller signed distance
+  double bound;            ///< [m] no point below has a smaller signed distance
+  Eigen::Vector3d center;  ///< of the box, link frame
+  double exact;            ///< [m] signed distance of the centre
   std::int32_t child;
 };
 
-struct Ball3d {
+struct Around {
   Eigen::Vector3d center;
   double radius;
 };
 
-Ball3d around_box(const BoxNode& node, int k) {
+Around around_box(const BoxNode& node, int k) {
   const Eigen::Vector3d low(node.min_x[k], node.min_y[k], node.min_z[k]);
   const Eigen::Vector3d high(node.max_x[k], node.max_y[k], node.max_z[k]);
   return {0.5 * (low + high), 0.5 * (high - low).norm()};
@@ -31,10 +34,11 @@ Ball3d around_box(const BoxNode& node, int k) {
 // changes by no more than the way between two points, so its exact value at a box's middle bounds
 // all of the box: branch and bound over the boxes that may hold points inside.
 void LinkQuery::find_depth(Deadline* deadline) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
-  std::array<Entry, 1024> stack;  // 16 children on each of at most 8 levels, and room
+  std::array<Entry, 512> stack;  // 16 children on each of at most 8 levels, and room
   std::size_t top = 0;
-  stack[top++] = {-std::numeric_limits<double>::infinity(), index_->root()};
+  stack[top++] = {-kInfinity, Eigen::Vector3d::Zero(), -kInfinity, index_->root()};
   while (top > 0) {
     const Entry entry = stack[--top];
     if (entry.bound >= threshold()) {
@@ -46,37 +50,69 @@ void LinkQuery::find_depth(Deadline* deadline) {
       return;
     }
     if (entry.child < 0) {
-      find_depth_in_tile(~entry.child);
+      find_depth_in_tile(~entry.child, entry.center, entry.exact);
       continue;
     }
     const BoxNode& node = index_->nodes()[static_cast<std::size_t>(entry.child)];
     const std::size_t begin = top;
     for (int k = 0; k < node.count; ++k) {
-      const Ball3d ball = around_box(node, k);
-      const Eigen::Vector3d p_L = X_LO_ * ball.center;
+      const Around ball = around_box(node, k);
+      const Eigen::Vector3d center = X_LO_ * ball.center;
+      const double inherited = entry.exact - (center - entry.center).norm() - ball.radius;
+      if (inherited >= threshold()) {
+        drop(inherited);
+        continue;
+      }
       // Farther boxes hold no point inside; what they hold outside the descent has seen.
-      if (link_->tree.outer_distance(p_L, interior + ball.radius) > interior + ball.radius) continue;
+      const double near = interior + ball.radius;
+      if (link_->tree.outer_distance(center, near) > near) continue;
       ++statistics_->exact_evaluations;
-      const double bound = link_->solid.signed_distance(p_L).distance - ball.radius;
+      const double exact = link_->solid.signed_distance(center).distance;
+      const double bound = exact - ball.radius;
       if (bound >= threshold()) {
         drop(bound);
         continue;
       }
       std::size_t at = top++;
       for (; at > begin && stack[at - 1].bound < bound; --at) stack[at] = stack[at - 1];
-      stack[at] = {bound, node.child[k]};
+      stack[at] = {bound, center, exact, node.child[k]};
     }
   }
 }
 
-void LinkQuery::find_depth_in_tile(std::int32_t tile) {
+// Each point that is evaluated bounds its neighbours too, so few of the sixteen have to be.
+void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double exact) {
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
   const int count = index_->tiles()[static_cast<std::size_t>(tile)].count;
-  for (int lane = 0; lane < count; ++lane) {
-    const Eigen::Vector3d p_L = X_LO_ * point_O(tile, lane);
-    if (link_->tree.outer_distance(p_L, interior) > interior) continue;
+  std::array<Eigen::Vector3d, kPointWidth> p_L;
+  std::array<double, kPointWidth> bound;
+  std::array<bool, kPointWidth> open;
+  for (int k = 0; k < count; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    p_L[i] = X_LO_ * point_O(tile, k);
+    bound[i] = exact - (p_L[i] - center).norm();
+    open[i] = true;
+  }
+  for (int round = 0; round < count; ++round) {
+    int next = -1;
+    for (int k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (open[i] && (next < 0 || bound[i] < bound[static_cast<std::size_t>(next)])) next = k;
+    }
+    const auto i = static_cast<std::size_t>(next);
+    if (bound[i] >= threshold()) {
+      drop(bound[i]);  // the smallest of those that are left
+      return;
+    }
+    open[i] = false;
+    if (link_->tree.outer_distance(p_L[i], interior) > interior) continue;
     ++statistics_->exact_evaluations;
-    take(link_->solid.signed_distance(p_L), p_L, tile, lane);
+    const SignedDistance measured = link_->solid.signed_distance(p_L[i]);
+    take(measured, p_L[i], tile, next);
+    for (int k = 0; k < count; ++k) {
+      const auto j = static_cast<std::size_t>(k);
+      bound[j] = std::max(bound[j], measured.distance - (p_L[j] - p_L[i]).norm());
+    }
   }
 }
 

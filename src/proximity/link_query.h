@@ -58,7 +58,7 @@ class LinkQuery {
   void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, std::int32_t tile, int lane);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
-  void find_depth_in_tile(std::int32_t tile);
+  void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double exact);
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
   /// [m] bounds from here on cannot change the answer by more than the tolerance.
