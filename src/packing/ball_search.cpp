@@ -45,13 +45,15 @@ std::uint32_t BallSearch::build(std::uint32_t first, std::uint32_t last) {
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   nodes_.emplace_back();
   Eigen::AlignedBox3d box;
+  std::uint32_t newest = 0;
   double max_weight = 0.0, min_weight = std::numeric_limits<double>::infinity();
   for (std::uint32_t i = first; i < last; ++i) {
     box.extend(balls_[order_[i]].center);
+    newest = std::max(newest, order_[i]);
     max_weight = std::max(max_weight, balls_[order_[i]].weight);
     min_weight = std::min(min_weight, balls_[order_[i]].weight);
   }
-  nodes_[index] = {box, max_weight, first, last - first};
+  nodes_[index] = {box, max_weight, first, last - first, newest};
   if (last - first <= kLeafSize) return index;
   // The radius is a fourth axis: large balls among small ones would loosen the bound of all.
   Eigen::Index axis;
@@ -73,14 +75,14 @@ std::uint32_t BallSearch::build(std::uint32_t first, std::uint32_t last) {
 }
 
 BallSearch::Match BallSearch::best(const Eigen::Vector3d* corners, int corner_count,
-                                   std::uint32_t hint) const {
+                                   std::uint32_t hint, std::size_t seen) const {
   Match match{hint, cost_of(balls_[hint].center, balls_[hint].weight, corners, corner_count)};
   const auto consider = [&](std::uint32_t ball) {
     const double cost = cost_of(balls_[ball].center, balls_[ball].weight, corners, corner_count);
     if (cost < match.cost || (cost == match.cost && ball < match.ball)) match = {ball, cost};
   };
-  for (std::size_t i = in_tree_; i < balls_.size(); ++i) consider(static_cast<std::uint32_t>(i));
-  if (nodes_.empty()) return match;
+  for (std::size_t i = std::max(in_tree_, seen); i < balls_.size(); ++i) consider(static_cast<std::uint32_t>(i));
+  if (nodes_.empty() || seen >= in_tree_) return match;
 
   // A ball below a node is at least as far from the farthest corner as the node's box is.
   const auto bound = [&](const Node& node) {
@@ -108,8 +110,8 @@ BallSearch::Match BallSearch::best(const Eigen::Vector3d* corners, int corner_co
     Entry near{entry.node + 1, bound(nodes_[entry.node + 1])};
     Entry far{node.first, bound(nodes_[node.first])};
     if (far.bound < near.bound) std::swap(near, far);
-    if (far.bound <= match.cost) stack[top++] = far;
-    if (near.bound <= match.cost) stack[top++] = near;
+    if (far.bound <= match.cost && nodes_[far.node].newest >= seen) stack[top++] = far;
+    if (near.bound <= match.cost && nodes_[near.node].newest >= seen) stack[top++] = near;
   }
   return match;
 }

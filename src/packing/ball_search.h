@@ -24,9 +24,10 @@ class BallSearch {
   /// Adds a ball with weight [m] (its inner or outer radius).
   void add(const Eigen::Vector3d& center, double weight);
 
-  /// The ball of least cost; ties go to the lowest index. `hint` is any ball's index.
-  /// Needs at least one ball.
-  Match best(const Eigen::Vector3d* corners, int corner_count, std::uint32_t hint) const;
+  /// The ball of least cost among those added after the first `seen`, and `hint` (any ball's
+  /// index); ties go to the lowest index. Needs at least one ball.
+  Match best(const Eigen::Vector3d* corners, int corner_count, std::uint32_t hint,
+             std::size_t seen = 0) const;
 
   std::size_t size() const { return balls_.size(); }
 
@@ -39,6 +40,7 @@ class BallSearch {
     Eigen::AlignedBox3d box;  ///< of the centres
     double max_weight;
     std::uint32_t first, count;  ///< leaf: range in order_; inner: first = right child, count = 0
+    std::uint32_t newest;        ///< largest index of a ball below
   };
 
   void rebuild();

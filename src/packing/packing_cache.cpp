@@ -26,9 +26,11 @@ namespace fs = std::filesystem;
 constexpr char kMagic[] = "ISTPACK";  // with its final 0: 8 bytes
 constexpr std::uint32_t kFormatVersion = 1;
 constexpr std::size_t kKeySize = 32;
-constexpr std::size_t kHeaderSize = sizeof(kMagic) + 4 + kKeySize + 8 + 5 * 8 + 4;
-constexpr std::size_t kBallSize = 5 * 8;
+constexpr std::size_t kDouble = 8;
+constexpr std::size_t kHeaderSize = sizeof(kMagic) + 4 + kKeySize + 8 + 5 * kDouble + 4;
+constexpr std::size_t kBallSize = 5 * kDouble;
 constexpr std::size_t kChecksumSize = 8;
+constexpr std::streamoff kMaxFileSize = 1LL << 32;
 
 class Writer {
  public:
@@ -244,17 +246,18 @@ std::optional<Packing> PackingCache::load(const std::string& key, std::string* w
   const std::string file_name = path(key);
   std::error_code error;
   if (!fs::exists(file_name, error) && !error) return std::nullopt;
-  std::string problem;
-  const std::uintmax_t size = fs::file_size(file_name, error);
-  std::ifstream file(file_name, std::ios::binary);
-  std::string bytes;
-  if (error || !file) {
+  std::string problem, bytes;
+  // The size of what was opened: another process may put a new file in its place meanwhile.
+  std::ifstream file(file_name, std::ios::binary | std::ios::ate);
+  const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
+  if (size < 0 || !fs::is_regular_file(file_name, error)) {
     problem = "it cannot be read";
-  } else if (size > kHeaderSize + kBallSize * 0x10000000ULL) {
+  } else if (size > kMaxFileSize) {
     problem = "it is absurdly large";
   } else {
-    bytes.resize(size);
-    file.read(bytes.data(), static_cast<std::streamsize>(size));
+    bytes.resize(static_cast<std::size_t>(size));
+    file.seekg(0);
+    file.read(bytes.data(), size);
     if (!file) problem = "it cannot be read";
   }
   Packing packing;

@@ -47,7 +47,7 @@ void SurfaceCover::seed() {
   add_ball(finder_.at_surface(middle, normal(largest), 1e3 * smallest_patch_));
   heap_.reserve(2 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-    Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, t};
+    Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 1, t};
     patch.bound = search_.best(patch.corner, 3, 0).cost;
     heap_.push_back(patch);
   }
@@ -66,7 +66,8 @@ void SurfaceCover::push(const Patch& patch) {
 
 // Balls added since the bound was computed may cover the patch better.
 bool SurfaceCover::tighten(Patch* patch) const {
-  const BallSearch::Match match = search_.best(patch->corner, 3, patch->ball);
+  const BallSearch::Match match = search_.best(patch->corner, 3, patch->ball, patch->seen);
+  patch->seen = static_cast<std::uint32_t>(balls_.size());
   if (match.cost >= patch->bound) return false;
   patch->ball = match.ball;
   patch->bound = match.cost;
@@ -136,6 +137,7 @@ void SurfaceCover::split(const Patch& patch) {
   for (const int replaced : {a, b}) {
     Patch half = patch;
     half.corner[replaced] = middle;
+    half.seen = 0;  // another ball may suit the smaller patch
     // The parent's bound holds for its parts too, whatever the search says.
     tighten(&half);
     push(half);

@@ -1,89 +1,20 @@
 #include "ist_proximity/robot/robot_description.h"
 
-#include <console_bridge/console.h>
 #include <tinyxml2.h>
 #include <urdf_model/model.h>
-#include <urdf_parser/urdf_parser.h>
 
 #include <cmath>
 #include <map>
-#include <mutex>
 #include <sstream>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/mesh_io.h"
+#include "urdfdom_parser.h"
 
 namespace ist {
 namespace {
-
-// Takes urdfdom's messages while it lives; other threads' messages go on to where they went.
-class MessageCapture : public console_bridge::OutputHandler {
- public:
-  MessageCapture()
-      : lock_(mutex()),
-        previous_(console_bridge::getOutputHandler()),
-        thread_(std::this_thread::get_id()) {
-    console_bridge::useOutputHandler(this);
-  }
-
-  ~MessageCapture() override {
-    // Twice, because console_bridge remembers one previous handler, which would be this one.
-    console_bridge::useOutputHandler(previous_);
-    console_bridge::useOutputHandler(previous_);
-  }
-
-  MessageCapture(const MessageCapture&) = delete;
-  MessageCapture& operator=(const MessageCapture&) = delete;
-
-  void log(const std::string& text, console_bridge::LogLevel level, const char* file,
-           int line) override {
-    if (std::this_thread::get_id() != thread_) {
-      if (previous_ != nullptr) previous_->log(text, level, file, line);
-    } else if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) {
-      errors_.push_back(text);
-    }
-  }
-
-  const std::vector<std::string>& errors() const { return errors_; }
-
- private:
-  static std::mutex& mutex() {
-    static std::mutex mutex;
-    return mutex;
-  }
-
-  const std::lock_guard<std::mutex> lock_;
-  console_bridge::OutputHandler* const previous_;
-  const std::thread::id thread_;
-  std::vector<std::string> errors_;
-};
-
-// What urdfdom makes of a URDF. After an error inside a link it goes on without the faulty part, so
-// a model may come with errors.
-struct ParsedUrdf {
-  urdf::ModelInterfaceSharedPtr model;
-  std::vector<std::string> errors;  // the cause first, then what it led to
-};
-
-ParsedUrdf parse(const tinyxml2::XMLDocument& document) {
-  tinyxml2::XMLPrinter printer(nullptr, true);
-  document.Print(&printer);
-  ParsedUrdf parsed;
-  const MessageCapture capture;
-  try {
-    parsed.model = urdf::parseURDF(printer.CStr());
-    parsed.errors = capture.errors();
-  } catch (const std::exception& error) {
-    parsed.errors = {error.what()};
-  }
-  if (parsed.model == nullptr && parsed.errors.empty()) {
-    parsed.errors = {"urdfdom gives no reason"};
-  }
-  return parsed;
-}
 
 const tinyxml2::XMLElement& robot_element(const std::string& urdf_xml,
                                           tinyxml2::XMLDocument* document) {
@@ -116,6 +47,42 @@ void copy_attributes(const tinyxml2::XMLElement& from, tinyxml2::XMLElement* to)
   }
 }
 
+std::string link_attribute(const tinyxml2::XMLElement& joint, const char* tag) {
+  const tinyxml2::XMLElement* end = joint.FirstChildElement(tag);
+  const char* link = end != nullptr ? end->Attribute("link") : nullptr;
+  return link != nullptr ? link : "";
+}
+
+// urdfdom lets pass a link with two parents and rings of joints beside the root's tree (and never
+// frees a ring). What else may be wrong with joints is its to say.
+void check_tree(const tinyxml2::XMLElement& robot) {
+  std::map<std::string, const tinyxml2::XMLElement*> joint_above;
+  const auto name = [](const tinyxml2::XMLElement* joint) {
+    const char* text = joint->Attribute("name");
+    return std::string(text != nullptr ? text : "");
+  };
+  for (const auto* joint = robot.FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint")) {
+    const std::string child = link_attribute(*joint, "child");
+    if (child.empty()) continue;
+    const auto [other, is_new] = joint_above.insert({child, joint});
+    if (is_new) continue;
+    throw ModelError("robot description is no tree: link '" + child + "' is the child of joint '" +
+                     name(other->second) + "' and of joint '" + name(joint) +
+                     "'; a link may have one parent");
+  }
+  for (const auto& [link, joint] : joint_above) {
+    std::string above = link_attribute(*joint, "parent");
+    for (std::size_t steps = 0; joint_above.count(above) > 0; ++steps) {
+      if (above == link || steps > joint_above.size()) {
+        throw ModelError("robot description is no tree: the joints above link '" + link +
+                         "' form a ring");
+      }
+      above = link_attribute(*joint_above.at(above), "parent");
+    }
+  }
+}
+
 // Links and joints alone: what stands inside a link is parsed element by element, so that one
 // faulty element does not cost the others.
 urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot) {
@@ -138,33 +105,11 @@ urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot)
       root->InsertEndChild(child->DeepClone(&skeleton));
     }
   }
-  const ParsedUrdf parsed = parse(skeleton);
+  const ParsedUrdf parsed = parse_with_urdfdom(skeleton);
   if (parsed.model != nullptr) return parsed.model;
   std::string reasons;
   for (const std::string& error : parsed.errors) reasons += (reasons.empty() ? "" : ": ") + error;
   throw ModelError("robot description is no valid URDF: " + reasons);
-}
-
-// urdfdom lets pass a link with two parents and rings of joints beside the root's tree.
-void check_tree(const urdf::ModelInterface& model) {
-  std::map<std::string, const urdf::Joint*> joint_to;
-  for (const auto& [name, joint] : model.joints_) {
-    const auto [other, is_new] = joint_to.insert({joint->child_link_name, joint.get()});
-    if (is_new) continue;
-    throw ModelError("robot description is no tree: link '" + joint->child_link_name +
-                     "' is the child of joint '" + other->second->name + "' and of joint '" + name +
-                     "'; a link may have one parent");
-  }
-  for (const auto& [name, link] : model.links_) {
-    const std::string* at = &name;
-    for (std::size_t steps = 0; joint_to.count(*at) > 0; ++steps) {
-      at = &joint_to.at(*at)->parent_link_name;
-      if (steps > model.links_.size()) {
-        throw ModelError("robot description is no tree: the joints above link '" + name +
-                         "' form a ring");
-      }
-    }
-  }
 }
 
 void check_size(const char* what, double value) {
@@ -224,7 +169,7 @@ GeometryElement parse_element(const tinyxml2::XMLElement& xml, const PackageFind
     throw ModelError("it has no <geometry>; add one or remove the element");
   }
 
-  const ParsedUrdf parsed = parse(document);
+  const ParsedUrdf parsed = parse_with_urdfdom(document);
   const urdf::LinkConstSharedPtr link = parsed.model ? parsed.model->getLink("l") : nullptr;
   if (link == nullptr || !parsed.errors.empty()) {
     throw ModelError(parsed.errors.front() + "; correct the element in the URDF");
@@ -280,8 +225,8 @@ RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
                             const PackageFinder& find_package) {
   tinyxml2::XMLDocument document;
   const tinyxml2::XMLElement& robot = robot_element(urdf_xml, &document);
+  check_tree(robot);
   const urdf::ModelInterfaceSharedPtr model = parse_structure(robot);
-  check_tree(*model);
 
   RobotDescription description;
   description.name = model->getName();

@@ -79,6 +79,7 @@ std::vector<MonitoredLink> select_links(const RobotDescription& robot,
     if (!contains(names, name)) names.push_back(name);
   }
   std::vector<MonitoredLink> links;
+  links.reserve(names.size());
   for (const std::string& name : names) links.push_back(monitored(robot, name));
   return links;
 }

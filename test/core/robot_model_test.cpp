@@ -281,7 +281,8 @@ TEST(RobotModel, canBeCancelled) {
   callbacks.cancelled = [&] { return ++calls > 4; };
   EXPECT_EQ(build_robot_model(gripper(), config, callbacks), nullptr);
   callbacks.cancelled = {};
-  for (const LinkModel& l : build_robot_model(gripper(), config, callbacks)->links) {
+  const auto model = build_robot_model(gripper(), config, callbacks);
+  for (const LinkModel& l : model->links) {
     if (l.usable()) {
       EXPECT_TRUE(l.packing.certificate.reached) << l.name;
     }

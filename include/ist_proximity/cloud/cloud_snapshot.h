@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "ist_proximity/cloud/point_index.h"
+
+namespace ist {
+
+/// What became of the points of one cloud.
+struct IngestCounts {
+  std::uint32_t received = 0;      ///< points in the message
+  std::uint32_t not_a_number = 0;  ///< dropped: a coordinate is NaN
+  std::uint32_t infinite = 0;      ///< dropped: a coordinate is infinite, and none is NaN
+  std::uint32_t out_of_range = 0;  ///< dropped: nearer than min_range or beyond max_range
+  std::uint32_t on_robot = 0;      ///< dropped by the self-filter
+  std::uint32_t used = 0;          ///< what queries see
+
+  /// Every point of a cloud that holds some is NaN: the sensor saw nothing at all.
+  bool saw_nothing() const { return received > 0 && not_a_number == received; }
+};
+
+/// One cloud, as queries see it: immutable, in the fixed frame.
+struct CloudSnapshot {
+  PointIndex index;   ///< all points used
+  PointIndex coarse;  ///< the same, thinned to one point per cell of the thinning grid
+  IngestCounts counts;
+  double stamp = 0.0;  ///< [s] acquisition
+  double ingest_time = 0.0;  ///< [s] it took
+};
+
+}  // namespace ist

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace ist {
+
+constexpr int kPointWidth = 16;
+
+/// Points side by side for SIMD, in metres from the index's origin. Unused slots hold a point so
+/// far away that no bound is touched by it (but whose square is still finite).
+struct alignas(64) PointTile {
+  float x[kPointWidth], y[kPointWidth], z[kPointWidth];
+  std::uint32_t id[kPointWidth];  ///< index of the point in the message it came from
+  std::int32_t count;             ///< used slots, at the front
+};
+
+/// Boxes of up to sixteen children side by side.
+struct alignas(64) BoxNode {
+  float min_x[kPointWidth], min_y[kPointWidth], min_z[kPointWidth];
+  float max_x[kPointWidth], max_y[kPointWidth], max_z[kPointWidth];
+  std::int32_t child[kPointWidth];  ///< >= 0: node; < 0: tile ~child
+  std::int32_t count;               ///< used slots, at the front
+};
+
+constexpr float kFarAway = 1e15F;  ///< [m] coordinates of unused slots
+
+/// An immutable hierarchy of boxes over points: tiles of up to 16 neighbours, 16-wide boxes above.
+/// Coordinates are relative to `origin` so that float loses nothing far from zero. Thread safe.
+class PointIndex {
+ public:
+  /// Builds over points given relative to `origin` (fixed frame, double) in structure-of-arrays.
+  /// The result depends on nothing but the arguments. For a stream of clouds use
+  /// PointIndexBuilder, which keeps its working memory; this allocates.
+  /// @param x,y,z  n coordinates [m] each, finite, below kFarAway
+  /// @param id     n identities, carried through to the answers
+  void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
+             const std::uint32_t* id, std::size_t n);
+
+  bool empty() const { return tiles_.empty(); }
+  std::size_t size() const { return size_; }  ///< points
+  const Eigen::Vector3d& origin() const { return origin_; }  ///< [m] in the fixed frame
+  const std::vector<BoxNode>& nodes() const { return nodes_; }  ///< the root is nodes()[root()]
+  std::int32_t root() const { return root_; }  ///< -1 when empty
+  const std::vector<PointTile>& tiles() const { return tiles_; }
+  Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< relative to the origin
+  /// Another number after every build() of any index: tells whether an answer belongs to it.
+  std::uint64_t generation() const { return generation_; }
+
+ private:
+  friend class PointIndexBuilder;
+
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  Eigen::AlignedBox3f bounds_;
+  std::vector<BoxNode> nodes_;  ///< level by level, the root last
+  std::vector<PointTile> tiles_;
+  std::size_t size_ = 0;
+  std::int32_t root_ = -1;
+  std::uint64_t generation_ = 0;  ///< never 0 once built
+};
+
+}  // namespace ist

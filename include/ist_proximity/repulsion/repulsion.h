@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/packing/packing.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// The repulsion vector of a link.
+struct RepulsionConfig {
+  /// [m] > 0: at and beyond it the vector is zero. Not more than the query's max_distance: what is
+  /// CLEAR repels nothing.
+  double influence_distance = 0.3;
+  double gain = 1.0;        ///< length of the vector at touch and in contact; >= 0
+  double smoothing = 0.05;  ///< [m] > 0: pairs this much farther than the nearest still count
+};
+
+/// Blended repulsion, continuous in the robot's motion.
+///
+/// A link is a fixed, coarse set of its inner balls, an obstacle the thinned points. With d the
+/// distance of a pair (negative for a point in a ball) and n its unit vector from point to ball
+/// centre,
+///   u = sum(w n) / sum(w),  w = max(0, 1 - (d - d_min) / smoothing)^2,
+/// over all pairs: the nearest pair alone would jump when two obstacles are equally near. The
+/// vector is gain * s * u with s = 1 - distance / influence_distance, not below 0 and not above 1:
+/// its length is 0 at and beyond the influence distance and never more than the gain. In contact it
+/// stays at the gain (how deep is for the penetration wrench to say), and in a symmetric squeeze
+/// the terms cancel.
+///
+/// A point at a ball's very centre has no direction; it takes the link's `direction`.
+class Repulsion {
+ public:
+  /// Chooses the balls; the model is not needed afterwards.
+  explicit Repulsion(const std::shared_ptr<const RobotModel>& model);
+
+  /// @param link      index in the model
+  /// @param X_FL      link frame -> fixed frame, rigid
+  /// @param clouds    as given to ProximityQuery::run
+  /// @param proximity the link's answer: supplies state, distance and direction
+  /// @returns the vector in the fixed frame; zero when CLEAR, NaN when UNKNOWN
+  /// Allocates nothing. Thread safe.
+  Eigen::Vector3d operator()(std::size_t link, const Eigen::Isometry3d& X_FL,
+                             const std::vector<const CloudSnapshot*>& clouds,
+                             const LinkProximity& proximity, const RepulsionConfig& config) const;
+
+ private:
+  std::vector<std::vector<Ball>> coarse_;  ///< by link, at most kCoarseBalls
+};
+
+/// Balls that stand for a link.
+constexpr std::size_t kCoarseBalls = 50;
+
+/// The first `count` balls of those that stand for a link best: starting with the largest, the ball
+/// that reaches farthest beyond the chosen ones is next. Unlike the first balls of the packing,
+/// which may be those of the link's first element, they are spread over the whole link.
+std::vector<Ball> coarse_balls(const Packing& packing, std::size_t count);
+
+}  // namespace ist

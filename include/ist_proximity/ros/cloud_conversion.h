@@ -1,0 +1,21 @@
+#pragma once
+
+#include <sensor_msgs/PointCloud2.h>
+
+#include <string>
+
+#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/raw_cloud.h"
+
+namespace ist {
+
+/// Looks at a message's points without copying them; `raw` is valid as long as the message.
+/// @returns empty, or one sentence with the faulty field and values
+std::string view_cloud(const sensor_msgs::PointCloud2& message, RawCloud* raw);
+
+/// What queries see of a cloud, as x, y, z in float32 [m] in the fixed frame.
+sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros::Time& stamp,
+                                       const std::string& fixed_frame);
+
+}  // namespace ist

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <tf2/buffer_core.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/cloud/snapshot_channel.h"
+#include "ist_proximity/ros/parameters.h"
+#include "ist_proximity/ros/status.h"
+
+namespace ist {
+
+/// A cloud as queries see it, and what it was made with.
+struct SourceSnapshot {
+  CloudSnapshot cloud;
+  ros::Time stamp;
+  std::shared_ptr<const RobotModel> model;
+  /// By link: false where the self-filter had no pose at the cloud's stamp, so that points on that
+  /// link are still among the obstacles. Empty: the source does not filter.
+  std::vector<bool> filtered;
+  std::uint64_t generation = 0;  ///< of the clock, see CloudSource; 0: none yet
+};
+
+/// One sensor: receives its clouds and turns them into snapshots, in a thread of its own, so that
+/// neither a large cloud nor a late transform ever delays a query.
+///
+/// A cloud waits until tf knows its sensor and, for the self-filter, the links at the cloud's own
+/// stamp; the newest one that is ready is taken, what it overtakes is dropped. A link whose
+/// transforms have stopped is not waited for. This takes the place of tf2_ros::MessageFilter, which
+/// can neither give up on a single frame (setTargetFrames() needs clear(), which races with the tf
+/// listener's thread) nor say which transform it waits for.
+///
+/// When the ROS clock jumps back (a bag starts over), everything received before is forgotten.
+class CloudSource {
+ public:
+  /// @param nh        in the namespace that the topic is relative to
+  /// @param buffer    outlives this
+  /// @param filtered  where what queries see is published while somebody listens
+  CloudSource(const SourceConfig& config, ros::NodeHandle nh, const tf2::BufferCore& buffer,
+              ros::Publisher filtered);
+  ~CloudSource();
+  CloudSource(const CloudSource&) = delete;
+  CloudSource& operator=(const CloudSource&) = delete;
+
+  /// What clouds are transformed to and filtered with; null: they cannot be used. Thread safe.
+  void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame);
+
+  /// The newest snapshot made with `model` since the clock's last jump; null: none. Valid until
+  /// the next call. One thread only; never waits.
+  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model);
+
+  /// Everything but the snapshot's part. Thread safe.
+  SourceFacts facts();
+
+  const SourceConfig& config() const { return config_; }
+
+ private:
+  struct Waiting {
+    sensor_msgs::PointCloud2ConstPtr message;
+    RawCloud raw;  ///< views the message
+  };
+  struct Target {
+    std::shared_ptr<const RobotModel> model;
+    std::string fixed_frame;
+    std::uint64_t generation = 1;
+  };
+
+  void run();
+  void receive(const sensor_msgs::PointCloud2ConstPtr& message);
+  std::string why_unusable(const sensor_msgs::PointCloud2& message, RawCloud* raw) const;
+  Target target();
+  void use_newest_ready();
+  void forget_old();
+  void count_publishers();
+  std::string missing_transform(const Waiting& waiting) const;
+  bool worth_waiting_for(const std::string& link, const ros::Time& stamp) const;
+  std::string ingest(const Waiting& waiting);
+  void pose_robot(const ros::Time& stamp, PosedRobot* robot) const;
+  void notice_clock_jump();  ///< with mutex_ held
+  void set_problem(const std::string& problem, bool dropped);
+
+  const SourceConfig config_;
+  const tf2::BufferCore& buffer_;
+  ros::Publisher filtered_;
+  ros::CallbackQueue queue_;
+  ros::Subscriber subscriber_;
+  SnapshotChannel<SourceSnapshot> channel_;
+
+  std::mutex mutex_;  // for what follows, held for copies only
+  Target shared_target_;
+  SourceFacts facts_;
+  ros::Time last_now_;
+
+  // The source's thread alone.
+  Target target_;
+  Ingest ingest_;
+  std::deque<Waiting> waiting_;  ///< by stamp
+  ros::Time in_use_;             ///< stamp of the newest snapshot of this generation
+  std::chrono::steady_clock::time_point target_since_, next_count_;
+  std::atomic<bool> running_{true};
+  std::thread thread_;
+};
+
+}  // namespace ist

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <diagnostic_msgs/DiagnosticStatus.h>
+#include <ist_proximity/ProximityArray.h>
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/ros/model_loader.h"
+#include "ist_proximity/ros/status.h"
+
+namespace ist {
+
+/// Computation times of the last thousand cycles. Not thread safe.
+class CycleTimes {
+ public:
+  void add(double seconds);
+  double quantile(double q) const;  ///< [s] 0.5: median; NaN without any
+
+ private:
+  static constexpr std::size_t kKept = 1000;
+  std::vector<double> ring_;
+  std::size_t total_ = 0;
+};
+
+/// What the cycle thread leaves for the diagnostics thread.
+struct CycleReport {
+  std::uint8_t status = 0;
+  std::string text;
+  std::vector<SourceFacts> sources;
+  std::vector<Verdict> verdicts;
+  std::vector<std::string> pose_problems;
+  std::size_t links_known = 0, links_monitored = 0;
+  double pose_age = 0.0;   ///< [s] of the common instant, when any link is known
+  std::size_t cycles = 0;  ///< since the start, those without a model too
+  CycleTimes times;        ///< of those with one
+};
+
+// One DiagnosticStatus each; `node` goes before every name. Pure functions.
+diagnostic_msgs::DiagnosticStatus input_diagnostics(const std::string& node,
+                                                    const SourceFacts& source,
+                                                    const Verdict& verdict, double now);
+diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
+                                                   const CycleReport& report);
+/// @param rate         [Hz] that was reached since the last call
+/// @param wanted_rate  [Hz]
+diagnostic_msgs::DiagnosticStatus query_diagnostics(const std::string& node,
+                                                    const CycleReport& report, double rate,
+                                                    double wanted_rate);
+diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
+                                                    const ModelState& state);
+
+}  // namespace ist

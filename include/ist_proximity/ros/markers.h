@@ -1,0 +1,53 @@
+#pragma once
+
+#include <ist_proximity/ProximityArray.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// Draws a ProximityArray for rviz, in its own frame. Namespaces: "distance" (line from obstacle to
+/// link, green at ~max_distance to red at touch), "point_on_link", "point_on_obstacle", "repulsion"
+/// (arrow), "text"; the id is the link's place in the array. Not thread safe.
+class ProximityMarkers {
+ public:
+  /// @param max_distance  [m] that is drawn green
+  /// @param lifetime      [s] after which rviz drops a marker that nobody has renewed: a node that
+  ///                      died leaves no distances behind
+  ProximityMarkers(double max_distance, double lifetime)
+      : max_distance_(max_distance), lifetime_(lifetime) {}
+
+  /// Markers of every link NEAR or CONTACT, and DELETE for those of the last call that are gone.
+  visualization_msgs::MarkerArray draw(const ist_proximity::ProximityArray& proximity);
+
+ private:
+  using Key = std::pair<std::string, int>;  // namespace and id
+
+  visualization_msgs::Marker marker(const std::string& ns, int id, int type) const;
+  void draw_link(const ist_proximity::LinkProximity& link, int id,
+                 std::vector<visualization_msgs::Marker>* markers) const;
+
+  double max_distance_, lifetime_;
+  std_msgs::Header header_;
+  std::map<Key, std_msgs::Header> shown_;
+};
+
+/// The inner spheres of some links, in the links' own frames (rviz moves them along): one namespace
+/// per link, the largest spheres first.
+/// @param links         indices into the model
+/// @param max_per_link  how many spheres of each
+visualization_msgs::MarkerArray sphere_markers(const RobotModel& model,
+                                               const std::vector<std::size_t>& links,
+                                               std::size_t max_per_link);
+
+/// DELETE for every marker of an array.
+visualization_msgs::MarkerArray deleted(const visualization_msgs::MarkerArray& markers);
+
+}  // namespace ist

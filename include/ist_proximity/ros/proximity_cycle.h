@@ -1,0 +1,72 @@
+#pragma once
+
+#include <ist_proximity/ProximityArray.h>
+#include <ros/time.h>
+#include <tf2/buffer_core.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/ros/closing_speed.h"
+#include "ist_proximity/ros/cloud_source.h"
+#include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/model_loader.h"
+#include "ist_proximity/ros/parameters.h"
+#include "ist_proximity/ros/pose_source.h"
+#include "ist_proximity/ros/status.h"
+
+namespace ist {
+
+using CloudSources = std::vector<std::unique_ptr<CloudSource>>;
+
+/// From poses and clouds to one ProximityArray, again and again: all that belongs to one robot
+/// model. It takes what is there and waits for nothing. One thread.
+class ProximityCycle {
+ public:
+  /// @param model   ready
+  /// @param buffer  outlives this
+  ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
+                 const tf2::BufferCore& buffer);
+
+  /// @param now      of the ROS clock
+  /// @param message  overwritten
+  /// @param report   sources, poses and status are overwritten, the times go on
+  void run(const ros::Time& now, const CloudSources& sources, const RepulsionConfig& repulsion,
+           ist_proximity::ProximityArray* message, CycleReport* report);
+
+  /// After the clock has jumped: no speed across the jump.
+  void forget() { speeds_.assign(speeds_.size(), ClosingSpeed()); }
+
+ private:
+  void look_at_sources(const ros::Time& now, const CloudSources& sources);
+  void look_at_poses(const ros::Time& now);
+  std::vector<std::string> pose_problems() const;
+  void fill_links(const RepulsionConfig& repulsion, ist_proximity::ProximityArray* message);
+
+  std::shared_ptr<const ModelState> model_;
+  const RobotModel& robot_;
+  std::string fixed_frame_;
+  PoseSource pose_source_;
+  ProximityQuery query_;
+  Repulsion repulsion_;
+  std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
+
+  // Of this cycle.
+  LinkPoses poses_;
+  Situation situation_;
+  std::vector<const SourceSnapshot*> snapshots_;  ///< by source; null: none
+  std::vector<const CloudSnapshot*> clouds_;      ///< what the query sees
+  std::vector<std::string> cloud_names_;          ///< of `clouds_`
+  std::vector<LinkProximity> results_;            ///< by link of the robot
+};
+
+/// What is said while there is no model to measure with: MODEL_ERROR and every link UNKNOWN.
+/// @param fixed_frame  may be empty, while only the URDF could tell
+void say_no_model(const ModelState& model, const std::string& fixed_frame, const ros::Time& now,
+                  const CloudSources& sources, ist_proximity::ProximityArray* message,
+                  CycleReport* report);
+
+}  // namespace ist

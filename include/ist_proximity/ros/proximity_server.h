@@ -1,0 +1,87 @@
+#pragma once
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <ros/node_handle.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/markers.h"
+#include "ist_proximity/ros/model_loader.h"
+#include "ist_proximity/ros/parameters.h"
+#include "ist_proximity/ros/proximity_cycle.h"
+
+namespace ist {
+
+/// The whole of ist_proximity as node and nodelet run it. Threads:
+///   - the cycle: at ~rate of the wall clock (a paused /clock does not silence it) it takes the
+///     newest poses and clouds, queries and publishes; it waits for nothing;
+///   - one per source, for receiving and ingesting clouds;
+///   - the model loader; - tf's listener;
+///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
+///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
+///     not every ROS 1 distribution has).
+/// The service is answered from the queue of the node handles.
+class ProximityServer {
+ public:
+  /// @param nh          topics like `cloud` are relative to it
+  /// @param private_nh  `~`
+  ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
+                  const ServerConfig& config);
+  /// Stops all threads; packing is broken off.
+  ~ProximityServer();
+  ProximityServer(const ProximityServer&) = delete;
+  ProximityServer& operator=(const ProximityServer&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void advertise();
+  void run_cycles();
+  void run_cycle();
+  void notice_clock_jump(const ros::Time& now);
+  void take_model();
+  void publish(const ist_proximity::ProximityArrayConstPtr& message);
+  void publish_spheres();
+  void run_diagnostics();
+  void read_repulsion_again();
+  bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool sleep_until(Clock::time_point time);  ///< false when it is time to stop
+
+  const ServerConfig config_;
+  ros::NodeHandle nh_, private_nh_;
+  const std::string name_;  ///< in diagnostics
+
+  ros::Publisher proximity_, min_distance_, markers_, spheres_, filtered_cloud_, diagnostics_;
+  ros::ServiceServer reload_service_;
+  tf2_ros::Buffer buffer_;
+  tf2_ros::TransformListener listener_;
+  CloudSources sources_;
+  ModelLoader loader_;
+
+  // The cycle thread's own.
+  std::shared_ptr<const ModelState> model_;
+  std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
+  ProximityMarkers marker_drawer_;
+  visualization_msgs::MarkerArray shown_spheres_;
+  Clock::time_point next_markers_;
+  ros::Time last_now_;
+
+  std::mutex shared_mutex_;  // for what cycle and diagnostics threads share
+  CycleReport report_;
+  RepulsionConfig repulsion_;
+
+  std::mutex stop_mutex_;
+  std::condition_variable stop_signal_;
+  bool stop_ = false;
+  std::thread cycle_thread_, diagnostics_thread_;
+};
+
+}  // namespace ist

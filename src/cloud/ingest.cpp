@@ -1,0 +1,84 @@
+#include "ist_proximity/cloud/ingest.h"
+
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "cloud/crop.h"
+#include "cloud/point_index_builder.h"
+#include "cloud/self_filter.h"
+#include "cloud/thinning.h"
+
+namespace ist {
+namespace {
+
+void require(bool valid, const char* member, double value, const char* range) {
+  if (valid) return;
+  throw std::invalid_argument(std::string("IngestConfig::") + member + " is " +
+                              std::to_string(value) + ", it must be " + range + ".");
+}
+
+void check(const IngestConfig& config) {
+  require(config.min_range >= 0.0 && std::isfinite(config.min_range), "min_range",
+          config.min_range, "0 or more");
+  require(config.max_range > config.min_range, "max_range", config.max_range,
+          "more than min_range");
+  require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
+          "self_filter_padding", config.self_filter_padding, "0 or more");
+  require(config.thinning > 0.0 && std::isfinite(config.thinning), "thinning", config.thinning,
+          "more than 0");
+}
+
+}  // namespace
+
+struct Ingest::Impl {
+  IngestConfig config;
+  CroppedCloud cropped;
+  PointIndexBuilder builder;
+  SelfFilter self_filter;
+  Thinning thinning;
+};
+
+Ingest::Ingest(const IngestConfig& config) : impl_(std::make_unique<Impl>()) {
+  check(config);
+  impl_->config = config;
+}
+
+Ingest::~Ingest() = default;
+Ingest::Ingest(Ingest&&) noexcept = default;
+Ingest& Ingest::operator=(Ingest&&) noexcept = default;
+
+const IngestConfig& Ingest::config() const { return impl_->config; }
+
+void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
+                 double stamp, CloudSnapshot* snapshot) {
+  const auto start = std::chrono::steady_clock::now();
+  if (!X_FS.matrix().allFinite()) {
+    throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
+  }
+  const IngestConfig& config = impl_->config;
+  CroppedCloud& points = impl_->cropped;
+  IngestCounts counts;
+  crop(cloud, X_FS, config.min_range, config.max_range, &points, &counts);
+
+  PointFilter on_robot;
+  if (config.self_filter && robot.model != nullptr) {
+    impl_->self_filter.pose(robot, points.origin, config.self_filter_padding);
+    on_robot = [filter = &impl_->self_filter](const PointRun& run) {
+      return filter->on_robot(run);
+    };
+  }
+  impl_->builder.build(points.origin, points.x.data(), points.y.data(), points.z.data(),
+                       points.id.data(), points.size, on_robot, &snapshot->index);
+  counts.used = static_cast<std::uint32_t>(snapshot->index.size());
+  counts.on_robot = static_cast<std::uint32_t>(points.size) - counts.used;
+  impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
+
+  snapshot->counts = counts;
+  snapshot->stamp = stamp;
+  snapshot->ingest_time =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace ist

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "cloud/morton_order.h"
+#include "ist_proximity/cloud/point_index.h"
+
+namespace ist {
+
+/// Axis-aligned box; x, y, z [m] and 0, which fit one SIMD register.
+struct PaddedBox {
+  Eigen::Array4f min, max;
+
+  void extend(const PaddedBox& other) {
+    min = min.min(other.min);
+    max = max.max(other.max);
+  }
+  float diagonal() const { return (max - min).matrix().norm(); }
+};
+
+/// Says which points of a tile stay out of the index: bit k for slot k. The box holds exactly the
+/// tile's points; its unused slots have no meaning yet.
+using PointFilter = std::function<std::uint32_t(const PointTile& tile, const PaddedBox& box)>;
+
+/// Builds point indices; keeps its working memory, so a steady stream of clouds allocates nothing.
+/// Not thread safe.
+///
+/// Morton order brings neighbours together. Runs of 16 become tiles, but a run is cut where the
+/// order leaps, so that no tile has a big box. Above the tiles, space is divided at medians across
+/// the longest side: grouping along the Morton order alone makes boxes that overlap, and doubles
+/// what a query visits. Every node is full but the last of each level.
+class PointIndexBuilder {
+ public:
+  /// As PointIndex::build.
+  /// @param drop   may be empty. Called once for each tile-to-be, before boxes are made: to filter a
+  ///               tile at a time is much cheaper than a point at a time.
+  /// @param index  overwritten, its buffers reused
+  void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
+             const std::uint32_t* id, std::size_t n, const PointFilter& drop, PointIndex* index);
+
+ private:
+  /// A tile on its way to its place in the hierarchy.
+  struct Item {
+    Eigen::Vector3f center;  ///< [m] twice the middle of its box
+    std::int32_t tile;
+  };
+
+  void arrange(std::size_t first, std::size_t last);
+  void write_nodes(PointIndex* index) const;
+
+  MortonOrder morton_;
+  std::vector<std::uint32_t> order_;  ///< numbers of the points, in Morton order
+  std::vector<PaddedBox> boxes_;      ///< by tile
+  std::vector<Item> items_;           ///< one for each tile
+};
+
+}  // namespace ist

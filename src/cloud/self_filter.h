@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "cloud/point_index_builder.h"
+#include "ist_proximity/cloud/ingest.h"
+
+namespace ist {
+
+/// Tells the robot's own points from obstacles: a point is the robot's when its exact distance to a
+/// link of known pose is at most the padding, or when it is inside.
+///
+/// Each run of neighbouring points is first asked for as one ball: outer balls of the tree prove it
+/// clear of the link, an inner ball proves it the robot's. Only where both leave it open are the
+/// points asked for one by one, and only where that leaves it open, the exact geometry.
+/// Keeps its memory. Not thread safe.
+class SelfFilter {
+ public:
+  /// @param robot    links without a known pose, without geometry or with an error claim no point
+  /// @param origin   [m] of the points, in the fixed frame
+  /// @param padding  [m] >= 0
+  void pose(const PosedRobot& robot, const Eigen::Vector3d& origin, double padding);
+
+  /// Bit k: points[k] is the robot's.
+  std::uint32_t on_robot(const PointRun& run) const;
+
+ private:
+  enum class Verdict { kClear, kOnLink, kOpen };
+
+  struct PosedLink {
+    const LinkModel* model;
+    Eigen::Isometry3d X_LO;    ///< origin's frame (fixed frame's axes) -> link frame
+    Eigen::Vector3f center_O;  ///< [m] of the link's bounding sphere
+    float reach;               ///< [m] bounding sphere and padding
+    float slack;               ///< [m] more than what float rounds off
+    float clear_beyond;        ///< [m] outer distance that proves a point clear
+  };
+
+  Verdict ask_tree(const PosedLink& link, const Eigen::Vector3d& center_L, double radius) const;
+  bool ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L) const;
+  std::uint32_t on_link(const PosedLink& link, const PointRun& run,
+                        const Eigen::Vector3d& center_O, double radius) const;
+
+  double padding_ = 0.0;
+  std::vector<PosedLink> links_;
+};
+
+}  // namespace ist

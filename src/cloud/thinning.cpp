@@ -1,0 +1,123 @@
+#include "cloud/thinning.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kSmallestTable = 64;  // a power of two, as all of them
+constexpr double kMiddle = 1 << 30;         // number of the origin's cell: none is negative
+
+// The grid along one axis, relative to an origin that lies anywhere in it.
+struct Axis {
+  Axis(double origin, double cell) : scale(1.0 / cell) {
+    const double cells = origin / cell;
+    offset = kMiddle + (cells - std::floor(cells));
+  }
+
+  // The cells of a tile's coordinates and the squared distances to their centres.
+  void divide(const float* v, std::int32_t* cell, float* off_centre) const {
+    for (int k = 0; k < kPointWidth; ++k) {
+      const double cells = static_cast<double>(v[k]) * scale + offset;
+      cell[k] = static_cast<std::int32_t>(cells);
+      const float off = static_cast<float>(cells - cell[k]) - 0.5F;
+      off_centre[k] += off * off;
+    }
+  }
+
+  double scale;   // [1/m]
+  double offset;  // of the origin, in cells
+};
+
+// Cells are larger where their numbers would not fit: across more than a billion of them.
+double fitting(double cell, const PointIndex& all) {
+  if (all.empty()) return cell;
+  const float reach = std::max(all.bounds().min().cwiseAbs().maxCoeff(),
+                               all.bounds().max().cwiseAbs().maxCoeff());
+  return std::max(cell, static_cast<double>(reach) / (kMiddle - 2.0));
+}
+
+}  // namespace
+
+bool Thinning::Entry::better_than(const Entry& other) const {
+  if (off_centre != other.off_centre) return off_centre < other.off_centre;
+  return std::tie(x, y, z, id) < std::tie(other.x, other.y, other.z, other.id);
+}
+
+void Thinning::run(const PointIndex& all, double cell, PointIndexBuilder* builder,
+                   PointIndex* thin) {
+  std::size_t table_size = kSmallestTable;
+  while (8 * table_size < all.size()) table_size *= 2;
+  table_.assign(table_size, 0U);
+  entries_.clear();
+  last_ = 0;
+  const Eigen::Vector3d& origin = all.origin();
+  const double edge = fitting(cell, all);
+  const Axis axis_x(origin.x(), edge), axis_y(origin.y(), edge), axis_z(origin.z(), edge);
+  for (const PointTile& tile : all.tiles()) {
+    std::int32_t x[kPointWidth], y[kPointWidth], z[kPointWidth];
+    float off_centre[kPointWidth] = {};
+    axis_x.divide(tile.x, x, off_centre);
+    axis_y.divide(tile.y, y, off_centre);
+    axis_z.divide(tile.z, z, off_centre);
+    for (int k = 0; k < tile.count; ++k) {
+      add({{x[k], y[k], z[k]}, off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
+    }
+  }
+
+  const std::size_t n = entries_.size();
+  x_.resize(n);
+  y_.resize(n);
+  z_.resize(n);
+  id_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    x_[i] = entries_[i].x;
+    y_[i] = entries_[i].y;
+    z_[i] = entries_[i].z;
+    id_[i] = entries_[i].id;
+  }
+  builder->build(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, {}, thin);
+}
+
+void Thinning::add(const Entry& entry) {
+  if (entries_.empty() || !(entries_[last_].cell == entry.cell)) {
+    std::uint32_t* slot = find(entry.cell);
+    if (*slot == 0) {
+      last_ = entries_.size();
+      entries_.push_back(entry);
+      *slot = static_cast<std::uint32_t>(entries_.size());
+      if (2 * entries_.size() > table_.size()) grow();
+      return;
+    }
+    last_ = *slot - 1;
+  }
+  if (entry.better_than(entries_[last_])) entries_[last_] = entry;
+}
+
+std::size_t Thinning::hash(const Cell& cell) {
+  // Odd numbers near 2^64 over the golden ratio, the plastic number and its square.
+  std::uint64_t h = static_cast<std::uint32_t>(cell.x) * 0x9E3779B97F4A7C15ULL ^
+                    static_cast<std::uint32_t>(cell.y) * 0xC13FA9A902A6328FULL ^
+                    static_cast<std::uint32_t>(cell.z) * 0x91E10DA5C79E7B1DULL;
+  h ^= h >> 32;
+  return static_cast<std::size_t>(h * 0x9E3779B97F4A7C15ULL >> 20);
+}
+
+// The slot that holds a cell, or the empty one where it belongs.
+std::uint32_t* Thinning::find(const Cell& cell) {
+  const std::size_t mask = table_.size() - 1;
+  std::size_t i = hash(cell) & mask;
+  while (table_[i] != 0 && !(entries_[table_[i] - 1].cell == cell)) i = (i + 1) & mask;
+  return &table_[i];
+}
+
+void Thinning::grow() {
+  table_.assign(2 * table_.size(), 0U);
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    *find(entries_[i].cell) = static_cast<std::uint32_t>(i + 1);
+  }
+}
+
+}  // namespace ist

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cloud/point_index_builder.h"
+#include "ist_proximity/cloud/point_index.h"
+
+namespace ist {
+
+/// Keeps one point of each occupied cell of a cubic grid that is aligned to the fixed frame: the
+/// one nearest to the cell's centre, so that which one it is does not depend on the points' order
+/// and changes little as they move. Keeps its memory. Not thread safe.
+class Thinning {
+ public:
+  /// @param all   what to thin
+  /// @param cell  [m] > 0, edge of a cell
+  /// @param thin  overwritten, with the same origin and ids
+  void run(const PointIndex& all, double cell, PointIndexBuilder* builder, PointIndex* thin);
+
+ private:
+  /// Number of a cell along each axis, from the origin.
+  struct Cell {
+    std::int32_t x, y, z;
+    bool operator==(const Cell& other) const {
+      return x == other.x && y == other.y && z == other.z;
+    }
+  };
+
+  /// The best point of a cell so far.
+  struct Entry {
+    Cell cell;
+    float off_centre;  ///< squared distance to the cell's centre, in cells
+    float x, y, z;     ///< [m] from the origin
+    std::uint32_t id;
+
+    bool better_than(const Entry& other) const;
+  };
+
+  static std::size_t hash(const Cell& cell);
+  void add(const Entry& entry);
+  std::uint32_t* find(const Cell& cell);
+  void grow();
+
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> table_;  ///< open addressing: number of an entry plus one, or 0
+  std::size_t last_ = 0;              ///< entry of the point before: neighbours share cells
+  std::vector<float> x_, y_, z_;
+  std::vector<std::uint32_t> id_;
+};
+
+}  // namespace ist

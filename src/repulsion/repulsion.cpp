@@ -1,0 +1,161 @@
+#include "ist_proximity/repulsion/repulsion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace ist {
+namespace {
+
+// Sixteen numbers side by side; Eigen turns them into SIMD, square roots included.
+using Lanes = Eigen::Array<float, kPointWidth, 1>;
+using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
+
+// A ball in the frame of an index: the fixed frame's axes at the index's origin.
+struct PlacedBall {
+  float x, y, z, radius;  // [m]
+};
+
+// From each point of a tile to a ball.
+struct ToBall {
+  ToBall(const PointTile& tile, const PlacedBall& ball)
+      : x(ball.x - LaneMap(tile.x)), y(ball.y - LaneMap(tile.y)), z(ball.z - LaneMap(tile.z)) {
+    length = (x * x + y * y + z * z).sqrt();
+    distance = length - ball.radius;
+  }
+  Lanes x, y, z, length;  // [m] to the centre
+  Lanes distance;         // [m] to the surface, negative inside
+};
+
+Lanes squared_distance(const BoxNode& node, const PlacedBall& ball) {
+  const auto outside = [](const float* min, const float* max, float v) {
+    return Lanes((LaneMap(min) - v).max(v - LaneMap(max)).max(0.0F));
+  };
+  const Lanes x = outside(node.min_x, node.max_x, ball.x);
+  const Lanes y = outside(node.min_y, node.max_y, ball.y);
+  const Lanes z = outside(node.min_z, node.max_z, ball.z);
+  return x * x + y * y + z * z;
+}
+
+// Visits the tiles that may hold a point nearer to the ball's surface than `limit`, the nearest
+// first. The limit may shrink meanwhile.
+template <typename Visit>
+void visit_tiles(const PointIndex& index, const PlacedBall& ball, const float& limit,
+                 const Visit& visit) {
+  if (index.empty()) return;
+  const auto too_far = [&ball, &limit](float squared) {
+    const float reach = std::max(limit + ball.radius, 0.0F);
+    return !(squared < reach * reach);
+  };
+  struct Entry {
+    std::int32_t child;
+    float squared;
+  };
+  std::array<Entry, 160> stack;  // sixteen on each of the levels that 2^31 tiles can have
+  std::size_t top = 0;
+  stack[top++] = {index.root(), 0.0F};
+  while (top > 0) {
+    const Entry entry = stack[--top];
+    if (too_far(entry.squared)) continue;
+    if (entry.child < 0) {
+      visit(index.tiles()[static_cast<std::size_t>(~entry.child)]);
+      continue;
+    }
+    const BoxNode& node = index.nodes()[static_cast<std::size_t>(entry.child)];
+    const Lanes squared = squared_distance(node, ball);
+    const std::size_t begin = top;
+    for (int k = 0; k < node.count; ++k) {
+      if (too_far(squared[k])) continue;
+      std::size_t at = top++;
+      for (; at > begin && stack[at - 1].squared < squared[k]; --at) stack[at] = stack[at - 1];
+      stack[at] = {node.child[k], squared[k]};
+    }
+  }
+}
+
+PlacedBall place(const Ball& ball, const Eigen::Isometry3d& X_OL) {
+  const Eigen::Vector3f c = (X_OL * ball.center).cast<float>();
+  return {c.x(), c.y(), c.z(), static_cast<float>(ball.radius)};
+}
+
+// Calls visit(index, placed ball) for each thinned cloud and each ball.
+template <typename Visit>
+void for_each_pair(const std::vector<const CloudSnapshot*>& clouds, const std::vector<Ball>& balls,
+                   const Eigen::Isometry3d& X_FL, const Visit& visit) {
+  for (const CloudSnapshot* cloud : clouds) {
+    if (cloud == nullptr) continue;
+    Eigen::Isometry3d X_OL = X_FL;
+    X_OL.translation() -= cloud->coarse.origin();
+    for (const Ball& ball : balls) visit(cloud->coarse, place(ball, X_OL));
+  }
+}
+
+// The sums of all pairs, lane by lane.
+struct Blend {
+  Lanes x = Lanes::Zero(), y = Lanes::Zero(), z = Lanes::Zero();
+  Lanes weight = Lanes::Zero();
+  Lanes undirected = Lanes::Zero();  // the weight of points at a centre
+
+  void add(const ToBall& pair, float nearest, float per_smoothing) {
+    const Lanes w = (1.0F - (pair.distance - nearest) * per_smoothing).max(0.0F).square();
+    // Shorter than this a direction is noise; the weight moves over to the fallback smoothly.
+    constexpr float kTiny = 1e-6F;  // [m]
+    const Lanes directed = w / pair.length.max(kTiny);
+    x += directed * pair.x;
+    y += directed * pair.y;
+    z += directed * pair.z;
+    weight += w;
+    undirected += w * (1.0F - pair.length / kTiny).max(0.0F);
+  }
+
+  Eigen::Vector3d direction(const Eigen::Vector3d& fallback) const {
+    const auto total = static_cast<double>(weight.sum());
+    if (!(total > 0.0)) return fallback;
+    const Eigen::Vector3d sum = Eigen::Vector3f(x.sum(), y.sum(), z.sum()).cast<double>();
+    return (sum + static_cast<double>(undirected.sum()) * fallback) / total;
+  }
+};
+
+}  // namespace
+
+Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
+  coarse_.reserve(model->links.size());
+  for (const LinkModel& link : model->links) {
+    coarse_.push_back(coarse_balls(link.packing, kCoarseBalls));
+  }
+}
+
+Eigen::Vector3d Repulsion::operator()(std::size_t link, const Eigen::Isometry3d& X_FL,
+                                      const std::vector<const CloudSnapshot*>& clouds,
+                                      const LinkProximity& proximity,
+                                      const RepulsionConfig& config) const {
+  if (proximity.state == LinkState::kUnknown) {
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  if (proximity.state == LinkState::kClear) return Eigen::Vector3d::Zero();
+  const double strength =
+      std::clamp(1.0 - proximity.distance / config.influence_distance, 0.0, 1.0);
+  if (!(strength > 0.0)) return Eigen::Vector3d::Zero();
+
+  const std::vector<Ball>& balls = coarse_[link];
+  float nearest = std::numeric_limits<float>::infinity();
+  for_each_pair(clouds, balls, X_FL, [&nearest](const PointIndex& index, const PlacedBall& ball) {
+    visit_tiles(index, ball, nearest, [&nearest, &ball](const PointTile& tile) {
+      nearest = std::min(nearest, ToBall(tile, ball).distance.minCoeff());
+    });
+  });
+  Blend blend;
+  if (std::isfinite(nearest)) {
+    const auto smoothing = static_cast<float>(std::max(config.smoothing, 1e-6));
+    const float limit = nearest + smoothing;
+    for_each_pair(clouds, balls, X_FL, [&](const PointIndex& index, const PlacedBall& ball) {
+      visit_tiles(index, ball, limit, [&](const PointTile& tile) {
+        blend.add(ToBall(tile, ball), nearest, 1.0F / smoothing);
+      });
+    });
+  }
+  return config.gain * strength * blend.direction(proximity.direction);
+}
+
+}  // namespace ist

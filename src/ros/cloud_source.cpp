@@ -1,0 +1,268 @@
+#include "ist_proximity/ros/cloud_source.h"
+
+#include <ros/console.h>
+#include <ros/subscribe_options.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "ist_proximity/ros/cloud_conversion.h"
+#include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/transforms.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kMaxWaiting = 10;
+constexpr std::chrono::milliseconds kGrace(500), kCountPeriod(500);
+const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
+
+}  // namespace
+
+CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
+                         const tf2::BufferCore& buffer, ros::Publisher filtered)
+    : config_(config), buffer_(buffer), filtered_(std::move(filtered)), ingest_(config.ingest) {
+  facts_.name = config.name;
+  facts_.topic = nh.resolveName(config.topic);
+  facts_.timeout = config.timeout;
+  facts_.required = config.required;
+  nh.setCallbackQueue(&queue_);
+  // A short queue: while one cloud is ingested, only the newest of the others is worth keeping.
+  subscriber_ = nh.subscribe<sensor_msgs::PointCloud2>(config.topic, 2, &CloudSource::receive, this,
+                                                       ros::TransportHints().tcpNoDelay());
+  thread_ = std::thread(&CloudSource::run, this);
+}
+
+CloudSource::~CloudSource() {
+  running_ = false;
+  thread_.join();
+  subscriber_.shutdown();
+}
+
+void CloudSource::set_model(std::shared_ptr<const RobotModel> model,
+                            const std::string& fixed_frame) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  shared_target_.model = std::move(model);
+  shared_target_.fixed_frame = fixed_frame;
+}
+
+const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model) {
+  channel_.update();
+  const SourceSnapshot& snapshot = channel_.front();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  const bool current =
+      model && snapshot.model == model && snapshot.generation == shared_target_.generation;
+  return current ? &snapshot : nullptr;
+}
+
+SourceFacts CloudSource::facts() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  return facts_;
+}
+
+void CloudSource::notice_clock_jump() {
+  const ros::Time now = ros::Time::now();
+  if (now < last_now_) {
+    ++shared_target_.generation;
+    facts_.messages = 0;
+    facts_.newest = std::numeric_limits<double>::quiet_NaN();
+    facts_.problem.clear();
+  }
+  last_now_ = now;
+}
+
+CloudSource::Target CloudSource::target() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  return shared_target_;
+}
+
+void CloudSource::set_problem(const std::string& problem, bool dropped) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  facts_.problem = problem;
+  if (dropped) ++facts_.unusable;
+}
+
+void CloudSource::run() {
+  while (running_) {
+    queue_.callAvailable(waiting_.empty() ? kPollIdle : kPollTf);
+    forget_old();
+    use_newest_ready();
+    count_publishers();
+  }
+}
+
+/// Not in facts(): roscpp's answer can wait for the master.
+void CloudSource::count_publishers() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_count_) return;
+  next_count_ = now + kCountPeriod;
+  const std::uint32_t publishers = subscriber_.getNumPublishers();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  facts_.publishers = publishers;
+}
+
+/// Drops what belongs to another model or to the time before the clock's jump, and what has waited
+/// until nobody may use it any more.
+void CloudSource::forget_old() {
+  Target now_asked = target();
+  if (now_asked.generation != target_.generation) waiting_.clear();
+  if (now_asked.generation != target_.generation || now_asked.model != target_.model) {
+    in_use_ = ros::Time();
+    target_since_ = std::chrono::steady_clock::now();
+  }
+  target_ = std::move(now_asked);
+  if (!target_.model) waiting_.clear();
+
+  const double now = ros::Time::now().toSec();
+  while (!waiting_.empty() &&
+         (waiting_.size() > kMaxWaiting ||
+          now - waiting_.front().message->header.stamp.toSec() > config_.timeout)) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++facts_.unusable;
+    waiting_.pop_front();
+  }
+}
+
+void CloudSource::receive(const sensor_msgs::PointCloud2ConstPtr& message) {
+  forget_old();
+  const ros::Time& stamp = message->header.stamp;
+  Waiting waiting{message, {}};
+  const std::string problem = why_unusable(*message, &waiting.raw);
+  const double ahead = seconds_between(ros::Time::now(), stamp);
+  const bool believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++facts_.messages;
+    if (believed) facts_.newest = std::fmax(facts_.newest, stamp.toSec());
+    if (believed && stamp < in_use_) {
+      ++facts_.out_of_order;
+      return;
+    }
+    facts_.problem = problem;
+    if (!problem.empty()) {
+      ++facts_.unusable;
+      return;
+    }
+  }
+  const auto after = std::upper_bound(waiting_.begin(), waiting_.end(), stamp,
+                                      [](const ros::Time& time, const Waiting& other) {
+                                        return time < other.message->header.stamp;
+                                      });
+  waiting_.insert(after, waiting);
+}
+
+std::string CloudSource::why_unusable(const sensor_msgs::PointCloud2& message,
+                                      RawCloud* raw) const {
+  const ros::Time& stamp = message.header.stamp;
+  if (stamp.isZero()) return "its clouds have no stamp (0): the driver must set header.stamp";
+  const double ahead = seconds_between(ros::Time::now(), stamp);
+  if (ahead > future_tolerance(config_.timeout)) {
+    char text[96];
+    std::snprintf(text, sizeof text, "its clouds are stamped %.2f s in the future: ", ahead);
+    return text + std::string("compare the clocks of sensor and node");
+  }
+  if (message.header.frame_id.empty()) return "its clouds have an empty frame_id";
+  const std::string fault = view_cloud(message, raw);
+  if (!fault.empty()) return "malformed cloud: " + fault;
+  if (!target_.model) return "it waits for the robot's model";
+  return "";
+}
+
+void CloudSource::use_newest_ready() {
+  for (std::size_t i = waiting_.size(); i-- > 0;) {
+    std::string problem = missing_transform(waiting_[i]);
+    if (!problem.empty()) {
+      if (i + 1 == waiting_.size()) set_problem(problem, false);
+      continue;
+    }
+    problem = ingest(waiting_[i]);
+    set_problem(problem, !problem.empty());
+    const std::lock_guard<std::mutex> lock(mutex_);
+    facts_.overtaken += i;
+    waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    return;
+  }
+}
+
+/// Empty when all that is needed at the cloud's stamp is known.
+std::string CloudSource::missing_transform(const Waiting& waiting) const {
+  const std_msgs::Header& header = waiting.message->header;
+  std::string problem;
+  if (!is_known(buffer_, target_.fixed_frame, without_slash(header.frame_id), header.stamp,
+                &problem)) {
+    return problem;
+  }
+  if (!config_.ingest.self_filter) return "";
+  for (const LinkModel& link : target_.model->links) {
+    if (link.usable() &&
+        !is_known(buffer_, target_.fixed_frame, link.name, header.stamp, &problem) &&
+        worth_waiting_for(link.name, header.stamp)) {
+      return "the self-filter waits: " + problem;
+    }
+  }
+  return "";
+}
+
+/// A cloud is worth more without one link's self-filter than past its timeout, so the wait ends
+/// before that; and it does not begin for a link that stands still in tf. At the start all links
+/// are given time to appear.
+bool CloudSource::worth_waiting_for(const std::string& link, const ros::Time& stamp) const {
+  const ros::Time now = ros::Time::now();
+  const double patience = 0.8 * std::min(config_.timeout, 1.0);  // [s]
+  if (seconds_between(stamp, now) > patience) return false;
+  if (std::chrono::steady_clock::now() - target_since_ < kGrace) return true;
+  Eigen::Isometry3d ignored;
+  ros::Time newest;
+  return look_up(buffer_, target_.fixed_frame, link, ros::Time(), &ignored, &newest).empty() &&
+         seconds_between(newest, now) < patience;
+}
+
+void CloudSource::pose_robot(const ros::Time& stamp, PosedRobot* robot) const {
+  const auto& links = target_.model->links;
+  robot->model = target_.model.get();
+  robot->X_FL.resize(links.size(), Eigen::Isometry3d::Identity());
+  robot->known.assign(links.size(), false);
+  std::string ignored;
+  std::string ignored;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    // Asked first: an exception per missing link and cloud would cost more than the answer.
+    robot->known[i] =
+        links[i].usable() &&
+        is_known(buffer_, target_.fixed_frame, links[i].name, stamp, &ignored) &&
+        look_up(buffer_, target_.fixed_frame, links[i].name, stamp, &robot->X_FL[i]).empty();
+  }
+}
+
+std::string CloudSource::ingest(const Waiting& waiting) {
+  const std_msgs::Header& header = waiting.message->header;
+  Eigen::Isometry3d X_FS;
+  const std::string problem =
+      look_up(buffer_, target_.fixed_frame, without_slash(header.frame_id), header.stamp, &X_FS);
+  if (!problem.empty()) return problem;
+
+  PosedRobot robot;
+  if (config_.ingest.self_filter) pose_robot(header.stamp, &robot);
+  SourceSnapshot& snapshot = channel_.back();
+  try {
+    ingest_.run(waiting.raw, X_FS, robot, header.stamp.toSec(), &snapshot.cloud);
+  } catch (const std::exception& error) {  // no memory for a monstrous cloud
+    snapshot.generation = 0;
+    return std::string("the cloud could not be read: ") + error.what();
+  }
+  snapshot.stamp = header.stamp;
+  snapshot.model = target_.model;
+  snapshot.filtered = robot.known;
+  snapshot.generation = target_.generation;
+  in_use_ = header.stamp;
+  if (filtered_.getNumSubscribers() > 0) {
+    filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
+  }
+  channel_.publish();
+  return "";
+}
+
+}  // namespace ist

@@ -1,0 +1,167 @@
+#include "ist_proximity/ros/diagnostics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace ist {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+using ist_proximity::ProximityArray;
+
+DiagnosticStatus make(const std::string& node, const std::string& what) {
+  DiagnosticStatus status;
+  status.name = node + ": " + what;
+  status.hardware_id = node;
+  status.level = DiagnosticStatus::OK;
+  status.message = "OK";
+  return status;
+}
+
+void set(std::uint8_t level, const std::string& message, DiagnosticStatus* status) {
+  if (level <= static_cast<std::uint8_t>(status->level)) return;
+  status->level = static_cast<decltype(status->level)>(level);
+  status->message = message;
+}
+
+void add(const std::string& key, const std::string& value, DiagnosticStatus* status) {
+  diagnostic_msgs::KeyValue pair;
+  pair.key = key;
+  pair.value = value;
+  status->values.push_back(pair);
+}
+
+void add(const std::string& key, std::size_t value, DiagnosticStatus* status) {
+  add(key, std::to_string(value), status);
+}
+
+std::string number(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string milliseconds(double seconds) { return number("%.3f ms", 1e3 * seconds); }
+std::string millimetres(double metres) { return number("%.2f mm", 1e3 * metres); }
+
+}  // namespace
+
+void CycleTimes::add(double seconds) {
+  if (ring_.size() < kKept) {
+    ring_.push_back(seconds);
+  } else {
+    ring_[total_ % kKept] = seconds;
+  }
+  ++total_;
+}
+
+double CycleTimes::quantile(double q) const {
+  if (ring_.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> sorted = ring_;
+  std::sort(sorted.begin(), sorted.end());
+  const auto rank = static_cast<std::size_t>(q * static_cast<double>(sorted.size()));
+  return sorted[std::min(rank, sorted.size() - 1)];
+}
+
+DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& source,
+                                   const Verdict& verdict, double now) {
+  DiagnosticStatus status = make(node, "input " + source.name);
+  if (verdict.status == ProximityArray::STALE_CLOUD) {
+    set(source.required ? DiagnosticStatus::STALE : DiagnosticStatus::WARN, verdict.text, &status);
+  } else if (!verdict.ok()) {
+    set(source.required ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN, verdict.text, &status);
+  } else if (!source.problem.empty()) {
+    set(DiagnosticStatus::WARN, "the newest cloud is not in use: " + source.problem, &status);
+  }
+  add("topic", source.topic, &status);
+  add("required", source.required ? "true" : "false", &status);
+  add("publishers", source.publishers, &status);
+  add("messages received", source.messages, &status);
+  add("dropped: unusable", source.unusable, &status);
+  add("dropped: out of order", source.out_of_order, &status);
+  add("dropped: overtaken by a newer one", source.overtaken, &status);
+  if (source.has_snapshot) {
+    add("age", number("%.3f s", now - source.stamp.toSec()), &status);
+    add("points received", source.counts.received, &status);
+    add("points used", source.counts.used, &status);
+    add("points on the robot", source.counts.on_robot, &status);
+    add("points out of range", source.counts.out_of_range, &status);
+    add("points NaN", source.counts.not_a_number, &status);
+    add("points infinite", source.counts.infinite, &status);
+    add("time to ingest", milliseconds(source.ingest_time), &status);
+  }
+  return status;
+}
+
+DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& report) {
+  DiagnosticStatus status = make(node, "pose");
+  if (!report.pose_problems.empty()) {
+    set(DiagnosticStatus::ERROR, report.pose_problems.front(), &status);
+  } else if (report.links_monitored == 0) {
+    set(DiagnosticStatus::WARN, "no link is looked up yet", &status);
+  }
+  add("links monitored", report.links_monitored, &status);
+  add("links with a pose", report.links_known, &status);
+  if (report.links_known > 0) add("age", number("%.3f s", report.pose_age), &status);
+  for (const std::string& problem : report.pose_problems) add("problem", problem, &status);
+  return status;
+}
+
+DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& report, double rate,
+                                   double wanted_rate) {
+  DiagnosticStatus status = make(node, "query");
+  if (report.status == ProximityArray::DEGRADED) {
+    set(DiagnosticStatus::WARN, report.text, &status);
+  } else if (report.status != ProximityArray::OK) {
+    set(DiagnosticStatus::ERROR, report.text, &status);
+  }
+  if (rate < 0.8 * wanted_rate) {
+    set(DiagnosticStatus::WARN, "the rate is lower than ~rate: the machine is too busy", &status);
+  }
+  add("rate", number("%.1f Hz", rate), &status);
+  add("~rate", number("%.1f Hz", wanted_rate), &status);
+  add("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
+  add("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)), &status);
+  return status;
+}
+
+DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state) {
+  DiagnosticStatus status = make(node, "model");
+  const bool ready = state.phase == ModelState::Phase::kReady;
+  if (!state.problem.empty()) {
+    const bool under_way = state.phase == ModelState::Phase::kPacking;
+    set(under_way ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem, &status);
+  }
+  add("ready", ready ? "100 %" : number("%.0f %%", 100 * state.fraction), &status);
+  add("links monitored", state.links.size(), &status);
+  for (const std::size_t i : state.monitored) {
+    const LinkModel& link = state.robot->links[i];
+    if (!link.usable()) {
+      set(DiagnosticStatus::ERROR, link.error, &status);
+      add(link.name, link.error, &status);
+      continue;
+    }
+    const PackingCertificate& certificate = link.packing.certificate;
+    std::string text = std::to_string(link.packing.balls.size()) + " spheres, largest gap " +
+                       millimetres(certificate.max_gap) + ", mean " +
+                       millimetres(certificate.mean_gap);
+    if (certificate.unreachable_area > 0) {
+      text += number(", %.1f cm2 of sheets", 1e4 * certificate.unreachable_area);
+    }
+    if (!certificate.reached) {
+      text += ", ~packing/max_error not reached";
+      set(DiagnosticStatus::WARN, "link '" + link.name + "': " + text, &status);
+    }
+    text += link.from_cache ? ", from the cache" : number(", packed in %.1f s", link.packing_time);
+    add(link.name, text, &status);
+  }
+  for (const std::string& warning : state.warnings) {
+    set(DiagnosticStatus::WARN, warning, &status);
+    add("warning", warning, &status);
+  }
+  return status;
+}
+
+}  // namespace ist

@@ -1,0 +1,83 @@
+#include "ist_proximity/ros/message_conversion.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "ist_proximity/ros/ros_time.h"
+
+namespace ist {
+namespace {
+
+using LinkMessage = ist_proximity::LinkProximity;
+using ist_proximity::ProximityArray;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+template <typename Message>
+void assign(const Eigen::Vector3d& v, Message* message) {
+  message->x = v.x();
+  message->y = v.y();
+  message->z = v.z();
+}
+
+void assign(const Eigen::Vector3d& v, geometry_msgs::Wrench* wrench) {
+  assign(v, &wrench->force);
+  assign(v, &wrench->torque);
+}
+
+}  // namespace
+
+LinkMessage unknown_link(const std::string& name) {
+  return to_message(name, LinkProximity(), Eigen::Vector3d::Constant(kNaN), kNaN, "");
+}
+
+LinkMessage to_message(const std::string& name, const LinkProximity& result,
+                       const Eigen::Vector3d& repulsion, double closing_speed,
+                       const std::string& source) {
+  LinkMessage message;
+  message.link = name;
+  message.state = static_cast<std::uint8_t>(result.state);
+  message.distance = result.distance;
+  message.lower_bound = result.lower_bound;
+  assign(result.p_FL, &message.point_on_link);
+  assign(result.p_LL, &message.point_on_link_local);
+  assign(result.p_FO, &message.point_on_obstacle);
+  assign(result.direction, &message.direction);
+  assign(repulsion, &message.repulsion);
+  message.closing_speed = closing_speed;
+  if (result.state >= LinkState::kNear) message.source = source;
+  // The force in contact comes from volumes, which are not computed yet: not known, so NaN.
+  const bool no_contact = result.state == LinkState::kClear || result.state == LinkState::kNear;
+  assign(Eigen::Vector3d::Constant(no_contact ? 0.0 : kNaN), &message.penetration);
+  return message;
+}
+
+ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict& verdict,
+                                       const ros::Time& stamp) {
+  ist_proximity::SourceStatus message;
+  message.name = source.name;
+  message.status = verdict.status;
+  message.age = kNaN;
+  if (!source.has_snapshot) return message;
+  message.stamp = source.stamp;
+  message.age = seconds_between(message.stamp, stamp);
+  message.points_received = source.counts.received;
+  message.points_used = source.counts.used;
+  message.points_on_robot = source.counts.on_robot;
+  return message;
+}
+
+double min_distance(const ProximityArray& message) {
+  if (message.links.empty() ||
+      (message.status != ProximityArray::OK && message.status != ProximityArray::DEGRADED)) {
+    return kNaN;
+  }
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const LinkMessage& link : message.links) {
+    if (link.state == LinkMessage::UNKNOWN) return kNaN;
+    smallest = std::min(smallest, link.lower_bound);
+  }
+  return smallest;
+}
+
+}  // namespace ist

@@ -1,0 +1,180 @@
+#include "ist_proximity/ros/parameters.h"
+
+#include <ros/console.h>
+#include <ros/param.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <sstream>
+
+#include "ist_proximity/ros/parameter_reader.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+Range more_than_zero(const char* unit, double max, bool infinite = false) {
+  return {unit, 0.0, max, true, infinite};
+}
+
+Range from_zero(const char* unit, double max) { return {unit, 0.0, max, false, false}; }
+
+void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
+  const double default_max_range = ingest->max_range;
+  reader->read(prefix + "min_range", from_zero("m", 1e6), &ingest->min_range);
+  reader->read(prefix + "max_range", more_than_zero("m", kInf, true), &ingest->max_range);
+  reader->read(prefix + "self_filter", &ingest->self_filter);
+  reader->read(prefix + "self_filter_padding", from_zero("m", 1.0), &ingest->self_filter_padding);
+  if (!(ingest->max_range > ingest->min_range)) {
+    std::ostringstream text;
+    text << "~" << prefix << "max_range is " << ingest->max_range
+         << " m: it must be more than min_range, which is " << ingest->min_range << " m";
+    reader->add_error(text.str());
+    ingest->max_range = default_max_range;
+  }
+}
+
+void read_source(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+  reader->read(prefix + "topic", &source->topic);
+  if (source->topic.empty()) {
+    reader->add_error("~" + prefix + "topic is empty: the name of a topic is needed");
+  }
+  std::string type = "sensor_msgs/PointCloud2";
+  const std::string not_yet = "this type is not supported yet; publish it as a PointCloud2";
+  reader->read_choice(prefix + "type", {"sensor_msgs/PointCloud2"}, &type,
+                      {{"sensor_msgs/LaserScan", not_yet}, {"octomap_msgs/Octomap", not_yet}});
+  reader->read(prefix + "timeout", more_than_zero("s", kInf, true), &source->timeout);
+  reader->read(prefix + "required", &source->required);
+  read_ingest(reader, prefix, &source->ingest);
+}
+
+std::vector<SourceConfig> read_sources(ParameterReader* reader) {
+  // Parameters beside ~sources are for the single source, and defaults for several.
+  SourceConfig single;
+  reader->read("cloud_timeout", more_than_zero("s", kInf, true), &single.timeout);
+  read_ingest(reader, "", &single.ingest);
+  if (!reader->has("sources")) return {single};
+
+  std::vector<SourceConfig> sources;
+  for (const std::string& name : reader->children("sources")) {
+    SourceConfig source = single;
+    source.name = source.topic = name;
+    const std::string prefix = "sources/" + name;
+    reader->children(prefix);  // complains unless it is a dictionary
+    read_source(reader, prefix + "/", &source);
+    sources.push_back(source);
+  }
+  if (sources.empty() && reader->errors().empty()) {
+    reader->add_error("~sources is empty: at least one source is needed, or no ~sources at all");
+  }
+  return sources;
+}
+
+bool read_repulsion(ParameterReader* reader, double max_distance, RepulsionConfig* repulsion) {
+  reader->read("repulsion/influence_distance", more_than_zero("m", 1e3),
+               &repulsion->influence_distance);
+  reader->read("repulsion/gain", from_zero("", 1e6), &repulsion->gain);
+  reader->read("repulsion/smoothing", more_than_zero("m", 10.0), &repulsion->smoothing);
+  const bool clamped = repulsion->influence_distance > max_distance;
+  if (clamped) repulsion->influence_distance = max_distance;
+  return clamped && reader->has("repulsion/influence_distance");
+}
+
+void read_model(ParameterReader* reader, ServerConfig* config) {
+  reader->read("robot_description", &config->robot_description);
+  if (config->robot_description.empty()) {
+    reader->add_error("~robot_description is empty: the name of the parameter with the URDF");
+  }
+  std::string geometry = "collision";
+  reader->read_choice("geometry", {"collision", "visual"}, &geometry);
+  config->geometry = geometry == "visual" ? GeometrySource::kVisual : GeometrySource::kCollision;
+  reader->read("links", &config->model.links);
+  reader->read("packing/max_error", more_than_zero("m", 1.0), &config->model.packing.max_error);
+  reader->read("packing/max_spheres", Range{"", 1.0, 1e6}, &config->model.packing.max_spheres);
+  reader->read("packing/threads", from_zero("", 256), &config->model.threads);
+  config->model.cache_directory = default_cache_directory();
+  reader->read("cache_directory", &config->model.cache_directory);
+}
+
+void read_query(ParameterReader* reader, QueryConfig* query) {
+  reader->read("max_distance", more_than_zero("m", 1e3), &query->max_distance);
+  reader->read("query/tolerance", from_zero("m", 1.0), &query->tolerance);
+  reader->read("query/deadline", from_zero("s", 10.0), &query->deadline);
+  reader->read("query/margin", from_zero("m", 1.0), &query->margin);
+}
+
+void refuse_what_is_not_there_yet(ParameterReader* reader) {
+  std::string pose_source = "tf";
+  reader->read_choice(
+      "pose_source", {"tf"}, &pose_source,
+      {{"joint_states", "not supported yet; run robot_state_publisher and use tf"}});
+  bool self_collision = false;
+  reader->read("self_collision/enabled", &self_collision);
+  if (self_collision) {
+    reader->add_error("~self_collision/enabled is true: link against link is not supported yet");
+  }
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += (text.empty() ? "" : "\n") + line;
+  return text;
+}
+
+XmlRpc::XmlRpcValue fetch(const ros::NodeHandle& private_nh) {
+  XmlRpc::XmlRpcValue tree;
+  ros::param::get(private_nh.getNamespace(), tree);  // one call: a consistent view
+  return tree;
+}
+
+}  // namespace
+
+ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
+  ParameterReader reader(tree);
+  ServerConfig config;
+  reader.read("fixed_frame", &config.fixed_frame);
+  reader.read("pose_timeout", more_than_zero("s", 3600.0), &config.pose_timeout);
+  reader.read("rate", Range{"Hz", 0.01, 1000.0}, &config.rate);
+  read_model(&reader, &config);
+  read_query(&reader, &config.query);
+  if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {
+    warnings->push_back(
+        "~repulsion/influence_distance is more than ~max_distance, where measuring "
+        "ends; ~max_distance is used");
+  }
+  config.sources = read_sources(&reader);
+  refuse_what_is_not_there_yet(&reader);
+
+  if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
+  const std::vector<std::string> unknown = reader.unknown();
+  warnings->insert(warnings->end(), unknown.begin(), unknown.end());
+  // tf2 knows frames without the slash that older programs put in front.
+  if (!config.fixed_frame.empty() && config.fixed_frame[0] == '/') config.fixed_frame.erase(0, 1);
+  return config;
+}
+
+ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
+  std::vector<std::string> warnings;
+  const ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
+  for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
+  return config;
+}
+
+RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_distance) {
+  ParameterReader reader(fetch(private_nh));
+  RepulsionConfig repulsion;
+  read_repulsion(&reader, max_distance, &repulsion);
+  if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
+  return repulsion;
+}
+
+std::string default_cache_directory() {
+  const char* ros_home = std::getenv("ROS_HOME");
+  if (ros_home && *ros_home) return std::string(ros_home) + "/ist_proximity";
+  const char* home = std::getenv("HOME");
+  return home && *home ? std::string(home) + "/.ros/ist_proximity" : std::string();
+}
+
+}  // namespace ist

@@ -1,0 +1,203 @@
+#include "ist_proximity/ros/proximity_cycle.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "ist_proximity/ros/message_conversion.h"
+#include "ist_proximity/ros/ros_time.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+
+std::vector<std::string> link_names(const RobotModel& robot) {
+  std::vector<std::string> names;
+  for (const LinkModel& link : robot.links) names.push_back(link.name);
+  return names;
+}
+
+std::vector<bool> wanted_links(const ModelState& model) {
+  std::vector<bool> wanted(model.robot->links.size(), false);
+  for (const std::size_t i : model.monitored) wanted[i] = model.robot->links[i].usable();
+  return wanted;
+}
+
+void fill_sources(const Situation& situation, ProximityArray* message) {
+  message->sources.clear();
+  for (std::size_t i = 0; i < situation.sources.size(); ++i) {
+    message->sources.push_back(
+        to_message(situation.sources[i], situation.verdicts[i], message->header.stamp));
+  }
+}
+
+void fill_status(const Situation& situation, const ros::Time& now, ProximityArray* message,
+                 CycleReport* report) {
+  const Verdict verdict = judge(situation, now.toSec());
+  message->status = report->status = verdict.status;
+  message->status_text = report->text = verdict.text;
+  report->sources = situation.sources;
+  report->verdicts = situation.verdicts;
+  report->pose_problems = situation.pose_problems;
+}
+
+}  // namespace
+
+ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
+                               const tf2::BufferCore& buffer)
+    : model_(std::move(model)),
+      robot_(*model_->robot),
+      fixed_frame_(config.fixed_frame.empty() ? robot_.root_link : config.fixed_frame),
+      pose_source_(buffer, fixed_frame_, link_names(robot_), wanted_links(*model_),
+                   config.pose_timeout),
+      query_(model_->robot, config.query),
+      repulsion_(model_->robot),
+      speeds_(robot_.links.size()),
+      results_(robot_.links.size()) {
+  situation_.model_problem = model_->problem;
+  for (const std::size_t i : model_->monitored) {
+    const LinkModel& link = robot_.links[i];
+    if (!link.usable()) situation_.link_errors.push_back(link.error);
+  }
+}
+
+void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
+                         const RepulsionConfig& repulsion, ProximityArray* message,
+                         CycleReport* report) {
+  look_at_poses(now);
+  const auto begin = std::chrono::steady_clock::now();
+  look_at_sources(now, sources);
+  situation_.pose_problems = pose_problems();
+
+  // A link in tf, but whose own points are still in the cloud, would be found touching itself.
+  std::vector<bool> known = poses_.known;
+  for (const SourceSnapshot* snapshot : snapshots_) {
+    if (!snapshot || clouds_.empty() || snapshot->filtered.empty()) continue;
+    for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && snapshot->filtered[i];
+  }
+  situation_.deadline_passed =
+      !query_.run(poses_.X_FL, known, clouds_, &results_) && !clouds_.empty();
+
+  message->header.stamp = poses_.stamp;
+  message->header.frame_id = fixed_frame_;
+  fill_links(repulsion, message);
+  fill_sources(situation_, message);
+  message->cloud_stamp = ros::Time();
+  for (std::size_t i = 0; i < snapshots_.size(); ++i) {
+    if (clouds_.empty() || !situation_.verdicts[i].ok()) continue;
+    const ros::Time& stamp = snapshots_[i]->stamp;
+    if (message->cloud_stamp.isZero() || stamp < message->cloud_stamp) {
+      message->cloud_stamp = stamp;
+    }
+  }
+  fill_status(situation_, now, message, report);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  message->computation_time = took.count();
+
+  report->links_monitored = model_->monitored.size();
+  report->links_known = poses_.count_known();
+  report->pose_age = seconds_between(poses_.stamp, now);
+  report->times.add(took.count());
+}
+
+void ProximityCycle::look_at_poses(const ros::Time& now) {
+  pose_source_.look_up(now, &poses_);
+  situation_.clock_runs = !now.isZero();
+}
+
+/// Takes the newest snapshots and decides which of them the query may see.
+void ProximityCycle::look_at_sources(const ros::Time& now, const CloudSources& sources) {
+  situation_.sources.clear();
+  situation_.verdicts.clear();
+  snapshots_.clear();
+  for (const auto& source : sources) {
+    SourceFacts facts = source->facts();
+    const SourceSnapshot* snapshot = source->newest(model_->robot);
+    if (snapshot) {
+      facts.has_snapshot = true;
+      facts.stamp = snapshot->stamp;
+      facts.counts = snapshot->cloud.counts;
+      facts.ingest_time = snapshot->cloud.ingest_time;
+    }
+    situation_.verdicts.push_back(judge_source(facts, now.toSec()));
+    situation_.sources.push_back(std::move(facts));
+    snapshots_.push_back(snapshot);
+  }
+
+  clouds_.clear();
+  cloud_names_.clear();
+  const bool usable = clouds_usable(situation_);
+  for (std::size_t i = 0; i < snapshots_.size(); ++i) {
+    if (!situation_.verdicts[i].ok()) snapshots_[i] = nullptr;
+    if (!usable || !snapshots_[i]) continue;
+    clouds_.push_back(&snapshots_[i]->cloud);
+    cloud_names_.push_back(situation_.sources[i].name);
+  }
+}
+
+/// One sentence per reason, with every link that it holds for.
+std::vector<std::string> ProximityCycle::pose_problems() const {
+  std::vector<std::string> sentences;
+  std::string others;
+  for (const std::size_t i : model_->monitored) {
+    if (poses_.problems[i].empty()) continue;
+    const std::string name = "'" + robot_.links[i].name + "'";
+    if (sentences.empty()) {
+      sentences.push_back("link " + name + " has no pose: " + poses_.problems[i] +
+                          "; is robot_state_publisher running, with joint states coming in?");
+    } else {
+      others += (others.empty() ? "" : ", ") + name;
+    }
+  }
+  if (!others.empty()) sentences.push_back("no pose either for " + others);
+
+  for (std::size_t s = 0; s < snapshots_.size(); ++s) {
+    const SourceSnapshot* snapshot = snapshots_[s];
+    if (!snapshot || clouds_.empty() || snapshot->filtered.empty()) continue;
+    std::string unfiltered;
+    for (const std::size_t i : model_->monitored) {
+      if (!poses_.known[i] || snapshot->filtered[i]) continue;
+      unfiltered += (unfiltered.empty() ? "" : ", ") + ("'" + robot_.links[i].name + "'");
+    }
+    if (unfiltered.empty()) continue;
+    sentences.push_back("no pose at the stamp of the cloud in use from source '" +
+                        situation_.sources[s].name +
+                        "', so that its own points are still in it: " + unfiltered);
+  }
+  return sentences;
+}
+
+void ProximityCycle::fill_links(const RepulsionConfig& repulsion, ProximityArray* message) {
+  message->links.clear();
+  for (const std::size_t i : model_->monitored) {
+    const LinkProximity& result = results_[i];
+    const std::string source =
+        result.source >= 0 && static_cast<std::size_t>(result.source) < cloud_names_.size()
+            ? cloud_names_[static_cast<std::size_t>(result.source)]
+            : std::string();
+    message->links.push_back(to_message(
+        robot_.links[i].name, result, repulsion_(i, poses_.X_FL[i], clouds_, result, repulsion),
+        speeds_[i].update(message->header.stamp, result.distance), source));
+  }
+}
+
+void say_no_model(const ModelState& model, const std::string& fixed_frame, const ros::Time& now,
+                  const CloudSources& sources, ProximityArray* message, CycleReport* report) {
+  Situation situation;
+  situation.model_problem = model.problem;
+  situation.clock_runs = !now.isZero();
+  for (const auto& source : sources) {
+    situation.sources.push_back(source->facts());
+    situation.verdicts.push_back(judge_source(situation.sources.back(), now.toSec()));
+  }
+  *message = ProximityArray();
+  message->header.stamp = now;
+  message->header.frame_id = fixed_frame.empty() ? model.root_link : fixed_frame;
+  for (const std::string& link : model.links) message->links.push_back(unknown_link(link));
+  fill_sources(situation, message);
+  fill_status(situation, now, message, report);
+  report->links_monitored = model.links.size();
+  report->links_known = 0;
+}
+
+}  // namespace ist

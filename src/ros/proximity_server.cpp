@@ -1,0 +1,192 @@
+#include "ist_proximity/ros/proximity_server.h"
+
+#include <ros/console.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Float64.h>
+
+#include <algorithm>
+#include <boost/make_shared.hpp>
+
+#include "ist_proximity/ros/message_conversion.h"
+#include "ist_proximity/ros/ros_time.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+
+constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
+constexpr std::size_t kMaxSpheresPerLink = 250;         // one marker each
+
+std::string without_leading_slash(const std::string& name) {
+  return !name.empty() && name[0] == '/' ? name.substr(1) : name;
+}
+
+}  // namespace
+
+ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
+                                 const ServerConfig& config)
+    : config_(config),
+      nh_(nh),
+      private_nh_(private_nh),
+      name_(without_leading_slash(private_nh.getNamespace())),
+      buffer_(ros::Duration(10.0)),
+      listener_(buffer_, nh_, true),
+      loader_(config, nh),
+      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
+      repulsion_(config.repulsion) {
+  advertise();
+  for (const SourceConfig& source : config_.sources) {
+    sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
+  }
+  cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
+  diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
+}
+
+ProximityServer::~ProximityServer() {
+  {
+    const std::lock_guard<std::mutex> lock(stop_mutex_);
+    stop_ = true;
+  }
+  stop_signal_.notify_all();
+  cycle_thread_.join();
+  diagnostics_thread_.join();
+}
+
+void ProximityServer::advertise() {
+  proximity_ = private_nh_.advertise<ProximityArray>("proximity", 10);
+  min_distance_ = private_nh_.advertise<std_msgs::Float64>("min_distance", 10);
+  markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
+  spheres_ = private_nh_.advertise<visualization_msgs::MarkerArray>("spheres", 1, true);
+  filtered_cloud_ = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
+  diagnostics_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+  reload_service_ =
+      private_nh_.advertiseService("reload_model", &ProximityServer::reload_model, this);
+}
+
+bool ProximityServer::sleep_until(Clock::time_point time) {
+  std::unique_lock<std::mutex> lock(stop_mutex_);
+  return !stop_signal_.wait_until(lock, time, [this] { return stop_; });
+}
+
+void ProximityServer::run_cycles() {
+  const auto period = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(1.0 / config_.rate));
+  Clock::time_point next = Clock::now();
+  do {
+    run_cycle();
+    // A cycle that took too long is not made up for by a burst.
+    next = std::max(next + period, Clock::now());
+  } while (sleep_until(next));
+}
+
+void ProximityServer::run_cycle() {
+  const ros::Time now = ros::Time::now();
+  notice_clock_jump(now);
+  take_model();
+  const auto message = boost::make_shared<ProximityArray>();
+  {
+    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    if (cycle_) {
+      cycle_->run(now, sources_, repulsion_, message.get(), &report_);
+    } else {
+      say_no_model(*model_, config_.fixed_frame, now, sources_, message.get(), &report_);
+    }
+    ++report_.cycles;
+  }
+  publish(message);
+}
+
+/// Transforms from before the jump would be taken for the newest. The sources look after
+/// themselves.
+void ProximityServer::notice_clock_jump(const ros::Time& now) {
+  if (now < last_now_) {
+    ROS_WARN("the ROS clock jumped back by %.3f s: transforms and clouds from before are dropped",
+             seconds_between(now, last_now_));
+    buffer_.clear();
+    if (cycle_) cycle_->forget();
+  }
+  last_now_ = now;
+}
+
+void ProximityServer::take_model() {
+  std::shared_ptr<const ModelState> model = loader_.state();
+  if (model == model_) return;
+  model_ = std::move(model);
+  if (model_->phase == ModelState::Phase::kReady) {
+    cycle_ = std::make_unique<ProximityCycle>(model_, config_, buffer_);
+  } else {
+    cycle_.reset();
+  }
+  publish_spheres();
+  const std::string& fixed_frame =
+      config_.fixed_frame.empty() ? model_->root_link : config_.fixed_frame;
+  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame);
+}
+
+void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& message) {
+  proximity_.publish(message);
+  std_msgs::Float64 smallest;
+  smallest.data = min_distance(*message);
+  min_distance_.publish(smallest);
+  if (markers_.getNumSubscribers() > 0 && Clock::now() >= next_markers_) {
+    next_markers_ = Clock::now() + kMarkerPeriod;
+    markers_.publish(marker_drawer_.draw(*message));
+  }
+}
+
+void ProximityServer::publish_spheres() {
+  if (!shown_spheres_.markers.empty()) spheres_.publish(deleted(shown_spheres_));
+  shown_spheres_.markers.clear();
+  if (!model_->robot) return;
+  shown_spheres_ = sphere_markers(*model_->robot, model_->monitored, kMaxSpheresPerLink);
+  spheres_.publish(shown_spheres_);
+}
+
+void ProximityServer::run_diagnostics() {
+  std::size_t cycles_before = 0;
+  Clock::time_point before = Clock::now();
+  while (sleep_until(before + std::chrono::seconds(1))) {
+    read_repulsion_again();
+    CycleReport report;
+    {
+      const std::lock_guard<std::mutex> lock(shared_mutex_);
+      report = report_;
+    }
+    const std::chrono::duration<double> interval = Clock::now() - before;
+    before = Clock::now();
+    const double rate = static_cast<double>(report.cycles - cycles_before) / interval.count();
+    cycles_before = report.cycles;
+
+    diagnostic_msgs::DiagnosticArray message;
+    message.header.stamp = ros::Time::now();
+    for (std::size_t i = 0; i < report.sources.size(); ++i) {
+      message.status.push_back(input_diagnostics(name_, report.sources[i], report.verdicts[i],
+                                                 message.header.stamp.toSec()));
+    }
+    message.status.push_back(pose_diagnostics(name_, report));
+    message.status.push_back(query_diagnostics(name_, report, rate, config_.rate));
+    message.status.push_back(model_diagnostics(name_, *loader_.state()));
+    diagnostics_.publish(message);
+  }
+}
+
+void ProximityServer::read_repulsion_again() {
+  try {
+    const RepulsionConfig repulsion = read_repulsion(private_nh_, config_.query.max_distance);
+    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    repulsion_ = repulsion;
+  } catch (const ParameterError& error) {
+    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~repulsion goes on: " << error.what());
+  }
+}
+
+bool ProximityServer::reload_model(std_srvs::Trigger::Request&,
+                                   std_srvs::Trigger::Response& response) {
+  bool found = false;
+  response.message = loader_.reload(&found);
+  response.success = found;
+  return true;
+}
+
+}  // namespace ist

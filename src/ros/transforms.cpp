@@ -1,0 +1,70 @@
+#include "ist_proximity/ros/transforms.h"
+
+#include <cmath>
+#include <exception>
+
+#include "ist_proximity/proximity/proximity_query.h"
+
+namespace ist {
+
+std::string trimmed(std::string tf_error) {
+  while (!tf_error.empty() && (tf_error.back() == ' ' || tf_error.back() == '.')) {
+    tf_error.pop_back();
+  }
+  return tf_error;
+}
+
+std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
+                    const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
+                    ros::Time* stamp) {
+  if (frame == fixed) {  // tf2 would give the stamp of what moves the fixed frame itself
+    X_FT->setIdentity();
+    if (stamp) *stamp = ros::Time();
+    return "";
+  }
+  geometry_msgs::TransformStamped transform;
+  try {
+    transform = buffer.lookupTransform(fixed, frame, time);
+  } catch (const std::exception& error) {  // tf2's own, or a duration that overflows
+    return "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error.what());
+  }
+  const std::string fault = to_isometry(transform.transform, X_FT);
+  if (!fault.empty()) return "transform from '" + frame + "' to '" + fixed + "': " + fault;
+  if (stamp) *stamp = transform.header.stamp;
+  return "";
+}
+
+bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std::string& frame,
+              const ros::Time& time, std::string* problem) {
+  if (frame == fixed) return true;
+  std::string error;
+  try {
+    if (buffer.canTransform(fixed, frame, time, &error)) return true;
+  } catch (const std::exception& exception) {
+    error = exception.what();
+  }
+  *problem = "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error);
+  return false;
+}
+
+std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isometry3d* X) {
+  const auto& r = transform.rotation;
+  Eigen::Quaterniond q(r.w, r.x, r.y, r.z);
+  const double norm = q.norm();
+  if (!(std::abs(norm - 1.0) < 1e-3)) {
+    return "its quaternion has length " + std::to_string(norm) + ", so it is no rotation";
+  }
+  q.coeffs() /= norm;
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  result.linear() = q.toRotationMatrix();
+  result.translation() << transform.translation.x, transform.translation.y, transform.translation.z;
+  if (!is_rigid(result)) return "it holds NaN or infinity";
+  *X = result;
+  return "";
+}
+
+std::string without_slash(const std::string& frame) {
+  return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
+}
+
+}  // namespace ist

@@ -1,0 +1,447 @@
+#include "ist_proximity/cloud/ingest.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <random>
+#include <set>
+#include <stdexcept>
+
+#include "ist_proximity/cloud/cloud_layout.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+using Points = std::vector<Eigen::Vector3d>;
+
+// How a message lays out its points.
+struct Format {
+  bool is_double = false, is_bigendian = false;
+  std::size_t x = 0, y = 4, z = 8, point_step = 12;
+  std::size_t width = 0;        // 0: one row
+  std::size_t row_padding = 0;  // bytes after each row
+};
+
+template <typename T>
+void put(T value, bool reversed, std::uint8_t* bytes) {
+  std::memcpy(bytes, &value, sizeof value);
+  if (reversed) std::reverse(bytes, bytes + sizeof value);
+}
+
+// A message's bytes, checked the way the node does it. The bytes between the coordinates are 0xFF.
+class Message {
+ public:
+  Message(const Points& points, const Format& format) {
+    const std::size_t width = format.width == 0 ? points.size() : format.width;
+    CloudLayout layout;
+    layout.width = static_cast<std::uint32_t>(width);
+    layout.height = static_cast<std::uint32_t>(width == 0 ? 0 : points.size() / width);
+    layout.point_step = static_cast<std::uint32_t>(format.point_step);
+    layout.row_step = static_cast<std::uint32_t>(width * format.point_step + format.row_padding);
+    layout.is_bigendian = format.is_bigendian;
+    const auto type = static_cast<std::uint8_t>(format.is_double ? 8 : 7);
+    layout.fields = {{"x", static_cast<std::uint32_t>(format.x), type, 1},
+                     {"y", static_cast<std::uint32_t>(format.y), type, 1},
+                     {"z", static_cast<std::uint32_t>(format.z), type, 1}};
+    // One byte more in front, so that nothing is aligned.
+    bytes_.assign(1 + std::size_t{layout.height} * layout.row_step, 0xFF);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      std::uint8_t* point =
+          &bytes_[1] + i / width * layout.row_step + i % width * format.point_step;
+      for (const auto& [offset, value] : {std::pair{format.x, points[i].x()},
+                                          std::pair{format.y, points[i].y()},
+                                          std::pair{format.z, points[i].z()}}) {
+        if (format.is_double) {
+          put(value, format.is_bigendian, point + offset);
+        } else {
+          put(static_cast<float>(value), format.is_bigendian, point + offset);
+        }
+      }
+    }
+    layout.data = bytes_.data() + 1;
+    layout.data_size = bytes_.size() - 1;
+    EXPECT_EQ(check_layout(layout, &raw), "");
+  }
+  Message(const Message&) = delete;
+
+  RawCloud raw;
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+Format float64() {
+  Format format;
+  format.is_double = true;
+  format.y = 8;
+  format.z = 16;
+  format.point_step = 24;
+  return format;
+}
+
+CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
+                     const Format& format = {},
+                     const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity(),
+                     const PosedRobot& robot = {}) {
+  const Message message(points, format);
+  CloudSnapshot snapshot;
+  Ingest(config).run(message.raw, X_FS, robot, 12.5, &snapshot);
+  const IngestCounts& n = snapshot.counts;
+  EXPECT_EQ(n.received, points.size());
+  EXPECT_EQ(n.received, n.not_a_number + n.infinite + n.out_of_range + n.on_robot + n.used);
+  EXPECT_EQ(n.used, snapshot.index.size());
+  return snapshot;
+}
+
+// The points of an index in the fixed frame, by id.
+std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
+  std::map<std::uint32_t, Eigen::Vector3d> points;
+  for (const PointTile& tile : index.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      const Eigen::Vector3d p = Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]).cast<double>();
+      EXPECT_TRUE(points.emplace(tile.id[k], index.origin() + p).second) << "id twice";
+    }
+  }
+  return points;
+}
+
+Points random_points(std::size_t n, double size, unsigned seed) {
+  std::mt19937 random(seed);
+  // Floats, so that both precisions hold the same.
+  std::uniform_real_distribution<float> u(-static_cast<float>(size), static_cast<float>(size));
+  Points points;
+  for (std::size_t i = 0; i < n; ++i) {
+    const float x = u(random), y = u(random), z = u(random);
+    points.emplace_back(x, y, z);
+  }
+  return points;
+}
+
+Eigen::Isometry3d pose(double x, double y, double z) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() << x, y, z;
+  X.rotate(Eigen::AngleAxisd(1.1, Eigen::Vector3d(1.0, -2.0, 0.5).normalized()));
+  return X;
+}
+
+TEST(Ingest, emptyCloud) {
+  const CloudSnapshot snapshot = ingest({});
+  EXPECT_TRUE(snapshot.index.empty());
+  EXPECT_TRUE(snapshot.coarse.empty());
+  EXPECT_FALSE(snapshot.counts.saw_nothing()) << "a measurement of nothing";
+}
+
+TEST(Ingest, countsAndStamp) {
+  const CloudSnapshot snapshot =
+      ingest({{1, 0, 0}, {kNan, 0, 0}, {0, kNan, kInf}, {0, -kInf, 0}, {0, 0, 10}, {0.01, 0, 0}});
+  EXPECT_EQ(snapshot.counts.not_a_number, 2U) << "NaN counts before infinite";
+  EXPECT_EQ(snapshot.counts.infinite, 1U);
+  EXPECT_EQ(snapshot.counts.out_of_range, 2U);
+  EXPECT_EQ(snapshot.counts.on_robot, 0U);
+  EXPECT_EQ(snapshot.counts.used, 1U);
+  EXPECT_EQ(snapshot.stamp, 12.5);
+  EXPECT_GT(snapshot.ingest_time, 0.0);
+}
+
+TEST(Ingest, onlyAllNanIsSeeingNothing) {
+  EXPECT_TRUE(ingest({{kNan, 0, 0}, {0, 0, kNan}}).counts.saw_nothing());
+  EXPECT_FALSE(ingest({{kNan, 0, 0}, {kInf, 0, 0}}).counts.saw_nothing());
+  EXPECT_FALSE(ingest({{kNan, 0, 0}, {100, 0, 0}}).counts.saw_nothing());
+}
+
+// Squares of these overflow float, and the last ones double: none may become NaN, infinite or near.
+TEST(Ingest, hugeFiniteCoordinatesAreOutOfRange) {
+  for (const double max_range : {3.0, kInf}) {
+    SCOPED_TRACE(max_range);
+    IngestConfig config;
+    config.max_range = max_range;
+    EXPECT_EQ(ingest({{1e30, 0, 0}, {0, -1e38, 1e38}, {1e20, 1e20, 1e20}}, config)
+                  .counts.out_of_range,
+              3U);
+    const CloudSnapshot doubles =
+        ingest({{1e300, 0, 0}, {-1e308, 1e308, 1e308}, {kInf, 1e300, 0}}, config, float64());
+    EXPECT_EQ(doubles.counts.out_of_range, 2U);
+    EXPECT_EQ(doubles.counts.infinite, 1U);
+  }
+}
+
+TEST(Ingest, rangesIncludeTheirBounds) {
+  IngestConfig config;
+  config.min_range = 0.5;
+  config.max_range = 2.0;
+  const float below = std::nextafter(0.5F, 0.0F), beyond = std::nextafter(2.0F, 3.0F);
+  const CloudSnapshot snapshot =
+      ingest({{0.5, 0, 0}, {0, 2.0, 0}, {0, 0, static_cast<double>(below)},
+              {static_cast<double>(beyond), 0, 0}, {1.2, 1.2, 1.2}, {1.1, 1.1, 1.1}},
+             config);
+  const auto points = points_by_id(snapshot.index);
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_EQ(points.count(0), 1U);
+  EXPECT_EQ(points.count(1), 1U);
+  EXPECT_EQ(points.count(5), 1U);
+}
+
+TEST(Ingest, rangeIsMeasuredFromTheSensor) {
+  const CloudSnapshot snapshot = ingest({{1, 0, 0}, {4, 0, 0}}, {}, {}, pose(100, 0, 0));
+  EXPECT_EQ(snapshot.counts.used, 1U);
+}
+
+TEST(Ingest, denormalsAndZeroFollowMinRange) {
+  const Points points = {{0, 0, 0}, {1e-45, 0, 0}, {-1e-40, 1e-42, 0}, {0.04, 0, 0}};
+  EXPECT_EQ(ingest(points).counts.out_of_range, 4U);
+  IngestConfig config;
+  config.min_range = 0.0;
+  EXPECT_EQ(ingest(points, config).counts.used, 4U);
+}
+
+TEST(Ingest, infiniteMaxRangeKeepsAllThatIsFinite) {
+  IngestConfig config;
+  config.max_range = kInf;
+  const CloudSnapshot snapshot = ingest({{1e5, 0, 0}, {0, 5e6, 0}, {kInf, 0, 0}}, config);
+  EXPECT_EQ(snapshot.counts.used, 2U);
+  EXPECT_EQ(snapshot.counts.infinite, 1U);
+}
+
+TEST(Ingest, everyFormatReadsTheSame) {
+  Points points = random_points(600, 1.5, 1);
+  points[17].x() = kNan;
+  points[45].z() = kInf;
+  std::map<std::string, Format> formats;
+  formats["float64"] = float64();
+  for (const bool is_bigendian : {false, true}) {
+    for (const bool is_double : {false, true}) {
+      const std::size_t size = is_double ? 8 : 4;
+      const std::string name =
+          std::string(is_double ? "float64" : "float32") + (is_bigendian ? " big endian" : "");
+      Format odd;
+      odd.is_double = is_double;
+      odd.is_bigendian = is_bigendian;
+      odd.point_step = 37;  // odd stride and offsets, and another order
+      odd.z = 1;
+      odd.x = 1 + size + 2;
+      odd.y = 37 - size;
+      formats[name + ", odd stride"] = odd;
+      Format rows = odd;
+      rows.width = 25;
+      formats[name + ", organized"] = rows;
+      rows.row_padding = 11;
+      formats[name + ", padded rows"] = rows;
+      rows.width = 1;
+      formats[name + ", one padded column"] = rows;
+      rows.width = 300;
+      formats[name + ", rows longer than a block"] = rows;
+    }
+  }
+  const Eigen::Isometry3d X_FS = pose(0.3, -0.2, 0.9);
+  const CloudSnapshot expected = ingest(points, {}, {}, X_FS);
+  const auto expected_points = points_by_id(expected.index);
+  ASSERT_GT(expected_points.size(), 500U);
+  for (const auto& [name, format] : formats) {
+    SCOPED_TRACE(name);
+    const CloudSnapshot snapshot = ingest(points, {}, format, X_FS);
+    EXPECT_EQ(snapshot.counts.not_a_number, 1U);
+    EXPECT_EQ(snapshot.counts.infinite, 1U);
+    EXPECT_TRUE(points_by_id(snapshot.index) == expected_points);
+  }
+}
+
+void expect_transformed(const Points& points, const Eigen::Isometry3d& X_FS, const PointIndex& index,
+                        double tolerance) {
+  const auto found = points_by_id(index);
+  ASSERT_EQ(found.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d expected = X_FS * points[i];
+    ASSERT_LT((found.at(static_cast<std::uint32_t>(i)) - expected).norm(), tolerance) << i;
+  }
+}
+
+IngestConfig without_limits() {
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = kInf;
+  return config;
+}
+
+TEST(Ingest, pointsAreInTheFixedFrame) {
+  const Points points = random_points(500, 2.0, 2);
+  const Eigen::Isometry3d X_FS = pose(0.3, -0.2, 0.9);
+  expect_transformed(points, X_FS, ingest(points, without_limits(), {}, X_FS).index, 5e-7);
+}
+
+// Four ways to be far away. In float, a coordinate of 4e6 m is off by up to 0.25 m.
+TEST(Ingest, farSensorLosesNothing) {
+  const Points points = random_points(500, 2.0, 3);
+  const Eigen::Isometry3d X_FS = pose(691000.123, 5334000.456, 520.789);
+  IngestConfig config;
+  config.max_range = 10.0;
+  config.min_range = 0.0;
+  expect_transformed(points, X_FS, ingest(points, config, {}, X_FS).index, 1e-6);
+  expect_transformed(points, X_FS, ingest(points, config, float64(), X_FS).index, 1e-6);
+}
+
+TEST(Ingest, farPointsLoseNothing) {
+  Points points = random_points(500, 2.0, 4);
+  for (Eigen::Vector3d& p : points) p += Eigen::Vector3d(691000.123, 5334000.456, 520.789);
+  for (const Eigen::Isometry3d& X_FS :
+       {Eigen::Isometry3d(Eigen::Isometry3d::Identity()), pose(1.0, 2.0, 3.0)}) {
+    const CloudSnapshot snapshot = ingest(points, without_limits(), float64(), X_FS);
+    expect_transformed(points, X_FS, snapshot.index, 1e-6);
+  }
+}
+
+TEST(Ingest, farPointsWithASensorFrameThatBringsThemBack) {
+  Points points = random_points(500, 2.0, 5);
+  for (Eigen::Vector3d& p : points) p += Eigen::Vector3d(691000.123, 5334000.456, 520.789);
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  X_FS.translation() << -691000.0, -5334000.0, -520.0;
+  const CloudSnapshot snapshot = ingest(points, without_limits(), float64(), X_FS);
+  EXPECT_LT(snapshot.index.origin().norm(), 10.0);
+  expect_transformed(points, X_FS, snapshot.index, 1e-6);
+}
+
+// A few far points must not move the origin away from where most are.
+TEST(Ingest, farOutliersDoNotMoveTheOrigin) {
+  Points points = random_points(500, 2.0, 6);
+  for (int i = 0; i < 50; ++i) points.emplace_back(1e8, -1e8, 1e8);
+  const CloudSnapshot snapshot = ingest(points, without_limits(), float64());
+  EXPECT_EQ(snapshot.index.origin(), Eigen::Vector3d(0, 0, 0));
+}
+
+TEST(Ingest, originIsOnWholeMetres) {
+  const CloudSnapshot snapshot = ingest(random_points(50, 1.0, 7), {}, {}, pose(1.4, -2.6, 0.2));
+  EXPECT_EQ(snapshot.index.origin(), Eigen::Vector3d(1, -3, 0));
+  EXPECT_EQ(snapshot.coarse.origin(), snapshot.index.origin());
+}
+
+TEST(Ingest, badConfigurationIsNamed) {
+  const auto fault = [](const IngestConfig& config) -> std::string {
+    try {
+      Ingest ingest(config);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(fault({}), "");
+  IngestConfig config;
+  config.min_range = -1.0;
+  EXPECT_NE(fault(config).find("min_range is -1"), std::string::npos);
+  config = {};
+  config.max_range = 0.05;
+  EXPECT_NE(fault(config).find("max_range"), std::string::npos);
+  config.max_range = kNan;
+  EXPECT_NE(fault(config).find("max_range"), std::string::npos);
+  config = {};
+  config.self_filter_padding = -0.1;
+  EXPECT_NE(fault(config).find("self_filter_padding"), std::string::npos);
+  config = {};
+  config.thinning = 0.0;
+  EXPECT_NE(fault(config).find("thinning"), std::string::npos);
+}
+
+TEST(Ingest, poseThatIsNotFiniteIsRefused) {
+  const Message message({{1, 0, 0}}, {});
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  X_FS.translation().x() = kNan;
+  CloudSnapshot snapshot;
+  EXPECT_THROW(Ingest({}).run(message.raw, X_FS, {}, 0.0, &snapshot), std::invalid_argument);
+}
+
+TEST(Ingest, buffersAreReused) {
+  const Points points = random_points(20000, 1.5, 8);
+  const Message message(points, {});
+  Ingest ingest({});
+  CloudSnapshot snapshot;
+  ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
+  const auto* tiles = snapshot.index.tiles().data();
+  const auto* coarse = snapshot.coarse.tiles().data();
+  const auto expected = points_by_id(snapshot.index);
+  for (int i = 0; i < 3; ++i) ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
+  EXPECT_EQ(snapshot.index.tiles().data(), tiles);
+  EXPECT_EQ(snapshot.coarse.tiles().data(), coarse);
+  EXPECT_EQ(points_by_id(snapshot.index), expected);
+}
+
+std::vector<std::int64_t> cell_of(const Eigen::Vector3d& p, double edge) {
+  return {static_cast<std::int64_t>(std::floor(p.x() / edge)),
+          static_cast<std::int64_t>(std::floor(p.y() / edge)),
+          static_cast<std::int64_t>(std::floor(p.z() / edge))};
+}
+
+TEST(Thinning, onePointOfEachOccupiedCell) {
+  IngestConfig config = without_limits();
+  config.thinning = 0.1;
+  const CloudSnapshot snapshot = ingest(random_points(20000, 1.0, 9), config, {}, pose(3, -4, 5));
+  std::map<std::vector<std::int64_t>, std::pair<double, std::uint32_t>> nearest;
+  const auto all = points_by_id(snapshot.index);
+  for (const auto& [id, p] : all) {
+    const auto cell = cell_of(p, config.thinning);
+    const Eigen::Vector3d centre =
+        config.thinning * (Eigen::Vector3d(static_cast<double>(cell[0]), static_cast<double>(cell[1]),
+                                           static_cast<double>(cell[2])) +
+                           Eigen::Vector3d::Constant(0.5));
+    const std::pair<double, std::uint32_t> candidate((p - centre).norm(), id);
+    const auto [it, is_new] = nearest.emplace(cell, candidate);
+    if (!is_new) it->second = std::min(it->second, candidate);
+  }
+  const auto thin = points_by_id(snapshot.coarse);
+  EXPECT_EQ(thin.size(), nearest.size());
+  for (const auto& [cell, best] : nearest) {
+    ASSERT_EQ(thin.count(best.second), 1U);
+    EXPECT_EQ(thin.at(best.second), all.at(best.second));
+  }
+}
+
+TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
+  IngestConfig config = without_limits();
+  config.thinning = 0.05;
+  Points points = random_points(5000, 0.5, 10);
+  points.insert(points.end(), points.begin(), points.begin() + 100);  // some twice
+  const auto coordinates = [&config](const Points& cloud) {
+    std::set<std::vector<double>> set;
+    for (const auto& [id, p] : points_by_id(ingest(cloud, config).coarse)) {
+      set.insert({p.x(), p.y(), p.z()});
+    }
+    return set;
+  };
+  const auto expected = coordinates(points);
+  std::shuffle(points.begin(), points.end(), std::mt19937(1));
+  EXPECT_EQ(coordinates(points), expected);
+}
+
+// The grid belongs to the fixed frame, not to the sensor or the origin.
+TEST(Thinning, gridStaysWhenTheSensorMoves) {
+  IngestConfig config = without_limits();
+  const Points points = random_points(3000, 0.3, 11);
+  const auto thinned = [&](const Eigen::Vector3d& sensor) {
+    Points seen = points;
+    for (Eigen::Vector3d& p : seen) p -= sensor;
+    Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+    X_FS.translation() = sensor;
+    std::set<std::uint32_t> ids;
+    for (const auto& [id, p] : points_by_id(ingest(seen, config, float64(), X_FS).coarse)) {
+      ids.insert(id);
+    }
+    return ids;
+  };
+  EXPECT_EQ(thinned({0, 0, 0}), thinned({0.25, -7.5, 3.75}));
+}
+
+TEST(Thinning, cellsThatCannotBeNumberedGrow) {
+  IngestConfig config = without_limits();
+  config.thinning = 1e-6;
+  const CloudSnapshot snapshot =
+      ingest({{1e8, 0, 0}, {-1e8, 0, 0}, {0, 0, 1}, {0, 0, 1.000001}}, config, float64());
+  EXPECT_EQ(snapshot.counts.used, 4U);
+  EXPECT_EQ(snapshot.coarse.size(), 3U);
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,329 @@
+#include "ist_proximity/repulsion/repulsion.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+Ball ball(double x, double y, double z, double radius) { return {{x, y, z}, radius, radius}; }
+
+std::shared_ptr<const RobotModel> robot_of(const std::vector<Ball>& balls) {
+  auto model = std::make_shared<RobotModel>();
+  model->links.resize(1);
+  model->links[0].packing.balls = balls;
+  return model;
+}
+
+// A bar of seven overlapping balls along x.
+std::vector<Ball> bar() {
+  std::vector<Ball> balls;
+  for (int i = -3; i <= 3; ++i) balls.push_back(ball(0.03 * i, 0.0, 0.0, 0.03));
+  return balls;
+}
+
+CloudSnapshot cloud_of(const std::vector<Vector3d>& points, const Vector3d& origin = {0, 0, 0}) {
+  std::vector<float> x, y, z;
+  std::vector<std::uint32_t> id;
+  for (const Vector3d& p : points) {
+    x.push_back(static_cast<float>(p.x() - origin.x()));
+    y.push_back(static_cast<float>(p.y() - origin.y()));
+    z.push_back(static_cast<float>(p.z() - origin.z()));
+    id.push_back(static_cast<std::uint32_t>(id.size()));
+  }
+  CloudSnapshot cloud;
+  cloud.index.build(origin, x.data(), y.data(), z.data(), id.data(), x.size());
+  cloud.coarse = cloud.index;
+  return cloud;
+}
+
+// A square of side 0.4 m with a point every `spacing`, about `centre`.
+std::vector<Vector3d> wall(const Vector3d& centre, const Vector3d& u, const Vector3d& v,
+                           double spacing) {
+  std::vector<Vector3d> points;
+  const int half = static_cast<int>(0.2 / spacing);
+  for (int i = -half; i <= half; ++i) {
+    for (int j = -half; j <= half; ++j) points.push_back(centre + spacing * (i * u + j * v));
+  }
+  return points;
+}
+
+Eigen::Isometry3d at(const Vector3d& p) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = p;
+  return X;
+}
+
+// What the formula in the header says, pair by pair in double.
+struct Expected {
+  double nearest = kInf;  // [m] smallest distance
+  Vector3d nearest_direction = Vector3d::Zero();
+  Vector3d blend = Vector3d::Zero();
+};
+
+Expected expected(const std::vector<Ball>& balls, const Eigen::Isometry3d& X_FL,
+                  const std::vector<Vector3d>& points, double smoothing) {
+  Expected result;
+  for (const Ball& b : balls) {
+    for (const Vector3d& p : points) {
+      const Vector3d to_ball = X_FL * b.center - p;
+      if (to_ball.norm() - b.radius < result.nearest) {
+        result.nearest = to_ball.norm() - b.radius;
+        result.nearest_direction = to_ball.normalized();
+      }
+    }
+  }
+  double weights = 0.0;
+  for (const Ball& b : balls) {
+    for (const Vector3d& p : points) {
+      const Vector3d to_ball = X_FL * b.center - p;
+      const double d = to_ball.norm() - b.radius;
+      const double w = std::pow(std::max(0.0, 1.0 - (d - result.nearest) / smoothing), 2);
+      result.blend += w * to_ball.normalized();
+      weights += w;
+    }
+  }
+  result.blend /= weights;
+  return result;
+}
+
+LinkProximity near_by(double distance, const Vector3d& direction = Vector3d::UnitZ()) {
+  LinkProximity proximity;
+  proximity.state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
+  proximity.distance = proximity.lower_bound = distance;
+  proximity.direction = direction;
+  return proximity;
+}
+
+double degrees_between(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / 3.14159265358979323846;
+}
+
+TEST(Repulsion, unknownIsNanAndClearIsZero) {
+  const Repulsion repulsion(robot_of(bar()));
+  const CloudSnapshot cloud = cloud_of({{0, 0, 0.2}});
+  LinkProximity proximity;
+  EXPECT_TRUE(repulsion(0, at({0, 0, 0}), {&cloud}, proximity, {}).array().isNaN().all());
+  proximity.state = LinkState::kClear;
+  proximity.distance = kInf;
+  EXPECT_EQ(repulsion(0, at({0, 0, 0}), {&cloud}, proximity, {}), Vector3d::Zero());
+}
+
+TEST(Repulsion, lengthFallsFromGainAtTouchToZeroAtTheInfluenceDistance) {
+  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0.1)}));
+  RepulsionConfig config;
+  config.influence_distance = 0.2;
+  config.gain = 3.0;
+  for (const double distance : {0.0, 0.05, 0.1, 0.15, 0.1999}) {
+    const CloudSnapshot cloud = cloud_of({{0, 0, -0.1 - distance}});
+    const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(distance), config);
+    EXPECT_NEAR(v.norm(), 3.0 * (1.0 - distance / 0.2), 1e-5);
+    EXPECT_NEAR(v.z(), v.norm(), 1e-6) << "away from the point";
+  }
+  for (const double distance : {0.2, 0.21, 0.9}) {
+    const CloudSnapshot cloud = cloud_of({{0, 0, -0.1 - distance}});
+    EXPECT_EQ(repulsion(0, at({0, 0, 0}), {&cloud}, near_by(distance), config), Vector3d::Zero());
+  }
+}
+
+TEST(Repulsion, agreesWithTheFormula) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> u(-0.4, 0.4);
+  const std::vector<Ball> balls = bar();
+  const Repulsion repulsion(robot_of(balls));
+  RepulsionConfig config;
+  config.influence_distance = 1.0;
+  for (int trial = 0; trial < 50; ++trial) {
+    std::vector<Vector3d> points;
+    for (int i = 0; i < 300; ++i) points.emplace_back(u(random), u(random), u(random));
+    const CloudSnapshot cloud = cloud_of(points, {1.0, 0.0, -2.0});
+    Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
+    X_FL.rotate(Eigen::AngleAxisd(5.0 * u(random), Vector3d(1, 2, 3).normalized()));
+    const Expected e = expected(balls, X_FL, points, config.smoothing);
+    const Vector3d v = repulsion(0, X_FL, {&cloud}, near_by(e.nearest), config);
+    const double strength = std::min(1.0, 1.0 - e.nearest);
+    ASSERT_LT((v - strength * e.blend).norm(), 1e-4) << trial;
+  }
+}
+
+// A bar slides between two walls, and past a third. The nearest pair jumps by 178 degrees in one
+// step where the walls are equally near; the blend must not.
+TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
+  std::vector<Vector3d> points = wall({0, 0, -0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
+  for (const Vector3d& p : wall({0, 0, 0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01)) {
+    points.push_back(p);
+  }
+  for (const Vector3d& p : wall({0.25, 0, 0}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01)) {
+    points.push_back(p);
+  }
+  const CloudSnapshot cloud = cloud_of(points);
+  const std::vector<Ball> balls = bar();
+  const Repulsion repulsion(robot_of(balls));
+  const RepulsionConfig config;
+  Vector3d last = Vector3d::Zero(), last_nearest = Vector3d::UnitZ();
+  double largest_step = 0.0, largest_jump = 0.0;
+  constexpr int kSteps = 1500;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double s = static_cast<double>(i) / kSteps;  // 0.15 m up and 0.1 m forward: 0.12 mm each
+    const Eigen::Isometry3d X_FL = at({0.1 * s, 0.0033, -0.075 + 0.15 * s});
+    const Expected e = expected(balls, X_FL, points, config.smoothing);
+    const Vector3d v = repulsion(0, X_FL, {&cloud}, near_by(e.nearest), config);
+    if (i > 0) {
+      largest_step = std::max(largest_step, (v - last).norm());
+      largest_jump = std::max(largest_jump, degrees_between(e.nearest_direction, last_nearest));
+    }
+    last = v;
+    last_nearest = e.nearest_direction;
+  }
+  EXPECT_GT(largest_jump, 90.0) << "the motion must be a hard one";
+  EXPECT_LT(largest_step, 0.01);
+}
+
+TEST(Repulsion, symmetricSqueezeCancels) {
+  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0.1)}));
+  const CloudSnapshot cloud = cloud_of({{0, 0, -0.15}, {0, 0, 0.15}});
+  EXPECT_LT(repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.05), {}).norm(), 1e-6);
+}
+
+// Weights are normalized, so twice the points push no harder; and the obstacle's edges show up in
+// the direction by no more than a few percent.
+TEST(Repulsion, doesNotDependOnDensity) {
+  const Repulsion repulsion(robot_of(bar()));
+  const auto over_a_wall = [&repulsion](double spacing, const Vector3d& p) {
+    std::vector<Vector3d> points =
+        wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), spacing);
+    for (const Vector3d& q :
+         wall({-0.2, 0, 0.2}, Vector3d::UnitY(), Vector3d::UnitZ(), spacing)) {
+      points.push_back(q);
+    }
+    const CloudSnapshot cloud = cloud_of(points);
+    return repulsion(0, at(p), {&cloud}, near_by(p.z() - 0.03), {});
+  };
+  for (const Vector3d& p : {Vector3d(0, 0, 0.1), Vector3d(-0.03, 0.05, 0.1), Vector3d(0, 0, 0.05)}) {
+    const Vector3d sparse = over_a_wall(0.01, p), dense = over_a_wall(0.01 / std::sqrt(2.0), p);
+    EXPECT_GT(sparse.norm(), 0.3);
+    EXPECT_LT((sparse - dense).norm(), 0.03 * sparse.norm());
+  }
+}
+
+TEST(Repulsion, contactIsBoundedAndContinuous) {
+  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0.1)}));
+  RepulsionConfig config;
+  config.gain = 2.0;
+  Vector3d last(0, 0, 2.0 * (1.0 - 0.02 / 0.3));
+  for (double z = -0.12; z < -0.001; z += 0.001) {  // from 20 mm before to 99 mm inside
+    const CloudSnapshot cloud = cloud_of({{0, 0, z}});
+    const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(-z - 0.1), config);
+    EXPECT_LE(v.norm(), 2.0 * (1.0 + 1e-6));
+    EXPECT_LT((v - last).norm(), 0.01);
+    EXPECT_GT(v.z(), 0.0) << "the way out of the ball is away from the point";
+    last = v;
+  }
+  EXPECT_NEAR(last.norm(), 2.0, 1e-5);
+}
+
+TEST(Repulsion, isDefinedAtTouchAndAtABallsCentre) {
+  const Repulsion repulsion(robot_of({ball(0.5, 0.25, 0, 0.125)}));
+  const Vector3d direction = Vector3d(1, 2, -2) / 3.0;
+  const CloudSnapshot touch = cloud_of({{0.625, 0.25, 0}});
+  EXPECT_LT((repulsion(0, at({0, 0, 0}), {&touch}, near_by(0.0), {}) - Vector3d(-1, 0, 0)).norm(),
+            1e-6);
+  const CloudSnapshot centre = cloud_of({{0.5, 0.25, 0}});
+  const Vector3d v = repulsion(0, at({0, 0, 0}), {&centre}, near_by(-0.125, direction), {});
+  EXPECT_LT((v - direction).norm(), 1e-6);
+  const CloudSnapshot both = cloud_of({{0.5, 0.25, 0}, {0.5, 0.25, 0.01}});
+  EXPECT_TRUE(repulsion(0, at({0, 0, 0}), {&both}, near_by(-0.125, direction), {}).allFinite());
+}
+
+TEST(Repulsion, ballsOfRadiusZeroCount) {
+  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0)}));
+  const CloudSnapshot cloud = cloud_of({{0.1, 0, 0}});
+  const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.1), {});
+  EXPECT_LT((v - Vector3d(-1.0 + 0.1 / 0.3, 0, 0)).norm(), 1e-6);
+}
+
+TEST(Repulsion, severalCloudsAreOneObstacle) {
+  const std::vector<Ball> balls = bar();
+  const Repulsion repulsion(robot_of(balls));
+  const std::vector<Vector3d> a = wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
+  const std::vector<Vector3d> b = wall({-0.2, 0, 0.2}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01);
+  std::vector<Vector3d> all = a;
+  all.insert(all.end(), b.begin(), b.end());
+  const CloudSnapshot cloud = cloud_of(all), cloud_a = cloud_of(a, {2, 0, 1}),
+                      cloud_b = cloud_of(b, {0, -1, 0}), empty = cloud_of({});
+  const Eigen::Isometry3d X_FL = at({-0.03, 0, 0.1});
+  const Vector3d together = repulsion(0, X_FL, {&cloud}, near_by(0.07), {});
+  const Vector3d apart =
+      repulsion(0, X_FL, {&empty, &cloud_a, nullptr, &cloud_b}, near_by(0.07), {});
+  EXPECT_LT((together - apart).norm(), 1e-4);
+}
+
+TEST(Repulsion, losesNothingFarFromTheFixedFramesOrigin) {
+  const Vector3d base(691000, 5334000, 520);
+  std::vector<Vector3d> points = wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
+  const Repulsion repulsion(robot_of(bar()));
+  const CloudSnapshot here = cloud_of(points);
+  for (Vector3d& p : points) p += base;
+  const CloudSnapshot there = cloud_of(points, base);
+  const Vector3d p(0.123, 0.05, 0.08);
+  EXPECT_LT((repulsion(0, at(p), {&here}, near_by(0.05), {}) -
+             repulsion(0, at(base + p), {&there}, near_by(0.05), {}))
+                .norm(),
+            1e-5);
+}
+
+// Nothing to sum over: the link's own direction is the best that is known.
+TEST(Repulsion, withoutPairsTheLinksDirectionServes) {
+  const Repulsion repulsion(robot_of({}));
+  const CloudSnapshot cloud = cloud_of({{0, 0, 0}}), empty = cloud_of({});
+  const Vector3d v =
+      repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
+  EXPECT_LT((v - 0.5 * Vector3d::UnitY()).norm(), 1e-12);
+}
+
+TEST(CoarseBalls, beginWithTheLargestAndSpread) {
+  // Two elements of a link, packed one after the other: the first 50 balls are all in the first.
+  Packing packing;
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> u(-0.1, 0.1);
+  for (int i = 0; i < 500; ++i) {
+    packing.balls.push_back(ball(u(random), u(random), u(random), 0.01));
+  }
+  packing.balls.push_back(ball(0, 0, 0, 0.03));
+  for (int i = 0; i < 500; ++i) {
+    packing.balls.push_back(ball(1.0 + u(random), u(random), u(random), 0.01));
+  }
+  const std::vector<Ball> chosen = coarse_balls(packing, kCoarseBalls);
+  ASSERT_EQ(chosen.size(), kCoarseBalls);
+  EXPECT_EQ(chosen[0].radius, 0.03);
+  const auto in_second = std::count_if(chosen.begin(), chosen.end(),
+                                       [](const Ball& b) { return b.center.x() > 0.5; });
+  EXPECT_GT(in_second, 15);
+  EXPECT_LT(in_second, 35);
+  for (const Ball& b : packing.balls) {
+    double beyond = kInf;
+    for (const Ball& c : chosen) {
+      beyond = std::min(beyond, (b.center - c.center).norm() + b.radius - c.radius);
+    }
+    EXPECT_LT(beyond, 0.1);
+  }
+}
+
+TEST(CoarseBalls, endWhenTheRestLiesWithin) {
+  Packing packing;
+  EXPECT_TRUE(coarse_balls(packing, 50).empty());
+  packing.balls = {ball(0, 0, 0, 0.01), ball(0, 0, 0, 0.1), ball(0.05, 0, 0, 0.02),
+                   ball(0.5, 0, 0, 0.1), ball(0.5, 0, 0, 0.1)};
+  EXPECT_EQ(coarse_balls(packing, 50).size(), 2U);
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,208 @@
+#include "cloud/self_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/packing/packer.h"
+
+namespace ist {
+namespace {
+
+LinkModel link_of(const std::string& name, const Shape& shape, double max_error) {
+  PackingConfig config;
+  config.max_error = max_error;
+  LinkModel link;
+  link.name = name;
+  link.packing = pack_element(shape, config);
+  link.tree = InnerSphereTree(link.packing);
+  GeometryElement element;
+  element.shape = shape;
+  link.solid = Solid({element});
+  return link;
+}
+
+// Coarsely packed, so that there is much between inner and outer balls for the geometry to decide.
+RobotModel coarse_robot() {
+  RobotModel model;
+  model.links.push_back(link_of("box", Box{{0.3, 0.2, 0.1}}, 0.02));
+  model.links.push_back(link_of("cylinder", Cylinder{0.08, 0.4}, 0.02));
+  model.links.push_back(link_of("ball", Sphere{0.12}, 0.02));
+  return model;
+}
+
+PosedRobot posed(const RobotModel& model, const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
+  PosedRobot robot;
+  robot.model = &model;
+  robot.known.assign(model.links.size(), true);
+  for (std::size_t i = 0; i < model.links.size(); ++i) {
+    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+    X.translation() = base + Eigen::Vector3d(0.0, 0.25 * static_cast<double>(i), 0.1);
+    X.rotate(Eigen::AngleAxisd(0.4 + static_cast<double>(i), Eigen::Vector3d(1, 2, 3).normalized()));
+    robot.X_FL.push_back(X);
+  }
+  return robot;
+}
+
+// Smallest signed distance [m] to the links whose pose is known.
+double exact_distance(const PosedRobot& robot, const Eigen::Vector3d& p_F) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < robot.model->links.size(); ++i) {
+    if (!robot.known[i]) continue;
+    const Eigen::Vector3d p_L = robot.X_FL[i].inverse() * p_F;
+    nearest = std::min(nearest, robot.model->links[i].solid.signed_distance(p_L).distance);
+  }
+  return nearest;
+}
+
+std::vector<Eigen::Vector3f> cloud_about_the_robot(std::size_t n) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> u(-0.5F, 0.5F);
+  std::vector<Eigen::Vector3f> points;
+  for (std::size_t i = 0; i < n; ++i) {
+    const float x = u(random), y = 0.25F + 1.2F * u(random), z = 0.1F + u(random);
+    points.emplace_back(x, y, z);
+  }
+  return points;
+}
+
+// Runs a cloud that is given in the frame of a sensor at `base`.
+CloudSnapshot ingest(const std::vector<Eigen::Vector3f>& points, const PosedRobot& robot,
+                     const IngestConfig& config,
+                     const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
+  RawCloud raw;
+  raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
+  raw.width = points.size();
+  raw.height = 1;
+  raw.point_step = sizeof(Eigen::Vector3f);
+  raw.row_step = raw.width * raw.point_step;
+  raw.y = 4;
+  raw.z = 8;
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  X_FS.translation() = base;
+  CloudSnapshot snapshot;
+  Ingest(config).run(raw, X_FS, robot, 0.0, &snapshot);
+  const IngestCounts& counts = snapshot.counts;
+  EXPECT_EQ(counts.received, counts.not_a_number + counts.infinite + counts.out_of_range +
+                                 counts.on_robot + counts.used);
+  return snapshot;
+}
+
+std::set<std::uint32_t> ids(const PointIndex& index) {
+  std::set<std::uint32_t> set;
+  for (const PointTile& tile : index.tiles()) set.insert(tile.id, tile.id + tile.count);
+  return set;
+}
+
+IngestConfig config_with(double padding) {
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.self_filter_padding = padding;
+  return config;
+}
+
+// Every point is judged as its exact distance says; rounding decides within a micrometre.
+void expect_exact(const std::vector<Eigen::Vector3f>& points, const PosedRobot& robot,
+                  double padding, const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
+  const CloudSnapshot snapshot = ingest(points, robot, config_with(padding), base);
+  const std::set<std::uint32_t> kept = ids(snapshot.index);
+  std::size_t dropped = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double distance = exact_distance(robot, base + points[i].cast<double>());
+    const bool is_kept = kept.count(static_cast<std::uint32_t>(i)) > 0;
+    dropped += is_kept ? 0 : 1;
+    if (std::abs(distance - padding) < 1e-6) continue;
+    ASSERT_EQ(is_kept, distance > padding) << "point " << i << " at " << distance << " m";
+  }
+  EXPECT_EQ(snapshot.counts.on_robot, dropped);
+  EXPECT_GT(dropped, points.size() / 100);
+  EXPECT_LT(dropped, points.size() / 2);
+}
+
+TEST(SelfFilter, agreesWithExactDistance) {
+  const RobotModel model = coarse_robot();
+  const std::vector<Eigen::Vector3f> points = cloud_about_the_robot(30000);
+  for (const double padding : {0.0, 0.001, 0.02, 0.1}) {
+    SCOPED_TRACE(padding);
+    expect_exact(points, posed(model), padding);
+  }
+}
+
+TEST(SelfFilter, agreesWithExactDistanceFarFromTheFixedFramesOrigin) {
+  const RobotModel model = coarse_robot();
+  const Eigen::Vector3d base(691000.25, 5334000.5, 520.75);
+  expect_exact(cloud_about_the_robot(10000), posed(model, base), 0.02, base);
+}
+
+// Points on the robot's own surface, as its camera sees them, with noise: none may remain.
+TEST(SelfFilter, leavesNoPointOfTheSurface) {
+  const RobotModel model = coarse_robot();
+  const PosedRobot robot = posed(model);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 20000; ++i) {
+    const std::size_t link = static_cast<std::size_t>(i) % 3;
+    const Eigen::Vector3d outside =
+        Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+    const SignedDistance nearest = model.links[link].solid.signed_distance(outside);
+    const Eigen::Vector3d p_L = nearest.witness + 0.002 * normal(random) * nearest.normal;
+    points.push_back((robot.X_FL[link] * p_L).cast<float>());
+  }
+  const CloudSnapshot snapshot = ingest(points, robot, config_with(0.02));
+  EXPECT_EQ(snapshot.counts.on_robot, points.size());
+  EXPECT_TRUE(snapshot.index.empty());
+  EXPECT_TRUE(snapshot.coarse.empty());
+  EXPECT_FALSE(snapshot.counts.saw_nothing());
+}
+
+TEST(SelfFilter, linkOfUnknownPoseClaimsNothing) {
+  const RobotModel model = coarse_robot();
+  PosedRobot robot = posed(model);
+  robot.known[1] = false;
+  robot.X_FL[1].matrix().setConstant(std::nan(""));
+  expect_exact(cloud_about_the_robot(10000), robot, 0.02);
+  robot.known.assign(3, false);
+  EXPECT_EQ(ingest(cloud_about_the_robot(1000), robot, config_with(0.02)).counts.on_robot, 0U);
+}
+
+TEST(SelfFilter, linkWithoutGeometryClaimsNothing) {
+  RobotModel model = coarse_robot();
+  model.links[0].error = "no mesh";
+  model.links[2] = LinkModel();
+  PosedRobot robot = posed(model);
+  const CloudSnapshot snapshot =
+      ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
+  robot.known[0] = robot.known[2] = false;
+  const CloudSnapshot expected = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
+  EXPECT_EQ(ids(snapshot.index), ids(expected.index));
+  EXPECT_GT(snapshot.counts.on_robot, 0U);
+}
+
+TEST(SelfFilter, canBeSwitchedOff) {
+  const RobotModel model = coarse_robot();
+  IngestConfig config = config_with(0.02);
+  config.self_filter = false;
+  EXPECT_EQ(ingest(cloud_about_the_robot(1000), posed(model), config).counts.on_robot, 0U);
+  EXPECT_EQ(ingest(cloud_about_the_robot(1000), {}, config_with(0.02)).counts.on_robot, 0U);
+}
+
+// No point may be claimed for a robot of fewer poses than links.
+TEST(SelfFilter, missingPosesAreUnknown) {
+  const RobotModel model = coarse_robot();
+  PosedRobot robot = posed(model);
+  robot.known.resize(1);
+  robot.X_FL.resize(1);
+  const CloudSnapshot snapshot =
+      ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
+  robot = posed(model);
+  robot.known = {true, false, false};
+  EXPECT_EQ(ids(snapshot.index),
+            ids(ingest(cloud_about_the_robot(5000), robot, config_with(0.02)).index));
+}
+
+}  // namespace
+}  // namespace ist
