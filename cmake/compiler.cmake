@@ -1,0 +1,28 @@
+# Language, warnings, sanitizers.
+
+set(CMAKE_CXX_STANDARD 17)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+# ISO mode, so that GCC does not contract a*b+c behind our back: results must not depend on it.
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+
+# -ffast-math is out: NaN and infinity carry meaning here. -march=native is out: Highway picks the
+# instruction set at run time, and Eigen types in the interface would change their alignment.
+add_compile_options(-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wvla)
+if(IST_PROXIMITY_WERROR)
+  add_compile_options(-Werror)
+endif()
+
+if(IST_PROXIMITY_SANITIZE)
+  add_compile_options(
+    -fsanitize=${IST_PROXIMITY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  add_compile_definitions(_GLIBCXX_ASSERTIONS)
+  # Not add_link_options(): catkin's own targets are linked without it.
+  string(APPEND CMAKE_EXE_LINKER_FLAGS " -fsanitize=${IST_PROXIMITY_SANITIZE}")
+  string(APPEND CMAKE_SHARED_LINKER_FLAGS " -fsanitize=${IST_PROXIMITY_SANITIZE}")
+endif()

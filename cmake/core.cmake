@@ -1,0 +1,79 @@
+# The core library, its tools and its installation: no ROS.
+
+set(core_folders geometry packing tree robot cloud proximity repulsion)
+list(TRANSFORM core_folders PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/src/" OUTPUT_VARIABLE core_globs)
+list(TRANSFORM core_globs APPEND "/*.cpp")
+file(GLOB core_sources CONFIGURE_DEPENDS ${core_globs})
+
+add_library(ist_proximity_core ${core_sources})
+add_library(ist_proximity::ist_proximity_core ALIAS ist_proximity_core)
+target_compile_features(ist_proximity_core PUBLIC cxx_std_17)
+target_include_directories(ist_proximity_core
+  PUBLIC
+    $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+  PRIVATE
+    src)
+target_link_libraries(ist_proximity_core
+  PUBLIC Eigen3::Eigen Threads::Threads
+  PRIVATE
+    ist_proximity::assimp
+    ist_proximity::console_bridge
+    ist_proximity::hwy
+    ist_proximity::tinyxml2
+    ist_proximity::urdfdom
+    ist_proximity::urdfdom_headers
+    ist_proximity::xxhash)
+
+# Each file in src/tools is a program of its own.
+file(GLOB tool_sources CONFIGURE_DEPENDS src/tools/*.cpp)
+set(tools "")
+foreach(source IN LISTS tool_sources)
+  get_filename_component(tool ${source} NAME_WE)
+  add_executable(${tool} ${source})
+  target_link_libraries(${tool} PRIVATE ist_proximity_core)
+  list(APPEND tools ${tool})
+endforeach()
+
+# Within catkin the programs go where rosrun looks for them.
+if(catkin_FOUND)
+  set(IST_PROXIMITY_BINDIR ${CATKIN_PACKAGE_BIN_DESTINATION})
+  set(IST_PROXIMITY_LIBDIR ${CATKIN_PACKAGE_LIB_DESTINATION})
+else()
+  set(IST_PROXIMITY_BINDIR ${CMAKE_INSTALL_BINDIR})
+  set(IST_PROXIMITY_LIBDIR ${CMAKE_INSTALL_LIBDIR})
+endif()
+file(RELATIVE_PATH bin_to_lib "/${IST_PROXIMITY_BINDIR}" "/${IST_PROXIMITY_LIBDIR}")
+set_target_properties(ist_proximity_core PROPERTIES INSTALL_RPATH "$ORIGIN")
+if(tools)
+  set_target_properties(${tools} PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+  install(TARGETS ${tools} RUNTIME DESTINATION ${IST_PROXIMITY_BINDIR})
+endif()
+
+install(TARGETS ist_proximity_core EXPORT ist_proximity_core-targets
+  ARCHIVE DESTINATION ${IST_PROXIMITY_LIBDIR}
+  LIBRARY DESTINATION ${IST_PROXIMITY_LIBDIR}
+  RUNTIME DESTINATION ${IST_PROXIMITY_BINDIR})
+#catkin_lint: ignore_once wrong_install_destination
+install(DIRECTORY include/ist_proximity/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ist_proximity
+  FILES_MATCHING PATTERN "*.h"
+  PATTERN ros EXCLUDE)
+
+# find_package(ist_proximity_core) for programs that know nothing of ROS.
+include(CMakePackageConfigHelpers)
+set(core_config_dir ${IST_PROXIMITY_LIBDIR}/cmake/ist_proximity_core)
+configure_package_config_file(cmake/ist_proximity_core-config.cmake.in
+  ${CMAKE_CURRENT_BINARY_DIR}/ist_proximity_core-config.cmake
+  INSTALL_DESTINATION ${core_config_dir})
+write_basic_package_version_file(
+  ${CMAKE_CURRENT_BINARY_DIR}/ist_proximity_core-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+#catkin_lint: ignore_once missing_file wrong_install_destination
+install(
+  FILES
+    ${CMAKE_CURRENT_BINARY_DIR}/ist_proximity_core-config.cmake
+    ${CMAKE_CURRENT_BINARY_DIR}/ist_proximity_core-config-version.cmake
+    cmake/dependencies.cmake
+  DESTINATION ${core_config_dir})
+install(EXPORT ist_proximity_core-targets
+  NAMESPACE ist_proximity:: DESTINATION ${core_config_dir})

@@ -1,0 +1,45 @@
+# What other ROS packages see of this one: its dependencies, messages and exports.
+
+find_package(catkin REQUIRED COMPONENTS
+  diagnostic_updater
+  geometry_msgs
+  message_filters
+  message_generation
+  nodelet
+  pluginlib
+  roscpp
+  roslib
+  sensor_msgs
+  std_msgs
+  std_srvs
+  tf2_eigen
+  tf2_ros
+  tf2_sensor_msgs
+  topic_tools
+  urdf
+  visualization_msgs)
+
+add_message_files(DIRECTORY msg FILES
+  LinkProximity.msg
+  ProximityArray.msg
+  SourceStatus.msg)
+add_service_files(DIRECTORY srv FILES QueryProximity.srv)
+generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
+
+catkin_package(
+  INCLUDE_DIRS include
+  LIBRARIES ist_proximity_core ist_proximity_ros
+  CATKIN_DEPENDS
+    diagnostic_updater
+    geometry_msgs
+    message_filters
+    message_runtime
+    nodelet
+    roscpp
+    sensor_msgs
+    std_msgs
+    std_srvs
+    tf2_ros
+    topic_tools
+    visualization_msgs
+  DEPENDS EIGEN3)

@@ -1,0 +1,34 @@
+# The ROS side: library, node, nodelet, and the files a robot's launch file refers to.
+
+file(GLOB ros_sources CONFIGURE_DEPENDS src/ros/*.cpp)
+add_library(ist_proximity_ros ${ros_sources})
+add_dependencies(ist_proximity_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
+target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRARIES})
+
+add_executable(proximity_node src/nodes/proximity_node.cpp)
+target_link_libraries(proximity_node PRIVATE ist_proximity_ros)
+
+add_library(ist_proximity_nodelet MODULE src/nodes/proximity_nodelet.cpp)
+target_link_libraries(ist_proximity_nodelet PRIVATE ist_proximity_ros)
+
+foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
+  # System headers: their warnings are not ours to mend.
+  target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+endforeach()
+
+set_target_properties(ist_proximity_ros ist_proximity_nodelet PROPERTIES INSTALL_RPATH "$ORIGIN")
+set_target_properties(proximity_node PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+
+install(TARGETS ist_proximity_ros ist_proximity_nodelet
+  ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+  RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
+install(TARGETS proximity_node RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+install(DIRECTORY include/ist_proximity/ros/
+  DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION}/ros FILES_MATCHING PATTERN "*.h")
+install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
+install(DIRECTORY config demo launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
+  USE_SOURCE_PERMISSIONS
+  PATTERN __pycache__ EXCLUDE)
+catkin_install_python(PROGRAMS scripts/proximity_table
+  DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

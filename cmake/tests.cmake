@@ -1,0 +1,67 @@
+# Core tests: one GoogleTest program per test/core/*_test.cpp, no ROS. ROS tests: rostest files.
+#
+# With catkin they are known to `ctest` and to `make run_tests`, and built by `make tests` only.
+# Results go as XML to test_results/ in the build folder.
+
+find_package(GTest QUIET)
+if(NOT GTEST_FOUND AND NOT GTest_FOUND)
+  message(STATUS "ist_proximity: no tests, GoogleTest is missing (apt install libgtest-dev)")
+  return()
+endif()
+
+file(GLOB support_sources CONFIGURE_DEPENDS test/support/*.cpp)
+file(GLOB core_test_sources CONFIGURE_DEPENDS test/core/*_test.cpp)
+set(results_dir ${CMAKE_BINARY_DIR}/test_results/${PROJECT_NAME})
+
+# What every test program links: helpers (when there are any), the core and GoogleTest.
+if(support_sources)
+  add_library(test_support STATIC EXCLUDE_FROM_ALL ${support_sources})
+  set_target_properties(test_support PROPERTIES
+    ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
+  set(scope PUBLIC)
+else()
+  add_library(test_support INTERFACE)
+  set(scope INTERFACE)
+endif()
+target_include_directories(test_support ${scope} test src)
+# An EXPECT in an `if` without braces: GoogleTest's macros are safe there, GCC does not see it.
+target_compile_options(test_support ${scope} -Wno-dangling-else)
+target_link_libraries(test_support ${scope} ist_proximity_core GTest::GTest)
+# Where tests find demo/ and, unless the environment variable IST_PROXIMITY_DATA says otherwise,
+# ../shared/data.
+target_compile_definitions(test_support ${scope}
+  IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+
+foreach(source IN LISTS core_test_sources)
+  get_filename_component(test ${source} NAME_WE)
+  add_executable(${test} ${source})
+  target_link_libraries(${test} PRIVATE test_support GTest::Main)
+  set_target_properties(${test} PROPERTIES
+    RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
+  set(arguments --gtest_output=xml:${results_dir}/gtest-${test}.xml)
+  if(catkin_FOUND)
+    set_target_properties(${test} PROPERTIES EXCLUDE_FROM_ALL ON)
+    add_dependencies(tests ${test})
+    catkin_run_tests_target(gtest ${test} gtest-${test}.xml
+      COMMAND "${CMAKE_CURRENT_BINARY_DIR}/test/${test} ${arguments}" DEPENDENCIES ${test})
+    set(ctest_name _ctest_${PROJECT_NAME}_gtest_${test})
+  else()
+    add_test(NAME ${test} COMMAND ${test} ${arguments})
+    set(ctest_name ${test})
+  endif()
+  set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
+endforeach()
+
+if(catkin_FOUND)
+  find_package(rostest QUIET)
+endif()
+if(rostest_FOUND)
+  file(GLOB rostests CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} test/ros/*.test)
+  foreach(file IN LISTS rostests)
+    add_rostest(${file} DEPENDENCIES proximity_node ist_proximity_nodelet)
+    string(REPLACE "/" "_" test ${file})
+    # One at a time: they measure rates and ages.
+    set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES
+      LABELS ros TIMEOUT 300 RUN_SERIAL ON)
+  endforeach()
+endif()
