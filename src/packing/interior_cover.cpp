@@ -20,22 +20,28 @@ class InteriorCover {
     for (const Ball& ball : packing_.balls) search_.add(ball.center, ball.cover_radius);
   }
 
-  void run() {
+  bool run(const PackingProgress& progress) {
     packing_.certificate.interior_gap = config_.max_error;
     const Eigen::AlignedBox3d box = bvh_.bounds();
-    if (box.sizes().minCoeff() <= 0.0) return;  // flat: no interior
+    if (box.sizes().minCoeff() <= 0.0) return true;  // flat: no interior
     // Nearly cubic cells, for a long thin link too.
     const double side = std::max(box.sizes().minCoeff(), box.sizes().maxCoeff() / 64.0);
     const Eigen::Array3i n = (box.sizes().array() / side).ceil().cast<int>();
     const Eigen::Vector3d half = 0.5 * (box.sizes().array() / n.cast<double>()).matrix();
-    for (int i = 0; i < n.x(); ++i) {
-      for (int j = 0; j < n.y(); ++j) {
-        for (int k = 0; k < n.z(); ++k) {
+    // The first two levels by hand, so that progress is told between cells.
+    const Eigen::Array3i m = 4 * n;
+    const Eigen::Vector3d quarter = 0.25 * half;
+    for (int i = 0; i < m.x(); ++i) {
+      for (int j = 0; j < m.y(); ++j) {
+        for (int k = 0; k < m.z(); ++k) {
           const Eigen::Vector3d cell(2.0 * i + 1.0, 2.0 * j + 1.0, 2.0 * k + 1.0);
-          visit(box.min() + cell.cwiseProduct(half), half, 0);
+          visit(box.min() + cell.cwiseProduct(quarter), quarter, 0);
         }
+        const double done = static_cast<double>(i * m.y() + j + 1) / (m.x() * m.y());
+        if (progress && !progress(done)) return false;
       }
     }
+    return true;
   }
 
  private:
@@ -95,9 +101,10 @@ class InteriorCover {
 
 }  // namespace
 
-void cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                    const PackingConfig& config, Packing* packing) {
-  InteriorCover(bvh, finder, config, packing).run();
+bool cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
+                    const PackingConfig& config, const PackingProgress& progress,
+                    Packing* packing) {
+  return InteriorCover(bvh, finder, config, packing).run(progress);
 }
 
 }  // namespace ist

@@ -14,7 +14,9 @@ namespace ist {
 /// empty cell is outside, or near enough to an outer ball, or gets a ball of its own.
 /// @param packing  certified by SurfaceCover; balls are added, `interior_gap` is set to max_error
 ///                 (larger where max_spheres leaves interior cells uncovered)
-void cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                    const PackingConfig& config, Packing* packing);
+/// @returns false when `progress` stopped it: nothing is proven then of the interior
+bool cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
+                    const PackingConfig& config, const PackingProgress& progress,
+                    Packing* packing);
 
 }  // namespace ist

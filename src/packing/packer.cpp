@@ -15,6 +15,14 @@ namespace {
 // The share of the wanted error that an inscribed prism may take.
 constexpr double kTessellationShare = 0.1;
 
+// About how the time goes.
+constexpr double kSurfaceShare = 0.6;
+
+PackingProgress share_of(const PackingProgress& progress, double from, double to) {
+  if (!progress) return {};
+  return [progress, from, to](double done) { return progress(from + (to - from) * done); };
+}
+
 Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& config,
                          const PackingProgress& progress) {
   PackingConfig inner = config;
@@ -32,7 +40,7 @@ Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& 
 Packing pack_sphere(const Sphere& sphere) {
   Packing packing;
   packing.balls.push_back({Eigen::Vector3d::Zero(), sphere.radius, sphere.radius});
-  packing.certificate.surface_area = 4.0 * EIGEN_PI * sphere.radius * sphere.radius;
+  packing.certificate.surface_area = 4.0 * M_PI * sphere.radius * sphere.radius;
   packing.certificate.reached = true;
   return packing;
 }
@@ -45,10 +53,13 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
   const TriangleBvh bvh(mesh);
   const MedialBallFinder finder(bvh, is_closed_mesh(mesh));
   SurfaceCover cover(mesh, finder);
-  cover.refine(config, progress);
+  cover.refine(config, share_of(progress, 0.0, kSurfaceShare));
   Packing packing;
   cover.certify(&packing);
-  cover_interior(bvh, finder, config, &packing);
+  const PackingProgress rest = share_of(progress, kSurfaceShare, 1.0);
+  if (!cover_interior(bvh, finder, config, rest, &packing)) {
+    packing.certificate.interior_gap = bvh.bounds().sizes().norm();
+  }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;
   if (progress) progress(1.0);
   return packing;

@@ -11,7 +11,7 @@ namespace {
 // How near a new ball must come to the point it was made for, as a share of the gap there. Larger
 // balls cover more of the neighbourhood; nearer ones leave less behind.
 constexpr double kSlack = 0.5;
-constexpr int kProgressInterval = 512;
+constexpr int kProgressInterval = 256;
 
 }  // namespace
 
