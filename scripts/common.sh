@@ -3,6 +3,8 @@
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build_dir=$root/build/ros
+# Not below build/: rosrun skips executables that are in a package's own build folder.
+devel_dir=$root/devel
 
 # ROS' Python modules belong to the system's Python; another python3 may be first in PATH.
 export PATH=/usr/bin:/bin:/usr/sbin:/sbin:$PATH
@@ -47,5 +49,5 @@ use_installed_ros() {
 use_build() {
   getent hosts localhost > /dev/null ||
     die "'localhost' does not resolve, which ROS needs: put '127.0.0.1 localhost' into /etc/hosts"
-  source_setup "$build_dir/devel/setup.bash"
+  source_setup "$devel_dir/setup.bash"
 }

@@ -17,8 +17,8 @@ constexpr bool kMachineIsBigEndian = false;
 std::string text(std::uint64_t value) { return std::to_string(value); }
 
 std::string datatype_name(std::uint8_t datatype) {
-  static const char* const kNames[] = {"int8",   "uint8",  "int16",   "uint16",
-                                       "int32",  "uint32", "float32", "float64"};
+  static const char* const kNames[] = {"int8",  "uint8",  "int16",   "uint16",
+                                       "int32", "uint32", "float32", "float64"};
   const std::string number = text(datatype);
   if (datatype < 1 || datatype > kFloat64) return "unknown (" + number + ")";
   return std::string(kNames[datatype - 1]) + " (" + number + ")";
@@ -70,8 +70,8 @@ std::string check_sizes(const CloudLayout& layout, std::uint64_t row_step) {
   const std::uint64_t width = layout.width, height = layout.height;
   const std::uint64_t row = width * layout.point_step;
   if (row_step < row) {
-    return "row_step is " + text(row_step) + ", less than width " + text(width) +
-           " * point_step " + text(layout.point_step) + " = " + text(row) + ".";
+    return "row_step is " + text(row_step) + ", less than width " + text(width) + " * point_step " +
+           text(layout.point_step) + " = " + text(row) + ".";
   }
   const std::uint64_t needed = height * row_step;
   if (layout.data_size < needed) {
@@ -104,9 +104,8 @@ std::string check_layout(const CloudLayout& layout, RawCloud* cloud) {
   if (!fault.empty()) return fault;
 
   const bool row_step_left_out = layout.row_step == 0 && layout.height == 1;
-  const std::uint64_t row_step = row_step_left_out
-                                     ? std::uint64_t{layout.width} * layout.point_step
-                                     : std::uint64_t{layout.row_step};
+  const std::uint64_t row_step = row_step_left_out ? std::uint64_t{layout.width} * layout.point_step
+                                                   : std::uint64_t{layout.row_step};
   fault = check_sizes(layout, row_step);
   if (!fault.empty()) return fault;
 

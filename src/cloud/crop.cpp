@@ -190,11 +190,11 @@ void crop(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range
   cropped->size = 0;
   counts->received = static_cast<std::uint32_t>(n);
   if (cloud.is_double) {
-    (cloud.swap_bytes ? crop_as<double, true> : crop_as<double, false>)(
-        cloud, X_FS, min_range, max_range, cropped, counts);
+    (cloud.swap_bytes ? crop_as<double, true> : crop_as<double, false>)(cloud, X_FS, min_range,
+                                                                        max_range, cropped, counts);
   } else {
-    (cloud.swap_bytes ? crop_as<float, true> : crop_as<float, false>)(
-        cloud, X_FS, min_range, max_range, cropped, counts);
+    (cloud.swap_bytes ? crop_as<float, true> : crop_as<float, false>)(cloud, X_FS, min_range,
+                                                                      max_range, cropped, counts);
   }
   counts->out_of_range = counts->received - counts->not_a_number - counts->infinite -
                          static_cast<std::uint32_t>(cropped->size);

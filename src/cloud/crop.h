@@ -13,9 +13,9 @@ namespace ist {
 /// The points of a cloud that are finite and in range, in the fixed frame.
 struct CroppedCloud {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [m] in the fixed frame
-  std::vector<float> x, y, z;      ///< [m] from the origin along the fixed frame's axes
-  std::vector<std::uint32_t> id;   ///< index of the point in the message
-  std::size_t size = 0;            ///< points; the vectors may be longer
+  std::vector<float> x, y, z;     ///< [m] from the origin along the fixed frame's axes
+  std::vector<std::uint32_t> id;  ///< index of the point in the message
+  std::size_t size = 0;           ///< points; the vectors may be longer
 };
 
 /// No sensor sees farther; what claims to be beyond is out of range whatever the configuration.

@@ -20,8 +20,8 @@ void require(bool valid, const char* member, double value, const char* range) {
 }
 
 void check(const IngestConfig& config) {
-  require(config.min_range >= 0.0 && std::isfinite(config.min_range), "min_range",
-          config.min_range, "0 or more");
+  require(config.min_range >= 0.0 && std::isfinite(config.min_range), "min_range", config.min_range,
+          "0 or more");
   require(config.max_range > config.min_range, "max_range", config.max_range,
           "more than min_range");
   require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
@@ -65,8 +65,8 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   PointFilter on_robot;
   if (config.self_filter && robot.model != nullptr) {
     impl_->self_filter.pose(robot, points.origin, config.self_filter_padding);
-    on_robot = [filter = &impl_->self_filter](const PointRun& run) {
-      return filter->on_robot(run);
+    on_robot = [filter = &impl_->self_filter](const PointTile& tile, const PaddedBox& box) {
+      return filter->on_robot(tile, box);
     };
   }
   impl_->builder.build(points.origin, points.x.data(), points.y.data(), points.z.data(),

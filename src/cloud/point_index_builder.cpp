@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstring>
+#include <limits>
 
 namespace ist {
 namespace {
@@ -16,16 +16,32 @@ constexpr auto kWidth = static_cast<std::uint32_t>(kPointWidth);
 // half empty.
 constexpr float kCutBelow = 0.7F;
 
+// Sixteen numbers side by side; Eigen turns them into SIMD.
 using Lanes = Eigen::Array<float, kPointWidth, 1>;
-using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
+using LaneMap = Eigen::Map<const Lanes>;
 
-PaddedBox box_of(const float* x, const float* y, const float* z) {
-  const LaneMap X(x), Y(y), Z(z);
-  return {{X.minCoeff(), Y.minCoeff(), Z.minCoeff(), 0.0F},
-          {X.maxCoeff(), Y.maxCoeff(), Z.maxCoeff(), 0.0F}};
+// The box of the slots that `mask` leaves: -inf where a slot belongs, inf where not.
+PaddedBox box_of(const PointTile& tile, const Lanes& mask) {
+  const LaneMap x(tile.x), y(tile.y), z(tile.z);
+  return {{x.max(mask).minCoeff(), y.max(mask).minCoeff(), z.max(mask).minCoeff(), 0.0F},
+          {x.min(-mask).maxCoeff(), y.min(-mask).maxCoeff(), z.min(-mask).maxCoeff(), 0.0F}};
 }
 
-PaddedBox box_of(const PointTile& tile) { return box_of(tile.x, tile.y, tile.z); }
+PaddedBox box_of(const PointTile& tile) {
+  const LaneMap x(tile.x), y(tile.y), z(tile.z);
+  return {{x.minCoeff(), y.minCoeff(), z.minCoeff(), 0.0F},
+          {x.maxCoeff(), y.maxCoeff(), z.maxCoeff(), 0.0F}};
+}
+
+// The mask of the first `count` slots; negated, of the others.
+Lanes mask_of_first(std::int32_t count) {
+  constexpr float kIn = -std::numeric_limits<float>::infinity(), kOut = -kIn;
+  static constexpr float kMasks[2 * kPointWidth] = {kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,
+                                                    kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,
+                                                    kOut, kOut, kOut, kOut, kOut, kOut, kOut, kOut,
+                                                    kOut, kOut, kOut, kOut, kOut, kOut, kOut, kOut};
+  return LaneMap(kMasks + kPointWidth - count);
+}
 
 // Slots from `count` on become the one before: they add nothing to the box, and no step.
 void repeat_last(std::uint32_t count, PointTile* tile) {
@@ -39,36 +55,24 @@ void repeat_last(std::uint32_t count, PointTile* tile) {
 
 // Where the second part begins when points are parted at the longest step between neighbours.
 std::int32_t longest_leap(const PointTile& tile) {
-  constexpr std::uint32_t kSteps = kWidth - 1;
-  alignas(64) float step[kWidth] = {};  // squared
-  for (std::uint32_t k = 0; k < kSteps; ++k) {
-    const float dx = tile.x[k + 1] - tile.x[k], dy = tile.y[k + 1] - tile.y[k],
-                dz = tile.z[k + 1] - tile.z[k];
-    step[k] = dx * dx + dy * dy + dz * dz;
-  }
-  // Positive floats compare like integers: the lowest bits, of no account, take the slot's number.
-  std::int32_t bits[kWidth], longest = 0;
-  std::memcpy(bits, step, sizeof bits);
-  for (std::uint32_t k = 0; k < kSteps; ++k) {
-    const auto number = static_cast<std::int32_t>(k);
-    const std::int32_t numbered = (bits[k] & ~15) | number;
-    longest = numbered > longest ? numbered : longest;
-  }
-  return (longest & 15) + 1;
-}
-
-// The box of one part of a tile: the other's slots become `stand_in`, a slot of this part.
-PaddedBox box_of_part(const PointTile& tile, std::int32_t begin, std::int32_t end, int stand_in) {
-  alignas(64) float part[3][kWidth];
-  const float* const sources[3] = {tile.x, tile.y, tile.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    const float* source = sources[axis];
-    const float other = source[stand_in];
-    for (std::int32_t k = 0; k < kPointWidth; ++k) {
-      part[axis][k] = k >= begin && k < end ? source[k] : other;
-    }
-  }
-  return box_of(part[0], part[1], part[2]);
+  // Fifteen steps, in two overlapping halves.
+  constexpr int kHalf = kPointWidth / 2;
+  using Half = Eigen::Array<float, kHalf, 1>;
+  using HalfMap = Eigen::Map<const Half>;
+  const auto squared_steps = [&tile](int first) {
+    const auto along = [first](const float* v) {
+      return Half((HalfMap(v + first + 1) - HalfMap(v + first)).square());
+    };
+    return Half(along(tile.x) + along(tile.y) + along(tile.z));
+  };
+  const Half front = squared_steps(0), back = squared_steps(kHalf - 1);
+  const float front_longest = front.maxCoeff(), back_longest = back.maxCoeff();
+  const bool in_front = front_longest >= back_longest;
+  const Half& half = in_front ? front : back;
+  const float longest = in_front ? front_longest : back_longest;
+  int k = 0;
+  while (k < kHalf - 1 && half[k] != longest) ++k;
+  return k + (in_front ? 1 : kHalf);
 }
 
 // Shortens a tile until no leap is worth a cut; gives its box.
@@ -76,8 +80,8 @@ PaddedBox cut(PointTile* tile) {
   PaddedBox box = box_of(*tile);
   while (tile->count > 1) {
     const std::int32_t front = longest_leap(*tile);
-    const PaddedBox front_box = box_of_part(*tile, 0, front, 0);
-    const PaddedBox back_box = box_of_part(*tile, front, kPointWidth, kPointWidth - 1);
+    const Lanes mask = mask_of_first(front);
+    const PaddedBox front_box = box_of(*tile, mask), back_box = box_of(*tile, -mask);
     if (!(front_box.diagonal() + back_box.diagonal() < kCutBelow * box.diagonal())) break;
     repeat_last(static_cast<std::uint32_t>(front), tile);
     box = front_box;
@@ -207,9 +211,9 @@ void PointIndexBuilder::arrange(std::size_t first, std::size_t last) {
     const auto at = [this](std::size_t i) {
       return items_.begin() + static_cast<std::ptrdiff_t>(i);
     };
-    std::nth_element(
-        at(first), at(first + half), at(last),
-        [axis](const Item& a, const Item& b) { return a.center[axis] < b.center[axis]; });
+    std::nth_element(at(first), at(first + half), at(last), [axis](const Item& a, const Item& b) {
+      return a.center[axis] < b.center[axis];
+    });
     arrange(first, first + half);
     first += half;
   }

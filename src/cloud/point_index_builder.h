@@ -36,7 +36,8 @@ using PointFilter = std::function<std::uint32_t(const PointTile& tile, const Pad
 class PointIndexBuilder {
  public:
   /// As PointIndex::build.
-  /// @param drop   may be empty. Called once for each tile-to-be, before boxes are made: to filter a
+  /// @param drop   may be empty. Called once for each tile-to-be, before boxes are made: to filter
+  /// a
   ///               tile at a time is much cheaper than a point at a time.
   /// @param index  overwritten, its buffers reused
   void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,

@@ -10,7 +10,9 @@ namespace {
 // Covers the rounding of float coordinates and radii, as a share of the numbers involved.
 constexpr double kRounding = 1e-6;
 
-std::uint32_t all_of(const PointRun& run) { return (1U << run.count) - 1U; }
+std::uint32_t all_of(const PointTile& tile) {
+  return (1U << static_cast<std::uint32_t>(tile.count)) - 1U;
+}
 
 }  // namespace
 
@@ -39,33 +41,33 @@ void SelfFilter::pose(const PosedRobot& robot, const Eigen::Vector3d& origin, do
   }
 }
 
-std::uint32_t SelfFilter::on_robot(const PointRun& run) const {
-  const Eigen::Vector3f center = 0.5F * (run.box.min + run.box.max).head<3>();
-  const float radius = 0.5F * run.box.diagonal();
+std::uint32_t SelfFilter::on_robot(const PointTile& tile, const PaddedBox& box) const {
+  const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
+  const float radius = 0.5F * box.diagonal();
   std::uint32_t mask = 0;
   for (const PosedLink& link : links_) {
     const float reach = link.reach + radius * (1.0F + static_cast<float>(kRounding));
     if ((center - link.center_O).squaredNorm() > reach * reach) continue;
-    mask |= on_link(link, run, center.cast<double>(), static_cast<double>(radius));
-    if (mask == all_of(run)) break;
+    mask |= on_link(link, tile, center.cast<double>(), static_cast<double>(radius));
+    if (mask == all_of(tile)) break;
   }
   return mask;
 }
 
-std::uint32_t SelfFilter::on_link(const PosedLink& link, const PointRun& run,
+std::uint32_t SelfFilter::on_link(const PosedLink& link, const PointTile& tile,
                                   const Eigen::Vector3d& center_O, double radius) const {
   switch (ask_tree(link, link.X_LO * center_O, radius)) {
     case Verdict::kClear:
       return 0;
     case Verdict::kOnLink:
-      return all_of(run);
+      return all_of(tile);
     case Verdict::kOpen:
       break;
   }
   std::uint32_t mask = 0;
-  for (std::uint32_t k = 0; k < run.count; ++k) {
-    const Eigen::Vector3d p_L =
-        link.X_LO * run.points[k].head<3>().matrix().cast<double>();
+  for (std::int32_t k = 0; k < tile.count; ++k) {
+    const Eigen::Vector3f p_O(tile.x[k], tile.y[k], tile.z[k]);
+    const Eigen::Vector3d p_L = link.X_LO * p_O.cast<double>();
     const Verdict verdict = ask_tree(link, p_L, 0.0);
     const bool on_robot =
         verdict == Verdict::kOnLink || (verdict == Verdict::kOpen && ask_geometry(link, p_L));
@@ -85,8 +87,8 @@ SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vec
 
   // How far inside reach [m^2] the centre is from each of eight spheres; negative: not.
   std::array<float, kSphereWidth> inside;
-  const auto within = [&c, &inside](const float* x, const float* y, const float* z,
-                                    const float* r, float margin) {
+  const auto within = [&c, &inside](const float* x, const float* y, const float* z, const float* r,
+                                    float margin) {
     bool any = false;
     for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
       const float dx = x[k] - c.x(), dy = y[k] - c.y(), dz = z[k] - c.z();

@@ -13,7 +13,7 @@ namespace ist {
 /// Tells the robot's own points from obstacles: a point is the robot's when its exact distance to a
 /// link of known pose is at most the padding, or when it is inside.
 ///
-/// Each run of neighbouring points is first asked for as one ball: outer balls of the tree prove it
+/// The points of a tile are first asked for as one ball: outer balls of the tree prove it
 /// clear of the link, an inner ball proves it the robot's. Only where both leave it open are the
 /// points asked for one by one, and only where that leaves it open, the exact geometry.
 /// Keeps its memory. Not thread safe.
@@ -24,8 +24,9 @@ class SelfFilter {
   /// @param padding  [m] >= 0
   void pose(const PosedRobot& robot, const Eigen::Vector3d& origin, double padding);
 
-  /// Bit k: points[k] is the robot's.
-  std::uint32_t on_robot(const PointRun& run) const;
+  /// Bit k: the point in slot k is the robot's.
+  /// @param box  of the tile's points
+  std::uint32_t on_robot(const PointTile& tile, const PaddedBox& box) const;
 
  private:
   enum class Verdict { kClear, kOnLink, kOpen };
@@ -41,7 +42,7 @@ class SelfFilter {
 
   Verdict ask_tree(const PosedLink& link, const Eigen::Vector3d& center_L, double radius) const;
   bool ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L) const;
-  std::uint32_t on_link(const PosedLink& link, const PointRun& run,
+  std::uint32_t on_link(const PosedLink& link, const PointTile& tile,
                         const Eigen::Vector3d& center_O, double radius) const;
 
   double padding_ = 0.0;

@@ -7,36 +7,42 @@
 namespace ist {
 namespace {
 
+// Sixteen numbers side by side; Eigen turns them into SIMD.
+using Lanes = Eigen::Array<float, kPointWidth, 1>;
+using Ints = Eigen::Array<std::int32_t, kPointWidth, 1>;
+
 constexpr std::size_t kSmallestTable = 64;  // a power of two, as all of them
-constexpr double kMiddle = 1 << 30;         // number of the origin's cell: none is negative
+constexpr double kMostCells = 1 << 30;      // from the origin to either side
+constexpr float kUnused = 1.5e9F;           // cell of unused slots: fits, and is beyond all others
 
-// The grid along one axis, relative to an origin that lies anywhere in it.
+// The grid along one axis, relative to an origin that lies anywhere in it. Float is enough: cells
+// come out no less exact than the coordinates are.
 struct Axis {
-  Axis(double origin, double cell) : scale(1.0 / cell) {
+  Axis(double origin, double cell) : scale(static_cast<float>(1.0 / cell)) {
     const double cells = origin / cell;
-    offset = kMiddle + (cells - std::floor(cells));
+    offset = static_cast<float>(cells - std::floor(cells));
   }
 
-  // The cells of a tile's coordinates and the squared distances to their centres.
-  void divide(const float* v, std::int32_t* cell, float* off_centre) const {
-    for (int k = 0; k < kPointWidth; ++k) {
-      const double cells = static_cast<double>(v[k]) * scale + offset;
-      cell[k] = static_cast<std::int32_t>(cells);
-      const float off = static_cast<float>(cells - cell[k]) - 0.5F;
-      off_centre[k] += off * off;
-    }
+  // The cells of a tile's coordinates, and the squared distances to their centres are added up.
+  void divide(const float* v, Ints* cell, Lanes* off_centre) const {
+    const Lanes cells = (Eigen::Map<const Lanes>(v) * scale + offset).min(kUnused);
+    // Floor, which has no SIMD before SSE4.1: one less where rounding toward zero went up.
+    const Lanes toward_zero = cells.cast<std::int32_t>().cast<float>();
+    const Lanes floor = toward_zero - ((toward_zero - cells) * 1e38F).max(0.0F).min(1.0F);
+    *cell = floor.cast<std::int32_t>();
+    *off_centre += (cells - floor - 0.5F).square();
   }
 
-  double scale;   // [1/m]
-  double offset;  // of the origin, in cells
+  float scale;   // [1/m]
+  float offset;  // of the origin, in cells
 };
 
-// Cells are larger where their numbers would not fit: across more than a billion of them.
+// Cells are larger where their numbers would not fit: across more than two billion of them.
 double fitting(double cell, const PointIndex& all) {
   if (all.empty()) return cell;
-  const float reach = std::max(all.bounds().min().cwiseAbs().maxCoeff(),
-                               all.bounds().max().cwiseAbs().maxCoeff());
-  return std::max(cell, static_cast<double>(reach) / (kMiddle - 2.0));
+  const float reach =
+      std::max(all.bounds().min().cwiseAbs().maxCoeff(), all.bounds().max().cwiseAbs().maxCoeff());
+  return std::max(cell, static_cast<double>(reach) / kMostCells);
 }
 
 }  // namespace
@@ -46,24 +52,26 @@ bool Thinning::Entry::better_than(const Entry& other) const {
   return std::tie(x, y, z, id) < std::tie(other.x, other.y, other.z, other.id);
 }
 
-void Thinning::run(const PointIndex& all, double cell, PointIndexBuilder* builder,
+void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* builder,
                    PointIndex* thin) {
   std::size_t table_size = kSmallestTable;
   while (8 * table_size < all.size()) table_size *= 2;
   table_.assign(table_size, 0U);
   entries_.clear();
-  last_ = 0;
+  recent_.fill(0);
   const Eigen::Vector3d& origin = all.origin();
-  const double edge = fitting(cell, all);
+  const double edge = fitting(cell_size, all);
   const Axis axis_x(origin.x(), edge), axis_y(origin.y(), edge), axis_z(origin.z(), edge);
   for (const PointTile& tile : all.tiles()) {
-    std::int32_t x[kPointWidth], y[kPointWidth], z[kPointWidth];
-    float off_centre[kPointWidth] = {};
-    axis_x.divide(tile.x, x, off_centre);
-    axis_y.divide(tile.y, y, off_centre);
-    axis_z.divide(tile.z, z, off_centre);
+    Ints x, y, z;
+    Lanes off_centre = Lanes::Zero();
+    axis_x.divide(tile.x, &x, &off_centre);
+    axis_y.divide(tile.y, &y, &off_centre);
+    axis_z.divide(tile.z, &z, &off_centre);
     for (int k = 0; k < tile.count; ++k) {
-      add({{x[k], y[k], z[k]}, off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
+      const Cell cell{x[k], y[k], z[k]};
+      if (is_beaten(cell, off_centre[k])) continue;
+      add({cell, off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
     }
   }
 
@@ -81,19 +89,28 @@ void Thinning::run(const PointIndex& all, double cell, PointIndexBuilder* builde
   builder->build(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, {}, thin);
 }
 
+// The usual case, on its own for speed: a cell seen a moment ago has a better point already.
+inline bool Thinning::is_beaten(const Cell& cell, float off_centre) const {
+  const std::uint32_t recent = recent_[cell.parity()];
+  return recent < entries_.size() && entries_[recent].cell == cell &&
+         entries_[recent].off_centre < off_centre;
+}
+
 void Thinning::add(const Entry& entry) {
-  if (entries_.empty() || !(entries_[last_].cell == entry.cell)) {
-    std::uint32_t* slot = find(entry.cell);
+  const Cell& cell = entry.cell;
+  std::uint32_t& recent = recent_[cell.parity()];
+  if (recent >= entries_.size() || !(entries_[recent].cell == cell)) {
+    std::uint32_t* slot = find(cell);
     if (*slot == 0) {
-      last_ = entries_.size();
+      recent = static_cast<std::uint32_t>(entries_.size());
       entries_.push_back(entry);
-      *slot = static_cast<std::uint32_t>(entries_.size());
+      *slot = recent + 1;
       if (2 * entries_.size() > table_.size()) grow();
       return;
     }
-    last_ = *slot - 1;
+    recent = *slot - 1;
   }
-  if (entry.better_than(entries_[last_])) entries_[last_] = entry;
+  if (entry.better_than(entries_[recent])) entries_[recent] = entry;
 }
 
 std::size_t Thinning::hash(const Cell& cell) {

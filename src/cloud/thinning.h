@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -14,9 +16,9 @@ namespace ist {
 class Thinning {
  public:
   /// @param all   what to thin
-  /// @param cell  [m] > 0, edge of a cell
+  /// @param cell_size  [m] > 0, edge of a cell
   /// @param thin  overwritten, with the same origin and ids
-  void run(const PointIndex& all, double cell, PointIndexBuilder* builder, PointIndex* thin);
+  void run(const PointIndex& all, double cell_size, PointIndexBuilder* builder, PointIndex* thin);
 
  private:
   /// Number of a cell along each axis, from the origin.
@@ -24,6 +26,9 @@ class Thinning {
     std::int32_t x, y, z;
     bool operator==(const Cell& other) const {
       return x == other.x && y == other.y && z == other.z;
+    }
+    std::size_t parity() const {
+      return static_cast<std::size_t>((x & 1) | (y & 1) << 1 | (z & 1) << 2);
     }
   };
 
@@ -38,13 +43,15 @@ class Thinning {
   };
 
   static std::size_t hash(const Cell& cell);
+  bool is_beaten(const Cell& cell, float off_centre) const;
   void add(const Entry& entry);
   std::uint32_t* find(const Cell& cell);
   void grow();
 
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> table_;  ///< open addressing: number of an entry plus one, or 0
-  std::size_t last_ = 0;              ///< entry of the point before: neighbours share cells
+  /// Entries of the cells seen last, by the parity of their numbers: neighbours share cells.
+  std::array<std::uint32_t, 8> recent_{};
   std::vector<float> x_, y_, z_;
   std::vector<std::uint32_t> id_;
 };

@@ -1,6 +1,7 @@
 #include "ist_proximity/geometry/triangle_bvh.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "geometry/triangle_bvh_builder.h"
@@ -13,11 +14,60 @@ namespace {
 constexpr float kQuickBeta = 2.0F;
 constexpr float kBeta = 6.0F;
 
+// The usual closest point divides by the square of the triangle's area: what it loses grows with
+// the square of length over height. Flatter than this, another way is taken.
+constexpr double kSliver = 1e-3;
+constexpr double kNoArea = 1e-8;
+
+Eigen::Vector3d closest_on_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b) {
+  const Eigen::Vector3d ab = b - a;
+  const double length_sq = ab.squaredNorm();
+  if (!(length_sq > 0.0)) return a;
+  return a + std::clamp((p - a).dot(ab) / length_sq, 0.0, 1.0) * ab;
+}
+
+// The nearest point of the edges, or from there within the plane where that comes nearer: by no
+// more than the triangle's height.
+Eigen::Vector3d closest_on_sliver(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
+                                  const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const std::array<const Eigen::Vector3d*, 5> corner = {&a, &b, &c, &a, &b};
+  Eigen::Vector3d nearest = a;
+  std::size_t longest = 0;
+  double longest_sq = -1.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Eigen::Vector3d q = closest_on_segment(p, *corner[k], *corner[k + 1]);
+    if ((q - p).squaredNorm() < (nearest - p).squaredNorm()) nearest = q;
+    const double length_sq = (*corner[k + 1] - *corner[k]).squaredNorm();
+    if (length_sq > longest_sq) {
+      longest_sq = length_sq;
+      longest = k;
+    }
+  }
+  // From the two shorter edges the normal is the least uncertain.
+  const Eigen::Vector3d& apex = *corner[longest + 2];
+  const Eigen::Vector3d n = (*corner[longest] - apex).cross(*corner[longest + 1] - apex);
+  const double area = n.norm();
+  if (!(area > kNoArea * longest_sq)) return nearest;
+  const Eigen::Vector3d normal = n / area, off = p - nearest;
+  const Eigen::Vector3d projected = p - normal.dot(off) * normal;
+  if ((projected - nearest).squaredNorm() * longest_sq > area * area) return nearest;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Eigen::Vector3d edge = *corner[k + 1] - *corner[k];
+    if (normal.dot(edge.cross(projected - *corner[k])) < 0.0) return nearest;
+  }
+  return projected;
+}
+
 }  // namespace
 
 Eigen::Vector3d closest_point_on_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                           const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a;
+  const double longest_sq = std::max({ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm()});
+  if (!(ab.cross(ac).squaredNorm() > kSliver * kSliver * longest_sq * longest_sq)) {
+    return closest_on_sliver(p, a, b, c);
+  }
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
   if (d1 <= 0 && d2 <= 0) return a;
   const Eigen::Vector3d bp = p - b;

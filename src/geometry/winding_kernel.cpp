@@ -34,8 +34,22 @@ HWY_INLINE V Dot(V ax, V ay, V az, V bx, V by, V bz) {
   return hn::MulAdd(ax, bx, hn::MulAdd(ay, by, hn::Mul(az, bz)));
 }
 
+// Half the solid angle of a triangle in double.
+double HalfAngle(const TriangleBvh::Triangle& triangle, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
+  const double la = a.norm(), lb = b.norm(), lc = c.norm();
+  const double det = a.dot((triangle.b - triangle.a).cross(triangle.c - triangle.a));
+  if (det == 0.0) return 0.0;  // in the plane, as below
+  return std::atan2(det, la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+}
+
+// Below this share of the lengths' product a phasor is what is left of larger terms: a sliver seen
+// from nearby, or a point next to an edge. In float its sign would be chance.
+constexpr float kCancelled = 1e-3F;
+
 // Half the solid angle of each triangle, as a phasor (van Oosterom and Strackee 1983).
-HWY_INLINE void AddTriangles(const TriangleBvh::Leaf& leaf, const float* p, Angles* angles) {
+HWY_INLINE void AddTriangles(const TriangleBvh::View& tree, const TriangleBvh::Leaf& leaf,
+                             const Eigen::Vector3d& p_M, const float* p, Angles* angles) {
   const WindingTag d;
   for (std::size_t k = 0; k < kWindingWidth; k += hn::Lanes(d)) {
     const auto px = hn::Set(d, p[0]), py = hn::Set(d, p[1]), pz = hn::Set(d, p[2]);
@@ -51,32 +65,38 @@ HWY_INLINE void AddTriangles(const TriangleBvh::Leaf& leaf, const float* p, Angl
     const auto ny = hn::Sub(hn::Mul(bz, cx), hn::Mul(bx, cz));
     const auto nz = hn::Sub(hn::Mul(bx, cy), hn::Mul(by, cx));
     const auto det = Dot(ax, ay, az, nx, ny, nz);
-    const auto side = hn::MulAdd(
-        hn::Mul(la, lb), lc,
-        hn::MulAdd(Dot(ax, ay, az, bx, by, bz), lc,
-                   hn::MulAdd(Dot(bx, by, bz, cx, cy, cz), la,
-                              hn::Mul(Dot(cx, cy, cz, ax, ay, az), lb))));
+    const auto lengths = hn::Mul(hn::Mul(la, lb), lc);
+    const auto side =
+        hn::Add(lengths, hn::MulAdd(Dot(ax, ay, az, bx, by, bz), lc,
+                                    hn::MulAdd(Dot(bx, by, bz, cx, cy, cz), la,
+                                               hn::Mul(Dot(cx, cy, cz, ax, ay, az), lb))));
     // Unit phasors, so that products stay in range; nothing where the point is in the plane.
     const auto zero = hn::Zero(d);
     const auto size = hn::Add(hn::Abs(det), hn::Abs(side));
     const auto is_something = hn::Ne(det, zero);
-    const auto scale = hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(is_something, size, hn::Set(d, 1.0F)));
+    const auto is_precise = hn::Ge(size, hn::Mul(hn::Set(d, kCancelled), lengths));
+    const auto scale =
+        hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(is_something, size, hn::Set(d, 1.0F)));
     const auto re = hn::IfThenElse(is_something, hn::Mul(side, scale), hn::Set(d, 1.0F));
     const auto im = hn::IfThenElse(is_something, hn::Mul(det, scale), zero);
     const auto old_re = hn::Load(d, angles->re + k), old_im = hn::Load(d, angles->im + k);
     auto new_re = hn::Sub(hn::Mul(old_re, re), hn::Mul(old_im, im));
     auto new_im = hn::MulAdd(old_re, im, hn::Mul(old_im, re));
     // Both below a right angle: the sum cannot wrap. Past it, both are put aside.
-    const auto fits = hn::And(hn::Gt(re, zero), hn::Gt(new_re, zero));
+    const auto fits = hn::And(is_precise, hn::And(hn::Gt(re, zero), hn::Gt(new_re, zero)));
     if (!hn::AllTrue(d, fits)) {
-      alignas(64) float r[kWindingWidth], i[kWindingWidth], keep[kWindingWidth];
+      alignas(64) float r[kWindingWidth], i[kWindingWidth], keep[kWindingWidth],
+          precise[kWindingWidth];
       hn::Store(re, d, r);
       hn::Store(im, d, i);
+      hn::Store(hn::IfThenElse(is_precise, hn::Set(d, 1.0F), zero), d, precise);
       hn::Store(hn::IfThenElse(fits, hn::Set(d, 1.0F), zero), d, keep);
       for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
         if (keep[lane] != 0.0F) continue;
-        angles->sum += std::atan2(static_cast<double>(i[lane]), static_cast<double>(r[lane])) +
-                       std::atan2(static_cast<double>(angles->im[k + lane]),
+        angles->sum += precise[lane] != 0.0F
+                           ? std::atan2(static_cast<double>(i[lane]), static_cast<double>(r[lane]))
+                           : HalfAngle(tree.triangles[leaf.first + k + lane], p_M);
+        angles->sum += std::atan2(static_cast<double>(angles->im[k + lane]),
                                   static_cast<double>(angles->re[k + lane]));
       }
       new_re = hn::IfThenElse(fits, new_re, hn::Set(d, 1.0F));
@@ -123,8 +143,8 @@ double SumWinding(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, flo
       const auto qdz = Dot(qxz, qyz, qzz, dx, dy, dz);
       const auto dqd = Dot(dx, dy, dz, qdx, qdy, qdz);
       const auto trace = hn::Add(qxx, hn::Add(qyy, qzz));
-      const auto moments = hn::Add(
-          dipole, hn::NegMulAdd(hn::Mul(hn::Set(d, 3.0F), inverse_sq), dqd, trace));
+      const auto moments =
+          hn::Add(dipole, hn::NegMulAdd(hn::Mul(hn::Set(d, 3.0F), inverse_sq), dqd, trace));
       const auto term = hn::Mul(moments, hn::Mul(inverse, inverse_sq));
       const auto kept = hn::IfThenElse(is_far, term, hn::Zero(d));
       hn::Store(hn::Add(hn::Load(d, far_sums + k), kept), d, far_sums + k);
@@ -134,7 +154,7 @@ double SumWinding(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, flo
       if (near[k] == 0.0F) continue;
       const std::int32_t child = tree.boxes[index].child[k];
       if (child < 0) {
-        AddTriangles(tree.leaves[~child], p, &angles);
+        AddTriangles(tree, tree.leaves[~child], p_M, p, &angles);
       } else {
         stack[top++] = child;
       }

@@ -11,9 +11,8 @@ std::vector<Ball> coarse_balls(const Packing& packing, std::size_t count) {
   if (balls.empty()) return chosen;
   // How far each ball reaches beyond the chosen ones [m]; whole balls, in the bound's sense.
   std::vector<double> beyond(balls.size(), std::numeric_limits<double>::infinity());
-  auto next = std::max_element(balls.begin(), balls.end(), [](const Ball& a, const Ball& b) {
-    return a.radius < b.radius;
-  });
+  auto next = std::max_element(balls.begin(), balls.end(),
+                               [](const Ball& a, const Ball& b) { return a.radius < b.radius; });
   while (chosen.size() < std::min(count, balls.size())) {
     chosen.push_back(*next);
     double farthest = 0.0;

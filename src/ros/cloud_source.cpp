@@ -227,7 +227,6 @@ void CloudSource::pose_robot(const ros::Time& stamp, PosedRobot* robot) const {
   robot->X_FL.resize(links.size(), Eigen::Isometry3d::Identity());
   robot->known.assign(links.size(), false);
   std::string ignored;
-  std::string ignored;
   for (std::size_t i = 0; i < links.size(); ++i) {
     // Asked first: an exception per missing link and cloud would cost more than the answer.
     robot->known[i] =

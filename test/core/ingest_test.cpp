@@ -55,9 +55,9 @@ class Message {
     for (std::size_t i = 0; i < points.size(); ++i) {
       std::uint8_t* point =
           &bytes_[1] + i / width * layout.row_step + i % width * format.point_step;
-      for (const auto& [offset, value] : {std::pair{format.x, points[i].x()},
-                                          std::pair{format.y, points[i].y()},
-                                          std::pair{format.z, points[i].z()}}) {
+      for (const auto& [offset, value] :
+           {std::pair{format.x, points[i].x()}, std::pair{format.y, points[i].y()},
+            std::pair{format.z, points[i].z()}}) {
         if (format.is_double) {
           put(value, format.is_bigendian, point + offset);
         } else {
@@ -162,9 +162,9 @@ TEST(Ingest, hugeFiniteCoordinatesAreOutOfRange) {
     SCOPED_TRACE(max_range);
     IngestConfig config;
     config.max_range = max_range;
-    EXPECT_EQ(ingest({{1e30, 0, 0}, {0, -1e38, 1e38}, {1e20, 1e20, 1e20}}, config)
-                  .counts.out_of_range,
-              3U);
+    EXPECT_EQ(
+        ingest({{1e30, 0, 0}, {0, -1e38, 1e38}, {1e20, 1e20, 1e20}}, config).counts.out_of_range,
+        3U);
     const CloudSnapshot doubles =
         ingest({{1e300, 0, 0}, {-1e308, 1e308, 1e308}, {kInf, 1e300, 0}}, config, float64());
     EXPECT_EQ(doubles.counts.out_of_range, 2U);
@@ -177,10 +177,13 @@ TEST(Ingest, rangesIncludeTheirBounds) {
   config.min_range = 0.5;
   config.max_range = 2.0;
   const float below = std::nextafter(0.5F, 0.0F), beyond = std::nextafter(2.0F, 3.0F);
-  const CloudSnapshot snapshot =
-      ingest({{0.5, 0, 0}, {0, 2.0, 0}, {0, 0, static_cast<double>(below)},
-              {static_cast<double>(beyond), 0, 0}, {1.2, 1.2, 1.2}, {1.1, 1.1, 1.1}},
-             config);
+  const CloudSnapshot snapshot = ingest({{0.5, 0, 0},
+                                         {0, 2.0, 0},
+                                         {0, 0, static_cast<double>(below)},
+                                         {static_cast<double>(beyond), 0, 0},
+                                         {1.2, 1.2, 1.2},
+                                         {1.1, 1.1, 1.1}},
+                                        config);
   const auto points = points_by_id(snapshot.index);
   ASSERT_EQ(points.size(), 3U);
   EXPECT_EQ(points.count(0), 1U);
@@ -252,8 +255,8 @@ TEST(Ingest, everyFormatReadsTheSame) {
   }
 }
 
-void expect_transformed(const Points& points, const Eigen::Isometry3d& X_FS, const PointIndex& index,
-                        double tolerance) {
+void expect_transformed(const Points& points, const Eigen::Isometry3d& X_FS,
+                        const PointIndex& index, double tolerance) {
   const auto found = points_by_id(index);
   ASSERT_EQ(found.size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -384,9 +387,10 @@ TEST(Thinning, onePointOfEachOccupiedCell) {
   for (const auto& [id, p] : all) {
     const auto cell = cell_of(p, config.thinning);
     const Eigen::Vector3d centre =
-        config.thinning * (Eigen::Vector3d(static_cast<double>(cell[0]), static_cast<double>(cell[1]),
-                                           static_cast<double>(cell[2])) +
-                           Eigen::Vector3d::Constant(0.5));
+        config.thinning *
+        (Eigen::Vector3d(static_cast<double>(cell[0]), static_cast<double>(cell[1]),
+                         static_cast<double>(cell[2])) +
+         Eigen::Vector3d::Constant(0.5));
     const std::pair<double, std::uint32_t> candidate((p - centre).norm(), id);
     const auto [it, is_new] = nearest.emplace(cell, candidate);
     if (!is_new) it->second = std::min(it->second, candidate);

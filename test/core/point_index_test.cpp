@@ -28,8 +28,8 @@ struct Points {
 
 PointIndex build(const Points& points) {
   PointIndex index;
-  index.build({1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(),
-              points.id.data(), points.size());
+  index.build({1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
+              points.size());
   return index;
 }
 
@@ -66,7 +66,10 @@ Eigen::Vector3f point_of(const PointTile& tile, int k) { return {tile.x[k], tile
 class Checker {
  public:
   Checker(const Points& points, const PointIndex& index)
-      : points_(points), index_(index), seen_(points.size(), 0), tile_seen_(index.tiles().size(), 0) {}
+      : points_(points),
+        index_(index),
+        seen_(points.size(), 0),
+        tile_seen_(index.tiles().size(), 0) {}
 
   void run() {
     ASSERT_EQ(index_.size(), points_.size());
@@ -321,19 +324,20 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
   PointIndexBuilder().build(
       {1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
       points.size(),
-      [&](const PointRun& run) {
-        asked += run.count;
+      [&](const PointTile& tile, const PaddedBox& box) {
+        asked += static_cast<std::size_t>(tile.count);
+        Eigen::AlignedBox3f exact;
         std::uint32_t mask = 0;
-        for (std::uint32_t k = 0; k < run.count; ++k) {
-          EXPECT_TRUE((run.points[k] >= run.box.min).all());
-          EXPECT_TRUE((run.points[k] <= run.box.max).all());
-          if (is_dropped(run.points[k][0], run.points[k][1])) mask |= 1U << k;
+        for (int k = 0; k < tile.count; ++k) {
+          exact.extend(point_of(tile, k));
+          if (is_dropped(tile.x[k], tile.y[k])) mask |= 1U << k;
         }
+        EXPECT_EQ(exact.min(), box.min.head<3>().matrix());
+        EXPECT_EQ(exact.max(), box.max.head<3>().matrix());
         return mask;
       },
       &index);
   EXPECT_EQ(asked, points.size());
-  Points kept;
   std::size_t expected = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     expected += is_dropped(points.x[i], points.y[i]) ? 0 : 1;
@@ -357,7 +361,7 @@ TEST(PointIndex, filterThatDropsAll) {
   PointIndex index;
   PointIndexBuilder().build(
       {1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
-      points.size(), [](const PointRun& run) { return (1U << run.count) - 1U; }, &index);
+      points.size(), [](const PointTile&, const PaddedBox&) { return 0xFFFFU; }, &index);
   EXPECT_TRUE(index.empty());
   EXPECT_EQ(index.root(), -1);
   EXPECT_TRUE(index.nodes().empty());

@@ -198,16 +198,15 @@ TEST(Repulsion, symmetricSqueezeCancels) {
 TEST(Repulsion, doesNotDependOnDensity) {
   const Repulsion repulsion(robot_of(bar()));
   const auto over_a_wall = [&repulsion](double spacing, const Vector3d& p) {
-    std::vector<Vector3d> points =
-        wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), spacing);
-    for (const Vector3d& q :
-         wall({-0.2, 0, 0.2}, Vector3d::UnitY(), Vector3d::UnitZ(), spacing)) {
+    std::vector<Vector3d> points = wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), spacing);
+    for (const Vector3d& q : wall({-0.2, 0, 0.2}, Vector3d::UnitY(), Vector3d::UnitZ(), spacing)) {
       points.push_back(q);
     }
     const CloudSnapshot cloud = cloud_of(points);
     return repulsion(0, at(p), {&cloud}, near_by(p.z() - 0.03), {});
   };
-  for (const Vector3d& p : {Vector3d(0, 0, 0.1), Vector3d(-0.03, 0.05, 0.1), Vector3d(0, 0, 0.05)}) {
+  for (const Vector3d& p :
+       {Vector3d(0, 0, 0.1), Vector3d(-0.03, 0.05, 0.1), Vector3d(0, 0, 0.05)}) {
     const Vector3d sparse = over_a_wall(0.01, p), dense = over_a_wall(0.01 / std::sqrt(2.0), p);
     EXPECT_GT(sparse.norm(), 0.3);
     EXPECT_LT((sparse - dense).norm(), 0.03 * sparse.norm());
@@ -284,8 +283,7 @@ TEST(Repulsion, losesNothingFarFromTheFixedFramesOrigin) {
 TEST(Repulsion, withoutPairsTheLinksDirectionServes) {
   const Repulsion repulsion(robot_of({}));
   const CloudSnapshot cloud = cloud_of({{0, 0, 0}}), empty = cloud_of({});
-  const Vector3d v =
-      repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
+  const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
   EXPECT_LT((v - 0.5 * Vector3d::UnitY()).norm(), 1e-12);
 }
 
@@ -304,8 +302,8 @@ TEST(CoarseBalls, beginWithTheLargestAndSpread) {
   const std::vector<Ball> chosen = coarse_balls(packing, kCoarseBalls);
   ASSERT_EQ(chosen.size(), kCoarseBalls);
   EXPECT_EQ(chosen[0].radius, 0.03);
-  const auto in_second = std::count_if(chosen.begin(), chosen.end(),
-                                       [](const Ball& b) { return b.center.x() > 0.5; });
+  const auto in_second =
+      std::count_if(chosen.begin(), chosen.end(), [](const Ball& b) { return b.center.x() > 0.5; });
   EXPECT_GT(in_second, 15);
   EXPECT_LT(in_second, 35);
   for (const Ball& b : packing.balls) {

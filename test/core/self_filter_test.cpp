@@ -41,7 +41,8 @@ PosedRobot posed(const RobotModel& model, const Eigen::Vector3d& base = Eigen::V
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
     X.translation() = base + Eigen::Vector3d(0.0, 0.25 * static_cast<double>(i), 0.1);
-    X.rotate(Eigen::AngleAxisd(0.4 + static_cast<double>(i), Eigen::Vector3d(1, 2, 3).normalized()));
+    X.rotate(
+        Eigen::AngleAxisd(0.4 + static_cast<double>(i), Eigen::Vector3d(1, 2, 3).normalized()));
     robot.X_FL.push_back(X);
   }
   return robot;
@@ -174,8 +175,7 @@ TEST(SelfFilter, linkWithoutGeometryClaimsNothing) {
   model.links[0].error = "no mesh";
   model.links[2] = LinkModel();
   PosedRobot robot = posed(model);
-  const CloudSnapshot snapshot =
-      ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
+  const CloudSnapshot snapshot = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
   robot.known[0] = robot.known[2] = false;
   const CloudSnapshot expected = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
   EXPECT_EQ(ids(snapshot.index), ids(expected.index));
@@ -196,8 +196,7 @@ TEST(SelfFilter, missingPosesAreUnknown) {
   PosedRobot robot = posed(model);
   robot.known.resize(1);
   robot.X_FL.resize(1);
-  const CloudSnapshot snapshot =
-      ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
+  const CloudSnapshot snapshot = ingest(cloud_about_the_robot(5000), robot, config_with(0.02));
   robot = posed(model);
   robot.known = {true, false, false};
   EXPECT_EQ(ids(snapshot.index),

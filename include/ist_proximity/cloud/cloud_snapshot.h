@@ -25,7 +25,7 @@ struct CloudSnapshot {
   PointIndex index;   ///< all points used
   PointIndex coarse;  ///< the same, thinned to one point per cell of the thinning grid
   IngestCounts counts;
-  double stamp = 0.0;  ///< [s] acquisition
+  double stamp = 0.0;        ///< [s] acquisition
   double ingest_time = 0.0;  ///< [s] it took
 };
 

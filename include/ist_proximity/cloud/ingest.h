@@ -13,18 +13,18 @@ namespace ist {
 
 /// What is kept of a cloud.
 struct IngestConfig {
-  double min_range = 0.05;  ///< [m] from the sensor; >= 0
-  double max_range = 3.0;   ///< [m] from the sensor; > min_range, may be inf
-  bool self_filter = true;  ///< drop points on the robot
+  double min_range = 0.05;            ///< [m] from the sensor; >= 0
+  double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
+  bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: a point at most this far from a link is its own
-  double thinning = 0.01;   ///< [m] > 0: cell of the thinned cloud that repulsion sums over
+  double thinning = 0.01;  ///< [m] > 0: cell of the thinned cloud that repulsion sums over
 };
 
 /// The robot at a cloud's own stamp, for the self-filter.
 struct PosedRobot {
-  const RobotModel* model = nullptr;      ///< null: no self-filter
-  std::vector<Eigen::Isometry3d> X_FL;    ///< by link: link frame -> fixed frame
-  std::vector<bool> known;                ///< by link: whether the pose is known
+  const RobotModel* model = nullptr;    ///< null: no self-filter
+  std::vector<Eigen::Isometry3d> X_FL;  ///< by link: link frame -> fixed frame
+  std::vector<bool> known;              ///< by link: whether the pose is known
 };
 
 /// Turns raw clouds into snapshots. Keeps its working memory, so a steady stream does not

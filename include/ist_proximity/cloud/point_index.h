@@ -41,10 +41,10 @@ class PointIndex {
              const std::uint32_t* id, std::size_t n);
 
   bool empty() const { return tiles_.empty(); }
-  std::size_t size() const { return size_; }  ///< points
-  const Eigen::Vector3d& origin() const { return origin_; }  ///< [m] in the fixed frame
+  std::size_t size() const { return size_; }                    ///< points
+  const Eigen::Vector3d& origin() const { return origin_; }     ///< [m] in the fixed frame
   const std::vector<BoxNode>& nodes() const { return nodes_; }  ///< the root is nodes()[root()]
-  std::int32_t root() const { return root_; }  ///< -1 when empty
+  std::int32_t root() const { return root_; }                   ///< -1 when empty
   const std::vector<PointTile>& tiles() const { return tiles_; }
   Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< relative to the origin
   /// Another number after every build() of any index: tells whether an answer belongs to it.

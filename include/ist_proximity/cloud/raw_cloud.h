@@ -9,8 +9,8 @@ namespace ist {
 
 /// Where x, y and z lie in a cloud's bytes, checked once so that reading needs no checks.
 struct RawCloud {
-  const std::uint8_t* data = nullptr;  ///< not owned
-  std::size_t width = 0, height = 0;   ///< points in a row, rows
+  const std::uint8_t* data = nullptr;        ///< not owned
+  std::size_t width = 0, height = 0;         ///< points in a row, rows
   std::size_t point_step = 0, row_step = 0;  ///< [bytes]
   std::size_t x = 0, y = 0, z = 0;           ///< [bytes] offsets within a point
   bool is_double = false;                    ///< float64 coordinates, else float32

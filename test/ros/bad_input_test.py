@@ -1,0 +1,323 @@
+#!/usr/bin/env python3
+"""Bad clouds, bad meshes, bad URDFs: never a crash, never a made-up value, and a way back."""
+
+import contextlib
+import os
+import shutil
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+
+FAR_BOX = pt.transform((0, 0.8, 0))
+POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
+
+
+def without_z():
+    message = pt.cloud(POINT)
+    message.fields = message.fields[:2]
+    return message
+
+
+def integer_x():
+    message = pt.cloud(POINT)
+    message.fields[0].datatype = 5  # int32
+    return message
+
+
+def too_little_data():
+    message = pt.cloud(POINT)
+    message.data = message.data[:8]
+    return message
+
+
+def contradicting_rows():
+    message = pt.cloud(POINT)
+    message.row_step = 4
+    return message
+
+
+def field_beyond_point():
+    message = pt.cloud(POINT)
+    message.fields[2].offset = 1000
+    return message
+
+
+def huge():
+    message = pt.cloud(POINT)
+    message.width, message.height = 0xFFFFFFFF, 0xFFFFFFFF
+    return message
+
+
+def unknown_frame():
+    return pt.cloud(POINT, frame="nowhere")
+
+
+def empty_frame():
+    return pt.cloud(POINT, frame="")
+
+
+# What each cloud makes, and a word of the text that says what is wrong.
+UNUSABLE = [
+    (without_z, "z"),
+    (integer_x, "x"),
+    (too_little_data, "data"),
+    (contradicting_rows, "row_step"),
+    (field_beyond_point, "z"),
+    (huge, "malformed"),
+    (unknown_frame, "nowhere"),
+    (empty_frame, "frame_id"),
+]
+
+
+class BadCloudTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.world = pt.World("/bad_clouds").stand(box=FAR_BOX)
+        cls.node = pt.ProximityNode("/bad_clouds", urdf_text=pt.urdf())
+        cls.world.start_tf()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.world.stop()
+        assert cls.node.stop() == 0
+
+    def setUp(self):
+        self.begin = len(self.node.messages)
+
+    def tearDown(self):
+        for message in self.node.messages[self.begin :]:
+            pt.check_invariants(self, message)
+
+    @contextlib.contextmanager
+    def stream(self, make, rate=20):
+        repeater = self.world.repeat(rate, lambda: self.world.cloud_publisher.publish(make()))
+        try:
+            yield
+        finally:
+            repeater.stop()
+
+    def check_recovery(self):
+        with self.stream(lambda: pt.cloud(POINT)):
+            message = self.node.wait_for(
+                lambda m: m.status == 0 and pt.link(m, "ball_link").state == LinkProximity.NEAR,
+                "recovery",
+            )
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+
+    def test_unusable(self):
+        for make, word in UNUSABLE:
+            with self.subTest(make.__name__):
+                with self.stream(make):
+                    message = self.node.wait_for(
+                        lambda m: m.status != 0 and word in m.status_text and pt.all_unknown(m),
+                        word,
+                    )
+                self.assertIn(
+                    message.status, (ProximityArray.NO_CLOUD, ProximityArray.STALE_CLOUD)
+                )
+                self.assertIn("'cloud'", message.status_text)
+                self.check_recovery()
+
+    def test_unusable_beside_good_ones(self):
+        """Every other cloud is malformed: the good ones are used."""
+        with self.stream(lambda: pt.cloud(POINT)), self.stream(without_z):
+            self.node.wait_for_status(ProximityArray.OK)
+            begin = len(self.node.messages)
+            self.node.wait_for(lambda m: len(self.node.messages) > begin + 100, "100 messages")
+            wrong = [m for m in self.node.messages[begin:] if m.status != ProximityArray.OK]
+            self.assertLess(len(wrong), 10, wrong[-1].status_text if wrong else "")
+
+    def test_all_nan(self):
+        """A sensor that saw nothing at all: UNKNOWN, also when there was a good cloud just now."""
+        self.check_recovery()
+        with self.stream(lambda: pt.cloud(np.full((5, 3), np.nan))):
+            message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "NaN")
+        self.assertTrue(pt.all_unknown(message))
+        self.assertEqual(message.sources[0].status, ProximityArray.NO_CLOUD)
+        self.assertEqual(message.sources[0].points_received, 5)
+        self.check_recovery()
+
+    def test_nothing_in_range(self):
+        """Measured, and nothing there: CLEAR, with +inf."""
+        nothing = {
+            "empty": np.zeros((0, 3)),
+            "too near": np.array([[0.0, 0.0, 0.01]]),
+            "too far": np.array([[0.0, 0.0, 30.0], [np.nan, 0, 0]]),
+            "infinite": np.full((3, 3), np.inf),
+        }
+        for name, points in nothing.items():
+            with self.subTest(name):
+                stamps = []
+
+                def send(points=points, stamps=stamps):
+                    message = pt.cloud(points)
+                    stamps.append(message.header.stamp)
+                    return message
+
+                with self.stream(send):
+                    message = self.node.wait_for(lambda m: m.cloud_stamp in stamps, name)
+                self.assertEqual(message.status, ProximityArray.OK)
+                self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+                self.assertEqual(message.sources[0].points_used, 0)
+                self.check_recovery()
+
+    def test_some_bad_points(self):
+        """NaN, infinite and enormous points among good ones change nothing."""
+        points = np.array(POINT + [[np.nan, 0, 0], [np.inf, 0, 0], [1e30, 0, 0], [0, -np.inf, 1]])
+        with self.stream(lambda: pt.cloud(points)):
+            message = self.node.wait_for(
+                lambda m: m.status == 0 and m.sources[0].points_received == 5, "five points"
+            )
+        self.assertEqual(message.sources[0].points_used, 1)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+
+
+class BadModelTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.folder = tempfile.mkdtemp()
+        self.world = pt.World(self.namespace).stand(box=FAR_BOX)
+        self.world.points = np.array(POINT)
+        self.world.start_tf()
+        self.world.start_clouds()
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        shutil.rmtree(self.folder)
+        if self.node:
+            for message in self.node.messages:
+                pt.check_invariants(self, message)
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, urdf, **parameters):
+        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        return self.node
+
+    def check_one_bad_link(self, geometry, words):
+        """box_link cannot be had; ball_link is measured all the same."""
+        node = self.start(pt.urdf(box=geometry))
+        message = node.wait_for(
+            lambda m: m.links and pt.link(m, "ball_link").state == LinkProximity.NEAR, "the ball"
+        )
+        self.assertEqual(message.status, ProximityArray.MODEL_ERROR)
+        for word in ["box_link"] + words:
+            self.assertIn(word, message.status_text)
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+        node.wait_until(
+            lambda: "model" in node.diagnostics and node.diagnostics["model"].level == 2,
+            "model diagnostics ERROR",
+        )
+
+    def test_missing_mesh(self):
+        path = os.path.join(self.folder, "missing.stl")
+        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["missing.stl"])
+
+    def test_unknown_package(self):
+        self.check_one_bad_link(
+            '<mesh filename="package://no_such_package/a.stl"/>', ["no_such_package"]
+        )
+
+    def test_empty_mesh(self):
+        path = os.path.join(self.folder, "empty.stl")
+        open(path, "w").close()
+        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["empty.stl"])
+
+    def test_zero_scale(self):
+        path = os.path.join(self.folder, "triangle.stl")
+        with open(path, "w") as f:
+            f.write(
+                "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                "vertex 0 1 0\nendloop\nendfacet\nendsolid t\n"
+            )
+        self.check_one_bad_link('<mesh filename="file://%s" scale="1 0 1"/>' % path, ["scale"])
+
+    def test_mesh_that_appears(self):
+        """A mesh that is missing, then there: ~reload_model takes it."""
+        path = os.path.join(self.folder, "late.stl")
+        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["late.stl"])
+        corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)]
+        faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        with open(path, "w") as f:
+            f.write("solid box\n")
+            for a, b, c, d in faces:
+                for triangle in ((a, b, c), (a, c, d)):
+                    f.write("facet normal 0 0 0\nouter loop\n")
+                    for i in triangle:
+                        f.write("vertex %g %g %g\n" % corners[i])
+                    f.write("endloop\nendfacet\n")
+            f.write("endsolid box\n")
+        self.assertTrue(self.node.reload().success)
+        message = self.node.wait_for_status(ProximityArray.OK)
+        truth = pt.distance_to_box(np.array(POINT) - [0, 0.8, 0])[0]
+        self.assertAlmostEqual(pt.link(message, "box_link").distance, truth, delta=0.0011)
+
+    def test_link_without_geometry(self):
+        node = self.start(pt.urdf(), links=["base", "ball_link", "nobody"])
+        message = node.wait_for(
+            lambda m: m.links and pt.link(m, "ball_link").state == LinkProximity.NEAR, "the ball"
+        )
+        self.assertEqual(message.status, ProximityArray.MODEL_ERROR)
+        self.assertEqual({one.link for one in message.links}, {"base", "ball_link", "nobody"})
+        for name in ("base", "nobody"):
+            self.assertIn(name, message.status_text)
+            self.assertEqual(pt.link(message, name).state, LinkProximity.UNKNOWN)
+
+    def test_unparsable_then_fixed(self):
+        node = self.start("<robot name='broken'><link name='a'>")
+        message = node.wait_for_status(ProximityArray.MODEL_ERROR, "URDF")
+        self.assertFalse(message.links)
+        # A changed parameter is taken without being told.
+        rospy.set_param(self.namespace + "/robot_description", pt.urdf())
+        node.wait_for_status(ProximityArray.OK)
+
+        # From good to bad: the old model is no answer any more.
+        for bad in ("", "no XML", "<robot name='r'/>", 42):
+            rospy.set_param(self.namespace + "/robot_description", bad)
+            self.assertTrue(node.reload().message)
+            message = node.wait_for_status(ProximityArray.MODEL_ERROR, "robot_description")
+            self.assertTrue(pt.all_unknown(message))
+        rospy.delete_param(self.namespace + "/robot_description")
+        self.assertFalse(node.reload().success)
+        node.wait_for_status(ProximityArray.MODEL_ERROR, "waiting for the parameter")
+
+        # And back, with another link.
+        more = """<link name="hat"><collision><geometry><box size="0.1 0.1 0.1"/></geometry>
+            </collision></link><joint name="to_hat" type="fixed"><parent link="base"/>
+            <child link="hat"/></joint>"""
+        self.world.poses["hat"] = ("base", pt.transform((0, 0, 0.45)))
+        rospy.set_param(self.namespace + "/robot_description", pt.urdf(more))
+        self.assertTrue(node.reload().success)
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual([one.link for one in message.links], ["ball_link", "box_link", "hat"])
+        self.assertAlmostEqual(pt.link(message, "hat").distance, 0.1, 4)
+
+    def test_late_description(self):
+        node = self.start(None)
+        message = node.wait_for(lambda m: True, "the first message", start=0)
+        self.assertEqual(message.status, ProximityArray.MODEL_ERROR)
+        self.assertFalse(message.links)
+        self.assertIn("robot_description", message.status_text)
+        rospy.set_param(self.namespace + "/robot_description", pt.urdf())
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual(message.header.frame_id, "base")
+
+    def test_robot_without_geometry(self):
+        node = self.start('<robot name="ghost"><link name="base"/></robot>')
+        message = node.wait_for_status(ProximityArray.MODEL_ERROR, "geometry")
+        self.assertFalse(message.links)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("bad_input_test")
+    suite = sys.argv[1] if len(sys.argv) > 1 else ""
+    kinds = {"clouds": BadCloudTest, "models": BadModelTest}
+    rostest.rosrun("ist_proximity", "bad_" + suite, kinds[suite], sys.argv)

@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+"""Simulated time: no clock yet, a clock that stands still, and one that jumps back."""
+
+import sys
+import threading
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from rosgraph_msgs.msg import Clock
+
+
+class SimulatedClock:
+    def __init__(self):
+        self._publisher = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._lock = threading.Lock()
+        self.now, self.step = 1000.0, 0.005
+        self._repeater = None
+
+    def start(self):
+        self._repeater = pt.Repeater(200, self._tick)
+
+    def _tick(self):
+        with self._lock:
+            self.now += self.step
+            self._publisher.publish(Clock(rospy.Time.from_sec(self.now)))
+
+    def jump(self, seconds):
+        with self._lock:
+            self.now += seconds
+
+    def stop(self):
+        if self._repeater:
+            self._repeater.stop()
+
+
+class ClockTest(unittest.TestCase):
+    def count_messages(self, node, n):
+        """Waits for n more messages and returns them."""
+        begin = len(node.messages)
+        node.wait_for(lambda m: len(node.messages) >= begin + n, "%d messages" % n)
+        return node.messages[begin:]
+
+    def test_clock(self):
+        clock = SimulatedClock()
+        node = pt.ProximityNode("/clock_test", {"rate": 50}, pt.urdf())
+        message = node.wait_for_status(ProximityArray.NO_CLOUD, "/clock")
+        self.assertTrue(pt.all_unknown(message))
+
+        clock.start()
+        pt.wait_until(lambda: not rospy.Time.now().is_zero(), "the clock")
+        world = pt.World("/clock_test").stand(box=pt.transform((0, 0.8, 0)))
+        world.points = np.array([[0.0, 0.0, 0.3]])
+        world.start_tf()
+        world.start_clouds()
+        node.wait_for_status(ProximityArray.OK)
+
+        # The clock stands still: answers go on, and nothing becomes stale.
+        clock.step = 0.0
+        frozen = self.count_messages(node, 100)[20:]
+        self.assertEqual({m.status for m in frozen}, {ProximityArray.OK})
+        self.assertEqual(len({m.header.stamp for m in frozen}), 1)
+        clock.step = 0.005
+
+        # Back in time, a little and a lot, with other clouds than before.
+        for i, jump in enumerate((-5.0, -400.0, -0.9)):
+            node.wait_for_status(ProximityArray.OK)
+            world.points = np.array([[0.0, 0.0, 0.35 + 0.05 * i]])
+            before = rospy.Time.now()
+            begin = len(node.messages)
+            clock.jump(jump)
+            message = node.wait_for(
+                lambda m: m.status == 0 and m.header.stamp < before, "OK after the jump"
+            )
+            new = [m for m in node.messages[begin:] if m.header.stamp < before and m.status == 0]
+            for m in new:
+                self.assertLess(m.cloud_stamp, before)
+            node.wait_for(
+                lambda m: m.status == 0
+                and abs(pt.link(m, "ball_link").distance - (0.25 + 0.05 * i)) < 1e-5,
+                "the new cloud",
+            )
+
+        # A transform far in the future keeps later ones out of tf: its link is not shown where it
+        # was last, and nothing breaks, although ros::Duration cannot hold the difference.
+        far = rospy.Time.from_sec(4.0e9)
+        world.publish_transforms(
+            [pt.transform_message("base", "ball_link", pt.transform(), far)]
+        )
+        message = node.wait_for_status(ProximityArray.NO_POSE, "in the future")
+        self.assertIn("ball_link", message.status_text)
+        self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.NEAR)
+        for m in node.messages:
+            pt.check_invariants(self, m)
+        world.stop()
+        self.assertEqual(node.stop(), 0)
+        clock.stop()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("clock_test")
+    rostest.rosrun("ist_proximity", "clock_test", ClockTest, sys.argv)

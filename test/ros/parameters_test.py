@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""Wrong parameters: the node does not start, and says which, why, and what is allowed."""
+
+import os
+import sys
+import unittest
+
+import proximity_testing as pt
+import rospy
+import rosparam
+
+# Parameters, and words of the message. Several mistakes in one start are all told.
+WRONG = [
+    (
+        {
+            "rate": -5,
+            "max_distance": float("nan"),
+            "pose_timeout": 0,
+            "query/tolerance": -0.1,
+            "query/deadline": "soon",
+            "packing/max_error": 0.0,
+            "packing/max_spheres": 2.5,
+            "geometry": "both",
+            "links": "ball_link",
+            "fixed_frame": 3,
+        },
+        [
+            "~rate is -5 Hz",
+            "~max_distance is nan m",
+            "~pose_timeout is 0 s",
+            "~query/tolerance is -0.1 m",
+            '~query/deadline is "soon"',
+            "~packing/max_error is 0 m",
+            "~packing/max_spheres is 2.5",
+            '~geometry is "both": allowed is collision, visual',
+            "~links",
+            "~fixed_frame",
+            "more than 0",
+        ],
+    ),
+    (
+        {
+            "repulsion/influence_distance": float("inf"),
+            "repulsion/gain": -1,
+            "repulsion/smoothing": 0.0,
+            "robot_description": "",
+            "cache_directory": 7,
+            "pose_source": "joint_states",
+            "self_collision/enabled": True,
+            "self_filter": "yes",
+        },
+        [
+            "~repulsion/influence_distance is inf m",
+            "~repulsion/gain is -1",
+            "~repulsion/smoothing is 0 m",
+            "~robot_description",
+            "~cache_directory",
+            "~pose_source",
+            "not supported yet",
+            "~self_collision/enabled",
+            "~self_filter",
+        ],
+    ),
+    (
+        {
+            "sources": {
+                "scan": {"type": "sensor_msgs/LaserScan"},
+                "map": {"type": "octomap_msgs/Octomap"},
+                "odd": {"type": "sensor_msgs/Image", "timeout": 0, "required": 1},
+                "range": {"min_range": 2.0, "max_range": 1.0},
+                "padding": {"self_filter_padding": -0.01, "topic": ""},
+                "flat": 3,
+            }
+        },
+        [
+            "~sources/scan/type",
+            "~sources/map/type",
+            "not supported yet",
+            "~sources/odd/type",
+            "~sources/odd/timeout is 0 s",
+            "~sources/odd/required",
+            "~sources/range/max_range is 1 m",
+            "~sources/padding/self_filter_padding is -0.01 m",
+            "~sources/padding/topic",
+            "~sources/flat",
+        ],
+    ),
+    ({"sources": [1, 2]}, ["~sources"]),
+]
+
+
+class ParametersTest(unittest.TestCase):
+    def test_wrong(self):
+        for i, (parameters, words) in enumerate(WRONG):
+            with self.subTest(i):
+                node = pt.ProximityNode("/wrong_%d" % i, parameters, pt.urdf(), listen=False)
+                code = node.process.wait(pt.TIMEOUT)
+                log = node.log()
+                node.stop()
+                self.assertGreater(code, 0, log)
+                for word in words:
+                    self.assertIn(word, log)
+
+    def test_unknown(self):
+        """A misspelt name is told, with the nearest one; the node runs."""
+        parameters = {
+            "max_distence": 0.5,
+            "query/tolerence": 0.1,
+            "sources": {"cloud": {"tiemout": 1.0}},
+            "packing/max_spheres": 20000.0,
+            "max_distance": 2,
+        }
+        node = pt.ProximityNode("/unknown", parameters, pt.urdf())
+        node.wait_for(lambda m: m.links, "the model")
+        log = node.log()
+        self.assertIn("~max_distence has no effect; did you mean ~max_distance?", log)
+        self.assertIn("did you mean ~query/tolerance?", log)
+        self.assertIn("did you mean ~sources/cloud/timeout?", log)
+        self.assertEqual(log.count("no effect"), 3, log)
+        self.assertEqual(node.stop(), 0)
+
+    def test_config_files(self):
+        """The files of the package are valid, and name nothing unknown."""
+        folder = os.path.join(os.path.dirname(__file__), "..", "..", "config")
+        for name in ("proximity.yaml", "demo.yaml"):
+            with self.subTest(name):
+                parameters = rosparam.load_file(os.path.join(folder, name))[0][0]
+                namespace = "/file_" + name.split(".")[0]
+                node = pt.ProximityNode(namespace, parameters, pt.urdf())
+                node.wait_for(lambda m: m.links, "the model")
+                self.assertNotIn("unknown parameter", node.log())
+                self.assertEqual(node.stop(), 0)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("parameters_test")
+    rostest.rosrun("ist_proximity", "parameters_test", ParametersTest, sys.argv)

@@ -1,0 +1,383 @@
+"""Helpers of the rostests: a small robot whose true distances are easy, clouds, tf, and a node.
+
+Every node runs in a namespace of its own, with its own /tf, so that no test sees another's robot.
+Nothing here sleeps and hopes: tests wait for a condition, with a timeout that a busy machine can keep.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+
+import genpy.dynamic
+import numpy as np
+import roslib.packages
+import rospy
+from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import PointCloud2, PointField
+from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
+
+from ist_proximity.msg import LinkProximity, ProximityArray
+
+TIMEOUT = 30.0  # [s] for anything to happen
+
+BALL_RADIUS = 0.1
+BOX_SIZE = np.array([0.2, 0.4, 0.6])
+BOX_OFFSET = np.array([0.05, 0.0, 0.1])  # of the box in its link's frame
+
+
+def urdf(extra="", box='<box size="0.2 0.4 0.6"/>'):
+    """base (no geometry) carries ball_link, a sphere, and box_link; `extra` goes before the end."""
+    return """<robot name="tiny">
+  <link name="base"/>
+  <link name="ball_link"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="box_link"><collision><origin xyz="0.05 0 0.1"/><geometry>%s</geometry></collision>
+  </link>
+  <joint name="to_ball" type="floating"><parent link="base"/><child link="ball_link"/></joint>
+  <joint name="to_box" type="floating"><parent link="base"/><child link="box_link"/></joint>
+  %s
+</robot>""" % (
+        box,
+        extra,
+    )
+
+
+def transform(p=(0, 0, 0), axis=(0, 0, 1), angle=0.0):
+    """4x4, a rotation about a unit axis, then a translation."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    X = np.eye(4)
+    X[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    X[:3, 3] = p
+    return X
+
+
+def inverse(X):
+    Y = np.eye(4)
+    Y[:3, :3], Y[:3, 3] = X[:3, :3].T, -X[:3, :3].T @ X[:3, 3]
+    return Y
+
+
+def apply(X, points):
+    return np.asarray(points, float) @ X[:3, :3].T + X[:3, 3]
+
+
+def quaternion(X):
+    """(x, y, z, w), from the eigenvector of largest eigenvalue."""
+    R = X[:3, :3]
+    K = np.zeros((4, 4))
+    K[:3, :3] = R + R.T - np.trace(R) * np.eye(3)
+    K[:3, 3] = K[3, :3] = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
+    K[3, 3] = np.trace(R)
+    return np.linalg.eigh(K)[1][:, -1]
+
+
+def distance_to_ball(p_L):
+    return np.linalg.norm(np.atleast_2d(p_L), axis=1) - BALL_RADIUS
+
+
+def distance_to_box(p_L):
+    q = abs(np.atleast_2d(p_L) - BOX_OFFSET) - BOX_SIZE / 2
+    return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(1), 0)
+
+
+DISTANCE = {"ball_link": distance_to_ball, "box_link": distance_to_box}
+
+
+def cloud(points, frame="camera", stamp=None, dtype="<f4"):
+    """A PointCloud2 of (n, 3) points, stamped now unless said."""
+    points = np.atleast_2d(np.asarray(points, float)).reshape(-1, 3)
+    message = PointCloud2(height=1, width=len(points), is_dense=False)
+    message.header.frame_id = frame
+    message.header.stamp = rospy.Time.now() if stamp is None else stamp
+    size = np.dtype(dtype).itemsize
+    datatype = PointField.FLOAT32 if size == 4 else PointField.FLOAT64
+    message.fields = [PointField(name, i * size, datatype, 1) for i, name in enumerate("xyz")]
+    message.is_bigendian = dtype[0] == ">"
+    message.point_step = 3 * size
+    message.row_step = message.point_step * len(points)
+    message.data = points.astype(dtype).tobytes()
+    return message
+
+
+def transform_message(parent, child, X, stamp):
+    message = TransformStamped()
+    message.header.stamp = stamp
+    message.header.frame_id, message.child_frame_id = parent, child
+    p, q = message.transform.translation, message.transform.rotation
+    p.x, p.y, p.z = X[:3, 3]
+    q.x, q.y, q.z, q.w = quaternion(X)
+    return message
+
+
+class Repeater:
+    """Calls a function at a rate, in a thread, until stopped or paused."""
+
+    def __init__(self, rate, function):
+        self._period, self._function = 1.0 / rate, function
+        self._stop = threading.Event()
+        self.paused = False
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        while not self._stop.wait(self._period):
+            if not self.paused:
+                self._function()
+
+    def stop(self):
+        self._stop.set()
+        self._thread.join()
+
+
+class World:
+    """What is around a node: moving links in its /tf, a static camera, and a cloud."""
+
+    def __init__(self, namespace, X_BC=np.eye(4), static=True):
+        self.namespace = namespace
+        self.poses = {}  # child frame: (parent, X or a function of the time in seconds)
+        self.points = np.zeros((0, 3))  # in the camera's frame
+        self._tf = rospy.Publisher(namespace + "/tf", TFMessage, queue_size=100)
+        self._tf_static = rospy.Publisher(
+            namespace + "/tf_static", TFMessage, queue_size=10, latch=True
+        )
+        self.cloud_publisher = rospy.Publisher(namespace + "/cloud", PointCloud2, queue_size=10)
+        if static:
+            stamp = rospy.Time.now()
+            self._tf_static.publish([transform_message("base", "camera", X_BC, stamp)])
+        self._repeaters = []
+
+    def stand(self, ball=transform((0, 0, 0)), box=transform((2, 0, 0))):
+        """Both links, standing still."""
+        self.poses = {"ball_link": ("base", ball), "box_link": ("base", box)}
+        return self
+
+    def send_tf(self):
+        stamp = rospy.Time.now()
+        messages = [
+            transform_message(parent, child, X(stamp.to_sec()) if callable(X) else X, stamp)
+            for child, (parent, X) in dict(self.poses).items()
+        ]
+        if messages:
+            self._tf.publish(messages)
+
+    def publish_transforms(self, messages):
+        self._tf.publish(messages)
+
+    def send_cloud(self):
+        self.cloud_publisher.publish(cloud(self.points))
+
+    def start_tf(self, rate=50):
+        return self.repeat(rate, self.send_tf)
+
+    def start_clouds(self, rate=20):
+        return self.repeat(rate, self.send_cloud)
+
+    def repeat(self, rate, function):
+        self._repeaters.append(Repeater(rate, function))
+        return self._repeaters[-1]
+
+    def stop(self):
+        for repeater in self._repeaters:
+            repeater.stop()
+        self._repeaters = []
+        for publisher in (self._tf, self._tf_static, self.cloud_publisher):
+            publisher.unregister()
+
+
+def find_program(package, name):
+    return roslib.packages.find_node(package, name)[0]
+
+
+class ProximityNode:
+    """proximity_node in a namespace, as a process of the test, and what it publishes."""
+
+    # What to run instead of the node, e.g. to load the nodelet.
+    command = None
+
+    def __init__(self, namespace, parameters=None, urdf_text=None, listen=True):
+        self.namespace, self.name = namespace, namespace + "/proximity"
+        self.messages, self.diagnostics = [], {}
+        self._condition = threading.Condition()
+        self._cache = tempfile.mkdtemp()
+        if urdf_text is not None:
+            rospy.set_param(namespace + "/robot_description", urdf_text)
+        parameters = dict(parameters or {})
+        parameters.setdefault("cache_directory", self._cache)
+        for name, value in parameters.items():
+            rospy.set_param(self.name + "/" + name, value)
+        self._subscribers = []
+        if listen:
+            self.subscribe("proximity", ProximityArray, self._on_message)
+            self._subscribers.append(
+                rospy.Subscriber("/diagnostics", rospy.AnyMsg, self._on_diagnostics)
+            )
+        command = self.command or [find_program("ist_proximity", "proximity_node")]
+        self._log = tempfile.TemporaryFile()
+        self.process = subprocess.Popen(
+            command
+            + [
+                "__ns:=" + namespace,
+                "__name:=proximity",
+                "/tf:=" + namespace + "/tf",
+                "/tf_static:=" + namespace + "/tf_static",
+            ],
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+        )
+
+    def subscribe(self, topic, kind, callback):
+        subscriber = rospy.Subscriber(self.name + "/" + topic, kind, callback, queue_size=200)
+        self._subscribers.append(subscriber)
+        return subscriber
+
+    def _on_message(self, message):
+        with self._condition:
+            self.messages.append(message)
+            self._condition.notify_all()
+
+    def _on_diagnostics(self, raw):
+        # Not every distribution has diagnostic_msgs for Python; the connection tells its definition.
+        header = raw._connection_header
+        kinds = genpy.dynamic.generate_dynamic(header["type"], header["message_definition"])
+        message = kinds[header["type"]]().deserialize(raw._buff)
+        with self._condition:
+            for status in message.status:
+                if status.name.startswith(self.name[1:] + ":"):
+                    self.diagnostics[status.name.split(": ", 1)[1]] = status
+            self._condition.notify_all()
+
+    def wait_for(self, condition, what, timeout=TIMEOUT, start=None):
+        """The first message, from now (or from index `start`) on, for which condition holds."""
+        deadline = time.monotonic() + timeout
+        with self._condition:
+            i = len(self.messages) if start is None else start
+            while True:
+                while i < len(self.messages):
+                    if condition(self.messages[i]):
+                        return self.messages[i]
+                    i += 1
+                if self.process.poll() is not None:
+                    raise AssertionError("the node ended: " + self.log())
+                if time.monotonic() > deadline:
+                    last = self.messages[-1] if self.messages else None
+                    raise AssertionError(
+                        "waited in vain for %s; the last of %d messages is\n%s\n%s"
+                        % (what, len(self.messages), last, self.log())
+                    )
+                self._condition.wait(0.1)
+
+    def wait_for_status(self, status, text="", **kwargs):
+        return self.wait_for(
+            lambda m: m.status == status and text in m.status_text,
+            "status %d with '%s'" % (status, text),
+            **kwargs
+        )
+
+    def wait_until(self, condition, what, timeout=TIMEOUT):
+        """Waits for anything that is not in a ProximityArray."""
+        wait_until(condition, what, timeout, self._condition)
+
+    def reload(self):
+        service = rospy.ServiceProxy(self.name + "/reload_model", Trigger)
+        service.wait_for_service(TIMEOUT)
+        return service()
+
+    def log(self):
+        self._log.seek(0)
+        text = self._log.read().decode(errors="replace")
+        return "\n".join(line for line in text.splitlines() if not repeated_tf(line))
+
+    def stop(self):
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            code = self.process.wait(TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise AssertionError("the node does not end: " + self.log())
+        finally:
+            shutil.rmtree(self._cache, ignore_errors=True)
+        return code
+
+
+def repeated_tf(line):
+    """What tf2 says for each transform while the clock stands still."""
+    return "TF_REPEATED_DATA" in line or "tf2/src/buffer_core.cpp" in line
+
+
+def wait_until(condition, what, timeout=TIMEOUT, lock=None):
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > deadline:
+            raise AssertionError("waited in vain for " + what)
+        if lock is None:
+            time.sleep(0.02)
+        else:
+            with lock:
+                lock.wait(0.05)
+
+
+def link(message, name):
+    for one in message.links:
+        if one.link == name:
+            return one
+    raise AssertionError("no link %s in %s" % (name, [one.link for one in message.links]))
+
+
+def vector(v):
+    return np.array([v.x, v.y, v.z])
+
+
+def states(message):
+    return [one.state for one in message.links]
+
+
+def all_unknown(message):
+    return all(one.state == LinkProximity.UNKNOWN for one in message.links)
+
+
+def check_invariants(test, message, max_distance=1.0):
+    """What holds for every ProximityArray whatever is missing."""
+    for one in message.links:
+        p_link, p_obstacle = vector(one.point_on_link), vector(one.point_on_obstacle)
+        direction, local = vector(one.direction), vector(one.point_on_link_local)
+        wrench = np.hstack([vector(one.penetration.force), vector(one.penetration.torque)])
+        repulsion = vector(one.repulsion)
+        if one.state == LinkProximity.UNKNOWN:
+            test.assertTrue(np.isnan(one.distance))
+            test.assertEqual(one.lower_bound, -np.inf)
+            test.assertTrue(np.isnan(one.closing_speed))
+            for v in (p_link, p_obstacle, direction, local, repulsion, wrench):
+                test.assertTrue(np.isnan(v).all(), one)
+            test.assertEqual(one.source, "")
+        elif one.state == LinkProximity.CLEAR:
+            test.assertEqual(one.distance, np.inf)
+            test.assertGreaterEqual(one.lower_bound, max_distance)
+            test.assertTrue(np.isnan(one.closing_speed))
+            for v in (p_link, p_obstacle, direction, local):
+                test.assertTrue(np.isnan(v).all(), one)
+            test.assertFalse(repulsion.any() or wrench.any(), one)
+            test.assertEqual(one.source, "")
+        else:
+            test.assertTrue(np.isfinite(one.distance))
+            test.assertLessEqual(one.lower_bound, one.distance)
+            test.assertAlmostEqual(np.linalg.norm(direction), 1.0, 6)
+            np.testing.assert_allclose(p_link - p_obstacle, one.distance * direction, atol=1e-6)
+            test.assertTrue(np.isfinite(repulsion).all())
+            test.assertNotEqual(one.source, "")
+            if one.state == LinkProximity.NEAR:
+                test.assertGreaterEqual(one.distance, 0.0)
+                test.assertFalse(wrench.any())
+    if message.status == ProximityArray.OK:
+        test.assertEqual(message.status_text, "")
+        test.assertFalse(all_unknown(message) and message.links)
+    else:
+        test.assertNotEqual(message.status_text, "")

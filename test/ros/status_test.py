@@ -1,0 +1,281 @@
+#!/usr/bin/env python3
+"""What is said when clouds or poses are missing, late, or come back: status, text, states."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64
+
+FAR_BOX = pt.transform((0, 0.8, 0))
+POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
+
+
+class StatusTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace).stand(box=FAR_BOX)
+        self.world.points = np.array(POINT)
+        self.nodes = []
+
+    def tearDown(self):
+        self.world.stop()
+        for node in self.nodes:
+            for message in node.messages:
+                pt.check_invariants(self, message)
+            self.assertEqual(node.stop(), 0)
+
+    def start(self, **parameters):
+        self.nodes.append(pt.ProximityNode(self.namespace, parameters, pt.urdf()))
+        return self.nodes[-1]
+
+    def test_no_cloud_stale_cloud_recovery(self):
+        smallest = []
+        node = self.start()
+        node.subscribe("min_distance", Float64, lambda m: smallest.append(m.data))
+        self.world.start_tf()
+        message = node.wait_for_status(ProximityArray.NO_CLOUD, "'cloud'")
+        self.assertIn(self.namespace + "/cloud", message.status_text)
+        self.assertEqual([one.link for one in message.links], ["ball_link", "box_link"])
+        self.assertTrue(pt.all_unknown(message))
+        self.assertTrue(message.cloud_stamp.is_zero())
+        source = message.sources[0]
+        self.assertEqual(source.status, ProximityArray.NO_CLOUD)
+        self.assertTrue(source.stamp.is_zero() and np.isnan(source.age))
+        node.wait_until(lambda: smallest and np.isnan(smallest[-1]), "NaN on ~min_distance")
+
+        clouds = self.world.start_clouds()
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+        node.wait_until(lambda: not np.isnan(smallest[-1]), "a value on ~min_distance")
+
+        # Until the timeout the last cloud is used, not a moment longer.
+        clouds.paused = True
+        begin = len(node.messages)
+        message = node.wait_for_status(ProximityArray.STALE_CLOUD, "'cloud'")
+        self.assertTrue(pt.all_unknown(message))
+        self.assertEqual(message.sources[0].status, ProximityArray.STALE_CLOUD)
+        self.assertFalse(message.sources[0].stamp.is_zero())
+        for m in node.messages[begin:]:
+            if m.status == ProximityArray.OK:
+                self.assertLess((m.header.stamp - m.cloud_stamp).to_sec(), 0.5)
+        node.wait_until(lambda: np.isnan(smallest[-1]), "NaN on ~min_distance")
+        node.wait_until(
+            lambda: "input cloud" in node.diagnostics and node.diagnostics["input cloud"].level == 3,
+            "STALE in the diagnostics",
+        )
+
+        clouds.paused = False
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+
+    def test_old_future_and_unordered_stamps(self):
+        node = self.start()
+        self.world.start_tf()
+        node.wait_for_status(ProximityArray.NO_CLOUD)
+
+        def send(offset):
+            stamp = rospy.Time.now() + rospy.Duration(offset)
+            self.world.cloud_publisher.publish(pt.cloud(POINT, stamp=stamp))
+
+        for offset, text in ((-5.0, "old"), (3600.0, "in the future")):
+            repeater = self.world.repeat(20, lambda offset=offset: send(offset))
+            message = node.wait_for_status(ProximityArray.STALE_CLOUD, text)
+            self.assertTrue(pt.all_unknown(message))
+            repeater.stop()
+        # A cloud of the far future does not shut out those of now.
+        repeater = self.world.repeat(20, lambda: send(0))
+        node.wait_for_status(ProximityArray.OK)
+        # Nor does one without a stamp, nor one that is overtaken.
+        unstamped = pt.cloud([[0, 0, 0.15]], stamp=rospy.Time(0))
+        self.world.cloud_publisher.publish(unstamped)
+        other = self.world.repeat(20, lambda: send(-0.3))
+        node.wait_until(
+            lambda: any(
+                int(value.value) > 5
+                for value in node.diagnostics["input cloud"].values
+                if value.key == "dropped: out of order"
+            )
+            if "input cloud" in node.diagnostics
+            else False,
+            "clouds out of order in the diagnostics",
+        )
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertLess((message.header.stamp - message.cloud_stamp).to_sec(), 0.3)
+        other.stop()
+        repeater.stop()
+
+    def test_no_pose(self):
+        node = self.start()
+        self.world.start_clouds()
+        message = node.wait_for_status(ProximityArray.NO_POSE, "ball_link")
+        self.assertTrue(pt.all_unknown(message))
+        self.assertIn("base", message.status_text)
+
+        # One link: the other goes on.
+        self.world.poses = {"ball_link": ("base", pt.transform())}
+        tf = self.world.start_tf()
+        message = node.wait_for(
+            lambda m: m.status == ProximityArray.NO_POSE
+            and pt.link(m, "ball_link").state == LinkProximity.NEAR,
+            "ball_link alone",
+        )
+        self.assertIn("box_link", message.status_text)
+        self.assertNotIn("'ball_link'", message.status_text)
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+
+        self.world.stand(box=FAR_BOX)
+        node.wait_for_status(ProximityArray.OK)
+        node.wait_until(
+            lambda: "pose" in node.diagnostics and node.diagnostics["pose"].level == 0,
+            "pose diagnostics OK",
+        )
+
+        # One link stops: it becomes UNKNOWN, the other goes on at the present instant.
+        self.world.poses = {"ball_link": ("base", pt.transform())}
+        message = node.wait_for_status(ProximityArray.NO_POSE, "box_link")
+        message = node.wait_for(
+            lambda m: m.status == ProximityArray.NO_POSE
+            and pt.link(m, "ball_link").state == LinkProximity.NEAR
+            and (rospy.Time.now() - m.header.stamp).to_sec() < 0.4,
+            "ball_link at the present",
+        )
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
+
+        # All of them: nothing is measured with old poses.
+        tf.paused = True
+        node.wait_for(
+            lambda m: m.status == ProximityArray.NO_POSE and pt.all_unknown(m), "all UNKNOWN"
+        )
+        self.world.stand(box=FAR_BOX)
+        tf.paused = False
+        node.wait_for_status(ProximityArray.OK)
+
+    def test_late_tf(self):
+        """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""
+        node = self.start()
+
+        def send_late_tf():
+            stamp = rospy.Time.now() - rospy.Duration(0.15)
+            self.world.publish_transforms(
+                [
+                    pt.transform_message(parent, child, X, stamp)
+                    for child, (parent, X) in self.world.poses.items()
+                ]
+            )
+
+        self.world.repeat(50, send_late_tf)
+        self.world.start_clouds()
+        node.wait_for_status(ProximityArray.OK)
+        begin = len(node.messages)
+        node.wait_for(lambda m: len(node.messages) > begin + 150, "150 messages")
+        late = [m for m in node.messages[begin:] if m.status != ProximityArray.OK]
+        self.assertLess(len(late), 15, late[-1].status_text if late else "")
+
+    def test_rate(self):
+        """Each cycle is published, with nothing at all as with everything."""
+        node = self.start(rate=50)
+        first = node.wait_for(lambda m: True, "the first message", start=0)
+        self.assertEqual(first.status, ProximityArray.MODEL_ERROR)
+        for prepare in (lambda: None, self.world.start_tf, self.world.start_clouds):
+            prepare()
+            begin = len(node.messages)
+            started = rospy.get_time()
+            node.wait_for(lambda m: len(node.messages) >= begin + 100, "100 messages")
+            self.assertLess(rospy.get_time() - started, 4.0)
+
+    def test_optional_and_required_sources(self):
+        """A required source without clouds: nothing is known. An optional one: left out."""
+        sources = {
+            "front": {"topic": "front/points"},
+            "rear": {"topic": "rear/points", "timeout": 0.3},
+            "side": {"topic": "side/points", "required": False},
+        }
+        node = self.start(sources=sources)
+        self.world.start_tf()
+        message = node.wait_for_status(ProximityArray.NO_CLOUD, "'front'")
+        self.assertEqual([s.name for s in message.sources], ["front", "rear", "side"])
+        self.assertNotIn("'side'", message.status_text)
+
+        publishers = {
+            name: rospy.Publisher(self.namespace + "/%s/points" % name, PointCloud2, queue_size=5)
+            for name in sources
+        }
+        positions = {"front": [[0, 0, 0.3]], "rear": [[0, 0, -0.25]], "side": [[0.2, 0, 0]]}
+
+        def start(name):
+            return self.world.repeat(
+                20, lambda: publishers[name].publish(pt.cloud(positions[name]))
+            )
+
+        start("front")
+        message = node.wait_for(
+            lambda m: m.status == ProximityArray.NO_CLOUD and "'front'" not in m.status_text,
+            "clouds from the front",
+        )
+        self.assertIn("'rear'", message.status_text)
+        self.assertTrue(pt.all_unknown(message))
+
+        rear = start("rear")
+        message = node.wait_for_status(ProximityArray.OK)
+        ball = pt.link(message, "ball_link")
+        self.assertEqual((ball.source, round(ball.distance, 4)), ("rear", 0.15))
+        by_name = {s.name: s for s in message.sources}
+        self.assertEqual(by_name["side"].status, ProximityArray.NO_CLOUD)
+        used = [s.stamp for s in message.sources if s.status == ProximityArray.OK]
+        self.assertEqual(message.cloud_stamp, min(used))
+
+        side = start("side")
+        node.wait_for(
+            lambda m: m.status == 0 and pt.link(m, "ball_link").source == "side", "the side"
+        )
+        side.stop()
+        message = node.wait_for(
+            lambda m: m.status == 0 and pt.link(m, "ball_link").source == "rear", "the rear"
+        )
+        by_name = {s.name: s for s in message.sources}
+        self.assertEqual(by_name["side"].status, ProximityArray.STALE_CLOUD)
+
+        rear.stop()
+        message = node.wait_for_status(ProximityArray.STALE_CLOUD, "'rear'")
+        self.assertTrue(pt.all_unknown(message))
+        for publisher in publishers.values():
+            publisher.unregister()
+
+    def test_two_namespaces(self):
+        """Two robots, one master: each node hears its own topics and parameters only."""
+        node = self.start()
+        self.world.start_tf()
+        self.world.start_clouds()
+        other_namespace = self.namespace + "_other"
+        other_world = pt.World(other_namespace).stand(box=FAR_BOX)
+        try:
+            other_world.points = np.array([[0, 0, 0.5]])
+            other = pt.ProximityNode(other_namespace, {"rate": 20}, pt.urdf())
+            self.nodes.append(other)
+            other_world.start_tf()
+            other.wait_for_status(ProximityArray.NO_CLOUD)
+            message = node.wait_for_status(ProximityArray.OK)
+            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+            other_world.start_clouds()
+            message = other.wait_for_status(ProximityArray.OK)
+            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.4, 5)
+            node.wait_until(lambda: len(node.diagnostics) >= 4, "diagnostics")
+            other.wait_until(lambda: len(other.diagnostics) >= 4, "the other's diagnostics")
+            expected = {"input cloud", "pose", "query", "model"}
+            self.assertEqual(set(node.diagnostics), expected)
+            self.assertEqual(set(other.diagnostics), expected)
+        finally:
+            other_world.stop()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("status_test")
+    rostest.rosrun("ist_proximity", "status_test", StatusTest, sys.argv)

@@ -1,0 +1,308 @@
+#!/usr/bin/env python3
+"""Distances, bounds, witnesses, frames, stamps and vectors against truth that is easy to compute."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64
+from visualization_msgs.msg import Marker, MarkerArray
+
+X_BC = pt.transform((0.3, -0.2, 0.5), axis=(0.6, 0.0, 0.8), angle=0.7)
+BALL = pt.transform((0.4, 0.1, 0.2), axis=(0.0, 0.6, 0.8), angle=1.1)
+BOX = pt.transform((-0.5, 0.3, 0.1), axis=(1.0, 0.0, 0.0), angle=-0.4)
+
+
+def cloud_around(rng, n=3000):
+    """Points in base that leave a little room around ball and box."""
+    points = rng.uniform(-1.5, 1.5, (n, 3))
+    free = np.ones(n, bool)
+    for name, X in (("ball_link", BALL), ("box_link", BOX)):
+        free &= pt.DISTANCE[name](pt.apply(pt.inverse(X), points)) > 0.05
+    return points[free]
+
+
+class TruthTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.node = None
+        self.world = pt.World(self.namespace, X_BC).stand(BALL, BOX)
+
+    def tearDown(self):
+        self.world.stop()
+        if self.node:
+            for message in self.node.messages:
+                pt.check_invariants(self, message, self.max_distance)
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, points, **parameters):
+        """The node, links in tf and a stream of clouds of points given in base."""
+        self.max_distance = parameters.get("max_distance", 1.0)
+        self.world.points = pt.apply(pt.inverse(X_BC), points)
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        self.world.start_tf()
+        self.world.start_clouds()
+        return self.node
+
+    def check_distances(self, message, points, X, tolerance=0.001):
+        """Against brute force over points in the message's frame; X: link poses in it."""
+        for name, X_FL in X.items():
+            one = pt.link(message, name)
+            every = pt.DISTANCE[name](pt.apply(pt.inverse(X_FL), points))
+            truth = every.min()
+            self.assertLessEqual(abs(truth), self.max_distance)
+            self.assertGreaterEqual(one.distance, truth - 1e-5)
+            self.assertLessEqual(one.distance, truth + tolerance + 1e-5)
+            self.assertLessEqual(one.lower_bound, truth + 1e-5)
+            self.assertLessEqual(one.distance - one.lower_bound, tolerance + 1e-5)
+            # The witness on the obstacle is a point of the cloud, at that distance.
+            witness = pt.vector(one.point_on_obstacle)
+            nearest = np.linalg.norm(points - witness, axis=1).argmin()
+            np.testing.assert_allclose(points[nearest], witness, atol=1e-5)
+            self.assertAlmostEqual(every[nearest], one.distance, 5)
+            # The one on the link lies on its surface, and is the same in the link's frame.
+            local = pt.vector(one.point_on_link_local)
+            self.assertAlmostEqual(pt.DISTANCE[name](local)[0], 0.0, 5)
+            np.testing.assert_allclose(
+                pt.apply(X_FL, local), pt.vector(one.point_on_link), atol=1e-6
+            )
+            self.assertEqual(one.source, "cloud")
+
+    def test_distances(self):
+        points = cloud_around(np.random.default_rng(1))
+        node = self.start(points)
+        smallest = []
+        node.subscribe("min_distance", Float64, lambda m: smallest.append(m.data))
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual(message.header.frame_id, "base")
+        self.assertEqual([one.link for one in message.links], ["ball_link", "box_link"])
+        self.assertEqual(pt.states(message), [LinkProximity.NEAR] * 2)
+        self.check_distances(message, points, {"ball_link": BALL, "box_link": BOX})
+
+        source = message.sources[0]
+        self.assertEqual((source.name, source.status), ("cloud", ProximityArray.OK))
+        self.assertEqual(source.stamp, message.cloud_stamp)
+        self.assertAlmostEqual(source.age, (message.header.stamp - source.stamp).to_sec(), 6)
+        self.assertLess(abs(source.age), 1.0)
+        self.assertEqual(source.points_received, len(points))
+        self.assertEqual(source.points_on_robot, 0)
+        self.assertGreater(source.points_used, 0)
+        self.assertGreater(message.computation_time, 0)
+
+        expected = min(one.lower_bound for one in message.links)
+        node.wait_until(
+            lambda: smallest and abs(smallest[-1] - expected) < 1e-6, "~min_distance"
+        )
+
+    def test_deadline(self):
+        """Too short a deadline: said so, and the bounds hold all the same."""
+        points = cloud_around(np.random.default_rng(4))
+        node = self.start(points, **{"query/deadline": 1e-9, "query/tolerance": 0.0})
+        message = node.wait_for_status(ProximityArray.DEGRADED, "deadline")
+        for name, X in (("ball_link", BALL), ("box_link", BOX)):
+            one = pt.link(message, name)
+            truth = pt.DISTANCE[name](pt.apply(pt.inverse(X), points)).min()
+            self.assertLessEqual(one.lower_bound, truth + 1e-5)
+            if one.state >= LinkProximity.NEAR:
+                self.assertGreaterEqual(one.distance, truth - 1e-5)
+
+    def test_contact_and_vectors(self):
+        """Points inside the box, one of them on its middle plane; self-filter off."""
+        deep = pt.apply(BOX, pt.BOX_OFFSET + [[0.06, 0, 0], [-0.04, 0.05, 0.0]])
+        points = np.vstack([deep, pt.apply(BALL, [[0.25, 0, 0]])])
+        node = self.start(points, self_filter=False)
+        message = node.wait_for_status(ProximityArray.OK)
+        box, ball = pt.link(message, "box_link"), pt.link(message, "ball_link")
+        self.assertEqual(box.state, LinkProximity.CONTACT)
+        self.assertAlmostEqual(box.distance, -0.06, 5)
+        # The nearest way out for the deepest point is -x of the link; the link goes the other way.
+        np.testing.assert_allclose(pt.vector(box.direction), BOX[:3, 0], atol=1e-4)
+        self.assertTrue(np.isnan(pt.vector(box.penetration.force)).all())
+        self.assertAlmostEqual(ball.distance, 0.15, 5)
+        np.testing.assert_allclose(pt.vector(ball.direction), -BALL[:3, 0], atol=1e-4)
+
+        # Repulsion: along the direction, as long as configured, and changed while running.
+        expected = 1.0 - 0.15 / 0.3
+        np.testing.assert_allclose(
+            pt.vector(ball.repulsion), -expected * BALL[:3, 0], atol=0.02 * expected
+        )
+        rospy.set_param(node.name + "/repulsion/gain", 3.0)
+        node.wait_for(
+            lambda m: np.linalg.norm(pt.vector(pt.link(m, "ball_link").repulsion)) > 2.5 * expected,
+            "three times the repulsion",
+        )
+        rospy.set_param(node.name + "/repulsion/influence_distance", 0.14)
+        node.wait_for(
+            lambda m: not pt.vector(pt.link(m, "ball_link").repulsion).any(), "no repulsion"
+        )
+
+    def test_fixed_frame_and_moving_camera(self):
+        """Fixed frame `world`; a camera that moves fast, whose clouds come late."""
+        X_WB = pt.transform((10.0, -5.0, 1.0), axis=(0, 0, 1), angle=2.0)
+
+        def X_BM(t):  # a moving mount
+            return pt.transform((0.3 * np.sin(3 * t), 0.2 * np.cos(3 * t), 0.0), angle=0.5)
+
+        self.world.poses["base"] = ("world", X_WB)
+        self.world.poses["moving_camera"] = ("base", X_BM)
+        points = pt.apply(BALL, [[0.0, 0.0, 0.3]])  # in base, standing still
+
+        def send_late():
+            stamp = rospy.Time.now() - rospy.Duration(0.1)
+            seen = pt.apply(pt.inverse(X_BM(stamp.to_sec())), points)
+            self.world.cloud_publisher.publish(pt.cloud(seen, "moving_camera", stamp))
+
+        self.max_distance = 1.0
+        self.node = node = pt.ProximityNode(self.namespace, {"fixed_frame": "world"}, pt.urdf())
+        self.world.start_tf(100)
+        self.world.repeat(20, send_late)
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual(message.header.frame_id, "world")
+        for _ in range(20):  # interpolating between 100 Hz of tf bends the circle by microns
+            message = node.wait_for_status(ProximityArray.OK)
+            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 3)
+            np.testing.assert_allclose(
+                pt.vector(pt.link(message, "ball_link").point_on_obstacle),
+                pt.apply(X_WB, points)[0],
+                atol=5e-4,
+            )
+
+    def test_moving_link(self):
+        """The stamp is the instant of the poses; closing speed."""
+        speed, turn = 0.1, 4.0
+
+        def X_BL(t):  # to and fro along y, 0.1 m/s
+            phase = t % turn
+            y = speed * (phase if phase < turn / 2 else turn - phase)
+            return pt.transform((0.0, y - 0.1, 0.0))
+
+        self.world.stand(X_BL, pt.transform((5, 5, 5)))
+        points = np.array([[0.0, 0.5, 0.0]])
+        node = self.start(points)
+        node.wait_for_status(ProximityArray.OK)
+        checked, unknown_speeds = 0, 0
+        while checked < 50:
+            message = node.wait_for_status(ProximityArray.OK)
+            t = message.header.stamp.to_sec()
+            phase = t % (turn / 2)
+            if not 0.3 < phase < turn / 2 - 0.1:
+                continue  # about the turning points speed is not constant
+            one = pt.link(message, "ball_link")
+            self.assertAlmostEqual(one.distance, 0.5 - X_BL(t)[1, 3] - pt.BALL_RADIUS, 4)
+            self.assertLess((rospy.Time.now() - message.header.stamp).to_sec(), 1.0)
+            if np.isnan(one.closing_speed):  # the first one, or tf has paused
+                unknown_speeds += 1
+                self.assertLess(unknown_speeds, 20)
+                continue
+            checked += 1
+            sign = 1 if t % turn < turn / 2 else -1
+            self.assertAlmostEqual(one.closing_speed, sign * speed, delta=0.01)
+        # CLEAR, although it is the same cloud.
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.CLEAR)
+
+    def test_self_filter(self):
+        """Points on the robot, of both links, are dropped; those beyond the padding stay."""
+        rng = np.random.default_rng(2)
+        shell = rng.normal(size=(500, 3))
+        shell *= pt.BALL_RADIUS / np.linalg.norm(shell, axis=1)[:, None]
+        box = rng.uniform(-0.5, 0.5, (500, 3)) * pt.BOX_SIZE + pt.BOX_OFFSET
+        seen = pt.apply(BALL, [[0.0, 0.0, 0.2], [0.0, 0.25, 0.0]])
+        points = np.vstack([pt.apply(BALL, shell), pt.apply(BOX, box), seen])
+        # Only the ball is monitored; the box is on the robot all the same.
+        clouds = []
+        node = self.start(points, links=["ball_link"], self_filter_padding=0.03, min_range=0.0)
+        node.subscribe("filtered_cloud", PointCloud2, clouds.append)
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual([one.link for one in message.links], ["ball_link"])
+        self.assertEqual(message.sources[0].points_on_robot, 1000)
+        self.assertEqual(message.sources[0].points_used, 2)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.1, 5)
+
+        node.wait_until(lambda: clouds, "~filtered_cloud")
+        self.assertEqual(clouds[0].header.frame_id, "base")
+        self.assertEqual(clouds[0].width * clouds[0].height, 2)
+        kept = np.frombuffer(clouds[0].data, "<f4").reshape(2, 3)
+        for p in seen:
+            self.assertLess(np.linalg.norm(kept - p, axis=1).min(), 1e-5)
+
+    def test_range_and_clear(self):
+        """~max_distance, ranges of the source; markers come and go."""
+        markers, spheres, deleted = {}, [], set()
+
+        def on_markers(array):
+            for marker in array.markers:
+                key = (marker.ns, marker.id)
+                if marker.action == Marker.ADD:
+                    markers[key] = marker
+                else:
+                    self.assertIn(key, markers)
+                    deleted.add(key)
+
+        near = pt.apply(BALL, [[0.0, 0.0, 0.35]])
+        far_away = pt.apply(X_BC, [[0.0, 0.0, 2.5]])
+        node = self.start(np.vstack([near, far_away]), max_distance=0.3, max_range=2.0)
+        node.subscribe("markers", MarkerArray, on_markers)
+        node.subscribe("spheres", MarkerArray, spheres.append)
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual(message.sources[0].points_used, 1)
+        self.assertEqual(pt.states(message), [LinkProximity.NEAR, LinkProximity.CLEAR])
+
+        names = {"distance", "point_on_link", "point_on_obstacle", "repulsion", "text"}
+        node.wait_until(lambda: {ns for ns, _ in markers} == names, "all markers of one link")
+        line = markers[("distance", 0)]
+        self.assertEqual(line.header.frame_id, "base")
+        ends = [pt.vector(p) for p in line.points]
+        self.assertAlmostEqual(np.linalg.norm(ends[0] - ends[1]), 0.25, 4)
+        self.assertEqual({i for _, i in markers}, {0})
+
+        node.wait_until(lambda: spheres, "~spheres")
+        first = [m for m in spheres[0].markers if m.ns == "ball_link"]
+        self.assertEqual(len(first), 1)  # a ball is one sphere
+        self.assertAlmostEqual(first[0].scale.x, 2 * pt.BALL_RADIUS, 4)
+        for marker in spheres[0].markers:
+            self.assertEqual(marker.header.frame_id, marker.ns)
+            self.assertTrue(marker.frame_locked)
+            self.assertEqual(marker.type, Marker.SPHERE)
+        self.assertLess(len(spheres[0].markers), 400)
+
+        self.world.points = pt.apply(pt.inverse(X_BC), far_away)
+        message = node.wait_for(
+            lambda m: pt.states(m) == [LinkProximity.CLEAR] * 2 and m.status == 0, "CLEAR"
+        )
+        self.assertEqual(message.sources[0].points_used, 0)
+        node.wait_until(lambda: deleted == set(markers), "DELETE for every marker")
+
+    def test_formats(self):
+        """float64, the other byte order, a frame with a slash give the same distances."""
+        points = np.random.default_rng(3).uniform(-1, 1, (200, 3)) + [0, 0, 3]
+        points[0] = pt.apply(BALL, [[0.2, 0, 0]])[0]
+        node = self.start(points, max_range=10.0)
+        truth = pt.link(node.wait_for_status(ProximityArray.OK), "ball_link").distance
+        self.assertAlmostEqual(truth, 0.1, 5)
+        variants = (("<f8", "camera"), (">f4", "camera"), (">f8", "camera"), ("<f4", "/camera"))
+        for dtype, frame in variants:
+            stamp = []
+
+            def send(dtype=dtype, frame=frame, stamp=stamp):
+                message = pt.cloud(self.world.points, frame, dtype=dtype)
+                stamp.append(message.header.stamp)
+                self.world.cloud_publisher.publish(message)
+
+            self.world.send_cloud = lambda: None
+            repeater = self.world.repeat(20, send)
+            message = node.wait_for(
+                lambda m: stamp and m.cloud_stamp in stamp, "a cloud of " + dtype + frame
+            )
+            self.assertAlmostEqual(pt.link(message, "ball_link").distance, truth, 6)
+            repeater.stop()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("truth_test")
+    rostest.rosrun("ist_proximity", "truth_test", TruthTest, sys.argv)
