@@ -30,7 +30,8 @@ target_compile_options(test_support ${scope} -Wno-dangling-else)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(test_support ${scope} -Wno-free-nonheap-object -Wno-maybe-uninitialized)
 endif()
-target_link_libraries(test_support ${scope} ist_proximity_core GTest::GTest)
+# Highway: one test goes through the instruction sets.
+target_link_libraries(test_support ${scope} ist_proximity_core ist_proximity::hwy GTest::GTest)
 # Where tests find demo/ and, unless the environment variable IST_PROXIMITY_DATA says otherwise,
 # ../shared/data.
 target_compile_definitions(test_support ${scope}

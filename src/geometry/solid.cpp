@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/boundary_edges.h"
+
 namespace ist {
 namespace {
 
@@ -32,8 +34,9 @@ SignedDistance to_box(const Box& box, const Eigen::Vector3d& p) {
 SignedDistance to_cylinder(const Cylinder& cylinder, const Eigen::Vector3d& p) {
   const double half = 0.5 * cylinder.length;
   const double radial = std::hypot(p.x(), p.y());
-  const Eigen::Vector3d outward = radial > kTouch ? Eigen::Vector3d(p.x() / radial, p.y() / radial, 0)
-                                                  : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d outward = radial > kTouch
+                                      ? Eigen::Vector3d(p.x() / radial, p.y() / radial, 0)
+                                      : Eigen::Vector3d::UnitX();
   const double side = std::copysign(1.0, p.z());
   const double over_wall = radial - cylinder.radius, over_cap = std::abs(p.z()) - half;
   SignedDistance result;
@@ -57,7 +60,8 @@ SignedDistance to_cylinder(const Cylinder& cylinder, const Eigen::Vector3d& p) {
   if (result.distance > kTouch) {
     result.normal = away / result.distance;
   } else {
-    result.normal = over_wall > over_cap ? outward : Eigen::Vector3d(side * Eigen::Vector3d::UnitZ());
+    result.normal =
+        over_wall > over_cap ? outward : Eigen::Vector3d(side * Eigen::Vector3d::UnitZ());
   }
   return result;
 }
@@ -102,8 +106,7 @@ Eigen::Vector3d normal_at_touch(const TriangleBvh& bvh, const Eigen::Vector3d& f
 
 SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
                        const Eigen::Vector3d& p, double max_distance, bool inside) {
-  const double bound =
-      std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
+  const double bound = std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
   const ClosestPoint closest = bvh.closest(p, bound);
   SignedDistance result;
   if (!std::isfinite(closest.distance_sq)) return result;
@@ -126,10 +129,12 @@ Solid::Solid(const LinkGeometry& geometry) {
     Element element;
     element.X_LE = source.X_LE;
     element.X_EL = source.X_LE.inverse();
+    element.is_closed = true;
     if (const auto* mesh = std::get_if<TriangleMesh>(&source.shape)) {
       element.primitive = TriangleMesh{};
       element.bvh = TriangleBvh(*mesh);
       element.normals = face_normals(*mesh);
+      element.is_closed = is_closed_mesh(*mesh);
     } else {
       element.primitive = source.shape;
     }
@@ -143,8 +148,7 @@ SignedDistance Solid::signed_distance(const Eigen::Vector3d& p_L) const {
     const Eigen::Vector3d p_E = element.X_EL * p_L;
     SignedDistance candidate;
     if (element.bvh.size() > 0) {
-      const bool inside =
-          element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
+      const bool inside = element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
       const double limit = inside || best.distance < 0.0
                                ? (inside ? std::numeric_limits<double>::infinity() : 0.0)
                                : best.distance;
@@ -167,9 +171,9 @@ SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_di
   double bound = max_distance;
   for (const Element& element : elements_) {
     const Eigen::Vector3d p_E = element.X_EL * p_L;
-    const SignedDistance candidate =
-        element.bvh.size() > 0 ? to_mesh(element.bvh, element.normals, p_E, bound, false)
-                               : to_primitive(element.primitive, p_E);
+    const SignedDistance candidate = element.bvh.size() > 0
+                                         ? to_mesh(element.bvh, element.normals, p_E, bound, false)
+                                         : to_primitive(element.primitive, p_E);
     if (candidate.distance < bound) {
       bound = candidate.distance;
       best.distance = candidate.distance;
@@ -178,6 +182,18 @@ SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_di
     }
   }
   return best;
+}
+
+double Solid::distance_floor(const Eigen::Vector3d& p_L, const SignedDistance& measured) const {
+  double floor = measured.distance;
+  for (const Element& element : elements_) {
+    if (element.is_closed || element.bvh.size() == 0) continue;
+    const double unsigned_distance =
+        elements_.size() == 1 ? std::abs(measured.distance)
+                              : std::sqrt(element.bvh.closest(element.X_EL * p_L).distance_sq);
+    floor = std::min(floor, -unsigned_distance);
+  }
+  return floor;
 }
 
 bool Solid::is_inside(const Eigen::Vector3d& p_L) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/boundary_edges.h"
 #include "interior_cover.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/tessellation.h"

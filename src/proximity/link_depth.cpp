@@ -13,7 +13,8 @@ namespace {
 struct Entry {
   double bound;            ///< [m] no point below has a smaller signed distance
   Eigen::Vector3d center;  ///< of the box, link frame
-  double exact;            ///< [m] signed distance of the centre
+  double floor;            ///< [m] at the centre, see Solid::distance_floor
+  double guess;            ///< [m] as `bound`, holes left out of account: which to visit first
   std::int32_t child;
 };
 
@@ -31,14 +32,15 @@ Around around_box(const BoxNode& node, int k) {
 }  // namespace
 
 // Culling by unsigned distance fails inside, where the deepest point is wanted. The signed distance
-// changes by no more than the way between two points, so its exact value at a box's middle bounds
-// all of the box: branch and bound over the boxes that may hold points inside.
+// falls by no more than the way between two points (but for holes, see Solid::distance_floor), so
+// its exact value at a box's middle bounds all of the box: branch and bound over the boxes that may
+// hold points inside.
 void LinkQuery::find_depth(Deadline* deadline) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
   std::array<Entry, 512> stack;  // 16 children on each of at most 8 levels, and room
   std::size_t top = 0;
-  stack[top++] = {-kInfinity, Eigen::Vector3d::Zero(), -kInfinity, index_->root()};
+  stack[top++] = {-kInfinity, Eigen::Vector3d::Zero(), -kInfinity, -kInfinity, index_->root()};
   while (top > 0) {
     const Entry entry = stack[--top];
     if (entry.bound >= threshold()) {
@@ -50,7 +52,7 @@ void LinkQuery::find_depth(Deadline* deadline) {
       return;
     }
     if (entry.child < 0) {
-      find_depth_in_tile(~entry.child, entry.center, entry.exact);
+      find_depth_in_tile(~entry.child, entry.center, entry.floor);
       continue;
     }
     const BoxNode& node = index_->nodes()[static_cast<std::size_t>(entry.child)];
@@ -58,7 +60,7 @@ void LinkQuery::find_depth(Deadline* deadline) {
     for (int k = 0; k < node.count; ++k) {
       const Around ball = around_box(node, k);
       const Eigen::Vector3d center = X_LO_ * ball.center;
-      const double inherited = entry.exact - (center - entry.center).norm() - ball.radius;
+      const double inherited = entry.floor - (center - entry.center).norm() - ball.radius;
       if (inherited >= threshold()) {
         drop(inherited);
         continue;
@@ -67,21 +69,23 @@ void LinkQuery::find_depth(Deadline* deadline) {
       const double near = interior + ball.radius;
       if (link_->tree.outer_distance(center, near) > near) continue;
       ++statistics_->exact_evaluations;
-      const double exact = link_->solid.signed_distance(center).distance;
-      const double bound = exact - ball.radius;
+      const Solid& solid = link_->solid;
+      const SignedDistance exact = solid.signed_distance(center);
+      const double floor = solid.distance_floor(center, exact);
+      const double bound = floor - ball.radius, guess = exact.distance - ball.radius;
       if (bound >= threshold()) {
         drop(bound);
         continue;
       }
       std::size_t at = top++;
-      for (; at > begin && stack[at - 1].bound < bound; --at) stack[at] = stack[at - 1];
-      stack[at] = {bound, center, exact, node.child[k]};
+      for (; at > begin && stack[at - 1].guess < guess; --at) stack[at] = stack[at - 1];
+      stack[at] = {bound, center, floor, guess, node.child[k]};
     }
   }
 }
 
 // Each point that is evaluated bounds its neighbours too, so few of the sixteen have to be.
-void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double exact) {
+void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor) {
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
   const int count = index_->tiles()[static_cast<std::size_t>(tile)].count;
   std::array<Eigen::Vector3d, kPointWidth> p_L;
@@ -90,7 +94,7 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& cen
   for (int k = 0; k < count; ++k) {
     const auto i = static_cast<std::size_t>(k);
     p_L[i] = X_LO_ * point_O(tile, k);
-    bound[i] = exact - (p_L[i] - center).norm();
+    bound[i] = floor - (p_L[i] - center).norm();
     open[i] = true;
   }
   for (int round = 0; round < count; ++round) {
@@ -109,9 +113,10 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& cen
     ++statistics_->exact_evaluations;
     const SignedDistance measured = link_->solid.signed_distance(p_L[i]);
     take(measured, p_L[i], tile, next);
+    const double nearby = link_->solid.distance_floor(p_L[i], measured);
     for (int k = 0; k < count; ++k) {
       const auto j = static_cast<std::size_t>(k);
-      bound[j] = std::max(bound[j], measured.distance - (p_L[j] - p_L[i]).norm());
+      bound[j] = std::max(bound[j], nearby - (p_L[j] - p_L[i]).norm());
     }
   }
 }

@@ -45,7 +45,7 @@ class LinkQuery {
 
  private:
   struct Nearest {
-    SignedDistance exact;  ///< in the link's frame
+    SignedDistance exact;                           ///< in the link's frame
     Eigen::Vector3d p_L = Eigen::Vector3d::Zero();  ///< the obstacle point, in the link's frame
     Eigen::Vector3d p_F = Eigen::Vector3d::Zero();  ///< the same in the fixed frame
     std::int32_t cloud = -1, tile = 0;
@@ -58,7 +58,7 @@ class LinkQuery {
   void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, std::int32_t tile, int lane);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
-  void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double exact);
+  void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
   /// [m] bounds from here on cannot change the answer by more than the tolerance.

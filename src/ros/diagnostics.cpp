@@ -102,6 +102,9 @@ DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& re
   } else if (report.links_monitored == 0) {
     set(DiagnosticStatus::WARN, "no link is looked up yet", &status);
   }
+  if (!report.transform_problem.empty()) {
+    set(DiagnosticStatus::WARN, report.transform_problem, &status);
+  }
   add("links monitored", report.links_monitored, &status);
   add("links with a pose", report.links_known, &status);
   if (report.links_known > 0) add("age", number("%.3f s", report.pose_age), &status);

@@ -7,13 +7,6 @@
 #include "ist_proximity/ros/transforms.h"
 
 namespace ist {
-namespace {
-
-// Some publishers stamp fixed joints half a second ahead. What is far ahead hides that newer
-// transforms do not get in any more.
-constexpr double kMaxAhead = 1.0;  // [s]
-
-}  // namespace
 
 std::size_t LinkPoses::count_known() const {
   return static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
@@ -35,14 +28,10 @@ bool PoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* stamp
   if (!problem->empty()) return false;
   if (stamp->isZero()) return true;
   const double age = seconds_between(*stamp, now);
-  if (age <= timeout_ && age >= -kMaxAhead) return true;
+  if (age <= timeout_) return true;
   char text[96];
-  if (age < 0) {
-    std::snprintf(text, sizeof text, "' is %.2f s in the future: do the clocks differ?", -age);
-  } else {
-    std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
-                  timeout_);
-  }
+  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
+                timeout_);
   *problem = "the newest transform from '" + frames_[link] + "' to '" + fixed_frame_ + text;
   return false;
 }

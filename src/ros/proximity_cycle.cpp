@@ -68,6 +68,9 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   const auto begin = std::chrono::steady_clock::now();
   look_at_sources(now, sources);
   situation_.pose_problems = pose_problems();
+  if (!situation_.pose_problems.empty() && !report->transform_problem.empty()) {
+    situation_.pose_problems.push_back(report->transform_problem);
+  }
 
   // A link in tf, but whose own points are still in the cloud, would be found touching itself.
   std::vector<bool> known = poses_.known;

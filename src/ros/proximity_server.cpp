@@ -8,7 +8,6 @@
 #include <boost/make_shared.hpp>
 
 #include "ist_proximity/ros/message_conversion.h"
-#include "ist_proximity/ros/ros_time.h"
 
 namespace ist {
 namespace {
@@ -31,7 +30,7 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       private_nh_(private_nh),
       name_(without_leading_slash(private_nh.getNamespace())),
       buffer_(ros::Duration(10.0)),
-      listener_(buffer_, nh_, true),
+      listener_(&buffer_, nh_),
       loader_(config, nh),
       marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
       repulsion_(config.repulsion) {
@@ -84,9 +83,15 @@ void ProximityServer::run_cycle() {
   const ros::Time now = ros::Time::now();
   notice_clock_jump(now);
   take_model();
+  if (Clock::now() >= spheres_again_) {
+    spheres_again_ = Clock::time_point::max();
+    spheres_.publish(shown_spheres_);
+  }
   const auto message = boost::make_shared<ProximityArray>();
+  const std::string transform_problem = listener_.problem();
   {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
+    report_.transform_problem = transform_problem;
     if (cycle_) {
       cycle_->run(now, sources_, repulsion_, message.get(), &report_);
     } else {
@@ -97,15 +102,10 @@ void ProximityServer::run_cycle() {
   publish(message);
 }
 
-/// Transforms from before the jump would be taken for the newest. The sources look after
-/// themselves.
+/// The sources look after themselves.
 void ProximityServer::notice_clock_jump(const ros::Time& now) {
-  if (now < last_now_) {
-    ROS_WARN("the ROS clock jumped back by %.3f s: transforms and clouds from before are dropped",
-             seconds_between(now, last_now_));
-    buffer_.clear();
-    if (cycle_) cycle_->forget();
-  }
+  listener_.notice_clock_jump();
+  if (now < last_now_ && cycle_) cycle_->forget();
   last_now_ = now;
 }
 

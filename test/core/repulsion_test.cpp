@@ -86,9 +86,10 @@ Expected expected(const std::vector<Ball>& balls, const Eigen::Isometry3d& X_FL,
     for (const Vector3d& p : points) {
       const Vector3d to_ball = X_FL * b.center - p;
       const double d = to_ball.norm() - b.radius;
-      const double w = std::pow(std::max(0.0, 1.0 - (d - result.nearest) / smoothing), 2);
-      result.blend += w * to_ball.normalized();
-      weights += w;
+      const double root = 1.0 - (d - result.nearest) / smoothing;
+      if (root <= 0.0) continue;
+      result.blend += root * root * to_ball.normalized();
+      weights += root * root;
     }
   }
   result.blend /= weights;
@@ -154,14 +155,15 @@ TEST(Repulsion, agreesWithTheFormula) {
   }
 }
 
-// A bar slides between two walls, and past a third. The nearest pair jumps by 178 degrees in one
-// step where the walls are equally near; the blend must not.
+// A bar slides between two walls, and past a third. The direction of the nearest pair jumps by 94
+// degrees in one step of 0.12 mm where two walls are equally near, and the vector with it by 0.79;
+// blended it moves by 0.005 at most.
 TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
-  std::vector<Vector3d> points = wall({0, 0, -0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
-  for (const Vector3d& p : wall({0, 0, 0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01)) {
+  std::vector<Vector3d> points = wall({0, 0, -0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02);
+  for (const Vector3d& p : wall({0, 0, 0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02)) {
     points.push_back(p);
   }
-  for (const Vector3d& p : wall({0.25, 0, 0}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01)) {
+  for (const Vector3d& p : wall({0.25, 0, 0}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.02)) {
     points.push_back(p);
   }
   const CloudSnapshot cloud = cloud_of(points);

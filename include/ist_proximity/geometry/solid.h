@@ -39,6 +39,12 @@ class Solid {
   /// is nearer than `max_distance` [m]; otherwise `distance` is inf.
   SignedDistance distance_outside(const Eigen::Vector3d& p_L, double max_distance) const;
 
+  /// [m] A lower bound that holds nearby too: no point has a signed distance below this minus its
+  /// way to p_L. The signed distance itself, but for meshes with holes: through a hole it jumps
+  /// from the distance of a point outside to minus that.
+  /// @param measured  signed_distance(p_L)
+  double distance_floor(const Eigen::Vector3d& p_L, const SignedDistance& measured) const;
+
   /// Whether p_L is inside any element.
   bool is_inside(const Eigen::Vector3d& p_L) const;
 
@@ -52,6 +58,7 @@ class Solid {
     std::vector<Eigen::Vector3d> normals;  ///< unit, by triangle; zero for triangles without area
     Eigen::Isometry3d X_LE;
     Eigen::Isometry3d X_EL;
+    bool is_closed;  ///< no mesh, or one without holes
   };
 
   std::vector<Element> elements_;

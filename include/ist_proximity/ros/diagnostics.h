@@ -32,6 +32,7 @@ struct CycleReport {
   std::vector<SourceFacts> sources;
   std::vector<Verdict> verdicts;
   std::vector<std::string> pose_problems;
+  std::string transform_problem;  ///< what tf's listener kept out
   std::size_t links_known = 0, links_monitored = 0;
   double pose_age = 0.0;   ///< [s] of the common instant, when any link is known
   std::size_t cycles = 0;  ///< since the start, those without a model too

@@ -33,7 +33,8 @@ class ProximityCycle {
 
   /// @param now      of the ROS clock
   /// @param message  overwritten
-  /// @param report   sources, poses and status are overwritten, the times go on
+  /// @param report   its transform_problem is read; sources, poses and status are overwritten, the
+  ///                 times go on
   void run(const ros::Time& now, const CloudSources& sources, const RepulsionConfig& repulsion,
            ist_proximity::ProximityArray* message, CycleReport* report);
 

@@ -3,8 +3,7 @@
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/node_handle.h>
 #include <std_srvs/Trigger.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
+#include <tf2/buffer_core.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -17,6 +16,7 @@
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/proximity_cycle.h"
+#include "ist_proximity/ros/transform_listener.h"
 
 namespace ist {
 
@@ -61,8 +61,8 @@ class ProximityServer {
 
   ros::Publisher proximity_, min_distance_, markers_, spheres_, filtered_cloud_, diagnostics_;
   ros::ServiceServer reload_service_;
-  tf2_ros::Buffer buffer_;
-  tf2_ros::TransformListener listener_;
+  tf2::BufferCore buffer_;
+  TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
 
@@ -71,6 +71,7 @@ class ProximityServer {
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
   ProximityMarkers marker_drawer_;
   visualization_msgs::MarkerArray shown_spheres_;
+  Clock::time_point spheres_again_ = Clock::time_point::max();  ///< when to latch them anew
   Clock::time_point next_markers_;
   ros::Time last_now_;
 

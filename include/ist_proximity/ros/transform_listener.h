@@ -1,0 +1,54 @@
+#pragma once
+
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <tf2/buffer_core.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <string>
+#include <thread>
+
+namespace ist {
+
+/// Fills a tf buffer from /tf and /tf_static, in a thread of its own.
+///
+/// As tf2_ros::TransformListener, but transforms that are stamped far ahead of the clock stay
+/// outside. When the clock jumps back (a bag starts over), one from before the jump can come in
+/// after it; the buffer then takes it for the newest and refuses the present ones as too old (seen
+/// with a 12 s bag in a loop: no poses for seconds).
+class TransformListener {
+ public:
+  /// @param buffer  outlives this
+  TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh);
+  ~TransformListener();
+  TransformListener(const TransformListener&) = delete;
+  TransformListener& operator=(const TransformListener&) = delete;
+
+  /// Empties the buffer if the ROS clock has jumped back since the last call or message; static
+  /// transforms stay. Thread safe.
+  void notice_clock_jump();
+
+  /// What was kept out during the last second, as a sentence; empty when nothing was. Thread safe.
+  std::string problem() const;
+
+ private:
+  void receive(const tf2_msgs::TFMessage& message, bool is_static);
+  void keep_out(const geometry_msgs::TransformStamped& transform, double ahead);
+
+  tf2::BufferCore& buffer_;
+  ros::CallbackQueue queue_;
+  ros::Subscriber moving_, static_;
+
+  mutable std::mutex mutex_;
+  ros::Time last_now_;
+  std::string problem_;
+  std::chrono::steady_clock::time_point problem_time_;
+
+  std::atomic<bool> running_{true};
+  std::thread thread_;
+};
+
+}  // namespace ist

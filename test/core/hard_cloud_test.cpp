@@ -1,0 +1,226 @@
+// Clouds that break indices: many equal points, every order, numbers that are none, far origins.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+using Point = Eigen::Vector3d;
+using Points = std::vector<Eigen::Vector3d>;
+
+const test::Trial& common_links() {
+  static const test::Trial trial(
+      {Box{{0.2, 0.1, 0.3}}, Cylinder{0.08, 0.25}, Sphere{0.1}, test::l_shape(0.2, 0.05)});
+  return trial;
+}
+
+std::vector<LinkProximity> query(const std::vector<const CloudSnapshot*>& clouds,
+                                 const Eigen::Isometry3d& X_FL, const QueryConfig& config) {
+  const std::size_t count = common_links().model().links.size();
+  std::vector<LinkProximity> results;
+  ProximityQuery(common_links().shared_model(), config)
+      .run(std::vector<Eigen::Isometry3d>(count, X_FL), std::vector<bool>(count, true), clouds,
+           &results);
+  return results;
+}
+
+QueryConfig exact() {
+  QueryConfig config;
+  config.tolerance = 0.0;
+  return config;
+}
+
+// Millions of points in one place, with IST_PROXIMITY_LARGE_TESTS set; else as many as a depth
+// image has.
+TEST(HardCloud, ManyPointsInOnePlace) {
+  const bool large = std::getenv("IST_PROXIMITY_LARGE_TESTS") != nullptr;
+  const std::size_t count = large ? 5000000 : test::kSanitized ? 30000 : 300000;
+  for (const Point& p : {Point(0.3, 0.2, 0.1), Point(0.02, 0.03, 0.04), Point(0.1, 0.05, 0.15)}) {
+    const CloudSnapshot many = test::make_snapshot(Points(count, p));
+    const CloudSnapshot one = test::make_snapshot({p});
+    ASSERT_EQ(many.index.size(), count);
+    for (const double tolerance : {0.0, 0.001}) {
+      QueryConfig config;
+      config.tolerance = tolerance;
+      const auto a = query({&many}, Eigen::Isometry3d::Identity(), config);
+      const auto b = query({&one}, Eigen::Isometry3d::Identity(), config);
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(a[i].state, b[i].state);
+        EXPECT_NEAR(a[i].distance, b[i].distance, 1e-12);
+        EXPECT_LE(a[i].lower_bound, b[i].distance);
+        test::expect_witness(a[i], Eigen::Isometry3d::Identity());
+      }
+    }
+  }
+}
+
+TEST(HardCloud, OrderAndDuplicatesDoNotMatter) {
+  test::Rng rng(61);
+  for (int scene = 0; scene < test::scaled(60); ++scene) {
+    Points points;
+    for (int i = 0; i < 3000; ++i) points.push_back(test::random_vector(&rng, 0.5));
+    // A tenth of them in one place, and a sheet.
+    for (int i = 0; i < 300; ++i) points[static_cast<std::size_t>(i)] = points[0];
+    for (std::size_t i = 300; i < 1300; ++i) points[i].z() = -0.31;
+    std::vector<Points> orders(6, points);
+    const auto by_x = [](const Point& a, const Point& b) { return a.x() < b.x(); };
+    std::sort(orders[1].begin(), orders[1].end(), by_x);
+    std::reverse_copy(orders[1].begin(), orders[1].end(), orders[2].begin());
+    std::shuffle(orders[3].begin(), orders[3].end(), rng);
+    // From end to end and back: neighbours in the message are as far apart as can be.
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      orders[4][i] = orders[1][i % 2 == 0 ? i / 2 : points.size() - 1 - i / 2];
+    }
+    orders[5].insert(orders[5].end(), points.begin(), points.end());
+    const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.4);
+    std::vector<LinkProximity> first;
+    for (std::size_t k = 0; k < orders.size(); ++k) {
+      SCOPED_TRACE("order " + std::to_string(k));
+      const CloudSnapshot cloud = test::make_snapshot(orders[k]);
+      const auto results = query({&cloud}, X_FL, exact());
+      const auto coarse = query({&cloud}, X_FL, {});
+      if (k == 0) first = results;
+      for (std::size_t i = 0; i < results.size(); ++i) {
+        ASSERT_EQ(results[i].state, first[i].state);
+        ASSERT_EQ(coarse[i].state, first[i].state);
+        if (first[i].state == LinkState::kClear) continue;
+        ASSERT_NEAR(results[i].distance, first[i].distance, 1e-12);
+        ASSERT_LE(coarse[i].lower_bound, first[i].distance);
+        ASSERT_GE(coarse[i].distance, first[i].distance - 1e-12);
+      }
+    }
+  }
+}
+
+template <typename Scalar>
+RawCloud raw(const std::vector<Scalar>& xyz) {
+  RawCloud cloud;
+  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
+  cloud.width = xyz.size() / 3;
+  cloud.height = 1;
+  cloud.point_step = 3 * sizeof(Scalar);
+  cloud.row_step = cloud.width * cloud.point_step;
+  cloud.y = sizeof(Scalar);
+  cloud.z = 2 * sizeof(Scalar);
+  cloud.is_double = sizeof(Scalar) == 8;
+  return cloud;
+}
+
+template <typename Scalar>
+CloudSnapshot ingest(const Points& points_S, const Eigen::Isometry3d& X_FS, double max_range) {
+  std::vector<Scalar> xyz;
+  for (const Point& p : points_S) {
+    for (int i = 0; i < 3; ++i) xyz.push_back(static_cast<Scalar>(p[i]));
+  }
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = max_range;
+  CloudSnapshot snapshot;
+  Ingest(config).run(raw(xyz), X_FS, {}, 0.0, &snapshot);
+  return snapshot;
+}
+
+// Each odd number in each coordinate, among good points: the answer is that of the good points and
+// of those that differ from them by nothing.
+template <typename Scalar>
+void expect_odd_numbers_dropped() {
+  using Limits = std::numeric_limits<Scalar>;
+  const std::vector<Scalar> dropped = {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(),
+                                       Scalar(1e30),        Scalar(-1e30),      Limits::max(),
+                                       Limits::lowest()};
+  const std::vector<Scalar> kept = {Limits::denorm_min(), -Limits::denorm_min(), Limits::min(),
+                                    Scalar(-0.0)};
+  const Points good = {{0.5, 0.1, 0.2}, {0.3, 0.4, -0.2}};
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<Scalar> xyz;
+    const auto append = [&xyz](const Point& p) {
+      for (int i = 0; i < 3; ++i) xyz.push_back(static_cast<Scalar>(p[i]));
+    };
+    const auto append_with = [&](const Point& p, Scalar odd) {
+      append(p);
+      xyz[xyz.size() - 3 + static_cast<std::size_t>(axis)] = odd;
+    };
+    for (const Point& p : good) append(p);
+    for (const Scalar odd : dropped) append_with({0.05, 0.05, 0.05}, odd);
+    for (const Scalar odd : kept) append_with({0.6, 0.6, 0.6}, odd);
+    CloudSnapshot cloud;
+    Ingest({}).run(raw(xyz), Eigen::Isometry3d::Identity(), {}, 0.0, &cloud);
+    EXPECT_EQ(cloud.counts.used, good.size() + kept.size());
+    EXPECT_EQ(cloud.counts.not_a_number, 1U);
+    EXPECT_EQ(cloud.counts.infinite, 2U);
+    EXPECT_EQ(cloud.counts.out_of_range, 4U);
+    Points expected = good;
+    Point zero(0.6, 0.6, 0.6);
+    zero[axis] = 0.0;
+    expected.push_back(zero);
+    const auto results = query({&cloud}, Eigen::Isometry3d::Identity(), exact());
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      test::expect_truth(results[i],
+                         test::truth_of(common_links().link(i), Eigen::Isometry3d::Identity(),
+                                        expected, cloud),
+                         exact(), Eigen::Isometry3d::Identity(), 1e-7);
+    }
+  }
+}
+
+TEST(HardCloud, OddNumbersInEachCoordinate) {
+  expect_odd_numbers_dropped<float>();
+  expect_odd_numbers_dropped<double>();
+}
+
+// The same scene at the origin and 1e6 m away, by the sensor's pose and by map coordinates.
+TEST(HardCloud, FarFromTheOrigin) {
+  test::Rng rng(62);
+  for (const Point& far : {Point(1e6, -2e6, 5e5), Point(1e6 + 0.3, 1e6 - 0.7, 0.1)}) {
+    for (int scene = 0; scene < test::scaled(100); ++scene) {
+      Points points;
+      for (int i = 0; i < 200; ++i) {
+        const Point p = test::random_vector(&rng, 0.8);
+        points.push_back(p.cast<float>().cast<double>());  // what both precisions hold
+      }
+      const Eigen::Isometry3d X_FS = test::random_pose(&rng, 0.5), X_FL = test::random_pose(&rng, 0.5);
+      const Eigen::Translation3d move(far);
+      Points map_points;
+      for (const Point& p : points) map_points.push_back(far + X_FS * p);
+      const CloudSnapshot here = ingest<float>(points, X_FS, 3.0);
+      const CloudSnapshot there = ingest<float>(points, Eigen::Isometry3d(move * X_FS), 3.0);
+      const CloudSnapshot map = ingest<double>(map_points, Eigen::Isometry3d::Identity(),
+                                               std::numeric_limits<double>::infinity());
+      ASSERT_EQ(there.index.size(), here.index.size());
+      ASSERT_EQ(map.index.size(), points.size());
+      const CloudSnapshot near_map = [&] {
+        Points local;
+        for (const Point& p : points) local.push_back(X_FS * p);
+        return ingest<double>(local, Eigen::Isometry3d::Identity(), 100.0);
+      }();
+      const auto a = query({&here}, X_FL, exact());
+      const auto b = query({&there}, Eigen::Isometry3d(move * X_FL), exact());
+      const auto c = query({&near_map}, X_FL, exact());
+      const auto d = query({&map}, Eigen::Isometry3d(move * X_FL), exact());
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(a[i].state, b[i].state);
+        if (a[i].state < LinkState::kNear) continue;
+        EXPECT_NEAR(a[i].distance, b[i].distance, 1e-6);
+        EXPECT_NEAR(a[i].lower_bound, b[i].lower_bound, 1e-5);
+        EXPECT_LT((a[i].p_FO + far - b[i].p_FO).norm(), 1e-5);
+      }
+      for (std::size_t i = 0; i < c.size(); ++i) {
+        if (c[i].state >= LinkState::kNear) EXPECT_NEAR(c[i].distance, d[i].distance, 1e-6);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,170 @@
+// Poses that are none, long motions, random deadlines.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+const std::vector<Shape>& shapes() {
+  static const std::vector<Shape> kShapes = {Box{{0.2, 0.1, 0.3}}, Cylinder{0.08, 0.25},
+                                             test::l_shape(0.2, 0.05),
+                                             test::torus(0.1, 0.03, 24, 12),
+                                             test::open_box({0.1, 0.1, 0.1})};
+  return kShapes;
+}
+
+CloudSnapshot random_cloud(test::Rng* rng, int count) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) points.push_back(test::random_vector(rng, 0.8));
+  return test::make_snapshot(points);
+}
+
+TEST(HardPoses, AQuaternionThatIsOffIsRefused) {
+  test::Rng rng(71);
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Isometry3d X = test::random_pose(&rng, 10.0);
+    EXPECT_TRUE(is_rigid(X));
+    Eigen::Quaterniond q(X.linear());
+    for (const double off : {1e-3, -1e-3}) {
+      Eigen::Isometry3d X_off = X;
+      Eigen::Quaterniond longer = q;
+      longer.coeffs() *= 1.0 + off;
+      X_off.linear() = longer.toRotationMatrix();  // as it is, without making it of unit length
+      EXPECT_FALSE(is_rigid(X_off));
+      X_off.linear() = longer.normalized().toRotationMatrix();
+      EXPECT_TRUE(is_rigid(X_off));
+    }
+  }
+}
+
+TEST(HardPoses, ReflectedScaledAndShearedAreRefused) {
+  test::Rng rng(72);
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Isometry3d X = test::random_pose(&rng, 1e6);
+    const int axis = i % 3, other = (i + 1) % 3;
+    for (const double factor : {-1.0, 1.0 + 1e-5, 1.0 - 1e-5, 2.0, 0.0}) {
+      Eigen::Isometry3d X_bad = X;
+      X_bad.linear().col(axis) *= factor;
+      EXPECT_FALSE(is_rigid(X_bad)) << factor;
+    }
+    Eigen::Isometry3d X_bad = X;
+    X_bad.linear().col(axis) += 1e-5 * X.linear().col(other);
+    EXPECT_FALSE(is_rigid(X_bad)) << "sheared";
+    for (const double odd : {std::numeric_limits<double>::quiet_NaN(),
+                             std::numeric_limits<double>::infinity(), 1e300}) {
+      X_bad = X;
+      X_bad.linear()(axis, other) = odd;
+      EXPECT_FALSE(is_rigid(X_bad)) << odd;
+      if (std::isfinite(odd)) continue;
+      X_bad = X;
+      X_bad.translation()[axis] = odd;
+      EXPECT_FALSE(is_rigid(X_bad)) << odd;
+    }
+  }
+}
+
+// The last answer starts the next query; over many steps, hardly apart, that must not add up.
+TEST(HardMotion, WarmStartDoesNotDrift) {
+  test::Rng rng(73);
+  const auto model = test::make_model(shapes(), 0.005);
+  const CloudSnapshot cloud = random_cloud(&rng, 500);
+  const std::vector<bool> known(model->links.size(), true);
+  QueryConfig exact, coarse;
+  exact.tolerance = 0.0;
+  ProximityQuery warm(model, exact), warm_coarse(model, coarse);
+  std::vector<Eigen::Isometry3d> X_FL(model->links.size());
+  for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.3);
+  std::vector<LinkProximity> results, coarse_results, cold_results;
+  const int steps = test::scaled(100000), interval = test::scaled(1000);
+  for (int step = 1; step <= steps; ++step) {
+    const double size = std::pow(10.0, test::uniform(&rng, -9, -3));
+    for (Eigen::Isometry3d& X : X_FL) {
+      X.translation() += test::random_vector(&rng, size);
+      X.rotate(Eigen::AngleAxisd(size, test::random_vector(&rng, 1.0).normalized()));
+      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+    }
+    ASSERT_TRUE(warm.run(X_FL, known, {&cloud}, &results));
+    if (step % 16 == 0) warm_coarse.run(X_FL, known, {&cloud}, &coarse_results);
+    if (step % interval != 0) continue;
+    warm_coarse.run(X_FL, known, {&cloud}, &coarse_results);
+    ProximityQuery(model, exact).run(X_FL, known, {&cloud}, &cold_results);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      ASSERT_EQ(results[i].state, cold_results[i].state) << "step " << step;
+      ASSERT_NEAR(results[i].distance, cold_results[i].distance, 1e-12) << "step " << step;
+      ASSERT_NEAR(results[i].lower_bound, cold_results[i].lower_bound, 1e-12) << "step " << step;
+      ASSERT_LE(coarse_results[i].lower_bound, cold_results[i].distance);
+      ASSERT_GE(coarse_results[i].distance, cold_results[i].distance - 1e-12);
+      ASSERT_LE(coarse_results[i].distance, cold_results[i].distance + coarse.tolerance);
+    }
+  }
+}
+
+// Whatever the deadline, bounds hold; a query without one is whole again, whatever came before.
+TEST(HardMotion, RandomDeadlines) {
+  test::Rng rng(74);
+  const auto model = test::make_model(shapes(), 0.002);
+  const std::vector<bool> known(model->links.size(), true);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  std::vector<Eigen::Isometry3d> X_FL(model->links.size());
+  std::vector<LinkProximity> whole, results;
+  const int scenes = test::scaled(200);
+  int stopped = 0, partial = 0;
+  for (int scene = 0; scene < scenes; ++scene) {
+    const CloudSnapshot cloud = random_cloud(&rng, 4000), other = random_cloud(&rng, 100);
+    const std::vector<const CloudSnapshot*> clouds = {&cloud, &other};
+    for (int k = 0; k < 50; ++k) {
+      if (k % 10 == 0) {
+        for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.6);
+        config.deadline = 0.0;
+        query.set_config(config);
+        ASSERT_TRUE(query.run(X_FL, known, clouds, &whole)) << "no deadline, no excuse";
+        ProximityQuery(model, config).run(X_FL, known, clouds, &results);
+        for (std::size_t i = 0; i < whole.size(); ++i) {
+          ASSERT_EQ(whole[i].state, results[i].state);
+          if (whole[i].state != LinkState::kClear) {
+            ASSERT_NEAR(whole[i].distance, results[i].distance, 1e-12);
+          }
+        }
+      }
+      config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 3.0));
+      // Half of them cold: nothing is known yet when the deadline passes.
+      ProximityQuery cold(model, config);
+      query.set_config(config);
+      ProximityQuery& stopping = k % 2 == 0 ? cold : query;
+      const bool complete = stopping.run(X_FL, known, clouds, &results);
+      stopped += complete ? 0 : 1;
+      for (std::size_t i = 0; i < results.size(); ++i) {
+        const bool clear = whole[i].state == LinkState::kClear;
+        const double truth = clear ? config.max_distance : whole[i].distance;
+        ASSERT_LE(results[i].lower_bound, truth + 1e-12);
+        if (results[i].state == LinkState::kUnknown) {
+          ASSERT_FALSE(complete);
+          ASSERT_TRUE(std::isnan(results[i].distance));
+          continue;
+        }
+        if (results[i].state == LinkState::kClear) {
+          ASSERT_TRUE(clear);
+          continue;
+        }
+        ASSERT_GE(results[i].distance, truth - 1e-12);
+        test::expect_witness(results[i], X_FL[i]);
+        partial += results[i].distance > truth + 1e-9 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(stopped, scenes) << "the deadlines are too generous to show anything";
+  EXPECT_GT(partial, 0);
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,96 @@
+// Every SIMD path that this machine can run gives the same answers.
+
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "support/random_links.h"
+#include "support/sanitizers.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+// Makes the library choose among `targets` from now on; 0: among all that the machine has.
+void choose(std::int64_t targets) {
+  hwy::SetSupportedTargetsForTest(targets);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+std::vector<std::int64_t> machine_targets() {
+  choose(0);
+  std::vector<std::int64_t> targets;
+  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
+    targets.push_back(left & -left);
+  }
+  return targets;
+}
+
+class InstructionSets : public ::testing::Test {
+ protected:
+  void TearDown() override { choose(0); }
+};
+
+TEST_F(InstructionSets, SameGeometry) {
+  test::Rng rng(81);
+  const TriangleMesh mesh = test::torus(0.1, 0.03, 24, 12);
+  const TriangleBvh bvh(mesh);
+  for (int i = 0; i < test::scaled(2000); ++i) {
+    const Eigen::Vector3d p = test::random_vector(&rng, i % 2 == 0 ? 0.15 : 1.0);
+    const double distance = test::oracle_distance(mesh, p), w = test::oracle_winding(mesh, p);
+    for (const std::int64_t target : machine_targets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      choose(target);
+      ASSERT_NEAR(std::sqrt(bvh.closest(p).distance_sq), distance, 1e-12);
+      ASSERT_NEAR(bvh.winding_number(p), w, 0.01);
+      ASSERT_NEAR(bvh.quick_winding_number(p), w, TriangleBvh::kQuickWindingError);
+    }
+  }
+}
+
+TEST_F(InstructionSets, SameAnswers) {
+  test::Rng rng(82);
+  const std::vector<LinkGeometry> links = test::random_links(&rng);
+  const auto model = test::model_of(links, 0.01);
+  const std::vector<bool> known(links.size(), true);
+  const std::vector<std::int64_t> targets = machine_targets();
+  EXPECT_GT(targets.size(), 1U);
+  for (int scene = 0; scene < test::scaled(300); ++scene) {
+    const std::vector<Eigen::Vector3d> points = test::random_points(
+        &rng, links[static_cast<std::size_t>(scene) % links.size()], 1 + scene % 100);
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    const std::vector<Eigen::Isometry3d> X_FL(links.size(), test::random_pose(&rng, 0.1));
+    for (const double tolerance : {0.0, 0.001}) {
+      QueryConfig config;
+      config.tolerance = tolerance;
+      std::vector<LinkProximity> first, results;
+      for (const std::int64_t target : targets) {
+        SCOPED_TRACE(hwy::TargetName(target));
+        choose(target);
+        ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&cloud}, &results));
+        if (first.empty()) first = results;
+        for (std::size_t i = 0; i < links.size(); ++i) {
+          SCOPED_TRACE("link " + std::to_string(i));
+          if (std::abs(first[i].distance) > 2e-8 + tolerance) {
+            ASSERT_EQ(results[i].state, first[i].state);
+          }
+          if (first[i].state == LinkState::kClear) continue;
+          // Float decides which side of a mesh a point at its surface is on.
+          ASSERT_NEAR(results[i].distance, first[i].distance, tolerance + 4e-8);
+          test::expect_witness(results[i], X_FL[i]);
+        }
+      }
+      if (scene % 10 != 0) continue;
+      for (std::size_t i = 0; i < links.size(); ++i) {
+        test::expect_truth(results[i], test::truth_of(links[i], X_FL[i], points, cloud), config,
+                           X_FL[i]);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

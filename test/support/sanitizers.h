@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+
+/// Sanitizers cost 5 to 20 times the time; tests that count cases do fewer under them.
+namespace ist::test {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#else
+constexpr bool kSanitized = false;
+#endif
+
+/// `count`, or a twentieth under a sanitizer.
+constexpr int scaled(int count) { return kSanitized ? (count + 19) / 20 : count; }
+
+}  // namespace ist::test

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/scene.h"
+#include "support/shape_oracle.h"
+
+/// One query against the oracle: everything that an answer promises.
+namespace ist::test {
+
+/// What an answer is checked against.
+struct Truth {
+  double measured;  ///< [m] smallest signed distance of the points as given
+  double stored;    ///< [m] of the points as the index holds them
+};
+
+inline Truth truth_of(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
+                      const std::vector<Eigen::Vector3d>& points_F, const CloudSnapshot& cloud) {
+  return {oracle_minimum(link, X_FL, points_F),
+          oracle_minimum(link, X_FL, stored_points(cloud.index))};
+}
+
+/// Witnesses and direction fit each other, and everything is finite.
+inline void expect_witness(const LinkProximity& result, const Eigen::Isometry3d& X_FL,
+                           double scale = 1.0) {
+  ASSERT_GE(result.state, LinkState::kNear);
+  ASSERT_TRUE(result.p_FL.allFinite() && result.p_LL.allFinite() && result.p_FO.allFinite());
+  EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
+  EXPECT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9 * scale);
+  EXPECT_LT((X_FL * result.p_LL - result.p_FL).norm(), 1e-12 * scale);
+  EXPECT_EQ(result.state == LinkState::kContact, result.distance < 0.0);
+}
+
+/// State, bounds, interval width and witness of a complete answer.
+/// @param rounding  [m] what double precision may lose, and float where it tells on which side of a
+///                  mesh a point lies
+/// @param size      [m] of the link, where it is large
+inline void expect_truth(const LinkProximity& result, const Truth& truth, const QueryConfig& config,
+                         const Eigen::Isometry3d& X_FL, double rounding = 2e-8,
+                         double size = 1.0) {
+  ASSERT_NE(result.state, LinkState::kUnknown);
+  EXPECT_LE(result.lower_bound, truth.measured + rounding);
+  EXPECT_LE(result.lower_bound, result.distance);
+  if (result.state == LinkState::kClear) {
+    EXPECT_TRUE(std::isinf(result.distance) && result.distance > 0.0);
+    EXPECT_EQ(result.lower_bound, config.max_distance);
+    EXPECT_GT(truth.stored, config.max_distance);
+    return;
+  }
+  expect_witness(result, X_FL, size + X_FL.translation().norm());
+  EXPECT_GE(result.distance, truth.stored - rounding);
+  EXPECT_LE(result.distance, truth.stored + config.tolerance + rounding);
+  // Whether points are inside is decided however wide the tolerance; at touch, either is right.
+  if (std::abs(truth.stored) > rounding) {
+    EXPECT_EQ(result.state == LinkState::kContact, truth.stored < 0.0);
+  }
+  // The width also holds what float coordinates round.
+  const double reach = X_FL.translation().norm() + std::abs(truth.stored) + 10.0 * size;
+  EXPECT_LE(result.distance - result.lower_bound, config.tolerance + 2e-7 * reach);
+}
+
+/// A link packed with `max_error`, queried cold at tolerance 0 and 1 mm, against its oracle.
+class Trial {
+ public:
+  explicit Trial(const std::vector<Shape>& shapes, double max_error = 0.005, double rounding = 2e-8)
+      : model_(make_model(shapes, max_error)), rounding_(rounding) {
+    for (const Shape& shape : shapes) {
+      links_.push_back({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
+    }
+  }
+
+  /// Of links with a packing of their own.
+  Trial(std::shared_ptr<const RobotModel> model, std::vector<LinkGeometry> links, double rounding)
+      : model_(std::move(model)), links_(std::move(links)), rounding_(rounding) {}
+
+  double max_distance = 1.0;  ///< [m]
+  double size = 1.0;          ///< [m] of the links, where they are large
+
+  const RobotModel& model() const { return *model_; }
+  const std::shared_ptr<const RobotModel>& shared_model() const { return model_; }
+  const LinkGeometry& link(std::size_t i) const { return links_[i]; }
+
+  void expect(const std::vector<Eigen::Vector3d>& points_F,
+              const Eigen::Isometry3d& X_FL = Eigen::Isometry3d::Identity(),
+              const Eigen::Vector3d& origin = Eigen::Vector3d::Zero()) const {
+    const CloudSnapshot cloud = make_snapshot(points_F, origin);
+    const std::vector<Eigen::Isometry3d> poses(links_.size(), X_FL);
+    const std::vector<bool> known(links_.size(), true);
+    std::vector<LinkProximity> results;
+    for (const double tolerance : {0.0, 0.001}) {
+      SCOPED_TRACE("tolerance " + std::to_string(tolerance));
+      QueryConfig config;
+      config.max_distance = max_distance;
+      config.tolerance = tolerance;
+      ASSERT_TRUE(ProximityQuery(model_, config).run(poses, known, {&cloud}, &results));
+      for (std::size_t i = 0; i < links_.size(); ++i) {
+        SCOPED_TRACE(model_->links[i].name);
+        expect_truth(results[i], truth_of(links_[i], X_FL, points_F, cloud), config, X_FL,
+                     rounding_, size);
+      }
+    }
+  }
+
+ private:
+  std::shared_ptr<const RobotModel> model_;
+  std::vector<LinkGeometry> links_;
+  double rounding_;
+};
+
+}  // namespace ist::test
