@@ -64,11 +64,12 @@ HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* 
     const Vec3<V> ab = Minus(b, a), bc = Minus(c, b), ca = Minus(a, c);
     const Vec3<V> va = Minus(point, a), vb = Minus(point, b), vc = Minus(point, c);
     const Vec3<V> n = Cross(ca, ab);
-    const V edges = hn::Min(SegmentSq(d, ab, va), hn::Min(SegmentSq(d, bc, vb), SegmentSq(d, ca, vc)));
+    const V edges =
+        hn::Min(SegmentSq(d, ab, va), hn::Min(SegmentSq(d, bc, vb), SegmentSq(d, ca, vc)));
     const auto zero = hn::Zero(d);
-    const auto inside = hn::And(hn::Le(Dot3(Cross(ab, n), va), zero),
-                                hn::And(hn::Le(Dot3(Cross(bc, n), vb), zero),
-                                        hn::Le(Dot3(Cross(ca, n), vc), zero)));
+    const auto inside = hn::And(
+        hn::Le(Dot3(Cross(ab, n), va), zero),
+        hn::And(hn::Le(Dot3(Cross(bc, n), vb), zero), hn::Le(Dot3(Cross(ca, n), vc), zero)));
     const V height = Dot3(n, va);
     const V plane = hn::Div(hn::Mul(height, height), hn::Max(Dot3(n, n), hn::Set(d, 1e-30F)));
     hn::Store(hn::IfThenElse(inside, hn::Min(plane, edges), edges), d, out + k);
@@ -105,7 +106,8 @@ class Closest {
       for (int k = 0; k < boxes.count; ++k) {
         if (distance_sq[k] > limit_sq_) continue;
         std::size_t at = top++;  // nearest on top
-        for (; at > begin && stack[at - 1].distance_sq < distance_sq[k]; --at) stack[at] = stack[at - 1];
+        for (; at > begin && stack[at - 1].distance_sq < distance_sq[k]; --at)
+          stack[at] = stack[at - 1];
         stack[at] = {boxes.child[k], distance_sq[k]};
       }
     }

@@ -141,9 +141,8 @@ void TriangleBvhBuilder::set_moments(const Range& range, TriangleBvh::Moments* m
     dipole += n;
   }
   const double count = range.second - range.first;
-  const Eigen::Vector3d center = Eigen::Vector3d(area > 0.0 ? weighted / area : plain / count)
-                                     .cast<float>()
-                                     .cast<double>();
+  const Eigen::Vector3d center =
+      Eigen::Vector3d(area > 0.0 ? weighted / area : plain / count).cast<float>().cast<double>();
   Eigen::Matrix3d quadrupole = Eigen::Matrix3d::Zero();
   double radius_sq = 0.0;
   for (std::uint32_t i = range.first; i < range.second; ++i) {

@@ -81,7 +81,8 @@ BallSearch::Match BallSearch::best(const Eigen::Vector3d* corners, int corner_co
     const double cost = cost_of(balls_[ball].center, balls_[ball].weight, corners, corner_count);
     if (cost < match.cost || (cost == match.cost && ball < match.ball)) match = {ball, cost};
   };
-  for (std::size_t i = std::max(in_tree_, seen); i < balls_.size(); ++i) consider(static_cast<std::uint32_t>(i));
+  for (std::size_t i = std::max(in_tree_, seen); i < balls_.size(); ++i)
+    consider(static_cast<std::uint32_t>(i));
   if (nodes_.empty() || seen >= in_tree_) return match;
 
   // A ball below a node is at least as far from the farthest corner as the node's box is.

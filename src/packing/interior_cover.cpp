@@ -67,7 +67,8 @@ class InteriorCover {
   // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
   bool fill(const Eigen::Vector3d& center, double radius, const BallSearch::Match& match) {
     const double uncovered = search_.best(&center, 1, match.ball).cost;
-    if (uncovered <= 0.5 * config_.max_error && 2.0 * radius > 0.5 * config_.max_error) return false;
+    if (uncovered <= 0.5 * config_.max_error && 2.0 * radius > 0.5 * config_.max_error)
+      return false;
     if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
       return true;

@@ -16,7 +16,6 @@ namespace ist {
 ///                 (larger where max_spheres leaves interior cells uncovered)
 /// @returns false when `progress` stopped it: nothing is proven then of the interior
 bool cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                    const PackingConfig& config, const PackingProgress& progress,
-                    Packing* packing);
+                    const PackingConfig& config, const PackingProgress& progress, Packing* packing);
 
 }  // namespace ist

@@ -35,8 +35,9 @@ void SurfaceCover::seed() {
   std::uint32_t largest = 0;
   double largest_area = -1.0;
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-    const double area =
-        (mesh_.corner(t, 1) - mesh_.corner(t, 0)).cross(mesh_.corner(t, 2) - mesh_.corner(t, 0)).norm();
+    const double area = (mesh_.corner(t, 1) - mesh_.corner(t, 0))
+                            .cross(mesh_.corner(t, 2) - mesh_.corner(t, 0))
+                            .norm();
     if (area > largest_area) {
       largest_area = area;
       largest = t;

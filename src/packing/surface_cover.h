@@ -31,7 +31,7 @@ class SurfaceCover {
  private:
   struct Patch {
     Eigen::Vector3d corner[3];
-    double bound;            ///< [m] no point of the patch is farther from `ball`
+    double bound;  ///< [m] no point of the patch is farther from `ball`
     std::uint32_t ball;
     std::uint32_t seen;  ///< balls there were when it was last searched
     std::uint32_t triangle;

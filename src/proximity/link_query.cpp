@@ -79,8 +79,8 @@ double LinkQuery::threshold() const {
 }
 
 bool LinkQuery::first_visit(std::int32_t tile, int lane) {
-  const std::uint32_t key = static_cast<std::uint32_t>(tile) * kPointWidth +
-                            static_cast<std::uint32_t>(lane);
+  const std::uint32_t key =
+      static_cast<std::uint32_t>(tile) * kPointWidth + static_cast<std::uint32_t>(lane);
   Visit& visit = visited_[(key * 2654435761U) >> 23U];
   if (visit.epoch == epoch_ && visit.key == key) return false;
   visit = {epoch_, key};
@@ -202,8 +202,7 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   last_lane_ = nearest.lane;
   result->state = nearest.exact.distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = nearest.exact.distance;
-  result->lower_bound =
-      std::min(nearest.exact.distance, dropped_) - point_error - config_.margin;
+  result->lower_bound = std::min(nearest.exact.distance, dropped_) - point_error - config_.margin;
   result->p_LL = nearest.exact.witness;
   result->p_FL = X_FL_ * nearest.exact.witness;
   result->p_FO = nearest.p_F;

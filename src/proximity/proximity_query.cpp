@@ -73,8 +73,7 @@ const QueryStatistics& ProximityQuery::statistics() const { return impl_->statis
 const RobotModel& ProximityQuery::model() const { return *impl_->model; }
 
 bool is_rigid(const Eigen::Isometry3d& X, double tolerance) {
-  const Eigen::Matrix3d error =
-      X.linear().transpose() * X.linear() - Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d error = X.linear().transpose() * X.linear() - Eigen::Matrix3d::Identity();
   // Written so that NaN fails.
   return error.cwiseAbs().maxCoeff() <= tolerance && X.linear().determinant() > 0.0 &&
          X.translation().allFinite();

@@ -53,10 +53,10 @@ HWY_INLINE void Pose(const Traversal& t, const float* x, const float* y, const f
     float* out[3] = {posed->x, posed->y, posed->z};
     for (int row = 0; row < 3; ++row) {
       const float* r = t.R_OL + 3 * row;
-      const auto sum = hn::MulAdd(
-          hn::Set(d, r[0]), vx,
-          hn::MulAdd(hn::Set(d, r[1]), vy,
-                     hn::MulAdd(hn::Set(d, r[2]), vz, hn::Set(d, t.p_OL[row]))));
+      const auto sum =
+          hn::MulAdd(hn::Set(d, r[0]), vx,
+                     hn::MulAdd(hn::Set(d, r[1]), vy,
+                                hn::MulAdd(hn::Set(d, r[2]), vz, hn::Set(d, t.p_OL[row]))));
       hn::Store(sum, d, out[row] + k);
     }
   }
@@ -80,7 +80,8 @@ class Descent {
         Drop(t_.interior);
         return;
       }
-      if (++t_.node_pairs % kExpiryInterval == 0 && t_.expired != nullptr && t_.expired(t_.context)) {
+      if (++t_.node_pairs % kExpiryInterval == 0 && t_.expired != nullptr &&
+          t_.expired(t_.context)) {
         t_.stopped = true;
         Drop(pair.bound);
         while (top_ > 0) Drop(stack_[--top_].bound);
@@ -139,9 +140,12 @@ class Descent {
     Pose(t_, node.x, node.y, node.z, &posed);
     alignas(64) float bound[kSphereWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
-      const auto dx = Gap(d, hn::Set(d, pair.min[0]), hn::Set(d, pair.max[0]), hn::Load(d, posed.x + k));
-      const auto dy = Gap(d, hn::Set(d, pair.min[1]), hn::Set(d, pair.max[1]), hn::Load(d, posed.y + k));
-      const auto dz = Gap(d, hn::Set(d, pair.min[2]), hn::Set(d, pair.max[2]), hn::Load(d, posed.z + k));
+      const auto dx =
+          Gap(d, hn::Set(d, pair.min[0]), hn::Set(d, pair.max[0]), hn::Load(d, posed.x + k));
+      const auto dy =
+          Gap(d, hn::Set(d, pair.min[1]), hn::Set(d, pair.max[1]), hn::Load(d, posed.y + k));
+      const auto dz =
+          Gap(d, hn::Set(d, pair.min[2]), hn::Set(d, pair.max[2]), hn::Load(d, posed.z + k));
       hn::Store(hn::Sub(Norm(dx, dy, dz), hn::Load(d, node.radius + k)), d, bound + k);
     }
     Pair child = pair;
@@ -167,9 +171,12 @@ class Descent {
     const PointTag d;
     alignas(64) float bound[kPointWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
-      const auto dx = Gap(d, hn::Load(d, node.min_x + k), hn::Load(d, node.max_x + k), hn::Set(d, pair.x));
-      const auto dy = Gap(d, hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k), hn::Set(d, pair.y));
-      const auto dz = Gap(d, hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, pair.z));
+      const auto dx =
+          Gap(d, hn::Load(d, node.min_x + k), hn::Load(d, node.max_x + k), hn::Set(d, pair.x));
+      const auto dy =
+          Gap(d, hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k), hn::Set(d, pair.y));
+      const auto dz =
+          Gap(d, hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, pair.z));
       hn::Store(hn::Sub(Norm(dx, dy, dz), hn::Set(d, pair.radius)), d, bound + k);
     }
     Pair child = pair;
@@ -204,7 +211,8 @@ class Descent {
     const PointTag d;
     alignas(64) float distance[kPointWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
-      const auto x = hn::Load(d, tile.x + k), y = hn::Load(d, tile.y + k), z = hn::Load(d, tile.z + k);
+      const auto x = hn::Load(d, tile.x + k), y = hn::Load(d, tile.y + k),
+                 z = hn::Load(d, tile.z + k);
       auto nearest = hn::Set(d, kFarAway);
       for (int b = 0; b < leaf.count; ++b) {
         const auto dx = hn::Sub(x, hn::Set(d, posed.x[b]));

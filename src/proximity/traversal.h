@@ -37,7 +37,7 @@ struct Traversal {
   bool may_be_inside = false;  ///< some point's bound is at most `interior`
   bool stopped = false;        ///< `expired` ended it; the bounds of what was left are in `dropped`
   float inner_distance = std::numeric_limits<float>::infinity();  ///< [m] smallest |p - c| - inner
-  std::int32_t inner_tile = -1;  ///< of that point
+  std::int32_t inner_tile = -1;                                   ///< of that point
   int inner_lane = 0;
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
 };

@@ -110,10 +110,9 @@ std::uint32_t Builder::split(const Range& range) {
 std::vector<Range> Builder::partition(const Range& range) {
   std::vector<Range> groups{range};
   while (groups.size() < static_cast<std::size_t>(kSphereWidth)) {
-    const auto largest =
-        std::max_element(groups.begin(), groups.end(), [](const Range& a, const Range& b) {
-          return a.second - a.first < b.second - b.first;
-        });
+    const auto largest = std::max_element(
+        groups.begin(), groups.end(),
+        [](const Range& a, const Range& b) { return a.second - a.first < b.second - b.first; });
     if (largest->second - largest->first <= static_cast<std::uint32_t>(kSphereWidth)) break;
     const std::uint32_t middle = split(*largest);
     const Range upper{middle, largest->second};
@@ -140,7 +139,8 @@ std::int32_t Builder::add_node(const Range& range) {
     for (std::uint32_t i = groups[k].first; i < groups[k].second; ++i) {
       node.max_inner[k] = std::max(node.max_inner[k], round_up(balls_[order_[i]].radius));
     }
-    const bool is_leaf = groups[k].second - groups[k].first <= static_cast<std::uint32_t>(kSphereWidth);
+    const bool is_leaf =
+        groups[k].second - groups[k].first <= static_cast<std::uint32_t>(kSphereWidth);
     node.child[k] = is_leaf ? ~add_leaf(groups[k]) : add_node(groups[k]);
   }
   nodes_[static_cast<std::size_t>(index)] = node;

@@ -51,23 +51,39 @@ TEST(HardCases, OnSurfaceEdgeAndVertex) {
     }
   }
   // Of the primitives: cap, wall and rim of the cylinder, pole and equator of the ball.
-  expect_each(trial, {{0, 0, 0.125}, {0.08, 0, 0}, {0.08, 0, 0.125}, {0, 0.08, -0.125},
-                      {0, 0, 0.1}, {0.1, 0, 0}, {0, -0.1, 0}});
+  expect_each(trial, {{0, 0, 0.125},
+                      {0.08, 0, 0},
+                      {0.08, 0, 0.125},
+                      {0, 0.08, -0.125},
+                      {0, 0, 0.1},
+                      {0.1, 0, 0},
+                      {0, -0.1, 0}});
 }
 
 TEST(HardCases, NextToTheSurface) {
   const test::Trial& trial = common_links();
   for (const double off : {1e-4, 1e-6, 1e-8, 1e-10, 1e-13, 1e-16}) {
-    expect_each(trial, {{0.1 + off, 0, 0}, {0.1 - off, 0, 0}, {0.1 + off, 0.05 + off, 0},
-                        {0.1 + off, 0.05 + off, 0.15 + off}, {0.08 + off, 0, 0.125 + off}});
+    expect_each(trial, {{0.1 + off, 0, 0},
+                        {0.1 - off, 0, 0},
+                        {0.1 + off, 0.05 + off, 0},
+                        {0.1 + off, 0.05 + off, 0.15 + off},
+                        {0.08 + off, 0, 0.125 + off}});
   }
 }
 
 TEST(HardCases, AtCentresAndOnTheMedialAxis) {
   const test::Trial& trial = common_links();
-  Points points = {{0, 0, 0},       {0, 0, 0.05},  {0, 0, -0.1},    {0.05, 0, 0.1},
-                   {0.1, 0, 0},     {0, 0.1, 0},   {-0.0707, 0.0707, 0},  // the torus's circle
-                   {0.025, 0.025, 0.025}, {0.1, 0.025, 0.025}, {1e-300, 0, 0}, {0, 5e-324, 0}};
+  Points points = {{0, 0, 0},
+                   {0, 0, 0.05},
+                   {0, 0, -0.1},
+                   {0.05, 0, 0.1},
+                   {0.1, 0, 0},
+                   {0, 0.1, 0},
+                   {-0.0707, 0.0707, 0},  // the torus's circle
+                   {0.025, 0.025, 0.025},
+                   {0.1, 0.025, 0.025},
+                   {1e-300, 0, 0},
+                   {0, 5e-324, 0}};
   for (std::size_t i = 0; i < trial.model().links.size(); ++i) {
     const std::vector<Ball>& balls = trial.model().links[i].packing.balls;
     for (std::size_t k = 0; k < balls.size(); k += 1 + balls.size() / 6) {
@@ -123,8 +139,9 @@ TEST(HardCases, Chazelle) {
   for (int i = 0; i < test::scaled(300); ++i) {
     Points points;
     for (int k = 0; k < 1 + i % 10; ++k) {
-      const Point inside = box.min() + 0.5 * (test::random_vector(&rng, 1.0) + Point::Ones())
-                                                 .cwiseProduct(box.sizes());
+      const Point inside =
+          box.min() +
+          0.5 * (test::random_vector(&rng, 1.0) + Point::Ones()).cwiseProduct(box.sizes());
       points.push_back(i % 2 == 0 ? inside : Point(box.center() + test::random_vector(&rng, 0.3)));
     }
     trial.expect(points);
@@ -134,11 +151,14 @@ TEST(HardCases, Chazelle) {
 // Thin parts are where balls are small and winding numbers change fast.
 TEST(HardCases, ThinPlatesAndNeedles) {
   test::Rng rng(23);
-  const std::vector<TriangleMesh> meshes = {
-      test::thin_plate(0.2, 1e-3),       test::thin_plate(0.2, 1e-5),
-      test::box({1e-4, 1e-4, 0.3}),      test::needle(0.3, 1e-3),
-      test::needle(0.3, 1e-5),           test::sliver_plate(0.3, 0.01, 1e-3, 50),
-      test::sliver_plate(1.0, 0.01, 1e-5, 100), test::sheet(0.2)};
+  const std::vector<TriangleMesh> meshes = {test::thin_plate(0.2, 1e-3),
+                                            test::thin_plate(0.2, 1e-5),
+                                            test::box({1e-4, 1e-4, 0.3}),
+                                            test::needle(0.3, 1e-3),
+                                            test::needle(0.3, 1e-5),
+                                            test::sliver_plate(0.3, 0.01, 1e-3, 50),
+                                            test::sliver_plate(1.0, 0.01, 1e-5, 100),
+                                            test::sheet(0.2)};
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     SCOPED_TRACE("mesh " + std::to_string(m));
     // Which side of a surface a point is on is told by float sums: to 1e-6 of the size at worst.

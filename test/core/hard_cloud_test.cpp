@@ -166,10 +166,10 @@ void expect_odd_numbers_dropped() {
     expected.push_back(zero);
     const auto results = query({&cloud}, Eigen::Isometry3d::Identity(), exact());
     for (std::size_t i = 0; i < results.size(); ++i) {
-      test::expect_truth(results[i],
-                         test::truth_of(common_links().link(i), Eigen::Isometry3d::Identity(),
-                                        expected, cloud),
-                         exact(), Eigen::Isometry3d::Identity(), 1e-7);
+      test::expect_truth(
+          results[i],
+          test::truth_of(common_links().link(i), Eigen::Isometry3d::Identity(), expected, cloud),
+          exact(), Eigen::Isometry3d::Identity(), 1e-7);
     }
   }
 }
@@ -189,7 +189,8 @@ TEST(HardCloud, FarFromTheOrigin) {
         const Point p = test::random_vector(&rng, 0.8);
         points.push_back(p.cast<float>().cast<double>());  // what both precisions hold
       }
-      const Eigen::Isometry3d X_FS = test::random_pose(&rng, 0.5), X_FL = test::random_pose(&rng, 0.5);
+      const Eigen::Isometry3d X_FS = test::random_pose(&rng, 0.5),
+                              X_FL = test::random_pose(&rng, 0.5);
       const Eigen::Translation3d move(far);
       Points map_points;
       for (const Point& p : points) map_points.push_back(far + X_FS * p);

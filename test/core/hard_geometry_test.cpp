@@ -18,17 +18,25 @@ namespace {
 
 using Point = Eigen::Vector3d;
 
-// A triangle as bad as can be: two long sides, a short one, in any order, down to a line or a point.
+// A triangle as bad as can be: two long sides, a short one, in any order, down to a line or a
+// point.
 std::array<Point, 3> random_sliver(test::Rng* rng) {
   const Point a = test::random_vector(rng, 0.5), along = test::random_vector(rng, 0.5);
   const double width = std::pow(10.0, test::uniform(rng, -18, 0));
   const double where = test::uniform(rng, -1, 2);
   Point b = a + along, c = a + where * along + test::random_vector(rng, width);
   switch (static_cast<int>(test::uniform(rng, 0, 8))) {
-    case 0: c = a + where * along; break;  // a line, but for rounding
-    case 1: c = b; break;
-    case 2: b = c = a; break;
-    default: break;
+    case 0:
+      c = a + where * along;
+      break;  // a line, but for rounding
+    case 1:
+      c = b;
+      break;
+    case 2:
+      b = c = a;
+      break;
+    default:
+      break;
   }
   std::array<Point, 3> triangle = {a, b, c};
   std::rotate(triangle.begin(), triangle.begin() + static_cast<int>(test::uniform(rng, 0, 3)),
@@ -65,8 +73,8 @@ std::vector<TriangleMesh> thin_meshes() {
 
 // A point near a triangle of the mesh, at any scale.
 Point near_surface(const TriangleMesh& mesh, test::Rng* rng) {
-  const auto t = static_cast<std::size_t>(
-      test::uniform(rng, 0, 1) * static_cast<double>(mesh.triangles.size()));
+  const auto t = static_cast<std::size_t>(test::uniform(rng, 0, 1) *
+                                          static_cast<double>(mesh.triangles.size()));
   const double u = test::uniform(rng, 0, 1), v = test::uniform(rng, 0, 1 - u);
   return (1 - u - v) * mesh.corner(t, 0) + u * mesh.corner(t, 1) + v * mesh.corner(t, 2) +
          test::random_vector(rng, std::pow(10.0, test::uniform(rng, -8, -1)));

@@ -14,10 +14,9 @@ namespace ist {
 namespace {
 
 const std::vector<Shape>& shapes() {
-  static const std::vector<Shape> kShapes = {Box{{0.2, 0.1, 0.3}}, Cylinder{0.08, 0.25},
-                                             test::l_shape(0.2, 0.05),
-                                             test::torus(0.1, 0.03, 24, 12),
-                                             test::open_box({0.1, 0.1, 0.1})};
+  static const std::vector<Shape> kShapes = {
+      Box{{0.2, 0.1, 0.3}}, Cylinder{0.08, 0.25}, test::l_shape(0.2, 0.05),
+      test::torus(0.1, 0.03, 24, 12), test::open_box({0.1, 0.1, 0.1})};
   return kShapes;
 }
 

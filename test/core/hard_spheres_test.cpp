@@ -60,7 +60,8 @@ struct BallLink {
 double nearest_ball(const std::vector<Ball>& balls, const Point& p, bool outer) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const Ball& ball : balls) {
-    nearest = std::min(nearest, (p - ball.center).norm() - (outer ? ball.cover_radius : ball.radius));
+    nearest =
+        std::min(nearest, (p - ball.center).norm() - (outer ? ball.cover_radius : ball.radius));
   }
   return nearest;
 }
@@ -77,8 +78,8 @@ BallLink random_balls(test::Rng* rng, int count, double smallest, double largest
 }
 
 Point random_point(test::Rng* rng, const BallLink& link) {
-  const auto i = static_cast<std::size_t>(test::uniform(rng, 0, 1) *
-                                          static_cast<double>(link.balls.size()));
+  const auto i =
+      static_cast<std::size_t>(test::uniform(rng, 0, 1) * static_cast<double>(link.balls.size()));
   const Ball& ball = link.balls[i];
   const double reach = ball.radius * std::pow(10.0, test::uniform(rng, -3, 1));
   return ball.center + test::random_vector(rng, 1.0).normalized() *

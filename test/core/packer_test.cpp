@@ -61,9 +61,8 @@ void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, 
   const InnerSphereTree tree(packing);
   *worst_excess = 0.0;
   for (int i = 0; i < points; ++i) {
-    const Eigen::Vector3d p =
-        box.center() + (0.5 * box.sizes() + Eigen::Vector3d::Constant(margin))
-                           .cwiseProduct(test::random_vector(&rng, 1.0));
+    const Eigen::Vector3d p = box.center() + (0.5 * box.sizes() + Eigen::Vector3d::Constant(margin))
+                                                 .cwiseProduct(test::random_vector(&rng, 1.0));
     const double truth = test::oracle_signed_distance(mesh, p);
     double outer = 1e9;
     for (const Ball& ball : packing.balls) {
@@ -98,8 +97,8 @@ TEST(PackMesh, CertificateHoldsOnAnyMesh) {
 }
 
 TEST(PackMesh, InnerBallsOfClosedMeshesStayInside) {
-  for (const TriangleMesh& mesh : {test::box({0.1, 0.2, 0.3}), test::l_shape(0.2, 0.05),
-                                   test::torus(0.1, 0.03, 32, 16)}) {
+  for (const TriangleMesh& mesh :
+       {test::box({0.1, 0.2, 0.3}), test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 32, 16)}) {
     PackingConfig config;
     config.max_error = 0.004;
     for (const Ball& ball : pack_mesh(mesh, config).balls) {
@@ -172,8 +171,8 @@ TEST(PackMesh, RefusesAMeshWithoutTriangles) {
 
 TEST(PackElement, PrimitivesAreCoveredAsTheyAre) {
   test::Rng rng(8);
-  for (const Shape& shape : {Shape(Sphere{0.07}), Shape(Cylinder{0.05, 0.2}),
-                             Shape(Box{{0.1, 0.05, 0.2}})}) {
+  for (const Shape& shape :
+       {Shape(Sphere{0.07}), Shape(Cylinder{0.05, 0.2}), Shape(Box{{0.1, 0.05, 0.2}})}) {
     PackingConfig config;
     config.max_error = 0.004;
     const Packing packing = pack_element(shape, config);

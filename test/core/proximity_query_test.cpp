@@ -31,10 +31,17 @@ std::vector<Eigen::Vector3d> random_cloud(test::Rng* rng, int kind, int count) {
   for (int i = 0; i < count; ++i) {
     const double s = test::uniform(rng, -1, 1), t = test::uniform(rng, -1, 1);
     switch (kind % 4) {
-      case 0: points.push_back(test::random_vector(rng, 0.6)); break;      // a volume
-      case 1: points.push_back(middle + s * a + t * b); break;             // a plane
-      case 2: points.push_back(middle + s * a); break;                     // a line
-      default: points.push_back(middle + test::random_vector(rng, 0.05));  // a cluster
+      case 0:
+        points.push_back(test::random_vector(rng, 0.6));
+        break;  // a volume
+      case 1:
+        points.push_back(middle + s * a + t * b);
+        break;  // a plane
+      case 2:
+        points.push_back(middle + s * a);
+        break;  // a line
+      default:
+        points.push_back(middle + test::random_vector(rng, 0.05));  // a cluster
     }
   }
   return points;
@@ -46,8 +53,8 @@ std::vector<Eigen::Vector3d> stored_points(const CloudSnapshot& snapshot,
   std::vector<Eigen::Vector3d> points;
   for (const PointTile& tile : snapshot.index.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      points.push_back(X_LF * (snapshot.index.origin() +
-                               Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k])));
+      points.push_back(
+          X_LF * (snapshot.index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k])));
     }
   }
   return points;
@@ -82,7 +89,8 @@ TEST_P(AgainstOracle, RandomScenes) {
         test::make_snapshot(random_cloud(&rng, scene, 1 + scene * 7), test::random_vector(&rng, 1));
     for (int step = 0; step < 4; ++step) {  // later steps start warm
       for (Eigen::Isometry3d& X : X_FL) {
-        X = step == 0 ? test::random_pose(&rng, 0.4) : Eigen::Isometry3d(X * test::random_pose(&rng, 0.01));
+        X = step == 0 ? test::random_pose(&rng, 0.4)
+                      : Eigen::Isometry3d(X * test::random_pose(&rng, 0.01));
       }
       ASSERT_TRUE(query.run(X_FL, known, {&snapshot}, &results));
       for (std::size_t i = 0; i < meshes.size(); ++i) {
@@ -141,8 +149,8 @@ TEST(ProximityQuery, SeveralCloudsAreOneObstacle) {
   QueryConfig config;
   config.tolerance = 0.0;
   ProximityQuery query(model, config);
-  const CloudSnapshot far = test::make_snapshot({{0.9, 0, 0}}), near = test::make_snapshot({{0, 0.5, 0}}),
-                      nothing = test::make_snapshot({});
+  const CloudSnapshot far = test::make_snapshot({{0.9, 0, 0}}),
+                      near = test::make_snapshot({{0, 0.5, 0}}), nothing = test::make_snapshot({});
   const std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
   std::vector<LinkProximity> results;
   query.run(X_FL, {true, true}, {&far, &nothing, &near}, &results);
@@ -237,7 +245,8 @@ TEST(ProximityQuery, FarFromTheOriginNothingIsLost) {
   const std::vector<Eigen::Vector3d> points = random_cloud(&rng, 0, 500);
   std::vector<Eigen::Vector3d> far_points;
   for (const Eigen::Vector3d& p : points) far_points.push_back(p + far);
-  const CloudSnapshot here = test::make_snapshot(points), there = test::make_snapshot(far_points, far);
+  const CloudSnapshot here = test::make_snapshot(points),
+                      there = test::make_snapshot(far_points, far);
   std::vector<Eigen::Isometry3d> X_here(model->links.size()), X_there;
   for (Eigen::Isometry3d& X : X_here) {
     X = test::random_pose(&rng, 0.5);
@@ -251,8 +260,8 @@ TEST(ProximityQuery, FarFromTheOriginNothingIsLost) {
 }
 
 TEST(ProximityQuery, PointsOnTheSurfaceAndAtCentres) {
-  const auto model =
-      test::make_model({Sphere{0.1}, Box{{0.2, 0.2, 0.2}}, Shape(test::box({0.2, 0.2, 0.2}))}, 0.005);
+  const auto model = test::make_model(
+      {Sphere{0.1}, Box{{0.2, 0.2, 0.2}}, Shape(test::box({0.2, 0.2, 0.2}))}, 0.005);
   QueryConfig config;
   config.tolerance = 0.0;
   ProximityQuery query(model, config);

@@ -40,15 +40,16 @@ TEST(RandomCases, BoundsHoldAndZeroToleranceIsExact) {
       known[i] = true;
       const std::vector<Eigen::Vector3d> points = test::random_points(
           &rng, links[i], 1 + static_cast<int>(std::pow(test::uniform(&rng, 0, 1), 3) * 40));
-      const CloudSnapshot cloud =
-          test::make_snapshot(points, test::random_vector(&rng, 0.1));
+      const CloudSnapshot cloud = test::make_snapshot(points, test::random_vector(&rng, 0.1));
       Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
       for (int step = 0; step < kSteps; ++step, ++cases) {
         const QueryConfig config = random_config(&rng);
         query.set_config(config);
-        ASSERT_TRUE(query.run(std::vector<Eigen::Isometry3d>(count, X_FL), known, {&cloud}, &results));
-        SCOPED_TRACE(::testing::Message() << "case " << cases << ", link " << i << ", " << points.size()
-                                          << " points, tolerance " << config.tolerance);
+        ASSERT_TRUE(
+            query.run(std::vector<Eigen::Isometry3d>(count, X_FL), known, {&cloud}, &results));
+        SCOPED_TRACE(::testing::Message()
+                     << "case " << cases << ", link " << i << ", " << points.size()
+                     << " points, tolerance " << config.tolerance);
         const test::Truth truth = test::truth_of(links[i], X_FL, points, cloud);
         test::expect_truth(results[i], truth, config, X_FL, kRounding);
         contacts += results[i].state == LinkState::kContact ? 1 : 0;

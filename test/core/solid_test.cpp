@@ -56,9 +56,9 @@ TEST(Solid, CylinderIsTheCylinder) {
 }
 
 TEST(Solid, NormalIsDefinedOnTheSurfaceAndAtCentres) {
-  for (const Shape& shape : {Shape(Box{{0.2, 0.2, 0.2}}), Shape(Cylinder{0.1, 0.2}),
-                             Shape(Sphere{0.1}), Shape(test::box({0.2, 0.2, 0.2})),
-                             Shape(test::inside_out(test::box({0.2, 0.2, 0.2})))}) {
+  for (const Shape& shape :
+       {Shape(Box{{0.2, 0.2, 0.2}}), Shape(Cylinder{0.1, 0.2}), Shape(Sphere{0.1}),
+        Shape(test::box({0.2, 0.2, 0.2})), Shape(test::inside_out(test::box({0.2, 0.2, 0.2})))}) {
     const Solid solid = solid_of(shape);
     for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.1, 0, 0), Eigen::Vector3d(0, 0, 0)}) {
       const SignedDistance result = solid.signed_distance(p);
@@ -83,8 +83,8 @@ TEST(Solid, UnionTakesTheNearestOutsideAndTheDeepestInside) {
 
 TEST(Solid, MeshEqualsBruteForceInsideAndOut) {
   test::Rng rng(5);
-  for (const TriangleMesh& mesh :
-       {test::l_shape(0.3, 0.06), test::torus(0.2, 0.06, 30, 16), test::open_box({0.2, 0.2, 0.3})}) {
+  for (const TriangleMesh& mesh : {test::l_shape(0.3, 0.06), test::torus(0.2, 0.06, 30, 16),
+                                   test::open_box({0.2, 0.2, 0.3})}) {
     const Solid solid = solid_of(mesh);
     for (int i = 0; i < 500; ++i) {
       const Eigen::Vector3d p = test::random_vector(&rng, 0.3);

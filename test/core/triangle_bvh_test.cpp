@@ -33,10 +33,10 @@ TEST(TriangleBvh, ClosestPointEqualsBruteForce) {
       const double expected = test::oracle_distance(mesh, p);
       ASSERT_NEAR(std::sqrt(closest.distance_sq), expected, 1e-12);
       ASSERT_NEAR((closest.point - p).norm(), expected, 1e-12);
-      ASSERT_LT(test::oracle_triangle(closest.point, mesh.corner(closest.triangle, 0),
-                                      mesh.corner(closest.triangle, 1),
-                                      mesh.corner(closest.triangle, 2)),
-                1e-9)
+      ASSERT_LT(
+          test::oracle_triangle(closest.point, mesh.corner(closest.triangle, 0),
+                                mesh.corner(closest.triangle, 1), mesh.corner(closest.triangle, 2)),
+          1e-9)
           << "the witness lies on the triangle that is named";
     }
   }

@@ -4,7 +4,7 @@ Every node runs in a namespace of its own, with its own /tf, so that no test see
 Nothing here sleeps and hopes: tests wait for a condition, with a timeout that a busy machine can keep.
 """
 
-import os
+import atexit
 import shutil
 import signal
 import subprocess
@@ -229,6 +229,7 @@ class ProximityNode:
             stdout=self._log,
             stderr=subprocess.STDOUT,
         )
+        atexit.register(self.process.kill)  # a test that fails leaves nothing behind
 
     def subscribe(self, topic, kind, callback):
         subscriber = rospy.Subscriber(self.name + "/" + topic, kind, callback, queue_size=200)

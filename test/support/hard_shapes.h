@@ -40,8 +40,8 @@ class MeshBuilder {
 };
 
 /// Chazelle's polyhedron (1984): a block with `notches` wedges cut into its top along x and as many
-/// into its bottom along y. The wedges' edges are rulings of the saddle z = x y, `gap` [m] apart, so
-/// that it falls into no fewer than about notches^2 convex parts. `size` [m] wide.
+/// into its bottom along y. The wedges' edges are rulings of the saddle z = x y, `gap` [m] apart,
+/// so that it falls into no fewer than about notches^2 convex parts. `size` [m] wide.
 inline TriangleMesh chazelle(int notches, double gap, double size) {
   using Point = Eigen::Vector3d;
   const double side = notches + 1, half_width = 0.04;
@@ -55,7 +55,8 @@ inline TriangleMesh chazelle(int notches, double gap, double size) {
     const auto point = [&](double u, double v, double w) { return Point(unit * to_xyz(u, v, w)); };
     const auto low = [&](double u, int i) { return point(u, i, slope * i * u + shift); };
     const auto strip = [&](double v0, double v1) {
-      builder.quad(point(0, v0, top), point(side, v0, top), point(side, v1, top), point(0, v1, top));
+      builder.quad(point(0, v0, top), point(side, v0, top), point(side, v1, top),
+                   point(0, v1, top));
     };
     strip(0.0, 1.0 - half_width);
     for (int i = 1; i <= notches; ++i) {

@@ -52,8 +52,8 @@ inline double oracle_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a
 inline double oracle_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    nearest = std::min(
-        nearest, oracle_triangle(p, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)));
+    nearest = std::min(nearest,
+                       oracle_triangle(p, mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)));
   }
   return nearest;
 }

@@ -56,7 +56,8 @@ inline std::vector<Eigen::Vector3f> read_pcd(const std::string& path) {
     }
   }
   std::uint32_t sizes[2];
-  if (!file.read(reinterpret_cast<char*>(sizes), 8)) throw std::runtime_error("cannot read " + path);
+  if (!file.read(reinterpret_cast<char*>(sizes), 8))
+    throw std::runtime_error("cannot read " + path);
   std::vector<std::uint8_t> packed(sizes[0]);
   file.read(reinterpret_cast<char*>(packed.data()), static_cast<std::streamsize>(packed.size()));
   const std::vector<std::uint8_t> data = decompress_lzf(packed, sizes[1]);

@@ -46,12 +46,17 @@ inline LinkGeometry random_compound(Rng* rng) {
 
 /// Primitives, closed, concave, thin, crossing, compound, and meshes with holes.
 inline std::vector<LinkGeometry> random_links(Rng* rng) {
-  std::vector<LinkGeometry> links = {
-      one(Box{{0.2, 0.1, 0.05}}), one(Cylinder{0.05, 0.2}), one(Cylinder{0.15, 0.002}),
-      one(Sphere{0.1}), one(box({0.2, 0.1, 0.05})), one(l_shape(0.2, 0.04)),
-      one(torus(0.1, 0.03, 10, 6)), one(thin_plate(0.2, 1e-4)), one(needle(0.3, 0.005)),
-      one(joined(box({0.2, 0.1, 0.05}), l_shape(0.1, 0.05))),
-      one(inside_out(box({0.1, 0.1, 0.1})))};
+  std::vector<LinkGeometry> links = {one(Box{{0.2, 0.1, 0.05}}),
+                                     one(Cylinder{0.05, 0.2}),
+                                     one(Cylinder{0.15, 0.002}),
+                                     one(Sphere{0.1}),
+                                     one(box({0.2, 0.1, 0.05})),
+                                     one(l_shape(0.2, 0.04)),
+                                     one(torus(0.1, 0.03, 10, 6)),
+                                     one(thin_plate(0.2, 1e-4)),
+                                     one(needle(0.3, 0.005)),
+                                     one(joined(box({0.2, 0.1, 0.05}), l_shape(0.1, 0.05))),
+                                     one(inside_out(box({0.1, 0.1, 0.1})))};
   for (int i = 0; i < 4; ++i) links.push_back(one(random_lump(rng)));
   for (int i = 0; i < 2; ++i) links.push_back(random_compound(rng));
   links.push_back(one(sheet(0.2)));
@@ -95,12 +100,12 @@ inline std::vector<Eigen::Vector3d> random_points(Rng* rng, const LinkGeometry& 
     } else if (kind == 2) {
       points.push_back(middle + random_vector(rng, size));
     } else if (kind == 3 && mesh != nullptr) {
-      const auto triangle = static_cast<std::size_t>(
-          uniform(rng, 0, 1) * static_cast<double>(mesh->triangles.size()));
+      const auto triangle = static_cast<std::size_t>(uniform(rng, 0, 1) *
+                                                     static_cast<double>(mesh->triangles.size()));
       const double a = uniform(rng, 0, 1), b = uniform(rng, 0, 1 - a);
-      points.push_back(link[0].X_LE * ((1 - a - b) * mesh->corner(triangle, 0) +
-                                       a * mesh->corner(triangle, 1) +
-                                       b * mesh->corner(triangle, 2)) +
+      points.push_back(link[0].X_LE *
+                           ((1 - a - b) * mesh->corner(triangle, 0) +
+                            a * mesh->corner(triangle, 1) + b * mesh->corner(triangle, 2)) +
                        random_vector(rng, size));
     } else {
       points.push_back(random_vector(rng, kind == 4 ? 0.12 : 0.6));

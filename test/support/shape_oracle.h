@@ -36,8 +36,8 @@ inline double oracle_signed_distance(const LinkGeometry& link, const Eigen::Vect
   for (const GeometryElement& element : link) {
     const Eigen::Vector3d p_E = element.X_LE.inverse() * p_L;
     smallest = std::min(
-        smallest, std::visit([&](const auto& s) { return oracle_signed_distance(s, p_E); },
-                             element.shape));
+        smallest,
+        std::visit([&](const auto& s) { return oracle_signed_distance(s, p_E); }, element.shape));
   }
   return smallest;
 }

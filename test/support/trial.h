@@ -44,8 +44,7 @@ inline void expect_witness(const LinkProximity& result, const Eigen::Isometry3d&
 ///                  mesh a point lies
 /// @param size      [m] of the link, where it is large
 inline void expect_truth(const LinkProximity& result, const Truth& truth, const QueryConfig& config,
-                         const Eigen::Isometry3d& X_FL, double rounding = 2e-8,
-                         double size = 1.0) {
+                         const Eigen::Isometry3d& X_FL, double rounding = 2e-8, double size = 1.0) {
   ASSERT_NE(result.state, LinkState::kUnknown);
   EXPECT_LE(result.lower_bound, truth.measured + rounding);
   EXPECT_LE(result.lower_bound, result.distance);

@@ -25,7 +25,7 @@ constexpr std::size_t kPandaLinks = 11;
 constexpr std::size_t kTruthPoses = 100;
 
 struct TruthRecord {
-  double distance;          ///< [m] unsigned, surface to cloud
+  double distance;  ///< [m] unsigned, surface to cloud
   std::int32_t points_inside;
 };
 
@@ -35,8 +35,9 @@ struct TruthCase {
 };
 
 inline const char* panda_mesh(std::size_t link) {
-  constexpr const char* kNames[kPandaLinks] = {"link0", "link1", "link2", "link3",  "link4", "link5",
-                                               "link6", "link7", "hand",  "finger", "finger"};
+  constexpr const char* kNames[kPandaLinks] = {"link0", "link1",  "link2", "link3",
+                                               "link4", "link5",  "link6", "link7",
+                                               "hand",  "finger", "finger"};
   return kNames[link];
 }
 
@@ -46,8 +47,8 @@ inline std::shared_ptr<RobotModel> panda_model(const std::filesystem::path& data
   RobotDescription description;
   description.name = "panda";
   for (std::size_t i = 0; i < kPandaLinks; ++i) {
-    const auto file = data / "robots/franka_description/meshes/visual" /
-                      (std::string(panda_mesh(i)) + ".dae");
+    const auto file =
+        data / "robots/franka_description/meshes/visual" / (std::string(panda_mesh(i)) + ".dae");
     LinkDescription link;
     link.name = panda_mesh(i) + std::to_string(i);
     link.geometry = {
@@ -63,7 +64,8 @@ inline CloudSnapshot truth_cloud(const std::filesystem::path& data, const std::s
   Eigen::Matrix4d X = Eigen::Matrix4d::Identity();
   std::ifstream file(data / "clouds/T_base_cam.txt");
   for (int i = 0; i < 16; ++i) file >> X(i / 4, i % 4);
-  const std::vector<Eigen::Vector3f> points = read_pcd((data / "clouds" / (name + ".pcd")).string());
+  const std::vector<Eigen::Vector3f> points =
+      read_pcd((data / "clouds" / (name + ".pcd")).string());
   std::vector<float> x, y, z;
   std::vector<std::uint32_t> id;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -91,8 +93,8 @@ inline std::vector<TruthCase> truth_cases(const std::filesystem::path& data,
     for (std::size_t link = 0; link < kPandaLinks; ++link) {
       Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
       for (int i = 0; i < 12; ++i) {
-        X.matrix()(i / 4, i % 4) = poses.values.at((k * stride * kPandaLinks + link) * 12 +
-                                                   static_cast<std::size_t>(i));
+        X.matrix()(i / 4, i % 4) =
+            poses.values.at((k * stride * kPandaLinks + link) * 12 + static_cast<std::size_t>(i));
       }
       cases[k].X_FL.push_back(X);
       char record[40];

@@ -6,8 +6,8 @@ namespace ist {
 
 /// A closed mesh inside a primitive, with how far the primitive's surface leaves it.
 struct Tessellation {
-  TriangleMesh mesh;        ///< every triangle lies inside or on the primitive
-  double deviation = 0.0;   ///< [m] largest distance from a point of the primitive to the mesh
+  TriangleMesh mesh;       ///< every triangle lies inside or on the primitive
+  double deviation = 0.0;  ///< [m] largest distance from a point of the primitive to the mesh
 };
 
 /// The 12 triangles of a box; deviation 0.

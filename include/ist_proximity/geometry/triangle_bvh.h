@@ -34,9 +34,8 @@ class TriangleBvh {
 
   /// Nearest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
   /// @returns distance_sq = inf when there is none.
-  ClosestPoint closest(
-      const Eigen::Vector3d& p_M,
-      double max_distance_sq = std::numeric_limits<double>::infinity()) const;
+  ClosestPoint closest(const Eigen::Vector3d& p_M,
+                       double max_distance_sq = std::numeric_limits<double>::infinity()) const;
 
   /// Generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. By a hierarchical expansion of second order (Barill et al. 2018); error

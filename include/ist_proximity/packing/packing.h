@@ -25,12 +25,12 @@ struct Ball {
 
 /// What is known for certain about a packing.
 struct PackingCertificate {
-  double max_gap = 0.0;        ///< [m] proven: no surface point is farther from the inner balls
-  double mean_gap = 0.0;       ///< [m] area-weighted mean of the per-patch bounds
-  double interior_gap = 0.0;   ///< [m] proven: no interior point is farther from the outer balls
+  double max_gap = 0.0;           ///< [m] proven: no surface point is farther from the inner balls
+  double mean_gap = 0.0;          ///< [m] area-weighted mean of the per-patch bounds
+  double interior_gap = 0.0;      ///< [m] proven: no interior point is farther from the outer balls
   double unreachable_area = 0.0;  ///< [m^2] surface only balls of radius 0 reach (sheets, flaps)
-  double surface_area = 0.0;   ///< [m^2]
-  bool reached = false;        ///< max_gap <= max_error
+  double surface_area = 0.0;      ///< [m^2]
+  bool reached = false;           ///< max_gap <= max_error
 };
 
 /// Inner and outer balls of one link or element.

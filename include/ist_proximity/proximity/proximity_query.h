@@ -29,14 +29,15 @@ enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kCont
 /// Answer for one link; vectors and points in the fixed frame F unless said.
 struct LinkProximity {
   LinkState state = LinkState::kUnknown;
-  double distance;     ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
-  double lower_bound;  ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
-  Eigen::Vector3d p_FL;       ///< [m] witness on the link; NaN unless NEAR or CONTACT
-  Eigen::Vector3d p_LL;       ///< [m] the same in the link's own frame
-  Eigen::Vector3d p_FO;       ///< [m] witness on the obstacle
-  Eigen::Vector3d direction;  ///< unit, the way the link should go: p_FL - p_FO = distance * direction
-  std::int32_t source = -1;   ///< index of the snapshot the nearest point is in
-  std::uint32_t point = 0;    ///< id of that point in its message
+  double distance;       ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
+  double lower_bound;    ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
+  Eigen::Vector3d p_FL;  ///< [m] witness on the link; NaN unless NEAR or CONTACT
+  Eigen::Vector3d p_LL;  ///< [m] the same in the link's own frame
+  Eigen::Vector3d p_FO;  ///< [m] witness on the obstacle
+  Eigen::Vector3d
+      direction;  ///< unit, the way the link should go: p_FL - p_FO = distance * direction
+  std::int32_t source = -1;  ///< index of the snapshot the nearest point is in
+  std::uint32_t point = 0;   ///< id of that point in its message
 
   LinkProximity() { reset(); }
   void reset();  ///< to UNKNOWN
@@ -44,8 +45,8 @@ struct LinkProximity {
 
 /// What a query cost, for tuning and tests.
 struct QueryStatistics {
-  std::uint64_t node_pairs = 0;   ///< pairs of tree node and box expanded
-  std::uint64_t leaf_pairs = 0;   ///< ball leaf against point tile
+  std::uint64_t node_pairs = 0;         ///< pairs of tree node and box expanded
+  std::uint64_t leaf_pairs = 0;         ///< ball leaf against point tile
   std::uint64_t exact_evaluations = 0;  ///< point against the link's exact geometry
 };
 

@@ -25,9 +25,9 @@ struct alignas(32) SphereNode {
 /// A leaf: up to eight balls.
 struct alignas(32) SphereLeaf {
   float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres, link frame
-  float inner[kSphereWidth];  ///< [m] inner radius, rounded down
-  float outer[kSphereWidth];  ///< [m] cover radius, rounded up
-  std::int32_t count;         ///< used slots
+  float inner[kSphereWidth];                                ///< [m] inner radius, rounded down
+  float outer[kSphereWidth];                                ///< [m] cover radius, rounded up
+  std::int32_t count;                                       ///< used slots
 };
 
 /// The Inner Sphere Tree of one link: flat, wide, float, in the link's frame.
