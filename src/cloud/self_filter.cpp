@@ -129,9 +129,12 @@ SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vec
 }
 
 bool SelfFilter::ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L) const {
-  const Solid& solid = link.model->solid;
+  const LinkModel& model = *link.model;
   const double just_beyond = padding_ + kRounding;
-  return solid.distance_outside(p_L, just_beyond).distance <= padding_ || solid.is_inside(p_L);
+  if (model.solid.distance_outside(p_L, just_beyond).distance <= padding_) return true;
+  // Beyond the padding from the surface: outside, where the tree can tell, or deep inside.
+  const double gap = model.tree.interior_gap();
+  return model.tree.outer_distance(p_L, gap) <= gap && model.solid.is_inside(p_L);
 }
 
 }  // namespace ist

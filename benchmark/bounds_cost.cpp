@@ -1,0 +1,74 @@
+// What the bounds cost, as a Markdown table: a query that wants no more than some point's distance,
+// against ones that narrow it down, in free space and in contact.
+//
+// Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: bounds_cost [max_error_mm]
+
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support.h"
+#include "support/data_dir.h"
+#include "support/truth.h"
+
+namespace {
+
+using ist::benchmark::Clock;
+using ist::benchmark::microseconds_since;
+using ist::benchmark::quantile;
+
+struct Mode {
+  const char* name;
+  double tolerance;  // [m]
+};
+
+// With a tolerance beyond all distances the first point found will do; contact is decided still.
+constexpr Mode kModes[] = {
+    {"upper bound only", 100.0}, {"5 mm", 0.005}, {"1 mm", 0.001}, {"exact", 0.0}};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto data = ist::test::data_dir();
+  if (!data) {
+    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
+    return 1;
+  }
+  const double max_error = argc > 1 ? 1e-3 * std::atof(argv[1]) : 0.005;
+  const auto model = ist::test::panda_model(*data, max_error);
+  const std::vector<bool> known(ist::test::kPandaLinks, true);
+  std::printf(
+      "| wanted | free median / p99 | in contact median / p99 | exact evaluations free / in "
+      "contact |\n|---|---|---|---|\n");
+  for (const Mode& mode : kModes) {
+    std::vector<double> us[2], evaluations[2];  // free, in contact
+    for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
+      const ist::CloudSnapshot cloud = ist::test::truth_cloud(*data, name);
+      for (const char* motion : {"traj", "rand"}) {
+        ist::QueryConfig config;
+        config.max_distance = 10.0;
+        config.tolerance = mode.tolerance;
+        ist::ProximityQuery query(model, config);
+        std::vector<ist::LinkProximity> results;
+        for (const ist::test::TruthCase& truth : ist::test::truth_cases(*data, name, motion)) {
+          const Clock::time_point start = Clock::now();
+          query.run(truth.X_FL, known, {&cloud}, &results);
+          const double elapsed = microseconds_since(start);
+          bool contact = false;
+          for (const ist::test::TruthRecord& link : truth.links) {
+            contact = contact || link.points_inside > 0;
+          }
+          us[contact ? 1 : 0].push_back(elapsed);
+          evaluations[contact ? 1 : 0].push_back(
+              static_cast<double>(query.statistics().exact_evaluations));
+        }
+      }
+    }
+    std::printf("| %s | %.0f / %.0f us | %.0f / %.0f us | %.0f / %.0f |\n", mode.name,
+                quantile(us[0], 0.5), quantile(us[0], 0.99), quantile(us[1], 0.5),
+                quantile(us[1], 0.99), quantile(evaluations[0], 0.5),
+                quantile(evaluations[1], 0.5));
+  }
+  return 0;
+}
