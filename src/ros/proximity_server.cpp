@@ -15,6 +15,7 @@ namespace {
 using ist_proximity::ProximityArray;
 
 constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
+constexpr std::chrono::seconds kFirstSpheresDelay(1), kLastSpheresDelay(4);  // after a clock jump
 constexpr std::size_t kMaxSpheresPerLink = 250;         // one marker each
 
 std::string without_leading_slash(const std::string& name) {
@@ -83,10 +84,7 @@ void ProximityServer::run_cycle() {
   const ros::Time now = ros::Time::now();
   notice_clock_jump(now);
   take_model();
-  if (Clock::now() >= spheres_again_) {
-    spheres_again_ = Clock::time_point::max();
-    spheres_.publish(shown_spheres_);
-  }
+  publish_spheres_again();
   const auto message = boost::make_shared<ProximityArray>();
   const std::string transform_problem = listener_.problem();
   {
@@ -105,8 +103,22 @@ void ProximityServer::run_cycle() {
 /// The sources look after themselves.
 void ProximityServer::notice_clock_jump(const ros::Time& now) {
   listener_.notice_clock_jump();
-  if (now < last_now_ && cycle_) cycle_->forget();
+  if (now < last_now_) {
+    if (cycle_) cycle_->forget();
+    spheres_delay_ = kFirstSpheresDelay;
+    spheres_again_ = Clock::now() + spheres_delay_;
+  }
   last_now_ = now;
+}
+
+/// When the clock jumps back, rviz forgets all markers, some time later and however they were
+/// latched.
+void ProximityServer::publish_spheres_again() {
+  if (Clock::now() < spheres_again_) return;
+  spheres_.publish(shown_spheres_);
+  spheres_delay_ *= 2;
+  spheres_again_ = spheres_delay_ <= kLastSpheresDelay ? Clock::now() + spheres_delay_
+                                                       : Clock::time_point::max();
 }
 
 void ProximityServer::take_model() {

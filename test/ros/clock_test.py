@@ -10,6 +10,7 @@ import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
 from rosgraph_msgs.msg import Clock
+from visualization_msgs.msg import MarkerArray
 
 
 class SimulatedClock:
@@ -57,6 +58,10 @@ class ClockTest(unittest.TestCase):
         world.start_clouds()
         node.wait_for_status(ProximityArray.OK)
 
+        spheres = []
+        node.subscribe("spheres", MarkerArray, spheres.append)
+        pt.wait_until(lambda: spheres, "~spheres")
+
         # The clock stands still: answers go on, and nothing becomes stale.
         clock.step = 0.0
         frozen = self.count_messages(node, 100)[20:]
@@ -82,6 +87,9 @@ class ClockTest(unittest.TestCase):
                 and abs(pt.link(m, "ball_link").distance - (0.25 + 0.05 * i)) < 1e-5,
                 "the new cloud",
             )
+
+        shown = len(spheres)
+        pt.wait_until(lambda: len(spheres) > shown, "~spheres again: rviz has forgotten them")
 
         # Transforms from before a jump that come in after it, and such of the far future, whose
         # distance ros::Duration cannot hold: tf would take them for the newest, and refuse the

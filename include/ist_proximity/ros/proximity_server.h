@@ -50,6 +50,7 @@ class ProximityServer {
   void take_model();
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void publish_spheres();
+  void publish_spheres_again();
   void run_diagnostics();
   void read_repulsion_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -72,6 +73,7 @@ class ProximityServer {
   ProximityMarkers marker_drawer_;
   visualization_msgs::MarkerArray shown_spheres_;
   Clock::time_point spheres_again_ = Clock::time_point::max();  ///< when to latch them anew
+  std::chrono::seconds spheres_delay_{0};
   Clock::time_point next_markers_;
   ros::Time last_now_;
 
