@@ -14,9 +14,9 @@ namespace {
 
 using ist_proximity::ProximityArray;
 
-constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
+constexpr std::chrono::milliseconds kMarkerPeriod(40);                       // rviz draws no faster
 constexpr std::chrono::seconds kFirstSpheresDelay(1), kLastSpheresDelay(4);  // after a clock jump
-constexpr std::size_t kMaxSpheresPerLink = 250;         // one marker each
+constexpr std::size_t kMaxSpheresPerLink = 250;                              // one marker each
 
 std::string without_leading_slash(const std::string& name) {
   return !name.empty() && name[0] == '/' ? name.substr(1) : name;

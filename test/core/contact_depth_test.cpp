@@ -77,7 +77,6 @@ TEST(ContactDepth, EqualsTheTruthInEveryContact) {
   const std::vector<LinkTruth> meshes = panda_meshes(*data);
   const auto model = test::panda_model(*data, 0.005);
   const std::vector<bool> known(test::kPandaLinks, true);
-  const std::size_t step = test::kSanitized ? 20 : 1;
   std::size_t contacts = 0, checked = 0, wrong = 0;
   double largest_error = 0.0;
   for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
@@ -91,7 +90,7 @@ TEST(ContactDepth, EqualsTheTruthInEveryContact) {
       coarse.tolerance = 0.005;
       ProximityQuery exact_query(model, exact), coarse_query(model, coarse);
       std::vector<LinkProximity> results, coarse_results;
-      for (std::size_t c = 0; c < cases.size(); c += step) {
+      for (std::size_t c = 0; c < cases.size(); c += test::kStride) {
         const std::vector<Eigen::Isometry3d> X_FL = rotations(cases[c].X_FL);
         exact_query.run(X_FL, known, {&cloud}, &results);
         coarse_query.run(X_FL, known, {&cloud}, &coarse_results);

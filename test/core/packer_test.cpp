@@ -11,6 +11,7 @@
 #include "ist_proximity/tree/inner_sphere_tree.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -83,7 +84,7 @@ void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, 
 TEST(PackMesh, CertificateHoldsOnAnyMesh) {
   for (const auto& [name, mesh] : hostile_meshes()) {
     SCOPED_TRACE(name);
-    for (const double max_error : {0.01, 0.003}) {
+    for (const double max_error : {test::packed_to(0.01), test::packed_to(0.003)}) {
       PackingConfig config;
       config.max_error = max_error;
       const Packing packing = pack_mesh(mesh, config);

@@ -20,6 +20,7 @@
 #include "robot/link_packing.h"
 #include "support/data_dir.h"
 #include "support/meshes.h"
+#include "support/sanitizers.h"
 #include "support/temp_dir.h"
 
 namespace ist {
@@ -104,7 +105,7 @@ TEST(RobotModel, buildsEveryLinkThatHasGeometry) {
     EXPECT_EQ(l.solid.empty(), !l.usable());
     EXPECT_FALSE(l.from_cache);
     if (!l.usable()) continue;
-    EXPECT_LE(l.packing.certificate.max_gap, 0.005) << l.name;
+    EXPECT_LE(l.packing.certificate.max_gap, config.packing.max_error) << l.name;
     EXPECT_TRUE(l.packing.certificate.reached) << l.name;
   }
   EXPECT_NE(model->links[2].error.find("a.stl"), std::string::npos);
@@ -364,12 +365,14 @@ TEST(RobotModelPanda, packsAllElevenLinks) {
   const RobotDescription description = parse_urdf(
       urdf.str(), GeometrySource::kVisual,
       [&](const std::string& name) { return name == "franka_description" ? package : ""; });
-  const auto model = build_robot_model(description, {});
+  RobotModelConfig config;
+  config.packing.max_error = test::packed_to(config.packing.max_error);
+  const auto model = build_robot_model(description, config);
   ASSERT_EQ(model->links.size(), 11U);
   for (const LinkModel& l : model->links) {
     EXPECT_TRUE(l.usable()) << l.error;
     EXPECT_TRUE(l.packing.certificate.reached) << l.name;
-    EXPECT_LE(l.packing.certificate.max_gap, 0.005) << l.name;
+    EXPECT_LE(l.packing.certificate.max_gap, config.packing.max_error) << l.name;
     EXPECT_GE(l.packing.balls.size(), 10U) << l.name;
     EXPECT_LE(l.packing.balls.size(), 20000U) << l.name;
   }

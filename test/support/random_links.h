@@ -8,6 +8,7 @@
 #include "ist_proximity/robot/robot_model.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 /// Small links of every kind, for as many cases as an oracle that tries every triangle can take.
@@ -79,7 +80,7 @@ inline std::shared_ptr<const RobotModel> model_of(const std::vector<LinkGeometry
     description.links.push_back(std::move(link));
   }
   RobotModelConfig config;
-  config.packing.max_error = max_error;
+  config.packing.max_error = packed_to(max_error);
   return build_robot_model(description, config);
 }
 

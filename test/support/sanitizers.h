@@ -14,4 +14,10 @@ constexpr bool kSanitized = false;
 /// `count`, or a twentieth under a sanitizer.
 constexpr int scaled(int count) { return kSanitized ? (count + 19) / 20 : count; }
 
+/// Of a list of cases every one, or every twentieth under a sanitizer.
+constexpr std::size_t kStride = kSanitized ? 20 : 1;
+
+/// [m] Packing takes longest under a sanitizer: links are packed more coarsely there.
+constexpr double packed_to(double max_error) { return kSanitized ? 4.0 * max_error : max_error; }
+
 }  // namespace ist::test

@@ -11,6 +11,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/packing/packer.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "support/sanitizers.h"
 
 /// Small robots and clouds for tests.
 namespace ist::test {
@@ -41,7 +42,7 @@ inline std::shared_ptr<RobotModel> make_model(const std::vector<Shape>& shapes, 
     LinkModel link;
     link.name = "link" + std::to_string(model->links.size());
     PackingConfig config;
-    config.max_error = max_error;
+    config.max_error = packed_to(max_error);
     link.packing = pack_element(shape, config);
     link.tree = InnerSphereTree(link.packing);
     link.solid = Solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});

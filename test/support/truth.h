@@ -17,6 +17,7 @@
 #include "ist_proximity/robot/robot_model.h"
 #include "support/npy.h"
 #include "support/pcd.h"
+#include "support/sanitizers.h"
 
 /// The Franka Panda among real Kinect frames, with exact distances computed in double precision.
 namespace ist::test {
@@ -56,7 +57,7 @@ inline std::shared_ptr<RobotModel> panda_model(const std::filesystem::path& data
     description.links.push_back(std::move(link));
   }
   RobotModelConfig config;
-  config.packing.max_error = max_error;
+  config.packing.max_error = packed_to(max_error);
   return std::make_shared<RobotModel>(*build_robot_model(description, config));
 }
 
