@@ -8,6 +8,7 @@
 
 #include "support/meshes.h"
 #include "support/oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -84,7 +85,7 @@ TEST_P(AgainstOracle, RandomScenes) {
   std::vector<Eigen::Isometry3d> X_FL(meshes.size());
   const std::vector<bool> known(meshes.size(), true);
   int clear = 0, near = 0, contact = 0;
-  for (int scene = 0; scene < 60; ++scene) {
+  for (int scene = 0; scene < test::scaled(60); ++scene) {
     const CloudSnapshot snapshot =
         test::make_snapshot(random_cloud(&rng, scene, 1 + scene * 7), test::random_vector(&rng, 1));
     for (int step = 0; step < 4; ++step) {  // later steps start warm
@@ -113,9 +114,9 @@ TEST_P(AgainstOracle, RandomScenes) {
       }
     }
   }
-  EXPECT_GT(clear, 50);
-  EXPECT_GT(near, 200);
-  EXPECT_GT(contact, 50);
+  EXPECT_GT(clear, test::scaled(50));
+  EXPECT_GT(near, test::scaled(200));
+  EXPECT_GT(contact, test::scaled(50));
 }
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, AgainstOracle, ::testing::Values(0.0, 0.001, 0.02));
@@ -131,7 +132,7 @@ TEST(ProximityQuery, WarmStartNeverChangesTheAnswer) {
   std::vector<Eigen::Isometry3d> X_FL(model->links.size(), Eigen::Isometry3d::Identity());
   const std::vector<bool> known(model->links.size(), true);
   std::vector<LinkProximity> a, b;
-  for (int step = 0; step < 300; ++step) {
+  for (int step = 0; step < test::scaled(300); ++step) {
     for (Eigen::Isometry3d& X : X_FL) X = X * test::random_pose(&rng, 0.003);
     ProximityQuery cold(model, config);
     warm.run(X_FL, known, {&snapshot}, &a);
@@ -217,7 +218,7 @@ TEST(ProximityQuery, BoundsHoldWheneverTheDeadlinePasses) {
   std::vector<LinkProximity> results;
   ProximityQuery query(model, config);
   int unfinished = 0;
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < test::scaled(200); ++i) {
     const CloudSnapshot snapshot = test::make_snapshot(random_cloud(&rng, i, 1500));
     for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.3);
     config.deadline = 1e-7 * std::pow(10.0, test::uniform(&rng, 0.0, 4.0));
@@ -232,7 +233,7 @@ TEST(ProximityQuery, BoundsHoldWheneverTheDeadlinePasses) {
       ASSERT_GE(results[k].distance, std::min(truth, config.max_distance) - 1e-9);
     }
   }
-  EXPECT_GT(unfinished, 20);
+  EXPECT_GT(unfinished, test::scaled(20));
 }
 
 TEST(ProximityQuery, FarFromTheOriginNothingIsLost) {

@@ -105,7 +105,7 @@ TEST(RobotModel, buildsEveryLinkThatHasGeometry) {
     EXPECT_EQ(l.solid.empty(), !l.usable());
     EXPECT_FALSE(l.from_cache);
     if (!l.usable()) continue;
-    EXPECT_LE(l.packing.certificate.max_gap, config.packing.max_error) << l.name;
+    EXPECT_LE(l.packing.certificate.max_gap, 0.005) << l.name;
     EXPECT_TRUE(l.packing.certificate.reached) << l.name;
   }
   EXPECT_NE(model->links[2].error.find("a.stl"), std::string::npos);
