@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "ist_proximity/geometry/shapes.h"
+#include "ist_proximity/robot/joint_description.h"
 #include "ist_proximity/robot/package_resolver.h"
 
 namespace ist {
@@ -25,6 +26,7 @@ struct RobotDescription {
   std::vector<LinkDescription> links;  ///< links that have geometry
   std::vector<std::string> links_without_geometry;
   std::vector<std::string> link_order;  ///< every link, with geometry or without
+  std::vector<JointDescription> joints;
 };
 
 /// Reads a URDF (urdfdom) and the meshes it names (assimp).
