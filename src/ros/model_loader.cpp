@@ -6,6 +6,7 @@
 #include <chrono>
 #include <set>
 
+#include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/ros/progress_report.h"
@@ -172,6 +173,12 @@ void ModelLoader::load(const std::string& urdf) {
   state.problem = "packing of the robot '" + description.name + "' begins";
   state.root_link = description.root_link;
   state.links = monitored_links(description, config_.model.links);
+  try {
+    state.kinematics = std::make_shared<const Kinematics>(description);
+  } catch (const ModelError& error) {
+    state.kinematics_problem = error.what();
+    ROS_WARN_STREAM("link poses cannot be computed from joint states: " << error.what());
+  }
   set_state(state);
 
   // The self-filter drops points on the whole robot, whatever part of it is monitored.

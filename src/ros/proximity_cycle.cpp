@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <chrono>
 
+#include "ist_proximity/ros/joint_pose_source.h"
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/tf_pose_source.h"
 
 namespace ist {
 namespace {
@@ -21,6 +23,20 @@ std::vector<bool> wanted_links(const ModelState& model) {
   std::vector<bool> wanted(model.robot->links.size(), false);
   for (const std::size_t i : model.monitored) wanted[i] = model.robot->links[i].usable();
   return wanted;
+}
+
+std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
+                                             const std::string& fixed_frame,
+                                             const tf2::BufferCore& buffer,
+                                             JointStateListener* joints) {
+  const std::vector<std::string> names = link_names(*model.robot);
+  const std::vector<bool> wanted = wanted_links(model);
+  if (!joints) {
+    return std::make_unique<TfPoseSource>(buffer, fixed_frame, names, wanted, config.pose_timeout);
+  }
+  if (!model.kinematics) return nullptr;
+  return std::make_unique<JointPoseSource>(model.kinematics, joints, buffer, fixed_frame, names,
+                                           wanted, config.pose_timeout);
 }
 
 void fill_sources(const Situation& situation, ProximityArray* message) {
@@ -44,12 +60,11 @@ void fill_status(const Situation& situation, const ros::Time& now, ProximityArra
 }  // namespace
 
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                               const tf2::BufferCore& buffer)
+                               const tf2::BufferCore& buffer, JointStateListener* joints)
     : model_(std::move(model)),
       robot_(*model_->robot),
       fixed_frame_(config.fixed_frame.empty() ? robot_.root_link : config.fixed_frame),
-      pose_source_(buffer, fixed_frame_, link_names(robot_), wanted_links(*model_),
-                   config.pose_timeout),
+      pose_source_(make_pose_source(*model_, config, fixed_frame_, buffer, joints)),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
       speeds_(robot_.links.size()),
@@ -104,7 +119,12 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 }
 
 void ProximityCycle::look_at_poses(const ros::Time& now) {
-  pose_source_.look_up(now, &poses_);
+  if (pose_source_) {
+    pose_source_->look_up(now, &poses_);
+  } else {
+    poses_.reset(now, robot_.links.size());
+    poses_.blame(wanted_links(*model_), "of the URDF, " + model_->kinematics_problem);
+  }
   situation_.clock_runs = !now.isZero();
 }
 
@@ -147,7 +167,7 @@ std::vector<std::string> ProximityCycle::pose_problems() const {
     const std::string name = "'" + robot_.links[i].name + "'";
     if (sentences.empty()) {
       sentences.push_back("link " + name + " has no pose: " + poses_.problems[i] +
-                          "; is robot_state_publisher running, with joint states coming in?");
+                          (pose_source_ ? "; " + pose_source_->hint() : ""));
     } else {
       others += (others.empty() ? "" : ", ") + name;
     }

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ist_proximity/ros/parameters.h"
 
@@ -33,7 +34,9 @@ struct ModelState {
   /// When ready. Holds every link with geometry, as the self-filter needs, not only the monitored
   /// ones.
   std::shared_ptr<const RobotModel> robot;
-  std::vector<std::size_t> monitored;  ///< when ready: indices into robot->links
+  std::vector<std::size_t> monitored;            ///< when ready: indices into robot->links
+  std::shared_ptr<const Kinematics> kinematics;  ///< from kPacking on; null: see the next
+  std::string kinematics_problem;                ///< why it cannot be had
 };
 
 /// Makes the robot's model in a thread of its own: waits for robot_description on the parameter

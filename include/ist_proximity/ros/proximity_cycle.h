@@ -13,6 +13,7 @@
 #include "ist_proximity/ros/closing_speed.h"
 #include "ist_proximity/ros/cloud_source.h"
 #include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/pose_source.h"
@@ -28,8 +29,9 @@ class ProximityCycle {
  public:
   /// @param model   ready
   /// @param buffer  outlives this
+  /// @param joints  outlives this; null: link poses come from the buffer
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                 const tf2::BufferCore& buffer);
+                 const tf2::BufferCore& buffer, JointStateListener* joints);
 
   /// @param now      of the ROS clock
   /// @param message  overwritten
@@ -50,7 +52,7 @@ class ProximityCycle {
   std::shared_ptr<const ModelState> model_;
   const RobotModel& robot_;
   std::string fixed_frame_;
-  PoseSource pose_source_;
+  std::unique_ptr<PoseSource> pose_source_;  ///< null: there is no kinematics
   ProximityQuery query_;
   Repulsion repulsion_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot

@@ -7,11 +7,13 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/markers.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
@@ -21,10 +23,11 @@
 namespace ist {
 
 /// The whole of ist_proximity as node and nodelet run it. Threads:
-///   - the cycle: at ~rate of the wall clock (a paused /clock does not silence it) it takes the
-///     newest poses and clouds, queries and publishes; it waits for nothing;
+///   - the cycle: it takes the newest poses and clouds, queries and publishes, and waits for
+///     nothing; at ~rate of the wall clock (a paused /clock does not silence it), or with
+///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
-///   - the model loader; - tf's listener;
+///   - the model loader; - the listeners of tf and joint_states;
 ///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
 ///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
 ///     not every ROS 1 distribution has).
@@ -45,6 +48,7 @@ class ProximityServer {
 
   void advertise();
   void run_cycles();
+  bool wait_for_joint_states();
   void run_cycle();
   void notice_clock_jump(const ros::Time& now);
   void take_model();
@@ -65,6 +69,7 @@ class ProximityServer {
   TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
+  std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   // The cycle thread's own.
   std::shared_ptr<const ModelState> model_;
@@ -82,6 +87,8 @@ class ProximityServer {
   std::mutex stop_mutex_;
   std::condition_variable stop_signal_;
   bool stop_ = false;
+  std::condition_variable state_signal_;  ///< to stop, or a joint state has come
+  std::uint64_t states_come_ = 0, states_taken_ = 0, states_skipped_ = 0;
   std::thread cycle_thread_, diagnostics_thread_;
 };
 
