@@ -13,32 +13,6 @@ namespace {
 
 using ist_proximity::ProximityArray;
 
-std::vector<std::string> link_names(const RobotModel& robot) {
-  std::vector<std::string> names;
-  for (const LinkModel& link : robot.links) names.push_back(link.name);
-  return names;
-}
-
-std::vector<bool> wanted_links(const ModelState& model) {
-  std::vector<bool> wanted(model.robot->links.size(), false);
-  for (const std::size_t i : model.monitored) wanted[i] = model.robot->links[i].usable();
-  return wanted;
-}
-
-std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
-                                             const std::string& fixed_frame,
-                                             const tf2::BufferCore& buffer,
-                                             JointStateListener* joints) {
-  const std::vector<std::string> names = link_names(*model.robot);
-  const std::vector<bool> wanted = wanted_links(model);
-  if (!joints) {
-    return std::make_unique<TfPoseSource>(buffer, fixed_frame, names, wanted, config.pose_timeout);
-  }
-  if (!model.kinematics) return nullptr;
-  return std::make_unique<JointPoseSource>(model.kinematics, joints, buffer, fixed_frame, names,
-                                           wanted, config.pose_timeout);
-}
-
 void fill_sources(const Situation& situation, ProximityArray* message) {
   message->sources.clear();
   for (std::size_t i = 0; i < situation.sources.size(); ++i) {
@@ -59,12 +33,43 @@ void fill_status(const Situation& situation, const ros::Time& now, ProximityArra
 
 }  // namespace
 
+std::vector<std::string> link_names(const RobotModel& robot) {
+  std::vector<std::string> names;
+  for (const LinkModel& link : robot.links) names.push_back(link.name);
+  return names;
+}
+
+std::vector<bool> wanted_links(const ModelState& model) {
+  std::vector<bool> wanted(model.robot->links.size(), false);
+  for (const std::size_t i : model.monitored) wanted[i] = model.robot->links[i].usable();
+  return wanted;
+}
+
+std::string fixed_frame_of(const ModelState& model, const ServerConfig& config) {
+  return config.fixed_frame.empty() ? model.root_link : config.fixed_frame;
+}
+
+std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
+                                             const tf2::BufferCore& buffer,
+                                             JointStateListener* joints) {
+  const std::string fixed_frame = fixed_frame_of(model, config);
+  const std::vector<std::string> names = link_names(*model.robot);
+  const std::vector<bool> wanted = wanted_links(model);
+  if (!joints) {
+    return std::make_unique<TfPoseSource>(buffer, fixed_frame, names, wanted, config.pose_timeout);
+  }
+  if (!model.kinematics) return nullptr;
+  return std::make_unique<JointPoseSource>(model.kinematics, joints, buffer, fixed_frame, names,
+                                           wanted, config.pose_timeout);
+}
+
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                               const tf2::BufferCore& buffer, JointStateListener* joints)
+                               std::unique_ptr<PoseSource> poses, Reader reader)
     : model_(std::move(model)),
       robot_(*model_->robot),
-      fixed_frame_(config.fixed_frame.empty() ? robot_.root_link : config.fixed_frame),
-      pose_source_(make_pose_source(*model_, config, fixed_frame_, buffer, joints)),
+      fixed_frame_(fixed_frame_of(*model_, config)),
+      pose_source_(std::move(poses)),
+      reader_(reader),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
       speeds_(robot_.links.size()),
@@ -133,9 +138,16 @@ void ProximityCycle::look_at_sources(const ros::Time& now, const CloudSources& s
   situation_.sources.clear();
   situation_.verdicts.clear();
   snapshots_.clear();
+  held_.clear();
   for (const auto& source : sources) {
     SourceFacts facts = source->facts();
-    const SourceSnapshot* snapshot = source->newest(model_->robot);
+    const SourceSnapshot* snapshot;
+    if (reader_ == Reader::kOnly) {
+      snapshot = source->newest(model_->robot);
+    } else {
+      held_.push_back(source->share(model_->robot));
+      snapshot = held_.back().get();
+    }
     if (snapshot) {
       facts.has_snapshot = true;
       facts.stamp = snapshot->stamp;

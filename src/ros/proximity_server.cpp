@@ -48,6 +48,10 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       state_signal_.notify_one();
     });
   }
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
+    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    return repulsion_;
+  });
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
 }
@@ -61,6 +65,7 @@ ProximityServer::~ProximityServer() {
   state_signal_.notify_all();
   cycle_thread_.join();
   diagnostics_thread_.join();
+  query_service_.reset();
   cycle_.reset();
   joint_states_.reset();  // its thread uses members that end before it
 }
@@ -145,7 +150,9 @@ void ProximityServer::take_model() {
   if (model == model_) return;
   model_ = std::move(model);
   if (model_->phase == ModelState::Phase::kReady) {
-    cycle_ = std::make_unique<ProximityCycle>(model_, config_, buffer_, joint_states_.get());
+    cycle_ = std::make_unique<ProximityCycle>(
+        model_, config_, make_pose_source(*model_, config_, buffer_, joint_states_.get()),
+        ProximityCycle::Reader::kOnly);
   } else {
     cycle_.reset();
   }
@@ -154,9 +161,9 @@ void ProximityServer::take_model() {
                                            : std::vector<std::string>());
     joint_states_->set_kinematics(model_->kinematics);
   }
+  query_service_->set_model(model_);
   publish_spheres();
-  const std::string& fixed_frame =
-      config_.fixed_frame.empty() ? model_->root_link : config_.fixed_frame;
+  const std::string fixed_frame = fixed_frame_of(*model_, config_);
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame);
 }
 

@@ -18,6 +18,7 @@
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/proximity_cycle.h"
+#include "ist_proximity/ros/query_service.h"
 #include "ist_proximity/ros/transform_listener.h"
 
 namespace ist {
@@ -27,11 +28,12 @@ namespace ist {
 ///     nothing; at ~rate of the wall clock (a paused /clock does not silence it), or with
 ///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
+///   - ~query, with a query of its own;
 ///   - the model loader; - the listeners of tf and joint_states;
 ///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
 ///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
 ///     not every ROS 1 distribution has).
-/// The service is answered from the queue of the node handles.
+/// The other services are answered from the queue of the node handles.
 class ProximityServer {
  public:
   /// @param nh          topics like `cloud` are relative to it
@@ -89,6 +91,7 @@ class ProximityServer {
   bool stop_ = false;
   std::condition_variable state_signal_;  ///< to stop, or a joint state has come
   std::uint64_t states_come_ = 0, states_taken_ = 0, states_skipped_ = 0;
+  std::unique_ptr<QueryService> query_service_;
   std::thread cycle_thread_, diagnostics_thread_;
 };
 
