@@ -151,6 +151,9 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   }
   add("ready", ready ? "100 %" : number("%.0f %%", 100 * state.fraction), &status);
   add("links monitored", state.links.size(), &status);
+  for (const AttachedObject& object : state.objects) {
+    add("attached object", "'" + object.name + "' on '" + object.link + "'", &status);
+  }
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
     if (!link.usable()) {

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <boost/make_shared.hpp>
 
+#include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/ros/message_conversion.h"
+#include "ist_proximity/ros/object_conversion.h"
 
 namespace ist {
 namespace {
@@ -79,6 +81,10 @@ void ProximityServer::advertise() {
   diagnostics_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
   reload_service_ =
       private_nh_.advertiseService("reload_model", &ProximityServer::reload_model, this);
+  attach_service_ =
+      private_nh_.advertiseService("attach_object", &ProximityServer::attach_object, this);
+  detach_service_ =
+      private_nh_.advertiseService("detach_object", &ProximityServer::detach_object, this);
 }
 
 bool ProximityServer::sleep_until(Clock::time_point time) {
@@ -238,6 +244,28 @@ bool ProximityServer::reload_model(std_srvs::Trigger::Request&,
   bool found = false;
   response.message = loader_.reload(&found);
   response.success = found;
+  return true;
+}
+
+bool ProximityServer::attach_object(ist_proximity::AttachObject::Request& request,
+                                    ist_proximity::AttachObject::Response& response) {
+  try {
+    response.message = loader_.attach(to_object(request, environment_package_finder()));
+  } catch (const std::exception& error) {  // ModelError, or no memory
+    response.message = error.what();
+  }
+  response.success = response.message.empty();
+  if (response.success) {
+    response.message = "'" + request.name + "' is now part of link '" + request.link + "'";
+  }
+  return true;
+}
+
+bool ProximityServer::detach_object(ist_proximity::DetachObject::Request& request,
+                                    ist_proximity::DetachObject::Response& response) {
+  response.message = loader_.detach(request.name);
+  response.success = response.message.empty();
+  if (response.success) response.message = "'" + request.name + "' is detached";
   return true;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -14,8 +15,9 @@ enum class GeometrySource { kCollision, kVisual };
 /// A link of the URDF with the exact shapes it is made of.
 struct LinkDescription {
   std::string name;
-  LinkGeometry geometry;  ///< empty when `error` is set
-  std::string error;      ///< why the geometry cannot be had: element, file, value, what to do
+  LinkGeometry geometry;     ///< empty when `error` is set
+  std::string error;         ///< why the geometry cannot be had: element, file, value, what to do
+  std::size_t attached = 0;  ///< how many elements, at the end of `geometry`, are attached objects
   bool used_visual_fallback = false;  ///< collision was asked for and only visual is there
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <ist_proximity/AttachObject.h>
+#include <ist_proximity/DetachObject.h>
 #include <ros/node_handle.h>
 #include <std_srvs/Trigger.h>
 #include <tf2/buffer_core.h>
@@ -59,6 +61,10 @@ class ProximityServer {
   void run_diagnostics();
   void read_repulsion_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool attach_object(ist_proximity::AttachObject::Request& request,
+                     ist_proximity::AttachObject::Response& response);
+  bool detach_object(ist_proximity::DetachObject::Request& request,
+                     ist_proximity::DetachObject::Response& response);
   bool sleep_until(Clock::time_point time);  ///< false when it is time to stop
 
   const ServerConfig config_;
@@ -66,7 +72,7 @@ class ProximityServer {
   const std::string name_;  ///< in diagnostics
 
   ros::Publisher proximity_, min_distance_, markers_, spheres_, filtered_cloud_, diagnostics_;
-  ros::ServiceServer reload_service_;
+  ros::ServiceServer reload_service_, attach_service_, detach_service_;
   tf2::BufferCore buffer_;
   TransformListener listener_;
   CloudSources sources_;
