@@ -23,7 +23,10 @@ add_message_files(DIRECTORY msg FILES
   LinkProximity.msg
   ProximityArray.msg
   SourceStatus.msg)
-add_service_files(DIRECTORY srv FILES QueryProximity.srv)
+add_service_files(DIRECTORY srv FILES
+  AttachObject.srv
+  DetachObject.srv
+  QueryProximity.srv)
 generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
 
 catkin_package(

@@ -154,8 +154,44 @@ Eigen::Isometry3d to_isometry(const urdf::Pose& pose) {
   X.translation() << pose.position.x, pose.position.y, pose.position.z;
   const urdf::Rotation& q = pose.rotation;
   X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized().toRotationMatrix();
-  if (!X.matrix().allFinite()) throw ModelError("its <origin> is not finite");
   return X;
+}
+
+JointType to_joint_type(int type) {
+  switch (type) {
+    case urdf::Joint::REVOLUTE:
+      return JointType::kRevolute;
+    case urdf::Joint::CONTINUOUS:
+      return JointType::kContinuous;
+    case urdf::Joint::PRISMATIC:
+      return JointType::kPrismatic;
+    case urdf::Joint::PLANAR:
+      return JointType::kPlanar;
+    case urdf::Joint::FLOATING:
+      return JointType::kFloating;
+    default:
+      return JointType::kFixed;
+  }
+}
+
+// Numbers as they are: whoever needs the joint's motion checks them.
+JointDescription to_joint(const urdf::Joint& joint) {
+  JointDescription result;
+  result.name = joint.name;
+  result.type = to_joint_type(joint.type);
+  result.parent_link = joint.parent_link_name;
+  result.child_link = joint.child_link_name;
+  result.X_PJ = to_isometry(joint.parent_to_joint_origin_transform);
+  result.axis << joint.axis.x, joint.axis.y, joint.axis.z;
+  if (joint.limits &&
+      (joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::PRISMATIC)) {
+    result.lower = joint.limits->lower;
+    result.upper = joint.limits->upper;
+  }
+  if (joint.mimic) {
+    result.mimic = Mimic{joint.mimic->joint_name, joint.mimic->multiplier, joint.mimic->offset};
+  }
+  return result;
 }
 
 // A <collision> or <visual>, as urdfdom reads it, alone in a robot of one link.
@@ -187,6 +223,7 @@ GeometryElement parse_element(const tinyxml2::XMLElement& xml, const PackageFind
 
   GeometryElement element;
   element.X_LE = to_isometry(origin);
+  if (!element.X_LE.matrix().allFinite()) throw ModelError("its <origin> is not finite");
   element.shape = to_shape(*geometry, find_package);
   return element;
 }
@@ -231,6 +268,7 @@ RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
   RobotDescription description;
   description.name = model->getName();
   description.root_link = model->getRoot()->name;
+  for (const auto& [name, joint] : model->joints_) description.joints.push_back(to_joint(*joint));
   for (const auto* xml = robot.FirstChildElement("link"); xml != nullptr;
        xml = xml->NextSiblingElement("link")) {
     LinkDescription link;

@@ -49,12 +49,32 @@ void CloudSource::set_model(std::shared_ptr<const RobotModel> model,
 
 const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model) {
   channel_.update();
-  const SourceSnapshot& snapshot = channel_.front();
+  const SourceSnapshot* snapshot = channel_.front().get();
   const std::lock_guard<std::mutex> lock(mutex_);
+  return is_current(snapshot, model) ? snapshot : nullptr;
+}
+
+std::shared_ptr<const SourceSnapshot> CloudSource::share(
+    const std::shared_ptr<const RobotModel>& model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return is_current(shared_.get(), model) ? shared_ : nullptr;
+}
+
+/// With mutex_ held.
+bool CloudSource::is_current(const SourceSnapshot* snapshot,
+                             const std::shared_ptr<const RobotModel>& model) {
   notice_clock_jump();
-  const bool current =
-      model && snapshot.model == model && snapshot.generation == shared_target_.generation;
-  return current ? &snapshot : nullptr;
+  return snapshot && model && snapshot->model == model &&
+         snapshot->generation == shared_target_.generation;
+}
+
+/// The snapshot to fill next: an old one, unless somebody still holds that.
+std::shared_ptr<SourceSnapshot>& CloudSource::writable() {
+  std::shared_ptr<SourceSnapshot>& snapshot = channel_.back();
+  if (!snapshot || snapshot.use_count() > 1) snapshot = std::make_shared<SourceSnapshot>();
+  // use_count() alone does not order what the last holder read before what is written now.
+  std::atomic_thread_fence(std::memory_order_acquire);
+  return snapshot;
 }
 
 SourceFacts CloudSource::facts() {
@@ -245,7 +265,8 @@ std::string CloudSource::ingest(const Waiting& waiting) {
 
   PosedRobot robot;
   if (config_.ingest.self_filter) pose_robot(header.stamp, &robot);
-  SourceSnapshot& snapshot = channel_.back();
+  const std::shared_ptr<SourceSnapshot>& shared = writable();
+  SourceSnapshot& snapshot = *shared;
   try {
     ingest_.run(waiting.raw, X_FS, robot, header.stamp.toSec(), &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a monstrous cloud
@@ -259,6 +280,10 @@ std::string CloudSource::ingest(const Waiting& waiting) {
   in_use_ = header.stamp;
   if (filtered_.getNumSubscribers() > 0) {
     filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    shared_ = shared;
   }
   channel_.publish();
   return "";

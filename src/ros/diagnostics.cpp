@@ -108,6 +108,16 @@ DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& re
   add("links monitored", report.links_monitored, &status);
   add("links with a pose", report.links_known, &status);
   if (report.links_known > 0) add("age", number("%.3f s", report.pose_age), &status);
+  if (report.joint_states) {
+    const JointStateFacts& joints = *report.joint_states;
+    if (!joints.problem.empty()) set(DiagnosticStatus::WARN, joints.problem, &status);
+    add("topic", joints.topic, &status);
+    add("publishers", joints.publishers, &status);
+    add("joint states received", joints.messages, &status);
+    add("joint states used", joints.used, &status);
+    add("joint states skipped: a newer one came first", report.states_skipped, &status);
+    add("positions that cannot be used", joints.dropped, &status);
+  }
   for (const std::string& problem : report.pose_problems) add("problem", problem, &status);
   return status;
 }
@@ -120,11 +130,13 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   } else if (report.status != ProximityArray::OK) {
     set(DiagnosticStatus::ERROR, report.text, &status);
   }
+  const std::string wanted = report.joint_states ? "rate of the joint states" : "~rate";
   if (rate < 0.8 * wanted_rate) {
-    set(DiagnosticStatus::WARN, "the rate is lower than ~rate: the machine is too busy", &status);
+    set(DiagnosticStatus::WARN, "the rate is lower than " + wanted + ": the machine is too busy",
+        &status);
   }
   add("rate", number("%.1f Hz", rate), &status);
-  add("~rate", number("%.1f Hz", wanted_rate), &status);
+  add(wanted, number("%.1f Hz", wanted_rate), &status);
   add("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
   add("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)), &status);
   return status;
@@ -139,6 +151,9 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   }
   add("ready", ready ? "100 %" : number("%.0f %%", 100 * state.fraction), &status);
   add("links monitored", state.links.size(), &status);
+  for (const AttachedObject& object : state.objects) {
+    add("attached object", "'" + object.name + "' on '" + object.link + "'", &status);
+  }
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
     if (!link.usable()) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <set>
 
+#include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/ros/progress_report.h"
@@ -33,6 +34,10 @@ std::vector<std::string> monitored_links(const RobotDescription& description,
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   }
   return names;
+}
+
+void add_name(const std::string& name, std::vector<std::string>* names) {
+  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
 bool any_self_filter(const std::vector<SourceConfig>& sources) {
@@ -162,28 +167,82 @@ void ModelLoader::load_once() {
   }
 }
 
-void ModelLoader::load(const std::string& urdf) {
-  const RobotDescription description =
-      parse_urdf(urdf, config_.geometry, environment_package_finder());
-  warn_of_visual_fallback(description);
+/// The self-filter drops points on the whole robot, whatever part of it is monitored.
+RobotModelConfig ModelLoader::model_config(const RobotDescription& description,
+                                           const std::vector<AttachedObject>& objects) const {
+  RobotModelConfig config = config_.model;
+  if (config.links.empty()) return config;
+  for (const AttachedObject& object : objects) add_name(object.link, &config.links);
+  if (!any_self_filter(config_.sources)) return config;
+  std::vector<std::string> links = monitored_links(description, {});
+  for (const std::string& name : config.links) add_name(name, &links);
+  config.links = links;
+  return config;
+}
 
+/// The rest of a state whose robot is built.
+void ModelLoader::finish(const RobotDescription& description, ModelState* state) const {
+  std::vector<std::string> wanted = config_.model.links;
+  if (!wanted.empty()) {
+    for (const AttachedObject& object : state->objects) add_name(object.link, &wanted);
+  }
+  const std::vector<std::string> names = monitored_links(description, wanted);
+  const std::set<std::string> monitored(names.begin(), names.end());
+  state->links.clear();
+  state->monitored.clear();
+  for (std::size_t i = 0; i < state->robot->links.size(); ++i) {
+    const std::string& name = state->robot->links[i].name;
+    if (monitored.count(name) == 0) continue;
+    state->monitored.push_back(i);
+    state->links.push_back(name);
+  }
+  state->phase = ModelState::Phase::kReady;
+  state->problem = state->links.empty() ? "no link of the robot '" + description.name +
+                                              "' has geometry: nothing can be measured"
+                                        : "";
+  state->fraction = 1.0;
+}
+
+/// The description with what is attached to links that are still there.
+RobotDescription ModelLoader::carry_objects(ModelState* state) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    state->objects = objects_;
+  }
+  RobotDescription carrying = *state->description;
+  std::vector<AttachedObject> kept;
+  for (const AttachedObject& object : state->objects) {
+    try {
+      carrying = with_objects(carrying, {object});
+      kept.push_back(object);
+    } catch (const ModelError& error) {
+      ROS_WARN_STREAM("no longer attached: " << error.what());
+    }
+  }
+  state->objects = kept;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  objects_ = std::move(kept);
+  return carrying;
+}
+
+void ModelLoader::load(const std::string& urdf) {
   ModelState state;
+  state.description = std::make_shared<const RobotDescription>(
+      parse_urdf(urdf, config_.geometry, environment_package_finder()));
+  warn_of_visual_fallback(*state.description);
+  const RobotDescription description = carry_objects(&state);
+
   state.phase = ModelState::Phase::kPacking;
   state.problem = "packing of the robot '" + description.name + "' begins";
   state.root_link = description.root_link;
   state.links = monitored_links(description, config_.model.links);
-  set_state(state);
-
-  // The self-filter drops points on the whole robot, whatever part of it is monitored.
-  RobotModelConfig config = config_.model;
-  if (!config.links.empty() && any_self_filter(config_.sources)) {
-    config.links = monitored_links(description, {});
-    for (const std::string& name : state.links) {
-      if (std::find(config.links.begin(), config.links.end(), name) == config.links.end()) {
-        config.links.push_back(name);
-      }
-    }
+  try {
+    state.kinematics = std::make_shared<const Kinematics>(description);
+  } catch (const ModelError& error) {
+    state.kinematics_problem = error.what();
+    ROS_WARN_STREAM("link poses cannot be computed from joint states: " << error.what());
   }
+  set_state(state);
 
   ProgressReport report;
   std::mutex report_mutex;  // several packing threads
@@ -202,23 +261,11 @@ void ModelLoader::load(const std::string& urdf) {
     set_state(state);
   };
   const auto begin = std::chrono::steady_clock::now();
-  state.robot = build_robot_model(description, config, callbacks);
+  state.robot = build_robot_model(description, model_config(description, state.objects), callbacks);
   report.finish();
   if (!state.robot) return;  // cancelled
 
-  const std::set<std::string> monitored(state.links.begin(), state.links.end());
-  state.links.clear();
-  for (std::size_t i = 0; i < state.robot->links.size(); ++i) {
-    const std::string& name = state.robot->links[i].name;
-    if (monitored.count(name) == 0) continue;
-    state.monitored.push_back(i);
-    state.links.push_back(name);
-  }
-  state.phase = ModelState::Phase::kReady;
-  state.problem = state.links.empty() ? "no link of the robot '" + description.name +
-                                            "' has geometry: nothing can be measured"
-                                      : "";
-  state.fraction = 1.0;
+  finish(description, &state);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   ROS_INFO("model of '%s' ready after %.1f s: %zu links monitored, %zu packed",
            description.name.c_str(), took.count(), state.monitored.size(),

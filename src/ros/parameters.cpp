@@ -82,6 +82,15 @@ bool read_repulsion(ParameterReader* reader, double max_distance, RepulsionConfi
   return clamped && reader->has("repulsion/influence_distance");
 }
 
+void read_poses(ParameterReader* reader, ServerConfig* config) {
+  reader->read("fixed_frame", &config->fixed_frame);
+  std::string pose_source = "tf";
+  reader->read_choice("pose_source", {"tf", "joint_states"}, &pose_source);
+  config->pose_source = pose_source == "tf" ? PoseSourceKind::kTf : PoseSourceKind::kJointStates;
+  reader->read("pose_timeout", more_than_zero("s", 3600.0), &config->pose_timeout);
+  reader->read("rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
+}
+
 void read_model(ParameterReader* reader, ServerConfig* config) {
   reader->read("robot_description", &config->robot_description);
   if (config->robot_description.empty()) {
@@ -106,10 +115,6 @@ void read_query(ParameterReader* reader, QueryConfig* query) {
 }
 
 void refuse_what_is_not_there_yet(ParameterReader* reader) {
-  std::string pose_source = "tf";
-  reader->read_choice(
-      "pose_source", {"tf"}, &pose_source,
-      {{"joint_states", "not supported yet; run robot_state_publisher and use tf"}});
   bool self_collision = false;
   reader->read("self_collision/enabled", &self_collision);
   if (self_collision) {
@@ -134,9 +139,7 @@ XmlRpc::XmlRpcValue fetch(const ros::NodeHandle& private_nh) {
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);
   ServerConfig config;
-  reader.read("fixed_frame", &config.fixed_frame);
-  reader.read("pose_timeout", more_than_zero("s", 3600.0), &config.pose_timeout);
-  reader.read("rate", Range{"Hz", 0.01, 1000.0}, &config.rate);
+  read_poses(&reader, &config);
   read_model(&reader, &config);
   read_query(&reader, &config.query);
   if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {

@@ -3,25 +3,15 @@
 #include <algorithm>
 #include <chrono>
 
+#include "ist_proximity/ros/joint_pose_source.h"
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/tf_pose_source.h"
 
 namespace ist {
 namespace {
 
 using ist_proximity::ProximityArray;
-
-std::vector<std::string> link_names(const RobotModel& robot) {
-  std::vector<std::string> names;
-  for (const LinkModel& link : robot.links) names.push_back(link.name);
-  return names;
-}
-
-std::vector<bool> wanted_links(const ModelState& model) {
-  std::vector<bool> wanted(model.robot->links.size(), false);
-  for (const std::size_t i : model.monitored) wanted[i] = model.robot->links[i].usable();
-  return wanted;
-}
 
 void fill_sources(const Situation& situation, ProximityArray* message) {
   message->sources.clear();
@@ -43,13 +33,43 @@ void fill_status(const Situation& situation, const ros::Time& now, ProximityArra
 
 }  // namespace
 
+std::vector<std::string> link_names(const RobotModel& robot) {
+  std::vector<std::string> names;
+  for (const LinkModel& link : robot.links) names.push_back(link.name);
+  return names;
+}
+
+std::vector<bool> wanted_links(const ModelState& model) {
+  std::vector<bool> wanted(model.robot->links.size(), false);
+  for (const std::size_t i : model.monitored) wanted[i] = model.robot->links[i].usable();
+  return wanted;
+}
+
+std::string fixed_frame_of(const ModelState& model, const ServerConfig& config) {
+  return config.fixed_frame.empty() ? model.root_link : config.fixed_frame;
+}
+
+std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
+                                             const tf2::BufferCore& buffer,
+                                             JointStateListener* joints) {
+  const std::string fixed_frame = fixed_frame_of(model, config);
+  const std::vector<std::string> names = link_names(*model.robot);
+  const std::vector<bool> wanted = wanted_links(model);
+  if (!joints) {
+    return std::make_unique<TfPoseSource>(buffer, fixed_frame, names, wanted, config.pose_timeout);
+  }
+  if (!model.kinematics) return nullptr;
+  return std::make_unique<JointPoseSource>(model.kinematics, joints, buffer, fixed_frame, names,
+                                           wanted, config.pose_timeout);
+}
+
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                               const tf2::BufferCore& buffer)
+                               std::unique_ptr<PoseSource> poses, Reader reader)
     : model_(std::move(model)),
       robot_(*model_->robot),
-      fixed_frame_(config.fixed_frame.empty() ? robot_.root_link : config.fixed_frame),
-      pose_source_(buffer, fixed_frame_, link_names(robot_), wanted_links(*model_),
-                   config.pose_timeout),
+      fixed_frame_(fixed_frame_of(*model_, config)),
+      pose_source_(std::move(poses)),
+      reader_(reader),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
       speeds_(robot_.links.size()),
@@ -104,7 +124,12 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 }
 
 void ProximityCycle::look_at_poses(const ros::Time& now) {
-  pose_source_.look_up(now, &poses_);
+  if (pose_source_) {
+    pose_source_->look_up(now, &poses_);
+  } else {
+    poses_.reset(now, robot_.links.size());
+    poses_.blame(wanted_links(*model_), "of the URDF, " + model_->kinematics_problem);
+  }
   situation_.clock_runs = !now.isZero();
 }
 
@@ -113,9 +138,16 @@ void ProximityCycle::look_at_sources(const ros::Time& now, const CloudSources& s
   situation_.sources.clear();
   situation_.verdicts.clear();
   snapshots_.clear();
+  held_.clear();
   for (const auto& source : sources) {
     SourceFacts facts = source->facts();
-    const SourceSnapshot* snapshot = source->newest(model_->robot);
+    const SourceSnapshot* snapshot;
+    if (reader_ == Reader::kOnly) {
+      snapshot = source->newest(model_->robot);
+    } else {
+      held_.push_back(source->share(model_->robot));
+      snapshot = held_.back().get();
+    }
     if (snapshot) {
       facts.has_snapshot = true;
       facts.stamp = snapshot->stamp;
@@ -147,7 +179,7 @@ std::vector<std::string> ProximityCycle::pose_problems() const {
     const std::string name = "'" + robot_.links[i].name + "'";
     if (sentences.empty()) {
       sentences.push_back("link " + name + " has no pose: " + poses_.problems[i] +
-                          "; is robot_state_publisher running, with joint states coming in?");
+                          (pose_source_ ? "; " + pose_source_->hint() : ""));
     } else {
       others += (others.empty() ? "" : ", ") + name;
     }

@@ -7,16 +7,23 @@
 #include <algorithm>
 #include <boost/make_shared.hpp>
 
+#include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/ros/message_conversion.h"
+#include "ist_proximity/ros/object_conversion.h"
 
 namespace ist {
 namespace {
 
 using ist_proximity::ProximityArray;
 
-constexpr std::chrono::milliseconds kMarkerPeriod(40);                       // rviz draws no faster
-constexpr std::chrono::seconds kFirstSpheresDelay(1), kLastSpheresDelay(4);  // after a clock jump
-constexpr std::size_t kMaxSpheresPerLink = 250;                              // one marker each
+// rviz draws no faster
+constexpr std::chrono::milliseconds kMarkerPeriod(40);
+// Without joint states.
+constexpr std::chrono::milliseconds kStatePatience(100);
+// After a clock jump.
+constexpr std::chrono::seconds kFirstSpheresDelay(1), kLastSpheresDelay(4);
+// One marker each.
+constexpr std::size_t kMaxSpheresPerLink = 250;
 
 std::string without_leading_slash(const std::string& name) {
   return !name.empty() && name[0] == '/' ? name.substr(1) : name;
@@ -39,6 +46,19 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
   for (const SourceConfig& source : config_.sources) {
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
   }
+  if (config_.pose_source == PoseSourceKind::kJointStates) {
+    joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
+      {
+        const std::lock_guard<std::mutex> lock(stop_mutex_);
+        ++states_come_;
+      }
+      state_signal_.notify_one();
+    });
+  }
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
+    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    return repulsion_;
+  });
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
 }
@@ -49,8 +69,12 @@ ProximityServer::~ProximityServer() {
     stop_ = true;
   }
   stop_signal_.notify_all();
+  state_signal_.notify_all();
   cycle_thread_.join();
   diagnostics_thread_.join();
+  query_service_.reset();
+  cycle_.reset();
+  joint_states_.reset();  // its thread uses members that end before it
 }
 
 void ProximityServer::advertise() {
@@ -62,6 +86,10 @@ void ProximityServer::advertise() {
   diagnostics_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
   reload_service_ =
       private_nh_.advertiseService("reload_model", &ProximityServer::reload_model, this);
+  attach_service_ =
+      private_nh_.advertiseService("attach_object", &ProximityServer::attach_object, this);
+  detach_service_ =
+      private_nh_.advertiseService("detach_object", &ProximityServer::detach_object, this);
 }
 
 bool ProximityServer::sleep_until(Clock::time_point time) {
@@ -69,7 +97,25 @@ bool ProximityServer::sleep_until(Clock::time_point time) {
   return !stop_signal_.wait_until(lock, time, [this] { return stop_; });
 }
 
+/// With pose_source joint_states: until one comes; after a while without, all the same. What came
+/// during the last cycle is taken at once, as one.
+bool ProximityServer::wait_for_joint_states() {
+  std::unique_lock<std::mutex> lock(stop_mutex_);
+  state_signal_.wait_for(lock, kStatePatience,
+                         [this] { return stop_ || states_come_ != states_taken_; });
+  const std::uint64_t come = states_come_ - states_taken_;
+  if (come > 1) states_skipped_ += come - 1;
+  states_taken_ = states_come_;
+  return !stop_;
+}
+
 void ProximityServer::run_cycles() {
+  if (joint_states_) {
+    do {
+      run_cycle();
+    } while (wait_for_joint_states());
+    return;
+  }
   const auto period = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(1.0 / config_.rate));
   Clock::time_point next = Clock::now();
@@ -126,13 +172,20 @@ void ProximityServer::take_model() {
   if (model == model_) return;
   model_ = std::move(model);
   if (model_->phase == ModelState::Phase::kReady) {
-    cycle_ = std::make_unique<ProximityCycle>(model_, config_, buffer_);
+    cycle_ = std::make_unique<ProximityCycle>(
+        model_, config_, make_pose_source(*model_, config_, buffer_, joint_states_.get()),
+        ProximityCycle::Reader::kOnly);
   } else {
     cycle_.reset();
   }
+  if (joint_states_) {
+    listener_.leave_out(model_->kinematics ? computed_frames(*model_->kinematics)
+                                           : std::vector<std::string>());
+    joint_states_->set_kinematics(model_->kinematics);
+  }
+  query_service_->set_model(model_);
   publish_spheres();
-  const std::string& fixed_frame =
-      config_.fixed_frame.empty() ? model_->root_link : config_.fixed_frame;
+  const std::string fixed_frame = fixed_frame_of(*model_, config_);
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame);
 }
 
@@ -157,6 +210,7 @@ void ProximityServer::publish_spheres() {
 
 void ProximityServer::run_diagnostics() {
   std::size_t cycles_before = 0;
+  std::uint64_t states_before = 0;
   Clock::time_point before = Clock::now();
   while (sleep_until(before + std::chrono::seconds(1))) {
     read_repulsion_again();
@@ -169,6 +223,14 @@ void ProximityServer::run_diagnostics() {
     before = Clock::now();
     const double rate = static_cast<double>(report.cycles - cycles_before) / interval.count();
     cycles_before = report.cycles;
+    double wanted_rate = config_.rate;
+    if (joint_states_) {
+      report.joint_states = joint_states_->facts();
+      const std::lock_guard<std::mutex> lock(stop_mutex_);
+      wanted_rate = static_cast<double>(states_come_ - states_before) / interval.count();
+      states_before = states_come_;
+      report.states_skipped = states_skipped_;
+    }
 
     diagnostic_msgs::DiagnosticArray message;
     message.header.stamp = ros::Time::now();
@@ -177,7 +239,7 @@ void ProximityServer::run_diagnostics() {
                                                  message.header.stamp.toSec()));
     }
     message.status.push_back(pose_diagnostics(name_, report));
-    message.status.push_back(query_diagnostics(name_, report, rate, config_.rate));
+    message.status.push_back(query_diagnostics(name_, report, rate, wanted_rate));
     message.status.push_back(model_diagnostics(name_, *loader_.state()));
     diagnostics_.publish(message);
   }
@@ -198,6 +260,28 @@ bool ProximityServer::reload_model(std_srvs::Trigger::Request&,
   bool found = false;
   response.message = loader_.reload(&found);
   response.success = found;
+  return true;
+}
+
+bool ProximityServer::attach_object(ist_proximity::AttachObject::Request& request,
+                                    ist_proximity::AttachObject::Response& response) {
+  try {
+    response.message = loader_.attach(to_object(request, environment_package_finder()));
+  } catch (const std::exception& error) {  // ModelError, or no memory
+    response.message = error.what();
+  }
+  response.success = response.message.empty();
+  if (response.success) {
+    response.message = "'" + request.name + "' is now part of link '" + request.link + "'";
+  }
+  return true;
+}
+
+bool ProximityServer::detach_object(ist_proximity::DetachObject::Request& request,
+                                    ist_proximity::DetachObject::Response& response) {
+  response.message = loader_.detach(request.name);
+  response.success = response.message.empty();
+  if (response.success) response.message = "'" + request.name + "' is detached";
   return true;
 }
 

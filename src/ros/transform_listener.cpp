@@ -7,6 +7,7 @@
 #include <exception>
 
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/transforms.h"
 
 namespace ist {
 namespace {
@@ -57,6 +58,7 @@ void TransformListener::receive(const tf2_msgs::TFMessage& message, bool is_stat
   notice_clock_jump();
   const ros::Time now = ros::Time::now();
   for (const auto& transform : message.transforms) {
+    if (is_left_out(transform.child_frame_id)) continue;
     const double ahead = seconds_between(now, transform.header.stamp);
     if (!is_static && ahead > kMaxAhead) {
       keep_out(transform, ahead);
@@ -78,6 +80,16 @@ void TransformListener::keep_out(const geometry_msgs::TransformStamped& transfor
   problem_ = "the transform from '" + transform.child_frame_id + "' to '" +
              transform.header.frame_id + text + ": compare the clocks";
   problem_time_ = std::chrono::steady_clock::now();
+}
+
+void TransformListener::leave_out(const std::vector<std::string>& child_frames) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  left_out_ = {child_frames.begin(), child_frames.end()};
+}
+
+bool TransformListener::is_left_out(const std::string& child_frame) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return !left_out_.empty() && left_out_.count(without_slash(child_frame)) > 0;
 }
 
 std::string TransformListener::problem() const {

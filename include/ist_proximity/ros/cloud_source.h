@@ -61,6 +61,9 @@ class CloudSource {
   /// the next call. One thread only; never waits.
   const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model);
 
+  /// The same for any other thread, for as long as it is held.
+  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model);
+
   /// Everything but the snapshot's part. Thread safe.
   SourceFacts facts();
 
@@ -88,6 +91,8 @@ class CloudSource {
   bool worth_waiting_for(const std::string& link, const ros::Time& stamp) const;
   std::string ingest(const Waiting& waiting);
   void pose_robot(const ros::Time& stamp, PosedRobot* robot) const;
+  std::shared_ptr<SourceSnapshot>& writable();
+  bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
   void notice_clock_jump();  ///< with mutex_ held
   void set_problem(const std::string& problem, bool dropped);
 
@@ -96,12 +101,13 @@ class CloudSource {
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
   ros::Subscriber subscriber_;
-  SnapshotChannel<SourceSnapshot> channel_;
+  SnapshotChannel<std::shared_ptr<SourceSnapshot>> channel_;
 
   std::mutex mutex_;  // for what follows, held for copies only
   Target shared_target_;
   SourceFacts facts_;
   ros::Time last_now_;
+  std::shared_ptr<const SourceSnapshot> shared_;  ///< the newest
 
   // The source's thread alone.
   Target target_;

@@ -5,9 +5,12 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/status.h"
 
@@ -32,7 +35,9 @@ struct CycleReport {
   std::vector<SourceFacts> sources;
   std::vector<Verdict> verdicts;
   std::vector<std::string> pose_problems;
-  std::string transform_problem;  ///< what tf's listener kept out
+  std::string transform_problem;                ///< what tf's listener kept out
+  std::optional<JointStateFacts> joint_states;  ///< with pose_source joint_states
+  std::uint64_t states_skipped = 0;  ///< joint states that a newer one overtook before its cycle
   std::size_t links_known = 0, links_monitored = 0;
   double pose_age = 0.0;   ///< [s] of the common instant, when any link is known
   std::size_t cycles = 0;  ///< since the start, those without a model too
@@ -46,7 +51,7 @@ diagnostic_msgs::DiagnosticStatus input_diagnostics(const std::string& node,
 diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
                                                    const CycleReport& report);
 /// @param rate         [Hz] that was reached since the last call
-/// @param wanted_rate  [Hz]
+/// @param wanted_rate  [Hz] ~rate, or that of the joint states
 diagnostic_msgs::DiagnosticStatus query_diagnostics(const std::string& node,
                                                     const CycleReport& report, double rate,
                                                     double wanted_rate);

@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "ist_proximity/robot/attached_object.h"
+#include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ist_proximity/ros/parameters.h"
 
@@ -33,7 +35,11 @@ struct ModelState {
   /// When ready. Holds every link with geometry, as the self-filter needs, not only the monitored
   /// ones.
   std::shared_ptr<const RobotModel> robot;
-  std::vector<std::size_t> monitored;  ///< when ready: indices into robot->links
+  std::vector<std::size_t> monitored;                   ///< when ready: indices into robot->links
+  std::shared_ptr<const Kinematics> kinematics;         ///< from kPacking on; null: see the next
+  std::string kinematics_problem;                       ///< why it cannot be had
+  std::shared_ptr<const RobotDescription> description;  ///< as parsed; from kPacking on
+  std::vector<AttachedObject> objects;                  ///< when ready: parts of `robot`
 };
 
 /// Makes the robot's model in a thread of its own: waits for robot_description on the parameter
@@ -55,11 +61,24 @@ class ModelLoader {
   /// @returns what happens now; `found` is whether the parameter is set at the moment
   std::string reload(bool* found);
 
+  /// Make an object a part of its link, and end that. The new model takes the old one's place when
+  /// it is ready, and before the function returns; until then the old one goes on. Attached objects
+  /// survive reload(), unless their link does not.
+  /// @returns empty on success, else why not; then nothing has changed
+  std::string attach(const AttachedObject& object);
+  std::string detach(const std::string& name);
+
  private:
   void run();
   void load_once();
   bool fetch(std::string* urdf, std::string* problem) const;
   void load(const std::string& urdf);
+  std::string change_objects(const std::shared_ptr<const ModelState>& state,
+                             std::vector<AttachedObject> objects, const std::string& link);
+  RobotModelConfig model_config(const RobotDescription& description,
+                                const std::vector<AttachedObject>& objects) const;
+  void finish(const RobotDescription& description, ModelState* state) const;
+  RobotDescription carry_objects(ModelState* state);
   void set_state(ModelState state);
   void wait();
   bool cancelled() const { return stop_ || reload_; }
@@ -72,6 +91,8 @@ class ModelLoader {
   std::condition_variable wake_;
   std::shared_ptr<const ModelState> state_;
   std::atomic<bool> stop_{false}, reload_{false};
+  std::vector<AttachedObject> objects_;  ///< guarded by mutex_
+  std::mutex change_mutex_;              ///< one change of objects after the other
   std::thread thread_;
 };
 

@@ -24,12 +24,16 @@ struct SourceConfig {
   IngestConfig ingest;
 };
 
+/// Where link poses come from.
+enum class PoseSourceKind { kTf, kJointStates };
+
 /// Everything a node can be told. Numbers that the core knows have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
   std::string fixed_frame;                              ///< empty: the URDF's root link
+  PoseSourceKind pose_source = PoseSourceKind::kTf;
   double pose_timeout = 0.5;  ///< [s] a link whose pose is older is UNKNOWN; > 0
-  double rate = 100.0;        ///< [Hz] of ~proximity; > 0
+  double rate = 100.0;        ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
   QueryConfig query;

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <ros/time.h>
-#include <tf2/buffer_core.h>
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -16,37 +16,24 @@ struct LinkPoses {
   std::vector<bool> known;              ///< by link
   std::vector<std::string> problems;    ///< by link: why not; empty where known or not wanted
 
+  /// Every one of `links` unknown, without a problem.
+  void reset(const ros::Time& now, std::size_t links);
+  /// Says why no link can be known.
+  void blame(const std::vector<bool>& wanted, const std::string& problem);
   std::size_t count_known() const;
 };
 
-/// Reads link poses from tf.
-///
-/// All poses belong to one instant, the newest at which every fresh link is known; mixing instants
-/// would tear a moving arm apart. A link that has not moved on for longer than the timeout is not
-/// known and does not hold back the others. Static links are known at any instant.
-/// Not thread safe; the buffer may be fed meanwhile. Never waits.
+/// Where the robot's links come from: tf, or the node's own kinematics. Not thread safe; never
+/// waits.
 class PoseSource {
  public:
-  /// @param buffer        outlives this
-  /// @param fixed_frame   frame F
-  /// @param link_frames   by link
-  /// @param wanted        by link: false leaves it unknown and out of everything
-  /// @param timeout       [s]
-  PoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
-             std::vector<std::string> link_frames, std::vector<bool> wanted, double timeout);
+  virtual ~PoseSource() = default;
 
   /// @param now  of the ROS clock; 0 (no clock yet) makes every link unknown
-  void look_up(const ros::Time& now, LinkPoses* poses);
+  virtual void look_up(const ros::Time& now, LinkPoses* poses) = 0;
 
- private:
-  /// Newest instant of one link; false and a sentence when there is none or it is too old.
-  bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, std::string* problem);
-
-  const tf2::BufferCore& buffer_;
-  std::string fixed_frame_;
-  std::vector<std::string> frames_;
-  std::vector<bool> wanted_;
-  double timeout_;
+  /// For a person whose links have no pose: what may be missing.
+  virtual std::string hint() const = 0;
 };
 
 }  // namespace ist

@@ -13,6 +13,7 @@
 #include "ist_proximity/ros/closing_speed.h"
 #include "ist_proximity/ros/cloud_source.h"
 #include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/pose_source.h"
@@ -26,10 +27,13 @@ using CloudSources = std::vector<std::unique_ptr<CloudSource>>;
 /// model. It takes what is there and waits for nothing. One thread.
 class ProximityCycle {
  public:
-  /// @param model   ready
-  /// @param buffer  outlives this
+  enum class Reader { kOnly, kOther };
+
+  /// @param model  ready
+  /// @param poses  of model->robot->links; null: there is no kinematics to compute them
+  /// @param reader kOnly: the one thread that reads the sources' channels; kOther: shares with it
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                 const tf2::BufferCore& buffer);
+                 std::unique_ptr<PoseSource> poses, Reader reader);
 
   /// @param now      of the ROS clock
   /// @param message  overwritten
@@ -50,7 +54,8 @@ class ProximityCycle {
   std::shared_ptr<const ModelState> model_;
   const RobotModel& robot_;
   std::string fixed_frame_;
-  PoseSource pose_source_;
+  std::unique_ptr<PoseSource> pose_source_;
+  const Reader reader_;
   ProximityQuery query_;
   Repulsion repulsion_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
@@ -58,11 +63,27 @@ class ProximityCycle {
   // Of this cycle.
   LinkPoses poses_;
   Situation situation_;
-  std::vector<const SourceSnapshot*> snapshots_;  ///< by source; null: none
-  std::vector<const CloudSnapshot*> clouds_;      ///< what the query sees
-  std::vector<std::string> cloud_names_;          ///< of `clouds_`
-  std::vector<LinkProximity> results_;            ///< by link of the robot
+  std::vector<const SourceSnapshot*> snapshots_;             ///< by source; null: none
+  std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< with Reader::kOther
+  std::vector<const CloudSnapshot*> clouds_;                 ///< what the query sees
+  std::vector<std::string> cloud_names_;                     ///< of `clouds_`
+  std::vector<LinkProximity> results_;                       ///< by link of the robot
 };
+
+/// Frame of all results.
+std::string fixed_frame_of(const ModelState& model, const ServerConfig& config);
+
+/// @param model   ready
+/// @param buffer  outlives the result
+/// @param joints  outlives the result; null: link poses come from the buffer
+/// @returns null when the URDF's kinematics is needed and faulty
+std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
+                                             const tf2::BufferCore& buffer,
+                                             JointStateListener* joints);
+
+/// By link of model.robot: names, and whether its pose is asked for.
+std::vector<std::string> link_names(const RobotModel& robot);
+std::vector<bool> wanted_links(const ModelState& model);
 
 /// What is said while there is no model to measure with: MODEL_ERROR and every link UNKNOWN.
 /// @param fixed_frame  may be empty, while only the URDF could tell

@@ -1,34 +1,41 @@
 #pragma once
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <ist_proximity/AttachObject.h>
+#include <ist_proximity/DetachObject.h>
 #include <ros/node_handle.h>
 #include <std_srvs/Trigger.h>
 #include <tf2/buffer_core.h>
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <thread>
 
 #include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/markers.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/proximity_cycle.h"
+#include "ist_proximity/ros/query_service.h"
 #include "ist_proximity/ros/transform_listener.h"
 
 namespace ist {
 
 /// The whole of ist_proximity as node and nodelet run it. Threads:
-///   - the cycle: at ~rate of the wall clock (a paused /clock does not silence it) it takes the
-///     newest poses and clouds, queries and publishes; it waits for nothing;
+///   - the cycle: it takes the newest poses and clouds, queries and publishes, and waits for
+///     nothing; at ~rate of the wall clock (a paused /clock does not silence it), or with
+///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
-///   - the model loader; - tf's listener;
+///   - ~query, with a query of its own;
+///   - the model loader; - the listeners of tf and joint_states;
 ///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
 ///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
 ///     not every ROS 1 distribution has).
-/// The service is answered from the queue of the node handles.
+/// The other services are answered from the queue of the node handles.
 class ProximityServer {
  public:
   /// @param nh          topics like `cloud` are relative to it
@@ -45,6 +52,7 @@ class ProximityServer {
 
   void advertise();
   void run_cycles();
+  bool wait_for_joint_states();
   void run_cycle();
   void notice_clock_jump(const ros::Time& now);
   void take_model();
@@ -54,6 +62,10 @@ class ProximityServer {
   void run_diagnostics();
   void read_repulsion_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool attach_object(ist_proximity::AttachObject::Request& request,
+                     ist_proximity::AttachObject::Response& response);
+  bool detach_object(ist_proximity::DetachObject::Request& request,
+                     ist_proximity::DetachObject::Response& response);
   bool sleep_until(Clock::time_point time);  ///< false when it is time to stop
 
   const ServerConfig config_;
@@ -61,11 +73,12 @@ class ProximityServer {
   const std::string name_;  ///< in diagnostics
 
   ros::Publisher proximity_, min_distance_, markers_, spheres_, filtered_cloud_, diagnostics_;
-  ros::ServiceServer reload_service_;
+  ros::ServiceServer reload_service_, attach_service_, detach_service_;
   tf2::BufferCore buffer_;
   TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
+  std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   // The cycle thread's own.
   std::shared_ptr<const ModelState> model_;
@@ -84,6 +97,9 @@ class ProximityServer {
   std::mutex stop_mutex_;
   std::condition_variable stop_signal_;
   bool stop_ = false;
+  std::condition_variable state_signal_;  ///< to stop, or a joint state has come
+  std::uint64_t states_come_ = 0, states_taken_ = 0, states_skipped_ = 0;
+  std::unique_ptr<QueryService> query_service_;
   std::thread cycle_thread_, diagnostics_thread_;
 };
 

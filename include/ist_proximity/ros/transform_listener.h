@@ -8,8 +8,10 @@
 #include <atomic>
 #include <chrono>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace ist {
 
@@ -31,11 +33,16 @@ class TransformListener {
   /// transforms stay. Thread safe.
   void notice_clock_jump();
 
+  /// Frames whose transforms stay outside from now on, because somebody else fills them in.
+  /// Thread safe.
+  void leave_out(const std::vector<std::string>& child_frames);
+
   /// What was kept out during the last second, as a sentence; empty when nothing was. Thread safe.
   std::string problem() const;
 
  private:
   void receive(const tf2_msgs::TFMessage& message, bool is_static);
+  bool is_left_out(const std::string& child_frame) const;
   void keep_out(const geometry_msgs::TransformStamped& transform, double ahead);
 
   tf2::BufferCore& buffer_;
@@ -46,6 +53,7 @@ class TransformListener {
   ros::Time last_now_;
   std::string problem_;
   std::chrono::steady_clock::time_point problem_time_;
+  std::set<std::string> left_out_;
 
   std::atomic<bool> running_{true};
   std::thread thread_;

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <ist_proximity/AttachObject.h>
+
+#include "ist_proximity/robot/attached_object.h"
+#include "ist_proximity/robot/package_resolver.h"
+
+namespace ist {
+
+/// What a request describes; its mesh is read.
+/// @throws ModelError naming the field that is wrong, its value and what is allowed
+AttachedObject to_object(const ist_proximity::AttachObject::Request& request,
+                         const PackageFinder& find_package);
+
+}  // namespace ist

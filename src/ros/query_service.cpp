@@ -1,0 +1,115 @@
+#include "ist_proximity/ros/query_service.h"
+
+#include <algorithm>
+#include <exception>
+
+namespace ist {
+
+using ist_proximity::ProximityArray;
+
+QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
+                           const CloudSources& sources, const tf2::BufferCore& buffer,
+                           std::function<RepulsionConfig()> repulsion)
+    : config_(config), sources_(sources), buffer_(buffer), repulsion_(std::move(repulsion)) {
+  config_.query.deadline = 0.0;
+  private_nh.setCallbackQueue(&queue_);
+  service_ = private_nh.advertiseService("query", &QueryService::answer, this);
+  thread_ = std::thread([this] {
+    while (running_) queue_.callAvailable(ros::WallDuration(0.05));
+  });
+}
+
+QueryService::~QueryService() {
+  running_ = false;
+  thread_.join();
+  service_.shutdown();
+}
+
+void QueryService::set_model(std::shared_ptr<const ModelState> model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  newest_model_ = std::move(model);
+}
+
+bool QueryService::answer(Service::Request& request, Service::Response& response) {
+  try {
+    response.message = run(request, &response);
+    response.success = response.message.empty();
+  } catch (const std::exception& error) {  // no memory for a monstrous request
+    response.success = false;
+    response.message = error.what();
+  }
+  if (!response.success) {
+    response.results.clear();
+    return true;
+  }
+  const auto bad =
+      std::find_if(response.results.begin(), response.results.end(),
+                   [](const ProximityArray& result) { return result.status != result.OK; });
+  if (bad != response.results.end()) {
+    response.message =
+        "results[" + std::to_string(bad - response.results.begin()) + "]: " + bad->status_text;
+  }
+  return true;
+}
+
+/// Empty, or why there is nothing to query with.
+std::string QueryService::take_model() {
+  std::shared_ptr<const ModelState> model;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    model = newest_model_;
+  }
+  if (!model || model->phase != ModelState::Phase::kReady) {
+    return model ? model->problem : "the robot's model is not there yet";
+  }
+  if (!model->kinematics) return "of the URDF, " + model->kinematics_problem;
+  if (model == model_) return "";
+  model_ = std::move(model);
+  auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
+                                                  fixed_frame_of(*model_, config_),
+                                                  link_names(*model_->robot), config_.pose_timeout);
+  poses_ = poses.get();
+  cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
+                                            ProximityCycle::Reader::kOther);
+  return "";
+}
+
+/// Empty, or which of them is none that is monitored.
+std::string QueryService::choose_links(const std::vector<std::string>& links) {
+  chosen_.assign(model_->links.size(), links.empty());
+  for (const std::string& name : links) {
+    const auto found = std::find(model_->links.begin(), model_->links.end(), name);
+    if (found == model_->links.end()) return "link '" + name + "' is not monitored";
+    chosen_[static_cast<std::size_t>(found - model_->links.begin())] = true;
+  }
+  std::vector<bool> wanted = wanted_links(*model_);
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    if (!chosen_[i]) wanted[model_->monitored[i]] = false;
+  }
+  poses_->set_wanted(wanted);
+  return "";
+}
+
+std::string QueryService::run(const Service::Request& request, Service::Response* response) {
+  std::string problem = take_model();
+  if (problem.empty()) problem = choose_links(request.links);
+  if (!problem.empty()) return problem;
+
+  const RepulsionConfig repulsion = repulsion_();
+  CycleReport ignored;
+  for (std::size_t i = 0; i < request.states.size(); ++i) {
+    problem = poses_->state(request.states[i]);
+    if (!problem.empty()) return "states[" + std::to_string(i) + "]: " + problem;
+    response->results.emplace_back();
+    ProximityArray& result = response->results.back();
+    cycle_->forget();  // one configuration after the other is no motion
+    cycle_->run(ros::Time::now(), sources_, repulsion, &result, &ignored);
+    for (std::size_t link = chosen_.size(); link-- > 0;) {
+      if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
+    }
+    if (!running_) return "the node ends";
+  }
+  return "";
+}
+
+}  // namespace ist

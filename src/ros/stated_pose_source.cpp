@@ -1,0 +1,104 @@
+#include "ist_proximity/ros/stated_pose_source.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/transforms.h"
+
+namespace ist {
+
+StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
+                                   const tf2::BufferCore& buffer, const std::string& fixed_frame,
+                                   const std::vector<std::string>& links, double timeout)
+    : kinematics_(std::move(kinematics)),
+      buffer_(buffer),
+      fixed_frame_(fixed_frame),
+      wanted_(links.size(), true),
+      timeout_(timeout),
+      q_(kinematics_->joints().size(), std::nan("")) {
+  const std::size_t none = kinematics_->links().size();
+  for (const std::string& name : links) {
+    places_.push_back(kinematics_->find_link(name).value_or(none));
+  }
+}
+
+std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration) {
+  const std::size_t count = configuration.name.size();
+  if (configuration.position.size() != count) {
+    return "it has " + std::to_string(count) + " names and " +
+           std::to_string(configuration.position.size()) + " positions";
+  }
+  std::vector<double> q(q_.size(), std::nan(""));
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string title = "joint '" + configuration.name[i] + "'";
+    const auto joint = kinematics_->find_joint(configuration.name[i]);
+    if (!joint) return title + " is not in the URDF";
+    if (kinematics_->joints()[*joint].has_unstated_pose()) {
+      return title + " is planar or floating, which one position cannot tell; leave it out";
+    }
+    if (!std::isfinite(configuration.position[i])) {
+      return "the position of " + title + " is NaN or infinite";
+    }
+    q[*joint] = configuration.position[i];
+  }
+  q_ = std::move(q);
+  return "";
+}
+
+std::string StatedPoseSource::hint() const {
+  return "state its position, or see that tf or joint states tell it";
+}
+
+/// The newest transform, unless it is too old.
+std::string StatedPoseSource::now_in_tf(const std::string& parent, const std::string& child,
+                                        const ros::Time& now, Eigen::Isometry3d* X) const {
+  std::string problem;
+  if (!is_known(buffer_, parent, child, ros::Time(), &problem)) return problem;
+  ros::Time stamp;
+  problem = ist::look_up(buffer_, parent, child, ros::Time(), X, &stamp);
+  if (!problem.empty() || stamp.isZero()) return problem;
+  const double age = seconds_between(stamp, now);
+  if (age <= timeout_) return "";
+  char text[96];
+  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
+                timeout_);
+  return "the newest transform from '" + child + "' to '" + parent + text;
+}
+
+void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+  poses->reset(now, places_.size());
+  if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
+  Eigen::Isometry3d X_FR;
+  const std::string problem = now_in_tf(fixed_frame_, kinematics_->links()[0], now, &X_FR);
+  if (!problem.empty()) return poses->blame(wanted_, problem);
+
+  kinematics_->place_joints(q_, &joints_);
+  const auto& joints = kinematics_->joints();
+  std::vector<std::string> joint_problems(joints.size());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints_.known[j]) continue;
+    const std::string why = now_in_tf(kinematics_->links()[joints[j].parent],
+                                      kinematics_->links()[joints[j].child], now, &joints_.X_PC[j]);
+    joints_.known[j] = why.empty();
+    if (!why.empty()) {
+      joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
+    }
+  }
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<bool> known;
+  kinematics_->place_links(joints_, X_FR, &X_FL, &known);
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (!wanted_[i]) continue;
+    if (places_[i] == X_FL.size()) {
+      poses->problems[i] = "it is not in the URDF";
+    } else if (known[places_[i]]) {
+      poses->X_FL[i] = X_FL[places_[i]];
+      poses->known[i] = true;
+    } else {
+      poses->problems[i] = joint_problems[*kinematics_->first_unknown(joints_, places_[i])];
+    }
+  }
+}
+
+}  // namespace ist

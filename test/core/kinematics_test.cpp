@@ -1,0 +1,236 @@
+#include "ist_proximity/robot/kinematics.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/error.h"
+
+namespace ist {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kPi = 3.14159265358979323846;
+
+Kinematics kinematics(const std::string& content) {
+  return Kinematics(
+      parse_urdf("<robot name=\"test\">" + content + "</robot>", GeometrySource::kCollision, {}));
+}
+
+std::string links(int count) {
+  std::string text;
+  for (int i = 0; i < count; ++i) text += "<link name=\"l" + std::to_string(i) + "\"/>";
+  return text;
+}
+
+// Joint `name` from link l<parent> to l<child>.
+std::string joint(const std::string& name, const std::string& type, int parent, int child,
+                  const std::string& inside) {
+  return "<joint name=\"" + name + "\" type=\"" + type + "\"><parent link=\"l" +
+         std::to_string(parent) + "\"/><child link=\"l" + std::to_string(child) + "\"/>" + inside +
+         "<limit lower=\"-1\" upper=\"2\" effort=\"1\" velocity=\"1\"/></joint>";
+}
+
+std::string error_of(const std::string& content) {
+  try {
+    kinematics(content);
+  } catch (const ModelError& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+void expect_says(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
+}
+
+// Positions by name; what is left out is NaN.
+std::vector<double> positions(const Kinematics& k, const std::map<std::string, double>& q) {
+  std::vector<double> result(k.joints().size(), kNaN);
+  for (const auto& [name, value] : q) result[k.find_joint(name).value()] = value;
+  return result;
+}
+
+struct Placed {
+  JointPoses joints;
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<bool> known;
+};
+
+Placed place(const Kinematics& k, const std::map<std::string, double>& q,
+             const Eigen::Isometry3d& X_FR = Eigen::Isometry3d::Identity()) {
+  Placed placed;
+  k.place_joints(positions(k, q), &placed.joints);
+  k.place_links(placed.joints, X_FR, &placed.X_FL, &placed.known);
+  return placed;
+}
+
+TEST(Kinematics, handComputedChain) {
+  // Up 1, bent about y by 90 degrees, out 0.5 along the bent x (which is down), and a fixed tip.
+  const Kinematics k = kinematics(
+      links(4) + joint("bend", "revolute", 0, 1, "<origin xyz=\"0 0 1\"/><axis xyz=\"0 2 0\"/>") +
+      joint("slide", "prismatic", 1, 2, "<origin xyz=\"0.1 0 0\"/><axis xyz=\"10 0 0\"/>") +
+      joint("tip", "fixed", 2, 3, "<origin xyz=\"0 0 0.2\" rpy=\"0 0 1.5707963267948966\"/>"));
+  EXPECT_EQ(k.links(), (std::vector<std::string>{"l0", "l1", "l2", "l3"}));
+  const Placed placed = place(k, {{"bend", kPi / 2}, {"slide", 0.5}});
+  ASSERT_EQ(placed.known, std::vector<bool>(4, true));
+  EXPECT_TRUE(placed.X_FL[2].translation().isApprox(Eigen::Vector3d(0, 0, 1 - 0.6), 1e-15));
+  EXPECT_TRUE(placed.X_FL[3].translation().isApprox(Eigen::Vector3d(0.2, 0, 0.4), 1e-15));
+  // The tip's x is the wrist's y; its y is the wrist's -x, which points up.
+  EXPECT_TRUE(placed.X_FL[3].linear().col(0).isApprox(Eigen::Vector3d::UnitY(), 1e-15));
+  EXPECT_TRUE(placed.X_FL[3].linear().col(1).isApprox(Eigen::Vector3d::UnitZ(), 1e-15));
+  EXPECT_EQ(k.joints()[*k.find_joint("bend")].lower, -1.0);
+  EXPECT_EQ(k.joints()[*k.find_joint("bend")].upper, 2.0);
+  EXPECT_FALSE(k.find_joint("l0").has_value());
+  EXPECT_FALSE(k.find_link("bend").has_value());
+}
+
+TEST(Kinematics, chainsOfMimics) {
+  const std::string axis = "<axis xyz=\"0 0 1\"/>";
+  const Kinematics k = kinematics(
+      links(5) +
+      // Named and placed so that those that follow come before the one they follow.
+      joint("a", "continuous", 0, 1,
+            axis + "<mimic joint=\"b\" multiplier=\"-2\" offset=\"0.1\"/>") +
+      joint("b", "prismatic", 0, 2, axis + "<mimic joint=\"c\" multiplier=\"3\" offset=\"0.5\"/>") +
+      joint("c", "revolute", 2, 3, axis) +
+      joint("d", "revolute", 3, 4, axis + "<mimic joint=\"c\"/>"));
+  const double c = 0.7, b = 3 * c + 0.5, a = -2 * b + 0.1;
+  // A position of a mimic's own is not listened to.
+  const Placed placed = place(k, {{"c", c}, {"a", 99.0}, {"b", kNaN}});
+  const auto X = [&](const std::string& link) { return placed.X_FL[*k.find_link(link)]; };
+  EXPECT_NEAR(X("l2").translation().z(), b, 1e-15);
+  const Eigen::Matrix3d turned_a =
+      Eigen::AngleAxisd(a, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_TRUE(X("l1").linear().isApprox(turned_a, 1e-14));
+  const Eigen::Matrix3d turned_c_d =
+      Eigen::AngleAxisd(2 * c, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_TRUE(X("l4").linear().isApprox(turned_c_d, 1e-14));
+  for (const char* name : {"a", "b", "d"}) EXPECT_FALSE(k.joints()[*k.find_joint(name)].is_free());
+  EXPECT_TRUE(k.joints()[*k.find_joint("c")].is_free());
+}
+
+TEST(Kinematics, whatIsNotKnown) {
+  const Kinematics k =
+      kinematics(links(6) + joint("a", "revolute", 0, 1, "") + joint("b", "floating", 1, 2, "") +
+                 joint("c", "revolute", 2, 3, "") + joint("d", "planar", 0, 4, "") +
+                 joint("e", "fixed", 4, 5, ""));
+  const auto link = [&](const char* name) { return *k.find_link(name); };
+  Placed placed = place(k, {{"a", 0.1}});
+  for (const char* name : {"l0", "l1"}) EXPECT_TRUE(placed.known[link(name)]) << name;
+  for (const char* name : {"l2", "l3", "l4", "l5"}) EXPECT_FALSE(placed.known[link(name)]) << name;
+  const auto blamed = [&](const char* name) {
+    const auto joint = k.first_unknown(placed.joints, link(name));
+    return joint ? k.joints()[*joint].name : "";
+  };
+  EXPECT_EQ(blamed("l1"), "");
+  EXPECT_EQ(blamed("l3"), "b");  // before c, which is not known either
+  EXPECT_EQ(blamed("l5"), "d");
+
+  // The caller's pose for the floating joint, and nothing but c missing below it.
+  const std::size_t b = *k.find_joint("b");
+  EXPECT_TRUE(k.joints()[b].has_unstated_pose());
+  placed.joints.X_PC[b] = Eigen::Isometry3d(Eigen::Translation3d(1, 2, 3));
+  placed.joints.known[b] = true;
+  k.place_links(placed.joints, Eigen::Isometry3d::Identity(), &placed.X_FL, &placed.known);
+  EXPECT_TRUE(placed.known[link("l2")]);
+  EXPECT_EQ(blamed("l3"), "c");
+  const Eigen::Vector3d expected =
+      Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * Eigen::Vector3d(1, 2, 3);
+  EXPECT_TRUE(placed.X_FL[link("l2")].translation().isApprox(expected, 1e-15));
+}
+
+TEST(Kinematics, faults) {
+  expect_says(error_of(links(2) + joint("a", "revolute", 0, 1, "<axis xyz=\"0 0 0\"/>")),
+              "joint 'a': its <axis> has length 0");
+  expect_says(error_of(links(2) + joint("a", "revolute", 0, 1, "<mimic joint=\"z\"/>")),
+              "joint 'a' mimics joint 'z', which is not in the URDF");
+  expect_says(error_of(links(2) + joint("a", "revolute", 0, 1, "<mimic joint=\"a\"/>")), "ring");
+  expect_says(error_of(links(3) + joint("a", "revolute", 0, 1, "<mimic joint=\"b\"/>") +
+                       joint("b", "prismatic", 1, 2, "<mimic joint=\"a\"/>")),
+              "ring");
+  expect_says(error_of(links(3) + joint("a", "revolute", 0, 1, "<mimic joint=\"b\"/>") +
+                       joint("b", "floating", 1, 2, "")),
+              "joint 'a' mimics joint 'b', which has no position");
+  // An axis is of no use to a joint without position, and so not asked for.
+  EXPECT_EQ(error_of(links(2) + joint("a", "fixed", 0, 1, "<axis xyz=\"0 0 0\"/>")), "(no error)");
+}
+
+// A joint's motion by Rodrigues' formula, and its chain by plain products of 4x4 matrices.
+Eigen::Matrix4d naive_motion(JointType type, const Eigen::Vector3d& axis, double q) {
+  Eigen::Matrix4d X = Eigen::Matrix4d::Identity();
+  const Eigen::Vector3d n = axis.normalized();
+  if (type == JointType::kPrismatic) {
+    X.topRightCorner<3, 1>() = q * n;
+  } else if (type != JointType::kFixed) {
+    Eigen::Matrix3d cross;
+    cross << 0, -n.z(), n.y(), n.z(), 0, -n.x(), -n.y(), n.x(), 0;
+    X.topLeftCorner<3, 3>() += std::sin(q) * cross + (1 - std::cos(q)) * cross * cross;
+  }
+  return X;
+}
+
+TEST(Kinematics, randomTreesAgainstNaiveProducts) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> number(-1, 1);
+  const auto vector = [&] {
+    return Eigen::Vector3d(number(random), number(random), number(random));
+  };
+  const JointType types[] = {JointType::kFixed, JointType::kRevolute, JointType::kContinuous,
+                             JointType::kPrismatic};
+  for (int trial = 0; trial < 200; ++trial) {
+    RobotDescription robot;
+    robot.root_link = "l0";
+    const int count = 1 + static_cast<int>(random() % 20);
+    for (int i = 1; i <= count; ++i) {
+      JointDescription joint;
+      joint.name = "j" + std::to_string(i);
+      joint.type = types[random() % 4];
+      joint.parent_link = "l" + std::to_string(random() % static_cast<unsigned>(i));
+      joint.child_link = "l" + std::to_string(i);
+      joint.X_PJ = Eigen::Translation3d(vector()) *
+                   Eigen::AngleAxisd(3 * number(random), vector().normalized());
+      joint.axis = vector();
+      // Follows one of an earlier number, when that has a position.
+      if (i > 1 && random() % 3 == 0) {
+        const std::size_t other = random() % static_cast<unsigned>(i - 1);
+        if (robot.joints[other].type != JointType::kFixed) {
+          joint.mimic = Mimic{robot.joints[other].name, number(random), number(random)};
+        }
+      }
+      robot.joints.push_back(joint);
+    }
+    std::map<std::string, double> stated;
+    std::map<std::string, Eigen::Matrix4d> X_RL{{"l0", Eigen::Matrix4d::Identity()}};
+    std::map<std::string, double> q;
+    for (const JointDescription& joint : robot.joints) {
+      q[joint.name] = joint.mimic
+                          ? joint.mimic->multiplier * q[joint.mimic->joint] + joint.mimic->offset
+                          : 4 * number(random);
+      if (!joint.mimic) stated[joint.name] = q[joint.name];
+      X_RL[joint.child_link] = X_RL[joint.parent_link] * joint.X_PJ.matrix() *
+                               naive_motion(joint.type, joint.axis, q[joint.name]);
+    }
+    std::shuffle(robot.joints.begin(), robot.joints.end(), random);
+
+    const Kinematics k(robot);
+    const Eigen::Isometry3d X_FR =
+        Eigen::Translation3d(vector()) * Eigen::AngleAxisd(number(random), vector().normalized());
+    const Placed placed = place(k, stated, X_FR);
+    ASSERT_EQ(k.links().size(), X_RL.size());
+    for (std::size_t i = 0; i < k.links().size(); ++i) {
+      ASSERT_TRUE(placed.known[i]);
+      const Eigen::Matrix4d expected = X_FR.matrix() * X_RL.at(k.links()[i]);
+      EXPECT_LT((placed.X_FL[i].matrix() - expected).cwiseAbs().maxCoeff(), 1e-13);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

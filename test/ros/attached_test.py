@@ -1,0 +1,156 @@
+#!/usr/bin/env python3
+"""Attached objects: in their link's distances and out of the cloud, until they are detached."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion
+from proximity_testing import ProximityArray
+
+from ist_proximity.srv import AttachObject, AttachObjectRequest, DetachObject
+
+TOOL = (0.5, 0.0, 0.0)  # its middle on the ball's link
+TOOL_RADIUS = 0.05
+
+
+class AttachedTest(unittest.TestCase):
+    def start(self, **parameters):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 1.5, 0)))
+        # The tool as the camera sees it, and an obstacle beside it.
+        shell = np.random.default_rng(1).normal(size=(200, 3))
+        shell *= TOOL_RADIUS / np.linalg.norm(shell, axis=1)[:, None]
+        self.world.points = np.vstack([shell + TOOL, [[0.5, 0.0, 0.2]]])
+        self.world.start_tf()
+        self.world.start_clouds()
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        self.attach_object = self.proxy("attach_object", AttachObject)
+        self.detach_object = self.proxy("detach_object", DetachObject)
+        return self.node
+
+    def proxy(self, name, kind):
+        proxy = rospy.ServiceProxy(self.node.name + "/" + name, kind)
+        proxy.wait_for_service(pt.TIMEOUT)
+        return proxy
+
+    def tearDown(self):
+        self.world.stop()
+        for message in self.node.messages:
+            pt.check_invariants(self, message)
+        self.assertEqual(self.node.stop(), 0)
+
+    def attach(self, name="tool", link="ball_link", at=TOOL, **fields):
+        fields.setdefault("shape", AttachObjectRequest.SPHERE)
+        if fields["shape"] == AttachObjectRequest.SPHERE:
+            fields.setdefault("dimensions", [TOOL_RADIUS])
+        pose = Pose(Point(*at), fields.pop("orientation", Quaternion(w=1.0)))
+        return self.attach_object(name=name, link=link, pose=pose, **fields)
+
+    def attach_well(self, **fields):
+        answer = self.attach(**fields)
+        self.assertTrue(answer.success, answer.message)
+
+    def detach_well(self, name):
+        answer = self.detach_object(name)
+        self.assertTrue(answer.success, answer.message)
+
+    def wait_for_ball(self, distance, on_robot):
+        def is_so(m):
+            return (
+                m.status == ProximityArray.OK
+                and abs(pt.link(m, "ball_link").distance - distance) < 0.0011
+                and m.sources[0].points_on_robot == on_robot
+            )
+
+        return self.node.wait_for(is_so, "%.3f m and %d points on the robot" % (distance, on_robot))
+
+    def test_attach_and_detach(self):
+        node = self.start()
+        without = np.linalg.norm(self.world.points, axis=1).min() - pt.BALL_RADIUS
+        self.wait_for_ball(without, 0)
+        begin = len(node.messages)
+        self.attach_well()
+        message = self.wait_for_ball(0.2 - TOOL_RADIUS, 200)
+        np.testing.assert_allclose(
+            pt.vector(pt.link(message, "ball_link").point_on_link), [0.5, 0, TOOL_RADIUS], atol=1e-5
+        )
+        # Nothing but the tool's own changes on the way, and the time until the next cloud.
+        for m in node.messages[begin:]:
+            self.assertIn(m.status, (ProximityArray.OK, ProximityArray.NO_CLOUD))
+        node.wait_until(
+            lambda: any(
+                v.key == "attached object" and "'tool' on 'ball_link'" in v.value
+                for v in node.diagnostics["model"].values
+            ),
+            "the tool in diagnostics",
+        )
+
+        # It survives that the model is loaded again.
+        self.assertTrue(node.reload().success)
+        node.wait_for_status(ProximityArray.MODEL_ERROR, start=0)
+        self.wait_for_ball(0.2 - TOOL_RADIUS, 200)
+        self.detach_well("tool")
+        self.wait_for_ball(without, 0)
+
+        # A link without geometry has some while it carries.
+        self.attach_well(link="base", name="on_base")
+        message = node.wait_for(
+            lambda m: m.status == 0 and len(m.links) == 3 and m.sources[0].points_on_robot == 200,
+            "the base among the links",
+        )
+        self.assertEqual([one.link for one in message.links], ["base", "ball_link", "box_link"])
+        self.assertAlmostEqual(message.links[0].distance, 0.2 - TOOL_RADIUS, delta=0.0011)
+        self.detach_well("on_base")
+        node.wait_for(lambda m: m.status == 0 and len(m.links) == 2, "the base gone")
+
+    def test_shapes_and_faults(self):
+        node = self.start(links=["box_link"])
+        node.wait_for_status(ProximityArray.OK)
+        for words, fields in {
+            "name is empty": {"name": ""},
+            "link 'hand' is not in the URDF": {"link": "hand"},
+            "needed are 3": {"shape": AttachObjectRequest.BOX, "dimensions": [0.1]},
+            "dimensions holds -1 m": {"dimensions": [-1.0]},
+            "shape is 9": {"shape": 9},
+            "its quaternion has length 0": {"orientation": Quaternion()},
+            "it holds NaN": {"at": (np.nan, 0, 0)},
+            "missing.stl": {"shape": AttachObjectRequest.MESH, "mesh": "/missing.stl"},
+            "no_such_package": {
+                "shape": AttachObjectRequest.MESH,
+                "mesh": "package://no_such_package/a.stl",
+            },
+        }.items():
+            answer = self.attach(**fields)
+            self.assertFalse(answer.success)
+            self.assertIn(words, answer.message)
+        answer = self.detach_object("tool")
+        self.assertFalse(answer.success)
+        self.assertIn("no object 'tool' is attached; there is none", answer.message)
+        self.assertEqual(len(node.messages[-1].links), 1)
+
+        # A mesh of millimetres, on a link that was not monitored and is now.
+        self.attach_well(
+            shape=AttachObjectRequest.MESH,
+            mesh="package://ist_proximity/demo/meshes/shoulder_fork.stl",
+            dimensions=[0.001] * 3,
+        )
+        message = node.wait_for(lambda m: m.status == 0 and len(m.links) == 2, "the ball's link")
+        self.assertEqual([one.link for one in message.links], ["ball_link", "box_link"])
+        answer = self.attach(link="box_link")
+        self.assertFalse(answer.success)
+        self.assertIn("attached to link 'ball_link' already", answer.message)
+        self.attach_well(name="can", shape=AttachObjectRequest.CYLINDER, dimensions=[0.05, 0.1])
+        self.assertIn("there is tool, can", self.detach_object("tin").message)
+        self.detach_well("can")
+        self.detach_well("tool")
+        node.wait_for(lambda m: m.status == 0 and len(m.links) == 1, "the ball's link gone")
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("attached_test")
+    rostest.rosrun("ist_proximity", "attached_test", AttachedTest, sys.argv)

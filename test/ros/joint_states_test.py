@@ -1,0 +1,292 @@
+#!/usr/bin/env python3
+"""pose_source joint_states: truth by forward kinematics, publishers of a part, late and wrong ones."""
+
+import os
+import subprocess
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import JointState
+
+DEMO = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "demo")
+sys.path.insert(0, DEMO)
+
+# A column that turns and carries a slide with the ball; the box follows the slide, the other way.
+ARM = """<robot name="arm">
+  <link name="base"/> <link name="column"/> <link name="camera"/>
+  <link name="ball_link"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="box_link"><collision><origin xyz="0.05 0 0.1"/><geometry>
+    <box size="0.2 0.4 0.6"/></geometry></collision></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="column"/>
+    <origin xyz="0 0 0.5"/><axis xyz="0 0 1"/></joint>
+  <joint name="slide" type="prismatic"><parent link="column"/><child link="ball_link"/>
+    <axis xyz="2 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="follow" type="prismatic"><parent link="column"/><child link="box_link"/>
+    <axis xyz="1 0 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/>
+    <mimic joint="slide" multiplier="-1.5" offset="-0.5"/></joint>
+  <joint name="to_camera" type="fixed"><parent link="ball_link"/><child link="camera"/>
+    <origin xyz="0.3 0 0"/></joint>
+</robot>"""
+
+
+def arm_poses(turn, slide):
+    """X_BL by link."""
+    column = pt.transform((0, 0, 0.5), angle=turn)
+    ball = column @ pt.transform((slide, 0, 0))
+    return {
+        "ball_link": ball,
+        "box_link": column @ pt.transform((-1.5 * slide - 0.5, 0, 0)),
+        "camera": ball @ pt.transform((0.3, 0, 0)),
+    }
+
+
+def motion(t):
+    """Positions at a time [s]."""
+    return {"turn": np.sin(0.7 * t), "slide": 0.4 + 0.2 * np.sin(t)}
+
+
+def joint_state(positions, stamp=None):
+    message = JointState(name=list(positions), position=list(positions.values()))
+    message.header.stamp = rospy.Time.now() if stamp is None else stamp
+    return message
+
+
+class JointStatesTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.publisher = self.joint_publisher(self.namespace)
+        self.world = pt.World(self.namespace)
+        self.node, self.still = None, None
+
+    def tearDown(self):
+        self.world.stop()
+        if self.node:
+            for message in self.node.messages:
+                pt.check_invariants(self, message)
+            self.assertEqual(self.node.stop(), 0)
+
+    @staticmethod
+    def joint_publisher(namespace):
+        return rospy.Publisher(namespace + "/joint_states", JointState, queue_size=100)
+
+    def start(self, urdf=ARM, **parameters):
+        parameters.setdefault("pose_source", "joint_states")
+        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        return self.node
+
+    def send(self, *joints):
+        """A publisher of some joints, with their motion or standing still at `self.still`."""
+        stamp = rospy.Time.now()
+        q = self.still or motion(stamp.to_sec())
+        self.publisher.publish(joint_state({name: q[name] for name in joints}, stamp))
+        return stamp
+
+    def test_parts(self):
+        """Several publishers; one is missing, late, wrong; all stop, and come back."""
+        node = self.start(pose_timeout=0.4, max_distance=2.0)
+        still = {"turn": 0.3, "slide": 0.5}
+        X, points = arm_poses(**still), np.array([[0.6, 0.6, 0.6]])  # in base
+        self.world.points = pt.apply(pt.inverse(X["camera"]), points)
+        self.world.start_clouds()
+        node.wait_for_status(ProximityArray.NO_POSE, "joint 'turn' has not come")
+        sent = []
+        turn = self.world.repeat(100, lambda: sent.append(self.send("turn")))
+        message = node.wait_for_status(ProximityArray.NO_POSE, "joint 'slide' has not come")
+        self.assertIn("ball_link", message.status_text)
+        self.assertIn("box_link", message.status_text)  # by way of its mimic
+        self.assertTrue(pt.all_unknown(message))
+        self.still = still
+        slide = self.world.repeat(20, lambda: self.send("slide"))
+        node.wait_for_status(ProximityArray.OK)
+
+        # Distances are those of the positions; every joint state is answered.
+        begin, first = len(node.messages), len(sent)
+        message = node.wait_for(lambda m: len(sent) > first + 100, "a second of joint states")
+        for name in ("ball_link", "box_link"):
+            truth = pt.DISTANCE[name](pt.apply(pt.inverse(X[name]), points)).min()
+            one = pt.link(message, name)
+            self.assertLessEqual(one.lower_bound, truth + 1e-5)
+            self.assertLessEqual(abs(one.distance - truth), 0.001 + 1e-5)
+        answered = {m.header.stamp for m in node.messages[begin:]}
+        stamps = sent[first + 5 : first + 95]
+        self.assertGreater(len([s for s in stamps if s in answered]), 0.9 * len(stamps))
+
+        truth_of_ball = pt.link(message, "ball_link").distance
+
+        # What is wrong costs nothing that is known, and is said.
+        wrong = {
+            "1 names and 2 positions": lambda: JointState(name=["turn"], position=[1.0, 2.0]),
+            "'turn' is NaN": lambda: joint_state({"turn": np.nan}),
+            "'trun' is not in the URDF": lambda: joint_state({"trun": 1.0}),
+            "no stamp": lambda: joint_state({"turn": 9.0}, rospy.Time(0)),
+            "in the future": lambda: joint_state({"turn": 9.0}, rospy.Time.from_sec(4e9)),
+            "outside its limits of 0 to 1": lambda: joint_state({"slide": -0.3}),
+        }
+        for words, bad in wrong.items():
+            begin = len(node.messages)
+            repeater = self.world.repeat(10, lambda bad=bad: self.publisher.publish(bad()))
+            node.wait_until(lambda: words in node.diagnostics["pose"].message, words)
+            repeater.stop()
+            for m in node.messages[begin:]:
+                self.assertEqual(m.status, ProximityArray.OK, m.status_text)
+                if "limits" not in words:  # that one is used all the same
+                    self.assertAlmostEqual(pt.link(m, "ball_link").distance, truth_of_ball, 5)
+
+        # Efforts alone are no positions.
+        self.publisher.publish(JointState(name=["turn"], effort=[1.0]))
+
+        # One stops: its links are UNKNOWN, at the rate of the others.
+        slide.paused = True
+        message = node.wait_for_status(ProximityArray.NO_POSE, "the newest position of joint 'slide'")
+        self.assertTrue(pt.all_unknown(message))
+        turn.paused = True
+        begin = len(node.messages)
+        message = node.wait_for_status(ProximityArray.NO_POSE, "'turn'", start=begin)
+        node.wait_for(lambda m: len(node.messages) > begin + 8, "answers without joint states")
+        self.assertEqual(node.messages[-1].status, ProximityArray.NO_POSE)
+        turn.paused = slide.paused = False
+        node.wait_for_status(ProximityArray.OK)
+        pose = node.diagnostics["pose"]
+        values = {v.key: v.value for v in pose.values}
+        self.assertEqual(values["topic"], self.namespace + "/joint_states")
+        self.assertGreater(int(values["joint states used"]), 100)
+
+    def test_moving(self):
+        """Poses belong to the stamp; clouds of a camera on a link, late, with the robot in view;
+        the robot on a base that tf moves and that is behind the joint states."""
+        obstacle = np.array([[1.0, 1.0, 0.8]])  # in world
+
+        def X_WB(t):
+            return pt.transform((0.2 * np.sin(2 * t), 0.1, 0.0), angle=0.3 * np.sin(t))
+
+        def send_late():
+            """The obstacle, and the ball's surface as the camera on it sees it."""
+            stamp = rospy.Time.now() - rospy.Duration(0.1)
+            t = stamp.to_sec()
+            X_WC = X_WB(t) @ arm_poses(**motion(t))["camera"]
+            seen = np.vstack([pt.apply(pt.inverse(X_WC), obstacle), [[-0.2, 0, 0], [-0.3, 0.1, 0]]])
+            self.world.cloud_publisher.publish(pt.cloud(seen, "camera", stamp))
+
+        node = self.start(fixed_frame="world", max_distance=3.0, min_range=0.0)
+        self.world.poses["base"] = ("world", lambda t: X_WB(t))
+        # Somebody else's idea of a frame that is computed here is not listened to.
+        self.world.poses["ball_link"] = ("column", pt.transform((7, 7, 7)))
+        self.world.start_tf(40)
+        self.world.repeat(100, lambda: self.send("turn", "slide"))
+        self.world.repeat(20, send_late)
+        node.wait_for_status(ProximityArray.OK)
+        speeds = []
+        for _ in range(60):
+            message = node.wait_for_status(ProximityArray.OK)
+            self.assertEqual(message.header.frame_id, "world")
+            t = message.header.stamp.to_sec()
+            self.assertLess(rospy.Time.now().to_sec() - t, 1.0)
+            X = arm_poses(**motion(t))
+            for name in ("ball_link", "box_link"):
+                X_WL = X_WB(t) @ X[name]
+                truth = pt.DISTANCE[name](pt.apply(pt.inverse(X_WL), obstacle)).min()
+                # Interpolation between 40 Hz of tf and 100 Hz of joint states bends circles.
+                self.assertAlmostEqual(pt.link(message, name).distance, truth, delta=0.003)
+            self.assertEqual(message.sources[0].points_on_robot, 2)
+            speeds.append(pt.link(message, "ball_link").closing_speed)
+        self.assertGreater(np.isfinite(speeds).mean(), 0.8)
+
+    def test_floating(self):
+        """A floating joint's pose comes from tf, and is said to be missing where it is not there."""
+        node = self.start(pt.urdf())
+        self.world.points = np.array([[0.0, 0.0, 0.3]])
+        self.world.start_clouds()
+        node.wait_for_status(ProximityArray.NO_POSE, "'ball_link'")
+        self.world.stand(box=pt.transform((0, 0.8, 0))).start_tf()
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+
+    def test_faulty_mimic(self):
+        """Kinematics that cannot be: said, nothing is known."""
+        node = self.start(ARM.replace('mimic joint="slide"', 'mimic joint="silde"'))
+        self.world.points = np.array([[0.6, 0.6, 0.6]])
+        self.world.start_clouds()
+        message = node.wait_for_status(ProximityArray.NO_POSE, "mimics joint 'silde'")
+        self.assertTrue(pt.all_unknown(message))
+
+    def test_demo_arm_as_tf(self):
+        """The demo arm twice in one graph: with robot_state_publisher and tf, and without."""
+        import scene
+        from arm_model import ArmModel
+
+        with open(os.path.join(DEMO, "demo_arm.urdf")) as f:
+            urdf = f.read()
+        arm = ArmModel()
+        parameters = {
+            "query/tolerance": 0.0,
+            "packing/max_error": 0.02,
+            "self_filter": False,
+            "max_distance": 3.0,
+            "links": ["gripper_link", "jaw_link", "wrist_link", "base_link"],
+        }
+        node = self.start(urdf, **parameters)
+        other_namespace = self.namespace + "_tf"
+        other_world = pt.World(other_namespace, static=False)
+        rospy.set_param(other_namespace + "/robot_description", urdf)
+        publisher = subprocess.Popen(
+            [
+                pt.find_program("robot_state_publisher", "robot_state_publisher"),
+                "__ns:=" + other_namespace,
+                "/tf:=" + other_namespace + "/tf",
+                "/tf_static:=" + other_namespace + "/tf_static",
+                "_publish_frequency:=500",
+            ]
+        )
+        other = pt.ProximityNode(other_namespace, dict(parameters, rate=200), urdf)
+        other_joints = self.joint_publisher(other_namespace)
+
+        def send():
+            stamp = rospy.Time.now()
+            q = scene.joint_positions(stamp.to_sec() % 20.0)
+            message = joint_state(dict(zip(arm.joint_names, q)), stamp)
+            self.publisher.publish(message)
+            other_joints.publish(message)
+
+        points = np.random.default_rng(5).uniform(-1, 1, (300, 3)) + [0.5, 0, 1.0]
+
+        def send_cloud():
+            message = pt.cloud(points, "base_link")
+            self.world.cloud_publisher.publish(message)
+            other_world.cloud_publisher.publish(message)
+
+        self.world.repeat(50, send)
+        self.world.repeat(10, send_cloud)
+        try:
+            node.wait_for_status(ProximityArray.OK)
+            other.wait_for_status(ProximityArray.OK)
+            begin = len(other.messages)
+            other.wait_for(lambda m: len(other.messages) > begin + 300, "answers of the other")
+            own = {m.header.stamp: m for m in node.messages if m.status == ProximityArray.OK}
+            compared = 0
+            for theirs in other.messages[begin:]:
+                ours = own.get(theirs.header.stamp)
+                if ours is None or theirs.status != ProximityArray.OK:
+                    continue
+                compared += 1
+                for a, b in zip(ours.links, theirs.links):
+                    self.assertEqual(a.link, b.link)
+                    self.assertEqual(a.state, b.state)
+                    if a.state == LinkProximity.NEAR:
+                        self.assertAlmostEqual(a.distance, b.distance, 6)
+            self.assertGreater(compared, 20)
+        finally:
+            publisher.terminate()
+            publisher.wait()
+            other.stop()
+            other_world.stop()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("joint_states_test")
+    rostest.rosrun("ist_proximity", "joint_states_test", JointStatesTest, sys.argv)

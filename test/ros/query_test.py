@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""~query: truth for stated configurations, what is left out, what is wrong, and the cycle beside it."""
+
+import sys
+import time
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from joint_states_test import ARM, arm_poses, joint_state
+from proximity_testing import ProximityArray
+from sensor_msgs.msg import JointState
+
+from ist_proximity.srv import QueryProximity
+
+NOW = {"turn": 0.3, "slide": 0.5}
+
+
+class QueryTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace)
+        self.points = np.random.default_rng(3).uniform(-1.5, 1.5, (400, 3)) + [0, 0, 0.8]
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        if self.node:
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, **parameters):
+        parameters.setdefault("max_distance", 3.0)
+        parameters.setdefault("self_filter", False)
+        self.node = pt.ProximityNode(self.namespace, parameters, ARM)
+        self.service = rospy.ServiceProxy(self.node.name + "/query", QueryProximity)
+        self.service.wait_for_service(pt.TIMEOUT)
+        publisher = self.world.cloud_publisher
+        self.clouds = self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "base")))
+
+    def tf(self):
+        """The robot as it is now."""
+        X = arm_poses(**NOW)
+        column = pt.transform((0, 0, 0.5), angle=NOW["turn"])
+        self.world.poses = {"column": ("base", column)}
+        for name in ("ball_link", "box_link"):
+            self.world.poses[name] = ("column", pt.inverse(column) @ X[name])
+        self.world.start_tf()
+
+    def joints(self):
+        publisher = rospy.Publisher(self.namespace + "/joint_states", JointState, queue_size=10)
+        self.world.repeat(100, lambda: publisher.publish(joint_state(NOW)))
+
+    def ask(self, *configurations, **kwargs):
+        states = [JointState(name=list(q), position=list(q.values())) for q in configurations]
+        return self.service(states=states, **kwargs)
+
+    def check(self, result, q, links=("ball_link", "box_link")):
+        self.assertEqual(result.status, ProximityArray.OK, result.status_text)
+        pt.check_invariants(self, result, 3.0)
+        self.assertEqual([one.link for one in result.links], list(links))
+        X = arm_poses(**q)
+        for one in result.links:
+            every = pt.DISTANCE[one.link](pt.apply(pt.inverse(X[one.link]), self.points))
+            self.assertGreaterEqual(one.distance, every.min() - 1e-5)
+            self.assertLessEqual(one.distance, every.min() + 0.001 + 1e-5)
+            self.assertLessEqual(one.lower_bound, every.min() + 1e-5)
+            self.assertTrue(np.isnan(one.closing_speed))
+
+    def check_all(self):
+        """What holds with both sources of poses."""
+        rng = np.random.default_rng(4)
+        asked = [
+            {"turn": turn, "slide": slide}
+            for turn, slide in zip(rng.uniform(-3, 3, 40), rng.uniform(0, 1, 40))
+        ]
+        answer = self.ask(*asked)
+        self.assertTrue(answer.success)
+        self.assertEqual(answer.message, "")
+        self.assertEqual(len(answer.results), len(asked))
+        for result, q in zip(answer.results, asked):
+            self.check(result, q)
+            self.assertEqual(result.header.frame_id, "base")
+            self.assertEqual(result.sources[0].stamp, result.cloud_stamp)
+
+        # A joint that is left out is where it is now.
+        self.check(self.ask({"turn": 1.0}).results[0], {"turn": 1.0, "slide": NOW["slide"]})
+        self.check(self.ask({}).results[0], NOW)
+        # A position of a mimic joint is not listened to, as with joint states.
+        result = self.ask({"turn": 1.0, "slide": 0.1, "follow": 3.0}).results[0]
+        self.check(result, {"turn": 1.0, "slide": 0.1})
+        # Some links.
+        answer = self.ask(NOW, links=["box_link"])
+        self.check(answer.results[0], NOW, ["box_link"])
+        # Nothing asked, nothing answered.
+        answer = self.ask()
+        self.assertTrue(answer.success)
+        self.assertEqual(answer.results, [])
+
+        for bad, words in (
+            ({"turn": np.nan}, "states[1]: the position of joint 'turn' is NaN"),
+            ({"trun": 1.0}, "states[1]: joint 'trun' is not in the URDF"),
+        ):
+            answer = self.ask(NOW, bad)
+            self.assertFalse(answer.success)
+            self.assertIn(words, answer.message)
+            self.assertEqual(answer.results, [])
+        answer = self.service(states=[JointState(name=["turn", "slide"], position=[1.0])])
+        self.assertFalse(answer.success)
+        self.assertIn("2 names and 1 positions", answer.message)
+        answer = self.ask(NOW, links=["ball"])
+        self.assertFalse(answer.success)
+        self.assertIn("'ball' is not monitored", answer.message)
+
+    def test_tf(self):
+        self.start()
+        self.tf()
+        self.node.wait_for_status(ProximityArray.OK)
+        self.check_all()
+
+        # A planner's batch does not hold up the cycle.
+        begin, start = len(self.node.messages), time.monotonic()
+        batch = [{"turn": t, "slide": 0.5} for t in np.linspace(-3, 3, 3000)]
+        self.assertEqual(len(self.ask(*batch).results), len(batch))
+        took = time.monotonic() - start
+        answered = len(self.node.messages) - begin
+        self.assertGreater(answered, 0.5 * 100 * took)
+        self.assertEqual({m.status for m in self.node.messages[begin:]}, {ProximityArray.OK})
+
+        # No obstacles: said in each result, and nothing looks free.
+        self.clouds.paused = True
+        self.node.wait_for_status(ProximityArray.STALE_CLOUD)
+        answer = self.ask(NOW)
+        self.assertTrue(answer.success)
+        self.assertEqual(answer.results[0].status, ProximityArray.STALE_CLOUD)
+        self.assertTrue(pt.all_unknown(answer.results[0]))
+        self.assertIn("results[0]: source 'cloud'", answer.message)
+
+    def test_joint_states(self):
+        self.start(pose_source="joint_states")
+        self.node.wait_for(
+            lambda m: m.status == ProximityArray.NO_POSE and m.sources[0].status == 0, "the cloud"
+        )
+        # Nothing is known now, but all that is needed is stated.
+        self.check(self.ask(NOW).results[0], NOW)
+        answer = self.ask({"slide": 0.2})
+        self.assertEqual(answer.results[0].status, ProximityArray.NO_POSE)
+        self.assertTrue(pt.all_unknown(answer.results[0]))
+        self.assertIn("joint 'turn' is not stated, and not known now", answer.message)
+        self.joints()
+        self.node.wait_for_status(ProximityArray.OK)
+        self.check_all()
+
+    def test_no_model(self):
+        self.node = pt.ProximityNode(self.namespace, {})
+        service = rospy.ServiceProxy(self.node.name + "/query", QueryProximity)
+        service.wait_for_service(pt.TIMEOUT)
+        self.node.wait_for_status(ProximityArray.MODEL_ERROR)
+        answer = service(states=[JointState()])
+        self.assertFalse(answer.success)
+        self.assertIn("robot_description", answer.message)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("query_test")
+    rostest.rosrun("ist_proximity", "query_test", QueryTest, sys.argv)
