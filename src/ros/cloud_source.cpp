@@ -22,15 +22,18 @@ const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
                          const tf2::BufferCore& buffer, ros::Publisher filtered)
-    : config_(config), buffer_(buffer), filtered_(std::move(filtered)), ingest_(config.ingest) {
+    : config_(config),
+      buffer_(buffer),
+      filtered_(std::move(filtered)),
+      ingest_(ingest_config(config)) {
   facts_.name = config.name;
   facts_.topic = nh.resolveName(config.topic);
+  facts_.type = message_type(config.type);
+  facts_.noun = noun(config.type);
   facts_.timeout = config.timeout;
   facts_.required = config.required;
   nh.setCallbackQueue(&queue_);
-  // A short queue: while one cloud is ingested, only the newest of the others is worth keeping.
-  subscriber_ = nh.subscribe<sensor_msgs::PointCloud2>(config.topic, 2, &CloudSource::receive, this,
-                                                       ros::TransportHints().tcpNoDelay());
+  subscriber_ = subscribe(config, &nh, [this](const Received& received) { receive(received); });
   thread_ = std::thread(&CloudSource::run, this);
 }
 
@@ -118,20 +121,18 @@ void CloudSource::forget_old() {
   if (!target_.model) waiting_.clear();
 
   const double now = ros::Time::now().toSec();
-  while (!waiting_.empty() &&
-         (waiting_.size() > kMaxWaiting ||
-          now - waiting_.front().message->header.stamp.toSec() > config_.timeout)) {
+  while (!waiting_.empty() && (waiting_.size() > kMaxWaiting ||
+                               now - waiting_.front()->header().stamp.toSec() > config_.timeout)) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++facts_.unusable;
     waiting_.pop_front();
   }
 }
 
-void CloudSource::receive(const sensor_msgs::PointCloud2ConstPtr& message) {
+void CloudSource::receive(const Received& received) {
   forget_old();
-  const ros::Time& stamp = message->header.stamp;
-  Waiting waiting{message, {}};
-  const std::string problem = why_unusable(*message, &waiting.raw);
+  const ros::Time& stamp = received.header.stamp;
+  const std::string problem = why_unusable(received);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   {
@@ -148,38 +149,36 @@ void CloudSource::receive(const sensor_msgs::PointCloud2ConstPtr& message) {
       return;
     }
   }
-  const auto after = std::upper_bound(waiting_.begin(), waiting_.end(), stamp,
-                                      [](const ros::Time& time, const Waiting& other) {
-                                        return time < other.message->header.stamp;
-                                      });
-  waiting_.insert(after, waiting);
+  const auto after = std::upper_bound(
+      waiting_.begin(), waiting_.end(), stamp,
+      [](const ros::Time& time, const Waiting& other) { return time < other->header().stamp; });
+  waiting_.insert(after, received.measurement);
 }
 
-std::string CloudSource::why_unusable(const sensor_msgs::PointCloud2& message,
-                                      RawCloud* raw) const {
-  const ros::Time& stamp = message.header.stamp;
-  if (stamp.isZero()) return "its clouds have no stamp (0): the driver must set header.stamp";
+std::string CloudSource::why_unusable(const Received& received) const {
+  const ros::Time& stamp = received.header.stamp;
+  const std::string plural = "its " + facts_.noun + "s ";
+  if (stamp.isZero()) return plural + "have no stamp (0): the driver must set header.stamp";
   const double ahead = seconds_between(ros::Time::now(), stamp);
   if (ahead > future_tolerance(config_.timeout)) {
     char text[96];
-    std::snprintf(text, sizeof text, "its clouds are stamped %.2f s in the future: ", ahead);
-    return text + std::string("compare the clocks of sensor and node");
+    std::snprintf(text, sizeof text, "are stamped %.2f s in the future: ", ahead);
+    return plural + text + "compare the clocks of sensor and node";
   }
-  if (message.header.frame_id.empty()) return "its clouds have an empty frame_id";
-  const std::string fault = view_cloud(message, raw);
-  if (!fault.empty()) return "malformed cloud: " + fault;
+  if (received.header.frame_id.empty()) return plural + "have an empty frame_id";
+  if (!received.fault.empty()) return received.fault;
   if (!target_.model) return "it waits for the robot's model";
   return "";
 }
 
 void CloudSource::use_newest_ready() {
   for (std::size_t i = waiting_.size(); i-- > 0;) {
-    std::string problem = missing_transform(waiting_[i]);
+    std::string problem = missing_transform(*waiting_[i]);
     if (!problem.empty()) {
       if (i + 1 == waiting_.size()) set_problem(problem, false);
       continue;
     }
-    problem = ingest(waiting_[i]);
+    problem = ingest(*waiting_[i]);
     set_problem(problem, !problem.empty());
     const std::lock_guard<std::mutex> lock(mutex_);
     facts_.overtaken += i;
@@ -188,20 +187,21 @@ void CloudSource::use_newest_ready() {
   }
 }
 
-/// Empty when all that is needed at the cloud's stamp is known.
-std::string CloudSource::missing_transform(const Waiting& waiting) const {
-  const std_msgs::Header& header = waiting.message->header;
+/// Empty when all that is needed at the measurement's instants is known.
+std::string CloudSource::missing_transform(const Measurement& waiting) const {
+  const std::string sensor = without_slash(waiting.header().frame_id);
+  const std::vector<ros::Time> instants = waiting.instants();
   std::string problem;
-  if (!is_known(buffer_, target_.fixed_frame, without_slash(header.frame_id), header.stamp,
-                &problem)) {
-    return problem;
+  for (const ros::Time& time : {instants.front(), instants.back()}) {
+    if (!is_known(buffer_, target_.fixed_frame, sensor, time, &problem)) return problem;
   }
   if (!config_.ingest.self_filter) return "";
-  for (const LinkModel& link : target_.model->links) {
-    if (link.usable() &&
-        !is_known(buffer_, target_.fixed_frame, link.name, header.stamp, &problem) &&
-        worth_waiting_for(link.name, header.stamp)) {
-      return "the self-filter waits: " + problem;
+  for (const ros::Time& time : {instants.front(), instants.back()}) {
+    for (const LinkModel& link : target_.model->links) {
+      if (link.usable() && !is_known(buffer_, target_.fixed_frame, link.name, time, &problem) &&
+          worth_waiting_for(link.name, time)) {
+        return "the self-filter waits: " + problem;
+      }
     }
   }
   return "";
@@ -236,27 +236,47 @@ void CloudSource::pose_robot(const ros::Time& stamp, PosedRobot* robot) const {
   }
 }
 
-std::string CloudSource::ingest(const Waiting& waiting) {
-  const std_msgs::Header& header = waiting.message->header;
-  Eigen::Isometry3d X_FS;
-  const std::string problem =
-      look_up(buffer_, target_.fixed_frame, without_slash(header.frame_id), header.stamp, &X_FS);
-  if (!problem.empty()) return problem;
+std::string CloudSource::place(const Measurement& waiting, Placement* placement) const {
+  const std::string sensor = without_slash(waiting.header().frame_id);
+  const std::vector<ros::Time> instants = waiting.instants();
+  std::string problem =
+      look_up(buffer_, target_.fixed_frame, sensor, instants.front(), &placement->X_FS);
+  placement->X_FS_end = placement->X_FS;
+  if (problem.empty() && instants.size() > 1) {
+    problem = look_up(buffer_, target_.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
+  }
+  if (!problem.empty() || !config_.ingest.self_filter) return problem;
+  pose_robot(instants.front(), &placement->robot);
+  for (std::size_t i = 1; i < instants.size(); ++i) {
+    placement->later.emplace_back();
+    pose_robot(instants[i], &placement->later.back());
+  }
+  return "";
+}
 
-  PosedRobot robot;
-  if (config_.ingest.self_filter) pose_robot(header.stamp, &robot);
+std::string CloudSource::ingest(const Measurement& waiting) {
+  const ros::Time& stamp = waiting.header().stamp;
+  Placement placement;
+  const std::string problem = place(waiting, &placement);
+  if (!problem.empty()) return problem;
   SourceSnapshot& snapshot = channel_.back();
   try {
-    ingest_.run(waiting.raw, X_FS, robot, header.stamp.toSec(), &snapshot.cloud);
+    waiting.ingest(placement, &ingest_, &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a monstrous cloud
     snapshot.generation = 0;
-    return std::string("the cloud could not be read: ") + error.what();
+    return "the " + facts_.noun + " could not be read: " + error.what();
   }
-  snapshot.stamp = header.stamp;
+  snapshot.stamp = stamp;
   snapshot.model = target_.model;
-  snapshot.filtered = robot.known;
+  // A link that was missing at any instant is not filtered.
+  snapshot.filtered = placement.robot.known;
+  for (const PosedRobot& later : placement.later) {
+    for (std::size_t i = 0; i < later.known.size(); ++i) {
+      snapshot.filtered[i] = snapshot.filtered[i] && later.known[i];
+    }
+  }
   snapshot.generation = target_.generation;
-  in_use_ = header.stamp;
+  in_use_ = stamp;
   if (filtered_.getNumSubscribers() > 0) {
     filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
   }

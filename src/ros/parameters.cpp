@@ -41,10 +41,12 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   if (source->topic.empty()) {
     reader->add_error("~" + prefix + "topic is empty: the name of a topic is needed");
   }
-  std::string type = "sensor_msgs/PointCloud2";
+  std::string type = message_type(source->type);
   const std::string not_yet = "this type is not supported yet; publish it as a PointCloud2";
-  reader->read_choice(prefix + "type", {"sensor_msgs/PointCloud2"}, &type,
-                      {{"sensor_msgs/LaserScan", not_yet}, {"octomap_msgs/Octomap", not_yet}});
+  reader->read_choice(prefix + "type",
+                      {message_type(SourceType::kCloud), message_type(SourceType::kScan)}, &type,
+                      {{"octomap_msgs/Octomap", not_yet}});
+  if (type == message_type(SourceType::kScan)) source->type = SourceType::kScan;
   reader->read(prefix + "timeout", more_than_zero("s", kInf, true), &source->timeout);
   reader->read(prefix + "required", &source->required);
   read_ingest(reader, prefix, &source->ingest);
@@ -130,6 +132,12 @@ XmlRpc::XmlRpcValue fetch(const ros::NodeHandle& private_nh) {
 }
 
 }  // namespace
+
+const char* message_type(SourceType type) {
+  return type == SourceType::kScan ? "sensor_msgs/LaserScan" : "sensor_msgs/PointCloud2";
+}
+
+const char* noun(SourceType type) { return type == SourceType::kScan ? "scan" : "cloud"; }
 
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);

@@ -36,8 +36,8 @@ Verdict judge_source(const SourceFacts& source, double now) {
     return {ProximityArray::NO_CLOUD,
             title(source) + ": nothing received yet" +
                 (source.publishers == 0
-                     ? ", nobody publishes a sensor_msgs/PointCloud2 there; start the sensor's "
-                       "driver, or set or remap the topic"
+                     ? ", nobody publishes a " + source.type +
+                           " there; start the sensor's driver, or set or remap the topic"
                      : ", although there is a publisher")};
   }
   if (std::isnan(source.newest)) {  // nothing but stamps that are not of this time
@@ -46,26 +46,25 @@ Verdict judge_source(const SourceFacts& source, double now) {
   const double newest_age = now - source.newest;
   if (newest_age > source.timeout) {
     return {ProximityArray::STALE_CLOUD,
-            title(source) + ": the newest cloud is " + seconds(newest_age) + " old, allowed is " +
-                seconds(source.timeout) +
+            title(source) + ": the newest " + source.noun + " is " + seconds(newest_age) +
+                " old, allowed is " + seconds(source.timeout) +
                 (source.problem.empty() ? "; has its driver stopped, or do the clocks of "
                                           "sensor and node differ?"
                                         : because(source.problem))};
   }
   if (!source.has_snapshot) {
     return {ProximityArray::NO_CLOUD,
-            title(source) + ": no cloud could be used yet" + because(source.problem)};
+            title(source) + ": no " + source.noun + " could be used yet" + because(source.problem)};
   }
   const double age = now - source.stamp.toSec();
   if (age > source.timeout) {
-    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable cloud is " +
-                                             seconds(age) + " old, allowed is " +
+    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
+                                             " is " + seconds(age) + " old, allowed is " +
                                              seconds(source.timeout) + because(source.problem)};
   }
   if (source.counts.saw_nothing()) {
-    return {ProximityArray::NO_CLOUD, title(source) +
-                                          ": every point of the newest cloud is NaN, "
-                                          "the sensor sees nothing at all"};
+    return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
+                                          " is NaN, the sensor sees nothing at all"};
   }
   return {ProximityArray::OK, ""};
 }

@@ -64,7 +64,7 @@ WRONG = [
     (
         {
             "sources": {
-                "scan": {"type": "sensor_msgs/LaserScan"},
+                "scan": {"type": "sensor_msgs/LaserScan", "max_range": "far"},
                 "map": {"type": "octomap_msgs/Octomap"},
                 "odd": {"type": "sensor_msgs/Image", "timeout": 0, "required": 1},
                 "range": {"min_range": 2.0, "max_range": 1.0},
@@ -73,7 +73,7 @@ WRONG = [
             }
         },
         [
-            "~sources/scan/type",
+            '~sources/scan/max_range is "far"',
             "~sources/map/type",
             "not supported yet",
             "~sources/odd/type",

@@ -2,7 +2,6 @@
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
-#include <sensor_msgs/PointCloud2.h>
 #include <tf2/buffer_core.h>
 
 #include <atomic>
@@ -17,6 +16,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/snapshot_channel.h"
+#include "ist_proximity/ros/measurement.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/status.h"
 
@@ -33,14 +33,14 @@ struct SourceSnapshot {
   std::uint64_t generation = 0;  ///< of the clock, see CloudSource; 0: none yet
 };
 
-/// One sensor: receives its clouds and turns them into snapshots, in a thread of its own, so that
-/// neither a large cloud nor a late transform ever delays a query.
+/// One sensor: receives its clouds (or scans) and turns them into snapshots, in a thread of its
+/// own, so that neither a large cloud nor a late transform ever delays a query.
 ///
 /// A cloud waits until tf knows its sensor and, for the self-filter, the links at the cloud's own
-/// stamp; the newest one that is ready is taken, what it overtakes is dropped. A link whose
-/// transforms have stopped is not waited for. This takes the place of tf2_ros::MessageFilter, which
-/// can neither give up on a single frame (setTargetFrames() needs clear(), which races with the tf
-/// listener's thread) nor say which transform it waits for.
+/// stamp, a scan until its last beam's time; the newest one that is ready is taken, what it
+/// overtakes is dropped. A link whose transforms have stopped is not waited for. This takes the
+/// place of tf2_ros::MessageFilter, which can neither give up on a single frame (setTargetFrames()
+/// needs clear(), which races with the tf listener's thread) nor say which transform it waits for.
 ///
 /// When the ROS clock jumps back (a bag starts over), everything received before is forgotten.
 class CloudSource {
@@ -67,10 +67,7 @@ class CloudSource {
   const SourceConfig& config() const { return config_; }
 
  private:
-  struct Waiting {
-    sensor_msgs::PointCloud2ConstPtr message;
-    RawCloud raw;  ///< views the message
-  };
+  using Waiting = std::shared_ptr<const Measurement>;
   struct Target {
     std::shared_ptr<const RobotModel> model;
     std::string fixed_frame;
@@ -78,15 +75,16 @@ class CloudSource {
   };
 
   void run();
-  void receive(const sensor_msgs::PointCloud2ConstPtr& message);
-  std::string why_unusable(const sensor_msgs::PointCloud2& message, RawCloud* raw) const;
+  void receive(const Received& received);
+  std::string why_unusable(const Received& received) const;
   Target target();
   void use_newest_ready();
   void forget_old();
   void count_publishers();
-  std::string missing_transform(const Waiting& waiting) const;
+  std::string missing_transform(const Measurement& waiting) const;
   bool worth_waiting_for(const std::string& link, const ros::Time& stamp) const;
-  std::string ingest(const Waiting& waiting);
+  std::string place(const Measurement& waiting, Placement* placement) const;
+  std::string ingest(const Measurement& waiting);
   void pose_robot(const ros::Time& stamp, PosedRobot* robot) const;
   void notice_clock_jump();  ///< with mutex_ held
   void set_problem(const std::string& problem, bool dropped);
