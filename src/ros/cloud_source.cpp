@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "ist_proximity/ros/cloud_conversion.h"
+#include "ist_proximity/ros/map_measurement.h"
 #include "ist_proximity/ros/ros_time.h"
 #include "ist_proximity/ros/transforms.h"
 
@@ -23,17 +24,20 @@ const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
                          const tf2::BufferCore& buffer, ros::Publisher filtered)
     : config_(config),
+      is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
       filtered_(std::move(filtered)),
       ingest_(ingest_config(config)) {
   facts_.name = config.name;
-  facts_.topic = nh.resolveName(config.topic);
+  facts_.is_file = !config.file.empty();
+  facts_.topic = facts_.is_file ? config.file : nh.resolveName(config.topic);
   facts_.type = message_type(config.type);
   facts_.noun = noun(config.type);
   facts_.timeout = config.timeout;
   facts_.required = config.required;
   nh.setCallbackQueue(&queue_);
-  subscriber_ = subscribe(config, &nh, [this](const Received& received) { receive(received); });
+  if (!facts_.is_file)
+    subscriber_ = subscribe(config, &nh, [this](const Received& received) { receive(received); });
   thread_ = std::thread(&CloudSource::run, this);
 }
 
@@ -50,29 +54,67 @@ void CloudSource::set_model(std::shared_ptr<const RobotModel> model,
   shared_target_.fixed_frame = fixed_frame;
 }
 
-const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model) {
+const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model,
+                                          const ros::Time& time, double max_age) {
   channel_.update();
-  const SourceSnapshot& snapshot = channel_.front();
+  SourceSnapshot& snapshot = channel_.front();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    notice_clock_jump();
+    const bool current = model && snapshot.model == model &&
+                         (snapshot.generation == shared_target_.generation ||
+                          (snapshot.generation != 0 && is_for_ever()));
+    if (!current) return nullptr;
+  }
+  if (!is_map_) return &snapshot;
+  const std::string problem = place_map(time, max_age, &snapshot);
   const std::lock_guard<std::mutex> lock(mutex_);
-  notice_clock_jump();
-  const bool current =
-      model && snapshot.model == model && snapshot.generation == shared_target_.generation;
-  return current ? &snapshot : nullptr;
+  placing_problem_ = problem;
+  return problem.empty() ? &snapshot : nullptr;
+}
+
+std::string CloudSource::place_map(const ros::Time& time, double max_age,
+                                   SourceSnapshot* snapshot) const {
+  const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
+  Eigen::Isometry3d& X_FM = snapshot->cloud.X_FM;
+  std::string ignored;
+  // Asked first: an exception in every cycle would cost more than the answer.
+  if (is_known(buffer_, fixed, frame, time, &ignored)) {
+    return look_up(buffer_, fixed, frame, time, &X_FM);
+  }
+  ros::Time stamp;
+  const std::string problem = look_up(buffer_, fixed, frame, ros::Time(), &X_FM, &stamp);
+  if (!problem.empty() || stamp.isZero()) return problem;
+  const double age = seconds_between(stamp, time);
+  if (age <= max_age) return "";
+  char text[96];
+  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
+                max_age);
+  return "the newest transform from '" + frame + "' to '" + fixed + text;
 }
 
 SourceFacts CloudSource::facts() {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  return facts_;
+  SourceFacts facts = facts_;
+  if (!placing_problem_.empty()) facts.problem = placing_problem_;
+  if (!file_problem_.empty()) facts.problem = file_problem_;
+  return facts;
+}
+
+bool CloudSource::is_for_ever() const {
+  return is_map_ && (!config_.file.empty() || std::isinf(config_.timeout));
 }
 
 void CloudSource::notice_clock_jump() {
   const ros::Time now = ros::Time::now();
   if (now < last_now_) {
     ++shared_target_.generation;
-    facts_.messages = 0;
-    facts_.newest = std::numeric_limits<double>::quiet_NaN();
-    facts_.problem.clear();
+    if (!is_for_ever()) {
+      facts_.messages = 0;
+      facts_.newest = std::numeric_limits<double>::quiet_NaN();
+      facts_.problem.clear();
+    }
   }
   last_now_ = now;
 }
@@ -90,10 +132,18 @@ void CloudSource::set_problem(const std::string& problem, bool dropped) {
 }
 
 void CloudSource::run() {
+  if (!config_.file.empty()) {
+    const Received received = read_map_file(config_.file, without_slash(config_.frame_id));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    file_problem_ = received.fault;
+    kept_ = received.measurement;
+    kept_is_new_ = kept_ != nullptr;
+  }
   while (running_) {
     queue_.callAvailable(waiting_.empty() ? kPollIdle : kPollTf);
     forget_old();
     use_newest_ready();
+    use_kept();
     count_publishers();
   }
 }
@@ -112,9 +162,13 @@ void CloudSource::count_publishers() {
 /// until nobody may use it any more.
 void CloudSource::forget_old() {
   Target now_asked = target();
-  if (now_asked.generation != target_.generation) waiting_.clear();
+  if (now_asked.generation != target_.generation) {
+    waiting_.clear();
+    if (!is_for_ever()) kept_.reset();
+  }
   if (now_asked.generation != target_.generation || now_asked.model != target_.model) {
     in_use_ = ros::Time();
+    kept_is_new_ = kept_ != nullptr;
     target_since_ = std::chrono::steady_clock::now();
   }
   target_ = std::move(now_asked);
@@ -149,6 +203,11 @@ void CloudSource::receive(const Received& received) {
       return;
     }
   }
+  if (is_map_) {
+    kept_ = received.measurement;
+    kept_is_new_ = true;
+    return;
+  }
   const auto after = std::upper_bound(
       waiting_.begin(), waiting_.end(), stamp,
       [](const ros::Time& time, const Waiting& other) { return time < other->header().stamp; });
@@ -167,7 +226,7 @@ std::string CloudSource::why_unusable(const Received& received) const {
   }
   if (received.header.frame_id.empty()) return plural + "have an empty frame_id";
   if (!received.fault.empty()) return received.fault;
-  if (!target_.model) return "it waits for the robot's model";
+  if (!target_.model && !is_map_) return "it waits for the robot's model";
   return "";
 }
 
@@ -185,6 +244,13 @@ void CloudSource::use_newest_ready() {
     waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
     return;
   }
+}
+
+void CloudSource::use_kept() {
+  if (!kept_ || !kept_is_new_ || !target_.model) return;
+  kept_is_new_ = false;
+  const std::string problem = ingest(*kept_);
+  set_problem(problem, !problem.empty());
 }
 
 /// Empty when all that is needed at the measurement's instants is known.
@@ -239,6 +305,7 @@ void CloudSource::pose_robot(const ros::Time& stamp, PosedRobot* robot) const {
 std::string CloudSource::place(const Measurement& waiting, Placement* placement) const {
   const std::string sensor = without_slash(waiting.header().frame_id);
   const std::vector<ros::Time> instants = waiting.instants();
+  if (instants.empty()) return "";
   std::string problem =
       look_up(buffer_, target_.fixed_frame, sensor, instants.front(), &placement->X_FS);
   placement->X_FS_end = placement->X_FS;
@@ -268,6 +335,8 @@ std::string CloudSource::ingest(const Measurement& waiting) {
   }
   snapshot.stamp = stamp;
   snapshot.model = target_.model;
+  snapshot.fixed_frame = target_.fixed_frame;
+  snapshot.map_frame = without_slash(waiting.header().frame_id);
   // A link that was missing at any instant is not filtered.
   snapshot.filtered = placement.robot.known;
   for (const PosedRobot& later : placement.later) {
@@ -277,7 +346,7 @@ std::string CloudSource::ingest(const Measurement& waiting) {
   }
   snapshot.generation = target_.generation;
   in_use_ = stamp;
-  if (filtered_.getNumSubscribers() > 0) {
+  if (!is_map_ && filtered_.getNumSubscribers() > 0) {
     filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
   }
   channel_.publish();

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "ist_proximity/ros/cloud_conversion.h"
+#include "ist_proximity/ros/map_measurement.h"
 #include "ist_proximity/ros/scan_measurement.h"
 
 namespace ist {
@@ -63,6 +64,11 @@ ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh,
         config, nh, receive, [limits](const sensor_msgs::LaserScanConstPtr& message) {
           return read_scan(message, limits.min_range, limits.max_range);
         });
+  }
+  if (config.type == SourceType::kMap) {
+    return subscribe_as<topic_tools::ShapeShifter>(
+        config, nh, receive,
+        [](const topic_tools::ShapeShifter::ConstPtr& message) { return read_map(*message); });
   }
   return subscribe_as<sensor_msgs::PointCloud2>(config, nh, receive, read_cloud);
 }

@@ -50,6 +50,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       fixed_frame_(config.fixed_frame.empty() ? robot_.root_link : config.fixed_frame),
       pose_source_(buffer, fixed_frame_, link_names(robot_), wanted_links(*model_),
                    config.pose_timeout),
+      pose_timeout_(config.pose_timeout),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
       speeds_(robot_.links.size()),
@@ -89,6 +90,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   for (std::size_t i = 0; i < snapshots_.size(); ++i) {
     if (clouds_.empty() || !situation_.verdicts[i].ok()) continue;
     const ros::Time& stamp = snapshots_[i]->stamp;
+    if (situation_.sources[i].is_file) continue;
     if (message->cloud_stamp.isZero() || stamp < message->cloud_stamp) {
       message->cloud_stamp = stamp;
     }
@@ -114,8 +116,8 @@ void ProximityCycle::look_at_sources(const ros::Time& now, const CloudSources& s
   situation_.verdicts.clear();
   snapshots_.clear();
   for (const auto& source : sources) {
+    const SourceSnapshot* snapshot = source->newest(model_->robot, poses_.stamp, pose_timeout_);
     SourceFacts facts = source->facts();
-    const SourceSnapshot* snapshot = source->newest(model_->robot);
     if (snapshot) {
       facts.has_snapshot = true;
       facts.stamp = snapshot->stamp;

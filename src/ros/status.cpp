@@ -32,6 +32,12 @@ std::string because(const std::string& problem) {
 double future_tolerance(double timeout) { return std::min(timeout, 1.0); }
 
 Verdict judge_source(const SourceFacts& source, double now) {
+  if (source.is_file) {
+    if (source.has_snapshot) return {ProximityArray::OK, ""};
+    return {ProximityArray::NO_CLOUD,
+            "source '" + source.name + "'" +
+                because(source.problem.empty() ? "its file is being read" : source.problem)};
+  }
   if (source.messages == 0) {
     return {ProximityArray::NO_CLOUD,
             title(source) + ": nothing received yet" +
@@ -48,8 +54,11 @@ Verdict judge_source(const SourceFacts& source, double now) {
     return {ProximityArray::STALE_CLOUD,
             title(source) + ": the newest " + source.noun + " is " + seconds(newest_age) +
                 " old, allowed is " + seconds(source.timeout) +
-                (source.problem.empty() ? "; has its driver stopped, or do the clocks of "
-                                          "sensor and node differ?"
+                (source.problem.empty() ? source.noun == "map"
+                                              ? "; is it latched, and sent once? Then its timeout "
+                                                "should be .inf"
+                                              : "; has its driver stopped, or do the clocks of "
+                                                "sensor and node differ?"
                                         : because(source.problem))};
   }
   if (!source.has_snapshot) {
@@ -103,10 +112,10 @@ Verdict judge(const Situation& situation, double now) {
            (sources[i].required || (one_is_enough && none_is_usable));
   };
   const auto arrives_fresh = [&](const SourceFacts& source) {
-    return source.messages > 0 && now - source.newest <= source.timeout;
+    return source.is_file || (source.messages > 0 && now - source.newest <= source.timeout);
   };
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (matters(i) && sources[i].messages == 0) {
+    if (matters(i) && sources[i].messages == 0 && !sources[i].is_file) {
       add(ProximityArray::NO_CLOUD, situation.verdicts[i].text);
     }
   }

@@ -30,7 +30,8 @@ struct SourceSnapshot {
   /// By link: false where the self-filter had no pose at the cloud's stamp, so that points on that
   /// link are still among the obstacles. Empty: the source does not filter.
   std::vector<bool> filtered;
-  std::uint64_t generation = 0;  ///< of the clock, see CloudSource; 0: none yet
+  std::uint64_t generation = 0;        ///< of the clock, see CloudSource; 0: none yet
+  std::string fixed_frame, map_frame;  ///< what a map is placed with
 };
 
 /// One sensor: receives its clouds (or scans) and turns them into snapshots, in a thread of its
@@ -42,7 +43,12 @@ struct SourceSnapshot {
 /// place of tf2_ros::MessageFilter, which can neither give up on a single frame (setTargetFrames()
 /// needs clear(), which races with the tf listener's thread) nor say which transform it waits for.
 ///
-/// When the ROS clock jumps back (a bag starts over), everything received before is forgotten.
+/// A map is not placed here but where tf says that its frame is when a query asks, so that it stays
+/// right on a robot that drives. The last one is kept for a model that is loaded later: it may
+/// never be sent again. A map file is read once, in this thread.
+///
+/// When the ROS clock jumps back (a bag starts over), everything received before is forgotten, but
+/// for maps that never become stale.
 class CloudSource {
  public:
   /// @param nh        in the namespace that the topic is relative to
@@ -58,8 +64,11 @@ class CloudSource {
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame);
 
   /// The newest snapshot made with `model` since the clock's last jump; null: none. Valid until
-  /// the next call. One thread only; never waits.
-  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model);
+  /// the next call. One thread only; never waits. Before facts(), which tells why there is none.
+  /// @param time     a map is placed where it is then, or else at the newest instant that tf knows
+  /// @param max_age  [s] of that instant
+  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
+                               const ros::Time& time, double max_age);
 
   /// Everything but the snapshot's part. Thread safe.
   SourceFacts facts();
@@ -79,6 +88,9 @@ class CloudSource {
   std::string why_unusable(const Received& received) const;
   Target target();
   void use_newest_ready();
+  void use_kept();
+  std::string place_map(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
+  bool is_for_ever() const;
   void forget_old();
   void count_publishers();
   std::string missing_transform(const Measurement& waiting) const;
@@ -90,6 +102,7 @@ class CloudSource {
   void set_problem(const std::string& problem, bool dropped);
 
   const SourceConfig config_;
+  const bool is_map_;
   const tf2::BufferCore& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
@@ -99,12 +112,15 @@ class CloudSource {
   std::mutex mutex_;  // for what follows, held for copies only
   Target shared_target_;
   SourceFacts facts_;
+  std::string file_problem_, placing_problem_;  ///< these do not pass with the next message
   ros::Time last_now_;
 
   // The source's thread alone.
   Target target_;
   Ingest ingest_;
   std::deque<Waiting> waiting_;  ///< by stamp
+  Waiting kept_;                 ///< the last map
+  bool kept_is_new_ = false;     ///< it is not in use with this model yet
   ros::Time in_use_;             ///< stamp of the newest snapshot of this generation
   std::chrono::steady_clock::time_point target_since_, next_count_;
   std::atomic<bool> running_{true};

@@ -35,7 +35,7 @@ class Measurement {
   const std_msgs::Header& header() const { return header_; }
 
   /// The instants, in order, at which sensor and robot have to be known: the stamp first. More than
-  /// one for what takes its time to measure.
+  /// one for what takes its time to measure, none for what stays in its own frame.
   virtual std::vector<ros::Time> instants() const { return {header_.stamp}; }
 
   /// @throws std::exception when there is not enough memory

@@ -51,6 +51,7 @@ class ProximityCycle {
   const RobotModel& robot_;
   std::string fixed_frame_;
   PoseSource pose_source_;
+  double pose_timeout_;  ///< [s]
   ProximityQuery query_;
   Repulsion repulsion_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot

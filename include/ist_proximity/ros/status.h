@@ -20,6 +20,7 @@ struct SourceFacts {
   std::string topic;  ///< resolved
   std::string type = "sensor_msgs/PointCloud2";
   std::string noun = "cloud";  ///< what one message is called
+  bool is_file = false;        ///< `topic` is a file's path, read once and never stale
   double timeout = 0.5;        ///< [s]
   bool required = true;
   std::uint64_t messages = 0;      ///< received
