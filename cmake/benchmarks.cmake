@@ -14,3 +14,18 @@ foreach(source IN LISTS benchmark_sources)
     OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
+
+# What the maps are measured beside, where it is installed.
+find_path(FCL_INCLUDE_DIR fcl/fcl.h)
+find_library(FCL_LIBRARY fcl)
+find_library(CCD_LIBRARY ccd)
+mark_as_advanced(FCL_INCLUDE_DIR FCL_LIBRARY CCD_LIBRARY)
+if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
+  target_compile_definitions(benchmark_octomap PRIVATE IST_PROXIMITY_HAS_FCL)
+  target_include_directories(benchmark_octomap SYSTEM PRIVATE
+    ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
+  target_link_libraries(benchmark_octomap PRIVATE
+    ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+else()
+  message(STATUS "ist_proximity: benchmark/octomap without FCL (apt install libfcl-dev)")
+endif()

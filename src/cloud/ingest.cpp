@@ -52,7 +52,7 @@ Ingest& Ingest::operator=(Ingest&&) noexcept = default;
 const IngestConfig& Ingest::config() const { return impl_->config; }
 
 void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
-                 double stamp, CloudSnapshot* snapshot) {
+                 double stamp, CloudSnapshot* snapshot, const std::vector<PosedRobot>& also) {
   const auto start = std::chrono::steady_clock::now();
   if (!X_FS.matrix().allFinite()) {
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
@@ -65,6 +65,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   PointFilter on_robot;
   if (config.self_filter && robot.model != nullptr) {
     impl_->self_filter.pose(robot, points.origin, config.self_filter_padding);
+    for (const PosedRobot& later : also) impl_->self_filter.add(later, points.origin);
     on_robot = [filter = &impl_->self_filter](const PointTile& tile, const PaddedBox& box) {
       return filter->on_robot(tile, box);
     };

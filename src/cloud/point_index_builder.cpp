@@ -1,7 +1,6 @@
 #include "cloud/point_index_builder.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -111,47 +110,13 @@ void put_unused_far_away(PointTile* tile) {
   }
 }
 
-std::size_t nodes_over(std::size_t children) { return (children + kWidth - 1) / kWidth; }
-
-void clear(BoxNode* node) {
-  for (int k = 0; k < kPointWidth; ++k) {
-    node->min_x[k] = node->min_y[k] = node->min_z[k] = kFarAway;
-    node->max_x[k] = node->max_y[k] = node->max_z[k] = kFarAway;
-    node->child[k] = 0;
-  }
-  node->count = 0;
-}
-
-void append(std::int32_t child, const PaddedBox& box, BoxNode* node) {
-  const int k = node->count++;
-  node->min_x[k] = box.min[0];
-  node->min_y[k] = box.min[1];
-  node->min_z[k] = box.min[2];
-  node->max_x[k] = box.max[0];
-  node->max_y[k] = box.max[1];
-  node->max_z[k] = box.max[2];
-  node->child[k] = child;
-}
-
-PaddedBox child_box(const BoxNode& node, int k) {
-  return {{node.min_x[k], node.min_y[k], node.min_z[k], 0.0F},
-          {node.max_x[k], node.max_y[k], node.max_z[k], 0.0F}};
-}
-
-PaddedBox box_of(const BoxNode& node) {
-  PaddedBox box = child_box(node, 0);
-  for (int k = 1; k < node.count; ++k) box.extend(child_box(node, k));
-  return box;
-}
-
 }  // namespace
 
 void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, const float* y,
                               const float* z, const std::uint32_t* id, std::size_t n,
                               const PointFilter& drop, PointIndex* index) {
   morton_.sort(x, y, z, n, &order_);
-  static std::atomic<std::uint64_t> builds{0};
-  index->generation_ = ++builds;
+  index->generation_ = next_generation();
   index->origin_ = origin;
   index->size_ = 0;
   boxes_.clear();
@@ -188,60 +153,12 @@ void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, con
     ++used;
   }
   tiles.resize(used);
-  arrange(0, items_.size());
-  write_nodes(index);
-}
-
-// Orders the tiles so that nodes can be filled with sixteen consecutive children on every level: a
-// range is parted near the middle, at a multiple of what a whole child holds.
-void PointIndexBuilder::arrange(std::size_t first, std::size_t last) {
-  while (last - first > kWidth) {
-    const std::size_t count = last - first;
-    std::size_t unit = kWidth;
-    while (unit * kWidth < count) unit *= kWidth;
-    const std::size_t half = std::max<std::size_t>((count / 2 + unit / 2) / unit, 1) * unit;
-
-    Eigen::Array3f min = items_[first].center, max = min;
-    for (std::size_t i = first + 1; i < last; ++i) {
-      min = min.min(items_[i].center.array());
-      max = max.max(items_[i].center.array());
-    }
-    Eigen::Index axis;
-    (max - min).maxCoeff(&axis);
-    const auto at = [this](std::size_t i) {
-      return items_.begin() + static_cast<std::ptrdiff_t>(i);
-    };
-    std::nth_element(at(first), at(first + half), at(last), [axis](const Item& a, const Item& b) {
-      return a.center[axis] < b.center[axis];
-    });
-    arrange(first, first + half);
-    first += half;
-  }
-}
-
-void PointIndexBuilder::write_nodes(PointIndex* index) const {
-  std::vector<BoxNode>& nodes = index->nodes_;
+  arrange(&items_);
+  write_nodes(items_, boxes_, &index->nodes_);
+  index->root_ = static_cast<std::int32_t>(index->nodes_.size()) - 1;
   index->bounds_.setEmpty();
-  index->root_ = -1;
-  nodes.resize(nodes_over(items_.size()));
-  if (nodes.empty()) return;
-  for (BoxNode& node : nodes) clear(&node);
-  for (std::size_t i = 0; i < items_.size(); ++i) {
-    const std::int32_t tile = items_[i].tile;
-    append(~tile, boxes_[static_cast<std::size_t>(tile)], &nodes[i / kWidth]);
-  }
-  std::size_t begin = 0, end = nodes.size();
-  while (end - begin > 1) {
-    nodes.resize(end + nodes_over(end - begin));
-    for (std::size_t i = end; i < nodes.size(); ++i) clear(&nodes[i]);
-    for (std::size_t i = begin; i < end; ++i) {
-      append(static_cast<std::int32_t>(i), box_of(nodes[i]), &nodes[end + (i - begin) / kWidth]);
-    }
-    begin = end;
-    end = nodes.size();
-  }
-  index->root_ = static_cast<std::int32_t>(begin);
-  const PaddedBox box = box_of(nodes[begin]);
+  if (index->root_ < 0) return;
+  const PaddedBox box = box_of(index->nodes_.back());
   index->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
 }
 

@@ -6,21 +6,11 @@
 #include <functional>
 #include <vector>
 
+#include "cloud/box_hierarchy.h"
 #include "cloud/morton_order.h"
 #include "ist_proximity/cloud/point_index.h"
 
 namespace ist {
-
-/// Axis-aligned box; x, y, z [m] and 0, which fit one SIMD register.
-struct PaddedBox {
-  Eigen::Array4f min, max;
-
-  void extend(const PaddedBox& other) {
-    min = min.min(other.min);
-    max = max.max(other.max);
-  }
-  float diagonal() const { return (max - min).matrix().norm(); }
-};
 
 /// Says which points of a tile stay out of the index: bit k for slot k. The box holds exactly the
 /// tile's points; its unused slots have no meaning yet.
@@ -44,19 +34,10 @@ class PointIndexBuilder {
              const std::uint32_t* id, std::size_t n, const PointFilter& drop, PointIndex* index);
 
  private:
-  /// A tile on its way to its place in the hierarchy.
-  struct Item {
-    Eigen::Vector3f center;  ///< [m] twice the middle of its box
-    std::int32_t tile;
-  };
-
-  void arrange(std::size_t first, std::size_t last);
-  void write_nodes(PointIndex* index) const;
-
   MortonOrder morton_;
   std::vector<std::uint32_t> order_;  ///< numbers of the points, in Morton order
   std::vector<PaddedBox> boxes_;      ///< by tile
-  std::vector<Item> items_;           ///< one for each tile
+  std::vector<HierarchyItem> items_;  ///< one for each tile
 };
 
 }  // namespace ist

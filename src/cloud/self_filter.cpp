@@ -19,6 +19,10 @@ std::uint32_t all_of(const PointTile& tile) {
 void SelfFilter::pose(const PosedRobot& robot, const Eigen::Vector3d& origin, double padding) {
   padding_ = padding;
   links_.clear();
+  add(robot, origin);
+}
+
+void SelfFilter::add(const PosedRobot& robot, const Eigen::Vector3d& origin) {
   if (robot.model == nullptr) return;
   const std::size_t count =
       std::min({robot.model->links.size(), robot.known.size(), robot.X_FL.size()});
@@ -28,7 +32,7 @@ void SelfFilter::pose(const PosedRobot& robot, const Eigen::Vector3d& origin, do
     const InnerSphereTree& tree = model.tree;
     Eigen::Isometry3d X_OL = robot.X_FL[i];
     X_OL.translation() -= origin;
-    const double clear_beyond = std::max(padding, tree.interior_gap());
+    const double clear_beyond = std::max(padding_, tree.interior_gap());
     const double size = tree.center().norm() + tree.radius() + clear_beyond;
     PosedLink link;
     link.model = &model;

@@ -23,6 +23,8 @@ class SelfFilter {
   /// @param origin   [m] of the points, in the fixed frame
   /// @param padding  [m] >= 0
   void pose(const PosedRobot& robot, const Eigen::Vector3d& origin, double padding);
+  /// The robot at one more instant, beside those before.
+  void add(const PosedRobot& robot, const Eigen::Vector3d& origin);
 
   /// Bit k: the point in slot k is the robot's.
   /// @param box  of the tile's points

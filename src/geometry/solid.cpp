@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "geometry/boundary_edges.h"
+#include "ist_proximity/geometry/tessellation.h"
 
 namespace ist {
 namespace {
@@ -137,6 +138,9 @@ Solid::Solid(const LinkGeometry& geometry) {
       element.is_closed = is_closed_mesh(*mesh);
     } else {
       element.primitive = source.shape;
+      if (const auto* box = std::get_if<Box>(&source.shape)) {
+        element.sides = TriangleBvh(tessellate(*box).mesh);
+      }
     }
     elements_.push_back(std::move(element));
   }
@@ -182,6 +186,36 @@ SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_di
     }
   }
   return best;
+}
+
+BoxDistance Solid::distance_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OL,
+                                   double max_distance) const {
+  BoxDistance best;
+  double limit = max_distance, lower_bound = max_distance;
+  for (const Element& element : elements_) {
+    const Eigen::Isometry3d X_OE = X_OL * element.X_LE;
+    BoxDistance candidate;
+    if (element.bvh.size() > 0) {
+      candidate = element.bvh.closest_to_box(box_O, X_OE, limit);
+    } else if (const auto* sphere = std::get_if<Sphere>(&element.primitive)) {
+      candidate = sphere_to_box(*sphere, X_OE.translation(), box_O);
+    } else if (const auto* cylinder = std::get_if<Cylinder>(&element.primitive)) {
+      candidate = cylinder_to_box(*cylinder, X_OE, box_O);
+    } else {
+      candidate = element.sides.closest_to_box(box_O, X_OE, limit);
+    }
+    lower_bound = std::min(lower_bound, candidate.lower_bound);
+    if (candidate.distance >= limit) continue;
+    best = candidate;
+    limit = candidate.distance;
+  }
+  best.lower_bound = lower_bound;
+  return best;
+}
+
+bool Solid::is_closed() const {
+  return std::all_of(elements_.begin(), elements_.end(),
+                     [](const Element& element) { return element.is_closed; });
 }
 
 double Solid::distance_floor(const Eigen::Vector3d& p_L, const SignedDistance& measured) const {

@@ -112,7 +112,7 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& cen
     if (link_->tree.outer_distance(p_L[i], interior) > interior) continue;
     ++statistics_->exact_evaluations;
     const SignedDistance measured = link_->solid.signed_distance(p_L[i]);
-    take(measured, p_L[i], tile, next);
+    take(measured, p_L[i], point_O(tile, next), tile, next);
     const double nearby = link_->solid.distance_floor(p_L[i], measured);
     for (int k = 0; k < count; ++k) {
       const auto j = static_cast<std::size_t>(k);

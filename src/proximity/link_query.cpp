@@ -34,6 +34,11 @@ bool Deadline::passed() {
   return passed_;
 }
 
+std::uint64_t LinkQuery::generation(const CloudSnapshot& cloud, Part part) {
+  if (part == Part::kPoints) return cloud.index.generation();
+  return cloud.boxes ? cloud.boxes->generation() : 0;
+}
+
 void LinkQuery::start(const Eigen::Isometry3d& X_FL,
                       const std::vector<const CloudSnapshot*>& clouds, const QueryConfig& config) {
   X_FL_ = X_FL;
@@ -46,23 +51,33 @@ void LinkQuery::start(const Eigen::Isometry3d& X_FL,
   dropped_ = -link_->tree.radius();
   rounding_ = reach_ = 0.0;
   for (std::size_t i = 0; i < clouds.size(); ++i) {
-    if (last_generation_ == 0 || clouds[i]->index.generation() != last_generation_) continue;
-    enter(*clouds[i], static_cast<std::int32_t>(i));
-    consider(last_tile_, last_lane_, false);
+    for (const Part part : {Part::kPoints, Part::kBoxes}) {
+      if (last_generation_ == 0 || generation(*clouds[i], part) != last_generation_) continue;
+      if (!enter(*clouds[i], static_cast<std::int32_t>(i), part)) continue;
+      consider(last_tile_, last_lane_, false);
+    }
   }
 }
 
-void LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index) {
-  index_ = &cloud.index;
+bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part) {
+  index_ = part == Part::kPoints ? &cloud.index : nullptr;
+  boxes_ = part == Part::kBoxes ? cloud.boxes.get() : nullptr;
+  if (part == Part::kPoints ? index_->empty() : boxes_ == nullptr || boxes_->empty()) return false;
   cloud_ = index;
-  const Eigen::Vector3d p_OL = X_FL_.translation() - index_->origin();
-  Eigen::Isometry3d X_OL = X_FL_;
-  X_OL.translation() = p_OL;
-  X_LO_ = X_OL.inverse();
-  const double reach =
-      p_OL.cwiseAbs().maxCoeff() + link_->tree.center().norm() + link_->tree.radius();
+  if (boxes_ != nullptr) {
+    X_FO_ = cloud.X_FM * Eigen::Translation3d(boxes_->origin());
+    X_OL_ = X_FO_.inverse() * X_FL_;
+  } else {
+    X_FO_ = Eigen::Translation3d(index_->origin());
+    X_OL_ = X_FL_;
+    X_OL_.translation() -= index_->origin();
+  }
+  X_LO_ = X_OL_.inverse();
+  const double reach = X_OL_.translation().cwiseAbs().maxCoeff() + link_->tree.center().norm() +
+                       link_->tree.radius();
   reach_ = std::max(reach_, reach);
   rounding_ = std::max(rounding_, kFloatError * (reach + config_.max_distance + config_.margin));
+  return true;
 }
 
 Eigen::Vector3d LinkQuery::point_O(std::int32_t tile, int lane) const {
@@ -88,7 +103,8 @@ bool LinkQuery::first_visit(std::int32_t tile, int lane) {
 }
 
 void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside) {
-  const Eigen::Vector3d p_L = X_LO_ * point_O(tile, lane);
+  if (boxes_ != nullptr) return consider_box(tile, lane, is_outside);
+  const Eigen::Vector3d p_O = point_O(tile, lane), p_L = X_LO_ * p_O;
   if (statistics_ != nullptr) ++statistics_->exact_evaluations;
   if (!is_outside) {
     const double interior = link_->tree.interior_gap();
@@ -98,19 +114,20 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside) {
       is_outside ? link_->solid.distance_outside(
                        p_L, std::min(nearest_.exact.distance, range() + rounding_))
                  : link_->solid.signed_distance(p_L);
-  take(exact, p_L, tile, lane);
+  take(exact, p_L, p_O, tile, lane);
 }
 
-void LinkQuery::take(const SignedDistance& exact, const Eigen::Vector3d& p_L, std::int32_t tile,
-                     int lane) {
+void LinkQuery::take(const SignedDistance& exact, const Eigen::Vector3d& p_L,
+                     const Eigen::Vector3d& p_O, std::int32_t tile, int lane) {
   // A point out of range is no answer, though a bound.
   if (!(exact.distance < nearest_.exact.distance)) return;
   nearest_.exact = exact;
   nearest_.p_L = p_L;
-  nearest_.p_F = index_->origin() + point_O(tile, lane);
+  nearest_.p_F = X_FO_ * p_O;
   nearest_.cloud = cloud_;
   nearest_.tile = tile;
   nearest_.lane = lane;
+  nearest_.part = boxes_ != nullptr ? Part::kBoxes : Part::kPoints;
   if (traversal_ != nullptr) {
     traversal_->threshold = std::min(traversal_->threshold, round_up(threshold() + rounding_));
   }
@@ -131,6 +148,9 @@ void LinkQuery::find_first(Traversal* traversal) {
   inner.expired = nullptr;
   descend_inner(&inner);
   if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false);
+  if (inner.inner_distance < 0.0F && boxes_ != nullptr) {
+    take_ball(inner.inner_leaf, inner.inner_tile, inner.inner_lane);
+  }
   traversal->node_pairs += inner.node_pairs;
   traversal->leaf_pairs += inner.leaf_pairs;
 }
@@ -141,46 +161,65 @@ bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline
   deadline_ = deadline;
   statistics_ = statistics;
   dropped_ = kInfinity;
-  const double interior = link_->tree.interior_gap();
+  cells_left_ = kMaxCells;
   bool stopped = false;
   for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
-    if (clouds[i]->index.empty()) continue;
-    enter(*clouds[i], static_cast<std::int32_t>(i));
-    if (i > 0) ++epoch_;  // keys are per cloud
-    Traversal traversal;
-    traversal.sphere_nodes = link_->tree.nodes().data();
-    traversal.sphere_leaves = link_->tree.leaves().data();
-    traversal.box_nodes = index_->nodes().data();
-    traversal.tiles = index_->tiles().data();
-    traversal.box_root = index_->root();
-    const Eigen::Isometry3d X_OL = X_LO_.inverse();
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) {
-        traversal.R_OL[3 * row + column] = static_cast<float>(X_OL.linear()(row, column));
-      }
-      traversal.p_OL[row] = static_cast<float>(X_OL.translation()[row]);
+    for (const Part part : {Part::kPoints, Part::kBoxes}) {
+      if (stopped || !enter(*clouds[i], static_cast<std::int32_t>(i), part)) continue;
+      ++epoch_;  // keys are per index
+      stopped = search(deadline);
     }
-    traversal.threshold = round_up(threshold() + rounding_);
-    traversal.interior = round_up(interior + rounding_);
-    traversal.candidate = &LinkQuery::on_candidate;
-    traversal.expired = &LinkQuery::on_expired;
-    traversal.context = this;
-    traversal_ = &traversal;
-    if (nearest_.exact.distance == kInfinity) find_first(&traversal);
-    descend_exact(&traversal);
-    traversal_ = nullptr;
-    statistics->node_pairs += traversal.node_pairs;
-    statistics->leaf_pairs += traversal.leaf_pairs;
-    drop(static_cast<double>(traversal.dropped) - rounding_);
-    stopped = traversal.stopped;
-    if (traversal.may_be_inside && !stopped) find_depth(deadline);
-    stopped = stopped || deadline->passed();
-    // A pair that was left may hold a point inside.
-    if (stopped && dropped_ <= interior + rounding_) drop(-link_->tree.radius());
   }
   if (stopped) drop(-link_->tree.radius());  // clouds that were not reached
   complete_ = !stopped;
   return complete_;
+}
+
+Traversal LinkQuery::make_traversal() {
+  Traversal traversal;
+  traversal.sphere_nodes = link_->tree.nodes().data();
+  traversal.sphere_leaves = link_->tree.leaves().data();
+  if (boxes_ != nullptr) {
+    traversal.box_nodes = boxes_->nodes().data();
+    traversal.box_tiles = boxes_->tiles().data();
+    traversal.box_root = boxes_->root();
+  } else {
+    traversal.box_nodes = index_->nodes().data();
+    traversal.tiles = index_->tiles().data();
+    traversal.box_root = index_->root();
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      traversal.R_OL[3 * row + column] = static_cast<float>(X_OL_.linear()(row, column));
+    }
+    traversal.p_OL[row] = static_cast<float>(X_OL_.translation()[row]);
+  }
+  traversal.threshold = round_up(threshold() + rounding_);
+  traversal.interior = round_up(link_->tree.interior_gap() + rounding_);
+  traversal.candidate = &LinkQuery::on_candidate;
+  traversal.expired = &LinkQuery::on_expired;
+  traversal.context = this;
+  return traversal;
+}
+
+// The index at work. True: the deadline passed.
+bool LinkQuery::search(Deadline* deadline) {
+  Traversal traversal = make_traversal();
+  traversal_ = &traversal;
+  if (nearest_.exact.distance == kInfinity) find_first(&traversal);
+  descend_exact(&traversal);
+  traversal_ = nullptr;
+  statistics_->node_pairs += traversal.node_pairs;
+  statistics_->leaf_pairs += traversal.leaf_pairs;
+  drop(static_cast<double>(traversal.dropped) - rounding_);
+  bool stopped = traversal.stopped;
+  if (traversal.may_be_inside && !stopped) {
+    boxes_ != nullptr ? find_overlap(deadline) : find_depth(deadline);
+  }
+  stopped = stopped || deadline->passed();
+  // A pair that was left may hold a point inside.
+  if (stopped && dropped_ <= link_->tree.interior_gap() + rounding_) drop(-link_->tree.radius());
+  return stopped;
 }
 
 void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result) {
@@ -197,7 +236,9 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   const Nearest& nearest = nearest_;
   // Points that could be nearer have coordinates no larger than this one's bound.
   const double point_error = kPointError * (reach_ + std::abs(nearest.exact.distance));
-  last_generation_ = clouds[static_cast<std::size_t>(nearest.cloud)]->index.generation();
+  const CloudSnapshot& cloud = *clouds[static_cast<std::size_t>(nearest.cloud)];
+  const auto tile = static_cast<std::size_t>(nearest.tile);
+  last_generation_ = generation(cloud, nearest.part);
   last_tile_ = nearest.tile;
   last_lane_ = nearest.lane;
   result->state = nearest.exact.distance < 0.0 ? LinkState::kContact : LinkState::kNear;
@@ -208,9 +249,8 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   result->p_FO = nearest.p_F;
   result->direction = -(X_FL_.linear() * nearest.exact.normal);
   result->source = nearest.cloud;
-  result->point = clouds[static_cast<std::size_t>(nearest.cloud)]
-                      ->index.tiles()[static_cast<std::size_t>(nearest.tile)]
-                      .id[nearest.lane];
+  result->point = nearest.part == Part::kBoxes ? cloud.boxes->tiles()[tile].id[nearest.lane]
+                                               : cloud.index.tiles()[tile].id[nearest.lane];
 }
 
 }  // namespace ist

@@ -25,7 +25,7 @@ class Deadline {
   bool passed_ = false;
 };
 
-/// The query of one link: warm start, descent against every cloud, exact refinement, depth.
+/// The query of one link: warm start, descent against every cloud and map, exact refinement, depth.
 class LinkQuery {
  public:
   explicit LinkQuery(const LinkModel& link) : link_(&link) {}
@@ -44,21 +44,44 @@ class LinkQuery {
   void forget() { last_generation_ = 0; }
 
  private:
+  /// Which of a snapshot's indices is at work.
+  enum class Part { kPoints, kBoxes };
+
   struct Nearest {
     SignedDistance exact;                           ///< in the link's frame
     Eigen::Vector3d p_L = Eigen::Vector3d::Zero();  ///< the obstacle point, in the link's frame
     Eigen::Vector3d p_F = Eigen::Vector3d::Zero();  ///< the same in the fixed frame
     std::int32_t cloud = -1, tile = 0;
     int lane = 0;
+    Part part = Part::kPoints;
   };
 
-  void enter(const CloudSnapshot& cloud, std::int32_t index);
+  static std::uint64_t generation(const CloudSnapshot& cloud, Part part);
+  bool enter(const CloudSnapshot& cloud, std::int32_t index, Part part);
   Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
   void consider(std::int32_t tile, int lane, bool is_outside);
-  void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, std::int32_t tile, int lane);
+  void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, const Eigen::Vector3d& p_O,
+            std::int32_t tile, int lane);
+  bool search(Deadline* deadline);
+  Traversal make_traversal();
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
   void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
+
+  // Of boxes, in link_boxes.cpp.
+  double depth_threshold() const;
+  static constexpr int kMaxCells = 256;  ///< a link may divide overlapping boxes into
+  struct BoxCell;
+  void consider_box(std::int32_t tile, int lane, bool is_outside);
+  void take_outside(const BoxDistance& found, std::int32_t tile, int lane);
+  void take_point(const Eigen::Vector3d& p_O, std::int32_t tile, int lane);
+  void take_overlap(const BoxDistance& found, const Eigen::AlignedBox3d& box, std::int32_t tile,
+                    int lane);
+  void take_ball(std::int32_t leaf, std::int32_t tile, int lane);
+  void find_overlap(Deadline* deadline);
+  void find_overlap_in_tile(std::int32_t tile);
+  void find_depth_in_box(const BoxCell& whole, std::int32_t tile, int lane);
+  BoxCell make_cell(const Eigen::AlignedBox3d& box, std::int32_t tile, int lane);
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
   /// [m] bounds from here on cannot change the answer by more than the tolerance.
@@ -76,10 +99,14 @@ class LinkQuery {
   double reach_ = 0.0;     ///< [m] largest coordinate of the link in the index's frame
   bool complete_ = false;
 
-  // The cloud at work.
+  // The index at work: its frame O has the fixed frame's axes for points, the map's for boxes.
   const PointIndex* index_ = nullptr;
+  const BoxIndex* boxes_ = nullptr;
   std::int32_t cloud_ = -1;
+  Eigen::Isometry3d X_FO_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d X_LO_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d X_OL_ = Eigen::Isometry3d::Identity();
+  int cells_left_ = 0;  ///< that overlapping boxes may still be divided into
   Traversal* traversal_ = nullptr;
   Deadline* deadline_ = nullptr;
   QueryStatistics* statistics_ = nullptr;
@@ -89,7 +116,7 @@ class LinkQuery {
   std::int32_t last_tile_ = 0;
   int last_lane_ = 0;
 
-  // Points evaluated in this descent: several ball leaves meet the same point.
+  // Points or boxes evaluated in this descent: several ball leaves meet the same one.
   static constexpr std::size_t kVisitedSize = 512;
   struct Visit {
     std::uint32_t epoch = 0, key = 0;

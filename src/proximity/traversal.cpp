@@ -62,7 +62,7 @@ HWY_INLINE void Pose(const Traversal& t, const float* x, const float* y, const f
   }
 }
 
-template <bool kExact>
+template <bool kExact, bool kBoxes>
 class Descent {
  public:
   explicit Descent(Traversal* traversal) : t_(*traversal) {}
@@ -199,26 +199,46 @@ class Descent {
     }
   }
 
-  // Up to 8 balls against 16 points: for each point the least distance to a ball.
-  void Leaves(const Pair& pair) {
+  // From sixteen points, or boxes, to a place.
+  HWY_INLINE hn::Vec<PointTag> Distance(const PointTile& tile, std::size_t k, float x, float y,
+                                        float z) const {
+    const PointTag d;
+    return Norm(hn::Sub(hn::Load(d, tile.x + k), hn::Set(d, x)),
+                hn::Sub(hn::Load(d, tile.y + k), hn::Set(d, y)),
+                hn::Sub(hn::Load(d, tile.z + k), hn::Set(d, z)));
+  }
+  HWY_INLINE hn::Vec<PointTag> Distance(const BoxTile& tile, std::size_t k, float x, float y,
+                                        float z) const {
+    const PointTag d;
+    return Norm(Gap(d, hn::Load(d, tile.min_x + k), hn::Load(d, tile.max_x + k), hn::Set(d, x)),
+                Gap(d, hn::Load(d, tile.min_y + k), hn::Load(d, tile.max_y + k), hn::Set(d, y)),
+                Gap(d, hn::Load(d, tile.min_z + k), hn::Load(d, tile.max_z + k), hn::Set(d, z)));
+  }
+
+  HWY_INLINE void Leaves(const Pair& pair) {
+    if constexpr (kBoxes) {
+      Leaves(pair, t_.box_tiles[~pair.box]);
+    } else {
+      Leaves(pair, t_.tiles[~pair.box]);
+    }
+  }
+
+  // Up to 8 balls against 16 points or boxes: for each of these the least distance to a ball.
+  template <class Tile>
+  HWY_INLINE void Leaves(const Pair& pair, const Tile& tile) {
     ++t_.leaf_pairs;
     const SphereLeaf& leaf = t_.sphere_leaves[~pair.sphere];
     const std::int32_t tile_index = ~pair.box;
-    const PointTile& tile = t_.tiles[tile_index];
     Posed posed;
     Pose(t_, leaf.x, leaf.y, leaf.z, &posed);
     const float* radius = kExact ? leaf.outer : leaf.inner;
     const PointTag d;
     alignas(64) float distance[kPointWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
-      const auto x = hn::Load(d, tile.x + k), y = hn::Load(d, tile.y + k),
-                 z = hn::Load(d, tile.z + k);
       auto nearest = hn::Set(d, kFarAway);
       for (int b = 0; b < leaf.count; ++b) {
-        const auto dx = hn::Sub(x, hn::Set(d, posed.x[b]));
-        const auto dy = hn::Sub(y, hn::Set(d, posed.y[b]));
-        const auto dz = hn::Sub(z, hn::Set(d, posed.z[b]));
-        nearest = hn::Min(nearest, hn::Sub(Norm(dx, dy, dz), hn::Set(d, radius[b])));
+        const auto to_center = Distance(tile, k, posed.x[b], posed.y[b], posed.z[b]);
+        nearest = hn::Min(nearest, hn::Sub(to_center, hn::Set(d, radius[b])));
       }
       hn::Store(nearest, d, distance + k);
     }
@@ -230,6 +250,7 @@ class Descent {
         t_.inner_distance = distance[k];
         t_.inner_tile = tile_index;
         t_.inner_lane = k;
+        t_.inner_leaf = ~pair.sphere;
       }
     }
   }
@@ -251,8 +272,10 @@ class Descent {
   Pair stack_[kStackSize];
 };
 
-void DescendInner(Traversal* traversal) { Descent<false>(traversal).Run(); }
-void DescendExact(Traversal* traversal) { Descent<true>(traversal).Run(); }
+void DescendInner(Traversal* traversal) { Descent<false, false>(traversal).Run(); }
+void DescendExact(Traversal* traversal) { Descent<true, false>(traversal).Run(); }
+void DescendInnerBoxes(Traversal* traversal) { Descent<false, true>(traversal).Run(); }
+void DescendExactBoxes(Traversal* traversal) { Descent<true, true>(traversal).Run(); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
@@ -263,9 +286,24 @@ namespace ist {
 
 HWY_EXPORT(DescendInner);
 HWY_EXPORT(DescendExact);
+HWY_EXPORT(DescendInnerBoxes);
+HWY_EXPORT(DescendExactBoxes);
 
-void descend_inner(Traversal* traversal) { HWY_DYNAMIC_DISPATCH(DescendInner)(traversal); }
-void descend_exact(Traversal* traversal) { HWY_DYNAMIC_DISPATCH(DescendExact)(traversal); }
+void descend_inner(Traversal* traversal) {
+  if (traversal->box_tiles != nullptr) {
+    HWY_DYNAMIC_DISPATCH(DescendInnerBoxes)(traversal);
+  } else {
+    HWY_DYNAMIC_DISPATCH(DescendInner)(traversal);
+  }
+}
+
+void descend_exact(Traversal* traversal) {
+  if (traversal->box_tiles != nullptr) {
+    HWY_DYNAMIC_DISPATCH(DescendExactBoxes)(traversal);
+  } else {
+    HWY_DYNAMIC_DISPATCH(DescendExact)(traversal);
+  }
+}
 
 }  // namespace ist
 #endif

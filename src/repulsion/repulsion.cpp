@@ -12,15 +12,28 @@ namespace {
 using Lanes = Eigen::Array<float, kPointWidth, 1>;
 using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
 
-// A ball in the frame of an index: the fixed frame's axes at the index's origin.
+// A ball in the frame of an index: its origin, and the axes of the fixed frame (points) or the map
+// (boxes).
 struct PlacedBall {
   float x, y, z, radius;  // [m]
 };
 
-// From each point of a tile to a ball.
+// From each point of a tile, or from the nearest point of each box, to a ball.
 struct ToBall {
   ToBall(const PointTile& tile, const PlacedBall& ball)
       : x(ball.x - LaneMap(tile.x)), y(ball.y - LaneMap(tile.y)), z(ball.z - LaneMap(tile.z)) {
+    measure(ball);
+  }
+  ToBall(const BoxTile& tile, const PlacedBall& ball)
+      : x(beyond(tile.min_x, tile.max_x, ball.x)),
+        y(beyond(tile.min_y, tile.max_y, ball.y)),
+        z(beyond(tile.min_z, tile.max_z, ball.z)) {
+    measure(ball);
+  }
+  static Lanes beyond(const float* min, const float* max, float v) {
+    return v - LaneMap(min).max(v).min(LaneMap(max));
+  }
+  void measure(const PlacedBall& ball) {
     length = (x * x + y * y + z * z).sqrt();
     distance = length - ball.radius;
   }
@@ -40,8 +53,8 @@ Lanes squared_distance(const BoxNode& node, const PlacedBall& ball) {
 
 // Visits the tiles that may hold a point nearer to the ball's surface than `limit`, the nearest
 // first. The limit may shrink meanwhile.
-template <typename Visit>
-void visit_tiles(const PointIndex& index, const PlacedBall& ball, const float& limit,
+template <typename Index, typename Visit>
+void visit_tiles(const Index& index, const PlacedBall& ball, const float& limit,
                  const Visit& visit) {
   if (index.empty()) return;
   const auto too_far = [&ball, &limit](float squared) {
@@ -79,15 +92,22 @@ PlacedBall place(const Ball& ball, const Eigen::Isometry3d& X_OL) {
   return {c.x(), c.y(), c.z(), static_cast<float>(ball.radius)};
 }
 
-// Calls visit(index, placed ball) for each thinned cloud and each ball.
+// Calls visit(index, placed ball, X_FO) for each thinned cloud and each map, and each ball.
 template <typename Visit>
 void for_each_pair(const std::vector<const CloudSnapshot*>& clouds, const std::vector<Ball>& balls,
                    const Eigen::Isometry3d& X_FL, const Visit& visit) {
   for (const CloudSnapshot* cloud : clouds) {
     if (cloud == nullptr) continue;
-    Eigen::Isometry3d X_OL = X_FL;
-    X_OL.translation() -= cloud->coarse.origin();
-    for (const Ball& ball : balls) visit(cloud->coarse, place(ball, X_OL));
+    Eigen::Isometry3d X_FO = Eigen::Isometry3d::Identity();
+    if (!cloud->coarse.empty()) {
+      Eigen::Isometry3d X_OL = X_FL;
+      X_OL.translation() -= cloud->coarse.origin();
+      for (const Ball& ball : balls) visit(cloud->coarse, place(ball, X_OL), X_FO.linear());
+    }
+    if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
+    X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
+    const Eigen::Isometry3d X_OL = X_FO.inverse() * X_FL;
+    for (const Ball& ball : balls) visit(*cloud->boxes, place(ball, X_OL), X_FO.linear());
   }
 }
 
@@ -109,11 +129,22 @@ struct Blend {
     undirected += w * (1.0F - pair.length / kTiny).max(0.0F);
   }
 
+  Eigen::Vector3d sum() const { return Eigen::Vector3f(x.sum(), y.sum(), z.sum()).cast<double>(); }
+};
+
+// Of all indices, in the fixed frame.
+struct Total {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weight = 0.0, undirected = 0.0;
+
+  void add(const Blend& blend, const Eigen::Matrix3d& R_FO) {
+    sum += R_FO * blend.sum();
+    weight += static_cast<double>(blend.weight.sum());
+    undirected += static_cast<double>(blend.undirected.sum());
+  }
+
   Eigen::Vector3d direction(const Eigen::Vector3d& fallback) const {
-    const auto total = static_cast<double>(weight.sum());
-    if (!(total > 0.0)) return fallback;
-    const Eigen::Vector3d sum = Eigen::Vector3f(x.sum(), y.sum(), z.sum()).cast<double>();
-    return (sum + static_cast<double>(undirected.sum()) * fallback) / total;
+    return weight > 0.0 ? Eigen::Vector3d((sum + undirected * fallback) / weight) : fallback;
   }
 };
 
@@ -140,22 +171,26 @@ Eigen::Vector3d Repulsion::operator()(std::size_t link, const Eigen::Isometry3d&
 
   const std::vector<Ball>& balls = coarse_[link];
   float nearest = std::numeric_limits<float>::infinity();
-  for_each_pair(clouds, balls, X_FL, [&nearest](const PointIndex& index, const PlacedBall& ball) {
-    visit_tiles(index, ball, nearest, [&nearest, &ball](const PointTile& tile) {
-      nearest = std::min(nearest, ToBall(tile, ball).distance.minCoeff());
-    });
-  });
-  Blend blend;
+  for_each_pair(clouds, balls, X_FL,
+                [&nearest](const auto& index, const PlacedBall& ball, const auto&) {
+                  visit_tiles(index, ball, nearest, [&nearest, &ball](const auto& tile) {
+                    nearest = std::min(nearest, ToBall(tile, ball).distance.minCoeff());
+                  });
+                });
+  Total total;
   if (std::isfinite(nearest)) {
     const auto smoothing = static_cast<float>(std::max(config.smoothing, 1e-6));
     const float limit = nearest + smoothing;
-    for_each_pair(clouds, balls, X_FL, [&](const PointIndex& index, const PlacedBall& ball) {
-      visit_tiles(index, ball, limit, [&](const PointTile& tile) {
-        blend.add(ToBall(tile, ball), nearest, 1.0F / smoothing);
-      });
-    });
+    for_each_pair(clouds, balls, X_FL,
+                  [&](const auto& index, const PlacedBall& ball, const auto& R_FO) {
+                    Blend blend;
+                    visit_tiles(index, ball, limit, [&](const auto& tile) {
+                      blend.add(ToBall(tile, ball), nearest, 1.0F / smoothing);
+                    });
+                    total.add(blend, R_FO);
+                  });
   }
-  return config.gain * strength * blend.direction(proximity.direction);
+  return config.gain * strength * total.direction(proximity.direction);
 }
 
 }  // namespace ist

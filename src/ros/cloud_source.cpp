@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "ist_proximity/ros/cloud_conversion.h"
+#include "ist_proximity/ros/map_measurement.h"
 #include "ist_proximity/ros/ros_time.h"
 #include "ist_proximity/ros/transforms.h"
 
@@ -22,15 +23,21 @@ const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
                          const tf2::BufferCore& buffer, ros::Publisher filtered)
-    : config_(config), buffer_(buffer), filtered_(std::move(filtered)), ingest_(config.ingest) {
+    : config_(config),
+      is_map_(config.type == SourceType::kMap),
+      buffer_(buffer),
+      filtered_(std::move(filtered)),
+      ingest_(ingest_config(config)) {
   facts_.name = config.name;
-  facts_.topic = nh.resolveName(config.topic);
+  facts_.is_file = !config.file.empty();
+  facts_.topic = facts_.is_file ? config.file : nh.resolveName(config.topic);
+  facts_.type = message_type(config.type);
+  facts_.noun = noun(config.type);
   facts_.timeout = config.timeout;
   facts_.required = config.required;
   nh.setCallbackQueue(&queue_);
-  // A short queue: while one cloud is ingested, only the newest of the others is worth keeping.
-  subscriber_ = nh.subscribe<sensor_msgs::PointCloud2>(config.topic, 2, &CloudSource::receive, this,
-                                                       ros::TransportHints().tcpNoDelay());
+  if (!facts_.is_file)
+    subscriber_ = subscribe(config, &nh, [this](const Received& received) { receive(received); });
   thread_ = std::thread(&CloudSource::run, this);
 }
 
@@ -47,17 +54,36 @@ void CloudSource::set_model(std::shared_ptr<const RobotModel> model,
   shared_target_.fixed_frame = fixed_frame;
 }
 
-const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model) {
+const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model,
+                                          const ros::Time& time, double max_age) {
   channel_.update();
-  const SourceSnapshot* snapshot = channel_.front().get();
+  const std::shared_ptr<SourceSnapshot>& snapshot = channel_.front();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_current(snapshot.get(), model)) return nullptr;
+  }
+  if (!is_map_) return snapshot.get();
+  if (map_ != snapshot) {
+    map_ = snapshot;
+    placed_map_ = *snapshot;
+  }
+  const std::string problem = place_map(time, max_age, &placed_map_);
   const std::lock_guard<std::mutex> lock(mutex_);
-  return is_current(snapshot, model) ? snapshot : nullptr;
+  placing_problem_ = problem;
+  return problem.empty() ? &placed_map_ : nullptr;
 }
 
 std::shared_ptr<const SourceSnapshot> CloudSource::share(
-    const std::shared_ptr<const RobotModel>& model) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return is_current(shared_.get(), model) ? shared_ : nullptr;
+    const std::shared_ptr<const RobotModel>& model, const ros::Time& time, double max_age) {
+  std::shared_ptr<const SourceSnapshot> snapshot;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_current(shared_.get(), model)) return nullptr;
+    snapshot = shared_;
+  }
+  if (!is_map_) return snapshot;
+  const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
+  return place_map(time, max_age, placed.get()).empty() ? placed : nullptr;
 }
 
 /// With mutex_ held.
@@ -65,7 +91,8 @@ bool CloudSource::is_current(const SourceSnapshot* snapshot,
                              const std::shared_ptr<const RobotModel>& model) {
   notice_clock_jump();
   return snapshot && model && snapshot->model == model &&
-         snapshot->generation == shared_target_.generation;
+         (snapshot->generation == shared_target_.generation ||
+          (snapshot->generation != 0 && is_for_ever()));
 }
 
 /// The snapshot to fill next: an old one, unless somebody still holds that.
@@ -77,19 +104,48 @@ std::shared_ptr<SourceSnapshot>& CloudSource::writable() {
   return snapshot;
 }
 
+std::string CloudSource::place_map(const ros::Time& time, double max_age,
+                                   SourceSnapshot* snapshot) const {
+  const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
+  Eigen::Isometry3d& X_FM = snapshot->cloud.X_FM;
+  std::string ignored;
+  // Asked first: an exception in every cycle would cost more than the answer.
+  if (is_known(buffer_, fixed, frame, time, &ignored)) {
+    return look_up(buffer_, fixed, frame, time, &X_FM);
+  }
+  ros::Time stamp;
+  const std::string problem = look_up(buffer_, fixed, frame, ros::Time(), &X_FM, &stamp);
+  if (!problem.empty() || stamp.isZero()) return problem;
+  const double age = seconds_between(stamp, time);
+  if (age <= max_age) return "";
+  char text[96];
+  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
+                max_age);
+  return "the newest transform from '" + frame + "' to '" + fixed + text;
+}
+
 SourceFacts CloudSource::facts() {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  return facts_;
+  SourceFacts facts = facts_;
+  if (!placing_problem_.empty()) facts.problem = placing_problem_;
+  if (!file_problem_.empty()) facts.problem = file_problem_;
+  return facts;
+}
+
+bool CloudSource::is_for_ever() const {
+  return is_map_ && (!config_.file.empty() || std::isinf(config_.timeout));
 }
 
 void CloudSource::notice_clock_jump() {
   const ros::Time now = ros::Time::now();
   if (now < last_now_) {
     ++shared_target_.generation;
-    facts_.messages = 0;
-    facts_.newest = std::numeric_limits<double>::quiet_NaN();
-    facts_.problem.clear();
+    if (!is_for_ever()) {
+      facts_.messages = 0;
+      facts_.newest = std::numeric_limits<double>::quiet_NaN();
+      facts_.problem.clear();
+    }
   }
   last_now_ = now;
 }
@@ -107,10 +163,18 @@ void CloudSource::set_problem(const std::string& problem, bool dropped) {
 }
 
 void CloudSource::run() {
+  if (!config_.file.empty()) {
+    const Received received = read_map_file(config_.file, without_slash(config_.frame_id));
+    const std::lock_guard<std::mutex> lock(mutex_);
+    file_problem_ = received.fault;
+    kept_ = received.measurement;
+    kept_is_new_ = kept_ != nullptr;
+  }
   while (running_) {
     queue_.callAvailable(waiting_.empty() ? kPollIdle : kPollTf);
     forget_old();
     use_newest_ready();
+    use_kept();
     count_publishers();
   }
 }
@@ -129,29 +193,31 @@ void CloudSource::count_publishers() {
 /// until nobody may use it any more.
 void CloudSource::forget_old() {
   Target now_asked = target();
-  if (now_asked.generation != target_.generation) waiting_.clear();
+  if (now_asked.generation != target_.generation) {
+    waiting_.clear();
+    if (!is_for_ever()) kept_.reset();
+  }
   if (now_asked.generation != target_.generation || now_asked.model != target_.model) {
     in_use_ = ros::Time();
+    kept_is_new_ = kept_ != nullptr;
     target_since_ = std::chrono::steady_clock::now();
   }
   target_ = std::move(now_asked);
   if (!target_.model) waiting_.clear();
 
   const double now = ros::Time::now().toSec();
-  while (!waiting_.empty() &&
-         (waiting_.size() > kMaxWaiting ||
-          now - waiting_.front().message->header.stamp.toSec() > config_.timeout)) {
+  while (!waiting_.empty() && (waiting_.size() > kMaxWaiting ||
+                               now - waiting_.front()->header().stamp.toSec() > config_.timeout)) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++facts_.unusable;
     waiting_.pop_front();
   }
 }
 
-void CloudSource::receive(const sensor_msgs::PointCloud2ConstPtr& message) {
+void CloudSource::receive(const Received& received) {
   forget_old();
-  const ros::Time& stamp = message->header.stamp;
-  Waiting waiting{message, {}};
-  const std::string problem = why_unusable(*message, &waiting.raw);
+  const ros::Time& stamp = received.header.stamp;
+  const std::string problem = why_unusable(received);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
   {
@@ -168,38 +234,41 @@ void CloudSource::receive(const sensor_msgs::PointCloud2ConstPtr& message) {
       return;
     }
   }
-  const auto after = std::upper_bound(waiting_.begin(), waiting_.end(), stamp,
-                                      [](const ros::Time& time, const Waiting& other) {
-                                        return time < other.message->header.stamp;
-                                      });
-  waiting_.insert(after, waiting);
+  if (is_map_) {
+    kept_ = received.measurement;
+    kept_is_new_ = true;
+    return;
+  }
+  const auto after = std::upper_bound(
+      waiting_.begin(), waiting_.end(), stamp,
+      [](const ros::Time& time, const Waiting& other) { return time < other->header().stamp; });
+  waiting_.insert(after, received.measurement);
 }
 
-std::string CloudSource::why_unusable(const sensor_msgs::PointCloud2& message,
-                                      RawCloud* raw) const {
-  const ros::Time& stamp = message.header.stamp;
-  if (stamp.isZero()) return "its clouds have no stamp (0): the driver must set header.stamp";
+std::string CloudSource::why_unusable(const Received& received) const {
+  const ros::Time& stamp = received.header.stamp;
+  const std::string plural = "its " + facts_.noun + "s ";
+  if (stamp.isZero()) return plural + "have no stamp (0): the driver must set header.stamp";
   const double ahead = seconds_between(ros::Time::now(), stamp);
   if (ahead > future_tolerance(config_.timeout)) {
     char text[96];
-    std::snprintf(text, sizeof text, "its clouds are stamped %.2f s in the future: ", ahead);
-    return text + std::string("compare the clocks of sensor and node");
+    std::snprintf(text, sizeof text, "are stamped %.2f s in the future: ", ahead);
+    return plural + text + "compare the clocks of sensor and node";
   }
-  if (message.header.frame_id.empty()) return "its clouds have an empty frame_id";
-  const std::string fault = view_cloud(message, raw);
-  if (!fault.empty()) return "malformed cloud: " + fault;
-  if (!target_.model) return "it waits for the robot's model";
+  if (received.header.frame_id.empty()) return plural + "have an empty frame_id";
+  if (!received.fault.empty()) return received.fault;
+  if (!target_.model && !is_map_) return "it waits for the robot's model";
   return "";
 }
 
 void CloudSource::use_newest_ready() {
   for (std::size_t i = waiting_.size(); i-- > 0;) {
-    std::string problem = missing_transform(waiting_[i]);
+    std::string problem = missing_transform(*waiting_[i]);
     if (!problem.empty()) {
       if (i + 1 == waiting_.size()) set_problem(problem, false);
       continue;
     }
-    problem = ingest(waiting_[i]);
+    problem = ingest(*waiting_[i]);
     set_problem(problem, !problem.empty());
     const std::lock_guard<std::mutex> lock(mutex_);
     facts_.overtaken += i;
@@ -208,20 +277,28 @@ void CloudSource::use_newest_ready() {
   }
 }
 
-/// Empty when all that is needed at the cloud's stamp is known.
-std::string CloudSource::missing_transform(const Waiting& waiting) const {
-  const std_msgs::Header& header = waiting.message->header;
+void CloudSource::use_kept() {
+  if (!kept_ || !kept_is_new_ || !target_.model) return;
+  kept_is_new_ = false;
+  const std::string problem = ingest(*kept_);
+  set_problem(problem, !problem.empty());
+}
+
+/// Empty when all that is needed at the measurement's instants is known.
+std::string CloudSource::missing_transform(const Measurement& waiting) const {
+  const std::string sensor = without_slash(waiting.header().frame_id);
+  const std::vector<ros::Time> instants = waiting.instants();
   std::string problem;
-  if (!is_known(buffer_, target_.fixed_frame, without_slash(header.frame_id), header.stamp,
-                &problem)) {
-    return problem;
+  for (const ros::Time& time : {instants.front(), instants.back()}) {
+    if (!is_known(buffer_, target_.fixed_frame, sensor, time, &problem)) return problem;
   }
   if (!config_.ingest.self_filter) return "";
-  for (const LinkModel& link : target_.model->links) {
-    if (link.usable() &&
-        !is_known(buffer_, target_.fixed_frame, link.name, header.stamp, &problem) &&
-        worth_waiting_for(link.name, header.stamp)) {
-      return "the self-filter waits: " + problem;
+  for (const ros::Time& time : {instants.front(), instants.back()}) {
+    for (const LinkModel& link : target_.model->links) {
+      if (link.usable() && !is_known(buffer_, target_.fixed_frame, link.name, time, &problem) &&
+          worth_waiting_for(link.name, time)) {
+        return "the self-filter waits: " + problem;
+      }
     }
   }
   return "";
@@ -256,29 +333,52 @@ void CloudSource::pose_robot(const ros::Time& stamp, PosedRobot* robot) const {
   }
 }
 
-std::string CloudSource::ingest(const Waiting& waiting) {
-  const std_msgs::Header& header = waiting.message->header;
-  Eigen::Isometry3d X_FS;
-  const std::string problem =
-      look_up(buffer_, target_.fixed_frame, without_slash(header.frame_id), header.stamp, &X_FS);
-  if (!problem.empty()) return problem;
+std::string CloudSource::place(const Measurement& waiting, Placement* placement) const {
+  const std::string sensor = without_slash(waiting.header().frame_id);
+  const std::vector<ros::Time> instants = waiting.instants();
+  if (instants.empty()) return "";
+  std::string problem =
+      look_up(buffer_, target_.fixed_frame, sensor, instants.front(), &placement->X_FS);
+  placement->X_FS_end = placement->X_FS;
+  if (problem.empty() && instants.size() > 1) {
+    problem = look_up(buffer_, target_.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
+  }
+  if (!problem.empty() || !config_.ingest.self_filter) return problem;
+  pose_robot(instants.front(), &placement->robot);
+  for (std::size_t i = 1; i < instants.size(); ++i) {
+    placement->later.emplace_back();
+    pose_robot(instants[i], &placement->later.back());
+  }
+  return "";
+}
 
-  PosedRobot robot;
-  if (config_.ingest.self_filter) pose_robot(header.stamp, &robot);
+std::string CloudSource::ingest(const Measurement& waiting) {
+  const ros::Time& stamp = waiting.header().stamp;
+  Placement placement;
+  const std::string problem = place(waiting, &placement);
+  if (!problem.empty()) return problem;
   const std::shared_ptr<SourceSnapshot>& shared = writable();
   SourceSnapshot& snapshot = *shared;
   try {
-    ingest_.run(waiting.raw, X_FS, robot, header.stamp.toSec(), &snapshot.cloud);
+    waiting.ingest(placement, &ingest_, &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a monstrous cloud
     snapshot.generation = 0;
-    return std::string("the cloud could not be read: ") + error.what();
+    return "the " + facts_.noun + " could not be read: " + error.what();
   }
-  snapshot.stamp = header.stamp;
+  snapshot.stamp = stamp;
   snapshot.model = target_.model;
-  snapshot.filtered = robot.known;
+  snapshot.fixed_frame = target_.fixed_frame;
+  snapshot.map_frame = without_slash(waiting.header().frame_id);
+  // A link that was missing at any instant is not filtered.
+  snapshot.filtered = placement.robot.known;
+  for (const PosedRobot& later : placement.later) {
+    for (std::size_t i = 0; i < later.known.size(); ++i) {
+      snapshot.filtered[i] = snapshot.filtered[i] && later.known[i];
+    }
+  }
   snapshot.generation = target_.generation;
-  in_use_ = header.stamp;
-  if (filtered_.getNumSubscribers() > 0) {
+  in_use_ = stamp;
+  if (!is_map_ && filtered_.getNumSubscribers() > 0) {
     filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
   }
   {

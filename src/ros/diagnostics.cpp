@@ -83,7 +83,7 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& s
   add("dropped: out of order", source.out_of_order, &status);
   add("dropped: overtaken by a newer one", source.overtaken, &status);
   if (source.has_snapshot) {
-    add("age", number("%.3f s", now - source.stamp.toSec()), &status);
+    if (!source.is_file) add("age", number("%.3f s", now - source.stamp.toSec()), &status);
     add("points received", source.counts.received, &status);
     add("points used", source.counts.used, &status);
     add("points on the robot", source.counts.on_robot, &status);

@@ -60,7 +60,7 @@ ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict&
   message.age = kNaN;
   if (!source.has_snapshot) return message;
   message.stamp = source.stamp;
-  message.age = seconds_between(message.stamp, stamp);
+  if (!source.is_file) message.age = seconds_between(message.stamp, stamp);
   message.points_received = source.counts.received;
   message.points_used = source.counts.used;
   message.points_on_robot = source.counts.on_robot;

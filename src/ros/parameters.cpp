@@ -36,18 +36,56 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
   }
 }
 
+void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
+  const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kScan, SourceType::kMap};
+  std::vector<std::string> names;
+  for (const SourceType one : types) names.emplace_back(message_type(one));
+  std::string name = message_type(*type);
+  reader->read_choice(prefix + "type", names, &name);
+  for (const SourceType one : types) {
+    if (name == message_type(one)) *type = one;
+  }
+}
+
+// A map has no sensor that ranges count from, and holds no robot.
+void read_map(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+  source->ingest.self_filter = false;
+  reader->read(prefix + "self_filter", &source->ingest.self_filter);
+  if (source->ingest.self_filter) {
+    reader->add_error("~" + prefix +
+                      "self_filter is true: it is for clouds and scans; leave the robot out of the "
+                      "map where the map is made");
+  }
+  if (!reader->has(prefix + "file")) return;
+  reader->read(prefix + "file", &source->file);
+  reader->read(prefix + "frame_id", &source->frame_id);
+  if (source->file.empty() || source->file[0] != '/') {
+    reader->add_error("~" + prefix + "file is \"" + source->file +
+                      "\": an absolute path is needed, for example /home/robot/room.bt");
+  }
+  if (source->frame_id.empty()) {
+    reader->add_error("~" + prefix + "frame_id is empty: the map's frame is needed");
+  }
+  if (reader->has(prefix + "topic")) {
+    reader->add_error("~" + prefix + "topic and ~" + prefix + "file are both set: one is needed");
+  }
+}
+
 void read_source(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+  read_type(reader, prefix, &source->type);
+  if (source->type == SourceType::kMap) {
+    read_map(reader, prefix, source);
+  } else {
+    read_ingest(reader, prefix, &source->ingest);
+  }
   reader->read(prefix + "topic", &source->topic);
   if (source->topic.empty()) {
     reader->add_error("~" + prefix + "topic is empty: the name of a topic is needed");
   }
-  std::string type = "sensor_msgs/PointCloud2";
-  const std::string not_yet = "this type is not supported yet; publish it as a PointCloud2";
-  reader->read_choice(prefix + "type", {"sensor_msgs/PointCloud2"}, &type,
-                      {{"sensor_msgs/LaserScan", not_yet}, {"octomap_msgs/Octomap", not_yet}});
-  reader->read(prefix + "timeout", more_than_zero("s", kInf, true), &source->timeout);
+  if (source->file.empty()) {
+    reader->read(prefix + "timeout", more_than_zero("s", kInf, true), &source->timeout);
+  }
   reader->read(prefix + "required", &source->required);
-  read_ingest(reader, prefix, &source->ingest);
 }
 
 std::vector<SourceConfig> read_sources(ParameterReader* reader) {
@@ -135,6 +173,30 @@ XmlRpc::XmlRpcValue fetch(const ros::NodeHandle& private_nh) {
 }
 
 }  // namespace
+
+const char* message_type(SourceType type) {
+  switch (type) {
+    case SourceType::kScan:
+      return "sensor_msgs/LaserScan";
+    case SourceType::kMap:
+      return "octomap_msgs/Octomap";
+    case SourceType::kCloud:
+      break;
+  }
+  return "sensor_msgs/PointCloud2";
+}
+
+const char* noun(SourceType type) {
+  switch (type) {
+    case SourceType::kScan:
+      return "scan";
+    case SourceType::kMap:
+      return "map";
+    case SourceType::kCloud:
+      break;
+  }
+  return "cloud";
+}
 
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);

@@ -70,6 +70,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
       reader_(reader),
+      pose_timeout_(config.pose_timeout),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
       speeds_(robot_.links.size()),
@@ -109,6 +110,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   for (std::size_t i = 0; i < snapshots_.size(); ++i) {
     if (clouds_.empty() || !situation_.verdicts[i].ok()) continue;
     const ros::Time& stamp = snapshots_[i]->stamp;
+    if (situation_.sources[i].is_file) continue;
     if (message->cloud_stamp.isZero() || stamp < message->cloud_stamp) {
       message->cloud_stamp = stamp;
     }
@@ -140,14 +142,14 @@ void ProximityCycle::look_at_sources(const ros::Time& now, const CloudSources& s
   snapshots_.clear();
   held_.clear();
   for (const auto& source : sources) {
-    SourceFacts facts = source->facts();
     const SourceSnapshot* snapshot;
     if (reader_ == Reader::kOnly) {
-      snapshot = source->newest(model_->robot);
+      snapshot = source->newest(model_->robot, poses_.stamp, pose_timeout_);
     } else {
-      held_.push_back(source->share(model_->robot));
+      held_.push_back(source->share(model_->robot, poses_.stamp, pose_timeout_));
       snapshot = held_.back().get();
     }
+    SourceFacts facts = source->facts();
     if (snapshot) {
       facts.has_snapshot = true;
       facts.stamp = snapshot->stamp;

@@ -32,12 +32,18 @@ std::string because(const std::string& problem) {
 double future_tolerance(double timeout) { return std::min(timeout, 1.0); }
 
 Verdict judge_source(const SourceFacts& source, double now) {
+  if (source.is_file) {
+    if (source.has_snapshot) return {ProximityArray::OK, ""};
+    return {ProximityArray::NO_CLOUD,
+            "source '" + source.name + "'" +
+                because(source.problem.empty() ? "its file is being read" : source.problem)};
+  }
   if (source.messages == 0) {
     return {ProximityArray::NO_CLOUD,
             title(source) + ": nothing received yet" +
                 (source.publishers == 0
-                     ? ", nobody publishes a sensor_msgs/PointCloud2 there; start the sensor's "
-                       "driver, or set or remap the topic"
+                     ? ", nobody publishes a " + source.type +
+                           " there; start the sensor's driver, or set or remap the topic"
                      : ", although there is a publisher")};
   }
   if (std::isnan(source.newest)) {  // nothing but stamps that are not of this time
@@ -46,26 +52,28 @@ Verdict judge_source(const SourceFacts& source, double now) {
   const double newest_age = now - source.newest;
   if (newest_age > source.timeout) {
     return {ProximityArray::STALE_CLOUD,
-            title(source) + ": the newest cloud is " + seconds(newest_age) + " old, allowed is " +
-                seconds(source.timeout) +
-                (source.problem.empty() ? "; has its driver stopped, or do the clocks of "
-                                          "sensor and node differ?"
+            title(source) + ": the newest " + source.noun + " is " + seconds(newest_age) +
+                " old, allowed is " + seconds(source.timeout) +
+                (source.problem.empty() ? source.noun == "map"
+                                              ? "; is it latched, and sent once? Then its timeout "
+                                                "should be .inf"
+                                              : "; has its driver stopped, or do the clocks of "
+                                                "sensor and node differ?"
                                         : because(source.problem))};
   }
   if (!source.has_snapshot) {
     return {ProximityArray::NO_CLOUD,
-            title(source) + ": no cloud could be used yet" + because(source.problem)};
+            title(source) + ": no " + source.noun + " could be used yet" + because(source.problem)};
   }
   const double age = now - source.stamp.toSec();
   if (age > source.timeout) {
-    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable cloud is " +
-                                             seconds(age) + " old, allowed is " +
+    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
+                                             " is " + seconds(age) + " old, allowed is " +
                                              seconds(source.timeout) + because(source.problem)};
   }
   if (source.counts.saw_nothing()) {
-    return {ProximityArray::NO_CLOUD, title(source) +
-                                          ": every point of the newest cloud is NaN, "
-                                          "the sensor sees nothing at all"};
+    return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
+                                          " is NaN, the sensor sees nothing at all"};
   }
   return {ProximityArray::OK, ""};
 }
@@ -104,10 +112,10 @@ Verdict judge(const Situation& situation, double now) {
            (sources[i].required || (one_is_enough && none_is_usable));
   };
   const auto arrives_fresh = [&](const SourceFacts& source) {
-    return source.messages > 0 && now - source.newest <= source.timeout;
+    return source.is_file || (source.messages > 0 && now - source.newest <= source.timeout);
   };
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (matters(i) && sources[i].messages == 0) {
+    if (matters(i) && sources[i].messages == 0 && !sources[i].is_file) {
       add(ProximityArray::NO_CLOUD, situation.verdicts[i].text);
     }
   }

@@ -267,6 +267,73 @@ TEST(Repulsion, severalCloudsAreOneObstacle) {
   EXPECT_LT((together - apart).norm(), 1e-4);
 }
 
+// Leaves of a map count with the point that is nearest to each ball.
+TEST(Repulsion, boxesAgreeWithTheFormula) {
+  std::mt19937_64 rng(5);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  const auto vector = [&] { return Vector3d(unit(rng), unit(rng), unit(rng)); };
+  const std::vector<Ball> balls = bar();
+  const Repulsion repulsion(robot_of(balls));
+  const RepulsionConfig config;
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<Eigen::AlignedBox3d> boxes;
+    for (int i = 0; i < 40; ++i) {
+      const Vector3d low = 0.4 * vector() + Vector3d(0.0, 0.0, 0.6);
+      boxes.emplace_back(low, low + Vector3d::Constant(0.05 * (1 << i % 3)));
+    }
+    const Eigen::Isometry3d X_FM(Eigen::Translation3d(0.1 * vector()) *
+                                 Eigen::AngleAxisd(0.5 * unit(rng), vector().normalized()));
+    CloudSnapshot map;
+    auto index = std::make_shared<BoxIndex>();
+    index->build(boxes);
+    map.boxes = index;
+    map.X_FM = X_FM;
+    Expected truth;
+    double weights = 0.0;
+    for (const bool second : {false, true}) {
+      for (const Ball& b : balls) {
+        for (const Eigen::AlignedBox3d& box : boxes) {
+          const Vector3d center_M = X_FM.inverse() * b.center;
+          const Vector3d to_ball =
+              X_FM.linear() * (center_M - center_M.cwiseMax(box.min()).cwiseMin(box.max()));
+          const double d = to_ball.norm() - b.radius;
+          if (!second) truth.nearest = std::min(truth.nearest, d);
+          const double root = 1.0 - (d - truth.nearest) / config.smoothing;
+          if (!second || root <= 0.0) continue;
+          truth.blend += root * root * to_ball.normalized();
+          weights += root * root;
+        }
+      }
+    }
+    const Vector3d found = repulsion(0, at({0, 0, 0}), {&map}, near_by(0.1), config);
+    const double strength = config.gain * (1.0 - 0.1 / config.influence_distance);
+    EXPECT_LT((found - strength * truth.blend / weights).norm(), 1e-4);
+  }
+}
+
+// Along a shelf of leaves of all sizes the vector turns a little at a time.
+TEST(Repulsion, isContinuousAlongBoxes) {
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (int i = -10; i < 10; ++i) {
+    const double size = 0.05 * (1 << (i + 10) % 3);
+    const Vector3d low(0.1 * i, -0.5 * size, i % 4 == 0 ? 0.1 : 0.14);
+    boxes.emplace_back(low, low + Vector3d::Constant(size));
+  }
+  auto index = std::make_shared<BoxIndex>();
+  index->build(boxes);
+  CloudSnapshot map;
+  map.boxes = index;
+  const Repulsion repulsion(robot_of(bar()));
+  Vector3d last = Vector3d::Zero();
+  double widest = 0.0;
+  for (double x = -0.6; x < 0.6; x += 0.001) {
+    const Vector3d v = repulsion(0, at({x, 0, 0}), {&map}, near_by(0.05), {});
+    if (!last.isZero()) widest = std::max(widest, degrees_between(last, v));
+    last = v;
+  }
+  EXPECT_LT(widest, 4.0);
+}
+
 TEST(Repulsion, losesNothingFarFromTheFixedFramesOrigin) {
   const Vector3d base(691000, 5334000, 520);
   std::vector<Vector3d> points = wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);

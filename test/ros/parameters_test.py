@@ -64,8 +64,9 @@ WRONG = [
     (
         {
             "sources": {
-                "scan": {"type": "sensor_msgs/LaserScan"},
-                "map": {"type": "octomap_msgs/Octomap"},
+                "scan": {"type": "sensor_msgs/LaserScan", "max_range": "far"},
+                "map": {"type": "octomap_msgs/Octomap", "self_filter": True, "timeout": 0},
+                "file": {"type": "octomap_msgs/Octomap", "file": "room.bt", "topic": "room"},
                 "odd": {"type": "sensor_msgs/Image", "timeout": 0, "required": 1},
                 "range": {"min_range": 2.0, "max_range": 1.0},
                 "padding": {"self_filter_padding": -0.01, "topic": ""},
@@ -73,9 +74,11 @@ WRONG = [
             }
         },
         [
-            "~sources/scan/type",
-            "~sources/map/type",
-            "not supported yet",
+            '~sources/scan/max_range is "far"',
+            "~sources/map/self_filter is true: it is for clouds and scans",
+            "~sources/map/timeout is 0 s: allowed is more than 0, inf included",
+            '~sources/file/file is "room.bt": an absolute path is needed',
+            "~sources/file/topic and ~sources/file/file are both set",
             "~sources/odd/type",
             "~sources/odd/timeout is 0 s",
             "~sources/odd/required",
@@ -122,7 +125,7 @@ class ParametersTest(unittest.TestCase):
     def test_config_files(self):
         """The files of the package are valid, and name nothing unknown."""
         folder = os.path.join(os.path.dirname(__file__), "..", "..", "config")
-        for name in ("proximity.yaml", "demo.yaml"):
+        for name in ("proximity.yaml", "demo.yaml", "camera_and_laser.yaml"):
             with self.subTest(name):
                 parameters = rosparam.load_file(os.path.join(folder, name))[0][0]
                 namespace = "/file_" + name.split(".")[0]

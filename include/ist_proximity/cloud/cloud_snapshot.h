@@ -1,8 +1,11 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <string>
 
+#include "ist_proximity/cloud/box_index.h"
 #include "ist_proximity/cloud/point_index.h"
 
 namespace ist {
@@ -20,10 +23,13 @@ struct IngestCounts {
   bool saw_nothing() const { return received > 0 && not_a_number == received; }
 };
 
-/// One cloud, as queries see it: immutable, in the fixed frame.
+/// One cloud or map, as queries see it: immutable. A cloud is points in the fixed frame; a map is
+/// solid boxes in a frame of its own.
 struct CloudSnapshot {
   PointIndex index;   ///< all points used
   PointIndex coarse;  ///< the same, thinned to one point per cell of the thinning grid
+  std::shared_ptr<const BoxIndex> boxes;                   ///< of a map; null: none
+  Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
   IngestCounts counts;
   double stamp = 0.0;        ///< [s] acquisition
   double ingest_time = 0.0;  ///< [s] it took

@@ -49,9 +49,11 @@ class Ingest {
   /// @param robot  poses at the cloud's stamp
   /// @param stamp  [s]
   /// @param snapshot  overwritten, its buffers reused
+  /// @param also   the robot at further instants, of a measurement that takes its time (a scan): a
+  ///               point that is the robot's at any of them is dropped
   /// @throws std::invalid_argument when X_FS is not finite; the snapshot is as before then
   void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
-           double stamp, CloudSnapshot* snapshot);
+           double stamp, CloudSnapshot* snapshot, const std::vector<PosedRobot>& also = {});
 
   const IngestConfig& config() const;
 

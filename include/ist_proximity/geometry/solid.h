@@ -45,6 +45,18 @@ class Solid {
   /// @param measured  signed_distance(p_L)
   double distance_floor(const Eigen::Vector3d& p_L, const SignedDistance& measured) const;
 
+  /// The nearest pair of points of the solid and a solid box, if nearer than `max_distance` [m];
+  /// `lower_bound` holds in any case.
+  /// 0 where they touch or overlap; only a box within a mesh, which touches no triangle of it, has
+  /// its distance to the surface (signed_distance of any of its points tells).
+  /// @param box_O  axis-aligned in a frame O, which the result is in
+  BoxDistance distance_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OL,
+                              double max_distance) const;
+
+  /// Whether every element is a primitive or a mesh without holes: then its inside ends at its
+  /// surface and nowhere else.
+  bool is_closed() const;
+
   /// Whether p_L is inside any element.
   bool is_inside(const Eigen::Vector3d& p_L) const;
 
@@ -53,7 +65,8 @@ class Solid {
 
  private:
   struct Element {
-    Shape primitive;  ///< Box, Cylinder or Sphere; an empty mesh when `bvh` is used
+    Shape primitive;    ///< Box, Cylinder or Sphere; an empty mesh when `bvh` is used
+    TriangleBvh sides;  ///< of a Box
     TriangleBvh bvh;
     std::vector<Eigen::Vector3d> normals;  ///< unit, by triangle; zero for triangles without area
     Eigen::Isometry3d X_LE;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "ist_proximity/geometry/box_distance.h"
 #include "ist_proximity/geometry/triangle_mesh.h"
 
 namespace ist {
@@ -36,6 +37,14 @@ class TriangleBvh {
   /// @returns distance_sq = inf when there is none.
   ClosestPoint closest(const Eigen::Vector3d& p_M,
                        double max_distance_sq = std::numeric_limits<double>::infinity()) const;
+
+  /// The surface and a solid box: the nearest pair of points, exact in double, if nearer than
+  /// `max_distance` [m]. 0 where the surface touches or crosses the box; a box that lies within a
+  /// closed surface has a positive distance to it.
+  /// @param box_O  axis-aligned in a frame O
+  /// @param X_OM   the mesh's frame -> O
+  BoxDistance closest_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OM,
+                             double max_distance) const;
 
   /// Generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. By a hierarchical expansion of second order (Barill et al. 2018); error

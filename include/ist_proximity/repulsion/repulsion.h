@@ -24,9 +24,9 @@ struct RepulsionConfig {
 
 /// Blended repulsion, continuous in the robot's motion.
 ///
-/// A link is a fixed, coarse set of its inner balls, an obstacle the thinned points. With d the
-/// distance of a pair (negative for a point in a ball) and n its unit vector from point to ball
-/// centre,
+/// A link is a fixed, coarse set of its inner balls, an obstacle the thinned points; of a map, each
+/// box's point that is nearest to the ball, so that a large leaf counts once. With d the distance
+/// of a pair (negative for a point in a ball) and n its unit vector from point to ball centre,
 ///   u = sum(w n) / sum(w),  w = max(0, 1 - (d - d_min) / smoothing)^2,
 /// over all pairs: the nearest pair alone would jump when two obstacles are equally near. The
 /// vector is gain * s * u with s = 1 - distance / influence_distance, not below 0 and not above 1:
@@ -34,7 +34,8 @@ struct RepulsionConfig {
 /// stays at the gain (how deep is for the penetration wrench to say), and in a symmetric squeeze
 /// the terms cancel.
 ///
-/// A point at a ball's very centre has no direction; it takes the link's `direction`.
+/// A point at a ball's very centre has no direction, nor has a box that holds the centre; it takes
+/// the link's `direction`.
 class Repulsion {
  public:
   /// Chooses the balls; the model is not needed afterwards.

@@ -2,7 +2,6 @@
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
-#include <sensor_msgs/PointCloud2.h>
 #include <tf2/buffer_core.h>
 
 #include <atomic>
@@ -17,6 +16,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/snapshot_channel.h"
+#include "ist_proximity/ros/measurement.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/status.h"
 
@@ -30,19 +30,25 @@ struct SourceSnapshot {
   /// By link: false where the self-filter had no pose at the cloud's stamp, so that points on that
   /// link are still among the obstacles. Empty: the source does not filter.
   std::vector<bool> filtered;
-  std::uint64_t generation = 0;  ///< of the clock, see CloudSource; 0: none yet
+  std::uint64_t generation = 0;        ///< of the clock, see CloudSource; 0: none yet
+  std::string fixed_frame, map_frame;  ///< what a map is placed with
 };
 
-/// One sensor: receives its clouds and turns them into snapshots, in a thread of its own, so that
-/// neither a large cloud nor a late transform ever delays a query.
+/// One sensor: receives its clouds (or scans) and turns them into snapshots, in a thread of its
+/// own, so that neither a large cloud nor a late transform ever delays a query.
 ///
 /// A cloud waits until tf knows its sensor and, for the self-filter, the links at the cloud's own
-/// stamp; the newest one that is ready is taken, what it overtakes is dropped. A link whose
-/// transforms have stopped is not waited for. This takes the place of tf2_ros::MessageFilter, which
-/// can neither give up on a single frame (setTargetFrames() needs clear(), which races with the tf
-/// listener's thread) nor say which transform it waits for.
+/// stamp, a scan until its last beam's time; the newest one that is ready is taken, what it
+/// overtakes is dropped. A link whose transforms have stopped is not waited for. This takes the
+/// place of tf2_ros::MessageFilter, which can neither give up on a single frame (setTargetFrames()
+/// needs clear(), which races with the tf listener's thread) nor say which transform it waits for.
 ///
-/// When the ROS clock jumps back (a bag starts over), everything received before is forgotten.
+/// A map is not placed here but where tf says that its frame is when a query asks, so that it stays
+/// right on a robot that drives. The last one is kept for a model that is loaded later: it may
+/// never be sent again. A map file is read once, in this thread.
+///
+/// When the ROS clock jumps back (a bag starts over), everything received before is forgotten, but
+/// for maps that never become stale.
 class CloudSource {
  public:
   /// @param nh        in the namespace that the topic is relative to
@@ -58,11 +64,15 @@ class CloudSource {
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame);
 
   /// The newest snapshot made with `model` since the clock's last jump; null: none. Valid until
-  /// the next call. One thread only; never waits.
-  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model);
+  /// the next call. One thread only; never waits. Before facts(), which tells why there is none.
+  /// @param time     a map is placed where it is then, or else at the newest instant that tf knows
+  /// @param max_age  [s] of that instant
+  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
+                               const ros::Time& time, double max_age);
 
   /// The same for any other thread, for as long as it is held.
-  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model);
+  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
+                                              const ros::Time& time, double max_age);
 
   /// Everything but the snapshot's part. Thread safe.
   SourceFacts facts();
@@ -70,10 +80,7 @@ class CloudSource {
   const SourceConfig& config() const { return config_; }
 
  private:
-  struct Waiting {
-    sensor_msgs::PointCloud2ConstPtr message;
-    RawCloud raw;  ///< views the message
-  };
+  using Waiting = std::shared_ptr<const Measurement>;
   struct Target {
     std::shared_ptr<const RobotModel> model;
     std::string fixed_frame;
@@ -81,15 +88,19 @@ class CloudSource {
   };
 
   void run();
-  void receive(const sensor_msgs::PointCloud2ConstPtr& message);
-  std::string why_unusable(const sensor_msgs::PointCloud2& message, RawCloud* raw) const;
+  void receive(const Received& received);
+  std::string why_unusable(const Received& received) const;
   Target target();
   void use_newest_ready();
+  void use_kept();
+  std::string place_map(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
+  bool is_for_ever() const;
   void forget_old();
   void count_publishers();
-  std::string missing_transform(const Waiting& waiting) const;
+  std::string missing_transform(const Measurement& waiting) const;
   bool worth_waiting_for(const std::string& link, const ros::Time& stamp) const;
-  std::string ingest(const Waiting& waiting);
+  std::string place(const Measurement& waiting, Placement* placement) const;
+  std::string ingest(const Measurement& waiting);
   void pose_robot(const ros::Time& stamp, PosedRobot* robot) const;
   std::shared_ptr<SourceSnapshot>& writable();
   bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
@@ -97,6 +108,7 @@ class CloudSource {
   void set_problem(const std::string& problem, bool dropped);
 
   const SourceConfig config_;
+  const bool is_map_;
   const tf2::BufferCore& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
@@ -106,13 +118,20 @@ class CloudSource {
   std::mutex mutex_;  // for what follows, held for copies only
   Target shared_target_;
   SourceFacts facts_;
+  std::string file_problem_, placing_problem_;  ///< these do not pass with the next message
   ros::Time last_now_;
   std::shared_ptr<const SourceSnapshot> shared_;  ///< the newest
+
+  // The thread that calls newest() alone.
+  std::shared_ptr<const SourceSnapshot> map_;  ///< what placed_map_ is a copy of
+  SourceSnapshot placed_map_;                  ///< where its frame was at last
 
   // The source's thread alone.
   Target target_;
   Ingest ingest_;
   std::deque<Waiting> waiting_;  ///< by stamp
+  Waiting kept_;                 ///< the last map
+  bool kept_is_new_ = false;     ///< it is not in use with this model yet
   ros::Time in_use_;             ///< stamp of the newest snapshot of this generation
   std::chrono::steady_clock::time_point target_since_, next_count_;
   std::atomic<bool> running_{true};

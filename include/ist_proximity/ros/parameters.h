@@ -15,12 +15,23 @@
 
 namespace ist {
 
+/// What a source sends.
+enum class SourceType { kCloud, kScan, kMap };
+
+/// The message type, as rostopic writes it, and what one such message is called.
+const char* message_type(SourceType type);
+const char* noun(SourceType type);
+
 /// One entry of ~sources.
 struct SourceConfig {
   std::string name = "cloud";
+  SourceType type = SourceType::kCloud;
   std::string topic = "cloud";  ///< as configured: relative to the node's namespace, remappable
-  double timeout = 0.5;         ///< [s] older than this is STALE_CLOUD; > 0, may be inf
-  bool required = true;         ///< false: its absence is reported in its own status only
+  /// Of a map that is read from a file, never stale, in place of a topic: absolute path.
+  std::string file;
+  std::string frame_id = "map";  ///< of the file's map
+  double timeout = 0.5;          ///< [s] older than this is STALE_CLOUD; > 0, may be inf
+  bool required = true;          ///< false: its absence is reported in its own status only
   IngestConfig ingest;
 };
 

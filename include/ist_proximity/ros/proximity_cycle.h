@@ -56,6 +56,7 @@ class ProximityCycle {
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;
   const Reader reader_;
+  const double pose_timeout_;  ///< [s]
   ProximityQuery query_;
   Repulsion repulsion_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot

@@ -17,8 +17,11 @@ namespace ist {
 /// since the start or the clock's last jump backwards.
 struct SourceFacts {
   std::string name;
-  std::string topic;     ///< resolved
-  double timeout = 0.5;  ///< [s]
+  std::string topic;  ///< resolved
+  std::string type = "sensor_msgs/PointCloud2";
+  std::string noun = "cloud";  ///< what one message is called
+  bool is_file = false;        ///< `topic` is a file's path, read once and never stale
+  double timeout = 0.5;        ///< [s]
   bool required = true;
   std::uint64_t messages = 0;      ///< received
   std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use

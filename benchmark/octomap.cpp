@@ -1,0 +1,189 @@
+// Links against an octree map: Inner Sphere Trees against FCL's mesh - octree distance, on the same
+// map, in the same run. Without FCL only the first.
+//
+// The map is clutter in a room of 8 m: about as many occupied leaves as asked for, of 1 to 8 cm, in
+// patches of surface. The links are
+// the Panda's (test data: IST_PROXIMITY_DATA, or ../shared/data). Usage: octomap [leaves] [queries]
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support.h"
+#include "support/data_dir.h"
+#include "support/truth.h"
+
+#ifdef IST_PROXIMITY_HAS_FCL
+#include <fcl/fcl.h>
+#include <octomap/octomap.h>
+#endif
+
+namespace {
+
+using ist::benchmark::Clock;
+using ist::benchmark::microseconds_since;
+using ist::benchmark::quantile;
+
+constexpr double kLeaf = 0.01;  // [m]
+
+// Leaves begin at whole multiples of their own size, as an octree has them.
+std::vector<Eigen::AlignedBox3d> make_room(std::size_t leaves) {
+  std::mt19937_64 rng(1);
+  std::uniform_real_distribution<double> place(-4.0, 4.0);
+  std::vector<Eigen::AlignedBox3d> boxes;
+  while (boxes.size() < leaves) {
+    const int choice = static_cast<int>(rng() % 100);
+    const int level = choice == 0 ? 3 : choice % 2;
+    const double size = kLeaf * (1 << level);
+    // A patch of a surface: leaves side by side.
+    Eigen::Vector3d low(place(rng), place(rng), place(rng));
+    if (low.norm() < 0.6) continue;  // where the robot stands
+    const int flat = static_cast<int>(rng() % 3);
+    for (int i = 0; i < 20; ++i) {
+      for (int j = 0; j < 20; ++j) {
+        Eigen::Vector3d corner = low;
+        corner[(flat + 1) % 3] += i * size;
+        corner[(flat + 2) % 3] += j * size;
+        corner = size * (corner / size).array().floor();
+        boxes.emplace_back(corner, corner + Eigen::Vector3d::Constant(size));
+      }
+    }
+  }
+  boxes.resize(leaves);
+  return boxes;
+}
+
+#ifdef IST_PROXIMITY_HAS_FCL
+std::vector<ist::TriangleMesh> panda_meshes(const std::filesystem::path& data) {
+  std::vector<ist::TriangleMesh> meshes;
+  for (std::size_t i = 0; i < ist::test::kPandaLinks; ++i) {
+    const auto file = data / "robots/franka_description/meshes/visual" /
+                      (std::string(ist::test::panda_mesh(i)) + ".dae");
+    meshes.push_back(ist::load_mesh(file.string()));
+  }
+  return meshes;
+}
+
+class Fcl {
+ public:
+  // FCL's octree has leaves of one size in the end: large ones are filled with smallest ones, which
+  // octomap merges again.
+  Fcl(const std::vector<Eigen::AlignedBox3d>& boxes, const std::vector<ist::TriangleMesh>& meshes) {
+    auto tree = std::make_shared<octomap::OcTree>(kLeaf);
+    for (const Eigen::AlignedBox3d& box : boxes) {
+      const int n = static_cast<int>(std::lround(box.sizes().x() / kLeaf));
+      for (int i = 0; i < n * n * n; ++i) {
+        const Eigen::Vector3d p =
+            box.min() + kLeaf * Eigen::Vector3d(i % n + 0.5, i / n % n + 0.5, i / n / n + 0.5);
+        tree->updateNode(p.x(), p.y(), p.z(), true, true);
+      }
+    }
+    tree->updateInnerOccupancy();
+    tree->prune();
+    for (auto leaf = tree->begin_leafs(); leaf != tree->end_leafs(); ++leaf) {
+      const Eigen::Vector3d center(leaf.getX(), leaf.getY(), leaf.getZ());
+      const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * leaf.getSize());
+      leaves_.emplace_back(center - half, center + half);
+    }
+    const auto geometry = std::make_shared<fcl::OcTree<double>>(tree);
+    room_ = std::make_unique<fcl::CollisionObject<double>>(geometry);
+    for (const ist::TriangleMesh& mesh : meshes) {
+      const auto model = std::make_shared<fcl::BVHModel<fcl::OBBRSS<double>>>();
+      std::vector<fcl::Triangle> triangles;
+      for (const auto& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
+      model->beginModel();
+      model->addSubModel(mesh.vertices, triangles);
+      model->endModel();
+      links_.push_back(std::make_unique<fcl::CollisionObject<double>>(model));
+    }
+  }
+
+  double distance(std::size_t link, const Eigen::Isometry3d& X_FL) {
+    links_[link]->setTransform(X_FL);
+    const fcl::DistanceRequest<double> request;
+    fcl::DistanceResult<double> result;
+    return fcl::distance(links_[link].get(), room_.get(), request, result);
+  }
+
+  /// What octomap has made of the boxes: merged, and each once.
+  const std::vector<Eigen::AlignedBox3d>& leaves() const { return leaves_; }
+
+ private:
+  std::unique_ptr<fcl::CollisionObject<double>> room_;
+  std::vector<std::unique_ptr<fcl::CollisionObject<double>>> links_;
+  std::vector<Eigen::AlignedBox3d> leaves_;
+};
+#endif
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto data = ist::test::data_dir();
+  if (!data) {
+    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
+    return 1;
+  }
+  const std::size_t leaves = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1000000;
+  const int queries = argc > 2 ? std::atoi(argv[2]) : 10;
+  const auto model = ist::test::panda_model(*data, 0.005);
+  std::vector<Eigen::AlignedBox3d> boxes = make_room(leaves);
+#ifdef IST_PROXIMITY_HAS_FCL
+  Fcl fcl(boxes, panda_meshes(*data));
+  boxes = fcl.leaves();
+#endif
+  ist::BoxIndex index;
+  const Clock::time_point build = Clock::now();
+  index.build(boxes);
+  const double build_ms = 1e-3 * microseconds_since(build);
+  ist::CloudSnapshot map;
+  map.boxes = std::make_shared<const ist::BoxIndex>(std::move(index));
+
+  ist::QueryConfig config;
+  config.max_distance = 10.0;
+  const std::vector<bool> known(ist::test::kPandaLinks, true);
+  std::printf("%zu leaves, index built in %.0f ms\n\n", boxes.size(), build_ms);
+  std::printf(
+      "| tolerance | motion | configurations | median, 11 links | p99 | FCL, median | times "
+      "faster | links apart | largest difference to FCL |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
+  for (const double tolerance : {0.001, 0.0}) {
+    config.tolerance = tolerance;
+    for (const char* motion : {"traj", "rand"}) {
+      ist::ProximityQuery query(model, config);
+      std::vector<double> us, fcl_us;
+      std::vector<ist::LinkProximity> results;
+      int apart = 0, count = 0;
+      double largest = 0.0;
+      for (const ist::test::TruthCase& truth : ist::test::truth_cases(*data, "mosd0", motion)) {
+        Clock::time_point start = Clock::now();
+        query.run(truth.X_FL, known, {&map}, &results);
+        us.push_back(microseconds_since(start));
+        if (count++ >= queries) continue;
+#ifdef IST_PROXIMITY_HAS_FCL
+        start = Clock::now();
+        std::vector<double> distances;
+        for (std::size_t i = 0; i < results.size(); ++i) {
+          distances.push_back(fcl.distance(i, truth.X_FL[i]));
+        }
+        fcl_us.push_back(microseconds_since(start));
+        for (std::size_t i = 0; i < results.size(); ++i) {
+          if (results[i].state != ist::LinkState::kNear) continue;
+          ++apart;
+          largest = std::max(largest, std::abs(results[i].distance - distances[i]));
+        }
+#endif
+      }
+      const double median = quantile(us, 0.5), fcl_median = quantile(fcl_us, 0.5);
+      std::printf("| %.0f mm | %s | %zu | %.0f us | %.0f us | %.0f us | %.0f | %d | %.4f mm |\n",
+                  1e3 * tolerance, motion, us.size(), median, quantile(us, 0.99), fcl_median,
+                  fcl_median / median, apart, 1e3 * largest);
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/raw_cloud.h"
+
+namespace ist {
+
+/// A planar scan (the members of sensor_msgs/LaserScan): beam i points along
+/// angle_min + i * angle_increment about the sensor's z axis, 0 being x.
+struct LaserScan {
+  double angle_min = 0.0, angle_increment = 0.0;  ///< [rad]
+  double time_increment = 0.0;                    ///< [s] between beams; 0: all at once
+  double range_min = 0.0, range_max = 0.0;        ///< [m] what the sensor can measure
+  const float* ranges = nullptr;                  ///< [m] not owned
+  std::size_t count = 0;                          ///< beams
+
+  /// [s] from the first beam to the last; negative when the last one comes first in time.
+  double duration() const {
+    return count > 1 ? static_cast<double>(count - 1) * time_increment : 0.0;
+  }
+};
+
+/// A scan that takes longer than this is not believed. [s]
+constexpr double kLongestScan = 10.0;
+
+/// @returns an empty string, or one sentence with the faulty member and its value: no beams; an
+/// angle, an increment or a limit that is not finite or makes no sense (range_max may be inf);
+/// beams over more than two turns; a scan longer than kLongestScan. Thread safe.
+std::string check_scan(const LaserScan& scan);
+
+/// A scan as points in the sensor's frame at the first beam.
+struct ScanPoints {
+  std::vector<double> xyz;
+  RawCloud raw() const;  ///< views xyz: one point a beam, in the scan's order
+};
+
+/// Places each beam's end where it was measured: in the sensor's pose at the beam's own time,
+/// interpolated between the first beam's and the last one's.
+///
+/// REP 117: +inf, and whatever is beyond range_max, is a measurement of nothing there and becomes
+/// an infinite point. NaN, -inf (too near to be measured) and what is below range_min (with some
+/// drivers 0 means "no echo") tells nothing and becomes a NaN point. What min_range and max_range
+/// exclude becomes a point that Ingest counts as out of range; so Ingest is to be given no limits
+/// of its own: distances from where the sensor was at the first beam are not ranges.
+/// @param scan  checked by check_scan
+/// @param min_range, max_range  [m] of the points to keep, bounds included
+/// @param X_SE  sensor's frame at the last beam -> at the first, rigid
+void to_points(const LaserScan& scan, double min_range, double max_range,
+               const Eigen::Isometry3d& X_SE, ScanPoints* points);
+
+}  // namespace ist

@@ -1,0 +1,195 @@
+#include "ist_proximity/cloud/octree.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+
+namespace ist {
+namespace {
+
+constexpr int kDepth = 16;                          // of every OcTree
+constexpr std::int32_t kHalf = 1 << (kDepth - 1);   // smallest leaves from the middle to a side
+constexpr std::size_t kMostLeaves = 50000000;       // what an index may sensibly hold
+constexpr double kSmallest = 1e-6, kLargest = 1e3;  // [m] resolutions
+
+class Reader {
+ public:
+  Reader(const OctreeData& data, Octree* octree)
+      : next_(data.data),
+        end_(data.data + data.size),
+        resolution_(data.resolution),
+        out_(*octree) {}
+
+  // Recursion ends at the tree's full depth.
+  bool binary_node(const Eigen::Vector3i& low, int depth) {
+    ++out_.nodes;
+    if (end_ - next_ < 2) return fail("ends in the middle of the tree");
+    const auto codes = static_cast<std::uint32_t>(next_[0] | next_[1] << 8);
+    next_ += 2;
+    if (depth == kDepth && codes != 0) return fail("is deeper than 16 levels");
+    for (int child = 0; child < 8; ++child) {
+      const std::uint32_t code = codes >> (2 * child) & 3U;
+      if (code == kFree) {
+        ++out_.nodes;
+        ++out_.free;
+      } else if (code == kOccupied) {
+        ++out_.nodes;
+        if (!add(corner(low, depth + 1, child), depth + 1)) return false;
+      } else if (code == kInner && !binary_node(corner(low, depth + 1, child), depth + 1)) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  bool full_node(const Eigen::Vector3i& low, int depth) {
+    ++out_.nodes;
+    float log_odds;
+    if (end_ - next_ < static_cast<std::ptrdiff_t>(sizeof log_odds) + 1) {
+      return fail("ends in the middle of the tree");
+    }
+    std::memcpy(&log_odds, next_, sizeof log_odds);
+    const std::uint8_t children = next_[sizeof log_odds];
+    next_ += sizeof log_odds + 1;
+    if (!std::isfinite(log_odds)) return fail("holds a log-odds value that is not finite");
+    if (children == 0) {
+      if (log_odds >= 0.0F) return add(low, depth);
+      ++out_.free;
+      return true;
+    }
+    if (depth == kDepth) return fail("is deeper than 16 levels");
+    for (int child = 0; child < 8; ++child) {
+      if ((children >> child & 1) == 0) continue;
+      if (!full_node(corner(low, depth + 1, child), depth + 1)) return false;
+    }
+    return true;
+  }
+
+  bool is_at_end() const { return next_ == end_; }
+  std::size_t left() const { return static_cast<std::size_t>(end_ - next_); }
+  const std::string& fault() const { return fault_; }
+
+ private:
+  static constexpr std::uint32_t kFree = 1, kOccupied = 2, kInner = 3;
+
+  bool fail(const char* what) {
+    fault_ = what;
+    return false;
+  }
+
+  static Eigen::Vector3i corner(const Eigen::Vector3i& low, int depth, int child) {
+    const std::int32_t size = 1 << (kDepth - depth);
+    return low + size * Eigen::Vector3i(child & 1, child >> 1 & 1, child >> 2 & 1);
+  }
+
+  // Whole numbers times the resolution: neighbours meet exactly.
+  bool add(const Eigen::Vector3i& low, int depth) {
+    if (out_.occupied.size() >= kMostLeaves)
+      return fail("has more than 50 million occupied leaves");
+    const Eigen::Vector3i high = low.array() + (1 << (kDepth - depth));
+    out_.occupied.emplace_back(resolution_ * low.cast<double>(), resolution_ * high.cast<double>());
+    return true;
+  }
+
+  const std::uint8_t *next_, *end_;
+  double resolution_;
+  Octree& out_;
+  std::string fault_;
+};
+
+// The tree itself; what follows it is left over.
+std::string read(const OctreeData& data, Octree* octree, std::size_t* left) {
+  *octree = Octree();
+  *left = 0;
+  if (data.id != "OcTree") {
+    return "the tree's type is '" + data.id + "', it must be 'OcTree'.";
+  }
+  if (!(data.resolution >= kSmallest && data.resolution <= kLargest)) {
+    std::ostringstream text;
+    text << "resolution is " << data.resolution << " m, it must be from 1e-6 to 1000 m.";
+    return text.str();
+  }
+  if (data.size == 0) return {};
+  Reader reader(data, octree);
+  const Eigen::Vector3i low = Eigen::Vector3i::Constant(-kHalf);
+  const bool whole = data.is_binary ? reader.binary_node(low, 0) : reader.full_node(low, 0);
+  if (!whole) {
+    return "the tree's data of " + std::to_string(data.size) + " bytes " + reader.fault() + ".";
+  }
+  *left = reader.left();
+  return {};
+}
+
+struct Header {
+  std::string id;
+  bool is_binary = false, has_data = false;
+  std::size_t nodes = 0;
+  double resolution = 0.0;
+};
+
+// Words in lines, until the one that says where the data begins.
+std::string read_header(std::istream& file, Header* header) {
+  std::string line;
+  std::getline(file, line);
+  header->is_binary = line.rfind("# Octomap OcTree binary file", 0) == 0;
+  if (!header->is_binary && line.rfind("# Octomap OcTree file", 0) != 0) {
+    return "is no OctoMap file: it does not begin with '# Octomap OcTree'.";
+  }
+  constexpr int kMostLines = 1000;
+  for (int i = 0; i < kMostLines && std::getline(file, line); ++i) {
+    std::istringstream words(line);
+    std::string key;
+    words >> key;
+    if (key == "data") {
+      header->has_data = true;
+      return {};
+    }
+    if (key == "id") words >> header->id;
+    if (key == "size") words >> header->nodes;
+    if (key == "res") words >> header->resolution;
+  }
+  return "is cut off: its header does not end with 'data'.";
+}
+
+}  // namespace
+
+std::string read_octree(const OctreeData& data, Octree* octree) {
+  std::size_t left = 0;
+  const std::string fault = read(data, octree, &left);
+  if (!fault.empty() || left == 0) return fault;
+  return "the tree ends " + std::to_string(left) + " bytes before its data of " +
+         std::to_string(data.size) + " bytes does.";
+}
+
+std::string read_octree_file(const std::string& path, Octree* octree) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string name = "map file '" + path + "' ";
+  if (!file) return name + "cannot be read: " + std::strerror(errno) + ".";
+  Header header;
+  const std::string fault = read_header(file, &header);
+  if (!fault.empty()) return name + fault;
+  const std::vector<char> bytes((std::istreambuf_iterator<char>(file)),
+                                std::istreambuf_iterator<char>());
+  if (file.bad()) return name + "cannot be read to its end.";
+  OctreeData data;
+  data.id = header.id;
+  data.is_binary = header.is_binary;
+  data.resolution = header.resolution;
+  data.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  data.size = header.nodes > 0 ? bytes.size() : 0;
+  if (header.nodes > 0 && bytes.empty()) return name + "is cut off: it holds no data.";
+  std::size_t left = 0;
+  const std::string damage = read(data, octree, &left);
+  if (!damage.empty()) return name + "cannot be used: " + damage;
+  if (octree->nodes != header.nodes) {
+    return name + "is damaged: its header says " + std::to_string(header.nodes) +
+           " nodes, its data holds " + std::to_string(octree->nodes) + ".";
+  }
+  return {};
+}
+
+}  // namespace ist

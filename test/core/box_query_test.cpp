@@ -1,0 +1,437 @@
+// Links against solid boxes: the leaves of an octree map.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/geometry/box_distance.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/box_oracle.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/random_links.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TriangleMesh one_triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                          const Eigen::Vector3d& c) {
+  TriangleMesh mesh;
+  mesh.vertices = {a, b, c};
+  mesh.triangles = {{0, 1, 2}};
+  return mesh;
+}
+
+TEST(BoxDistance, TrianglesOfEveryKind) {
+  test::Rng rng(31);
+  int touching = 0, apart = 0;
+  for (int i = 0; i < test::scaled(20000); ++i) {
+    const Eigen::AlignedBox3d box(Eigen::Vector3d(-0.5, -0.3, -0.2),
+                                  Eigen::Vector3d(0.5, 0.3, 0.2));
+    const double size = std::pow(10.0, test::uniform(&rng, -3.0, 0.5));
+    const Eigen::Vector3d middle = test::random_vector(&rng, 1.0);
+    Eigen::Vector3d a = middle + test::random_vector(&rng, size), b, c;
+    b = middle + test::random_vector(&rng, size);
+    c = middle + test::random_vector(&rng, size);
+    switch (i % 8) {
+      case 0:  // along an axis
+        b = a + size * Eigen::Vector3d::Unit(i % 3);
+        break;
+      case 1:  // parallel to a side
+        b[i % 3] = c[i % 3] = a[i % 3];
+        break;
+      case 2:  // a needle
+        c = a + 0.5 * (b - a) + test::random_vector(&rng, 1e-5 * size);
+        break;
+      case 3:  // no area
+        c = a + test::uniform(&rng, -1, 2) * (b - a);
+        break;
+      case 4:  // on a corner or side
+        a = clamp_to(box, a);
+        break;
+      default:
+        break;
+    }
+    const BoxDistance found = triangle_to_box(a, b, c, box);
+    const double truth =
+        test::oracle_box_distance(one_triangle(a, b, c), {box, Eigen::Isometry3d::Identity()});
+    ASSERT_NEAR(found.distance, truth, 1e-7 * (1.0 + size)) << i;
+    ASSERT_NEAR((found.p_OS - found.p_OB).norm(), found.distance, 1e-12);
+    ASSERT_LT(box.exteriorDistance(found.p_OB), 1e-12);
+    ASSERT_LT(test::oracle_triangle(found.p_OS, a, b, c), 1e-9 * (1.0 + size)) << i;
+    found.distance == 0.0 ? ++touching : ++apart;
+  }
+  EXPECT_GT(touching, 1000);
+  EXPECT_GT(apart, 1000);
+}
+
+// The cylinder's own oracle: distance to a solid cylinder is convex, so nested golden sections over
+// the box find its minimum.
+double minimum_over_box(const Solid& solid, const Eigen::Isometry3d& X_LO,
+                        const Eigen::AlignedBox3d& box) {
+  const auto value = [&](const Eigen::Vector3d& p) {
+    return solid.signed_distance(X_LO * p).distance;
+  };
+  const auto along = [&](auto&& self, Eigen::Vector3d p, int axis) -> double {
+    if (axis == 3) return value(p);
+    constexpr double kGolden = 0.6180339887498949;
+    double low = box.min()[axis], high = box.max()[axis];
+    const auto at = [&](double v) {
+      p[axis] = v;
+      return self(self, p, axis + 1);
+    };
+    double x1 = high - kGolden * (high - low), x2 = low + kGolden * (high - low);
+    double f1 = at(x1), f2 = at(x2);
+    for (int i = 0; i < 32; ++i) {
+      if (f1 < f2) {
+        high = x2, x2 = x1, f2 = f1;
+        f1 = at(x1 = high - kGolden * (high - low));
+      } else {
+        low = x1, x1 = x2, f1 = f2;
+        f2 = at(x2 = low + kGolden * (high - low));
+      }
+    }
+    return std::min({f1, f2, at(box.min()[axis]), at(box.max()[axis])});
+  };
+  return along(along, box.center(), 0);
+}
+
+TEST(BoxDistance, Primitives) {
+  test::Rng rng(32);
+  for (int i = 0; i < test::scaled(60); ++i) {
+    const Eigen::Isometry3d X_OL = test::random_pose(&rng, i % 4 == 0 ? 0.05 : 0.4);
+    const Eigen::Vector3d half(test::uniform(&rng, 0.01, 0.2), test::uniform(&rng, 0.01, 0.2),
+                               test::uniform(&rng, 0.01, 0.2));
+    const Eigen::AlignedBox3d box(-half, half);
+    for (const Shape& shape :
+         {Shape(Sphere{0.1}), Shape(Cylinder{0.05, 0.2}), Shape(Box{{0.2, 0.1, 0.05}})}) {
+      const Solid solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
+      const BoxDistance found = solid.distance_to_box(box, X_OL, kInfinity);
+      const double truth = minimum_over_box(solid, X_OL.inverse(), box);
+      if (truth > 1e-6) {
+        ASSERT_NEAR(found.distance, truth, 2e-6) << i << " shape " << shape.index();
+        ASSERT_LE(found.lower_bound, truth + 1e-9);
+        ASSERT_GE(found.lower_bound, found.distance - 1e-7);
+      } else if (truth < -1e-6 && shape.index() != 0) {
+        ASSERT_EQ(found.distance, 0.0);
+      }
+      ASSERT_LT(box.exteriorDistance(found.p_OB), 1e-12);
+      ASSERT_LT(solid.signed_distance(X_OL.inverse() * found.p_OS).distance, 1e-9);
+    }
+  }
+}
+
+TEST(BoxIndex, HoldsEveryBoxOnce) {
+  test::Rng rng(33);
+  for (const int count : {0, 1, 16, 17, 257, 5000}) {
+    std::vector<Eigen::AlignedBox3d> boxes;
+    for (int i = 0; i < count; ++i) boxes.push_back(test::random_leaf(&rng, 20.0, 0.05, 6));
+    BoxIndex index;
+    index.build(boxes);
+    EXPECT_EQ(index.size(), boxes.size());
+    EXPECT_EQ(index.empty(), boxes.empty());
+    std::vector<int> seen(boxes.size(), 0);
+    for (const BoxTile& tile : index.tiles()) {
+      for (int k = 0; k < tile.count; ++k) {
+        ++seen[tile.id[k]];
+        const Eigen::AlignedBox3d box = tile.box(k).translated(index.origin());
+        ASSERT_LT((box.min() - boxes[tile.id[k]].min()).norm(), 1e-5);
+        ASSERT_LT((box.max() - boxes[tile.id[k]].max()).norm(), 1e-5);
+      }
+    }
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), count);
+  }
+}
+
+struct Truth {
+  double distance = kInfinity;  ///< surface to the nearest box; 0: touches or crosses
+  bool is_contact = false;      ///< a box lies wholly inside, or the surface crosses one
+};
+
+Truth truth_of(const TriangleMesh& mesh, const CloudSnapshot& map, const Eigen::Isometry3d& X_FL) {
+  Truth truth;
+  const Eigen::Isometry3d X_LM = X_FL.inverse() * map.X_FM;
+  for (const BoxTile& tile : map.boxes->tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      const test::PlacedBox placed{tile.box(k), X_LM * Eigen::Translation3d(map.boxes->origin())};
+      const Eigen::Vector3d center = placed.X * placed.box.center();
+      const Eigen::AlignedBox3d around = test::bounds(mesh);
+      const double radii = 0.5 * (placed.box.sizes().norm() + around.sizes().norm());
+      if ((center - around.center()).norm() - radii > truth.distance) continue;
+      const double distance = test::oracle_box_distance(mesh, placed);
+      truth.distance = std::min(truth.distance, distance);
+      const bool inside = test::oracle_winding(mesh, center) > 0.5;
+      truth.is_contact = truth.is_contact || distance == 0.0 || inside;
+    }
+  }
+  return truth;
+}
+
+// The least signed distance of many points of the boxes: never below the true one.
+double sampled_depth(test::Rng* rng, const TriangleMesh& mesh, const CloudSnapshot& map,
+                     const Eigen::Isometry3d& X_FL, int samples) {
+  double deepest = kInfinity;
+  const Eigen::Isometry3d X_LO =
+      X_FL.inverse() * map.X_FM * Eigen::Translation3d(map.boxes->origin());
+  for (const BoxTile& tile : map.boxes->tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      const Eigen::AlignedBox3d box = tile.box(k);
+      for (int i = 0; i < samples; ++i) {
+        const Eigen::Vector3d t = 0.5 * (test::random_vector(rng, 1.0).array() + 1.0);
+        const Eigen::Vector3d p = box.min() + t.cwiseProduct(box.sizes());
+        deepest = std::min(deepest, test::oracle_signed_distance(mesh, X_LO * p));
+      }
+    }
+  }
+  return deepest;
+}
+
+bool in_a_box(const CloudSnapshot& map, const Eigen::Vector3d& p_F) {
+  const Eigen::Vector3d p_O = map.X_FM.inverse() * p_F - map.boxes->origin();
+  for (const BoxTile& tile : map.boxes->tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      if (tile.box(k).exteriorDistance(p_O) < 1e-9) return true;
+    }
+  }
+  return false;
+}
+
+std::vector<TriangleMesh> link_meshes() {
+  return {test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 12, 8), test::box({0.05, 0.1, 0.2}),
+          test::thin_plate(0.1, 0.001), test::icosphere(0.08, 1)};
+}
+
+class Boxes : public ::testing::TestWithParam<double> {};
+
+TEST_P(Boxes, AgainstOracle) {
+  const double tolerance = GetParam();
+  test::Rng rng(34);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  const auto model = test::make_model({meshes.begin(), meshes.end()}, 0.005);
+  QueryConfig config;
+  config.tolerance = tolerance;
+  config.max_distance = 0.3;
+  ProximityQuery query(model, config);
+  const std::vector<bool> known(meshes.size(), true);
+  std::vector<LinkProximity> results;
+  std::vector<Eigen::Isometry3d> X_FL(meshes.size());
+  int clear = 0, near = 0, contact = 0, cases = 0;
+  double widest = 0.0;
+  const int scenes = test::scaled(tolerance == 0.0 ? 500 : 100);
+  for (int scene = 0; scene < scenes; ++scene) {
+    std::vector<Eigen::AlignedBox3d> boxes;
+    const int count = 1 + scene % 25;
+    for (int i = 0; i < count; ++i) boxes.push_back(test::random_leaf(&rng, 0.5, 0.02, 4));
+    const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.3));
+    for (int step = 0; step < 4; ++step) {  // later steps start warm
+      for (Eigen::Isometry3d& X : X_FL) {
+        X = step == 0 ? test::random_pose(&rng, 0.4)
+                      : Eigen::Isometry3d(X * test::random_pose(&rng, 0.01));
+      }
+      ASSERT_TRUE(query.run(X_FL, known, {&map}, &results));
+      for (std::size_t i = 0; i < meshes.size(); ++i, ++cases) {
+        SCOPED_TRACE("scene " + std::to_string(scene) + " step " + std::to_string(step) + " link " +
+                     std::to_string(i));
+        const Truth truth = truth_of(meshes[i], map, X_FL[i]);
+        const LinkProximity& result = results[i];
+        if (result.state == LinkState::kClear) {
+          ++clear;
+          ASSERT_GE(truth.distance, config.max_distance - 1e-9);
+          ASSERT_FALSE(truth.is_contact);
+          continue;
+        }
+        ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
+        ASSERT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
+        ASSERT_LT((X_FL[i] * result.p_LL - result.p_FL).norm(), 1e-12);
+        ASSERT_TRUE(in_a_box(map, result.p_FO));
+        ASSERT_LT(test::oracle_distance(meshes[i], result.p_LL), 1e-9);
+        ASSERT_LE(result.lower_bound, result.distance);
+        ASSERT_EQ(result.state == LinkState::kContact, truth.is_contact) << result.distance;
+        if (result.state == LinkState::kNear) {
+          ++near;
+          ASSERT_LE(result.lower_bound, truth.distance);
+          ASSERT_GE(result.distance, truth.distance - 1e-9);
+          ASSERT_LE(result.distance - result.lower_bound, tolerance + 2e-6);
+          continue;
+        }
+        ++contact;
+        const Eigen::Vector3d p_L = X_FL[i].inverse() * result.p_FO;
+        ASSERT_NEAR(result.distance, test::oracle_signed_distance(meshes[i], p_L), 1e-9);
+        widest = std::max(widest, result.distance - result.lower_bound);
+        if (cases % 10 == 0) {
+          ASSERT_LE(result.lower_bound, sampled_depth(&rng, meshes[i], map, X_FL[i], 200));
+        }
+      }
+    }
+  }
+  EXPECT_GT(clear, scenes / 10);
+  EXPECT_GT(near, scenes);
+  EXPECT_GT(contact, scenes / 10);
+  RecordProperty("cases", cases);
+  std::printf("%d cases: %d clear, %d near, %d contact, widest depth interval %.2f mm\n", cases,
+              clear, near, contact, 1e3 * widest);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, Boxes, ::testing::Values(0.0, 0.001, 0.02));
+
+// Primitives, meshes with holes, compounds: bounds against many points of the boxes.
+TEST(Boxes, EveryKindOfLink) {
+  test::Rng rng(35);
+  const std::vector<LinkGeometry> links = test::random_links(&rng);
+  const auto model = test::model_of(links, 0.01);
+  std::vector<Solid> solids;
+  for (const LinkGeometry& link : links) solids.emplace_back(link);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  std::vector<LinkProximity> results;
+  const std::vector<bool> known(links.size(), true);
+  for (int scene = 0; scene < test::scaled(150); ++scene) {
+    std::vector<Eigen::AlignedBox3d> boxes;
+    for (int i = 0; i < 4; ++i) boxes.push_back(test::random_leaf(&rng, 0.3, 0.01, 5));
+    const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.2));
+    const std::vector<Eigen::Isometry3d> X_FL(links.size(), test::random_pose(&rng, 0.1));
+    query.run(X_FL, known, {&map}, &results);
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      SCOPED_TRACE("scene " + std::to_string(scene) + " link " + std::to_string(i));
+      const LinkProximity& result = results[i];
+      ASSERT_GE(result.state, LinkState::kNear);
+      ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
+      ASSERT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
+      ASSERT_TRUE(in_a_box(map, result.p_FO));
+      const Eigen::Isometry3d X_LM = X_FL[i].inverse() * map.X_FM;
+      ASSERT_NEAR(solids[i].signed_distance(X_FL[i].inverse() * result.p_FO).distance,
+                  result.distance, 1e-7);
+      for (const Eigen::AlignedBox3d& box : boxes) {
+        for (int k = 0; k < 60; ++k) {
+          Eigen::Vector3d t = 0.5 * (test::random_vector(&rng, 1.0).array() + 1.0);
+          if (k % 2 == 0) t[k % 3] = std::round(t[k % 3]);  // on a side
+          const Eigen::Vector3d p = box.min() + t.cwiseProduct(box.sizes());
+          ASSERT_LE(result.lower_bound, solids[i].signed_distance(X_LM * p).distance);
+        }
+      }
+    }
+  }
+}
+
+TEST(Boxes, TouchAndAlignment) {
+  const auto model = test::make_model(
+      {Box{{0.2, 0.2, 0.2}}, Shape(test::box({0.2, 0.2, 0.2})), Sphere{0.1}, Cylinder{0.1, 0.2}},
+      0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  const std::vector<Eigen::Isometry3d> X_FL(4, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results;
+  // A cube of 0.2 m whose near side is `gap` above the links' top.
+  for (const double gap : {0.5, 0.05, 1e-5, 0.0, -1e-5, -1e-3, -0.05, -0.1, -0.2}) {
+    const double low = 0.1 + gap;
+    const CloudSnapshot map =
+        test::make_map({{Eigen::Vector3d(-0.1, -0.1, low), Eigen::Vector3d(0.1, 0.1, low + 0.2)}});
+    query.run(X_FL, std::vector<bool>(4, true), {&map}, &results);
+    for (const LinkProximity& result : results) {
+      SCOPED_TRACE(gap);
+      ASSERT_GE(result.state, LinkState::kNear);
+      EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
+      EXPECT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
+      if (gap > 0.0) {
+        EXPECT_EQ(result.state, LinkState::kNear);
+        EXPECT_NEAR(result.distance, gap, 1e-7);
+        EXPECT_LE(result.lower_bound, gap);
+        EXPECT_GT(result.lower_bound, gap - 2e-6);
+      } else if (gap < -5e-6) {
+        EXPECT_EQ(result.state, LinkState::kContact);
+        // Deepest where the cube's side is, or in the middle of the link.
+        const double truth = std::max(gap, -0.1);
+        EXPECT_GE(result.distance, truth - 1e-7);
+        EXPECT_LE(result.distance, 0.5 * truth);
+        EXPECT_LE(result.lower_bound, truth + 1e-7);
+      } else {
+        EXPECT_NEAR(result.distance, 0.0, 2e-6);
+        EXPECT_LE(result.lower_bound, 0.0);
+      }
+    }
+  }
+}
+
+// A box that holds the whole link, and one wholly inside it, touch no triangle or all of them.
+TEST(Boxes, OneInsideTheOther) {
+  const TriangleMesh mesh = test::icosphere(0.1, 2);
+  const auto model = test::make_model({Shape(mesh)}, 0.005);
+  ProximityQuery query(model, {});
+  std::vector<LinkProximity> results;
+  const std::vector<Eigen::Isometry3d> X_FL(1, Eigen::Isometry3d::Identity());
+  const double depth = -test::oracle_signed_distance(mesh, Eigen::Vector3d::Zero());
+  for (const double half : {0.001, 0.01, 0.05, 0.5, 10.0}) {
+    SCOPED_TRACE(half);
+    const Eigen::Vector3d corner = Eigen::Vector3d::Constant(half);
+    const CloudSnapshot map = test::make_map({{-corner, corner}});
+    query.run(X_FL, {true}, {&map}, &results);
+    ASSERT_EQ(results[0].state, LinkState::kContact);
+    EXPECT_NEAR(results[0].distance, -depth, 0.005);
+    EXPECT_LE(results[0].lower_bound, -depth + 1e-9);
+  }
+}
+
+TEST(Boxes, PointsAndMapsTogether) {
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  const std::vector<Eigen::Isometry3d> X_FL(1, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results;
+  const CloudSnapshot cloud = test::make_snapshot({{0.5, 0, 0}});
+  const CloudSnapshot near =
+      test::make_map({{Eigen::Vector3d(-1, 0.3, -1), Eigen::Vector3d(1, 2, 1)}});
+  const CloudSnapshot far =
+      test::make_map({{Eigen::Vector3d(-1, 0.8, -1), Eigen::Vector3d(1, 2, 1)}});
+  const CloudSnapshot nothing = test::make_map({});
+  query.run(X_FL, {true}, {&cloud, &near}, &results);
+  EXPECT_NEAR(results[0].distance, 0.2, 1e-6);
+  EXPECT_EQ(results[0].source, 1);
+  EXPECT_LT((results[0].direction + Eigen::Vector3d::UnitY()).norm(), 1e-6);
+  // Another map in its place: the warm start must not take the box that is gone.
+  query.run(X_FL, {true}, {&cloud, &far}, &results);
+  EXPECT_NEAR(results[0].distance, 0.4, 1e-6);
+  EXPECT_EQ(results[0].source, 0);
+  query.run(X_FL, {true}, {&nothing}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kClear);
+}
+
+TEST(Boxes, BoundsHoldWheneverTheDeadlinePasses) {
+  test::Rng rng(36);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  const auto model = test::make_model({meshes.begin(), meshes.end()}, 0.005);
+  QueryConfig config;
+  config.max_distance = 2.0;
+  ProximityQuery query(model, config), full(model, config);
+  const std::vector<bool> known(meshes.size(), true);
+  std::vector<Eigen::Isometry3d> X_FL(meshes.size());
+  std::vector<LinkProximity> results, whole;
+  int unfinished = 0;
+  for (int i = 0; i < test::scaled(200); ++i) {
+    std::vector<Eigen::AlignedBox3d> boxes;
+    for (int k = 0; k < 1500; ++k) boxes.push_back(test::random_leaf(&rng, 1.0, 0.01, 3));
+    const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.3));
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.5);
+    config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 3.5));
+    query.set_config(config);
+    if (!query.run(X_FL, known, {&map}, &results)) ++unfinished;
+    ASSERT_TRUE(full.run(X_FL, known, {&map}, &whole));
+    for (std::size_t k = 0; k < meshes.size(); ++k) {
+      if (results[k].state == LinkState::kUnknown) continue;
+      ASSERT_LE(results[k].lower_bound, whole[k].distance);
+      ASSERT_GE(results[k].distance, whole[k].lower_bound);
+    }
+  }
+  EXPECT_GT(unfinished, test::scaled(20));
+}
+
+}  // namespace
+}  // namespace ist

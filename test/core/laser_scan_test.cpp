@@ -1,0 +1,201 @@
+#include "ist_proximity/cloud/laser_scan.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+LaserScan scan_of(const std::vector<float>& ranges) {
+  LaserScan scan;
+  scan.angle_min = -1.5;
+  scan.angle_increment = ranges.size() > 1 ? 3.0 / static_cast<double>(ranges.size() - 1) : 0.0;
+  scan.range_min = 0.1;
+  scan.range_max = 10.0;
+  scan.ranges = ranges.data();
+  scan.count = ranges.size();
+  return scan;
+}
+
+IngestConfig unlimited() {
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = std::numeric_limits<double>::infinity();
+  config.self_filter = false;
+  return config;
+}
+
+CloudSnapshot ingested(const LaserScan& scan, double min_range, double max_range,
+                       const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity(),
+                       const Eigen::Isometry3d& X_FS_end = Eigen::Isometry3d::Identity()) {
+  ScanPoints points;
+  to_points(scan, min_range, max_range, X_FS.inverse() * X_FS_end, &points);
+  CloudSnapshot snapshot;
+  Ingest(unlimited()).run(points.raw(), X_FS, {}, 0.0, &snapshot);
+  return snapshot;
+}
+
+std::vector<Eigen::Vector3d> by_beam(const CloudSnapshot& snapshot, std::size_t count) {
+  std::vector<Eigen::Vector3d> points(count, Eigen::Vector3d::Constant(NAN));
+  for (const PointTile& tile : snapshot.index.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      points[tile.id[k]] =
+          snapshot.index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]);
+    }
+  }
+  return points;
+}
+
+TEST(LaserScan, BeamsGoWhereTheyPoint) {
+  const std::vector<float> ranges = {1.0F, 2.0F, 0.5F};
+  test::Rng rng(1);
+  const Eigen::Isometry3d X_FS = test::random_pose(&rng, 3.0);
+  const auto points = by_beam(ingested(scan_of(ranges), 0.0, 5.0, X_FS, X_FS), 3);
+  for (int i = 0; i < 3; ++i) {
+    const double angle = -1.5 + 1.5 * i,
+                 r = static_cast<double>(ranges[static_cast<std::size_t>(i)]);
+    const Eigen::Vector3d truth =
+        X_FS * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), 0);
+    EXPECT_LT((points[static_cast<std::size_t>(i)] - truth).norm(), 1e-6);
+  }
+}
+
+// REP 117, and drivers that say 0 where nothing came back.
+TEST(LaserScan, WhatABeamSays) {
+  const std::vector<float> ranges = {kNaN,  -kInfinity, 0.0F, 0.05F, -1.0F, kInfinity,
+                                     11.0F, 0.2F,       7.0F, 1.0F,  10.0F};
+  const IngestCounts counts = ingested(scan_of(ranges), 0.5, 5.0).counts;
+  EXPECT_EQ(counts.received, ranges.size());
+  EXPECT_EQ(counts.not_a_number, 5U) << "NaN, -inf and below range_min";
+  EXPECT_EQ(counts.infinite, 2U) << "+inf and beyond range_max";
+  EXPECT_EQ(counts.out_of_range, 3U) << "0.2 m, 7 m and 10 m";
+  EXPECT_EQ(counts.used, 1U);
+  EXPECT_FALSE(counts.saw_nothing());
+  for (const float value : {kNaN, -kInfinity, 0.0F, kInfinity}) {
+    const std::vector<float> alike(4, value);
+    EXPECT_EQ(ingested(scan_of(alike), 0.0, 5.0).counts.saw_nothing(), value != kInfinity) << value;
+  }
+}
+
+// A sensor on a moving arm: all beams hit one fixed wall, each from where the sensor was then.
+TEST(LaserScan, EachBeamAtItsOwnTime) {
+  test::Rng rng(2);
+  constexpr std::size_t kBeams = 200;
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::Isometry3d X_start = test::random_pose(&rng, 0.3);
+    Eigen::Isometry3d X_end = X_start * test::random_pose(&rng, 0.1);
+    const Eigen::AngleAxisd turn(test::uniform(&rng, -1, 1), Eigen::Vector3d::UnitZ());
+    X_end.linear() = X_start.linear() * turn.toRotationMatrix();
+    std::vector<float> ranges(kBeams);
+    std::vector<Eigen::Vector3d> truth(kBeams);
+    for (std::size_t i = 0; i < kBeams; ++i) {
+      const double t = static_cast<double>(i) / (kBeams - 1), angle = -1.5 + 3.0 * t;
+      Eigen::Isometry3d X = X_start;
+      X.translation() += t * (X_end.translation() - X_start.translation());
+      X.linear() =
+          X_start.linear() * Eigen::AngleAxisd(t * turn.angle(), turn.axis()).toRotationMatrix();
+      const double range = test::uniform(&rng, 0.2, 3.0);
+      ranges[i] = static_cast<float>(range);
+      truth[i] = X * Eigen::Vector3d(range * std::cos(angle), range * std::sin(angle), 0);
+    }
+    LaserScan scan = scan_of(ranges);
+    scan.time_increment = 1e-4;
+    const auto points = by_beam(ingested(scan, 0.0, 5.0, X_start, X_end), kBeams);
+    for (std::size_t i = 0; i < kBeams; ++i) ASSERT_LT((points[i] - truth[i]).norm(), 1e-6);
+    // Without a time between the beams there is one pose for all.
+    scan.time_increment = 0.0;
+    const auto still = by_beam(ingested(scan, 0.0, 5.0, X_start, X_end), kBeams);
+    const double angle = 1.5, r = static_cast<double>(ranges.back());
+    EXPECT_LT(
+        (still.back() - X_start * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), 0))
+            .norm(),
+        1e-6);
+  }
+}
+
+// A range limit is about the beam, not about the distance to where the sensor was at first.
+TEST(LaserScan, RangeIsTheBeamsOwn) {
+  const std::vector<float> ranges(11, 1.0F);
+  LaserScan scan = scan_of(ranges);
+  scan.time_increment = 0.01;
+  Eigen::Isometry3d X_end = Eigen::Isometry3d::Identity();
+  X_end.translation().x() = 0.8;
+  EXPECT_EQ(ingested(scan, 0.9, 1.1, Eigen::Isometry3d::Identity(), X_end).counts.used, 11U);
+}
+
+TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  const std::vector<float> ranges(101, 1.0F);  // a half circle about the sensor
+  ScanPoints points;
+  to_points(scan_of(ranges), 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
+  const auto robot_at = [&](double x, double y) {
+    PosedRobot robot{model.get(), {Eigen::Isometry3d::Identity()}, {true}};
+    robot.X_FL[0].translation() << x, y, 0.0;
+    return robot;
+  };
+  IngestConfig config = unlimited();
+  config.self_filter = true;
+  Ingest ingest(config);
+  CloudSnapshot first, both;
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  ingest.run(points.raw(), X_FS, robot_at(1, 0), 0.0, &first);
+  ingest.run(points.raw(), X_FS, robot_at(1, 0), 0.0, &both, {robot_at(0, 1)});
+  const auto kept = by_beam(both, ranges.size());
+  std::uint32_t on_robot = 0;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const double angle = -1.5 + 0.03 * static_cast<double>(i);
+    const Eigen::Vector3d p(std::cos(angle), std::sin(angle), 0);
+    const bool expected = (p - Eigen::Vector3d::UnitX()).norm() <= 0.12 ||
+                          (p - Eigen::Vector3d::UnitY()).norm() <= 0.12;
+    EXPECT_EQ(kept[i].array().isNaN().all(), expected) << i;
+    on_robot += expected ? 1 : 0;
+  }
+  EXPECT_EQ(both.counts.on_robot, on_robot);
+  EXPECT_GT(both.counts.on_robot, first.counts.on_robot);
+}
+
+TEST(CheckScan, SaysWhatIsWrong) {
+  const std::vector<float> ranges(5, 1.0F);
+  const LaserScan good = scan_of(ranges);
+  EXPECT_EQ(check_scan(good), "");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  const auto expect_fault = [&](const char* member, auto&& change) {
+    LaserScan scan = good;
+    change(&scan);
+    EXPECT_EQ(check_scan(scan).rfind(member, 0), 0U) << member << ": " << check_scan(scan);
+  };
+  expect_fault("ranges", [](LaserScan* s) { s->count = 0; });
+  expect_fault("ranges", [](LaserScan* s) { s->ranges = nullptr; });
+  for (const double bad : {nan, inf, 1e9}) {
+    expect_fault("angle_min", [=](LaserScan* s) { s->angle_min = bad; });
+    expect_fault("angle_increment", [=](LaserScan* s) { s->angle_increment = bad; });
+  }
+  expect_fault("angle_increment", [](LaserScan* s) { s->angle_increment = 0.0; });
+  for (const double bad : {nan, inf, -0.1}) {
+    expect_fault("range_min", [=](LaserScan* s) { s->range_min = bad; });
+  }
+  for (const double bad : {nan, -inf, -1.0, 0.1}) {
+    expect_fault("range_max", [=](LaserScan* s) { s->range_max = bad; });
+  }
+  for (const double bad : {nan, inf, 3.0}) {
+    expect_fault("time_increment", [=](LaserScan* s) { s->time_increment = bad; });
+  }
+  LaserScan unlimited_range = good;
+  unlimited_range.range_max = inf;
+  EXPECT_EQ(check_scan(unlimited_range), "");
+  const std::vector<float> single(1, 1.0F);
+  EXPECT_EQ(check_scan(scan_of(single)), "") << "one beam needs no increment";
+}
+
+}  // namespace
+}  // namespace ist

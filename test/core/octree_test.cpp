@@ -1,0 +1,206 @@
+// The reader of OctoMap trees, against liboctomap.
+
+#include "ist_proximity/cloud/octree.h"
+
+#include <gtest/gtest.h>
+#include <octomap/octomap.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "support/sanitizers.h"
+#include "support/scene.h"
+#include "support/temp_dir.h"
+
+namespace ist {
+namespace {
+
+using Leaf = std::tuple<double, double, double, double>;
+
+// Scattered leaves, a solid block (whose leaves merge into large ones), free space.
+octomap::OcTree random_tree(test::Rng* rng, double resolution, int points) {
+  octomap::OcTree tree(resolution);
+  for (int i = 0; i < points; ++i) {
+    const Eigen::Vector3d p = test::random_vector(rng, 40.0 * resolution);
+    tree.updateNode(p.x(), p.y(), p.z(), test::uniform(rng, 0, 1) < 0.6);
+  }
+  if (points > 0) {
+    for (int i = 0; i < 16 * 16 * 16; ++i) {
+      const auto at = [&](int k) { return (k % 16 + 0.5) * resolution; };
+      tree.updateNode(at(i), at(i / 16), at(i / 256), true);
+    }
+  }
+  tree.updateInnerOccupancy();
+  return tree;
+}
+
+std::vector<Leaf> leaves_of(const octomap::OcTree& tree) {
+  std::vector<Leaf> leaves;
+  for (auto leaf = tree.begin_leafs(); leaf != tree.end_leafs(); ++leaf) {
+    if (tree.isNodeOccupied(*leaf)) {
+      leaves.emplace_back(leaf.getX(), leaf.getY(), leaf.getZ(), leaf.getSize());
+    }
+  }
+  std::sort(leaves.begin(), leaves.end());
+  return leaves;
+}
+
+void expect_same(const Octree& octree, const octomap::OcTree& tree) {
+  std::vector<Leaf> found;
+  for (const Eigen::AlignedBox3d& box : octree.occupied) {
+    const Eigen::Vector3d c = box.center();
+    // What octomap rounds to float.
+    const auto rounded = [](double v) { return static_cast<double>(static_cast<float>(v)); };
+    found.emplace_back(rounded(c.x()), rounded(c.y()), rounded(c.z()), box.sizes().x());
+  }
+  std::sort(found.begin(), found.end());
+  const std::vector<Leaf> truth = leaves_of(tree);
+  ASSERT_EQ(found.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    ASSERT_NEAR(std::get<0>(found[i]), std::get<0>(truth[i]), 1e-6);
+    ASSERT_NEAR(std::get<1>(found[i]), std::get<1>(truth[i]), 1e-6);
+    ASSERT_NEAR(std::get<2>(found[i]), std::get<2>(truth[i]), 1e-6);
+    ASSERT_NEAR(std::get<3>(found[i]), std::get<3>(truth[i]), 1e-9);
+  }
+}
+
+std::string bytes_of(const octomap::OcTree& tree, bool is_binary) {
+  std::ostringstream out;
+  if (tree.size() > 0) is_binary ? tree.writeBinaryData(out) : tree.writeData(out);
+  return out.str();
+}
+
+std::string read(const std::string& bytes, bool is_binary, Octree* octree,
+                 const std::string& id = "OcTree", double resolution = 0.05) {
+  OctreeData data;
+  data.id = id;
+  data.is_binary = is_binary;
+  data.resolution = resolution;
+  data.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  data.size = bytes.size();
+  return read_octree(data, octree);
+}
+
+TEST(ReadOctree, LeavesOfEverySize) {
+  test::Rng rng(51);
+  for (int trial = 0; trial < test::scaled(40); ++trial) {
+    const double resolution = trial % 2 == 0 ? 0.05 : 0.013;
+    octomap::OcTree tree = random_tree(&rng, resolution, trial * 20);
+    if (trial % 4 == 1) tree.prune();
+    Octree octree;
+    ASSERT_EQ(read(bytes_of(tree, false), false, &octree, "OcTree", resolution), "");
+    expect_same(octree, tree);
+    EXPECT_EQ(octree.nodes, tree.size());
+    tree.toMaxLikelihood();
+    tree.prune();
+    ASSERT_EQ(read(bytes_of(tree, true), true, &octree, "OcTree", resolution), "");
+    expect_same(octree, tree);
+    EXPECT_EQ(octree.nodes, tree.size());
+  }
+}
+
+TEST(ReadOctree, Files) {
+  test::Rng rng(52);
+  const test::TempDir folder;
+  octomap::OcTree tree = random_tree(&rng, 0.05, 300);
+  const std::string full = folder.file("map.ot");
+  const std::string binary = folder.file("map.bt");
+  ASSERT_TRUE(tree.write(full));
+  Octree octree;
+  EXPECT_EQ(read_octree_file(full, &octree), "");
+  expect_same(octree, tree);
+  ASSERT_TRUE(tree.writeBinary(binary));  // merges leaves of the tree first
+  EXPECT_EQ(read_octree_file(binary, &octree), "");
+  expect_same(octree, tree);
+  const octomap::OcTree empty(0.1);
+  ASSERT_TRUE(empty.write(full));
+  EXPECT_EQ(read_octree_file(full, &octree), "");
+  EXPECT_TRUE(octree.occupied.empty());
+}
+
+TEST(ReadOctree, WhatIsNoTreeIsSaid) {
+  test::Rng rng(53);
+  const octomap::OcTree tree = random_tree(&rng, 0.05, 100);
+  const std::string full = bytes_of(tree, false), binary = bytes_of(tree, true);
+  Octree octree;
+  const auto expect_fault = [](const std::string& fault, const std::string& words) {
+    EXPECT_NE(fault.find(words), std::string::npos) << fault;
+  };
+  expect_fault(read(full, false, &octree, "ColorOcTree"), "'ColorOcTree', it must be 'OcTree'");
+  expect_fault(read(full, false, &octree, "OcTree", 0.0), "resolution is 0");
+  expect_fault(read(full, false, &octree, "OcTree", std::nan("")), "resolution is nan");
+  expect_fault(read(full, false, &octree, "OcTree", -0.1), "resolution is -0.1");
+  expect_fault(read(full + "x", false, &octree), "ends 1 bytes before");
+  expect_fault(read(binary + "xyz", true, &octree), "ends 3 bytes before");
+  expect_fault(read(std::string(100, '\xff'), true, &octree), "deeper than 16 levels");
+  expect_fault(read(std::string(100, '\xff'), false, &octree), "not finite");
+  EXPECT_EQ(read("", true, &octree), "");
+  EXPECT_TRUE(octree.occupied.empty());
+}
+
+// Every length that is too short is noticed.
+TEST(ReadOctree, CutOffAnywhere) {
+  test::Rng rng(54);
+  octomap::OcTree tree(0.05);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 1.0);
+    tree.updateNode(p.x(), p.y(), p.z(), true);
+  }
+  const test::TempDir folder;
+  for (const bool is_binary : {false, true}) {
+    const std::string bytes = bytes_of(tree, is_binary);
+    Octree octree;
+    for (std::size_t n = 1; n < bytes.size(); ++n) {
+      ASSERT_NE(read(bytes.substr(0, n), is_binary, &octree), "") << n;
+    }
+    const std::string path = folder.file("cut");
+    ASSERT_TRUE(is_binary ? tree.writeBinary(path) : tree.write(path));
+    std::ifstream file(path, std::ios::binary);
+    const std::string whole((std::istreambuf_iterator<char>(file)),
+                            std::istreambuf_iterator<char>());
+    for (std::size_t n = 0; n < whole.size(); n += 7) {
+      std::ofstream(path, std::ios::binary) << whole.substr(0, n);
+      ASSERT_NE(read_octree_file(path, &octree), "") << n;
+    }
+  }
+  Octree octree;
+  EXPECT_NE(read_octree_file(folder.file("missing.bt"), &octree), "");
+  EXPECT_NE(read_octree_file(folder.path().string(), &octree), "");
+}
+
+// Whatever the bytes are, reading ends, and what it takes for leaves are boxes of the map.
+TEST(ReadOctree, RandomBytes) {
+  test::Rng rng(55);
+  const octomap::OcTree tree = random_tree(&rng, 0.05, 60);
+  int readable = 0;
+  for (int trial = 0; trial < test::scaled(20000); ++trial) {
+    const bool is_binary = trial % 2 == 0;
+    std::string bytes;
+    if (trial % 3 == 0) {
+      bytes.resize(static_cast<std::size_t>(test::uniform(&rng, 0, 200)));
+      for (char& byte : bytes) byte = static_cast<char>(rng());
+    } else {
+      bytes = bytes_of(tree, is_binary);
+      for (int flips = 0; flips < 1 + trial % 5; ++flips) {
+        bytes[rng() % bytes.size()] ^= static_cast<char>(1U << rng() % 8);
+      }
+      if (trial % 4 == 0) bytes.resize(rng() % bytes.size());
+    }
+    Octree octree;
+    if (!read(bytes, is_binary, &octree).empty()) continue;
+    ++readable;
+    for (const Eigen::AlignedBox3d& box : octree.occupied) {
+      ASSERT_FALSE(box.isEmpty());
+      ASSERT_LE(box.min().cwiseAbs().maxCoeff(), 0.05 * 32768);
+      ASSERT_GE(box.sizes().minCoeff(), 0.05 * 0.999);
+    }
+  }
+  EXPECT_GT(readable, 0);
+}
+
+}  // namespace
+}  // namespace ist

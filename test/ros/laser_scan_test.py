@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+"""LaserScan as a source: true distances, a moving sensor, and what a scan says when it sees nothing."""
+
+import contextlib
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import LaserScan
+
+FAR_BOX = pt.transform((0, 0.8, 0))
+X_BASE_LASER = pt.transform((-0.6, 0.0, 0.05), axis=(0, 0, 1), angle=0.2)
+BEAMS = 181
+
+
+def scan(ranges, stamp=None, frame="camera", **members):
+    message = LaserScan(range_min=0.05, range_max=10.0, angle_min=-1.5, angle_max=1.5)
+    message.header.frame_id = frame
+    message.header.stamp = rospy.Time.now() if stamp is None else stamp
+    message.angle_increment = 3.0 / max(len(ranges) - 1, 1)
+    message.ranges = list(ranges)
+    for name, value in members.items():
+        setattr(message, name, value)
+    return message
+
+
+def endpoints(message):
+    """Of the beams, in the laser's frame."""
+    angles = message.angle_min + message.angle_increment * np.arange(len(message.ranges))
+    ranges = np.array(message.ranges)
+    return np.stack([ranges * np.cos(angles), ranges * np.sin(angles), 0 * angles], axis=1)
+
+
+def wall():
+    """Ranges to the plane x = 0.9 m in the laser's frame, with a post in front of it."""
+    angles = np.linspace(-1.5, 1.5, BEAMS)
+    ranges = 0.9 / np.cos(angles)
+    ranges[100:104] = 0.42
+    return ranges
+
+
+# What makes a scan malformed, and a word of the message.
+MALFORMED = [
+    ({"angle_increment": 0.0}, "angle_increment is 0"),
+    ({"angle_increment": float("nan")}, "angle_increment is nan"),
+    ({"angle_min": float("inf")}, "angle_min is inf"),
+    ({"range_min": -1.0}, "range_min is -1"),
+    ({"range_min": float("nan")}, "range_min is nan"),
+    ({"range_max": 0.0}, "range_max is 0"),
+    ({"range_max": float("nan")}, "range_max is nan"),
+    ({"time_increment": float("nan")}, "time_increment is nan"),
+    ({"time_increment": 1e30}, "more than 10 s"),
+    ({"angle_increment": 1e30}, "more than two turns"),
+    ({"ranges": []}, "ranges is empty"),
+]
+
+
+class LaserScanTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace, X_BASE_LASER).stand(box=FAR_BOX)
+        self.publisher = rospy.Publisher(self.namespace + "/scan", LaserScan, queue_size=10)
+        source = {"topic": "scan", "type": "sensor_msgs/LaserScan"}
+        self.node = pt.ProximityNode(
+            self.namespace, {"sources": {"laser": source}, "query/tolerance": 0.0}, pt.urdf()
+        )
+        self.world.start_tf()
+
+    def tearDown(self):
+        self.world.stop()
+        self.publisher.unregister()
+        for message in self.node.messages:
+            pt.check_invariants(self, message)
+        self.assertEqual(self.node.stop(), 0)
+
+    @contextlib.contextmanager
+    def stream(self, make, rate=20):
+        repeater = self.world.repeat(rate, lambda: self.publisher.publish(make()))
+        try:
+            yield repeater
+        finally:
+            repeater.stop()
+
+    def check_wall(self):
+        message = scan(wall())
+        points = endpoints(message)
+        points = pt.apply(X_BASE_LASER, points[np.array(message.ranges) <= 3.0])  # max_range
+        with self.stream(lambda: scan(wall())):
+            answer = self.node.wait_for(
+                lambda m: m.status == 0 and m.sources[0].points_received == BEAMS, "the wall"
+            )
+        for name, link_pose in (("ball_link", pt.transform()), ("box_link", FAR_BOX)):
+            signed = pt.DISTANCE[name](pt.apply(pt.inverse(link_pose), points))
+            truth = signed[signed > 0.02].min()  # the self-filter's padding
+            self.assertAlmostEqual(pt.link(answer, name).distance, truth, 5)
+            self.assertEqual(pt.link(answer, name).source, "laser")
+
+    def test_distances_and_silence(self):
+        message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "'laser'")
+        self.assertIn("sensor_msgs/LaserScan", message.status_text)
+        self.assertTrue(pt.all_unknown(message))
+        self.check_wall()
+        message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "the newest scan is")
+        self.assertTrue(pt.all_unknown(message))
+        self.check_wall()
+
+    def test_what_scans_see(self):
+        self.check_wall()
+        # NaN, too near, and what drivers write where nothing came back: nothing is known.
+        for blind in (float("nan"), -float("inf"), 0.0):
+            with self.subTest(blind), self.stream(lambda blind=blind: scan([blind] * 5)):
+                message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "newest scan is NaN")
+                self.assertTrue(pt.all_unknown(message))
+                self.assertEqual(message.sources[0].points_received, 5)
+            self.check_wall()
+        # Nothing within range: measured.
+        for far in (float("inf"), 9.0, 1e6):
+            with self.subTest(far), self.stream(lambda far=far: scan([far] * 5)):
+                message = self.node.wait_for(
+                    lambda m: m.status == 0 and m.sources[0].points_received == 5, "the empty scan"
+                )
+                self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+                self.assertEqual(message.sources[0].points_used, 0)
+            self.check_wall()
+
+    def test_malformed(self):
+        for members, words in MALFORMED:
+            with self.subTest(words):
+                others = dict(members)
+                ranges = others.pop("ranges", [1.0] * 5)
+                with self.stream(lambda r=ranges, others=others: scan(r, **others)):
+                    message = self.node.wait_for(
+                        lambda m: m.status != 0 and words in m.status_text, words
+                    )
+                self.assertIn("malformed scan", message.status_text)
+                self.assertTrue(pt.all_unknown(message))
+        self.check_wall()
+
+    def test_moving_sensor(self):
+        """Each beam counts from where the sensor was at the beam's own time."""
+
+        def X_base_moving(t):
+            return pt.transform((-0.6 + 0.3 * np.sin(2.0 * t), 0.0, 0.0))
+
+        # Its transforms come in late and only up to now: the scan has to wait for its last beam.
+        self.world.poses["moving"] = ("base", X_base_moving)
+        point = 0.35  # [m] on the x axis: 0.25 m from the ball
+
+        def make():
+            stamp = rospy.Time.now()
+            duration = 0.2
+            at_point = X_base_moving(stamp.to_sec() + duration)[0, 3]
+            ranges = [float("inf")] * 100 + [point - at_point]  # the last beam, along x
+            return scan(
+                ranges,
+                stamp,
+                "moving",
+                angle_min=-1.0,
+                angle_increment=0.01,
+                time_increment=duration / 100,
+            )
+
+        with self.stream(make, rate=10):
+            self.node.wait_for_status(ProximityArray.OK)
+            begin = len(self.node.messages)
+            self.node.wait_for(lambda m: len(self.node.messages) > begin + 300, "300 messages")
+        distances = [
+            pt.link(m, "ball_link").distance for m in self.node.messages[begin:] if m.status == 0
+        ]
+        self.assertGreater(len(distances), 250)
+        # What remains is that tf interpolates between transforms 20 ms apart.
+        self.assertLess(max(abs(np.array(distances) - 0.25)), 2e-3)
+        print("moving sensor: largest error %.2f mm" % (1e3 * max(abs(np.array(distances) - 0.25))))
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("laser_scan_test")
+    rostest.rosrun("ist_proximity", "laser_scan_test", LaserScanTest, sys.argv)

@@ -1,0 +1,394 @@
+#!/usr/bin/env python3
+"""OctoMap as a source: topics (binary and full trees) and files, without octomap_msgs."""
+
+import os
+import shutil
+import struct
+import sys
+import tempfile
+import unittest
+
+import genpy.dynamic
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import PointCloud2
+
+FAR_BOX = pt.transform((0, 0.8, 0))
+RESOLUTION = 0.05
+Octomap = genpy.dynamic.generate_dynamic(
+    "octomap_msgs/Octomap",
+    """Header header
+bool binary
+string id
+float64 resolution
+int8[] data
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+""",
+)["octomap_msgs/Octomap"]
+
+# Leaves: lower corner and edge, in smallest leaves. A block, a shelf, a far wall, and free space.
+OCCUPIED = [((-8, -8, 8), 4), ((6, 0, 0), 1), ((6, 1, 0), 1), ((0, -16, 0), 8), ((-32, 32, -32), 32)]
+FREE = [((0, 0, 0), 4), ((-1, -1, -1), 1)]
+
+
+class Tree:
+    """Writes an OcTree as octomap does: depth first from the root, 16 levels down."""
+
+    def __init__(self, occupied=OCCUPIED, free=FREE):
+        self.leaves = {(tuple(low), size): True for low, size in occupied}
+        self.leaves.update({(tuple(low), size): False for low, size in free})
+        self.nodes = 0
+
+    def _inside(self, low, size):
+        return [
+            leaf
+            for leaf in self.leaves
+            if all(low[i] <= leaf[0][i] < low[i] + size for i in range(3))
+        ]
+
+    def _children(self, low, size):
+        half = size // 2
+        for i in range(8):
+            child = tuple(low[k] + half * (i >> k & 1) for k in range(3))
+            yield child, half, self._inside(child, half)
+
+    def binary(self, low=(-32768,) * 3, size=65536):
+        if low[0] == -32768 and size == 65536:
+            self.nodes = 0
+        self.nodes += 1
+        codes, below = 0, b""
+        for i, (child, half, inside) in enumerate(self._children(low, size)):
+            if (child, half) in self.leaves:
+                codes |= (2 if self.leaves[child, half] else 1) << 2 * i
+                self.nodes += 1
+            elif inside:
+                codes |= 3 << 2 * i
+                below += self.binary(child, half)
+        return struct.pack("<H", codes) + below
+
+    def full(self, low=(-32768,) * 3, size=65536):
+        if low[0] == -32768 and size == 65536:
+            self.nodes = 0
+        self.nodes += 1
+        if (low, size) in self.leaves:
+            return struct.pack("<fB", 3.5 if self.leaves[low, size] else -2.0, 0)
+        children, below = 0, b""
+        for i, (child, half, inside) in enumerate(self._children(low, size)):
+            if inside:
+                children |= 1 << i
+                below += self.full(child, half)
+        return struct.pack("<fB", 3.5, children) + below
+
+    def file(self, binary):
+        data = self.binary() if binary else self.full()
+        title = "# Octomap OcTree %sfile\n" % ("binary " if binary else "")
+        return b"%s# a comment\n#\nid OcTree\nsize %d\nres %g\ndata\n%s" % (
+            title.encode(),
+            self.nodes,
+            RESOLUTION,
+            data,
+        )
+
+    def boxes(self):
+        """(n, 2, 3): lower and upper corners of the occupied leaves, in the map's frame."""
+        return np.array(
+            [
+                [np.array(low) * RESOLUTION, (np.array(low) + size) * RESOLUTION]
+                for (low, size), is_occupied in self.leaves.items()
+                if is_occupied
+            ]
+        ).reshape(-1, 2, 3)
+
+
+def message(tree, binary=True, frame="map", **members):
+    data = tree.binary() if binary else tree.full()
+    result = Octomap(binary=binary, id="OcTree", resolution=RESOLUTION)
+    result.header.stamp = rospy.Time.now()
+    result.header.frame_id = frame
+    result.data = list(np.frombuffer(data, np.int8))
+    for name, value in members.items():
+        setattr(result, name, value)
+    return result
+
+
+def ball_truth(boxes, X_map_ball):
+    center = X_map_ball[:3, 3]
+    away = np.maximum(0, np.maximum(boxes[:, 0] - center, center - boxes[:, 1]))
+    return np.linalg.norm(away, axis=1).min() - pt.BALL_RADIUS
+
+
+def box_truth(boxes, p_map_box):
+    """Of box_link, when its axes are the map's."""
+    low, high = (p_map_box + pt.BOX_OFFSET + s * pt.BOX_SIZE / 2 for s in (-1, 1))
+    away = np.maximum(0, np.maximum(boxes[:, 0] - high, low - boxes[:, 1]))
+    return np.linalg.norm(away, axis=1).min()
+
+
+class OctomapTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.folder = tempfile.mkdtemp()
+        self.world = pt.World(self.namespace).stand(box=FAR_BOX)
+        self.world.poses["map"] = ("base", pt.transform())
+        self.world.start_tf()
+        self.node = None
+        self.publisher = None
+
+    def tearDown(self):
+        self.world.stop()
+        shutil.rmtree(self.folder)
+        if self.publisher:
+            self.publisher.unregister()
+        if self.node:
+            for m in self.node.messages:
+                pt.check_invariants(self, m)
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, sources, **parameters):
+        parameters.update({"sources": sources, "query/tolerance": 0.0})
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        return self.node
+
+    def topic(self, **parameters):
+        """A source on the topic `octomap`, and its publisher."""
+        self.publisher = rospy.Publisher(
+            self.namespace + "/octomap", Octomap, queue_size=2, latch=True
+        )
+        return dict(parameters, topic="octomap", type="octomap_msgs/Octomap")
+
+    def write(self, name, content):
+        path = os.path.join(self.folder, name)
+        with open(path, "wb") as f:
+            f.write(content)
+        return path
+
+    def wait_for_ball(self, truth, what):
+        m = self.node.wait_for(
+            lambda m: m.status == 0
+            and m.links
+            and abs(pt.link(m, "ball_link").distance - truth) < 1e-6,
+            "%s: %.6f m" % (what, truth),
+        )
+        self.assertLessEqual(pt.link(m, "ball_link").lower_bound, truth)
+        self.assertGreater(pt.link(m, "ball_link").lower_bound, truth - 1e-4)
+        return m
+
+    def test_topic(self):
+        node = self.start({"room": self.topic(timeout=float("inf"))})
+        node.wait_for_status(ProximityArray.NO_CLOUD, "'room'")
+        tree = Tree()
+        # Sent once, while the robot's model may still be loading; both kinds of tree.
+        for binary in (True, False):
+            self.publisher.publish(message(tree, binary))
+            m = self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map")
+            self.assertEqual(pt.link(m, "ball_link").source, "room")
+            truth = box_truth(tree.boxes(), FAR_BOX[:3, 3])
+            self.assertAlmostEqual(pt.link(m, "box_link").distance, truth, 6)
+            self.assertEqual(m.sources[0].points_used, len(OCCUPIED))
+            self.assertEqual(m.sources[0].points_received, len(OCCUPIED) + len(FREE))
+
+            # Another map takes its place, without a gap.
+            begin = len(node.messages)
+            other = Tree([((5, 5, 0), 1)])
+            self.publisher.publish(message(other, binary))
+            self.wait_for_ball(ball_truth(other.boxes(), pt.transform()), "the other map")
+            self.assertEqual({m.status for m in node.messages[begin:]}, {ProximityArray.OK})
+
+        # A large leaf that holds the ball's middle, and an empty map.
+        self.publisher.publish(message(Tree([((-8, -8, -8), 8), ((0, 0, 0), 8)], [])))
+        m = node.wait_for(
+            lambda m: pt.link(m, "ball_link").state == LinkProximity.CONTACT, "contact"
+        )
+        self.assertAlmostEqual(pt.link(m, "ball_link").distance, -pt.BALL_RADIUS, 3)
+        empty = message(Tree([], []), data=[])
+        self.publisher.publish(empty)
+        m = node.wait_for(
+            lambda m: m.status == 0 and pt.link(m, "ball_link").state == LinkProximity.CLEAR,
+            "the empty map",
+        )
+        self.assertEqual(m.sources[0].points_used, 0)
+
+        # The map outlives the model it was first used with.
+        self.publisher.publish(message(tree))
+        self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map")
+        rospy.set_param(self.namespace + "/robot_description", pt.urdf("<link name='new'/>"
+            "<joint name='j' type='fixed'><parent link='base'/><child link='new'/></joint>"))
+        self.assertTrue(node.reload().success)
+        self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map, model reloaded")
+
+    def test_driving(self):
+        """The map is where tf says it is at the instant of each answer, not when it was sent."""
+
+        def X_base_map(t):
+            return pt.transform((0.3 * np.sin(t), 0.2 * np.cos(t), 0), (0, 0, 1), 0.5 * np.sin(t))
+
+        self.world.poses["map"] = ("base", X_base_map)
+        node = self.start({"room": self.topic(timeout=float("inf"))})
+        tree = Tree()
+        self.publisher.publish(message(tree))
+        node.wait_for_status(ProximityArray.OK)
+        begin = len(node.messages)
+        node.wait_for(lambda m: len(node.messages) > begin + 300, "300 messages")
+        errors = []
+        for m in node.messages[begin:]:
+            self.assertEqual(m.status, ProximityArray.OK, m.status_text)
+            X = pt.inverse(X_base_map(m.header.stamp.to_sec()))
+            errors.append(pt.link(m, "ball_link").distance - ball_truth(tree.boxes(), X))
+        print("driving: largest error %.3f mm" % (1e3 * np.abs(errors).max()))
+        self.assertLess(np.abs(errors).max(), 1e-3)  # tf interpolates
+
+        # Lost: the map is somewhere, but not known where.
+        del self.world.poses["map"]
+        m = node.wait_for_status(ProximityArray.NO_CLOUD, "from 'map' to 'base'")
+        self.assertTrue(pt.all_unknown(m))
+
+    def test_timeout(self):
+        """As every source, a map is stale after half a second unless told otherwise."""
+        node = self.start({"room": self.topic()})
+        self.publisher.publish(message(Tree()))
+        m = node.wait_for_status(ProximityArray.STALE_CLOUD, "its timeout should be .inf")
+        self.assertTrue(pt.all_unknown(m))
+        self.world.repeat(10, lambda: self.publisher.publish(message(Tree())))
+        self.wait_for_ball(ball_truth(Tree().boxes(), pt.transform()), "a map ten times a second")
+
+    def test_bad_maps(self):
+        node = self.start({"room": self.topic(timeout=float("inf"))})
+        good = message(Tree())
+        full = message(Tree(), binary=False)
+        bad = [
+            (message(Tree(), data=good.data[:-3]), "ends in the middle of the tree"),
+            (message(Tree(), False, data=full.data[:-1]), "ends in the middle of the tree"),
+            (message(Tree(), data=good.data + [0] * 7), "ends 7 bytes before"),
+            (message(Tree(), data=[-1] * 1000), "deeper than 16 levels"),
+            (message(Tree(), False, data=[-1] * 1000), "not finite"),
+            (message(Tree(), id="ColorOcTree"), "'ColorOcTree', it must be 'OcTree'"),
+            (message(Tree(), resolution=0.0), "resolution is 0"),
+            (message(Tree(), resolution=float("nan")), "resolution is nan"),
+            (message(Tree(), frame=""), "empty frame_id"),
+            (message(Tree(), frame="nowhere"), "nowhere"),
+        ]
+        for one, words in bad:
+            with self.subTest(words):
+                one.header.stamp = rospy.Time.now()
+                self.publisher.publish(one)
+                if "nowhere" in words:  # a map as it should be, but where is it?
+                    m = node.wait_for_status(ProximityArray.NO_CLOUD, words)
+                    self.assertTrue(pt.all_unknown(m))
+                else:
+                    node.wait_until(
+                        lambda: "input room" in node.diagnostics
+                        and words in node.diagnostics["input room"].message,
+                        words,
+                    )
+        good.header.stamp = rospy.Time.now()
+        self.publisher.publish(good)
+        self.wait_for_ball(ball_truth(Tree().boxes(), pt.transform()), "a good map")
+
+    def test_wrong_type(self):
+        source = {"topic": "cloud", "type": "octomap_msgs/Octomap", "timeout": float("inf")}
+        node = self.start({"room": source})
+        self.world.start_clouds()
+        m = node.wait_for_status(ProximityArray.NO_CLOUD, "a sensor_msgs/PointCloud2 comes in")
+        self.assertTrue(pt.all_unknown(m))
+
+    def test_files(self):
+        tree = Tree()
+        truth = ball_truth(tree.boxes(), pt.transform())
+        for name, binary in (("room.bt", True), ("room.ot", False)):
+            with self.subTest(name):
+                path = self.write(name, tree.file(binary))
+                node = self.start({"room": {"type": "octomap_msgs/Octomap", "file": path}})
+                m = self.wait_for_ball(truth, name)
+                self.assertTrue(m.cloud_stamp.is_zero() and m.sources[0].stamp.is_zero())
+                self.assertTrue(np.isnan(m.sources[0].age))
+                self.assertEqual(m.sources[0].points_used, len(OCCUPIED))
+                # Never stale.
+                begin = len(node.messages)
+                node.wait_for(lambda m: len(node.messages) > begin + 100, "100 messages")
+                self.assertEqual({m.status for m in node.messages[begin:]}, {ProximityArray.OK})
+                self.assertEqual(node.stop(), 0)
+                self.node = None
+
+    def test_damaged_files(self):
+        """A file that is no map: said, and what is not required does not keep the others back."""
+        whole = Tree().file(True)
+        sources = {"camera": {"topic": "cloud", "type": "sensor_msgs/PointCloud2"}}
+        damaged = {
+            "cut.bt": (whole[:-5], "ends in the middle of the tree"),
+            "head.bt": (whole[:40], "its header does not end with 'data'"),
+            "text.bt": (b"once upon a time", "is no OctoMap file"),
+            "empty.bt": (b"", "is no OctoMap file"),
+            "other.ot": (Tree().file(False).replace(b"id OcTree", b"id ColorOcTree"), "ColorOcTree"),
+            "size.bt": (whole.replace(b"\nsize ", b"\nsize 9"), "its header says 9"),
+            "missing.bt": (None, "cannot be read"),
+        }
+        for name, (content, _) in damaged.items():
+            path = os.path.join(self.folder, name)
+            if content is not None:
+                self.write(name, content)
+            source = {"type": "octomap_msgs/Octomap", "file": path, "required": False}
+            sources[name.replace(".", "_")] = source
+        node = self.start(sources)
+        self.world.points = np.array([[0.0, 0.0, 0.3]])
+        self.world.start_clouds()
+        m = self.wait_for_ball(0.2, "the camera")
+        self.assertEqual(sum(s.status == ProximityArray.NO_CLOUD for s in m.sources), len(damaged))
+        for name, (_, words) in damaged.items():
+            with self.subTest(name):
+                key = "input " + name.replace(".", "_")
+                node.wait_until(
+                    lambda: key in node.diagnostics and words in node.diagnostics[key].message, words
+                )
+                self.assertIn(name, node.diagnostics[key].message)
+
+    def test_required_damaged_file(self):
+        path = self.write("cut.bt", Tree().file(True)[:-5])
+        sources = {
+            "camera": {"topic": "cloud"},
+            "room": {"type": "octomap_msgs/Octomap", "file": path},
+        }
+        node = self.start(sources)
+        self.world.start_clouds()
+        m = node.wait_for_status(ProximityArray.NO_CLOUD, "ends in the middle of the tree")
+        self.assertTrue(pt.all_unknown(m))
+        self.assertIn("cut.bt", m.status_text)
+
+    def test_map_and_cloud(self):
+        """The nearest of both, and each by its name."""
+        sources = {"camera": {"topic": "cloud"}, "room": self.topic(timeout=float("inf"))}
+        node = self.start(sources)
+        tree = Tree()
+        truth = ball_truth(tree.boxes(), pt.transform())
+        self.publisher.publish(message(tree))
+        clouds = []
+
+        def send(z):
+            clouds.append(z)
+            self.world.points = np.array([[0.0, 0.0, z]])
+
+        send(pt.BALL_RADIUS + truth + 0.05)
+        self.world.start_clouds()
+        m = self.wait_for_ball(truth, "the map")
+        self.assertEqual(pt.link(m, "ball_link").source, "room")
+        filtered = []
+        node.subscribe("filtered_cloud", PointCloud2, filtered.append)
+        send(pt.BALL_RADIUS + truth - 0.05)
+        m = node.wait_for(
+            lambda m: m.status == 0 and pt.link(m, "ball_link").source == "camera", "the cloud"
+        )
+        self.assertAlmostEqual(pt.link(m, "ball_link").distance, truth - 0.05, 5)
+        node.wait_until(lambda: filtered, "the filtered cloud")
+        self.assertEqual({f.width for f in filtered}, {1})
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("octomap_test")
+    rostest.rosrun("ist_proximity", "octomap_test", OctomapTest, sys.argv)
