@@ -114,12 +114,11 @@ void read_query(ParameterReader* reader, QueryConfig* query) {
   reader->read("query/margin", from_zero("m", 1.0), &query->margin);
 }
 
-void refuse_what_is_not_there_yet(ParameterReader* reader) {
-  bool self_collision = false;
-  reader->read("self_collision/enabled", &self_collision);
-  if (self_collision) {
-    reader->add_error("~self_collision/enabled is true: link against link is not supported yet");
-  }
+void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
+  reader->read("self_collision/enabled", &config->enabled);
+  reader->read("self_collision/rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
+  reader->read("self_collision/ignore", &config->ignore);
+  reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
 }
 
 std::string joined(const std::vector<std::string>& lines) {
@@ -148,7 +147,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
         "ends; ~max_distance is used");
   }
   config.sources = read_sources(&reader);
-  refuse_what_is_not_there_yet(&reader);
+  read_self_collision(&reader, &config.self_collision);
 
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   const std::vector<std::string> unknown = reader.unknown();

@@ -54,6 +54,10 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     return repulsion_;
   });
+  if (config_.self_collision.enabled) {
+    self_proximity_ =
+        std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_, joint_states_.get());
+  }
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
 }
@@ -68,6 +72,7 @@ ProximityServer::~ProximityServer() {
   cycle_thread_.join();
   diagnostics_thread_.join();
   query_service_.reset();
+  self_proximity_.reset();
   cycle_.reset();
   joint_states_.reset();  // its thread uses members that end before it
 }
@@ -168,6 +173,7 @@ void ProximityServer::take_model() {
     joint_states_->set_kinematics(model_->kinematics);
   }
   query_service_->set_model(model_);
+  if (self_proximity_) self_proximity_->set_model(model_);
   publish_spheres();
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame);

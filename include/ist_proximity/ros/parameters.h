@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -27,6 +28,15 @@ struct SourceConfig {
 /// Where link poses come from.
 enum class PoseSourceKind { kTf, kJointStates };
 
+/// Link against link.
+struct SelfCollisionConfig {
+  bool enabled = false;
+  double rate = 50.0;  ///< [Hz] of ~self_proximity; > 0
+  std::vector<std::pair<std::string, std::string>>
+      ignore;                          ///< pairs of links, besides adjacent ones
+  bool ignore_contact_at_rest = true;  ///< and those in contact with all joints at zero
+};
+
 /// Everything a node can be told. Numbers that the core knows have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
@@ -38,6 +48,7 @@ struct ServerConfig {
   RobotModelConfig model;
   QueryConfig query;
   RepulsionConfig repulsion;
+  SelfCollisionConfig self_collision;
   std::vector<SourceConfig> sources;
 };
 

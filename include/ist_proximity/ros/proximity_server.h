@@ -21,6 +21,7 @@
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/proximity_cycle.h"
 #include "ist_proximity/ros/query_service.h"
+#include "ist_proximity/ros/self_proximity.h"
 #include "ist_proximity/ros/transform_listener.h"
 
 namespace ist {
@@ -30,7 +31,7 @@ namespace ist {
 ///     nothing; at ~rate of the wall clock (a paused /clock does not silence it), or with
 ///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
-///   - ~query, with a query of its own;
+///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
 ///   - the model loader; - the listeners of tf and joint_states;
 ///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
 ///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
@@ -98,6 +99,7 @@ class ProximityServer {
   std::condition_variable state_signal_;  ///< to stop, or a joint state has come
   std::uint64_t states_come_ = 0, states_taken_ = 0, states_skipped_ = 0;
   std::unique_ptr<QueryService> query_service_;
+  std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
   std::thread cycle_thread_, diagnostics_thread_;
 };
 
