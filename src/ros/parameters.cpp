@@ -108,7 +108,6 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
 }
 
 void read_query(ParameterReader* reader, QueryConfig* query) {
-  reader->read("max_distance", more_than_zero("m", 1e3), &query->max_distance);
   reader->read("query/tolerance", from_zero("m", 1.0), &query->tolerance);
   reader->read("query/deadline", from_zero("s", 10.0), &query->deadline);
   reader->read("query/margin", from_zero("m", 1.0), &query->margin);
@@ -140,6 +139,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   ServerConfig config;
   read_poses(&reader, &config);
   read_model(&reader, &config);
+  reader.read("max_distance", more_than_zero("m", 1e3), &config.query.max_distance);
   read_query(&reader, &config.query);
   if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {
     warnings->push_back(
@@ -164,12 +164,14 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   return config;
 }
 
-RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_distance) {
+LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance) {
   ParameterReader reader(fetch(private_nh));
-  RepulsionConfig repulsion;
-  read_repulsion(&reader, max_distance, &repulsion);
+  LiveConfig live;
+  live.query.max_distance = max_distance;
+  read_query(&reader, &live.query);
+  read_repulsion(&reader, max_distance, &live.repulsion);
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
-  return repulsion;
+  return live;
 }
 
 std::string default_cache_directory() {

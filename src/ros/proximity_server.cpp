@@ -36,7 +36,7 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       listener_(&buffer_, nh_),
       loader_(config, nh),
       marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
-      repulsion_(config.repulsion) {
+      live_{config.query, config.repulsion} {
   advertise();
   for (const SourceConfig& source : config_.sources) {
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
@@ -52,7 +52,7 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
   }
   query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
-    return repulsion_;
+    return live_;
   });
   if (config_.self_collision.enabled) {
     self_proximity_ =
@@ -140,7 +140,7 @@ void ProximityServer::run_cycle() {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, repulsion_, message.get(), &report_);
+      cycle_->run(now, sources_, live_, message.get(), &report_);
     } else {
       say_no_model(*model_, config_.fixed_frame, now, sources_, message.get(), &report_);
     }
@@ -203,7 +203,7 @@ void ProximityServer::run_diagnostics() {
   std::uint64_t states_before = 0;
   Clock::time_point before = Clock::now();
   while (sleep_until(before + std::chrono::seconds(1))) {
-    read_repulsion_again();
+    read_live_again();
     CycleReport report;
     {
       const std::lock_guard<std::mutex> lock(shared_mutex_);
@@ -235,13 +235,13 @@ void ProximityServer::run_diagnostics() {
   }
 }
 
-void ProximityServer::read_repulsion_again() {
+void ProximityServer::read_live_again() {
   try {
-    const RepulsionConfig repulsion = read_repulsion(private_nh_, config_.query.max_distance);
+    const LiveConfig live = read_live(private_nh_, config_.query.max_distance);
     const std::lock_guard<std::mutex> lock(shared_mutex_);
-    repulsion_ = repulsion;
+    live_ = live;
   } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~repulsion goes on: " << error.what());
+    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
   }
 }
 

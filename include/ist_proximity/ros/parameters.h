@@ -69,11 +69,18 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 /// @throws ParameterError
 ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 
-/// Reads ~repulsion/* again: these may change while the node runs.
-/// @param max_distance  [m] the influence distance ends there at the latest: beyond it nothing is
-///                      measured, and the vector could not end in zero
+/// What may change while the node runs.
+struct LiveConfig {
+  QueryConfig query;  ///< but for max_distance
+  RepulsionConfig repulsion;
+};
+
+/// Reads ~query/* and ~repulsion/* again.
+/// @param max_distance  [m] as it was at the start. The influence distance ends there at the
+/// latest:
+///                      beyond it nothing is measured, and the vector could not end in zero
 /// @throws ParameterError
-RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_distance);
+LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance);
 
 /// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity; empty (no cache) without a home.
 std::string default_cache_directory();

@@ -33,7 +33,8 @@ namespace ist {
 ///   - one per source, for receiving and ingesting clouds;
 ///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
 ///   - the model loader; - the listeners of tf and joint_states;
-///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
+///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again from the parameter
+///   server, which is
 ///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
 ///     not every ROS 1 distribution has).
 /// The other services are answered from the queue of the node handles.
@@ -60,7 +61,7 @@ class ProximityServer {
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void publish_spheres();
   void run_diagnostics();
-  void read_repulsion_again();
+  void read_live_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool attach_object(ist_proximity::AttachObject::Request& request,
                      ist_proximity::AttachObject::Response& response);
@@ -91,7 +92,7 @@ class ProximityServer {
 
   std::mutex shared_mutex_;  // for what cycle and diagnostics threads share
   CycleReport report_;
-  RepulsionConfig repulsion_;
+  LiveConfig live_;
 
   std::mutex stop_mutex_;
   std::condition_variable stop_signal_;
