@@ -171,6 +171,25 @@ void ParameterReader::read(const std::string& name, std::vector<std::string>* va
   *value = std::move(strings);
 }
 
+void ParameterReader::read(const std::string& name,
+                           std::vector<std::pair<std::string, std::string>>* value) {
+  const XmlRpcValue* found = ask(name);
+  if (!found) return;
+  const std::string needed = "a list of pairs of strings is needed, [[a, b], [c, d]]";
+  if (found->getType() != XmlRpcValue::TypeArray) return wrong(name, *found, needed);
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (int i = 0; i < found->size(); ++i) {
+    const XmlRpcValue& pair = (*found)[i];
+    const bool is_pair = pair.getType() == XmlRpcValue::TypeArray && pair.size() == 2 &&
+                         pair[0].getType() == XmlRpcValue::TypeString &&
+                         pair[1].getType() == XmlRpcValue::TypeString;
+    if (!is_pair) return wrong(name, pair, needed);
+    pairs.emplace_back(static_cast<const std::string&>(pair[0]),
+                       static_cast<const std::string&>(pair[1]));
+  }
+  *value = std::move(pairs);
+}
+
 void ParameterReader::read_choice(const std::string& name, const std::vector<std::string>& choices,
                                   std::string* value,
                                   const std::map<std::string, std::string>& hints) {

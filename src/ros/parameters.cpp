@@ -146,18 +146,16 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
 }
 
 void read_query(ParameterReader* reader, QueryConfig* query) {
-  reader->read("max_distance", more_than_zero("m", 1e3), &query->max_distance);
   reader->read("query/tolerance", from_zero("m", 1.0), &query->tolerance);
   reader->read("query/deadline", from_zero("s", 10.0), &query->deadline);
   reader->read("query/margin", from_zero("m", 1.0), &query->margin);
 }
 
-void refuse_what_is_not_there_yet(ParameterReader* reader) {
-  bool self_collision = false;
-  reader->read("self_collision/enabled", &self_collision);
-  if (self_collision) {
-    reader->add_error("~self_collision/enabled is true: link against link is not supported yet");
-  }
+void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
+  reader->read("self_collision/enabled", &config->enabled);
+  reader->read("self_collision/rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
+  reader->read("self_collision/ignore", &config->ignore);
+  reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
 }
 
 std::string joined(const std::vector<std::string>& lines) {
@@ -203,6 +201,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   ServerConfig config;
   read_poses(&reader, &config);
   read_model(&reader, &config);
+  reader.read("max_distance", more_than_zero("m", 1e3), &config.query.max_distance);
   read_query(&reader, &config.query);
   if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {
     warnings->push_back(
@@ -210,7 +209,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
         "ends; ~max_distance is used");
   }
   config.sources = read_sources(&reader);
-  refuse_what_is_not_there_yet(&reader);
+  read_self_collision(&reader, &config.self_collision);
 
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   const std::vector<std::string> unknown = reader.unknown();
@@ -227,12 +226,14 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   return config;
 }
 
-RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_distance) {
+LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance) {
   ParameterReader reader(fetch(private_nh));
-  RepulsionConfig repulsion;
-  read_repulsion(&reader, max_distance, &repulsion);
+  LiveConfig live;
+  live.query.max_distance = max_distance;
+  read_query(&reader, &live.query);
+  read_repulsion(&reader, max_distance, &live.repulsion);
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
-  return repulsion;
+  return live;
 }
 
 std::string default_cache_directory() {

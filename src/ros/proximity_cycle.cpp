@@ -83,8 +83,8 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
 }
 
 void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
-                         const RepulsionConfig& repulsion, ProximityArray* message,
-                         CycleReport* report) {
+                         const LiveConfig& config, ProximityArray* message, CycleReport* report) {
+  query_.set_config(config.query);
   look_at_poses(now);
   const auto begin = std::chrono::steady_clock::now();
   look_at_sources(now, sources);
@@ -104,7 +104,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;
-  fill_links(repulsion, message);
+  fill_links(config.repulsion, message);
   fill_sources(situation_, message);
   message->cloud_stamp = ros::Time();
   for (std::size_t i = 0; i < snapshots_.size(); ++i) {

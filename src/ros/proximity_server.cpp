@@ -41,7 +41,7 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       listener_(&buffer_, nh_),
       loader_(config, nh),
       marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
-      repulsion_(config.repulsion) {
+      live_{config.query, config.repulsion} {
   advertise();
   for (const SourceConfig& source : config_.sources) {
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
@@ -57,8 +57,12 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
   }
   query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
-    return repulsion_;
+    return live_;
   });
+  if (config_.self_collision.enabled) {
+    self_proximity_ =
+        std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_, joint_states_.get());
+  }
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
 }
@@ -73,6 +77,7 @@ ProximityServer::~ProximityServer() {
   cycle_thread_.join();
   diagnostics_thread_.join();
   query_service_.reset();
+  self_proximity_.reset();
   cycle_.reset();
   joint_states_.reset();  // its thread uses members that end before it
 }
@@ -137,7 +142,7 @@ void ProximityServer::run_cycle() {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, repulsion_, message.get(), &report_);
+      cycle_->run(now, sources_, live_, message.get(), &report_);
     } else {
       say_no_model(*model_, config_.fixed_frame, now, sources_, message.get(), &report_);
     }
@@ -184,6 +189,7 @@ void ProximityServer::take_model() {
     joint_states_->set_kinematics(model_->kinematics);
   }
   query_service_->set_model(model_);
+  if (self_proximity_) self_proximity_->set_model(model_);
   publish_spheres();
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame);
@@ -213,7 +219,7 @@ void ProximityServer::run_diagnostics() {
   std::uint64_t states_before = 0;
   Clock::time_point before = Clock::now();
   while (sleep_until(before + std::chrono::seconds(1))) {
-    read_repulsion_again();
+    read_live_again();
     CycleReport report;
     {
       const std::lock_guard<std::mutex> lock(shared_mutex_);
@@ -245,13 +251,13 @@ void ProximityServer::run_diagnostics() {
   }
 }
 
-void ProximityServer::read_repulsion_again() {
+void ProximityServer::read_live_again() {
   try {
-    const RepulsionConfig repulsion = read_repulsion(private_nh_, config_.query.max_distance);
+    const LiveConfig live = read_live(private_nh_, config_.query.max_distance);
     const std::lock_guard<std::mutex> lock(shared_mutex_);
-    repulsion_ = repulsion;
+    live_ = live;
   } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~repulsion goes on: " << error.what());
+    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
   }
 }
 

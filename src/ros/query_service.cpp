@@ -9,9 +9,8 @@ using ist_proximity::ProximityArray;
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
                            const CloudSources& sources, const tf2::BufferCore& buffer,
-                           std::function<RepulsionConfig()> repulsion)
-    : config_(config), sources_(sources), buffer_(buffer), repulsion_(std::move(repulsion)) {
-  config_.query.deadline = 0.0;
+                           std::function<LiveConfig()> live)
+    : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
   private_nh.setCallbackQueue(&queue_);
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_ = std::thread([this] {
@@ -95,7 +94,8 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   if (problem.empty()) problem = choose_links(request.links);
   if (!problem.empty()) return problem;
 
-  const RepulsionConfig repulsion = repulsion_();
+  LiveConfig live = live_();
+  live.query.deadline = 0.0;
   CycleReport ignored;
   for (std::size_t i = 0; i < request.states.size(); ++i) {
     problem = poses_->state(request.states[i]);
@@ -103,7 +103,7 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     response->results.emplace_back();
     ProximityArray& result = response->results.back();
     cycle_->forget();  // one configuration after the other is no motion
-    cycle_->run(ros::Time::now(), sources_, repulsion, &result, &ignored);
+    cycle_->run(ros::Time::now(), sources_, live, &result, &ignored);
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }

@@ -120,7 +120,7 @@ TEST(AttachedObject, onlyLinksThatAreAskedFor) {
 }
 
 TEST(AttachedObject, linksThatCannotCarry) {
-  const auto error = [](const std::string& link) {
+  const auto message_of = [](const std::string& link) {
     try {
       with_objects(robot(), {ball_on(link)});
     } catch (const ModelError& error) {
@@ -128,9 +128,9 @@ TEST(AttachedObject, linksThatCannotCarry) {
     }
     return std::string("(no error)");
   };
-  EXPECT_NE(error("hand").find("link 'hand' is not in the URDF"), std::string::npos);
-  EXPECT_NE(error("faulty").find("no such file"), std::string::npos);
-  EXPECT_EQ(error("flange"), "(no error)");
+  EXPECT_NE(message_of("hand").find("link 'hand' is not in the URDF"), std::string::npos);
+  EXPECT_NE(message_of("faulty").find("no such file"), std::string::npos);
+  EXPECT_EQ(message_of("flange"), "(no error)");
 }
 
 }  // namespace

@@ -81,7 +81,8 @@ class AttachedTest(unittest.TestCase):
         for m in node.messages[begin:]:
             self.assertIn(m.status, (ProximityArray.OK, ProximityArray.NO_CLOUD))
         node.wait_until(
-            lambda: any(
+            lambda: "model" in node.diagnostics
+            and any(
                 v.key == "attached object" and "'tool' on 'ball_link'" in v.value
                 for v in node.diagnostics["model"].values
             ),

@@ -129,7 +129,10 @@ class JointStatesTest(unittest.TestCase):
         for words, bad in wrong.items():
             begin = len(node.messages)
             repeater = self.world.repeat(10, lambda bad=bad: self.publisher.publish(bad()))
-            node.wait_until(lambda: words in node.diagnostics["pose"].message, words)
+            node.wait_until(
+                lambda: "pose" in node.diagnostics and words in node.diagnostics["pose"].message,
+                words,
+            )
             repeater.stop()
             for m in node.messages[begin:]:
                 self.assertEqual(m.status, ProximityArray.OK, m.status_text)

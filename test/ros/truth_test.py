@@ -135,6 +135,17 @@ class TruthTest(unittest.TestCase):
             lambda m: np.linalg.norm(pt.vector(pt.link(m, "ball_link").repulsion)) > 2.5 * expected,
             "three times the repulsion",
         )
+        # The query's, too; what is out of range is refused, and the last valid ones go on.
+        rospy.set_param(node.name + "/query/margin", 0.07)
+        node.wait_for(
+            lambda m: abs(pt.link(m, "ball_link").lower_bound - 0.08) < 0.0011, "the margin"
+        )
+        rospy.set_param(node.name + "/query/tolerance", -1.0)
+        node.wait_until(lambda: "~query/tolerance is -1 m" in node.log(), "the refusal")
+        rospy.set_param(node.name + "/query/tolerance", 0.0)
+        node.wait_for(
+            lambda m: abs(pt.link(m, "ball_link").lower_bound - 0.08) < 1e-4, "the tolerance"
+        )
         rospy.set_param(node.name + "/repulsion/influence_distance", 0.14)
         node.wait_for(
             lambda m: not pt.vector(pt.link(m, "ball_link").repulsion).any(), "no repulsion"

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace ist {
@@ -34,6 +35,7 @@ class ParameterReader {
   void read(const std::string& name, bool* value);
   void read(const std::string& name, std::string* value);
   void read(const std::string& name, std::vector<std::string>* value);
+  void read(const std::string& name, std::vector<std::pair<std::string, std::string>>* value);
   /// One of `choices`; `hint`, where there is one for the value found, goes behind the message.
   void read_choice(const std::string& name, const std::vector<std::string>& choices,
                    std::string* value, const std::map<std::string, std::string>& hints = {});

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -38,6 +39,15 @@ struct SourceConfig {
 /// Where link poses come from.
 enum class PoseSourceKind { kTf, kJointStates };
 
+/// Link against link.
+struct SelfCollisionConfig {
+  bool enabled = false;
+  double rate = 50.0;  ///< [Hz] of ~self_proximity; > 0
+  std::vector<std::pair<std::string, std::string>>
+      ignore;                          ///< pairs of links, besides adjacent ones
+  bool ignore_contact_at_rest = true;  ///< and those in contact with all joints at zero
+};
+
 /// Everything a node can be told. Numbers that the core knows have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
@@ -49,6 +59,7 @@ struct ServerConfig {
   RobotModelConfig model;
   QueryConfig query;
   RepulsionConfig repulsion;
+  SelfCollisionConfig self_collision;
   std::vector<SourceConfig> sources;
 };
 
@@ -69,11 +80,18 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 /// @throws ParameterError
 ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 
-/// Reads ~repulsion/* again: these may change while the node runs.
-/// @param max_distance  [m] the influence distance ends there at the latest: beyond it nothing is
-///                      measured, and the vector could not end in zero
+/// What may change while the node runs.
+struct LiveConfig {
+  QueryConfig query;  ///< but for max_distance
+  RepulsionConfig repulsion;
+};
+
+/// Reads ~query/* and ~repulsion/* again.
+/// @param max_distance  [m] as it was at the start. The influence distance ends there at the
+/// latest:
+///                      beyond it nothing is measured, and the vector could not end in zero
 /// @throws ParameterError
-RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_distance);
+LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance);
 
 /// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity; empty (no cache) without a home.
 std::string default_cache_directory();

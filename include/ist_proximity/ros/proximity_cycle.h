@@ -39,7 +39,7 @@ class ProximityCycle {
   /// @param message  overwritten
   /// @param report   its transform_problem is read; sources, poses and status are overwritten, the
   ///                 times go on
-  void run(const ros::Time& now, const CloudSources& sources, const RepulsionConfig& repulsion,
+  void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
            ist_proximity::ProximityArray* message, CycleReport* report);
 
   /// After the clock has jumped: no speed across the jump.

@@ -21,6 +21,7 @@
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/proximity_cycle.h"
 #include "ist_proximity/ros/query_service.h"
+#include "ist_proximity/ros/self_proximity.h"
 #include "ist_proximity/ros/transform_listener.h"
 
 namespace ist {
@@ -30,9 +31,10 @@ namespace ist {
 ///     nothing; at ~rate of the wall clock (a paused /clock does not silence it), or with
 ///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
-///   - ~query, with a query of its own;
+///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
 ///   - the model loader; - the listeners of tf and joint_states;
-///   - once a second: diagnostics, and ~repulsion/* read again from the parameter server, which is
+///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again from the parameter
+///   server, which is
 ///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
 ///     not every ROS 1 distribution has).
 /// The other services are answered from the queue of the node handles.
@@ -60,7 +62,7 @@ class ProximityServer {
   void publish_spheres();
   void publish_spheres_again();
   void run_diagnostics();
-  void read_repulsion_again();
+  void read_live_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool attach_object(ist_proximity::AttachObject::Request& request,
                      ist_proximity::AttachObject::Response& response);
@@ -92,7 +94,7 @@ class ProximityServer {
 
   std::mutex shared_mutex_;  // for what cycle and diagnostics threads share
   CycleReport report_;
-  RepulsionConfig repulsion_;
+  LiveConfig live_;
 
   std::mutex stop_mutex_;
   std::condition_variable stop_signal_;
@@ -100,6 +102,7 @@ class ProximityServer {
   std::condition_variable state_signal_;  ///< to stop, or a joint state has come
   std::uint64_t states_come_ = 0, states_taken_ = 0, states_skipped_ = 0;
   std::unique_ptr<QueryService> query_service_;
+  std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
   std::thread cycle_thread_, diagnostics_thread_;
 };
 

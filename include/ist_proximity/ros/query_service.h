@@ -24,9 +24,9 @@ namespace ist {
 class QueryService {
  public:
   /// @param sources, buffer  outlive this
-  /// @param repulsion        what is configured now; called from the service's thread
+  /// @param live             what is configured now; called from the service's thread
   QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
-               const tf2::BufferCore& buffer, std::function<RepulsionConfig()> repulsion);
+               const tf2::BufferCore& buffer, std::function<LiveConfig()> live);
   ~QueryService();
   QueryService(const QueryService&) = delete;
   QueryService& operator=(const QueryService&) = delete;
@@ -42,10 +42,10 @@ class QueryService {
   std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
 
-  ServerConfig config_;
+  const ServerConfig config_;
   const CloudSources& sources_;
   const tf2::BufferCore& buffer_;
-  const std::function<RepulsionConfig()> repulsion_;
+  const std::function<LiveConfig()> live_;
   ros::CallbackQueue queue_;
   ros::ServiceServer service_;
 

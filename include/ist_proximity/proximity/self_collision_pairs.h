@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ist_proximity/proximity/self_query.h"
+#include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+using NamePairs = std::vector<std::pair<std::string, std::string>>;
+
+/// Pairs of usable links that may collide: all but those where a joint connects parent and child
+/// (links without geometry in between do not count), those that never move against each other, and
+/// those that are named.
+/// @param wanted   by link of the model: a pair needs two
+/// @param ignored  in either order; names that the model lacks have no effect
+std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinematics& kinematics,
+                                           const std::vector<bool>& wanted,
+                                           const NamePairs& ignored);
+
+/// Those of the pairs that are in contact at rest: with all joints at zero, or at the limit that is
+/// nearest to it, planar and floating ones at their origin.
+std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>& model,
+                                         const Kinematics& kinematics,
+                                         const std::vector<LinkPair>& pairs);
+
+/// The <disable_collisions> of an SRDF.
+/// @throws ModelError when the text is none
+NamePairs disabled_collisions(const std::string& srdf_xml);
+
+}  // namespace ist

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// Two links of a model, by index.
+struct LinkPair {
+  std::size_t first, second;
+};
+
+/// How near two links are; points and vectors in the fixed frame.
+struct PairProximity {
+  LinkState state = LinkState::kUnknown;
+  double distance;     ///< [m] signed: of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
+  double lower_bound;  ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
+  Eigen::Vector3d p_FFirst;   ///< [m] witness on the first link; NaN unless NEAR or CONTACT
+  Eigen::Vector3d p_FSecond;  ///< [m] on the second
+  /// Unit, the way the first link should go: p_FFirst - p_FSecond = distance * direction.
+  Eigen::Vector3d direction;
+
+  PairProximity() { reset(); }
+  void reset();  ///< to UNKNOWN
+};
+
+/// Distances between links of one robot.
+///
+/// The distance of two solids is the smallest signed distance of any point of either to the other:
+/// positive when they are apart, minus the depth of the deepest point when they are not. The outer
+/// balls of a link A cover it, so a lower bound is the smallest, over balls, of the exact signed
+/// distance of the centre to the other link B less the cover radius (signed distances change no
+/// faster than points move). It is found best first in A's tree; bounds from B's tree spare most
+/// exact evaluations. A is the link that is packed closer, and where they may touch, each in turn.
+/// `distance` is measured between two real points, found by going to and fro between the surfaces
+/// from the balls that are nearest. It is not below the true distance. For links that are apart it
+/// is above `lower_bound` by no more than max_error of A's packing and the tolerance; in contact
+/// the two may differ by more. Where solids merely touch, NEAR with a lower bound below 0 may be
+/// said.
+///
+/// run() never throws. One object per thread.
+class SelfQuery {
+ public:
+  /// @param config  max_distance, tolerance (how much closer to look for `distance`) and margin are
+  ///                read
+  SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
+            const QueryConfig& config);
+  ~SelfQuery();
+  SelfQuery(SelfQuery&&) noexcept;
+  SelfQuery& operator=(SelfQuery&&) noexcept;
+
+  /// @param X_FL     by link: link frame -> fixed frame, rigid
+  /// @param known    by link: false makes its pairs UNKNOWN
+  /// @param results  one per pair, overwritten
+  void run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+           std::vector<PairProximity>* results);
+
+  const std::vector<LinkPair>& pairs() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ist

@@ -1,0 +1,100 @@
+#include "ist_proximity/proximity/self_collision_pairs.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/error.h"
+
+namespace ist {
+namespace {
+
+using Names = std::set<std::string>;
+
+// base - turn - a - (fixed) plain, without geometry - turn - b - (fixed) tip; base - slide - c,
+// whose ball is in a's at rest.
+const char* const kRobot = R"(<robot name="r">
+  <link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="a"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="plain"/>
+  <link name="b"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="tip"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="c"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="j1" type="continuous"><parent link="base"/><child link="a"/>
+    <origin xyz="0 0 1"/></joint>
+  <joint name="j2" type="fixed"><parent link="a"/><child link="plain"/></joint>
+  <joint name="j3" type="continuous"><parent link="plain"/><child link="b"/>
+    <origin xyz="0 0 1"/></joint>
+  <joint name="j4" type="fixed"><parent link="b"/><child link="tip"/><origin xyz="0 0 1"/></joint>
+  <joint name="j5" type="prismatic"><parent link="base"/><child link="c"/><origin xyz="0 0 0.6"/>
+    <axis xyz="0 0 1"/><limit lower="0.25" upper="1" effort="1" velocity="1"/></joint>
+</robot>)";
+
+struct Robot {
+  RobotDescription description = parse_urdf(kRobot, GeometrySource::kCollision, {});
+  std::shared_ptr<const RobotModel> model = build_robot_model(description, {});
+  Kinematics kinematics{description};
+
+  std::vector<LinkPair> pairs(const NamePairs& ignored = {}) const {
+    return self_collision_pairs(*model, kinematics, std::vector<bool>(model->links.size(), true),
+                                ignored);
+  }
+  Names names(const std::vector<LinkPair>& pairs) const {
+    Names result;
+    for (const LinkPair& pair : pairs) {
+      result.insert(model->links[pair.first].name + "-" + model->links[pair.second].name);
+    }
+    return result;
+  }
+};
+
+TEST(SelfCollisionPairs, leavesOutAdjacentAndRigidOnes) {
+  const Robot robot;
+  // Adjacent: base-a, a-b (plain does not count), b-tip (rigid as well), base-c.
+  const Names all = {"base-b", "base-tip", "a-tip", "a-c", "b-c", "tip-c"};
+  EXPECT_EQ(robot.names(robot.pairs()), all);
+  const Names fewer = {"base-b", "base-tip", "a-tip", "tip-c"};
+  EXPECT_EQ(robot.names(robot.pairs({{"c", "a"}, {"b", "c"}, {"b", "nobody"}})), fewer);
+  std::vector<bool> wanted(robot.model->links.size(), true);
+  wanted[1] = false;  // a
+  ASSERT_EQ(robot.model->links[1].name, "a");
+  const Names without_a = {"base-b", "base-tip", "b-c", "tip-c"};
+  EXPECT_EQ(robot.names(self_collision_pairs(*robot.model, robot.kinematics, wanted, {})),
+            without_a);
+}
+
+TEST(SelfCollisionPairs, siblingsAreNotAdjacent) {
+  // Two fingers on a link without geometry.
+  const RobotDescription hand = parse_urdf(
+      R"(<robot name="r"><link name="hand"/>
+  <link name="left"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="right"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="l" type="continuous"><parent link="hand"/><child link="left"/></joint>
+  <joint name="r" type="continuous"><parent link="hand"/><child link="right"/></joint></robot>)",
+      GeometrySource::kCollision, {});
+  const auto model = build_robot_model(hand, {});
+  EXPECT_EQ(self_collision_pairs(*model, Kinematics(hand), {true, true}, {}).size(), 1U);
+}
+
+TEST(SelfCollisionPairs, inContactAtRest) {
+  const Robot robot;
+  // c's lower limit brings it to 0.85 m, into a's ball at 1 m.
+  const auto found = in_contact_at_rest(robot.model, robot.kinematics, robot.pairs());
+  EXPECT_EQ(robot.names(found), Names{"a-c"});
+}
+
+TEST(SelfCollisionPairs, srdf) {
+  const NamePairs expected = {{"a", "b"}, {"c", "a"}};
+  EXPECT_EQ(disabled_collisions("<robot name='r'><group name='g'/>"
+                                "<disable_collisions link1='a' link2='b' reason='Never'/>"
+                                "<disable_collisions link1='c' link2='a'/></robot>"),
+            expected);
+  EXPECT_THROW(disabled_collisions("<robot"), ModelError);
+  EXPECT_THROW(disabled_collisions("<other/>"), ModelError);
+  EXPECT_THROW(disabled_collisions("<robot><disable_collisions link1='a'/></robot>"), ModelError);
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,232 @@
+#include "ist_proximity/proximity/self_query.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/random_links.h"
+#include "support/scene.h"
+#include "support/shape_oracle.h"
+
+namespace ist {
+namespace {
+
+constexpr double kMaxError = 0.005;       // [m]
+constexpr std::size_t kClosedLinks = 17;  // of random_links; the others have holes
+
+// Points of a link, on its surface and inside, link frame.
+std::vector<Eigen::Vector3d> points_of(const LinkGeometry& link, test::Rng* rng) {
+  std::vector<Eigen::Vector3d> points;
+  for (const GeometryElement& element : link) {
+    if (const auto* mesh = std::get_if<TriangleMesh>(&element.shape)) {
+      for (std::size_t t = 0; t < mesh->triangles.size(); ++t) {
+        const double a = test::uniform(rng, 0, 1), b = test::uniform(rng, 0, 1 - a);
+        points.push_back(element.X_LE * ((1 - a - b) * mesh->corner(t, 0) + a * mesh->corner(t, 1) +
+                                         b * mesh->corner(t, 2)));
+      }
+      for (const Eigen::Vector3d& v : mesh->vertices) points.push_back(element.X_LE * v);
+    }
+  }
+  for (int i = 0; i < 600; ++i) {
+    const Eigen::Vector3d p = test::random_vector(rng, 0.25);
+    if (test::oracle_signed_distance(link, p) <= 0.0) points.push_back(p);
+  }
+  return points;
+}
+
+// The smallest signed distance to B of any point of A that a search at random finds: not below the
+// true one.
+double found_distance(const LinkGeometry& a, const LinkGeometry& b, const Eigen::Isometry3d& X_BA,
+                      test::Rng* rng) {
+  double best = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  const auto attempt = [&](const Eigen::Vector3d& p_A) {
+    const double distance = test::oracle_signed_distance(b, X_BA * p_A);
+    if (distance >= best) return false;
+    best = distance;
+    at = p_A;
+    return true;
+  };
+  for (const Eigen::Vector3d& p_A : points_of(a, rng)) attempt(p_A);
+  double step = 0.05;
+  for (int i = 0; i < 300; ++i) {  // downhill, within A
+    const Eigen::Vector3d p_A = at + test::random_vector(rng, step);
+    const bool better = test::oracle_signed_distance(a, p_A) <= 0.0 && attempt(p_A);
+    step *= better ? 1.2 : 0.95;
+  }
+  return best;
+}
+
+struct Scene {
+  std::vector<LinkGeometry> links;
+  std::shared_ptr<const RobotModel> model;
+  std::vector<LinkPair> pairs;
+  std::vector<Eigen::Isometry3d> X_FL;
+};
+
+Scene random_scene(test::Rng* rng, std::size_t count) {
+  Scene scene;
+  scene.links = test::random_links(rng);
+  scene.links.resize(std::min(count, scene.links.size()));
+  scene.model = test::model_of(scene.links, kMaxError);
+  for (std::size_t i = 0; i < scene.links.size(); ++i) {
+    for (std::size_t k = i + 1; k < scene.links.size(); ++k) scene.pairs.push_back({i, k});
+  }
+  scene.X_FL.resize(scene.links.size());
+  return scene;
+}
+
+QueryConfig config() {
+  QueryConfig result;
+  result.max_distance = 0.25;
+  return result;
+}
+
+// Both witnesses are where they are said to be, and `distance` apart.
+void check_witnesses(const Scene& scene, const LinkPair& pair, const PairProximity& result) {
+  const auto signed_distance = [&](std::size_t link, const Eigen::Vector3d& p_F) {
+    return test::oracle_signed_distance(scene.links[link], scene.X_FL[link].inverse() * p_F);
+  };
+  EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
+  const Eigen::Vector3d apart = result.p_FFirst - result.p_FSecond;
+  EXPECT_LT((apart - result.distance * result.direction).norm(), 1e-7);
+  // One of them is a point of its link with that signed distance to the other.
+  const double of_first = signed_distance(pair.second, result.p_FFirst);
+  const double of_second = signed_distance(pair.first, result.p_FSecond);
+  const bool first_searched = std::abs(of_first - result.distance) < 1e-7 &&
+                              signed_distance(pair.first, result.p_FFirst) < 1e-7;
+  const bool second_searched = std::abs(of_second - result.distance) < 1e-7 &&
+                               signed_distance(pair.second, result.p_FSecond) < 1e-7;
+  EXPECT_TRUE(first_searched || second_searched)
+      << of_first << " " << of_second << " " << result.distance;
+}
+
+TEST(SelfQuery, randomLinksAgainstSearch) {
+  test::Rng rng(11);
+  Scene scene = random_scene(&rng, kClosedLinks);
+  SelfQuery query(scene.model, scene.pairs, config());
+  std::vector<PairProximity> results;
+  int near = 0, contacts = 0, clear = 0;
+  for (int trial = 0; trial < 3; ++trial) {
+    for (auto& X : scene.X_FL) X = test::random_pose(&rng, 0.22);
+    query.run(scene.X_FL, std::vector<bool>(scene.links.size(), true), &results);
+    ASSERT_EQ(results.size(), scene.pairs.size());
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      const auto [first, second] = scene.pairs[i];
+      const PairProximity& result = results[i];
+      // In contact the depths differ; the deeper point counts.
+      const Eigen::Isometry3d X = scene.X_FL[second].inverse() * scene.X_FL[first];
+      const double there = found_distance(scene.links[first], scene.links[second], X, &rng);
+      const double back =
+          found_distance(scene.links[second], scene.links[first], X.inverse(), &rng);
+      const std::string what = "links " + std::to_string(first) + ", " + std::to_string(second);
+      if (result.state == LinkState::kClear) {
+        ++clear;
+        EXPECT_GE(std::min(there, back), 0.25) << what;
+        EXPECT_EQ(result.lower_bound, 0.25);
+        EXPECT_EQ(result.distance, std::numeric_limits<double>::infinity());
+        continue;
+      }
+      EXPECT_LE(result.lower_bound, std::min(there, back) + 1e-9) << what;
+      EXPECT_LE(result.lower_bound, result.distance) << what;
+      check_witnesses(scene, scene.pairs[i], result);
+      if (result.state == LinkState::kContact) {  // as the witnesses prove
+        ++contacts;
+        EXPECT_LT(result.distance, 0.0) << what;
+        continue;
+      }
+      ++near;
+      EXPECT_EQ(result.state, LinkState::kNear) << what;
+      EXPECT_GE(result.distance, 0.0) << what;
+      EXPECT_GT(std::min(there, back), -0.003) << what;  // crossing plates of 2 mm may pass
+      if (result.lower_bound > kMaxError) {
+        EXPECT_LE(result.distance, result.lower_bound + kMaxError + 0.001 + 1e-6) << what;
+      }
+    }
+  }
+  EXPECT_GT(near, 50);
+  EXPECT_GT(contacts, 30);
+  EXPECT_GT(clear, 5);
+}
+
+TEST(SelfQuery, spheresAreExact) {
+  test::Rng rng(12);
+  std::vector<Shape> shapes = {Sphere{0.05}, Sphere{0.1}, Box{{0.1, 0.2, 0.3}},
+                               Cylinder{0.05, 0.3}};
+  const auto model = test::make_model(shapes, kMaxError);
+  const std::vector<LinkPair> pairs = {{0, 1}, {2, 0}, {0, 3}};
+  SelfQuery query(model, pairs, config());
+  std::vector<PairProximity> results;
+  for (int trial = 0; trial < 100; ++trial) {
+    std::vector<Eigen::Isometry3d> X_FL;
+    for (int i = 0; i < 4; ++i) X_FL.push_back(test::random_pose(&rng, 0.25));
+    query.run(X_FL, std::vector<bool>(4, true), &results);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const std::size_t other = pairs[i].first == 0 ? pairs[i].second : pairs[i].first;
+      const Eigen::Vector3d center = X_FL[other].inverse() * X_FL[0].translation();
+      const LinkGeometry solid = test::one(shapes[other]);
+      const double truth = test::oracle_signed_distance(solid, center) - 0.05;
+      if (results[i].state != LinkState::kNear || truth < 1e-3) continue;
+      EXPECT_NEAR(results[i].distance, truth, 1e-6);
+      EXPECT_NEAR(results[i].lower_bound, truth, 1e-5);
+      EXPECT_LE(results[i].lower_bound, truth + 1e-9);
+    }
+  }
+}
+
+TEST(SelfQuery, linksWithHolesHaveBoundsToo) {
+  test::Rng rng(13);
+  Scene scene = random_scene(&rng, 100);
+  SelfQuery query(scene.model, scene.pairs, config());
+  std::vector<PairProximity> results;
+  for (auto& X : scene.X_FL) X = test::random_pose(&rng, 0.25);
+  query.run(scene.X_FL, std::vector<bool>(scene.links.size(), true), &results);
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const auto [first, second] = scene.pairs[i];
+    if (second < kClosedLinks || results[i].state == LinkState::kClear) continue;
+    const Eigen::Isometry3d X = scene.X_FL[second].inverse() * scene.X_FL[first];
+    const double there = found_distance(scene.links[first], scene.links[second], X, &rng);
+    const double back = found_distance(scene.links[second], scene.links[first], X.inverse(), &rng);
+    EXPECT_LE(results[i].lower_bound, std::min(there, back) + 1e-9) << first << ", " << second;
+  }
+}
+
+TEST(SelfQuery, oneInsideTheOther) {
+  const auto model = test::make_model({Box{{1.0, 1.0, 1.0}}, Sphere{0.05}}, 0.02);
+  for (const LinkPair pair : {LinkPair{0, 1}, LinkPair{1, 0}}) {
+    SelfQuery query(model, {pair}, config());
+    std::vector<PairProximity> results;
+    query.run(std::vector<Eigen::Isometry3d>(2, Eigen::Isometry3d::Identity()), {true, true},
+              &results);
+    EXPECT_EQ(results[0].state, LinkState::kContact);
+    EXPECT_LE(results[0].lower_bound, -0.5);
+  }
+}
+
+TEST(SelfQuery, unknownAndMargin) {
+  const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}, Sphere{0.1}}, kMaxError);
+  std::vector<Eigen::Isometry3d> X_FL(3, Eigen::Isometry3d::Identity());
+  X_FL[1].translation().x() = 0.3;
+  X_FL[2].translation().x() = 5.0;
+  QueryConfig with_margin = config();
+  with_margin.margin = 0.02;
+  SelfQuery query(model, {{0, 1}, {1, 2}}, with_margin);
+  std::vector<PairProximity> results;
+  query.run(X_FL, {true, true, true}, &results);
+  EXPECT_NEAR(results[0].distance, 0.1, 1e-6);
+  EXPECT_NEAR(results[0].lower_bound, 0.08, 1e-5);
+  EXPECT_TRUE(results[0].direction.isApprox(-Eigen::Vector3d::UnitX(), 1e-6));
+  EXPECT_EQ(results[1].state, LinkState::kClear);
+  query.run(X_FL, {true, false, true}, &results);
+  for (const PairProximity& result : results) {
+    EXPECT_EQ(result.state, LinkState::kUnknown);
+    EXPECT_TRUE(std::isnan(result.distance));
+    EXPECT_EQ(result.lower_bound, -std::numeric_limits<double>::infinity());
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""~self_proximity: truth, contact, pairs that are left out, and what is missing."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from joint_states_test import ARM, JointStatesTest, joint_state
+from proximity_testing import LinkProximity, ProximityArray
+
+SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
+
+
+class SelfProximityNode(pt.ProximityNode):
+    """Collects ~self_proximity in place of ~proximity."""
+
+    def subscribe(self, topic, kind, callback):
+        return super().subscribe("self_" + topic if topic == "proximity" else topic, kind, callback)
+
+
+class SelfProximityTest(unittest.TestCase):
+    def start(self, case, **parameters):
+        self.namespace = "/self_" + case
+        self.q = {"turn": 0.7, "slide": 0.1}
+        publisher = JointStatesTest.joint_publisher(self.namespace)
+        self.joints = pt.Repeater(100, lambda: publisher.publish(joint_state(self.q)))
+        parameters = {
+            "pose_source": "joint_states",
+            "self_collision/enabled": True,
+            "max_distance": 2.0,
+            **parameters,
+        }
+        self.node = SelfProximityNode(self.namespace, parameters, ARM)
+        return self.node
+
+    def tearDown(self):
+        self.joints.stop()
+        self.assertEqual(self.node.stop(), 0)
+
+    def check_vectors(self, one):
+        apart = pt.vector(one.point_on_link) - pt.vector(one.point_on_obstacle)
+        direction = pt.vector(one.direction)
+        self.assertAlmostEqual(np.linalg.norm(direction), 1.0, 6)
+        np.testing.assert_allclose(apart, one.distance * direction, atol=1e-6)
+
+    def test_truth(self):
+        node = self.start("truth")
+        for slide in (0.1, 0.4, 0.0):
+            self.q = {"turn": 0.7, "slide": slide}
+            truth = 2.5 * slide + 0.25  # between the ball and the box that goes the other way
+            message = node.wait_for(
+                lambda m: m.status == ProximityArray.OK
+                and abs(pt.link(m, "ball_link").distance - truth) < 0.0011,
+                "a distance of %.3f m" % truth,
+            )
+            self.assertEqual(message.header.frame_id, "base")
+            self.assertEqual(message.sources, [])
+            for name, other in (("ball_link", "box_link"), ("box_link", "ball_link")):
+                one = pt.link(message, name)
+                self.assertEqual(one.state, LinkProximity.NEAR)
+                self.assertEqual(one.source, other)
+                self.assertLessEqual(one.lower_bound, truth + 1e-6)
+                self.assertGreater(one.lower_bound, truth - 0.007)
+                self.check_vectors(one)
+            # The ball should go along the slide.
+            expected = [np.cos(0.7), np.sin(0.7), 0.0]
+            one = pt.link(message, "ball_link")
+            np.testing.assert_allclose(pt.vector(one.direction), expected, atol=1e-3)
+
+        self.q = {"turn": 0.7, "slide": -0.2}  # the ball in the box
+        message = node.wait_for(
+            lambda m: pt.states(m) == [LinkProximity.CONTACT] * 2, "contact of both"
+        )
+        one = pt.link(message, "ball_link")
+        self.assertLess(one.lower_bound, one.distance)
+        self.assertLess(one.distance, 0.0)
+        self.check_vectors(one)
+
+        self.joints.paused = True
+        message = node.wait_for_status(ProximityArray.NO_POSE, "'turn'")
+        self.assertTrue(pt.all_unknown(message))
+
+    def test_left_out(self):
+        for case, parameters in {
+            "by_list": {"self_collision/ignore": [["ball_link", "box_link"]]},
+            "by_srdf": {},
+        }.items():
+            if case == "by_srdf":
+                rospy.set_param("/self_by_srdf/robot_description_semantic", SRDF)
+            with self.subTest(case):
+                node = self.start(case, **parameters)
+                message = node.wait_for_status(ProximityArray.OK)
+                self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+                if case == "by_list":
+                    self.tearDown()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("self_proximity_test")
+    rostest.rosrun("ist_proximity", "self_proximity_test", SelfProximityTest, sys.argv)
