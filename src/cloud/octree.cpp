@@ -159,7 +159,7 @@ std::string read_header(std::istream& file, Header* header) {
 
 std::string read_octree(const OctreeData& data, Octree* octree) {
   std::size_t left = 0;
-  const std::string fault = read(data, octree, &left);
+  std::string fault = read(data, octree, &left);
   if (!fault.empty() || left == 0) return fault;
   return "the tree ends " + std::to_string(left) + " bytes before its data of " +
          std::to_string(data.size) + " bytes does.";

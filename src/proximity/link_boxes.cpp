@@ -1,10 +1,11 @@
 // The part of a link's query that measures against solid boxes.
 //
 // While a box is outside the link, its distance is exact: triangle against box, or primitive
-// against box. Where they overlap, the obstacle is every point of the box, and the answer is the
-// depth of the deepest one found: its exact signed distance, so that the deepest of all is at least
-// as deep. How much deeper it can be, branch and bound says: the signed distance at the middle of a
-// part of the box bounds all of that part.
+// against box. A box that touches no triangle of a mesh is inside or outside as a whole; if the
+// mesh has holes, the winding number at the box's middle decides. Where they overlap, the obstacle
+// is every point of the box, and the answer is the depth of the deepest one found: its exact signed
+// distance, so that the deepest of all is at least as deep. How much deeper it can be, branch and
+// bound says: the signed distance at the middle of a part of the box bounds all of that part.
 
 #include <algorithm>
 #include <array>
@@ -23,6 +24,9 @@ constexpr double kDepthResolution = 5e-4;
 
 // Where box and surface meet, steps of these lengths inward decide whether they overlap. [m]
 constexpr std::array<double, 3> kSteps = {1e-6, 1e-4, 1e-3};
+
+// Enough to find out whether something touches. [m]
+constexpr double kTouching = 1e-9;
 
 Eigen::AlignedBox3d child_box(const BoxNode& node, int k) {
   return {Eigen::Vector3d(node.min_x[k], node.min_y[k], node.min_z[k]),
@@ -162,27 +166,23 @@ void LinkQuery::find_overlap_in_tile(std::int32_t tile) {
       return;
     }
     const Eigen::AlignedBox3d box = boxes.box(lane);
+    const Eigen::Vector3d middle_L = X_LO_ * box.center();
     const double near = interior + radius_of(box);
-    if (link_->tree.outer_distance(X_LO_ * box.center(), near) > near) continue;
+    const double outer = link_->tree.outer_distance(middle_L, interior);
+    if (outer > near) continue;
+    ++statistics_->exact_evaluations;
+    const BoxDistance found =
+        link_->solid.distance_to_box(box, X_OL_, std::max(nearest_.exact.distance, kTouching));
+    if (found.distance > 0.0 && (outer > interior || !link_->solid.is_inside(middle_L))) {
+      take_outside(found, tile, lane);
+      continue;
+    }
     const BoxCell whole = make_cell(box, tile, lane);
     if (whole.bound >= depth_threshold()) {
       drop(whole.bound);
       continue;
     }
-    // Whether they overlap: no side of the link comes into the box, and its middle is outside.
-    ++statistics_->exact_evaluations;
-    const BoxDistance found =
-        link_->solid.distance_to_box(box, X_OL_, std::max(nearest_.exact.distance, 1e-9));
-    const bool is_apart = found.distance > 0.0 && !link_->solid.is_inside(X_LO_ * box.center());
-    if (is_apart && link_->solid.is_closed()) {
-      take_outside(found, tile, lane);
-      continue;
-    }
-    if (found.distance == 0.0) {
-      take_overlap(found, box, tile, lane);
-    } else {
-      take_outside(found, tile, lane);
-    }
+    if (found.distance == 0.0) take_overlap(found, box, tile, lane);
     find_depth_in_box(whole, tile, lane);
   }
 }

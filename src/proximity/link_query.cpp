@@ -161,7 +161,8 @@ bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline
   deadline_ = deadline;
   statistics_ = statistics;
   dropped_ = kInfinity;
-  cells_left_ = kMaxCells;
+  // With holes, cells bound little: see Solid::distance_floor.
+  cells_left_ = link_->solid.is_closed() ? kMaxCells : kMaxCells / 8;
   bool stopped = false;
   for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
     for (const Part part : {Part::kPoints, Part::kBoxes}) {

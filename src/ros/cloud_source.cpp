@@ -22,11 +22,11 @@ const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 }  // namespace
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
-                         const tf2::BufferCore& buffer, ros::Publisher filtered)
+                         const tf2::BufferCore& buffer, const ros::Publisher& filtered)
     : config_(config),
       is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
-      filtered_(std::move(filtered)),
+      filtered_(filtered),
       ingest_(ingest_config(config)) {
   facts_.name = config.name;
   facts_.is_file = !config.file.empty();
@@ -114,7 +114,7 @@ std::string CloudSource::place_map(const ros::Time& time, double max_age,
     return look_up(buffer_, fixed, frame, time, &X_FM);
   }
   ros::Time stamp;
-  const std::string problem = look_up(buffer_, fixed, frame, ros::Time(), &X_FM, &stamp);
+  std::string problem = look_up(buffer_, fixed, frame, ros::Time(), &X_FM, &stamp);
   if (!problem.empty() || stamp.isZero()) return problem;
   const double age = seconds_between(stamp, time);
   if (age <= max_age) return "";
@@ -355,7 +355,7 @@ std::string CloudSource::place(const Measurement& waiting, Placement* placement)
 std::string CloudSource::ingest(const Measurement& waiting) {
   const ros::Time& stamp = waiting.header().stamp;
   Placement placement;
-  const std::string problem = place(waiting, &placement);
+  std::string problem = place(waiting, &placement);
   if (!problem.empty()) return problem;
   const std::shared_ptr<SourceSnapshot>& shared = writable();
   SourceSnapshot& snapshot = *shared;

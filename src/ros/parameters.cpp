@@ -39,6 +39,7 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
 void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
   const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kScan, SourceType::kMap};
   std::vector<std::string> names;
+  names.reserve(types.size());
   for (const SourceType one : types) names.emplace_back(message_type(one));
   std::string name = message_type(*type);
   reader->read_choice(prefix + "type", names, &name);
@@ -221,7 +222,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 
 ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   std::vector<std::string> warnings;
-  const ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
+  ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
   for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
   return config;
 }

@@ -55,7 +55,7 @@ class CloudSource {
   /// @param buffer    outlives this
   /// @param filtered  where what queries see is published while somebody listens
   CloudSource(const SourceConfig& config, ros::NodeHandle nh, const tf2::BufferCore& buffer,
-              ros::Publisher filtered);
+              const ros::Publisher& filtered);
   ~CloudSource();
   CloudSource(const CloudSource&) = delete;
   CloudSource& operator=(const CloudSource&) = delete;
