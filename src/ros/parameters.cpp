@@ -4,10 +4,10 @@
 #include <ros/param.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <sstream>
 
+#include "ist_proximity/packing/packing_cache.h"
 #include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
@@ -168,13 +168,6 @@ RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_dis
   read_repulsion(&reader, max_distance, &repulsion);
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   return repulsion;
-}
-
-std::string default_cache_directory() {
-  const char* ros_home = std::getenv("ROS_HOME");
-  if (ros_home && *ros_home) return std::string(ros_home) + "/ist_proximity";
-  const char* home = std::getenv("HOME");
-  return home && *home ? std::string(home) + "/.ros/ist_proximity" : std::string();
 }
 
 }  // namespace ist

@@ -60,7 +60,4 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 /// @throws ParameterError
 RepulsionConfig read_repulsion(const ros::NodeHandle& private_nh, double max_distance);
 
-/// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity; empty (no cache) without a home.
-std::string default_cache_directory();
-
 }  // namespace ist
