@@ -30,6 +30,8 @@ class BallSearch {
              std::size_t seen = 0) const;
 
   std::size_t size() const { return balls_.size(); }
+  const Eigen::Vector3d& center(std::uint32_t ball) const { return balls_[ball].center; }
+  double weight(std::uint32_t ball) const { return balls_[ball].weight; }
 
  private:
   struct Item {

@@ -15,13 +15,19 @@ enum class Cell { kOutside, kInside, kBoundary };
 class InteriorCover {
  public:
   InteriorCover(const TriangleBvh& bvh, const MedialBallFinder& finder, const PackingConfig& config,
-                Packing* packing)
-      : bvh_(bvh), finder_(finder), config_(config), packing_(*packing) {
+                BallSearch* balls, Packing* packing)
+      : bvh_(bvh),
+        finder_(finder),
+        config_(config),
+        // Nearer than the surface is to the balls, the interior is of no use.
+        target_(std::max(config.max_error, packing->certificate.max_gap)),
+        balls_(*balls),
+        packing_(*packing) {
     for (const Ball& ball : packing_.balls) search_.add(ball.center, ball.cover_radius);
   }
 
   bool run(const PackingProgress& progress) {
-    packing_.certificate.interior_gap = config_.max_error;
+    packing_.certificate.interior_gap = target_;
     const Eigen::AlignedBox3d box = bvh_.bounds();
     if (box.sizes().minCoeff() <= 0.0) return true;  // flat: no interior
     // Nearly cubic cells, for a long thin link too.
@@ -53,11 +59,11 @@ class InteriorCover {
                                             (k & 4) != 0U ? half.z() : -half.z());
     }
     const BallSearch::Match match = search_.best(corners.data(), 8, hint);
-    if (match.cost <= config_.max_error) return;
+    if (match.cost <= target_) return;
     const double radius = half.norm();
     const Cell kind = classify(center, radius);
     if (kind == Cell::kOutside) return;
-    if (kind == Cell::kBoundary && 2.0 * radius <= config_.max_error) return;
+    if (kind == Cell::kBoundary && 2.0 * radius <= target_) return;
     if (kind == Cell::kInside && fill(center, radius, match)) return;
     for (const Eigen::Vector3d& corner : corners) {
       visit(0.5 * (center + corner), 0.5 * half, match.ball);
@@ -67,15 +73,15 @@ class InteriorCover {
   // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
   bool fill(const Eigen::Vector3d& center, double radius, const BallSearch::Match& match) {
     const double uncovered = search_.best(&center, 1, match.ball).cost;
-    if (uncovered <= 0.5 * config_.max_error && 2.0 * radius > 0.5 * config_.max_error)
-      return false;
+    if (uncovered <= 0.5 * target_ && 2.0 * radius > 0.5 * target_) return false;
     if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
       return true;
     }
-    const MedialBallFinder::InnerBall ball = finder_.around(center, 0.1 * config_.max_error);
+    const MedialBallFinder::InnerBall ball = finder_.around(center, 0.1 * target_);
     packing_.balls.push_back({ball.center, ball.radius, ball.radius});
     search_.add(ball.center, ball.radius);
+    balls_.add(ball.center, ball.radius);
     return false;
   }
 
@@ -96,16 +102,18 @@ class InteriorCover {
   const TriangleBvh& bvh_;
   const MedialBallFinder& finder_;
   const PackingConfig& config_;
+  const double target_;  // [m]
+  BallSearch& balls_;
   Packing& packing_;
-  BallSearch search_;
+  BallSearch search_;  // outer balls
 };
 
 }  // namespace
 
 bool cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                    const PackingConfig& config, const PackingProgress& progress,
+                    const PackingConfig& config, const PackingProgress& progress, BallSearch* balls,
                     Packing* packing) {
-  return InteriorCover(bvh, finder, config, packing).run(progress);
+  return InteriorCover(bvh, finder, config, balls, packing).run(progress);
 }
 
 }  // namespace ist

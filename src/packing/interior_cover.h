@@ -12,10 +12,13 @@ namespace ist {
 /// An octree over the mesh's box. A cell that the surface crosses is done once its diagonal is at
 /// most the gap wanted (its interior points are that near to the surface, which is covered); an
 /// empty cell is outside, or near enough to an outer ball, or gets a ball of its own.
-/// @param packing  certified by SurfaceCover; balls are added, `interior_gap` is set to max_error
-///                 (larger where max_spheres leaves interior cells uncovered)
+/// @param balls    inner balls, weighted by inner radius; those added are added here too
+/// @param packing  certified by SurfaceCover; balls are added, `interior_gap` is set to max_error,
+///                 or max_gap where that is larger (or more still: where max_spheres leaves
+///                 interior cells uncovered)
 /// @returns false when `progress` stopped it: nothing is proven then of the interior
 bool cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                    const PackingConfig& config, const PackingProgress& progress, Packing* packing);
+                    const PackingConfig& config, const PackingProgress& progress, BallSearch* balls,
+                    Packing* packing);
 
 }  // namespace ist

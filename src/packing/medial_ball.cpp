@@ -28,31 +28,49 @@ std::vector<Eigen::Vector3d> probe_directions() {
 
 }  // namespace
 
-MedialBallFinder::MedialBallFinder(const TriangleBvh& bvh, bool is_closed)
-    : bvh_(bvh), is_closed_(is_closed), size_(bvh.bounds().sizes().norm()) {}
+MedialBallFinder::MedialBallFinder(const TriangleBvh& bvh, bool is_closed, const BallSearch* taken)
+    : bvh_(bvh), is_closed_(is_closed), taken_(taken), size_(bvh.bounds().sizes().norm()) {}
+
+MedialBallFinder::Obstacle MedialBallFinder::nearest(const Eigen::Vector3d& x) const {
+  const ClosestPoint surface = bvh_.closest(x);
+  Obstacle obstacle{surface.point, surface.point, 0.0, std::sqrt(surface.distance_sq)};
+  if (taken_ == nullptr || taken_->size() == 0) return obstacle;
+  const BallSearch::Match match = taken_->best(&x, 1, 0);
+  if (match.cost >= obstacle.distance) return obstacle;
+  obstacle.center = taken_->center(match.ball);
+  obstacle.radius = taken_->weight(match.ball);
+  obstacle.distance = match.cost;
+  const Eigen::Vector3d away = x - obstacle.center;
+  const double norm = away.norm();
+  obstacle.contact = obstacle.center;
+  if (norm > 0.0) obstacle.contact += obstacle.radius / norm * away;
+  return obstacle;
+}
 
 MedialBallFinder::InnerBall MedialBallFinder::along(const Eigen::Vector3d& s,
                                                     const Eigen::Vector3d& direction, double slack,
                                                     Eigen::Vector3d* contact) const {
-  // Every surface point q bounds t: the ball about s + t d that reaches to within slack of s must
-  // not hold q. Taking the nearest q again and again shrinks t to the largest that all allow.
+  // Every obstacle bounds t: the ball about s + t d that reaches to within slack of s must not
+  // reach into it. Taking the nearest again and again shrinks t to the largest that all allow.
   double t = size_ + slack;
   const double accuracy = 1e-3 * slack;
   for (int i = 0; i < kMaxShrinks; ++i) {
     const Eigen::Vector3d center = s + t * direction;
-    const ClosestPoint nearest = bvh_.closest(center);
-    const double radius = std::sqrt(nearest.distance_sq);
-    *contact = nearest.point;
-    if (radius >= t - slack - accuracy) return {center, radius};
-    const Eigen::Vector3d to_contact = nearest.point - s;
-    const double along_ray = direction.dot(to_contact) - slack;
-    if (along_ray <= 0.0) return {center, radius};
-    t = std::max(slack, (to_contact.squaredNorm() - slack * slack) / (2.0 * along_ray));
+    const Obstacle obstacle = nearest(center);
+    *contact = obstacle.contact;
+    const InnerBall ball{center, std::max(0.0, obstacle.distance)};
+    if (obstacle.distance >= t - slack - accuracy) return ball;
+    // |s + t d - q| >= t - slack + r, solved for t.
+    const Eigen::Vector3d from_center = s - obstacle.center;
+    const double reach = obstacle.radius - slack;
+    const double along_ray = reach - direction.dot(from_center);
+    if (along_ray <= 0.0) return ball;
+    t = std::max(slack, (from_center.squaredNorm() - reach * reach) / (2.0 * along_ray));
   }
   const Eigen::Vector3d center = s + t * direction;
-  const ClosestPoint nearest = bvh_.closest(center);
-  *contact = nearest.point;
-  return {center, std::sqrt(nearest.distance_sq)};
+  const Obstacle obstacle = nearest(center);
+  *contact = obstacle.contact;
+  return {center, std::max(0.0, obstacle.distance)};
 }
 
 MedialBallFinder::InnerBall MedialBallFinder::turned(const Eigen::Vector3d& s,
@@ -103,11 +121,11 @@ MedialBallFinder::InnerBall MedialBallFinder::at_surface(const Eigen::Vector3d& 
 }
 
 MedialBallFinder::InnerBall MedialBallFinder::around(const Eigen::Vector3d& x, double slack) const {
-  const ClosestPoint nearest = bvh_.closest(x);
-  const double depth = std::sqrt(nearest.distance_sq);
+  const Obstacle obstacle = nearest(x);
+  const double depth = obstacle.distance;
   if (depth < 1e-9) return {x, 0.0};
   Eigen::Vector3d contact;
-  const InnerBall grown = along(nearest.point, (x - nearest.point) / depth, slack, &contact);
+  const InnerBall grown = along(obstacle.contact, (x - obstacle.contact) / depth, slack, &contact);
   if (grown.radius > (grown.center - x).norm() && bvh_.is_inside(grown.center) && is_inner(grown)) {
     return grown;
   }
@@ -118,14 +136,24 @@ MedialBallFinder::InnerBall MedialBallFinder::around(const Eigen::Vector3d& x, d
 MedialBallFinder::InnerBall MedialBallFinder::pulled_inside(const Eigen::Vector3d& s,
                                                             InnerBall ball) const {
   const double gap = std::max(0.0, (ball.center - s).norm() - ball.radius);
-  if (!bvh_.is_inside(ball.center)) return {s, 0.0};
+  if (ball.radius <= 0.0 || !bvh_.is_inside(ball.center)) return {s, 0.0};
   for (int i = 0; i < 20 && ball.radius > 0.0; ++i) {
     if (is_inner(ball)) return ball;
     const double radius = 0.75 * ball.radius;
     ball.center = s + (ball.center - s) * ((radius + gap) / (ball.radius + gap));
-    ball.radius = std::min(radius, std::sqrt(bvh_.closest(ball.center).distance_sq));
+    ball.radius = std::clamp(nearest(ball.center).distance, 0.0, radius);
   }
   return {s, 0.0};
+}
+
+MedialBallFinder::InnerBall MedialBallFinder::without_bulge(const InnerBall& ball) const {
+  InnerBall smaller = ball;
+  if (!bvh_.is_inside(ball.center)) smaller.radius = 0.0;
+  for (int i = 0; i < 20 && smaller.radius > 0.0; ++i) {
+    if (is_inner(smaller)) return smaller;
+    smaller.radius *= 0.75;
+  }
+  return {ball.center, 0.0};
 }
 
 bool MedialBallFinder::is_inner(const InnerBall& ball) const {

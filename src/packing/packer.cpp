@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "geometry/boundary_edges.h"
 #include "interior_cover.h"
@@ -9,12 +10,16 @@
 #include "ist_proximity/geometry/tessellation.h"
 #include "medial_ball.h"
 #include "surface_cover.h"
+#include "volume_filler.h"
 
 namespace ist {
 namespace {
 
 // The share of the wanted error that an inscribed prism may take.
 constexpr double kTessellationShare = 0.1;
+
+// Smaller holes than this share of the wanted error are left as they are.
+constexpr double kHoleShare = 0.5;
 
 // About how the time goes.
 constexpr double kSurfaceShare = 0.6;
@@ -52,13 +57,18 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
                   const PackingProgress& progress) {
   if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
   const TriangleBvh bvh(mesh);
-  const MedialBallFinder finder(bvh, is_closed_mesh(mesh));
-  SurfaceCover cover(mesh, finder);
-  cover.refine(config, share_of(progress, 0.0, kSurfaceShare));
+  BallSearch balls;
+  const bool may_overlap = config.order == PackingOrder::kMedial;
+  const MedialBallFinder finder(bvh, is_closed_mesh(mesh), may_overlap ? nullptr : &balls);
+  SurfaceCover cover(mesh, finder, &balls);
+  std::optional<VolumeFiller> holes;
+  if (!may_overlap) holes.emplace(bvh, finder, balls, kHoleShare * config.max_error);
+  cover.refine(config, holes ? &*holes : nullptr, share_of(progress, 0.0, kSurfaceShare));
+  cover.sharpen();
   Packing packing;
   cover.certify(&packing);
   const PackingProgress rest = share_of(progress, kSurfaceShare, 1.0);
-  if (!cover_interior(bvh, finder, config, rest, &packing)) {
+  if (!cover_interior(bvh, finder, config, rest, &balls, &packing)) {
     packing.certificate.interior_gap = bvh.bounds().sizes().norm();
   }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -225,11 +226,20 @@ std::string temporary_name(const std::string& path) {
 
 }  // namespace
 
+std::string default_cache_directory() {
+  const char* ros_home = std::getenv("ROS_HOME");
+  if (ros_home != nullptr && *ros_home != '\0') return std::string(ros_home) + "/ist_proximity";
+  const char* home = std::getenv("HOME");
+  if (home == nullptr || *home == '\0') return {};
+  return std::string(home) + "/.ros/ist_proximity";
+}
+
 std::string packing_key(const Shape& shape, const PackingConfig& config) {
   Writer out;
   out.u32(static_cast<std::uint32_t>(kPackingVersion));
   out.f64(config.max_error);
   out.u64(static_cast<std::uint64_t>(config.max_spheres));
+  out.u32(static_cast<std::uint32_t>(config.order));
   std::visit(ShapeWriter{&out}, shape);
   char text[kKeySize + 1];
   std::snprintf(text, sizeof(text), "%016llx%016llx", static_cast<unsigned long long>(out.hash(1)),

@@ -5,22 +5,32 @@
 #include <cmath>
 #include <limits>
 
+#include "clearance_climb.h"
+
 namespace ist {
 namespace {
 
-// How near a new ball must come to the point it was made for, as a share of the gap there. Larger
-// balls cover more of the neighbourhood; nearer ones leave less behind.
-constexpr double kSlack = 0.5;
+// How near new balls that are tried come to the point they are made for, as shares of the gap
+// there. Those that leave more of it are larger.
+constexpr double kSlacks[] = {0.6, 0.33, 0.15};
+// As much of the gap a disjoint ball may leave, if it is the largest of its neighbourhood.
+constexpr double kLooseSlack = 0.9;
 constexpr int kProgressInterval = 256;
+
+// A patch whose gap is known to be this share of its bound gets a ball; else it is split.
+constexpr double kTight = 0.8;
+// The same, when no more balls come: how near the certificate is to the truth.
+constexpr double kSharp = 0.95;
+constexpr std::size_t kMaxSharpenings = 1000000;
 
 }  // namespace
 
-SurfaceCover::SurfaceCover(const TriangleMesh& mesh, const MedialBallFinder& finder)
-    : mesh_(mesh), finder_(finder) {
+SurfaceCover::SurfaceCover(const TriangleMesh& mesh, const MedialBallFinder& finder,
+                           BallSearch* search)
+    : mesh_(mesh), finder_(finder), search_(*search) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
   smallest_patch_ = 1e-7 * box.sizes().norm();
-  seed();
 }
 
 Eigen::Vector3d SurfaceCover::normal(std::uint32_t t) const {
@@ -30,8 +40,16 @@ Eigen::Vector3d SurfaceCover::normal(std::uint32_t t) const {
   return norm > 0.0 ? Eigen::Vector3d(n / norm) : Eigen::Vector3d::Zero();
 }
 
-// The first ball touches the largest triangle; all patches start with it.
-void SurfaceCover::seed() {
+bool SurfaceCover::fill_hole(double at_least, VolumeFiller* holes) {
+  if (holes == nullptr) return false;
+  const auto ball = holes->next(at_least);
+  if (ball) add_ball(*ball);
+  return ball.has_value();
+}
+
+// The first ball is as large as it gets, or touches the largest triangle.
+void SurfaceCover::seed(VolumeFiller* holes) {
+  if (fill_hole(0.0, holes)) return;
   std::uint32_t largest = 0;
   double largest_area = -1.0;
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -46,10 +64,16 @@ void SurfaceCover::seed() {
   const Eigen::Vector3d middle =
       (mesh_.corner(largest, 0) + mesh_.corner(largest, 1) + mesh_.corner(largest, 2)) / 3.0;
   add_ball(finder_.at_surface(middle, normal(largest), 1e3 * smallest_patch_));
+}
+
+void SurfaceCover::cover_triangles() {
   heap_.reserve(2 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-    Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 1, t};
-    patch.bound = search_.best(patch.corner, 3, 0).cost;
+    Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 0, t};
+    const BallSearch::Match match = search_.best(patch.corner, 3, 0);
+    patch.bound = match.cost;
+    patch.ball = match.ball;
+    patch.seen = static_cast<std::uint32_t>(balls_.size());
     heap_.push_back(patch);
   }
   std::make_heap(heap_.begin(), heap_.end(), Looser());
@@ -75,7 +99,13 @@ bool SurfaceCover::tighten(Patch* patch) const {
   return true;
 }
 
-void SurfaceCover::refine(const PackingConfig& config, const PackingProgress& progress) {
+void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* holes,
+                          const PackingProgress& progress) {
+  seed(holes);
+  cover_triangles();
+  // In the order of volume every hole comes first; else one whose centre is as far from all balls
+  // as the worst patch.
+  const double hole_share = config.order == PackingOrder::kVolume ? 0.0 : 1.0;
   const double first_bound = std::max(heap_.front().bound, config.max_error);
   double worst = first_bound;
   for (int step = 0; heap_.front().bound > config.max_error; ++step) {
@@ -90,16 +120,18 @@ void SurfaceCover::refine(const PackingConfig& config, const PackingProgress& pr
     heap_.pop_back();
     if (tighten(&patch)) {
       push(patch);
+    } else if (fill_hole(hole_share * patch.bound, holes)) {
+      push(patch);
     } else {
       split_or_fill(patch, config.max_error);
     }
   }
 }
 
-void SurfaceCover::split_or_fill(const Patch& patch, double target) {
-  // The gap at the patch's own points is a lower bound of what a split could prove.
+// The largest gap at the patch's own points: a lower bound of what a split could prove.
+double SurfaceCover::gap_at_points(const Patch& patch, Eigen::Vector3d* worst_point) const {
   const Eigen::Vector3d middle = (patch.corner[0] + patch.corner[1] + patch.corner[2]) / 3.0;
-  Eigen::Vector3d worst_point = middle;
+  *worst_point = middle;
   double worst_gap = search_.best(&middle, 1, patch.ball).cost;
   for (const Eigen::Vector3d& corner : patch.corner) {
     // A little inside the patch: a corner belongs to faces of other normals too.
@@ -107,19 +139,72 @@ void SurfaceCover::split_or_fill(const Patch& patch, double target) {
     const double gap = search_.best(&point, 1, patch.ball).cost;
     if (gap > worst_gap) {
       worst_gap = gap;
-      worst_point = point;
+      *worst_point = point;
     }
   }
-  const double edge = std::max({(patch.corner[0] - patch.corner[1]).norm(),
-                                (patch.corner[1] - patch.corner[2]).norm(),
-                                (patch.corner[2] - patch.corner[0]).norm()});
-  if (worst_gap < std::max(0.75 * patch.bound, 0.98 * target) && edge > smallest_patch_) {
+  return worst_gap;
+}
+
+double SurfaceCover::longest_edge(const Patch& patch) {
+  return std::max({(patch.corner[0] - patch.corner[1]).norm(),
+                   (patch.corner[1] - patch.corner[2]).norm(),
+                   (patch.corner[2] - patch.corner[0]).norm()});
+}
+
+void SurfaceCover::split_or_fill(const Patch& patch, double target) {
+  Eigen::Vector3d worst_point;
+  const double worst_gap = gap_at_points(patch, &worst_point);
+  if (worst_gap < std::max(kTight * patch.bound, 0.98 * target) &&
+      longest_edge(patch) > smallest_patch_) {
     split(patch);
     return;
   }
-  const double slack = kSlack * std::max(std::min(worst_gap, patch.bound), 0.5 * target);
-  add_ball(finder_.at_surface(worst_point, normal(patch.triangle), slack));
+  const double gap = std::max(std::min(worst_gap, patch.bound), 0.5 * target);
+  add_ball(ball_at(worst_point, patch.triangle, gap));
   push(patch);
+}
+
+MedialBallFinder::InnerBall SurfaceCover::ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
+                                                  double gap) const {
+  const auto left = [&s](const MedialBallFinder::InnerBall& ball) {
+    return (ball.center - s).norm() - ball.radius;
+  };
+  // On a flat face a ball covers, to within the gap, an area that grows with its radius and with
+  // what it leaves of the gap. The square serves better where faces end.
+  MedialBallFinder::InnerBall best{s, 0.0};
+  double best_score = 0.0;
+  for (const double slack : kSlacks) {
+    if (finder_.is_disjoint() && best.radius > 0.0) break;  // it is a start to climb from
+    const MedialBallFinder::InnerBall ball = finder_.at_surface(s, normal(triangle), slack * gap);
+    const double closed = std::max(0.0, gap - left(ball));
+    const double score = ball.radius * closed * closed;
+    if (score <= best_score) continue;
+    best_score = score;
+    best = ball;
+  }
+  if (!finder_.is_disjoint() || best.radius <= 0.0) return best;
+  const MedialBallFinder::InnerBall top = finder_.without_bulge(climb(finder_, best.center));
+  return left(top) <= kLooseSlack * gap ? top : best;
+}
+
+void SurfaceCover::sharpen() {
+  double known = 0.0;  // [m] a gap that is there
+  for (std::size_t i = 0; i < kMaxSharpenings; ++i) {
+    std::pop_heap(heap_.begin(), heap_.end(), Looser());
+    Patch patch = heap_.back();
+    heap_.pop_back();
+    if (tighten(&patch)) {
+      push(patch);
+      continue;
+    }
+    Eigen::Vector3d worst_point;
+    known = std::max(known, gap_at_points(patch, &worst_point));
+    if (kSharp * patch.bound <= known || longest_edge(patch) <= smallest_patch_) {
+      push(patch);
+      return;
+    }
+    split(patch);
+  }
 }
 
 // Halves the longest edge: two patches of the same triangle, covering it without overlap.

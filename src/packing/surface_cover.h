@@ -8,20 +8,25 @@
 #include "ist_proximity/geometry/triangle_mesh.h"
 #include "ist_proximity/packing/packing.h"
 #include "medial_ball.h"
+#include "volume_filler.h"
 
 namespace ist {
 
 /// The surface as patches, each with the ball that covers it best and a proven bound of its gap.
 /// Refines, worst first: a patch is split where the bound is loose and gets a ball where it is not.
+/// Which balls are allowed is the finder's matter.
 class SurfaceCover {
  public:
-  SurfaceCover(const TriangleMesh& mesh, const MedialBallFinder& finder);
+  /// @param search  the balls there are, weighted by inner radius; the cover adds to it
+  SurfaceCover(const TriangleMesh& mesh, const MedialBallFinder& finder, BallSearch* search);
 
   /// Adds balls until every patch's bound is at most `config.max_error`, or max_spheres is reached.
-  void refine(const PackingConfig& config, const PackingProgress& progress);
+  /// @param holes  where there is one, a large enough hole comes before the worst patch
+  void refine(const PackingConfig& config, VolumeFiller* holes, const PackingProgress& progress);
 
-  /// Adds a ball found elsewhere (the interior's).
-  void add_ball(const MedialBallFinder::InnerBall& ball);
+  /// Splits patches, without new balls, until the largest bound is little above a gap that is
+  /// there for certain.
+  void sharpen();
 
   /// Gives every ball its gap, from the patches it covers best, and fills the certificate.
   void certify(Packing* packing);
@@ -40,18 +45,25 @@ class SurfaceCover {
     bool operator()(const Patch& a, const Patch& b) const { return a.bound < b.bound; }
   };
 
-  void seed();
+  void seed(VolumeFiller* holes);
+  void cover_triangles();
+  bool fill_hole(double at_least, VolumeFiller* holes);
+  void add_ball(const MedialBallFinder::InnerBall& ball);
+  double gap_at_points(const Patch& patch, Eigen::Vector3d* worst_point) const;
+  static double longest_edge(const Patch& patch);
   void push(const Patch& patch);
   bool tighten(Patch* patch) const;
   void split_or_fill(const Patch& patch, double target);
   void split(const Patch& patch);
+  MedialBallFinder::InnerBall ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
+                                      double gap) const;
   Eigen::Vector3d normal(std::uint32_t triangle) const;
 
   const TriangleMesh& mesh_;
   const MedialBallFinder& finder_;
   std::vector<Patch> heap_;
   std::vector<MedialBallFinder::InnerBall> balls_;
-  BallSearch search_;
+  BallSearch& search_;
   double smallest_patch_;  ///< [m] edges below it are not split: rounding would decide
 };
 

@@ -4,10 +4,10 @@
 #include <ros/param.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <sstream>
 
+#include "ist_proximity/packing/packing_cache.h"
 #include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
@@ -235,13 +235,6 @@ LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance) {
   read_repulsion(&reader, max_distance, &live.repulsion);
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   return live;
-}
-
-std::string default_cache_directory() {
-  const char* ros_home = std::getenv("ROS_HOME");
-  if (ros_home && *ros_home) return std::string(ros_home) + "/ist_proximity";
-  const char* home = std::getenv("HOME");
-  return home && *home ? std::string(home) + "/.ros/ist_proximity" : std::string();
 }
 
 }  // namespace ist

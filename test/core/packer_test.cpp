@@ -110,6 +110,63 @@ TEST(PackMesh, InnerBallsOfClosedMeshesStayInside) {
   }
 }
 
+constexpr PackingOrder kOrders[] = {PackingOrder::kMedial, PackingOrder::kDisjoint,
+                                    PackingOrder::kVolume};
+
+TEST(PackMesh, CertificateHoldsInEveryOrder) {
+  for (const auto& [name, mesh] : hostile_meshes()) {
+    for (const PackingOrder order : kOrders) {
+      SCOPED_TRACE(name + ", order " + std::to_string(static_cast<int>(order)));
+      PackingConfig config;
+      config.max_error = 0.01;
+      config.order = order;
+      const Packing packing = pack_mesh(mesh, config);
+      EXPECT_TRUE(packing.certificate.reached);
+      double excess = 0.0;
+      expect_certificate_holds(mesh, packing, 100, &excess);
+      EXPECT_LE(excess, packing.certificate.max_gap + 1e-6);
+    }
+  }
+}
+
+TEST(PackMesh, DisjointBallsNeitherOverlapNorProtrude) {
+  for (const auto& [name, mesh] : hostile_meshes()) {
+    for (const PackingOrder order : {PackingOrder::kDisjoint, PackingOrder::kVolume}) {
+      SCOPED_TRACE(name);
+      PackingConfig config;
+      config.max_error = 0.004;
+      config.max_spheres = 500;
+      config.order = order;
+      const std::vector<Ball> balls = pack_mesh(mesh, config).balls;
+      EXPECT_LE(balls.size(), 500U);
+      for (std::size_t i = 0; i < balls.size(); ++i) {
+        if (balls[i].radius == 0.0) continue;
+        EXPECT_GT(test::oracle_winding(mesh, balls[i].center), 0.5);
+        EXPECT_LE(balls[i].radius, test::oracle_distance(mesh, balls[i].center) + 1e-9);
+        for (std::size_t j = 0; j < i; ++j) {
+          ASSERT_GE((balls[i].center - balls[j].center).norm() + 1e-9,
+                    balls[i].radius + balls[j].radius)
+              << i << " and " << j;
+        }
+      }
+    }
+  }
+}
+
+// The ball of a cube, then the eight in its corners: each touches three faces and the first ball.
+TEST(PackMesh, VolumeOrderTakesTheLargestFirst) {
+  PackingConfig config;
+  config.max_error = 0.002;
+  config.max_spheres = 100;
+  config.order = PackingOrder::kVolume;
+  const std::vector<Ball> balls = pack_mesh(test::box({0.2, 0.2, 0.2}), config).balls;
+  ASSERT_GT(balls.size(), 30U);
+  EXPECT_NEAR(balls[0].radius, 0.1, 0.001);
+  const double corner = 0.1 * (2.0 - std::sqrt(3.0));
+  for (std::size_t i = 1; i <= 8; ++i) EXPECT_NEAR(balls[i].radius, corner, 0.1 * corner) << i;
+  EXPECT_LT(balls[30].radius, corner);
+}
+
 TEST(PackMesh, SmallerErrorsTakeMoreBallsAndLessGap) {
   const TriangleMesh mesh = test::l_shape(0.2, 0.05);
   std::size_t balls = 0;
@@ -131,7 +188,7 @@ TEST(PackMesh, MaxSpheresReachedFirstIsSaidAndStillHolds) {
   config.max_error = 0.001;
   config.max_spheres = 30;
   const Packing packing = pack_mesh(mesh, config);
-  EXPECT_LE(packing.balls.size(), 30U);
+  EXPECT_EQ(packing.balls.size(), 30U);
   EXPECT_FALSE(packing.certificate.reached);
   EXPECT_GT(packing.certificate.max_gap, 0.001);
   double excess = 0.0;
@@ -141,12 +198,16 @@ TEST(PackMesh, MaxSpheresReachedFirstIsSaidAndStillHolds) {
 
 TEST(PackMesh, SameInputSameBalls) {
   const TriangleMesh mesh = test::l_shape(0.2, 0.05);
-  const Packing a = pack_mesh(mesh, {}), b = pack_mesh(mesh, {});
-  ASSERT_EQ(a.balls.size(), b.balls.size());
-  for (std::size_t i = 0; i < a.balls.size(); ++i) {
-    EXPECT_EQ(a.balls[i].center, b.balls[i].center);
-    EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
-    EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+  for (const PackingOrder order : kOrders) {
+    PackingConfig config;
+    config.order = order;
+    const Packing a = pack_mesh(mesh, config), b = pack_mesh(mesh, config);
+    ASSERT_EQ(a.balls.size(), b.balls.size());
+    for (std::size_t i = 0; i < a.balls.size(); ++i) {
+      EXPECT_EQ(a.balls[i].center, b.balls[i].center);
+      EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
+      EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+    }
   }
 }
 

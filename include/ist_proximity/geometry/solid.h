@@ -61,6 +61,8 @@ class Solid {
   bool is_inside(const Eigen::Vector3d& p_L) const;
 
   bool empty() const { return elements_.empty(); }
+  /// Whether any element is a mesh that is not closed.
+  bool has_holes() const;
   std::size_t triangle_count() const;
 
  private:

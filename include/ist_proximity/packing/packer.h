@@ -6,15 +6,17 @@
 namespace ist {
 
 /// Part of every cache key: raise it whenever the same shape and configuration pack differently.
-constexpr int kPackingVersion = 1;
+constexpr int kPackingVersion = 2;
 
-/// Packs a mesh with inner medial balls, worst gap first, until the certified gap of every surface
-/// patch (and of the interior) is at most `config.max_error`.
+/// Packs a mesh with inner balls, in the order of `config.order`, until the certified gap of every
+/// surface patch (and of the interior) is at most `config.max_error`.
 ///
 /// A patch's gap is bounded by convexity: the distance to a ball is convex, so over a triangle it
 /// is largest at a corner; the patch with the largest bound is split, or gets the medial ball that
 /// touches it. Where no ball fits (open sheets, flaps), balls of radius 0 on the surface take over,
 /// so any mesh can be covered. Deterministic.
+///
+/// In disjoint packings no two inner balls overlap, interior ones included; their outer balls do.
 /// @throws ModelError if the mesh has no triangle.
 Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
                   const PackingProgress& progress = {});

@@ -7,12 +7,24 @@
 
 namespace ist {
 
+/// Which balls a packing takes, and in what order.
+enum class PackingOrder {
+  /// Medial balls that may overlap, where the gap is largest first: the fewest for an error.
+  kMedial,
+  /// The same, of balls that do not overlap: no volume counts twice (contact volumes).
+  kDisjoint,
+  /// The largest ball that still fits first, none overlapping: the ProtoSphere packing of
+  /// Weller 2013, chapter 5. Fills volume soonest and thin parts last.
+  kVolume,
+};
+
 /// How a link is packed. The error that is wanted decides how many balls it takes.
 struct PackingConfig {
   /// [m] largest allowed distance from the link's surface to its packing; > 0.
   double max_error = 0.005;
   /// Balls per link; reached first, the packing is still valid, with a larger error. >= 1.
   int max_spheres = 20000;
+  PackingOrder order = PackingOrder::kMedial;
 };
 
 /// One ball of a packing, twice: an inner ball of `radius` inside the link, and an outer ball of

@@ -9,6 +9,9 @@
 
 namespace ist {
 
+/// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity; empty when there is no home either.
+std::string default_cache_directory();
+
 /// Identity of a packing: a hash over the shape's own numbers, the configuration and the version
 /// of the packing algorithm. The same mesh under another file name has the same key.
 std::string packing_key(const Shape& shape, const PackingConfig& config);

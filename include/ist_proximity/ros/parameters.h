@@ -93,7 +93,4 @@ struct LiveConfig {
 /// @throws ParameterError
 LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance);
 
-/// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity; empty (no cache) without a home.
-std::string default_cache_directory();
-
 }  // namespace ist

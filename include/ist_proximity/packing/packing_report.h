@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "ist_proximity/geometry/solid.h"
+#include "ist_proximity/packing/packing.h"
+
+namespace ist {
+
+/// What is measured of a packing, for people: by samples, not proven.
+struct PackingReport {
+  double solid_volume = 0.0;  ///< [m^3] to about 0.5 %
+  double filled_volume =
+      0.0;               ///< [m^3] of the union of the inner balls; balls that overlap count once
+  double overlap = 0.0;  ///< [m] deepest that two inner balls reach into each other
+  /// [m] farthest that an inner ball bulges out of the solid (through a hole in its mesh), along
+  /// its radii.
+  double protrusion = 0.0;
+};
+
+/// Measures a packing against the solid it was made for. Deterministic; takes about 0.1 s, and for
+/// solids with holes about 0.1 ms a ball more. Thread safe.
+PackingReport measure_packing(const Solid& solid, const std::vector<Ball>& balls);
+
+}  // namespace ist

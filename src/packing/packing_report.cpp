@@ -1,0 +1,86 @@
+#include "ist_proximity/packing/packing_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "ball_search.h"
+
+namespace ist {
+namespace {
+
+constexpr int kVolumeSamples = 100000;
+constexpr int kDirections = 100;
+constexpr int kBisections = 30;
+constexpr double kGoldenAngle = 2.39996322972865332;
+
+// Evenly spread in the unit cube (Roberts' R3 sequence).
+Eigen::Vector3d cube_point(int i) {
+  const Eigen::Vector3d step(0.81917251339616444, 0.67104360670378921, 0.54970047790197027);
+  const Eigen::Vector3d p = Eigen::Vector3d::Constant(0.5) + i * step;
+  return p - p.array().floor().matrix();
+}
+
+// Evenly spread on the unit sphere (Fibonacci's spiral).
+Eigen::Vector3d direction(int i) {
+  const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
+  const double radius = std::sqrt(1.0 - z * z);
+  return {radius * std::cos(kGoldenAngle * i), radius * std::sin(kGoldenAngle * i), z};
+}
+
+// How far outside the end of this radius of the ball is, along it.
+double bulge(const Solid& solid, const Ball& ball, const Eigen::Vector3d& radius) {
+  if (solid.is_inside(ball.center + radius)) return 0.0;
+  double inside = 0.0, outside = 1.0;
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle = 0.5 * (inside + outside);
+    (solid.is_inside(ball.center + middle * radius) ? inside : outside) = middle;
+  }
+  return (1.0 - inside) * ball.radius;
+}
+
+double protrusion(const Solid& solid, const Ball& ball) {
+  const double depth = -solid.signed_distance(ball.center).distance;
+  double farthest = std::max(0.0, ball.radius - depth);
+  if (!solid.has_holes()) return farthest;
+  for (int i = 0; i < kDirections; ++i) {
+    farthest = std::max(farthest, bulge(solid, ball, ball.radius * direction(i)));
+  }
+  return farthest;
+}
+
+}  // namespace
+
+PackingReport measure_packing(const Solid& solid, const std::vector<Ball>& balls) {
+  PackingReport report;
+  BallSearch search;
+  Eigen::AlignedBox3d box;
+  for (const Ball& ball : balls) {
+    if (ball.radius > 0.0) {
+      report.protrusion = std::max(report.protrusion, protrusion(solid, ball));
+      if (search.size() > 0) {
+        const double nearest = search.best(&ball.center, 1, 0).cost;
+        report.overlap = std::max(report.overlap, ball.radius - nearest);
+      }
+    }
+    search.add(ball.center, ball.radius);
+    box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
+    box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
+  }
+  if (balls.empty()) return report;
+  int inside = 0, filled = 0;
+  std::uint32_t hint = 0;
+  for (int i = 0; i < kVolumeSamples; ++i) {
+    const Eigen::Vector3d p = box.min() + cube_point(i).cwiseProduct(box.sizes());
+    const BallSearch::Match match = search.best(&p, 1, hint);
+    hint = match.ball;
+    const bool in_ball = match.cost < 0.0;
+    if (in_ball) ++filled;
+    if (in_ball || solid.is_inside(p)) ++inside;
+  }
+  report.solid_volume = box.volume() * inside / kVolumeSamples;
+  report.filled_volume = box.volume() * filled / kVolumeSamples;
+  return report;
+}
+
+}  // namespace ist

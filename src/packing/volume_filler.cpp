@@ -1,0 +1,127 @@
+#include "volume_filler.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "clearance_climb.h"
+
+namespace ist {
+namespace {
+
+// A prototype is taken when nothing can be larger than it by more than this.
+constexpr double kEnough = 0.9;
+// A prototype starts where the cell is small against the clearance: a finer start climbs no higher.
+constexpr double kClimbAt = 0.5;
+// In an open mesh, what is less inside than this has no inside nearby.
+constexpr double kHardlyInside = 0.2;
+constexpr double kFinestSearch = 0.25;
+
+}  // namespace
+
+VolumeFiller::VolumeFiller(const TriangleBvh& bvh, const MedialBallFinder& finder,
+                           const BallSearch& balls, double min_radius)
+    : bvh_(bvh), finder_(finder), balls_(balls), min_radius_(min_radius) {
+  const Eigen::AlignedBox3d box = bvh.bounds();
+  const double half = 0.25 * box.sizes().maxCoeff();
+  if (box.sizes().minCoeff() <= 0.0) return;  // flat: nothing to fill
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d sign((corner & 1) - 0.5, ((corner >> 1) & 1) - 0.5,
+                               ((corner >> 2) & 1) - 0.5);
+    add_cell(box.center() + 2.0 * half * sign, half, nullptr);
+  }
+}
+
+void VolumeFiller::add_cell(const Eigen::Vector3d& center, double half, const Cell* parent) {
+  const double radius = std::sqrt(3.0) * half;
+  const double to_surface = std::sqrt(bvh_.closest(center).distance_sq);
+  // Within the ball about the parent's centre that no triangle enters, the side is the same.
+  const bool same_side = parent != nullptr && finder_.is_closed() &&
+                         std::abs(parent->surface) > (center - parent->center).norm();
+  const bool inside = same_side ? parent->surface > 0.0 : bvh_.is_inside(center);
+  // In an open mesh the inside may begin between triangles, at once with a large clearance; it is
+  // looked for down to a part of that.
+  const bool may_begin = !finder_.is_closed() && radius > kFinestSearch * to_surface &&
+                         bvh_.quick_winding_number(center) > kHardlyInside;
+  if (!inside && !may_begin && to_surface > radius) return;
+  const double signed_distance = inside ? to_surface : -to_surface;
+  Cell cell{center, half, signed_distance, signed_distance, 0.0, 0, false};
+  cell.bound = radius + (may_begin ? to_surface : signed_distance);
+  update(&cell);
+  if (cell.bound < min_radius_) return;
+  cells_.push_back(cell);
+  std::push_heap(cells_.begin(), cells_.end(), BoundLess());
+}
+
+// Balls added since; true if they lower the bound.
+bool VolumeFiller::update(Cell* cell) const {
+  if (cell->seen == count()) return false;
+  const BallSearch::Match match = balls_.best(&cell->center, 1, count() - 1, cell->seen);
+  cell->seen = count();
+  cell->clearance = std::min(cell->clearance, match.cost);
+  const double bound = match.cost + std::sqrt(3.0) * cell->half;
+  if (bound >= cell->bound) return false;
+  cell->bound = bound;
+  return true;
+}
+
+void VolumeFiller::add_prototype(const Eigen::Vector3d& start) {
+  const MedialBallFinder::InnerBall ball = finder_.without_bulge(climb(finder_, start));
+  if (ball.radius < min_radius_ || ball.radius <= 0.0) return;
+  prototypes_.push_back({ball, count()});
+  std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
+}
+
+// The largest prototype is clear of all balls afterwards. One that a new ball cuts into climbs
+// anew from where it is.
+void VolumeFiller::revise_prototypes() {
+  while (!prototypes_.empty() && prototypes_.front().seen != count()) {
+    std::pop_heap(prototypes_.begin(), prototypes_.end(), Smaller());
+    Prototype prototype = prototypes_.back();
+    prototypes_.pop_back();
+    const double clear = balls_.best(&prototype.ball.center, 1, count() - 1, prototype.seen).cost;
+    if (clear >= prototype.ball.radius) {
+      prototype.seen = count();
+      prototypes_.push_back(prototype);
+      std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
+    } else if (clear > 0.0) {
+      add_prototype(prototype.ball.center);
+    }
+  }
+}
+
+std::optional<MedialBallFinder::InnerBall> VolumeFiller::next(double at_least) {
+  for (;;) {
+    revise_prototypes();
+    const double found = prototypes_.empty() ? 0.0 : prototypes_.front().ball.radius;
+    if (cells_.empty() || cells_.front().bound <= std::max(found / kEnough, at_least)) {
+      if (found <= 0.0 || found < kEnough * at_least) return std::nullopt;
+      std::pop_heap(prototypes_.begin(), prototypes_.end(), Smaller());
+      const MedialBallFinder::InnerBall ball = prototypes_.back().ball;
+      prototypes_.pop_back();
+      return ball;
+    }
+    std::pop_heap(cells_.begin(), cells_.end(), BoundLess());
+    Cell cell = cells_.back();
+    cells_.pop_back();
+    const bool is_stale = update(&cell);
+    if (!is_stale && !cell.has_climbed && cell.half <= kClimbAt * cell.clearance) {
+      cell.has_climbed = true;
+      add_prototype(cell.center);
+    } else if (!is_stale) {
+      // By a hole the largest ball without bulge is smaller than the clearance; a finer start would
+      // not change that.
+      const bool is_exhausted = !finder_.is_closed() && cell.half <= kFinestSearch * cell.clearance;
+      for (int corner = 0; corner < 8 && !is_exhausted; ++corner) {
+        const Eigen::Vector3d sign((corner & 1) - 0.5, ((corner >> 1) & 1) - 0.5,
+                                   ((corner >> 2) & 1) - 0.5);
+        add_cell(cell.center + cell.half * sign, 0.5 * cell.half, &cell);
+      }
+      continue;
+    }
+    if (cell.bound < min_radius_) continue;
+    cells_.push_back(cell);
+    std::push_heap(cells_.begin(), cells_.end(), BoundLess());
+  }
+}
+
+}  // namespace ist

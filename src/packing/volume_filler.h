@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "ball_search.h"
+#include "ist_proximity/geometry/triangle_bvh.h"
+#include "medial_ball.h"
+
+namespace ist {
+
+/// Finds the largest ball that fits into what is left of a mesh, again and again: ProtoSphere
+/// (Weller 2013, section 5.2), prototypes that climb to local maxima of the clearance.
+///
+/// Prototypes start where they can matter: in cells of an octree, the one with the largest possible
+/// ball first. Clearance changes by no more than the way moved, so the clearance at a cell's centre
+/// bounds that in the cell, and the ball found is the largest there is, to a tenth.
+class VolumeFiller {
+ public:
+  /// @param finder  knows the balls in `balls` as taken
+  /// @param min_radius  [m] smaller balls are not looked for
+  VolumeFiller(const TriangleBvh& bvh, const MedialBallFinder& finder, const BallSearch& balls,
+               double min_radius);
+
+  /// The next ball, which must be added to `balls`; nothing when none of radius `at_least` [m]
+  /// fits.
+  std::optional<MedialBallFinder::InnerBall> next(double at_least);
+
+ private:
+  struct Cell {
+    Eigen::Vector3d center;
+    double half;         ///< [m] of an edge
+    double surface;      ///< [m] the centre's distance to it, negative outside
+    double clearance;    ///< [m] at the centre: to surface and balls
+    double bound;        ///< [m] no ball about a point of the cell is larger
+    std::uint32_t seen;  ///< balls that clearance and bound know of
+    bool has_climbed;
+  };
+  struct Prototype {
+    MedialBallFinder::InnerBall ball;
+    std::uint32_t seen;
+  };
+  struct BoundLess {
+    bool operator()(const Cell& a, const Cell& b) const { return a.bound < b.bound; }
+  };
+  struct Smaller {
+    bool operator()(const Prototype& a, const Prototype& b) const {
+      return a.ball.radius < b.ball.radius;
+    }
+  };
+
+  void add_cell(const Eigen::Vector3d& center, double half, const Cell* parent);
+  void add_prototype(const Eigen::Vector3d& start);
+  void revise_prototypes();
+  bool update(Cell* cell) const;
+  std::uint32_t count() const { return static_cast<std::uint32_t>(balls_.size()); }
+
+  const TriangleBvh& bvh_;
+  const MedialBallFinder& finder_;
+  const BallSearch& balls_;
+  const double min_radius_;
+  std::vector<Cell> cells_;            // heap
+  std::vector<Prototype> prototypes_;  // heap
+};
+
+}  // namespace ist
