@@ -8,6 +8,7 @@
 
 #include "ist_proximity/geometry/box_distance.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "support/allocations.h"
 #include "support/box_oracle.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
@@ -414,6 +415,28 @@ TEST(Boxes, PointsAndMapsTogether) {
   EXPECT_EQ(results[0].source, 0);
   query.run(X_FL, {true}, {&nothing}, &results);
   EXPECT_EQ(results[0].state, LinkState::kClear);
+}
+
+TEST(Boxes, QueriesAllocateNothing) {
+  test::Rng rng(37);
+  const std::vector<LinkGeometry> links = test::random_links(&rng);
+  const auto model = test::model_of(links, 0.01);
+  const CloudSnapshot map = test::make_map(random_leaves(&rng, 3000, 1.0, 0.01, 4));
+  const CloudSnapshot cloud = test::make_snapshot({{0.1, 0, 0}, {0, 0.4, 0}});
+  const std::vector<const CloudSnapshot*> obstacles = {&map, &cloud};
+  ProximityQuery query(model, {});
+  const std::vector<bool> known(links.size(), true);
+  std::vector<LinkProximity> results(links.size());
+  std::vector<Eigen::Isometry3d> X_FL(links.size());
+  int contacts = 0;
+  for (int i = 0; i < 30; ++i) {
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 1.5);
+    const long before = test::allocations;
+    query.run(X_FL, known, obstacles, &results);
+    ASSERT_EQ(test::allocations - before, 0);
+    for (const LinkProximity& result : results) contacts += result.state == LinkState::kContact;
+  }
+  EXPECT_GT(contacts, 10);
 }
 
 TEST(Boxes, BoundsHoldWheneverTheDeadlinePasses) {
