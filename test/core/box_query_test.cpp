@@ -147,9 +147,9 @@ TEST(BoxIndex, HoldsEveryBoxOnce) {
     for (const BoxTile& tile : index.tiles()) {
       for (int k = 0; k < tile.count; ++k) {
         ++seen[tile.id[k]];
-        const Eigen::AlignedBox3d box = tile.box(k).translated(index.origin());
-        ASSERT_LT((box.min() - boxes[tile.id[k]].min()).norm(), 1e-5);
-        ASSERT_LT((box.max() - boxes[tile.id[k]].max()).norm(), 1e-5);
+        const Eigen::AlignedBox3d box = tile.box(k);
+        ASSERT_LT((box.min() + index.origin() - boxes[tile.id[k]].min()).norm(), 1e-5);
+        ASSERT_LT((box.max() + index.origin() - boxes[tile.id[k]].max()).norm(), 1e-5);
       }
     }
     EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), count);
