@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "support/box_oracle.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/trial.h"
@@ -90,6 +91,36 @@ TEST_F(InstructionSets, SameAnswers) {
       }
     }
   }
+}
+
+TEST_F(InstructionSets, SameDistancesToBoxes) {
+  test::Rng rng(83);
+  const std::vector<LinkGeometry> links = test::random_links(&rng);
+  const auto model = test::model_of(links, 0.01);
+  const std::vector<bool> known(links.size(), true);
+  QueryConfig config;
+  config.tolerance = 0.0;
+  int near = 0;
+  for (int scene = 0; scene < test::scaled(100); ++scene) {
+    std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(1 + scene));
+    for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(&rng, 0.8, 0.02, 4);
+    const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.2));
+    const std::vector<Eigen::Isometry3d> X_FL(links.size(), test::random_pose(&rng, 0.3));
+    std::vector<LinkProximity> first, results;
+    for (const std::int64_t target : machine_targets()) {
+      SCOPED_TRACE(hwy::TargetName(target));
+      choose(target);
+      ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&map}, &results));
+      if (first.empty()) first = results;
+      for (std::size_t i = 0; i < links.size(); ++i) {
+        ASSERT_EQ(results[i].state, first[i].state);
+        if (first[i].state != LinkState::kNear) continue;  // of depths, any in the bounds will do
+        ASSERT_NEAR(results[i].distance, first[i].distance, 4e-8);
+        ++near;
+      }
+    }
+  }
+  EXPECT_GT(near, 10);
 }
 
 }  // namespace

@@ -176,6 +176,7 @@ TEST(ReadOctree, CutOffAnywhere) {
 TEST(ReadOctree, RandomBytes) {
   test::Rng rng(55);
   const octomap::OcTree tree = random_tree(&rng, 0.05, 60);
+  const std::string binary = bytes_of(tree, true), full = bytes_of(tree, false);
   int readable = 0;
   for (int trial = 0; trial < test::scaled(20000); ++trial) {
     const bool is_binary = trial % 2 == 0;
@@ -184,7 +185,7 @@ TEST(ReadOctree, RandomBytes) {
       bytes.resize(static_cast<std::size_t>(test::uniform(&rng, 0, 200)));
       for (char& byte : bytes) byte = static_cast<char>(rng());
     } else {
-      bytes = bytes_of(tree, is_binary);
+      bytes = is_binary ? binary : full;
       for (int flips = 0; flips < 1 + trial % 5; ++flips) {
         bytes[rng() % bytes.size()] ^= static_cast<char>(1U << rng() % 8);
       }

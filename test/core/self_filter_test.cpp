@@ -2,39 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
-#include <new>
 #include <random>
 #include <set>
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/packing/packer.h"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-// Counts what this program allocates. Not inlined: the compiler would take free() for a mistake.
-#define IST_NOINLINE __attribute__((noinline))
-IST_NOINLINE void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-IST_NOINLINE void* operator new(std::size_t size, std::align_val_t alignment) {
-  ++allocations;
-  const auto unit = static_cast<std::size_t>(alignment);
-  if (void* memory = std::aligned_alloc(unit, (size + unit - 1) / unit * unit)) return memory;
-  throw std::bad_alloc();
-}
-IST_NOINLINE void operator delete(void* memory) noexcept { std::free(memory); }
-IST_NOINLINE void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-IST_NOINLINE void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-IST_NOINLINE void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
+#include "support/allocations.h"
 
 namespace ist {
 namespace {
@@ -244,11 +218,11 @@ TEST(SelfFilter, aSteadyStreamAllocatesNothing) {
   Ingest ingest(config_with(0.02));
   CloudSnapshot snapshot;
   ingest.run(raw_of(large), X_FS, robot, 0.0, &snapshot);
-  const long before = allocations;
+  const long before = test::allocations;
   for (const auto* points : {&small, &large, &small}) {
     ingest.run(raw_of(*points), X_FS, robot, 0.0, &snapshot);
   }
-  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(test::allocations - before, 0);
   EXPECT_GT(snapshot.counts.on_robot, 0U);
 }
 

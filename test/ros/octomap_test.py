@@ -217,8 +217,9 @@ class OctomapTest(unittest.TestCase):
         # The map outlives the model it was first used with.
         self.publisher.publish(message(tree))
         self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map")
-        rospy.set_param(self.namespace + "/robot_description", pt.urdf("<link name='new'/>"
-            "<joint name='j' type='fixed'><parent link='base'/><child link='new'/></joint>"))
+        more = """<link name="new"/><joint name="to_new" type="fixed"><parent link="base"/>
+            <child link="new"/></joint>"""
+        rospy.set_param(self.namespace + "/robot_description", pt.urdf(more))
         self.assertTrue(node.reload().success)
         self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map, model reloaded")
 

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdlib>
+#include <new>
+
+/// Counts what this program allocates with `new`. For one file of a program only: it replaces the
+/// global operators.
+namespace ist::test {
+inline std::atomic<long> allocations{0};
+}
+
+// Not inlined: the compiler would take free() for a mistake.
+#define IST_NOINLINE __attribute__((noinline))
+IST_NOINLINE void* operator new(std::size_t size) {
+  ++ist::test::allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+IST_NOINLINE void* operator new(std::size_t size, std::align_val_t alignment) {
+  ++ist::test::allocations;
+  const auto unit = static_cast<std::size_t>(alignment);
+  if (void* memory = std::aligned_alloc(unit, (size + unit - 1) / unit * unit)) return memory;
+  throw std::bad_alloc();
+}
+IST_NOINLINE void operator delete(void* memory) noexcept { std::free(memory); }
+IST_NOINLINE void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+IST_NOINLINE void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+IST_NOINLINE void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
