@@ -159,7 +159,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 
 ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   std::vector<std::string> warnings;
-  const ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
+  ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
   for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
   return config;
 }
