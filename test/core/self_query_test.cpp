@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 
@@ -30,7 +32,7 @@ std::vector<Eigen::Vector3d> points_of(const LinkGeometry& link, test::Rng* rng)
       for (const Eigen::Vector3d& v : mesh->vertices) points.push_back(element.X_LE * v);
     }
   }
-  for (int i = 0; i < 600; ++i) {
+  for (int i = 0; i < test::scaled(600); ++i) {
     const Eigen::Vector3d p = test::random_vector(rng, 0.25);
     if (test::oracle_signed_distance(link, p) <= 0.0) points.push_back(p);
   }
@@ -52,7 +54,7 @@ double found_distance(const LinkGeometry& a, const LinkGeometry& b, const Eigen:
   };
   for (const Eigen::Vector3d& p_A : points_of(a, rng)) attempt(p_A);
   double step = 0.05;
-  for (int i = 0; i < 300; ++i) {  // downhill, within A
+  for (int i = 0; i < test::scaled(300); ++i) {  // downhill, within A
     const Eigen::Vector3d p_A = at + test::random_vector(rng, step);
     const bool better = test::oracle_signed_distance(a, p_A) <= 0.0 && attempt(p_A);
     step *= better ? 1.2 : 0.95;

@@ -8,6 +8,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
+from joint_states_test import ARM, JointStatesTest, joint_state
 from proximity_testing import LinkProximity, ProximityArray
 from rosgraph_msgs.msg import Clock
 from visualization_msgs.msg import MarkerArray
@@ -35,6 +36,25 @@ class SimulatedClock:
     def stop(self):
         if self._repeater:
             self._repeater.stop()
+
+
+class JointRobot:
+    """The arm of joint_states_test, standing still: a node, its joint states and its clouds."""
+
+    def __init__(self, namespace):
+        q = {"turn": 0.3, "slide": 0.5}
+        joints = JointStatesTest.joint_publisher(namespace)
+        self.world = pt.World(namespace, static=False)
+        clouds = self.world.cloud_publisher
+        self.world.repeat(50, lambda: joints.publish(joint_state(q)))
+        self.world.repeat(20, lambda: clouds.publish(pt.cloud([[0.6, 0.6, 0.6]], "base")))
+        self.node = pt.ProximityNode(namespace, {"pose_source": "joint_states"}, ARM)
+
+    def stop(self, test):
+        for m in self.node.messages:
+            pt.check_invariants(test, m)
+        self.world.stop()
+        test.assertEqual(self.node.stop(), 0)
 
 
 class ClockTest(unittest.TestCase):
@@ -69,6 +89,10 @@ class ClockTest(unittest.TestCase):
         self.assertEqual(len({m.header.stamp for m in frozen}), 1)
         clock.step = 0.005
 
+        # A second robot, with joint states in place of tf.
+        robot = JointRobot("/clock_joints")
+        robot.node.wait_for_status(ProximityArray.OK)
+
         # Back in time, a little and a lot, with other clouds than before.
         for i, jump in enumerate((-5.0, -400.0, -0.9)):
             node.wait_for_status(ProximityArray.OK)
@@ -87,6 +111,10 @@ class ClockTest(unittest.TestCase):
                 and abs(pt.link(m, "ball_link").distance - (0.25 + 0.05 * i)) < 1e-5,
                 "the new cloud",
             )
+            robot.node.wait_for(
+                lambda m: m.status == 0 and m.header.stamp < before, "OK of the second robot"
+            )
+        robot.stop(self)
 
         shown = len(spheres)
         pt.wait_until(lambda: len(spheres) > shown, "~spheres again: rviz has forgotten them")

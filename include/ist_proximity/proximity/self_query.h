@@ -40,9 +40,9 @@ struct PairProximity {
 /// exact evaluations. A is the link that is packed closer, and where they may touch, each in turn.
 /// `distance` is measured between two real points, found by going to and fro between the surfaces
 /// from the balls that are nearest. It is not below the true distance. For links that are apart it
-/// is above `lower_bound` by no more than max_error of A's packing and the tolerance; in contact
-/// the two may differ by more. Where solids merely touch, NEAR with a lower bound below 0 may be
-/// said.
+/// is above `lower_bound` by no more than max_error of A's packing and the tolerance (where they
+/// nearly touch, its interior gap comes on top); in contact the two may differ by more. Where
+/// solids merely touch, NEAR with a lower bound below 0 may be said.
 ///
 /// run() never throws. One object per thread.
 class SelfQuery {
