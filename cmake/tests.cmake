@@ -50,6 +50,9 @@ foreach(source IN LISTS core_test_sources)
     endif()
   endif()
   get_filename_component(test ${source} NAME_WE)
+  if(test STREQUAL "pack_robot_test" AND NOT TARGET pack_robot)
+    continue()
+  endif()
   add_executable(${test} ${source})
   target_link_libraries(${test} PRIVATE test_support GTest::Main)
   set_target_properties(${test} PROPERTIES
@@ -67,6 +70,12 @@ foreach(source IN LISTS core_test_sources)
   endif()
   set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
 endforeach()
+
+if(TARGET pack_robot_test)
+  add_dependencies(pack_robot_test pack_robot)
+  target_compile_definitions(pack_robot_test PRIVATE
+    IST_PROXIMITY_PACK_ROBOT="$<TARGET_FILE:pack_robot>")
+endif()
 
 if(catkin_FOUND)
   find_package(rostest QUIET)
