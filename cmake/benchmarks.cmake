@@ -14,3 +14,10 @@ foreach(source IN LISTS benchmark_sources)
     OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
+
+# A yardstick, where it is installed (libembree-dev).
+find_package(embree 3 QUIET)
+if(TARGET embree)
+  target_link_libraries(benchmark_packing PRIVATE embree)
+  target_compile_definitions(benchmark_packing PRIVATE IST_PROXIMITY_EMBREE)
+endif()
