@@ -29,3 +29,10 @@ if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
 else()
   message(STATUS "ist_proximity: benchmark/octomap without FCL (apt install libfcl-dev)")
 endif()
+
+# A yardstick, where it is installed (libembree-dev).
+find_package(embree 3 QUIET)
+if(TARGET embree)
+  target_link_libraries(benchmark_packing PRIVATE embree)
+  target_compile_definitions(benchmark_packing PRIVATE IST_PROXIMITY_EMBREE)
+endif()

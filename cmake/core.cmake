@@ -25,15 +25,27 @@ target_link_libraries(ist_proximity_core
     ist_proximity::urdfdom_headers
     ist_proximity::xxhash)
 
-# Each file in src/tools is a program of its own.
-file(GLOB tool_sources CONFIGURE_DEPENDS src/tools/*.cpp)
+# Each file in src/tools is a program of its own; the folder of its name holds the rest of it.
+find_path(IST_PROXIMITY_CLI11_INCLUDE_DIR CLI/CLI.hpp)
+mark_as_advanced(IST_PROXIMITY_CLI11_INCLUDE_DIR)
+find_package(PNG QUIET)
 set(tools "")
-foreach(source IN LISTS tool_sources)
-  get_filename_component(tool ${source} NAME_WE)
-  add_executable(${tool} ${source})
-  target_link_libraries(${tool} PRIVATE ist_proximity_core)
-  list(APPEND tools ${tool})
-endforeach()
+if(IST_PROXIMITY_CLI11_INCLUDE_DIR AND PNG_FOUND)
+  file(GLOB tool_sources CONFIGURE_DEPENDS src/tools/*.cpp)
+  foreach(source IN LISTS tool_sources)
+    get_filename_component(tool ${source} NAME_WE)
+    file(GLOB parts CONFIGURE_DEPENDS src/tools/${tool}/*.cpp)
+    add_executable(${tool} ${source} ${parts})
+    target_include_directories(${tool} PRIVATE src src/tools)
+    target_include_directories(${tool} SYSTEM PRIVATE ${IST_PROXIMITY_CLI11_INCLUDE_DIR})
+    target_link_libraries(${tool} PRIVATE ist_proximity_core ist_proximity::tinyxml2
+      ist_proximity::urdfdom ist_proximity::urdfdom_headers PNG::PNG)
+    list(APPEND tools ${tool})
+  endforeach()
+else()
+  message(STATUS "ist_proximity: no pack_robot, CLI11 or libpng is missing "
+    "(apt install libcli11-dev libpng-dev)")
+endif()
 
 # Within catkin the programs go where rosrun looks for them.
 if(catkin_FOUND)

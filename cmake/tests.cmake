@@ -62,7 +62,8 @@ foreach(source IN LISTS core_test_sources)
     endif()
   endif()
   get_filename_component(test ${source} NAME_WE)
-  if(test STREQUAL "octree_test" AND NOT octomap_FOUND)
+  if((test STREQUAL "octree_test" AND NOT octomap_FOUND) OR
+     (test STREQUAL "pack_robot_test" AND NOT TARGET pack_robot))
     continue()
   endif()
   add_executable(${test} ${source})
@@ -86,6 +87,12 @@ foreach(source IN LISTS core_test_sources)
   endif()
   set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
 endforeach()
+
+if(TARGET pack_robot_test)
+  add_dependencies(pack_robot_test pack_robot)
+  target_compile_definitions(pack_robot_test PRIVATE
+    IST_PROXIMITY_PACK_ROBOT="$<TARGET_FILE:pack_robot>")
+endif()
 
 if(catkin_FOUND)
   find_package(rostest QUIET)

@@ -11,17 +11,15 @@ namespace {
 constexpr int kMaxShrinks = 40;
 constexpr int kMaxTurns = 6;
 
-// Corners, edge middles and faces of a cube: enough directions to notice a bulge through a hole.
+// Evenly spread on the unit sphere (Fibonacci's spiral): enough to notice a bulge through a hole.
 std::vector<Eigen::Vector3d> probe_directions() {
+  constexpr int kCount = 150;
+  constexpr double kGoldenAngle = 2.39996322972865332;
   std::vector<Eigen::Vector3d> directions;
-  for (int i = -1; i <= 1; ++i) {
-    for (int j = -1; j <= 1; ++j) {
-      for (int k = -1; k <= 1; ++k) {
-        if (i != 0 || j != 0 || k != 0) {
-          directions.push_back(Eigen::Vector3d(i, j, k).normalized());
-        }
-      }
-    }
+  for (int i = 0; i < kCount; ++i) {
+    const double z = 1.0 - (2.0 * i + 1.0) / kCount, radius = std::sqrt(1.0 - z * z);
+    directions.emplace_back(radius * std::cos(kGoldenAngle * i),
+                            radius * std::sin(kGoldenAngle * i), z);
   }
   return directions;
 }
@@ -158,14 +156,14 @@ MedialBallFinder::InnerBall MedialBallFinder::without_bulge(const InnerBall& bal
 
 bool MedialBallFinder::is_inner(const InnerBall& ball) const {
   if (is_closed_) return true;
-  // No triangle is in the ball, so the winding number is harmonic there: near 1 at the centre, it
-  // is near 1 in most of the ball (Harnack's inequality for 1 - w).
+  // No triangle is in the ball, so the winding number is harmonic there: its mean over the ball's
+  // surface is that at the centre. Near 1, no large part of the surface can be outside.
   const double w = bvh_.winding_number(ball.center);
-  if (w > 0.98) return true;
+  if (w > 0.999) return true;
   if (w <= 0.5) return false;
   static const std::vector<Eigen::Vector3d> kDirections = probe_directions();
   return std::all_of(kDirections.begin(), kDirections.end(), [&](const Eigen::Vector3d& d) {
-    return bvh_.is_inside(ball.center + 0.98 * ball.radius * d);
+    return bvh_.is_inside(ball.center + ball.radius * d);
   });
 }
 

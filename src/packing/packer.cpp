@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include "geometry/boundary_edges.h"
 #include "interior_cover.h"
@@ -27,6 +28,21 @@ constexpr double kSurfaceShare = 0.6;
 PackingProgress share_of(const PackingProgress& progress, double from, double to) {
   if (!progress) return {};
   return [progress, from, to](double done) { return progress(from + (to - from) * done); };
+}
+
+void check_mesh(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      if (v >= mesh.vertices.size()) {
+        throw ModelError("triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
+                         " of " + std::to_string(mesh.vertices.size()));
+      }
+      if (!mesh.vertices[v].allFinite()) {
+        throw ModelError("a corner of triangle " + std::to_string(t) + " is not finite");
+      }
+    }
+  }
 }
 
 Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& config,
@@ -55,7 +71,7 @@ Packing pack_sphere(const Sphere& sphere) {
 
 Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
                   const PackingProgress& progress) {
-  if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
+  check_mesh(mesh);
   const TriangleBvh bvh(mesh);
   BallSearch balls;
   const bool may_overlap = config.order == PackingOrder::kMedial;

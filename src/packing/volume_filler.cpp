@@ -66,7 +66,8 @@ bool VolumeFiller::update(Cell* cell) const {
 
 void VolumeFiller::add_prototype(const Eigen::Vector3d& start) {
   const MedialBallFinder::InnerBall ball = finder_.without_bulge(climb(finder_, start));
-  if (ball.radius < min_radius_ || ball.radius <= 0.0) return;
+  // A little below min_radius too: what is left of a cell must be decided before its size is 0.
+  if (ball.radius < kEnough * min_radius_ || ball.radius <= 0.0) return;
   prototypes_.push_back({ball, count()});
   std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
 }

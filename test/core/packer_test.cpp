@@ -41,6 +41,7 @@ std::vector<NamedMesh> hostile_meshes() {
           {"L", test::l_shape(0.2, 0.05)},
           {"open box", test::open_box({0.1, 0.1, 0.2})},
           {"thin plate", test::thin_plate(0.1, 0.0005)},
+          {"plate as thick as the error", test::thin_plate(0.1, 0.01)},
           {"sheet", test::sheet(0.05)},
           {"inside out", test::inside_out(ball)},
           {"duplicated faces", test::joined(ball, ball)},

@@ -17,7 +17,8 @@ constexpr int kPackingVersion = 2;
 /// so any mesh can be covered. Deterministic.
 ///
 /// In disjoint packings no two inner balls overlap, interior ones included; their outer balls do.
-/// @throws ModelError if the mesh has no triangle.
+/// @throws ModelError if the mesh has no triangle, or one with a corner that is not finite or not
+///         there.
 Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
                   const PackingProgress& progress = {});
 

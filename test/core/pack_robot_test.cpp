@@ -1,0 +1,128 @@
+// The program pack_robot as users run it, on the demo's arm.
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "support/temp_dir.h"
+
+namespace ist {
+namespace {
+
+const std::string kArm = std::string(IST_PROXIMITY_SOURCE_DIR) + "/demo/demo_arm.urdf";
+const std::string kMesh = std::string(IST_PROXIMITY_SOURCE_DIR) + "/demo/meshes/shoulder_fork.stl";
+
+std::string read(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::vector<std::vector<std::string>> csv_rows(const std::string& path) {
+  std::istringstream lines(read(path));
+  std::vector<std::vector<std::string>> rows;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+class PackRobotTest : public testing::Test {
+ protected:
+  // Exit code; what it says is in said_.
+  int run(const std::string& arguments) {
+    const std::string said = dir_.file("said");
+    const std::string command = "ROS_PACKAGE_PATH='" + std::string(IST_PROXIMITY_SOURCE_DIR) +
+                                "' '" IST_PROXIMITY_PACK_ROBOT "' " + arguments + " > '" + said +
+                                "' 2>&1";
+    const int status = std::system(command.c_str());  // NOLINT(bugprone-command-processor)
+    said_ = read(said);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string file(const std::string& name) const { return dir_.file(name); }
+
+  test::TempDir dir_;
+  std::string said_;
+};
+
+TEST_F(PackRobotTest, tableSpheresAndPictureOfARobot) {
+  ASSERT_EQ(run(kArm + " --no-cache --max-error 0.02 0.01 --csv " + file("a.csv") + " --ply " +
+                file("a.ply") + " --picture " + file("a.png")),
+            0)
+      << said_;
+  const auto rows = csv_rows(file("a.csv"));
+  ASSERT_EQ(rows.size(), 19U) << "a header, and nine links at two errors";
+  std::size_t spheres = 0;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    ASSERT_EQ(rows[i].size(), rows[0].size());
+    EXPECT_NE(said_.find(rows[i][1]), std::string::npos) << rows[i][1];
+    const double max_error = std::stod(rows[i][0]), max_gap = std::stod(rows[i][7]);
+    EXPECT_LE(max_gap, max_error);
+    EXPECT_LE(std::stod(rows[i][8]), max_gap) << "mean";
+    EXPECT_LT(std::stod(rows[i][9]), 1e-9) << "protrusion of a closed mesh";
+    EXPECT_LE(std::stod(rows[i][6]), std::stod(rows[i][5])) << "filled, of the volume";
+    if (i > 9) spheres += std::stoul(rows[i][4]);
+  }
+  const std::string ply = read(file("a.ply"));
+  EXPECT_NE(ply.find("element vertex " + std::to_string(spheres) + "\n"), std::string::npos);
+  EXPECT_EQ(read(file("a.png")).substr(1, 3), "PNG");
+}
+
+TEST_F(PackRobotTest, anyNumberOfThreadsGivesTheSameSpheres) {
+  for (const std::string order : {"medial", "disjoint", "volume"}) {
+    std::vector<std::string> spheres;
+    for (const std::string threads : {"1", "2", "5"}) {
+      ASSERT_EQ(run(kArm + " --no-cache --max-error 0.02 --order " + order + " --threads " +
+                    threads + " --ply " + file("a.ply")),
+                0)
+          << said_;
+      spheres.push_back(read(file("a.ply")));
+    }
+    EXPECT_EQ(spheres[0], spheres[1]) << order;
+    EXPECT_EQ(spheres[0], spheres[2]) << order;
+  }
+}
+
+TEST_F(PackRobotTest, aMeshIsReadFromTheCacheTheSecondTime) {
+  // The mesh is in millimetres: as large as a house.
+  const std::string arguments = kMesh + " --max-error 5 --cache " + file("cache") + " --ply ";
+  ASSERT_EQ(run(arguments + file("a.ply")), 0) << said_;
+  EXPECT_EQ(said_.find("(cache)"), std::string::npos) << said_;
+  ASSERT_EQ(run(arguments + file("b.ply")), 0) << said_;
+  EXPECT_NE(said_.find("(cache)"), std::string::npos) << said_;
+  EXPECT_EQ(read(file("a.ply")), read(file("b.ply")));
+}
+
+TEST_F(PackRobotTest, saysWhatIsWrong) {
+  EXPECT_EQ(run(file("nowhere.stl")), 1);
+  EXPECT_NE(said_.find("nowhere.stl"), std::string::npos) << said_;
+  EXPECT_EQ(run("package://no_such_package/robot.urdf"), 1);
+  EXPECT_NE(said_.find("no_such_package"), std::string::npos) << said_;
+  EXPECT_NE(run(kMesh + " --order largest"), 0);
+  EXPECT_NE(said_.find("disjoint"), std::string::npos) << said_;
+  EXPECT_NE(run(kMesh + " --max-error -1"), 0);
+  EXPECT_EQ(run(kMesh + " --no-cache --max-error 10 --picture /nowhere/a.png"), 1);
+  EXPECT_NE(said_.find("/nowhere/a.png"), std::string::npos) << said_;
+}
+
+TEST_F(PackRobotTest, aFaultyLinkIsToldAndTheOthersArePacked) {
+  std::ofstream(file("half.urdf")) << R"(<robot name="half">
+    <link name="good"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+    <link name="bad"><collision><geometry><mesh filename="file:///nowhere.stl"/></geometry>
+      </collision></link>
+    <joint name="j" type="fixed"><parent link="good"/><child link="bad"/></joint></robot>)";
+  EXPECT_EQ(run(file("half.urdf") + " --no-cache"), 1);
+  EXPECT_NE(said_.find("nowhere.stl"), std::string::npos) << said_;
+  EXPECT_NE(said_.find("good"), std::string::npos) << said_;
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/hard_shapes.h"
+#include "support/meshes.h"
+
+/// Meshes as people have them, made by code.
+namespace ist::test {
+
+struct HostileMesh {
+  std::string name;
+  TriangleMesh mesh;
+  double max_error;  ///< [m] asked of its packing
+};
+
+inline TriangleMesh scaled(TriangleMesh mesh, double scale) {
+  for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
+  return mesh;
+}
+
+inline TriangleMesh shifted(TriangleMesh mesh, const Eigen::Vector3d& by) {
+  for (Eigen::Vector3d& v : mesh.vertices) v += by;
+  return mesh;
+}
+
+/// Every n-th triangle taken out.
+inline TriangleMesh perforated(TriangleMesh mesh, std::size_t n) {
+  std::vector<TriangleMesh::Triangle> kept;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (t % n != 0) kept.push_back(mesh.triangles[t]);
+  }
+  mesh.triangles = kept;
+  return mesh;
+}
+
+/// Every n-th triangle seen from the other side.
+inline TriangleMesh partly_flipped(TriangleMesh mesh, std::size_t n) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += n) {
+    std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
+  }
+  return mesh;
+}
+
+/// Each corner of each triangle a vertex of its own.
+inline TriangleMesh unwelded(const TriangleMesh& mesh) {
+  TriangleMesh soup;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+    for (int k = 0; k < 3; ++k) soup.vertices.push_back(mesh.corner(t, k));
+    soup.triangles.push_back({first, first + 1, first + 2});
+  }
+  return soup;
+}
+
+/// With `count` triangles without area: twice the same corner, or three on a line.
+inline TriangleMesh with_degenerate_triangles(TriangleMesh mesh, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const TriangleMesh::Triangle t = mesh.triangles[i];
+    mesh.vertices.push_back(0.5 * (mesh.vertices[t[0]] + mesh.vertices[t[1]]));
+    mesh.triangles.push_back({t[0], t[0], t[1]});
+    mesh.triangles.push_back({t[0], static_cast<std::uint32_t>(mesh.vertices.size() - 1), t[1]});
+  }
+  return mesh;
+}
+
+/// A box with a wall inside that hangs on an edge: three faces meet there.
+inline TriangleMesh box_with_wall(const Eigen::Vector3d& size) {
+  const Eigen::Vector3d h = 0.5 * size;
+  TriangleMesh wall;
+  wall.vertices = {{0, -h.y(), -h.z()}, {0, h.y(), -h.z()}, {0, h.y(), h.z()}, {0, -h.y(), h.z()}};
+  wall.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return joined(box(size), wall);
+}
+
+inline std::vector<HostileMesh> hostile_meshes() {
+  const TriangleMesh ball = icosphere(0.1, 2), cube = box({0.1, 0.1, 0.1});
+  const TriangleMesh sheet_on_edge = shifted(sheet(0.05), {0.12, 0, 0});
+  constexpr double k5mm = 0.005;
+  return {
+      {"box without a lid", open_box({0.1, 0.1, 0.2}), k5mm},
+      {"ball, every 10th triangle missing", perforated(ball, 10), k5mm},
+      {"half a ball's triangles missing", perforated(ball, 2), k5mm},
+      {"edge with three faces", box_with_wall({0.2, 0.1, 0.1}), k5mm},
+      {"two boxes that share an edge", joined(cube, shifted(cube, {0.1, 0.1, 0})), k5mm},
+      {"two boxes that share a corner", joined(cube, shifted(cube, {0.1, 0.1, 0.1})), k5mm},
+      {"inside out", inside_out(ball), k5mm},
+      {"every 7th face flipped", partly_flipped(ball, 7), k5mm},
+      {"every face twice", joined(ball, ball), k5mm},
+      {"every face in both directions", joined(ball, inside_out(ball)), k5mm},
+      {"two balls that pass through each other", joined(ball, shifted(ball, {0.1, 0, 0})), k5mm},
+      {"two balls apart", joined(ball, shifted(ball, {0.3, 0, 0})), k5mm},
+      {"ball with a cavity", joined(ball, inside_out(scaled(ball, 0.5))), k5mm},
+      {"ball in a cavity of a ball",
+       joined(joined(ball, inside_out(scaled(ball, 0.8))), scaled(ball, 0.5)), k5mm},
+      {"ball with a second one buried", joined(ball, scaled(ball, 0.5)), k5mm},
+      {"no edge shared (triangle soup)", unwelded(ball), k5mm},
+      {"60 triangles without area", with_degenerate_triangles(ball, 30), k5mm},
+      {"slivers of 1:1500", sliver_plate(0.3, 0.02, 0.01, 100), k5mm},
+      {"needle, 0.3 m by 20 um", needle(0.3, 1e-5), k5mm},
+      {"plate, 0.5 mm thick", thin_plate(0.1, 0.0005), k5mm},
+      {"plate, 1 um thick", thin_plate(0.1, 1e-6), k5mm},
+      {"sheet without volume", sheet(0.1), k5mm},
+      {"ball with a fin", joined(ball, sheet_on_edge), k5mm},
+      {"one triangle", {{{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}}, {{0, 1, 2}}}, 0.001},
+      {"one triangle, a line", {{{0, 0, 0}, {0.1, 0, 0}, {0.05, 0, 0}}, {{0, 1, 2}}}, k5mm},
+      {"one triangle, a point", {{{1, 2, 3}}, {{0, 0, 0}}}, k5mm},
+      {"Chazelle's polyhedron", chazelle(3, 0.002, 0.2), k5mm},
+      {"1 mm wide", scaled(ball, 0.005), 0.0001},
+      {"100 m wide", scaled(ball, 500.0), 2.0},
+      {"1 km from the origin", shifted(ball, {1000.0, 0, 0}), k5mm},
+      {"1000 km from the origin", shifted(ball, {0, 1e6, 0}), k5mm},
+      {"no triangle", TriangleMesh{}, k5mm},
+      {"a corner that is NaN", {{{0, 0, 0}, {NAN, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, k5mm},
+      {"a corner at infinity", {{{0, 0, 0}, {INFINITY, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, k5mm},
+      {"a corner that is not there", {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 7}}}, k5mm},
+  };
+}
+
+}  // namespace ist::test
