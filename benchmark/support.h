@@ -1,8 +1,11 @@
 #pragma once
 
+#include <time.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace ist::benchmark {
@@ -11,6 +14,29 @@ using Clock = std::chrono::steady_clock;
 
 inline double microseconds_since(Clock::time_point start) {
   return 1e6 * std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// [us] of processor time that this thread took since the last call: what others do on the machine
+/// at the same time does not count.
+class ThreadTimer {
+ public:
+  ThreadTimer() { lap(); }
+  double lap() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    const double us =
+        1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
+    return us - std::exchange(last_, us);
+  }
+
+ private:
+  double last_ = 0.0;
+};
+
+inline double mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
 }
 
 /// The q-quantile, q from 0 to 1; 0 without values.

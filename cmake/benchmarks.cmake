@@ -36,3 +36,49 @@ if(TARGET embree)
   target_link_libraries(benchmark_packing PRIVATE embree)
   target_compile_definitions(benchmark_packing PRIVATE IST_PROXIMITY_EMBREE)
 endif()
+
+# What people would use instead, in benchmark/peers: each where its library is found
+# (scripts/install_dependencies benchmark).
+target_sources(benchmark_peers PRIVATE
+  benchmark/peers/flat.cpp
+  benchmark/peers/floors.cpp
+  benchmark/peers/kinect.cpp
+  benchmark/peers/ours.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
+target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
+target_sources(benchmark_ingest PRIVATE
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
+# ist_proximity_peer(NAME HEADER [LIBRARY...]): compiles benchmark/peers/NAME.cpp where they are.
+function(ist_proximity_peer name header)
+  find_path(IST_PROXIMITY_${name}_INCLUDE_DIR ${header})
+  mark_as_advanced(IST_PROXIMITY_${name}_INCLUDE_DIR)
+  set(found ${IST_PROXIMITY_${name}_INCLUDE_DIR})
+  set(libraries "")
+  foreach(library IN LISTS ARGN)
+    find_library(IST_PROXIMITY_${library}_LIBRARY ${library})
+    mark_as_advanced(IST_PROXIMITY_${library}_LIBRARY)
+    if(NOT IST_PROXIMITY_${library}_LIBRARY)
+      set(found "")
+    endif()
+    list(APPEND libraries ${IST_PROXIMITY_${library}_LIBRARY})
+  endforeach()
+  if(NOT found)
+    message(STATUS "ist_proximity: benchmark without ${name}")
+    return()
+  endif()
+  string(TOUPPER IST_BENCHMARK_${name} definition)
+  target_sources(benchmark_peers PRIVATE benchmark/peers/${name}.cpp)
+  # Warnings in its templates are not ours.
+  set_source_files_properties(benchmark/peers/${name}.cpp PROPERTIES COMPILE_OPTIONS -w)
+  target_compile_definitions(benchmark_peers PRIVATE ${definition})
+  target_link_libraries(benchmark_peers PRIVATE ${libraries})
+endfunction()
+
+ist_proximity_peer(nanoflann nanoflann.hpp)
+ist_proximity_peer(embree embree3/rtcore.h embree3)
+ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
+ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
+ist_proximity_peer(dynamic_edt dynamicEDT3D/dynamicEDTOctomap.h dynamicedt3d octomap octomath)

@@ -1,0 +1,93 @@
+// What it costs to take in a depth image, organized and shuffled, against copying its bytes, as a
+// Markdown table. Every 640 x 480 frame that is there: the synthetic one, and the test data's.
+//
+// One thread, processor time of that thread; everything is warm. Usage: ingest [repetitions]
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "peers/scene.h"
+#include "support.h"
+#include "support/data_dir.h"
+
+namespace {
+
+using ist::benchmark::Frame;
+using ist::benchmark::quantile;
+using ist::benchmark::ThreadTimer;
+
+// The same points in one row, in random order.
+Frame shuffled(const Frame& frame) {
+  std::vector<std::size_t> order(frame.width * frame.height);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
+  Frame result = frame;
+  result.width = order.size();
+  result.height = 1;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
+  }
+  return result;
+}
+
+double copy_us(const Frame& frame, int repetitions) {
+  std::vector<float> copy(frame.data.size());
+  std::vector<double> us;
+  ThreadTimer timer;
+  for (int i = 0; i < repetitions; ++i) {
+    timer.lap();
+    std::memcpy(copy.data(), frame.data.data(), frame.bytes());
+    us.push_back(timer.lap());
+  }
+  return quantile(us, 0.5);
+}
+
+double ingest_us(const Frame& frame, int repetitions) {
+  ist::IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = std::numeric_limits<double>::infinity();
+  config.self_filter = false;
+  ist::Ingest ingest(config);
+  ist::CloudSnapshot snapshot;
+  ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
+  std::vector<double> us;
+  ThreadTimer timer;
+  for (int i = 0; i < repetitions; ++i) {
+    timer.lap();
+    ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
+    us.push_back(timer.lap());
+  }
+  return quantile(us, 0.5);
+}
+
+void print(const std::string& name, const Frame& frame, int repetitions) {
+  const double copy = copy_us(frame, repetitions);
+  const double image = ingest_us(frame, repetitions);
+  const double mixed = ingest_us(shuffled(frame), repetitions);
+  std::printf("| %s | %.0f us | %.0f us | %.1f | %.0f us | %.1f |\n", name.c_str(), copy, image,
+              image / copy, mixed, mixed / copy);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int repetitions = argc > 1 ? std::atoi(argv[1]) : 50;
+  std::printf(
+      "| frame | memcpy | organized | / memcpy | shuffled | / memcpy |\n"
+      "|---|---|---|---|---|---|\n");
+  print("synthetic", ist::benchmark::synthetic_frame(640, 480), repetitions);
+  if (const auto data = ist::test::data_dir()) {
+    for (const auto& scene : ist::benchmark::kinect_data(*data, "").scenes) {
+      print(scene.name, scene.frame, repetitions);
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,263 @@
+// The same job for everyone: for each link of a robot the minimum distance to a depth image and the
+// point where it is, ours side by side with what people would use instead, as CSV.
+//
+// One thread, processor time of that thread. Every answer is checked against exact truth before
+// anything is timed. Data: a scene that this program makes, and the test data where it is
+// (IST_PROXIMITY_DATA, or ../shared/data).
+//
+// Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]...; scripts/benchmark calls it.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "peers/method.h"
+#include "support.h"
+#include "support/data_dir.h"
+
+namespace {
+
+using ist::benchmark::Answer;
+using ist::benchmark::Configuration;
+using ist::benchmark::DataSet;
+using ist::benchmark::Kind;
+using ist::benchmark::mean;
+using ist::benchmark::Method;
+using ist::benchmark::Methods;
+using ist::benchmark::quantile;
+using ist::benchmark::Scene;
+using ist::benchmark::ThreadTimer;
+
+constexpr std::size_t kFewSpheres = 59;    // a common hand-made set for this arm, 59 spheres
+constexpr double kBudget = 2e6;            // [us] for what one method repeats on one scene
+constexpr std::size_t kFrameQueries = 33;  // at 1 kHz, between two images at 30 Hz
+
+struct Result {
+  std::vector<double> ingest, query, free_query, motion, free_motion;  // [us]
+  std::vector<double> error;                                           // [m] without contact
+  std::size_t failures = 0, answers = 0;
+};
+
+bool any_contact(const Configuration& configuration) {
+  return std::find(configuration.is_contact.begin(), configuration.is_contact.end(), true) !=
+         configuration.is_contact.end();
+}
+
+const char* name_of(Kind kind) {
+  switch (kind) {
+    case Kind::kFloor:
+      return "floor";
+    case Kind::kOurs:
+      return "ours";
+    case Kind::kExact:
+      return "exact";
+    case Kind::kSpheres:
+      return "spheres";
+    case Kind::kGrid:
+      return "grid";
+  }
+  return "";
+}
+
+// Often enough for a median, at least three times.
+void time_ingest(Method* method, const Scene& scene, Result* result) {
+  method->ingest(scene.frame);  // warm
+  ThreadTimer timer;
+  double sum = 0.0;
+  for (int i = 0; i < 30 && (i < 3 || sum < kBudget); ++i) {
+    timer.lap();
+    method->ingest(scene.frame);
+    result->ingest.push_back(timer.lap());
+    sum += result->ingest.back();
+  }
+}
+
+void check(Method* method, const Scene& scene, Result* result) {
+  std::vector<Answer> answers(scene.configurations.front().X_FL.size());
+  for (std::size_t k = 0; k < scene.configurations.size(); k += method->every) {
+    const Configuration& truth = scene.configurations[k];
+    method->query(truth.X_FL, &answers);
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      const bool contact = truth.is_contact[i];
+      const double error = answers[i].distance - truth.distance[i];
+      if (!contact) result->error.push_back(error);
+      ++result->answers;
+      const double apart = (answers[i].p_FL - answers[i].p_FO).norm();
+      const bool fits = std::abs(apart - std::abs(answers[i].distance)) <= method->witness_error ||
+                        std::isinf(method->witness_error);
+      const bool holds = error >= method->least_error && error <= method->largest_error;
+      if ((!contact || method->is_unsigned) && !(holds && fits)) {
+        if (result->failures++ == 0) {
+          std::fprintf(
+              stderr,
+              "%s, %s, configuration %zu, link %zu: %.6f m, truth %.6f m, witnesses %.6f m apart\n",
+              method->name.c_str(), scene.name.c_str(), k, i, answers[i].distance,
+              truth.distance[i], apart);
+        }
+      }
+    }
+  }
+}
+
+void time_queries(Method* method, const Scene& scene, Result* result) {
+  std::vector<Answer> answers(scene.configurations.front().X_FL.size());
+  ThreadTimer timer;
+  for (std::size_t k = 0; k < scene.configurations.size(); k += method->every) {
+    timer.lap();
+    method->query(scene.configurations[k].X_FL, &answers);
+    const double us = timer.lap();
+    result->query.push_back(us);
+    if (!any_contact(scene.configurations[k])) result->free_query.push_back(us);
+  }
+}
+
+// Images' worth of the motion, spread over it; all of it when there is time.
+void time_motion(Method* method, const DataSet& set, const std::vector<bool>& contact,
+                 Result* result) {
+  std::vector<Answer> answers(set.robot.meshes.size());
+  const std::size_t frames = set.motion.size() / kFrameQueries;
+  const double one = std::max(1.0, quantile(result->query, 0.5)) * kFrameQueries;
+  const auto affordable = static_cast<std::size_t>(std::max(1.0, kBudget / one));
+  const std::size_t step = std::max<std::size_t>(1, frames / affordable);
+  ThreadTimer timer;
+  method->query(set.motion[0], &answers);
+  for (std::size_t frame = 0; frame < frames; frame += step) {
+    for (std::size_t k = frame * kFrameQueries; k < (frame + 1) * kFrameQueries; ++k) {
+      timer.lap();
+      method->query(set.motion[k], &answers);
+      const double us = timer.lap();
+      result->motion.push_back(us);
+      if (!contact[k]) result->free_motion.push_back(us);
+    }
+  }
+}
+
+// Which poses of the motion are in contact: to tell their times apart, nothing else.
+std::vector<bool> contacts(const std::shared_ptr<const ist::RobotModel>& model, const DataSet& set,
+                           const Scene& scene) {
+  ist::IngestConfig config;
+  config.self_filter = false;
+  ist::CloudSnapshot snapshot;
+  ist::Ingest(config).run(scene.frame.raw(), scene.frame.X_FS, {}, 0.0, &snapshot);
+  ist::ProximityQuery query(model, {});
+  const std::vector<bool> known(model->links.size(), true);
+  std::vector<ist::LinkProximity> results;
+  std::vector<bool> contact;
+  for (const auto& X_FL : set.motion) {
+    query.run(X_FL, known, {&snapshot}, &results);
+    contact.push_back(std::any_of(results.begin(), results.end(), [](const auto& link) {
+      return link.state == ist::LinkState::kContact;
+    }));
+  }
+  return contact;
+}
+
+void print_header(std::FILE* csv) {
+  std::fprintf(csv,
+               "data,method,kind,spheres,max_error_mm,tolerance_mm,configurations,answers,failures,"
+               "ingest_us,ingest_p99_us,query_us,query_p99_us,free_query_us,free_query_p99_us,"
+               "error_mean_mm,error_least_mm,error_largest_mm,motion_queries,motion_us,"
+               "motion_p99_us,motion_max_us,motion_mean_us,free_motion_us,free_motion_p99_us,"
+               "free_motion_max_us\n");
+}
+
+void print(std::FILE* csv, const DataSet& set, const Method& method, const Result& r) {
+  std::vector<double> size = r.error;
+  for (double& error : size) error = std::abs(error);
+  std::fprintf(csv, "%s,\"%s\",%s,%zu,%g,%g,%zu,%zu,%zu", set.name.c_str(), method.name.c_str(),
+               name_of(method.kind), method.spheres, 1e3 * method.max_error, 1e3 * method.tolerance,
+               r.query.size(), r.answers, r.failures);
+  for (const auto* times : {&r.ingest, &r.query, &r.free_query}) {
+    std::fprintf(csv, ",%.1f,%.1f", quantile(*times, 0.5), quantile(*times, 0.99));
+  }
+  std::fprintf(csv, ",%.5f,%.5f,%.5f,%zu", 1e3 * mean(size), 1e3 * quantile(r.error, 0.0),
+               1e3 * quantile(r.error, 1.0), r.motion.size());
+  std::fprintf(csv, ",%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f\n", quantile(r.motion, 0.5),
+               quantile(r.motion, 0.99), quantile(r.motion, 1.0), mean(r.motion),
+               quantile(r.free_motion, 0.5), quantile(r.free_motion, 0.99),
+               quantile(r.free_motion, 1.0));
+  std::fflush(csv);
+}
+
+Methods all_methods(const DataSet& set) {
+  Methods methods;
+  const ist::benchmark::SphereSet spheres = few_spheres(set.robot, kFewSpheres);
+  add_floors(set.robot, spheres, &methods);
+  add_ours(set.robot, &methods);
+#ifdef IST_BENCHMARK_NANOFLANN
+  add_nanoflann(spheres, &methods);
+#endif
+#ifdef IST_BENCHMARK_EMBREE
+  add_embree(set.robot, &methods);
+#endif
+#ifdef IST_BENCHMARK_CGAL
+  add_cgal(set.robot, &methods);
+#endif
+#ifdef IST_BENCHMARK_FCL
+  add_fcl(set.robot, &methods);
+#endif
+#ifdef IST_BENCHMARK_DYNAMIC_EDT
+  add_dynamic_edt(spheres, &methods);
+#endif
+  return methods;
+}
+
+// @returns whether every answer was right
+bool run(const DataSet& set, std::FILE* csv) {
+  const auto model = set.robot.pack(0.005);
+  std::vector<std::vector<bool>> contact;
+  for (const Scene& scene : set.scenes) contact.push_back(contacts(model, set, scene));
+  bool all_right = true;
+  for (const auto& method : all_methods(set)) {
+    std::fprintf(stderr, "%s: %s, max_error %g mm, tolerance %g mm\n", set.name.c_str(),
+                 method->name.c_str(), 1e3 * method->max_error, 1e3 * method->tolerance);
+    Result result;
+    for (std::size_t s = 0; s < set.scenes.size(); ++s) {
+      time_ingest(method.get(), set.scenes[s], &result);
+      if (method->kind == Kind::kFloor) continue;
+      check(method.get(), set.scenes[s], &result);
+      time_queries(method.get(), set.scenes[s], &result);
+      if (method->every == 1) time_motion(method.get(), set, contact[s], &result);
+    }
+    if (result.failures > 0) {
+      std::fprintf(stderr, "  %zu of %zu answers are WRONG\n", result.failures, result.answers);
+      all_right = false;
+    }
+    print(csv, set, *method, result);
+  }
+  return all_right;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::fprintf(stderr, "Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]...\n");
+    return 2;
+  }
+  std::vector<std::string> wanted(argv + 3, argv + argc);
+  if (wanted.empty()) wanted = {"synthetic", "kinect"};
+  std::FILE* csv = std::fopen(argv[1], "w");
+  if (csv == nullptr) {
+    std::fprintf(stderr, "cannot write %s\n", argv[1]);
+    return 2;
+  }
+  print_header(csv);
+  bool all_right = true;
+  for (const std::string& name : wanted) {
+    const auto data = ist::test::data_dir();
+    if (name == "kinect" && !data) {
+      std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
+    } else if (name == "kinect") {
+      all_right = run(ist::benchmark::kinect_data(*data, argv[2]), csv) && all_right;
+    } else {
+      all_right = run(ist::benchmark::synthetic_data(argv[2]), csv) && all_right;
+    }
+  }
+  std::fclose(csv);
+  return all_right ? 0 : 1;
+}

@@ -1,0 +1,78 @@
+#include <dynamicEDT3D/dynamicEDTOctomap.h>
+#include <octomap/octomap.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "peers/flat.h"
+
+// A distance field on a grid of 2 cm about the robot, looked up at each sphere's centre.
+namespace ist::benchmark {
+namespace {
+
+class DynamicEdt : public Method {
+ public:
+  explicit DynamicEdt(const SphereSet& set) : set_(set) {
+    name = "dynamicEDT3D of 2 cm";
+    kind = Kind::kGrid;
+    spheres = set.size();
+    // From the centre of the sphere's cell to that of the nearest point's cell.
+    const double diagonal = std::sqrt(3.0) * kCell;
+    least_error = -set.gap - diagonal;
+    largest_error = set.gap + diagonal;
+    witness_error = diagonal;
+  }
+
+  void ingest(const Frame& frame) override {
+    points_.read(frame);
+    field_.reset();
+    tree_ = std::make_unique<octomap::OcTree>(kCell);
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const Eigen::Vector3f p = points_.at(i);
+      tree_->setNodeValue(p.x(), p.y(), p.z(), tree_->getClampingThresMaxLog(), true);
+    }
+    tree_->updateInnerOccupancy();
+    const float r = kReach;
+    field_ = std::make_unique<DynamicEDTOctomap>(
+        kFarthest, tree_.get(), octomap::point3d(-r, -r, -r), octomap::point3d(r, r, r), false);
+    field_->update();
+  }
+
+  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+    for (std::size_t link = 0; link < X_FL.size(); ++link) {
+      Answer& best = (*answers)[link];
+      best.distance = std::numeric_limits<double>::infinity();
+      for (const SphereSet::Sphere& sphere : set_.links[link]) {
+        const Eigen::Vector3d center = X_FL[link] * sphere.center;
+        const Eigen::Vector3f c = center.cast<float>();
+        float distance = 0.0F;
+        octomap::point3d cell;
+        field_->getDistanceAndClosestObstacle(octomap::point3d(c.x(), c.y(), c.z()), distance,
+                                              cell);
+        if (distance < 0.0F) continue;  // out of the grid
+        if (static_cast<double>(distance) - sphere.radius >= best.distance) continue;
+        best = sphere_answer(center, sphere.radius, {cell.x(), cell.y(), cell.z()});
+        best.distance = static_cast<double>(distance) - sphere.radius;
+      }
+    }
+  }
+
+ private:
+  static constexpr double kCell = 0.02;     // [m]
+  static constexpr float kReach = 1.3F;     // [m] of the robot
+  static constexpr float kFarthest = 2.0F;  // [m] beyond that it does not tell
+
+  SphereSet set_;
+  Points points_;
+  std::unique_ptr<octomap::OcTree> tree_;
+  std::unique_ptr<DynamicEDTOctomap> field_;
+};
+
+}  // namespace
+
+void add_dynamic_edt(const SphereSet& spheres, Methods* methods) {
+  methods->push_back(std::make_unique<DynamicEdt>(spheres));
+}
+
+}  // namespace ist::benchmark

@@ -1,0 +1,126 @@
+#include <embree3/rtcore.h>
+
+#include <limits>
+
+#include "peers/flat.h"
+
+// Embree's point query: the nearest triangle of a link's mesh, for every point the link's box
+// leaves.
+namespace ist::benchmark {
+namespace {
+
+// Ericson, Real-Time Collision Detection, 5.1.5, in float as Embree's own example does it.
+Eigen::Vector3f closest_on_triangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
+                                    const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
+  const Eigen::Vector3f ab = b - a, ac = c - a, ap = p - a;
+  const float d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0.0F && d2 <= 0.0F) return a;
+  const Eigen::Vector3f bp = p - b;
+  const float d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0.0F && d4 <= d3) return b;
+  const Eigen::Vector3f cp = p - c;
+  const float d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0.0F && d5 <= d6) return c;
+  const float vc = d1 * d4 - d3 * d2;
+  if (vc <= 0.0F && d1 >= 0.0F && d3 <= 0.0F) return a + d1 / (d1 - d3) * ab;
+  const float vb = d5 * d2 - d1 * d6;
+  if (vb <= 0.0F && d2 >= 0.0F && d6 <= 0.0F) return a + d2 / (d2 - d6) * ac;
+  const float va = d3 * d6 - d5 * d4;
+  if (va <= 0.0F && d4 - d3 >= 0.0F && d5 - d6 >= 0.0F) {
+    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  }
+  const float scale = 1.0F / (va + vb + vc);
+  return a + vb * scale * ab + vc * scale * ac;
+}
+
+struct Surface {
+  std::vector<Eigen::Vector3f> corners;  // three for each triangle
+  RTCScene scene = nullptr;
+};
+
+struct Found {
+  const Surface* surface;
+  Eigen::Vector3f point;
+  bool any = false;
+};
+
+bool visit(RTCPointQueryFunctionArguments* arguments) {
+  auto& found = *static_cast<Found*>(arguments->userPtr);
+  const Eigen::Vector3f* corner = &found.surface->corners[3 * std::size_t{arguments->primID}];
+  const Eigen::Vector3f p(arguments->query->x, arguments->query->y, arguments->query->z);
+  const Eigen::Vector3f q = closest_on_triangle(p, corner[0], corner[1], corner[2]);
+  const float distance = (q - p).norm();
+  if (!(distance < arguments->query->radius)) return false;
+  arguments->query->radius = distance;
+  found.point = q;
+  found.any = true;
+  return true;
+}
+
+class Embree : public PrunedByBox {
+ public:
+  explicit Embree(const Robot& robot) : PrunedByBox(robot), device_(rtcNewDevice("threads=1")) {
+    name = "Embree point query, link boxes";
+    for (const TriangleMesh& mesh : robot.meshes) {
+      Surface surface;
+      surface.scene = rtcNewScene(device_);
+      RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+      auto* vertices = static_cast<float*>(
+          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                  3 * sizeof(float), mesh.vertices.size()));
+      for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          vertices[3 * i + k] = static_cast<float>(mesh.vertices[i][static_cast<int>(k)]);
+        }
+      }
+      auto* indices = static_cast<unsigned*>(
+          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                  3 * sizeof(unsigned), mesh.triangles.size()));
+      for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          indices[3 * t + k] = mesh.triangles[t][k];
+          surface.corners.emplace_back(mesh.corner(t, static_cast<int>(k)).cast<float>());
+        }
+      }
+      rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+      rtcCommitGeometry(geometry);
+      rtcAttachGeometry(surface.scene, geometry);
+      rtcReleaseGeometry(geometry);
+      rtcSetSceneBuildQuality(surface.scene, RTC_BUILD_QUALITY_HIGH);
+      rtcCommitScene(surface.scene);
+      surfaces_.push_back(std::move(surface));
+    }
+  }
+  ~Embree() override {
+    for (const Surface& surface : surfaces_) rtcReleaseScene(surface.scene);
+    rtcReleaseDevice(device_);
+  }
+  Embree(const Embree&) = delete;
+  Embree& operator=(const Embree&) = delete;
+
+ protected:
+  bool closest(std::size_t link, const Eigen::Vector3f& p_L, float* distance,
+               Eigen::Vector3d* surface_L) override {
+    Found found{&surfaces_[link], Eigen::Vector3f::Zero()};
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    RTCPointQuery query{p_L.x(), p_L.y(), p_L.z(), 0.0F, *distance};
+    rtcPointQuery(surfaces_[link].scene, &query, &context, visit, &found);
+    if (!found.any) return false;
+    *distance = query.radius;
+    *surface_L = found.point.cast<double>();
+    return true;
+  }
+
+ private:
+  RTCDevice device_;
+  std::vector<Surface> surfaces_;
+};
+
+}  // namespace
+
+void add_embree(const Robot& robot, Methods* methods) {
+  methods->push_back(std::make_unique<Embree>(robot));
+}
+
+}  // namespace ist::benchmark

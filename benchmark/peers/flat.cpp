@@ -1,0 +1,123 @@
+#include "peers/flat.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace ist::benchmark {
+namespace {
+
+constexpr std::size_t kBlock = 1024;  // points; the nearest is looked for in one block only
+
+IST_BENCHMARK_SIMD void box_pass(const float* x, const float* y, const float* z, std::size_t n,
+                                 const float* R, const float* t, const float* low,
+                                 const float* high, float* out) {
+  for (std::size_t i = 0; i < n; ++i) {
+    float sum = 0.0F;
+    for (int k = 0; k < 3; ++k) {
+      const float p = R[3 * k] * x[i] + R[3 * k + 1] * y[i] + R[3 * k + 2] * z[i] + t[k];
+      const float below = low[k] - p, above = p - high[k];
+      const float out_of = below > above ? below : above;
+      const float gap = out_of > 0.0F ? out_of : 0.0F;
+      sum += gap * gap;
+    }
+    out[i] = sum;
+  }
+}
+
+IST_BENCHMARK_SIMD float smallest_sq(const float* x, const float* y, const float* z, std::size_t n,
+                                     float cx, float cy, float cz) {
+  constexpr std::size_t kLanes = 32;
+  float best[kLanes];
+  for (float& lane : best) lane = std::numeric_limits<float>::max();
+  std::size_t i = 0;
+  for (; i + kLanes <= n; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const float dx = x[i + k] - cx, dy = y[i + k] - cy, dz = z[i + k] - cz;
+      const float d = dx * dx + dy * dy + dz * dz;
+      best[k] = d < best[k] ? d : best[k];
+    }
+  }
+  for (; i < n; ++i) {
+    const float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz;
+    const float d = dx * dx + dy * dy + dz * dz;
+    best[0] = d < best[0] ? d : best[0];
+  }
+  return *std::min_element(best, best + kLanes);
+}
+
+}  // namespace
+
+void box_distances_sq(const Points& points, const Eigen::Isometry3d& X_LF,
+                      const Eigen::AlignedBox3f& box, std::vector<float>* distances_sq) {
+  distances_sq->resize(points.size());
+  const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> R = X_LF.linear().cast<float>();
+  const Eigen::Vector3f t = X_LF.translation().cast<float>();
+  box_pass(points.x.data(), points.y.data(), points.z.data(), points.size(), R.data(), t.data(),
+           box.min().data(), box.max().data(), distances_sq->data());
+}
+
+std::size_t nearest_of_all(const Points& points, const Eigen::Vector3f& center) {
+  float best = std::numeric_limits<float>::infinity();
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < points.size(); i += kBlock) {
+    const float value =
+        smallest_sq(&points.x[i], &points.y[i], &points.z[i], std::min(kBlock, points.size() - i),
+                    center.x(), center.y(), center.z());
+    if (value < best) {
+      best = value;
+      first = i;
+    }
+  }
+  std::size_t nearest = first;
+  for (std::size_t i = first; i < std::min(first + kBlock, points.size()); ++i) {
+    if ((points.at(i) - center).squaredNorm() < (points.at(nearest) - center).squaredNorm()) {
+      nearest = i;
+    }
+  }
+  return nearest;
+}
+
+Answer sphere_answer(const Eigen::Vector3d& center, double radius, const Eigen::Vector3d& p_FO) {
+  const Eigen::Vector3d way = p_FO - center;
+  const double length = way.norm();
+  const Eigen::Vector3d direction =
+      length > 0.0 ? Eigen::Vector3d(way / length) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+  return {length - radius, center + radius * direction, p_FO};
+}
+
+PrunedByBox::PrunedByBox(const Robot& robot) : last_(robot.meshes.size(), 0) {
+  kind = Kind::kExact;
+  is_unsigned = true;
+  for (const TriangleMesh& mesh : robot.meshes) {
+    Eigen::AlignedBox3f box;
+    for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v.cast<float>());
+    boxes_.push_back(box);
+  }
+}
+
+void PrunedByBox::ingest(const Frame& frame) { points_.read(frame); }
+
+void PrunedByBox::query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) {
+  for (std::size_t link = 0; link < X_FL.size(); ++link) {
+    const Eigen::Isometry3d X_LF = X_FL[link].inverse();
+    const Eigen::Isometry3f X = X_LF.cast<float>();
+    box_distances_sq(points_, X_LF, boxes_[link], &bound_sq_);
+    float distance = std::numeric_limits<float>::infinity();
+    Eigen::Vector3d surface_L = Eigen::Vector3d::Zero();
+    std::size_t nearest = 0;
+    const auto try_point = [&](std::size_t i) {
+      if (closest(link, X * points_.at(i), &distance, &surface_L)) nearest = i;
+    };
+    try_point(std::min(last_[link], points_.size() - 1));
+    try_point(static_cast<std::size_t>(std::min_element(bound_sq_.begin(), bound_sq_.end()) -
+                                       bound_sq_.begin()));
+    for (std::size_t i = 0; i < bound_sq_.size(); ++i) {
+      if (bound_sq_[i] < distance * distance) try_point(i);
+    }
+    last_[link] = nearest;
+    (*answers)[link] = {static_cast<double>(distance), X_FL[link] * surface_L,
+                        points_.at(nearest).cast<double>()};
+  }
+}
+
+}  // namespace ist::benchmark

@@ -1,0 +1,73 @@
+#include <limits>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "peers/method.h"
+
+namespace ist::benchmark {
+namespace {
+
+// The packing decides how fast, the tolerance how exact.
+constexpr double kMaxErrors[] = {0.01, 0.005, 0.002, 0.001};  // [m]
+constexpr double kTolerances[] = {0.0, 0.001, 0.005, 0.02};  // [m]
+
+IngestConfig everything() {
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = std::numeric_limits<double>::infinity();
+  config.self_filter = false;  // the truth is of all points
+  return config;
+}
+
+class Ours : public Method {
+ public:
+  Ours(const std::shared_ptr<const RobotModel>& model, double max_error_, double tolerance_)
+      : ingest_(everything()),
+        query_(model, config(tolerance_)),
+        known_(model->links.size(), true) {
+    name = "ist_proximity";
+    kind = Kind::kOurs;
+    max_error = max_error_;
+    tolerance = tolerance_;
+    largest_error = tolerance + kRounding;
+    for (const LinkModel& link : model->links) spheres += link.tree.ball_count();
+  }
+
+  void ingest(const Frame& frame) override {
+    ingest_.run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot_);
+  }
+
+  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+    query_.run(X_FL, known_, {&snapshot_}, &results_);
+    for (std::size_t i = 0; i < results_.size(); ++i) {
+      (*answers)[i] = {results_[i].distance, results_[i].p_FL, results_[i].p_FO};
+    }
+  }
+
+ private:
+  static QueryConfig config(double tolerance) {
+    QueryConfig config;
+    config.max_distance = 10.0;
+    config.tolerance = tolerance;
+    return config;
+  }
+
+  Ingest ingest_;
+  CloudSnapshot snapshot_;
+  ProximityQuery query_;
+  std::vector<bool> known_;
+  std::vector<LinkProximity> results_;
+};
+
+}  // namespace
+
+void add_ours(const Robot& robot, Methods* methods) {
+  for (const double max_error : kMaxErrors) {
+    const auto model = robot.pack(max_error);
+    for (const double tolerance : kTolerances) {
+      methods->push_back(std::make_unique<Ours>(model, max_error, tolerance));
+    }
+  }
+}
+
+}  // namespace ist::benchmark

@@ -1,0 +1,298 @@
+#!/usr/bin/env python3
+"""Makes tables and plot of what scripts/benchmark measured. Needs nothing but Python.
+
+Writes FOLDER/benchmark.csv and benchmark_growth.csv (with commit and machine), FOLDER/benchmark.svg,
+and the tables between the markers `<!-- NAME -->` and `<!-- end of NAME -->` of FOLDER/benchmark.md
+and of the README.
+"""
+
+import argparse
+import csv
+import math
+import re
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+QUERIES_PER_FRAME = 33  # 1 kHz between two images at 30 Hz
+NAMES = {"kinect": "Kinect frames", "synthetic": "Synthetic scene"}
+
+
+def read(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        for key, value in row.items():
+            try:
+                row[key] = float(value)
+            except ValueError:
+                pass
+    return rows
+
+
+def write(path, rows, arguments):
+    """Adds where and when to every row."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        extra = {"commit": arguments.commit, "machine": arguments.machine, "date": arguments.date}
+        writer = csv.DictWriter(file, [*extra, *rows[0]], lineterminator="\n")
+        writer.writeheader()
+        for row in rows:
+            writer.writerow({**extra, **{k: f"{v:g}" if isinstance(v, float) else v
+                                         for k, v in row.items()}})
+
+
+def time(us):
+    """Microseconds for a reader: three digits."""
+    if us >= 1e4:
+        return f"{us / 1e3:,.0f} ms"
+    if us >= 1e3:
+        return f"{us / 1e3:.1f} ms"
+    return f"{us:.0f} µs" if us >= 10 else f"{us:.1f} µs"
+
+
+def label(row):
+    if row["kind"] == "ours":
+        tolerance = "exact" if row["tolerance_mm"] == 0 else f"to {row['tolerance_mm']:g} mm"
+        return f"**ist_proximity, {tolerance}**, packed to {row['max_error_mm']:g} mm"
+    spheres = f", {row['spheres']:.0f} spheres" if row["spheres"] else ""
+    return row["method"] + spheres
+
+
+def worst(row):
+    return max(-row["error_least_mm"], row["error_largest_mm"])
+
+
+def number(value):
+    return f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
+
+
+def error(row):
+    """[mm] mean and both ends; what float rounds is not worth its digits."""
+    if worst(row) < 0.01:
+        return "0"
+    return (f"{number(row['error_mean_mm'])} "
+            f"({number(min(0, row['error_least_mm']))} … {number(row['error_largest_mm'])})")
+
+
+def frame(row):
+    """[us] of work between two images."""
+    return row["ingest_us"] + QUERIES_PER_FRAME * (row["motion_mean_us"] or row["query_us"])
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
+
+
+def peers_table(rows):
+    return table(
+        ["method", "ingest", "query, median / p99", "no link in contact, median / p99",
+         "error mean (least … largest) [mm]", "one 30 Hz frame"],
+        [[label(r), time(r["ingest_us"])] + (["", "", "", ""] if r["kind"] == "floor" else [
+            f"{time(r['query_us'])} / {time(r['query_p99_us'])}",
+            f"{time(r['free_query_us'])} / {time(r['free_query_p99_us'])}",
+            error(r), time(frame(r))]) for r in rows])
+
+
+def short_table(rows):
+    keep = [r for r in rows if r["kind"] not in ("ours", "floor")
+            or (r["kind"] == "ours" and r["max_error_mm"] == 2 and r["tolerance_mm"] < 20)]
+    keep.sort(key=lambda r: (r["kind"] != "ours", worst(r) >= 0.01, r["query_us"]))
+    return table(["method", "ingest", "query, median", "worst error"],
+                 [[label(r), time(r["ingest_us"]), time(r["query_us"]),
+                   "0" if worst(r) < 0.01 else f"{worst(r):.2g} mm"] for r in keep])
+
+
+def motion_table(rows):
+    return table(
+        ["method", "queries", "median", "p99", "largest", "p99 / median", "largest / median",
+         "no contact: median", "p99", "largest"],
+        [[label(r), f"{r['motion_queries']:.0f}", time(r["motion_us"]), time(r["motion_p99_us"]),
+          time(r["motion_max_us"]), f"{r['motion_p99_us'] / r['motion_us']:.1f}",
+          f"{r['motion_max_us'] / r['motion_us']:.1f}"] +
+         [time(r[f"free_motion_{k}"]) if r["free_motion_us"] else ""
+          for k in ("us", "p99_us", "max_us")] for r in rows if r["motion_queries"]])
+
+
+def growth_table(rows, what, unit):
+    chosen = [r for r in rows if r["what"] == what]
+    values = sorted({r["value"] for r in chosen})
+    cell = {(r["value"], r["tolerance_mm"]): f"{time(r['query_us'])} / {time(r['query_p99_us'])}"
+            for r in chosen}
+    return table([f"{what}{unit}", "to 1 mm, median / p99", "exact, median / p99"],
+                 [[f"{v:,.0f}" if v > 2 or v == int(v) else f"{v:g}", cell[v, 1.0], cell[v, 0.0]]
+                  for v in values])
+
+
+def best(rows, *, kinds, key):
+    chosen = [r for r in rows if r["kind"] in kinds]
+    return min(chosen, key=key) if chosen else None
+
+
+def ratios(rows):
+    """What the project set itself as goals: one row each."""
+    by = {(r["max_error_mm"], r["tolerance_mm"]): r for r in rows if r["kind"] == "ours"}
+    exact, coarse = by[2.0, 0.0], by[2.0, 1.0]
+    named = {r["method"].split(",")[0].split(" ")[0] + r["kind"]: r for r in rows}
+    lines = []
+
+    def line(text, value, goal):
+        lines.append([text, f"{value:.3g}", goal])
+
+    memcpy = next(r for r in rows if r["kind"] == "floor")
+    line("ingest of 640×480 / memcpy of the frame", exact["ingest_us"] / memcpy["ingest_us"],
+         "≤ 2.5")
+    for peer, ours, text, goal in (
+            ("Embreeexact", exact, "Embree / ours, exact, median query", "≥ 30"),
+            ("FCLexact", exact, "FCL mesh and point triangles / ours, exact, median query", "≥ 20"),
+            ("Embreeexact", coarse, "Embree / ours to 1 mm, median query", "≥ 80")):
+        if peer in named:
+            line(text, named[peer]["query_us"] / ours["query_us"], goal)
+    rival = best(rows, kinds=("exact",), key=frame)
+    if rival:
+        line(f"work per 30 Hz frame: {rival['method'].split(',')[0]} / ours, exact",
+             frame(rival) / frame(exact), "≥ 50")
+    if "nanoflannspheres" in named:
+        line("work per 30 Hz frame: nanoflann / ours to 1 mm",
+             frame(named["nanoflannspheres"]) / frame(coarse), "≥ 5")
+    line("motion, exact: p99 / median", exact["motion_p99_us"] / exact["motion_us"], "≤ 3")
+    line("motion, exact: largest / median", exact["motion_max_us"] / exact["motion_us"], "≤ 10")
+    return table(["what", "measured", "goal"], lines)
+
+
+class Plot:
+    """Speed against error, both axes logarithmic."""
+
+    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 30, 40, 60
+    COLOURS = {"ours": "#c0392b", "exact": "#2c3e50", "spheres": "#2980b9", "grid": "#8e44ad"}
+    FLOOR_MM = 0.01  # exact to float: drawn here
+
+    def __init__(self, rows, title):
+        self.rows = [r for r in rows if r["kind"] != "floor"]
+        self.title = title
+        times = [r["query_us"] for r in self.rows]
+        self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
+        self.x = (math.log10(self.FLOOR_MM) - 0.3, 2.0)
+        self.parts = []
+
+    def px(self, mm):
+        share = (math.log10(max(mm, self.FLOOR_MM)) - self.x[0]) / (self.x[1] - self.x[0])
+        return self.LEFT + share * (self.WIDTH - self.LEFT - self.RIGHT)
+
+    def py(self, us):
+        share = (math.log10(us) - self.y[0]) / (self.y[1] - self.y[0])
+        return self.HEIGHT - self.BOTTOM - share * (self.HEIGHT - self.TOP - self.BOTTOM)
+
+    def text(self, x, y, words, anchor="middle", colour="#333", extra=""):
+        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"'
+                          f'{extra}>{escape(words)}</text>')
+
+    def line(self, x1, y1, x2, y2, colour):
+        self.parts.append(f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" '
+                          f'stroke="{colour}"/>')
+
+    def axes(self):
+        left, right = self.LEFT, self.WIDTH - self.RIGHT
+        bottom = self.HEIGHT - self.BOTTOM
+        for decade in range(self.y[0], self.y[1] + 1):
+            y = self.py(10.0 ** decade)
+            self.line(left, y, right, y, "#ddd")
+            self.text(left - 8, y + 4, time(10.0 ** decade).replace(".0", ""), "end")
+        for decade in range(-2, 3):
+            x = self.px(10.0 ** decade)
+            self.line(x, self.TOP, x, bottom, "#ddd")
+            self.text(x, bottom + 18,
+                      "exact" if decade == -2 else f"{10.0 ** decade:g} mm")
+        self.text((left + right) / 2, self.HEIGHT - 14, "largest error of a link's distance")
+        self.text(20, (self.TOP + bottom) / 2, "query of all links, median, one thread",
+                  extra=f' transform="rotate(-90 20 {(self.TOP + bottom) / 2:.0f})"')
+        self.text((left + right) / 2, 22, self.title, extra=' font-weight="bold"')
+
+    def front(self):
+        ours = [r for r in self.rows if r["kind"] == "ours"]
+        colour = self.COLOURS["ours"]
+        for r in ours:
+            self.dot(r, colour, 3)
+        steps, fastest = [], {}
+        for r in ours:  # the fastest for each tolerance
+            t = r["tolerance_mm"]
+            if t not in fastest or r["query_us"] < fastest[t]["query_us"]:
+                fastest[t] = r
+        for _, r in sorted(fastest.items()):
+            steps.append(f"{self.px(worst(r)):.1f},{self.py(r['query_us']):.1f}")
+        self.parts.append(f'<polyline points="{" ".join(steps)}" fill="none" stroke="{colour}" '
+                          'stroke-width="2"/>')
+        first = fastest[min(fastest)]
+        self.text(self.px(worst(first)) + 10, self.py(first["query_us"]) + 20,
+                  "ist_proximity: tolerance 0, 1, 5, 20 mm; packed to 10, 5, 2, 1 mm", "start",
+                  colour)
+
+    def dot(self, row, colour, radius):
+        self.parts.append(f'<circle cx="{self.px(worst(row)):.1f}" cy="{self.py(row["query_us"]):.1f}" '
+                          f'r="{radius}" fill="{colour}"/>')
+
+    def peers(self):
+        taken = []  # heights of labels, so that none lies on another
+        for r in sorted((r for r in self.rows if r["kind"] != "ours"), key=lambda r: r["query_us"]):
+            colour = self.COLOURS[r["kind"]]
+            x, y = self.px(worst(r)), self.py(r["query_us"])
+            self.dot(r, colour, 5)
+            at = y + 4
+            while any(abs(at - other) < 14 and abs(x - place) < 320 for place, other in taken):
+                at -= 14
+            taken.append((x, at))
+            late = x > self.WIDTH / 2
+            self.text(x + (-9 if late else 9), at, label(r), "end" if late else "start", colour)
+
+    def svg(self):
+        self.axes()
+        self.front()
+        self.peers()
+        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
+                'font-family="sans-serif" font-size="12">\n'
+                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
+                "\n</svg>\n")
+
+
+def fill(path, parts):
+    """Replaces what is between the markers; a document without some of them is left so there."""
+    text = path.read_text(encoding="utf-8")
+    for name, content in parts.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+        text = re.sub(re.escape(begin) + ".*?" + re.escape(end),
+                      lambda _, part=begin + content + end: part, text, flags=re.DOTALL)
+    path.write_text(text, encoding="utf-8")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("peers", type=Path)
+    parser.add_argument("growth", type=Path)
+    for name in ("commit", "machine", "date"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--readme", type=Path)
+    arguments = parser.parse_args()
+
+    peers, growth = read(arguments.peers), read(arguments.growth)
+    write(arguments.folder / "benchmark.csv", peers, arguments)
+    write(arguments.folder / "benchmark_growth.csv", growth, arguments)
+    parts = {"benchmark run": f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"}
+    sets = {name: [r for r in peers if r["data"] == name] for name in NAMES}
+    for name, rows in sets.items():
+        if rows:
+            parts[f"benchmark {name}"] = peers_table(rows)
+            parts[f"benchmark motion {name}"] = motion_table(rows)
+    shown = sets["kinect"] or sets["synthetic"]
+    parts["benchmark ratios"] = ratios(shown)
+    parts["benchmark short"] = short_table(shown)
+    for what, unit in (("spheres", ""), ("points", ""), ("links", ""), ("distance", " [m]")):
+        parts[f"benchmark {what}"] = growth_table(growth, what, unit)
+    fill(arguments.folder / "benchmark.md", parts)
+    if arguments.readme:
+        fill(arguments.readme, parts)
+    title = f"Speed against error: {NAMES[shown[0]['data']]}, {arguments.commit}"
+    (arguments.folder / "benchmark.svg").write_text(Plot(shown, title).svg(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
