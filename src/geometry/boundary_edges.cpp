@@ -3,31 +3,54 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
-#include <map>
-#include <tuple>
+#include <numeric>
 #include <utility>
 #include <vector>
 
 namespace ist {
+namespace {
+
+// A number for each vertex, the same for vertices at the same place.
+std::vector<std::uint32_t> place_ids(const std::vector<Eigen::Vector3d>& vertices) {
+  std::vector<std::uint32_t> order(vertices.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto less = [&](std::uint32_t i, std::uint32_t j) {
+    const Eigen::Vector3d &a = vertices[i], &b = vertices[j];
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  std::sort(order.begin(), order.end(), less);
+  std::vector<std::uint32_t> id(vertices.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const bool is_new = k == 0 || less(order[k - 1], order[k]);
+    id[order[k]] = is_new ? order[k] : id[order[k - 1]];
+  }
+  return id;
+}
+
+}  // namespace
 
 std::size_t count_boundary_edges(const TriangleMesh& mesh) {
-  using Key = std::tuple<double, double, double>;
-  std::map<Key, std::uint32_t> unique;
-  std::vector<std::uint32_t> id(mesh.vertices.size());
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const Eigen::Vector3d& p = mesh.vertices[v];
-    id[v] = unique.emplace(Key(p.x(), p.y(), p.z()), static_cast<std::uint32_t>(unique.size()))
-                .first->second;
-  }
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> balance;  // forward minus backward
+  const std::vector<std::uint32_t> id = place_ids(mesh.vertices);
+  // An edge, and whether it is passed forward (1) or backward (-1).
+  std::vector<std::pair<std::uint64_t, int>> edges;
+  edges.reserve(3 * mesh.triangles.size());
   for (const TriangleMesh::Triangle& t : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = id[t[k]], b = id[t[(k + 1) % 3]];
-      if (a != b) balance[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
+      const std::uint64_t a = id[t[k]], b = id[t[(k + 1) % 3]];
+      if (a != b) edges.emplace_back(std::min(a, b) << 32U | std::max(a, b), a < b ? 1 : -1);
     }
   }
+  std::sort(edges.begin(), edges.end());
   std::size_t open = 0;
-  for (const auto& edge : balance) open += static_cast<std::size_t>(std::abs(edge.second));
+  for (std::size_t first = 0; first < edges.size();) {
+    std::size_t last = first;
+    int balance = 0;
+    while (last < edges.size() && edges[last].first == edges[first].first) {
+      balance += edges[last++].second;
+    }
+    open += static_cast<std::size_t>(std::abs(balance));
+    first = last;
+  }
   return open;
 }
 
