@@ -21,7 +21,13 @@ class PairSearch {
 
   PairSearch(const LinkModel& a, const LinkModel& b, const Eigen::Isometry3d& X_BA,
              const QueryConfig& config, std::vector<Item>* queue)
-      : a_(a), b_(b), X_BA_(X_BA), X_AB_(X_BA.inverse()), config_(config), queue_(*queue) {}
+      : a_(a),
+        b_(b),
+        X_BA_(X_BA),
+        X_AB_(X_BA.inverse()),
+        config_(config),
+        has_holes_(a.solid.has_holes() || b.solid.has_holes()),
+        queue_(*queue) {}
 
   void run() {
     queue_.clear();
@@ -42,8 +48,9 @@ class PairSearch {
     if (!queue_.empty()) lower_ = std::min(lower_, queue_.front().bound);
     lower_ = std::min(lower_, best_.distance);
     // Balls cover A's surface; its inside is this much farther from them. It cannot be what is
-    // nearest unless something of B is inside.
-    if (lower_ <= a_.tree.interior_gap()) lower_ -= a_.tree.interior_gap();
+    // nearest unless something of B is inside, or they meet through a hole.
+    const double reach = a_.tree.interior_gap() + (has_holes_ ? b_.tree.interior_gap() : 0.0);
+    if (lower_ <= reach) lower_ -= a_.tree.interior_gap();
   }
 
   double lower() const { return lower_; }
@@ -60,15 +67,21 @@ class PairSearch {
     return std::min({decided, best_.distance - config_.tolerance, config_.max_distance});
   }
 
-  // A lower bound of the signed distance of p_B, or, near B, that itself.
-  double floor_at(const Eigen::Vector3d& p_B) const {
-    const double outer = b_.tree.outer_distance(p_B, b_.tree.interior_gap());
-    if (outer > b_.tree.interior_gap()) return outer;
-    return b_.solid.distance_floor(p_B, b_.solid.signed_distance(p_B));
+  // What B's balls alone prove of all points within `radius` of p_B: a lower bound of their signed
+  // distance; -inf: nothing. Through a hole the signed distance jumps, so there all of them must
+  // be outside.
+  double far_bound(const Eigen::Vector3d& p_B, double radius) const {
+    const double gap = b_.tree.interior_gap();
+    const double outer = b_.tree.outer_distance(p_B, gap + (has_holes_ ? radius : 0.0));
+    return outer > gap + (has_holes_ ? radius : 0.0) ? outer - radius : -kInf;
   }
 
   void push(const Eigen::Vector3d& p_A, double radius, std::int32_t child) {
-    const double bound = floor_at(X_BA_ * p_A) - radius;
+    const Eigen::Vector3d p_B = X_BA_ * p_A;
+    double bound = far_bound(p_B, radius);
+    if (bound == -kInf) {
+      bound = b_.solid.distance_floor(p_B, b_.solid.signed_distance(p_B)) - radius;
+    }
     if (bound >= enough()) return skip(bound);
     queue_.push_back({bound, child});
     std::push_heap(queue_.begin(), queue_.end());
@@ -80,13 +93,14 @@ class PairSearch {
   void look_at(const SphereLeaf& leaf) {
     for (int k = 0; k < leaf.count; ++k) {
       const Eigen::Vector3d p_A(leaf.x[k], leaf.y[k], leaf.z[k]), p_B = X_BA_ * p_A;
-      const double outer = b_.tree.outer_distance(p_B, b_.tree.interior_gap());
-      if (outer > b_.tree.interior_gap() && outer - leaf.outer[k] >= enough()) {
-        skip(outer - leaf.outer[k]);
+      const double far = far_bound(p_B, leaf.outer[k]);
+      if (far >= enough()) {
+        skip(far);
         continue;
       }
       const SignedDistance measured = b_.solid.signed_distance(p_B);
-      lower_ = std::min(lower_, b_.solid.distance_floor(p_B, measured) - leaf.outer[k]);
+      const double near = b_.solid.distance_floor(p_B, measured) - leaf.outer[k];
+      lower_ = std::min(lower_, std::max(near, far));
       if (measured.distance < std::max(leaf.inner[k], 0.0F)) {
         go_deeper(p_A, measured, leaf.inner[k]);
       }
@@ -131,6 +145,7 @@ class PairSearch {
   const LinkModel &a_, &b_;
   const Eigen::Isometry3d X_BA_, X_AB_;
   const QueryConfig& config_;
+  const bool has_holes_;
   std::vector<Item>& queue_;
   double lower_ = kInf;
   SignedDistance best_;  // of p_BA_
