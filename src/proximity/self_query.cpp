@@ -47,10 +47,7 @@ class PairSearch {
     }
     if (!queue_.empty()) lower_ = std::min(lower_, queue_.front().bound);
     lower_ = std::min(lower_, best_.distance);
-    // Balls cover A's surface; its inside is this much farther from them. It cannot be what is
-    // nearest unless something of B is inside, or they meet through a hole.
-    const double reach = a_.tree.interior_gap() + (has_holes_ ? b_.tree.interior_gap() : 0.0);
-    if (lower_ <= reach) lower_ -= a_.tree.interior_gap();
+    lower_ -= beyond_balls();
   }
 
   double lower() const { return lower_; }
@@ -60,11 +57,20 @@ class PairSearch {
   const Eigen::Vector3d& normal_B() const { return best_.normal; }
 
  private:
+  // Balls cover a link's surface; its inside may be the interior gap farther from them. What is
+  // inside cannot be nearest unless something of B is inside A too, or it shows through a hole.
+  double beyond_balls() const {
+    const double gap_a = a_.tree.interior_gap(), gap_b = b_.tree.interior_gap();
+    if (has_holes_) return gap_a + gap_b;
+    return lower_ <= gap_a ? gap_a : 0.0;
+  }
+
   // What lies at or beyond this changes neither bound nor, by the tolerance, the distance. While
   // the bound alone allows contact, all that may be in contact is looked at.
   double enough() const {
     const double decided = lower_ > 0.0 || best_.distance < 0.0 ? lower_ : 0.0;
-    return std::min({decided, best_.distance - config_.tolerance, config_.max_distance});
+    const double beyond = has_holes_ ? beyond_balls() : 0.0;
+    return std::min({decided, best_.distance - config_.tolerance, config_.max_distance + beyond});
   }
 
   // What B's balls alone prove of all points within `radius` of p_B: a lower bound of their signed

@@ -41,7 +41,8 @@ struct PairProximity {
 /// `distance` is measured between two real points, found by going to and fro between the surfaces
 /// from the balls that are nearest. It is not below the true distance. For links that are apart it
 /// is above `lower_bound` by no more than max_error of A's packing and the tolerance (where they
-/// nearly touch, its interior gap comes on top); in contact the two may differ by more. Where
+/// nearly touch, its interior gap comes on top, and both gaps wherever one of the meshes has holes,
+/// because its inside shows there); in contact the two may differ by more. Where
 /// solids merely touch, NEAR with a lower bound below 0 may be said.
 ///
 /// run() never throws. One object per thread.
