@@ -232,7 +232,7 @@ class Plot:
                           'stroke-width="2"/>')
         first = fastest[min(fastest)]
         self.text(self.px(worst(first)) + 10, self.py(first["free_query_us"]) + 44,
-                  "ist_proximity: tolerance 0, 1, 5, 20 mm; packed to 10, 5, 2, 1 mm", "start",
+                  "ist_proximity: tolerance 0, 1, 5, 20 mm; packed to 10, 5, 2 mm", "start",
                   colour)
 
     def dot(self, row, colour, radius):
