@@ -62,6 +62,8 @@ def worst(row):
 
 
 def number(value):
+    if abs(value) < 1e-3:
+        return "0"
     return f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
 
 
@@ -70,7 +72,7 @@ def error(row):
     if worst(row) < 0.01:
         return "0"
     return (f"{number(row['error_mean_mm'])} "
-            f"({number(min(0, row['error_least_mm']))} … {number(row['error_largest_mm'])})")
+            f"({number(row['error_least_mm'])} … {number(row['error_largest_mm'])})")
 
 
 FREE = "free_motion_us"  # the median where no link is in contact; there is no mean of that
@@ -180,7 +182,7 @@ class Plot:
         self.title = title
         times = [r["free_query_us"] for r in self.rows]
         self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
-        self.x = (math.log10(self.FLOOR_MM) - 0.3, 2.8)  # room for labels
+        self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels
         self.parts = []
 
     def px(self, mm):
@@ -206,11 +208,11 @@ class Plot:
             y = self.py(10.0 ** decade)
             self.line(left, y, right, y, "#ddd")
             self.text(left - 8, y + 4, time(10.0 ** decade).replace(".0", ""), "end")
-        for decade in range(-2, 3):
+        for decade in range(-2, 4):
             x = self.px(10.0 ** decade)
             self.line(x, self.TOP, x, bottom, "#ddd")
             self.text(x, bottom + 18,
-                      "exact" if decade == -2 else f"{10.0 ** decade:g} mm")
+                      "exact" if decade == -2 else "1 m" if decade == 3 else f"{10.0 ** decade:g} mm")
         self.text((left + right) / 2, self.HEIGHT - 14, "largest error of a link's distance")
         self.text(20, (self.TOP + bottom) / 2, "query of all links, out of contact: median, one thread",
                   extra=f' transform="rotate(-90 20 {(self.TOP + bottom) / 2:.0f})"')
