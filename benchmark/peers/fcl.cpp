@@ -1,6 +1,7 @@
 #include <fcl/fcl.h>
 #include <octomap/octomap.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -38,7 +39,9 @@ class Fcl : public Method {
       request.enable_nearest_points = true;
       fcl::DistanceResultd result;
       fcl::distance(links_[link].get(), X_FL[link], obstacle(), identity, request, result);
-      (*answers)[link] = {result.min_distance, result.nearest_points[0], result.nearest_points[1]};
+      // Negative: the volumes overlap, and by how much it does not tell.
+      (*answers)[link] = {std::max(0.0, result.min_distance), result.nearest_points[0],
+                          result.nearest_points[1]};
     }
   }
 

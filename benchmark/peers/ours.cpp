@@ -8,7 +8,7 @@ namespace ist::benchmark {
 namespace {
 
 // The packing decides how fast, the tolerance how exact.
-constexpr double kMaxErrors[] = {0.01, 0.005, 0.002, 0.001};  // [m]
+constexpr double kMaxErrors[] = {0.01, 0.005, 0.002};        // [m]
 constexpr double kTolerances[] = {0.0, 0.001, 0.005, 0.02};  // [m]
 
 IngestConfig everything() {
