@@ -145,7 +145,8 @@ TEST(SelfQuery, randomLinksAgainstSearch) {
       EXPECT_GE(result.distance, 0.0) << what;
       EXPECT_GT(std::min(there, back), -0.003) << what;  // crossing plates of 2 mm may pass
       if (result.lower_bound > kMaxError) {
-        EXPECT_LE(result.distance, result.lower_bound + kMaxError + 0.001 + 1e-6) << what;
+        EXPECT_LE(result.distance, result.lower_bound + test::packed_to(kMaxError) + 0.001 + 1e-6)
+            << what;
       }
     }
   }

@@ -18,6 +18,11 @@ IST_NOINLINE void* operator new(std::size_t size) {
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
+// std::stable_sort asks this way.
+IST_NOINLINE void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
+  ++ist::test::allocations;
+  return std::malloc(size);
+}
 IST_NOINLINE void* operator new(std::size_t size, std::align_val_t alignment) {
   ++ist::test::allocations;
   const auto unit = static_cast<std::size_t>(alignment);
