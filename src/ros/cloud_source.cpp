@@ -113,15 +113,7 @@ std::string CloudSource::place_map(const ros::Time& time, double max_age,
   if (is_known(buffer_, fixed, frame, time, &ignored)) {
     return look_up(buffer_, fixed, frame, time, &X_FM);
   }
-  ros::Time stamp;
-  std::string problem = look_up(buffer_, fixed, frame, ros::Time(), &X_FM, &stamp);
-  if (!problem.empty() || stamp.isZero()) return problem;
-  const double age = seconds_between(stamp, time);
-  if (age <= max_age) return "";
-  char text[96];
-  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
-                max_age);
-  return "the newest transform from '" + frame + "' to '" + fixed + text;
+  return look_up_newest(buffer_, fixed, frame, time, max_age, &X_FM);
 }
 
 SourceFacts CloudSource::facts() {

@@ -1,9 +1,7 @@
 #include "ist_proximity/ros/stated_pose_source.h"
 
 #include <cmath>
-#include <cstdio>
 
-#include "ist_proximity/ros/ros_time.h"
 #include "ist_proximity/ros/transforms.h"
 
 namespace ist {
@@ -50,27 +48,12 @@ std::string StatedPoseSource::hint() const {
   return "state its position, or see that tf or joint states tell it";
 }
 
-/// The newest transform, unless it is too old.
-std::string StatedPoseSource::now_in_tf(const std::string& parent, const std::string& child,
-                                        const ros::Time& now, Eigen::Isometry3d* X) const {
-  std::string problem;
-  if (!is_known(buffer_, parent, child, ros::Time(), &problem)) return problem;
-  ros::Time stamp;
-  problem = ist::look_up(buffer_, parent, child, ros::Time(), X, &stamp);
-  if (!problem.empty() || stamp.isZero()) return problem;
-  const double age = seconds_between(stamp, now);
-  if (age <= timeout_) return "";
-  char text[96];
-  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
-                timeout_);
-  return "the newest transform from '" + child + "' to '" + parent + text;
-}
-
 void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   poses->reset(now, places_.size());
   if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
   Eigen::Isometry3d X_FR;
-  const std::string problem = now_in_tf(fixed_frame_, kinematics_->links()[0], now, &X_FR);
+  const std::string problem =
+      look_up_newest(buffer_, fixed_frame_, kinematics_->links()[0], now, timeout_, &X_FR);
   if (!problem.empty()) return poses->blame(wanted_, problem);
 
   kinematics_->place_joints(q_, &joints_);
@@ -78,8 +61,9 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   std::vector<std::string> joint_problems(joints.size());
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
-    const std::string why = now_in_tf(kinematics_->links()[joints[j].parent],
-                                      kinematics_->links()[joints[j].child], now, &joints_.X_PC[j]);
+    const std::string why =
+        look_up_newest(buffer_, kinematics_->links()[joints[j].parent],
+                       kinematics_->links()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
     joints_.known[j] = why.empty();
     if (!why.empty()) {
       joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;

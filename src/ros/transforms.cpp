@@ -1,9 +1,11 @@
 #include "ist_proximity/ros/transforms.h"
 
 #include <cmath>
+#include <cstdio>
 #include <exception>
 
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/ros/ros_time.h"
 
 namespace ist {
 
@@ -31,6 +33,27 @@ std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
   const std::string fault = to_isometry(transform.transform, X_FT);
   if (!fault.empty()) return "transform from '" + frame + "' to '" + fixed + "': " + fault;
   if (stamp) *stamp = transform.header.stamp;
+  return "";
+}
+
+std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fixed,
+                           const std::string& frame, const ros::Time& now, double max_age,
+                           Eigen::Isometry3d* X_FT) {
+  std::string problem;
+  // Asked first: an exception in every cycle would cost more than the answer.
+  if (!is_known(buffer, fixed, frame, ros::Time(), &problem)) return problem;
+  ros::Time stamp;
+  Eigen::Isometry3d X;
+  problem = look_up(buffer, fixed, frame, ros::Time(), &X, &stamp);
+  if (!problem.empty()) return problem;
+  const double age = stamp.isZero() ? 0.0 : seconds_between(stamp, now);
+  if (age > max_age) {
+    char text[96];
+    std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
+                  max_age);
+    return "the newest transform from '" + frame + "' to '" + fixed + text;
+  }
+  *X_FT = X;
   return "";
 }
 

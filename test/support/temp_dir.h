@@ -14,7 +14,8 @@ namespace ist::test {
 class TempDir {
  public:
   TempDir() {
-    std::string name = (std::filesystem::temp_directory_path() / "ist_test_XXXXXX").string();
+    std::string name =
+        (std::filesystem::temp_directory_path() / ("ist_test_" + std::string(6, 'X'))).string();
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder: " + name);
     path_ = name;
   }

@@ -36,9 +36,6 @@ class StatedPoseSource : public PoseSource {
   std::string hint() const override;
 
  private:
-  std::string now_in_tf(const std::string& parent, const std::string& child, const ros::Time& now,
-                        Eigen::Isometry3d* X) const;
-
   std::shared_ptr<const Kinematics> kinematics_;
   const tf2::BufferCore& buffer_;
   std::string fixed_frame_;

@@ -25,6 +25,12 @@ std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
 bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem);
 
+/// The newest transform, as look_up() at time 0, unless it is more than `max_age` [s] older than
+/// `now`.
+std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fixed,
+                           const std::string& frame, const ros::Time& now, double max_age,
+                           Eigen::Isometry3d* X_FT);
+
 /// A message's transform; its quaternion may be off unit length by rounding (1e-3).
 /// @returns empty on success, else what is wrong with the numbers
 std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isometry3d* X);
