@@ -1,22 +1,19 @@
 # What other ROS packages see of this one: its dependencies, messages and exports.
 
 find_package(catkin REQUIRED COMPONENTS
-  diagnostic_updater
+  diagnostic_msgs
+  dynamic_reconfigure
   geometry_msgs
-  message_filters
   message_generation
   nodelet
   pluginlib
   roscpp
-  roslib
   sensor_msgs
   std_msgs
   std_srvs
-  tf2_eigen
-  tf2_ros
-  tf2_sensor_msgs
+  tf2
+  tf2_msgs
   topic_tools
-  urdf
   visualization_msgs)
 
 add_message_files(DIRECTORY msg FILES
@@ -33,16 +30,17 @@ catkin_package(
   INCLUDE_DIRS include
   LIBRARIES ist_proximity_core ist_proximity_ros
   CATKIN_DEPENDS
-    diagnostic_updater
+    diagnostic_msgs
+    dynamic_reconfigure
     geometry_msgs
-    message_filters
     message_runtime
     nodelet
     roscpp
     sensor_msgs
     std_msgs
     std_srvs
-    tf2_ros
+    tf2
+    tf2_msgs
     topic_tools
     visualization_msgs
   DEPENDS EIGEN3)

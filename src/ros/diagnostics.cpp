@@ -46,6 +46,28 @@ std::string number(const char* format, double value) {
 std::string milliseconds(double seconds) { return number("%.3f ms", 1e3 * seconds); }
 std::string millimetres(double metres) { return number("%.2f mm", 1e3 * metres); }
 
+/// A share of the cloud on the robot that speaks of a wrong transform or model; empty: none.
+std::string doubt_of_self_filter(const SourceFacts& source) {
+  constexpr double kNearlyAll = 0.95;
+  const IngestCounts& counts = source.counts;
+  if (!source.has_snapshot || std::isnan(source.blind_skin)) return "";
+  const std::size_t in_range =
+      counts.received - counts.not_a_number - counts.infinite - counts.out_of_range;
+  if (in_range == 0) return "";
+  const double share = static_cast<double>(counts.on_robot) / static_cast<double>(in_range);
+  if (share >= kNearlyAll) {
+    return number("%.1f %% of the ", 100.0 * share) + source.noun +
+           " are on the robot and filtered out: check the sensor's transform, the URDF and "
+           "self_filter_padding";
+  }
+  // A laser scanner may well never see the robot.
+  if (counts.on_robot == 0 && source.noun == "cloud") {
+    return "no point of the cloud is on the robot: if the sensor sees the robot, its transform or "
+           "the URDF is wrong; if it does not, self_filter: false says so";
+  }
+  return "";
+}
+
 }  // namespace
 
 void CycleTimes::add(double seconds) {
@@ -66,7 +88,7 @@ double CycleTimes::quantile(double q) const {
 }
 
 DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& source,
-                                   const Verdict& verdict, double now) {
+                                   const Verdict& verdict, double rate, double now) {
   DiagnosticStatus status = make(node, "input " + source.name);
   if (verdict.status == ProximityArray::STALE_CLOUD) {
     set(source.required ? DiagnosticStatus::STALE : DiagnosticStatus::WARN, verdict.text, &status);
@@ -75,13 +97,20 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& s
   } else if (!source.problem.empty()) {
     set(DiagnosticStatus::WARN, "the newest cloud is not in use: " + source.problem, &status);
   }
+  const std::string doubt = doubt_of_self_filter(source);
+  if (!doubt.empty()) set(DiagnosticStatus::WARN, doubt, &status);
   add("topic", source.topic, &status);
   add("required", source.required ? "true" : "false", &status);
   add("publishers", source.publishers, &status);
   add("messages received", source.messages, &status);
+  if (!source.is_file) add("rate", number("%.1f Hz", rate), &status);
   add("dropped: unusable", source.unusable, &status);
   add("dropped: out of order", source.out_of_order, &status);
   add("dropped: overtaken by a newer one", source.overtaken, &status);
+  add("shown on ~filtered_cloud", source.shown, &status);
+  if (!std::isnan(source.blind_skin)) {
+    add("blind skin about the robot", millimetres(source.blind_skin), &status);
+  }
   if (source.has_snapshot) {
     if (!source.is_file) add("age", number("%.3f s", now - source.stamp.toSec()), &status);
     add("points received", source.counts.received, &status);
@@ -137,6 +166,8 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   }
   add("rate", number("%.1f Hz", rate), &status);
   add(wanted, number("%.1f Hz", wanted_rate), &status);
+  add("deadlines missed", report.deadlines_missed, &status);
+  add("markers drawn", report.markers_drawn, &status);
   add("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
   add("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)), &status);
   return status;

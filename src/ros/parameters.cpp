@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "ist_proximity/packing/packing_cache.h"
-#include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
 namespace {
@@ -165,13 +164,13 @@ std::string joined(const std::vector<std::string>& lines) {
   return text;
 }
 
-XmlRpc::XmlRpcValue fetch(const ros::NodeHandle& private_nh) {
+}  // namespace
+
+XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh) {
   XmlRpc::XmlRpcValue tree;
-  ros::param::get(private_nh.getNamespace(), tree);  // one call: a consistent view
+  ros::param::get(private_nh.getNamespace(), tree);
   return tree;
 }
-
-}  // namespace
 
 const char* message_type(SourceType type) {
   switch (type) {
@@ -222,17 +221,19 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 
 ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   std::vector<std::string> warnings;
-  ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
+  ServerConfig config = parse_parameters(fetch_parameters(private_nh), &warnings);
   for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
   return config;
 }
 
-LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance) {
-  ParameterReader reader(fetch(private_nh));
+LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
+                      std::vector<Tunable>* tunables) {
+  ParameterReader reader(tree);
   LiveConfig live;
   live.query.max_distance = max_distance;
   read_query(&reader, &live.query);
   read_repulsion(&reader, max_distance, &live.repulsion);
+  if (tunables) *tunables = reader.tunables();
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   return live;
 }

@@ -123,6 +123,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   report->links_known = poses_.count_known();
   report->pose_age = seconds_between(poses_.stamp, now);
   report->times.add(took.count());
+  if (situation_.deadline_passed) ++report->deadlines_missed;
 }
 
 void ProximityCycle::look_at_poses(const ros::Time& now) {

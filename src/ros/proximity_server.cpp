@@ -40,8 +40,8 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       buffer_(ros::Duration(10.0)),
       listener_(&buffer_, nh_),
       loader_(config, nh),
-      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
-      live_{config.query, config.repulsion} {
+      live_(private_nh, config),
+      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
   advertise();
   for (const SourceConfig& source : config_.sources) {
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
@@ -55,10 +55,8 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       state_signal_.notify_one();
     });
   }
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
-    const std::lock_guard<std::mutex> lock(shared_mutex_);
-    return live_;
-  });
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_,
+                                                  [this] { return live_.get(); });
   if (config_.self_collision.enabled) {
     self_proximity_ =
         std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_, joint_states_.get());
@@ -138,11 +136,12 @@ void ProximityServer::run_cycle() {
   publish_spheres_again();
   const auto message = boost::make_shared<ProximityArray>();
   const std::string transform_problem = listener_.problem();
+  const LiveConfig live = live_.get();
   {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, live_, message.get(), &report_);
+      cycle_->run(now, sources_, live, message.get(), &report_);
     } else {
       say_no_model(*model_, config_.fixed_frame, now, sources_, message.get(), &report_);
     }
@@ -203,6 +202,8 @@ void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& messa
   if (markers_.getNumSubscribers() > 0 && Clock::now() >= next_markers_) {
     next_markers_ = Clock::now() + kMarkerPeriod;
     markers_.publish(marker_drawer_.draw(*message));
+    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    ++report_.markers_drawn;
   }
 }
 
@@ -217,9 +218,10 @@ void ProximityServer::publish_spheres() {
 void ProximityServer::run_diagnostics() {
   std::size_t cycles_before = 0;
   std::uint64_t states_before = 0;
+  std::vector<std::uint64_t> messages_before;
   Clock::time_point before = Clock::now();
   while (sleep_until(before + std::chrono::seconds(1))) {
-    read_live_again();
+    live_.read_again();
     CycleReport report;
     {
       const std::lock_guard<std::mutex> lock(shared_mutex_);
@@ -240,24 +242,19 @@ void ProximityServer::run_diagnostics() {
 
     diagnostic_msgs::DiagnosticArray message;
     message.header.stamp = ros::Time::now();
+    messages_before.resize(report.sources.size());
     for (std::size_t i = 0; i < report.sources.size(); ++i) {
-      message.status.push_back(input_diagnostics(name_, report.sources[i], report.verdicts[i],
+      const SourceFacts& source = report.sources[i];
+      const auto come = static_cast<double>(source.messages - messages_before[i]);
+      messages_before[i] = source.messages;
+      message.status.push_back(input_diagnostics(name_, source, report.verdicts[i],
+                                                 come / interval.count(),
                                                  message.header.stamp.toSec()));
     }
     message.status.push_back(pose_diagnostics(name_, report));
     message.status.push_back(query_diagnostics(name_, report, rate, wanted_rate));
     message.status.push_back(model_diagnostics(name_, *loader_.state()));
     diagnostics_.publish(message);
-  }
-}
-
-void ProximityServer::read_live_again() {
-  try {
-    const LiveConfig live = read_live(private_nh_, config_.query.max_distance);
-    const std::lock_guard<std::mutex> lock(shared_mutex_);
-    live_ = live;
-  } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
   }
 }
 

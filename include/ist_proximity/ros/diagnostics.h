@@ -42,12 +42,16 @@ struct CycleReport {
   double pose_age = 0.0;   ///< [s] of the common instant, when any link is known
   std::size_t cycles = 0;  ///< since the start, those without a model too
   CycleTimes times;        ///< of those with one
+  std::size_t deadlines_missed = 0;  ///< cycles whose query was broken off, since the start
+  std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while somebody listens
 };
 
 // One DiagnosticStatus each; `node` goes before every name. Pure functions.
+/// @param rate  [Hz] of its messages since the last call
 diagnostic_msgs::DiagnosticStatus input_diagnostics(const std::string& node,
                                                     const SourceFacts& source,
-                                                    const Verdict& verdict, double now);
+                                                    const Verdict& verdict, double rate,
+                                                    double now);
 diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
                                                    const CycleReport& report);
 /// @param rate         [Hz] that was reached since the last call

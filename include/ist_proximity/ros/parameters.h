@@ -13,6 +13,7 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
 
@@ -86,11 +87,16 @@ struct LiveConfig {
   RepulsionConfig repulsion;
 };
 
+/// What the parameter server holds in the private namespace, in one call: a consistent view.
+XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh);
+
 /// Reads ~query/* and ~repulsion/* again.
+/// @param tree          as fetch_parameters() returns it
 /// @param max_distance  [m] as it was at the start. The influence distance ends there at the
-/// latest:
-///                      beyond it nothing is measured, and the vector could not end in zero
+///                      latest: beyond it nothing is measured, and the vector could not end in zero
+/// @param tunables      if not null: each of them, with its range
 /// @throws ParameterError
-LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance);
+LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
+                      std::vector<Tunable>* tunables = nullptr);
 
 }  // namespace ist

@@ -16,6 +16,7 @@
 
 #include "ist_proximity/ros/diagnostics.h"
 #include "ist_proximity/ros/joint_state_listener.h"
+#include "ist_proximity/ros/live_parameters.h"
 #include "ist_proximity/ros/markers.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
@@ -33,10 +34,7 @@ namespace ist {
 ///   - one per source, for receiving and ingesting clouds;
 ///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
 ///   - the model loader; - the listeners of tf and joint_states;
-///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again from the parameter
-///   server, which is
-///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
-///     not every ROS 1 distribution has).
+///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again (LiveParameters).
 /// The other services are answered from the queue of the node handles.
 class ProximityServer {
  public:
@@ -62,7 +60,6 @@ class ProximityServer {
   void publish_spheres();
   void publish_spheres_again();
   void run_diagnostics();
-  void read_live_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool attach_object(ist_proximity::AttachObject::Request& request,
                      ist_proximity::AttachObject::Response& response);
@@ -80,6 +77,7 @@ class ProximityServer {
   TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
+  LiveParameters live_;
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   // The cycle thread's own.
@@ -94,7 +92,6 @@ class ProximityServer {
 
   std::mutex shared_mutex_;  // for what cycle and diagnostics threads share
   CycleReport report_;
-  LiveConfig live_;
 
   std::mutex stop_mutex_;
   std::condition_variable stop_signal_;
