@@ -119,8 +119,8 @@ void LiveParameters::advertise(const std::string& name) {
   group->descriptions.publish(describe(name, tunables_));
   group->updates = nh.advertise<Config>("parameter_updates", 1, true);
   group->service = nh.advertiseService<Reconfigure::Request, Reconfigure::Response>(
-      "set_parameters", [this, group](Reconfigure::Request& request,
-                                      Reconfigure::Response& response) {
+      "set_parameters",
+      [this, group](Reconfigure::Request& request, Reconfigure::Response& response) {
         return set(group, request, response);
       });
 }
@@ -169,8 +169,8 @@ void LiveParameters::take(const Change& change) {
     ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
     return;
   } catch (const XmlRpc::XmlRpcException& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: "
-                                      << error.getMessage());
+    ROS_WARN_STREAM_THROTTLE(5.0,
+                             "the last valid ~query and ~repulsion go on: " << error.getMessage());
     return;
   }
   tunables_ = std::move(tunables);

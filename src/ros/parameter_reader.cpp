@@ -111,8 +111,7 @@ void ParameterReader::read(const std::string& name, const Range& range, double* 
 void ParameterReader::read(const std::string& name, const Range& range, int* value) {
   const double standard = *value;
   read_whole(name, range, value);
-  tunables_.push_back(
-      {name, Tunable::Kind::kInt, range, standard, static_cast<double>(*value)});
+  tunables_.push_back({name, Tunable::Kind::kInt, range, standard, static_cast<double>(*value)});
 }
 
 void ParameterReader::read(const std::string& name, bool* value) {

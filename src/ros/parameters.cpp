@@ -35,6 +35,16 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
   }
 }
 
+void read_noise(ParameterReader* reader, const std::string& prefix, NoiseFilterConfig* noise) {
+  reader->read(prefix + "noise_filter/radius", from_zero("m", 1.0), &noise->radius);
+  reader->read(prefix + "noise_filter/neighbors", Range{"", 1.0, 1000.0}, &noise->neighbors);
+  if (noise->radius > 0.0 && !has_noise_filter()) {
+    reader->add_error("~" + prefix +
+                      "noise_filter/radius is set, but this build has no noise filter: it was made "
+                      "without PCL (libpcl-dev)");
+  }
+}
+
 void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
   const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kScan, SourceType::kMap};
   std::vector<std::string> names;
@@ -77,6 +87,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
     read_map(reader, prefix, source);
   } else {
     read_ingest(reader, prefix, &source->ingest);
+    if (source->type == SourceType::kCloud) read_noise(reader, prefix, &source->noise);
   }
   reader->read(prefix + "topic", &source->topic);
   if (source->topic.empty()) {
@@ -93,6 +104,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   SourceConfig single;
   reader->read("cloud_timeout", more_than_zero("s", kInf, true), &single.timeout);
   read_ingest(reader, "", &single.ingest);
+  read_noise(reader, "", &single.noise);
   if (!reader->has("sources")) return {single};
 
   std::vector<SourceConfig> sources;

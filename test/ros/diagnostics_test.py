@@ -25,12 +25,12 @@ class DiagnosticsTest(unittest.TestCase):
         self.world.stop()
         self.assertEqual(self.node.stop(), 0)
 
-    def start(self, points, **parameters):
+    def start(self, points, status=ProximityArray.OK, **parameters):
         self.world.points = np.array(points)
         self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
         self.world.start_tf()
         self.world.start_clouds()
-        self.node.wait_for_status(ProximityArray.OK)
+        self.node.wait_for_status(status)
 
     def value(self, status, key):
         if status not in self.node.diagnostics:
@@ -76,7 +76,8 @@ class DiagnosticsTest(unittest.TestCase):
         self.node.wait_until(stands_still, "no markers and no clouds")
 
     def test_values(self):
-        self.start(ON_BALL + BESIDE, **{"query/deadline": 1e-9, "query/tolerance": 0.0})
+        short = {"query/deadline": 1e-9, "query/tolerance": 0.0}
+        self.start(ON_BALL + BESIDE, ProximityArray.DEGRADED, **short)
         self.node.wait_until(lambda: self.count("query", "deadlines missed") > 10, "deadlines")
         self.assertEqual(self.value("input cloud", "blind skin about the robot"), "20.00 mm")
         self.node.wait_until(

@@ -39,9 +39,9 @@ struct CycleReport {
   std::optional<JointStateFacts> joint_states;  ///< with pose_source joint_states
   std::uint64_t states_skipped = 0;  ///< joint states that a newer one overtook before its cycle
   std::size_t links_known = 0, links_monitored = 0;
-  double pose_age = 0.0;   ///< [s] of the common instant, when any link is known
-  std::size_t cycles = 0;  ///< since the start, those without a model too
-  CycleTimes times;        ///< of those with one
+  double pose_age = 0.0;             ///< [s] of the common instant, when any link is known
+  std::size_t cycles = 0;            ///< since the start, those without a model too
+  CycleTimes times;                  ///< of those with one
   std::size_t deadlines_missed = 0;  ///< cycles whose query was broken off, since the start
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while somebody listens
 };

@@ -25,9 +25,9 @@ struct Tunable {
   enum class Kind { kDouble, kInt, kBool };
   std::string name;
   Kind kind = Kind::kDouble;
-  Range range;             ///< of kBool: 0 to 1
-  double standard = 0.0;   ///< its default
-  double value = 0.0;      ///< what holds: the default, too, where the one that is set is wrong
+  Range range;            ///< of kBool: 0 to 1
+  double standard = 0.0;  ///< its default
+  double value = 0.0;     ///< what holds: the default, too, where the one that is set is wrong
 };
 
 /// Reads typed values from a tree of parameters: what the parameter server holds under one

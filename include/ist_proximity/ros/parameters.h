@@ -13,6 +13,7 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ist_proximity/ros/noise_filter.h"
 #include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
@@ -35,6 +36,7 @@ struct SourceConfig {
   double timeout = 0.5;          ///< [s] older than this is STALE_CLOUD; > 0, may be inf
   bool required = true;          ///< false: its absence is reported in its own status only
   IngestConfig ingest;
+  NoiseFilterConfig noise;  ///< of clouds
 };
 
 /// Where link poses come from.
