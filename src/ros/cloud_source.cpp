@@ -10,6 +10,7 @@
 #include "ist_proximity/ros/cloud_conversion.h"
 #include "ist_proximity/ros/map_measurement.h"
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/thread_name.h"
 #include "ist_proximity/ros/transforms.h"
 
 namespace ist {
@@ -156,6 +157,7 @@ void CloudSource::set_problem(const std::string& problem, bool dropped) {
 }
 
 void CloudSource::run() {
+  name_thread("ist " + config_.name);
   if (!config_.file.empty()) {
     const Received received = read_map_file(config_.file, without_slash(config_.frame_id));
     const std::lock_guard<std::mutex> lock(mutex_);

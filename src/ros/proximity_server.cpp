@@ -10,6 +10,7 @@
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/object_conversion.h"
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 namespace {
@@ -113,6 +114,7 @@ bool ProximityServer::wait_for_joint_states() {
 }
 
 void ProximityServer::run_cycles() {
+  name_thread("ist cycle");
   if (joint_states_) {
     do {
       run_cycle();
@@ -216,6 +218,7 @@ void ProximityServer::publish_spheres() {
 }
 
 void ProximityServer::run_diagnostics() {
+  name_thread("ist diagnostics");
   std::size_t cycles_before = 0;
   std::uint64_t states_before = 0;
   std::vector<std::uint64_t> messages_before;

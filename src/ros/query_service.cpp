@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <exception>
 
+#include "ist_proximity/ros/thread_name.h"
+
 namespace ist {
 
 using ist_proximity::ProximityArray;
@@ -14,6 +16,7 @@ QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& confi
   private_nh.setCallbackQueue(&queue_);
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_ = std::thread([this] {
+    name_thread("ist query");
     while (running_) queue_.callAvailable(ros::WallDuration(0.05));
   });
 }

@@ -11,6 +11,7 @@
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/proximity_cycle.h"
 #include "ist_proximity/ros/status.h"
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 
@@ -40,6 +41,7 @@ void SelfProximity::set_model(std::shared_ptr<const ModelState> model) {
 }
 
 void SelfProximity::run() {
+  name_thread("ist self");
   const auto period = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(1.0 / config_.self_collision.rate));
   Clock::time_point next = Clock::now();
