@@ -17,6 +17,7 @@ find_package(catkin REQUIRED COMPONENTS
   visualization_msgs)
 
 add_message_files(DIRECTORY msg FILES
+  JointRepulsion.msg
   LinkProximity.msg
   ProximityArray.msg
   SourceStatus.msg)

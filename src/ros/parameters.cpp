@@ -127,6 +127,7 @@ bool read_repulsion(ParameterReader* reader, double max_distance, RepulsionConfi
                &repulsion->influence_distance);
   reader->read("repulsion/gain", from_zero("", 1e6), &repulsion->gain);
   reader->read("repulsion/smoothing", more_than_zero("m", 10.0), &repulsion->smoothing);
+  reader->read("repulsion/filter_time", from_zero("s", 10.0), &repulsion->filter_time);
   const bool clamped = repulsion->influence_distance > max_distance;
   if (clamped) repulsion->influence_distance = max_distance;
   return clamped && reader->has("repulsion/influence_distance");

@@ -83,6 +83,7 @@ ProximityServer::~ProximityServer() {
 
 void ProximityServer::advertise() {
   proximity_ = private_nh_.advertise<ProximityArray>("proximity", 10);
+  joint_repulsion_ = private_nh_.advertise<ist_proximity::JointRepulsion>("joint_repulsion", 10);
   min_distance_ = private_nh_.advertise<std_msgs::Float64>("min_distance", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
   spheres_ = private_nh_.advertise<visualization_msgs::MarkerArray>("spheres", 1, true);
@@ -198,6 +199,7 @@ void ProximityServer::take_model() {
 
 void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& message) {
   proximity_.publish(message);
+  publish_joint_repulsion(*message);
   std_msgs::Float64 smallest;
   smallest.data = min_distance(*message);
   min_distance_.publish(smallest);
@@ -207,6 +209,17 @@ void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& messa
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     ++report_.markers_drawn;
   }
+}
+
+/// The Jacobians are worth computing only while somebody listens.
+void ProximityServer::publish_joint_repulsion(const ProximityArray& proximity) {
+  if (joint_repulsion_.getNumSubscribers() == 0) return;
+  ist_proximity::JointRepulsion message;
+  message.header.stamp = proximity.header.stamp;
+  message.status = proximity.status;
+  message.status_text = proximity.status_text;
+  if (cycle_) cycle_->fill_joint_repulsion(proximity, &message);
+  joint_repulsion_.publish(message);
 }
 
 void ProximityServer::publish_spheres() {

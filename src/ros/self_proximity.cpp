@@ -154,7 +154,6 @@ void SelfProximity::run_once() {
     const auto begin = Clock::now();
     query_->run(poses_.X_FL, poses_.known, &results_);
     message->header.stamp = poses_.stamp;
-    const Eigen::Vector3d no_repulsion = Eigen::Vector3d::Constant(std::nan(""));
     for (const std::size_t i : model_->monitored) {
       const LinkModel& link = model_->robot->links[i];
       if (!link.usable()) situation.link_errors.push_back(link.error);
@@ -164,9 +163,11 @@ void SelfProximity::run_once() {
       }
       std::size_t other = i;
       const LinkProximity answer = nearest(i, &other);
-      message->links.push_back(to_message(link.name, answer, no_repulsion,
-                                          speeds_[i].update(poses_.stamp, answer.distance),
-                                          model_->robot->links[other].name));
+      const std::string& name = model_->robot->links[other].name;
+      ClosingRates closing =
+          speeds_[i].update(poses_.stamp, answer, poses_.X_FL[i], {name, 0, 0.0});
+      closing.robot = ClosingRates::kNaN;  // both links move: it has no parts
+      message->links.push_back(to_message(link.name, answer, Push::unknown(), closing, name));
     }
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();

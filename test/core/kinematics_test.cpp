@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
+#include "support/random_robots.h"
 
 namespace ist {
 namespace {
@@ -177,42 +177,16 @@ Eigen::Matrix4d naive_motion(JointType type, const Eigen::Vector3d& axis, double
 }
 
 TEST(Kinematics, randomTreesAgainstNaiveProducts) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> number(-1, 1);
-  const auto vector = [&] {
-    return Eigen::Vector3d(number(random), number(random), number(random));
-  };
-  const JointType types[] = {JointType::kFixed, JointType::kRevolute, JointType::kContinuous,
-                             JointType::kPrismatic};
+  test::Rng random(7);
   for (int trial = 0; trial < 200; ++trial) {
-    RobotDescription robot;
-    robot.root_link = "l0";
-    const int count = 1 + static_cast<int>(random() % 20);
-    for (int i = 1; i <= count; ++i) {
-      JointDescription joint;
-      joint.name = "j" + std::to_string(i);
-      joint.type = types[random() % 4];
-      joint.parent_link = "l" + std::to_string(random() % static_cast<unsigned>(i));
-      joint.child_link = "l" + std::to_string(i);
-      joint.X_PJ = Eigen::Translation3d(vector()) *
-                   Eigen::AngleAxisd(3 * number(random), vector().normalized());
-      joint.axis = vector();
-      // Follows one of an earlier number, when that has a position.
-      if (i > 1 && random() % 3 == 0) {
-        const std::size_t other = random() % static_cast<unsigned>(i - 1);
-        if (robot.joints[other].type != JointType::kFixed) {
-          joint.mimic = Mimic{robot.joints[other].name, number(random), number(random)};
-        }
-      }
-      robot.joints.push_back(joint);
-    }
+    RobotDescription robot = test::random_robot(&random, 20);
     std::map<std::string, double> stated;
     std::map<std::string, Eigen::Matrix4d> X_RL{{"l0", Eigen::Matrix4d::Identity()}};
     std::map<std::string, double> q;
     for (const JointDescription& joint : robot.joints) {
       q[joint.name] = joint.mimic
                           ? joint.mimic->multiplier * q[joint.mimic->joint] + joint.mimic->offset
-                          : 4 * number(random);
+                          : test::uniform(&random, -4, 4);
       if (!joint.mimic) stated[joint.name] = q[joint.name];
       X_RL[joint.child_link] = X_RL[joint.parent_link] * joint.X_PJ.matrix() *
                                naive_motion(joint.type, joint.axis, q[joint.name]);
@@ -220,8 +194,7 @@ TEST(Kinematics, randomTreesAgainstNaiveProducts) {
     std::shuffle(robot.joints.begin(), robot.joints.end(), random);
 
     const Kinematics k(robot);
-    const Eigen::Isometry3d X_FR =
-        Eigen::Translation3d(vector()) * Eigen::AngleAxisd(number(random), vector().normalized());
+    const Eigen::Isometry3d X_FR = test::random_pose(&random, 1.0);
     const Placed placed = place(k, stated, X_FR);
     ASSERT_EQ(k.links().size(), X_RL.size());
     for (std::size_t i = 0; i < k.links().size(); ++i) {

@@ -8,6 +8,8 @@
 #include <string>
 
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/ros/closing_speed.h"
 #include "ist_proximity/ros/status.h"
 
 namespace ist {
@@ -17,10 +19,10 @@ ist_proximity::LinkProximity unknown_link(const std::string& name);
 
 /// @param result         in the fixed frame
 /// @param repulsion      of the same link
-/// @param closing_speed  [m/s]
+/// @param closing        of the same link
 /// @param source         name of the source of the nearest point; ignored unless NEAR or CONTACT
 ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
-                                        const Eigen::Vector3d& repulsion, double closing_speed,
+                                        const Push& repulsion, const ClosingRates& closing,
                                         const std::string& source);
 
 /// @param stamp  of the ProximityArray, which `age` counts from

@@ -57,6 +57,7 @@ class ProximityServer {
   void notice_clock_jump(const ros::Time& now);
   void take_model();
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
+  void publish_joint_repulsion(const ist_proximity::ProximityArray& proximity);
   void publish_spheres();
   void publish_spheres_again();
   void run_diagnostics();
@@ -71,7 +72,8 @@ class ProximityServer {
   ros::NodeHandle nh_, private_nh_;
   const std::string name_;  ///< in diagnostics
 
-  ros::Publisher proximity_, min_distance_, markers_, spheres_, filtered_cloud_, diagnostics_;
+  ros::Publisher proximity_, joint_repulsion_, min_distance_, markers_, spheres_, filtered_cloud_,
+      diagnostics_;
   ros::ServiceServer reload_service_, attach_service_, detach_service_;
   tf2::BufferCore buffer_;
   TransformListener listener_;

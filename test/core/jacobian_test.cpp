@@ -1,0 +1,143 @@
+#include "ist_proximity/robot/jacobian.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/random_robots.h"
+
+namespace ist {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+std::vector<Eigen::Isometry3d> place(const Kinematics& k, const std::vector<double>& q,
+                                     const Eigen::Isometry3d& X_FR) {
+  JointPoses joints;
+  k.place_joints(q, &joints);
+  // Planar and floating joints stand where nothing says otherwise.
+  for (std::size_t j = 0; j < joints.known.size(); ++j) {
+    if (!k.joints()[j].has_unstated_pose()) continue;
+    joints.X_PC[j] = k.joints()[j].X_PJ;
+    joints.known[j] = true;
+  }
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<bool> known;
+  k.place_links(joints, X_FR, &X_FL, &known);
+  return X_FL;
+}
+
+// Velocity of a link's point and of its frame, by central differences of the kinematics.
+Eigen::Matrix<double, 6, 1> difference(const Kinematics& k, std::vector<double> q, std::size_t j,
+                                       const Eigen::Isometry3d& X_FR, std::size_t link,
+                                       const Eigen::Vector3d& p_L) {
+  constexpr double kStep = 1e-5;
+  q[j] += kStep;
+  const Eigen::Isometry3d after = place(k, q, X_FR)[link];
+  q[j] -= 2 * kStep;
+  const Eigen::Isometry3d before = place(k, q, X_FR)[link];
+  const Eigen::AngleAxisd turn(after.linear() * before.linear().transpose());
+  Eigen::Matrix<double, 6, 1> velocity;
+  velocity << after * p_L - before * p_L, turn.angle() * turn.axis();
+  return velocity / (2 * kStep);
+}
+
+TEST(Jacobian, handComputedArm) {
+  RobotDescription robot;
+  robot.root_link = "base";
+  const auto add = [&robot](const std::string& name, JointType type, const Eigen::Vector3d& axis,
+                            const Eigen::Vector3d& origin) {
+    JointDescription joint;
+    joint.name = name;
+    joint.type = type;
+    joint.parent_link = robot.joints.empty() ? "base" : robot.joints.back().child_link;
+    joint.child_link = name + "_link";
+    joint.axis = axis;
+    joint.X_PJ.translation() = origin;
+    robot.joints.push_back(joint);
+  };
+  add("turn", JointType::kRevolute, {0, 0, 3}, {0, 0, 1});
+  add("slide", JointType::kPrismatic, {1, 0, 0}, {0.5, 0, 0});
+  add("tip", JointType::kFixed, {1, 0, 0}, {0.1, 0, 0});
+  const Kinematics k(robot);
+  // A quarter turn: the arm reaches 0.5 + 0.2 + 0.1 along y.
+  const auto X_FL = place(k, {kPi / 2, 0.2, 0.0}, Eigen::Isometry3d::Identity());
+  Jacobian J;
+  point_jacobian(k, X_FL, 3, X_FL[3].translation(), &J);
+  Jacobian expected = Jacobian::Zero(6, 3);
+  expected.col(0) << -0.8, 0, 0, 0, 0, 1;
+  expected.col(1) << 0, 1, 0, 0, 0, 0;
+  EXPECT_LT((J - expected).cwiseAbs().maxCoeff(), 1e-15) << J;
+}
+
+TEST(Jacobian, randomRobotsAgainstFiniteDifferences) {
+  test::Rng rng(61);
+  Jacobian J;
+  for (int trial = 0; trial < 60; ++trial) {
+    RobotDescription robot = test::random_robot(&rng, 12);
+    if (trial % 3 == 0) robot.joints[0].type = JointType::kFloating;
+    if (trial % 3 == 0) robot.joints[0].mimic.reset();
+    for (JointDescription& joint : robot.joints) {
+      if (joint.mimic && joint.mimic->joint == "j1" && trial % 3 == 0) joint.mimic.reset();
+    }
+    const Kinematics k(robot);
+    std::vector<double> q;
+    for (std::size_t j = 0; j < k.joints().size(); ++j) q.push_back(test::uniform(&rng, -2, 2));
+    const Eigen::Isometry3d X_FR = test::random_pose(&rng, 1.0);
+    const auto X_FL = place(k, q, X_FR);
+    for (std::size_t link = 0; link < k.links().size(); ++link) {
+      const Eigen::Vector3d p_L = test::random_vector(&rng, 1.0);
+      point_jacobian(k, X_FL, link, X_FL[link] * p_L, &J);
+      ASSERT_EQ(J.cols(), static_cast<Eigen::Index>(k.joints().size()));
+      for (std::size_t j = 0; j < k.joints().size(); ++j) {
+        const auto column = J.col(static_cast<Eigen::Index>(j));
+        if (!k.joints()[j].is_free()) {
+          EXPECT_TRUE(column.isZero(0.0));
+          continue;
+        }
+        EXPECT_LT((column - difference(k, q, j, X_FR, link, p_L)).cwiseAbs().maxCoeff(), 1e-7)
+            << "trial " << trial << ", joint " << j << ", link " << link;
+      }
+    }
+  }
+}
+
+TEST(Jacobian, tellsWhosePoseItNeeds) {
+  RobotDescription robot;
+  robot.root_link = "l0";
+  const JointType types[] = {JointType::kRevolute, JointType::kFloating, JointType::kPrismatic,
+                             JointType::kFixed};
+  for (int i = 0; i < 4; ++i) {
+    JointDescription joint;
+    joint.name = "j" + std::to_string(i);
+    joint.type = types[i];
+    joint.parent_link = "l" + std::to_string(i);
+    joint.child_link = "l" + std::to_string(i + 1);
+    robot.joints.push_back(joint);
+  }
+  const Kinematics k(robot);
+  std::vector<bool> known(5, true);
+  EXPECT_FALSE(first_link_needed(k, known, 4).has_value());
+  known[0] = known[2] = false;  // the root, and the child of the floating joint: neither is read
+  EXPECT_FALSE(first_link_needed(k, known, 4).has_value());
+  EXPECT_EQ(first_link_needed(k, known, 2), 2U) << "the link itself";
+  known[1] = false;
+  EXPECT_EQ(first_link_needed(k, known, 4), 1U);
+  known[3] = known[4] = false;
+  EXPECT_EQ(first_link_needed(k, known, 4), 4U);
+
+  // What is not needed is not read.
+  auto X_FL = place(k, {0.3, 0.0, 0.1, 0.0}, Eigen::Isometry3d::Identity());
+  Jacobian all, some;
+  point_jacobian(k, X_FL, 4, X_FL[4].translation(), &all);
+  X_FL[0].matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
+  X_FL[2].matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
+  point_jacobian(k, X_FL, 4, X_FL[4].translation(), &some);
+  EXPECT_EQ(all, some);
+}
+
+}  // namespace
+}  // namespace ist
