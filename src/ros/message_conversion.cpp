@@ -20,20 +20,21 @@ void assign(const Eigen::Vector3d& v, Message* message) {
   message->z = v.z();
 }
 
-void assign(const Eigen::Vector3d& v, geometry_msgs::Wrench* wrench) {
-  assign(v, &wrench->force);
-  assign(v, &wrench->torque);
+void assign(const Wrench& from, geometry_msgs::Wrench* wrench) {
+  assign(from.force, &wrench->force);
+  assign(from.torque, &wrench->torque);
 }
 
 }  // namespace
 
 LinkMessage unknown_link(const std::string& name) {
-  return to_message(name, LinkProximity(), Eigen::Vector3d::Constant(kNaN), kNaN, "");
+  return to_message(name, LinkProximity(), Eigen::Vector3d::Constant(kNaN), Wrench::unknown(), kNaN,
+                    "");
 }
 
 LinkMessage to_message(const std::string& name, const LinkProximity& result,
-                       const Eigen::Vector3d& repulsion, double closing_speed,
-                       const std::string& source) {
+                       const Eigen::Vector3d& repulsion, const Wrench& penetration,
+                       double closing_speed, const std::string& source) {
   LinkMessage message;
   message.link = name;
   message.state = static_cast<std::uint8_t>(result.state);
@@ -44,11 +45,9 @@ LinkMessage to_message(const std::string& name, const LinkProximity& result,
   assign(result.p_FO, &message.point_on_obstacle);
   assign(result.direction, &message.direction);
   assign(repulsion, &message.repulsion);
+  assign(penetration, &message.penetration);
   message.closing_speed = closing_speed;
   if (result.state >= LinkState::kNear) message.source = source;
-  // The force in contact comes from volumes, which are not computed yet: not known, so NaN.
-  const bool no_contact = result.state == LinkState::kClear || result.state == LinkState::kNear;
-  assign(Eigen::Vector3d::Constant(no_contact ? 0.0 : kNaN), &message.penetration);
   return message;
 }
 

@@ -104,7 +104,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;
-  fill_links(config.repulsion, message);
+  fill_links(config, message);
   fill_sources(situation_, message);
   message->cloud_stamp = ros::Time();
   for (std::size_t i = 0; i < snapshots_.size(); ++i) {
@@ -204,7 +204,7 @@ std::vector<std::string> ProximityCycle::pose_problems() const {
   return sentences;
 }
 
-void ProximityCycle::fill_links(const RepulsionConfig& repulsion, ProximityArray* message) {
+void ProximityCycle::fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message) {
   message->links.clear();
   for (const std::size_t i : model_->monitored) {
     const LinkProximity& result = results_[i];
@@ -213,9 +213,21 @@ void ProximityCycle::fill_links(const RepulsionConfig& repulsion, ProximityArray
             ? cloud_names_[static_cast<std::size_t>(result.source)]
             : std::string();
     message->links.push_back(to_message(
-        robot_.links[i].name, result, repulsion_(i, poses_.X_FL[i], clouds_, result, repulsion),
+        robot_.links[i].name, result,
+        repulsion_(i, poses_.X_FL[i], clouds_, result, config.repulsion), penetration(i, config),
         speeds_[i].update(message->header.stamp, result.distance), source));
   }
+}
+
+/// Not known in contact until the link's disjoint packing is there.
+Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) const {
+  const LinkProximity& result = results_[link];
+  const ContactBody* body = find_body(config.contacts.get(), robot_, link);
+  ContactVolume volume;
+  const bool is_known = result.state == LinkState::kContact && body != nullptr;
+  if (is_known) volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], clouds_);
+  return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
+                            config.penetration);
 }
 
 void say_no_model(const ModelState& model, const std::string& fixed_frame, const ros::Time& now,

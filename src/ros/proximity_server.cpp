@@ -40,8 +40,9 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       buffer_(ros::Duration(10.0)),
       listener_(&buffer_, nh_),
       loader_(config, nh),
+      contact_loader_(config, loader_),
       marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
-      live_{config.query, config.repulsion} {
+      live_{config.query, config.repulsion, config.penetration, nullptr} {
   advertise();
   for (const SourceConfig& source : config_.sources) {
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
@@ -55,13 +56,14 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       state_signal_.notify_one();
     });
   }
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
+  const auto live = [this] {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     return live_;
-  });
+  };
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live);
   if (config_.self_collision.enabled) {
-    self_proximity_ =
-        std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_, joint_states_.get());
+    self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
+                                                      joint_states_.get(), live);
   }
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
@@ -141,6 +143,7 @@ void ProximityServer::run_cycle() {
   {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
+    live_.contacts = contact_loader_.contacts();
     if (cycle_) {
       cycle_->run(now, sources_, live_, message.get(), &report_);
     } else {
@@ -246,18 +249,21 @@ void ProximityServer::run_diagnostics() {
     }
     message.status.push_back(pose_diagnostics(name_, report));
     message.status.push_back(query_diagnostics(name_, report, rate, wanted_rate));
-    message.status.push_back(model_diagnostics(name_, *loader_.state()));
+    message.status.push_back(model_diagnostics(
+        name_, *loader_.state(), contact_loader_.contacts().get(), config_.contacts_wanted));
     diagnostics_.publish(message);
   }
 }
 
 void ProximityServer::read_live_again() {
   try {
-    const LiveConfig live = read_live(private_nh_, config_.query.max_distance);
+    LiveConfig live = read_live(private_nh_, config_.query.max_distance);
     const std::lock_guard<std::mutex> lock(shared_mutex_);
-    live_ = live;
+    live.contacts = live_.contacts;
+    live_ = std::move(live);
   } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
+    ROS_WARN_STREAM_THROTTLE(
+        5.0, "the last valid ~query, ~repulsion and ~penetration go on: " << error.what());
   }
 }
 

@@ -49,7 +49,8 @@ class ProximityCycle {
   void look_at_sources(const ros::Time& now, const CloudSources& sources);
   void look_at_poses(const ros::Time& now);
   std::vector<std::string> pose_problems() const;
-  void fill_links(const RepulsionConfig& repulsion, ist_proximity::ProximityArray* message);
+  void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
+  Wrench penetration(std::size_t link, const LiveConfig& config) const;
 
   std::shared_ptr<const ModelState> model_;
   const RobotModel& robot_;

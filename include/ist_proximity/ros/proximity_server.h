@@ -14,6 +14,7 @@
 #include <mutex>
 #include <thread>
 
+#include "ist_proximity/ros/contact_loader.h"
 #include "ist_proximity/ros/diagnostics.h"
 #include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/markers.h"
@@ -32,11 +33,11 @@ namespace ist {
 ///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
 ///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
-///   - the model loader; - the listeners of tf and joint_states;
-///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again from the parameter
-///   server, which is
-///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
-///     not every ROS 1 distribution has).
+///   - the model loader; - the contact loader, which begins when the model is ready;
+///   - the listeners of tf and joint_states;
+///   - once a second: diagnostics, and ~query/*, ~repulsion/* and ~penetration/stiffness read again
+///     from the parameter server, which is how these change while running (`rosparam set`; no
+///     dynamic_reconfigure, whose generator not every ROS 1 distribution has).
 /// The other services are answered from the queue of the node handles.
 class ProximityServer {
  public:
@@ -80,6 +81,7 @@ class ProximityServer {
   TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
+  ContactLoader contact_loader_;
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   // The cycle thread's own.
