@@ -75,6 +75,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(points.size) - counts.used;
   impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
+  snapshot->thinning = config.thinning;
 
   snapshot->counts = counts;
   snapshot->stamp = stamp;

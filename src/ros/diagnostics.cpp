@@ -68,6 +68,39 @@ std::string doubt_of_self_filter(const SourceFacts& source) {
   return "";
 }
 
+// Why `penetration` is NaN in contact, where it is.
+void add_contacts(const ModelState& state, const ContactModel* contacts, bool wanted,
+                  DiagnosticStatus* status) {
+  if (!wanted) {
+    add("contact volumes", "off, ~penetration/enabled is false: penetration is NaN in contact",
+        status);
+    return;
+  }
+  if (!state.robot) return;
+  const bool is_there = contacts != nullptr && contacts->robot == state.robot;
+  std::size_t usable = 0, ready = 0;
+  for (const std::size_t i : state.monitored) {
+    if (!state.robot->links[i].usable()) continue;
+    ++usable;
+    if (!is_there || !contacts->bodies[i]) continue;
+    ++ready;
+    const ContactBody& body = *contacts->bodies[i];
+    std::string text;
+    if (body.has_volume()) {
+      text = std::to_string(body.ball_count) + number(" spheres, %.3f l", 1e3 * body.volume) +
+             number(", filled to %.0f %%", 100.0 * body.packed_volume / body.volume) +
+             (body.from_cache ? ", from the cache" : number(", packed in %.1f s", body.time));
+    }
+    if (!body.note.empty()) text += (text.empty() ? "" : "; ") + body.note;
+    add("volume of " + state.robot->links[i].name, text, status);
+  }
+  add("contact volumes",
+      ready == usable ? "ready"
+                      : std::to_string(ready) + " of " + std::to_string(usable) +
+                            " links; penetration is NaN in contact for those to come",
+      status);
+}
+
 }  // namespace
 
 void CycleTimes::add(double seconds) {
@@ -174,7 +207,8 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   return status;
 }
 
-DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state) {
+DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
+                                   const ContactModel* contacts, bool contacts_wanted) {
   DiagnosticStatus status = make(node, "model");
   const bool ready = state.phase == ModelState::Phase::kReady;
   if (!state.problem.empty()) {
@@ -207,6 +241,7 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
     text += link.from_cache ? ", from the cache" : number(", packed in %.1f s", link.packing_time);
     add(link.name, text, &status);
   }
+  add_contacts(state, contacts, contacts_wanted, &status);
   for (const std::string& warning : state.warnings) {
     set(DiagnosticStatus::WARN, warning, &status);
     add("warning", warning, &status);

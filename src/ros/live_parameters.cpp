@@ -103,10 +103,10 @@ bool same(const Config& a, const Config& b) {
 LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config)
     : private_nh_(private_nh),
       max_distance_(config.query.max_distance),
-      live_{config.query, config.repulsion} {
+      live_{config.query, config.repulsion, config.penetration, nullptr} {
   const std::lock_guard<std::mutex> lock(change_mutex_);
   parse_live(XmlRpc::XmlRpcValue(), max_distance_, &tunables_);  // which there are
-  for (const char* name : {"query", "repulsion"}) advertise(name);
+  for (const char* name : {"query", "repulsion", "penetration"}) advertise(name);
   take({});
 }
 
@@ -166,11 +166,12 @@ void LiveParameters::take(const Change& change) {
     const std::lock_guard<std::mutex> lock(live_mutex_);
     live_ = live;
   } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
+    ROS_WARN_STREAM_THROTTLE(
+        5.0, "the last valid ~query, ~repulsion and ~penetration go on: " << error.what());
     return;
   } catch (const XmlRpc::XmlRpcException& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0,
-                             "the last valid ~query and ~repulsion go on: " << error.getMessage());
+    ROS_WARN_STREAM_THROTTLE(
+        5.0, "the last valid ~query, ~repulsion and ~penetration go on: " << error.getMessage());
     return;
   }
   tunables_ = std::move(tunables);

@@ -21,9 +21,9 @@ void assign(const Eigen::Vector3d& v, Message* message) {
   message->z = v.z();
 }
 
-void assign(const Eigen::Vector3d& v, geometry_msgs::Wrench* wrench) {
-  assign(v, &wrench->force);
-  assign(v, &wrench->torque);
+void assign(const Wrench& from, geometry_msgs::Wrench* wrench) {
+  assign(from.force, &wrench->force);
+  assign(from.torque, &wrench->torque);
 }
 
 void assign(const ClosingRates& closing, LinkMessage* message) {
@@ -38,11 +38,12 @@ void assign(const ClosingRates& closing, LinkMessage* message) {
 }  // namespace
 
 LinkMessage unknown_link(const std::string& name) {
-  return to_message(name, LinkProximity(), Push::unknown(), {}, "");
+  return to_message(name, LinkProximity(), Push::unknown(), Wrench::unknown(), {}, "");
 }
 
 LinkMessage to_message(const std::string& name, const LinkProximity& result, const Push& repulsion,
-                       const ClosingRates& closing, const std::string& source) {
+                       const Wrench& penetration, const ClosingRates& closing,
+                       const std::string& source) {
   LinkMessage message;
   message.link = name;
   message.state = static_cast<std::uint8_t>(result.state);
@@ -54,11 +55,9 @@ LinkMessage to_message(const std::string& name, const LinkProximity& result, con
   assign(result.direction, &message.direction);
   assign(repulsion.force, &message.repulsion);
   assign(repulsion.torque, &message.repulsion_torque);
+  assign(penetration, &message.penetration);
   assign(closing, &message);
   if (result.state >= LinkState::kNear) message.source = source;
-  // The force in contact comes from volumes, which are not computed yet: not known, so NaN.
-  const bool no_contact = result.state == LinkState::kClear || result.state == LinkState::kNear;
-  assign(Eigen::Vector3d::Constant(no_contact ? 0.0 : kNaN), &message.penetration);
   return message;
 }
 

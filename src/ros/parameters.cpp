@@ -164,6 +164,19 @@ void read_query(ParameterReader* reader, QueryConfig* query) {
   reader->read("query/margin", from_zero("m", 1.0), &query->margin);
 }
 
+void read_penetration(ParameterReader* reader, PenetrationConfig* penetration) {
+  reader->read("penetration/stiffness", from_zero("N/m^3", 1e12), &penetration->stiffness);
+}
+
+void read_contacts(ParameterReader* reader, ServerConfig* config) {
+  reader->read("penetration/enabled", &config->contacts_wanted);
+  reader->read("penetration/max_error", more_than_zero("m", 1.0),
+               &config->contacts.packing.max_error);
+  reader->read("penetration/max_spheres", Range{"", 1.0, 1e5},
+               &config->contacts.packing.max_spheres);
+  read_penetration(reader, &config->penetration);
+}
+
 void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/enabled", &config->enabled);
   reader->read("self_collision/rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
@@ -221,6 +234,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
         "~repulsion/influence_distance is more than ~max_distance, where measuring "
         "ends; ~max_distance is used");
   }
+  read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
   read_self_collision(&reader, &config.self_collision);
 
@@ -246,6 +260,7 @@ LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
   live.query.max_distance = max_distance;
   read_query(&reader, &live.query);
   read_repulsion(&reader, max_distance, &live.repulsion);
+  read_penetration(&reader, &live.penetration);
   if (tunables) *tunables = reader.tunables();
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   return live;

@@ -103,7 +103,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;
-  fill_links(config.repulsion, message);
+  fill_links(config, message);
   fill_sources(situation_, message);
   message->cloud_stamp = ros::Time();
   for (std::size_t i = 0; i < snapshots_.size(); ++i) {
@@ -223,20 +223,31 @@ ClosingSpeed::Nearest ProximityCycle::nearest_source(const LinkProximity& result
   return {cloud_names_[source], obstacles_key({clouds_[source]}), clouds_[source]->stamp};
 }
 
-void ProximityCycle::fill_links(const RepulsionConfig& repulsion, ProximityArray* message) {
+void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* message) {
   message->links.clear();
   const std::uint64_t obstacles = obstacles_key(clouds_);
   for (const std::size_t i : model_->monitored) {
     const LinkProximity& result = results_[i];
     const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
     const ClosingSpeed::Nearest nearest = nearest_source(result);
-    pushes_[i] =
-        filters_[i].update(message->header.stamp.toSec(), obstacles,
-                           repulsion_.push(i, X_FL, clouds_, result, repulsion), result, repulsion);
+    pushes_[i] = filters_[i].update(message->header.stamp.toSec(), obstacles,
+                                    repulsion_.push(i, X_FL, clouds_, result, config.repulsion),
+                                    result, config.repulsion);
     message->links.push_back(to_message(
-        robot_.links[i].name, result, pushes_[i],
+        robot_.links[i].name, result, pushes_[i], penetration(i, config),
         speeds_[i].update(message->header.stamp, result, X_FL, nearest), nearest.source));
   }
+}
+
+/// Not known in contact until the link's disjoint packing is there.
+Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) const {
+  const LinkProximity& result = results_[link];
+  const ContactBody* body = find_body(config.contacts.get(), robot_, link);
+  ContactVolume volume;
+  const bool is_known = result.state == LinkState::kContact && body != nullptr;
+  if (is_known) volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], clouds_);
+  return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
+                            config.penetration);
 }
 
 void ProximityCycle::forget() {

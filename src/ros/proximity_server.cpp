@@ -42,6 +42,7 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       listener_(&buffer_, nh_),
       loader_(config, nh),
       live_(private_nh, config),
+      contact_loader_(config, loader_),
       marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
   advertise();
   for (const SourceConfig& source : config_.sources) {
@@ -56,11 +57,11 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       state_signal_.notify_one();
     });
   }
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_,
-                                                  [this] { return live_.get(); });
+  const auto live = [this] { return live_config(); };
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live);
   if (config_.self_collision.enabled) {
-    self_proximity_ =
-        std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_, joint_states_.get());
+    self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
+                                                      joint_states_.get(), live);
   }
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
@@ -132,6 +133,12 @@ void ProximityServer::run_cycles() {
   } while (sleep_until(next));
 }
 
+LiveConfig ProximityServer::live_config() const {
+  LiveConfig live = live_.get();
+  live.contacts = contact_loader_.contacts();
+  return live;
+}
+
 void ProximityServer::run_cycle() {
   const ros::Time now = ros::Time::now();
   notice_clock_jump(now);
@@ -139,7 +146,7 @@ void ProximityServer::run_cycle() {
   publish_spheres_again();
   const auto message = boost::make_shared<ProximityArray>();
   const std::string transform_problem = listener_.problem();
-  const LiveConfig live = live_.get();
+  const LiveConfig live = live_config();
   {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
@@ -269,7 +276,8 @@ void ProximityServer::run_diagnostics() {
     }
     message.status.push_back(pose_diagnostics(name_, report));
     message.status.push_back(query_diagnostics(name_, report, rate, wanted_rate));
-    message.status.push_back(model_diagnostics(name_, *loader_.state()));
+    message.status.push_back(model_diagnostics(
+        name_, *loader_.state(), contact_loader_.contacts().get(), config_.contacts_wanted));
     diagnostics_.publish(message);
   }
 }

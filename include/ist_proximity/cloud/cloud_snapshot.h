@@ -27,8 +27,9 @@ struct IngestCounts {
 /// One cloud or map, as queries see it: immutable. A cloud is points in the fixed frame; a map is
 /// solid boxes in a frame of its own.
 struct CloudSnapshot {
-  PointIndex index;   ///< all points used
-  PointIndex coarse;  ///< the same, thinned to one point per cell of the thinning grid
+  PointIndex index;        ///< all points used
+  PointIndex coarse;       ///< the same, thinned to one point per cell of the thinning grid
+  double thinning = 0.01;  ///< [m] edge of such a cell
   std::shared_ptr<const BoxIndex> boxes;                   ///< of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
   IngestCounts counts;

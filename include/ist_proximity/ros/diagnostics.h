@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/robot/contact_model.h"
 #include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/status.h"
@@ -59,7 +60,10 @@ diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
 diagnostic_msgs::DiagnosticStatus query_diagnostics(const std::string& node,
                                                     const CycleReport& report, double rate,
                                                     double wanted_rate);
+/// @param contacts  null: none yet, or not wanted
 diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
-                                                    const ModelState& state);
+                                                    const ModelState& state,
+                                                    const ContactModel* contacts,
+                                                    bool contacts_wanted);
 
 }  // namespace ist

@@ -15,10 +15,10 @@
 
 namespace ist {
 
-/// What may change while the node runs: ~query/* and ~repulsion/*. Two ways lead here: the
-/// parameter server, read again whenever the owner asks, and dynamic_reconfigure, in one group for
-/// each of the two names (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`).
-/// What is wrong is refused with a warning, and the last valid values go on.
+/// What may change while the node runs: ~query/*, ~repulsion/* and ~penetration/stiffness. Two ways
+/// lead here: the parameter server, read again whenever the owner asks, and dynamic_reconfigure, in
+/// one group for each of the three names (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set
+/// ~query ...`). What is wrong is refused with a warning, and the last valid values go on.
 ///
 /// Speaks dynamic_reconfigure's messages without its generated server: a .cfg file would state
 /// defaults and ranges a second time, and that server writes a whole group back at each change,

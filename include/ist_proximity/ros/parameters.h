@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -10,7 +11,9 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/penetration.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/contact_model.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ist_proximity/ros/noise_filter.h"
@@ -62,6 +65,9 @@ struct ServerConfig {
   RobotModelConfig model;
   QueryConfig query;
   RepulsionConfig repulsion;
+  bool contacts_wanted = true;  ///< ~penetration/enabled
+  ContactConfig contacts;
+  PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
   std::vector<SourceConfig> sources;
 };
@@ -87,12 +93,15 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 struct LiveConfig {
   QueryConfig query;  ///< but for max_distance
   RepulsionConfig repulsion;
+  PenetrationConfig penetration;
+  /// Not a parameter: what contact volumes are computed with, as far as it is there; may be null.
+  std::shared_ptr<const ContactModel> contacts;
 };
 
 /// What the parameter server holds in the private namespace, in one call: a consistent view.
 XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh);
 
-/// Reads ~query/* and ~repulsion/* again.
+/// Reads ~query/*, ~repulsion/* and ~penetration/stiffness again.
 /// @param tree          as fetch_parameters() returns it
 /// @param max_distance  [m] as it was at the start. The influence distance ends there at the
 ///                      latest: beyond it nothing is measured, and the vector could not end in zero

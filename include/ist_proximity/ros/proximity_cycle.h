@@ -62,7 +62,8 @@ class ProximityCycle {
   void look_at_poses(const ros::Time& now);
   std::vector<std::string> pose_problems() const;
   ClosingSpeed::Nearest nearest_source(const LinkProximity& result) const;
-  void fill_links(const RepulsionConfig& repulsion, ist_proximity::ProximityArray* message);
+  void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
+  Wrench penetration(std::size_t link, const LiveConfig& config) const;
 
   std::shared_ptr<const ModelState> model_;
   const RobotModel& robot_;

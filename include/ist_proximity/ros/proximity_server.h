@@ -14,6 +14,7 @@
 #include <mutex>
 #include <thread>
 
+#include "ist_proximity/ros/contact_loader.h"
 #include "ist_proximity/ros/diagnostics.h"
 #include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/live_parameters.h"
@@ -33,8 +34,10 @@ namespace ist {
 ///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
 ///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
-///   - the model loader; - the listeners of tf and joint_states;
-///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again (LiveParameters).
+///   - the model loader; - the contact loader, which begins when the model is ready;
+///   - the listeners of tf and joint_states;
+///   - once a second: diagnostics, and what may change while running is read again
+///     (LiveParameters).
 /// The other services are answered from the queue of the node handles.
 class ProximityServer {
  public:
@@ -53,6 +56,7 @@ class ProximityServer {
   void advertise();
   void run_cycles();
   bool wait_for_joint_states();
+  LiveConfig live_config() const;
   void run_cycle();
   void notice_clock_jump(const ros::Time& now);
   void take_model();
@@ -80,6 +84,7 @@ class ProximityServer {
   CloudSources sources_;
   ModelLoader loader_;
   LiveParameters live_;
+  ContactLoader contact_loader_;
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   // The cycle thread's own.
