@@ -16,6 +16,18 @@ foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 endforeach()
 
+# The demonstration of a controller: simulated robot, example controller.
+add_executable(simulator_node simulator/nodes/simulator_node.cpp)
+target_link_libraries(simulator_node PRIVATE ist_proximity_simulator ${catkin_LIBRARIES})
+add_executable(dodge_node examples/dodge_node.cpp)
+target_link_libraries(dodge_node PRIVATE ist_proximity_dodge ${catkin_LIBRARIES})
+foreach(target simulator_node dodge_node)
+  target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  add_dependencies(${target} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
+  set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+  install(TARGETS ${target} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endforeach()
+
 set_target_properties(ist_proximity_ros ist_proximity_nodelet PROPERTIES INSTALL_RPATH "$ORIGIN")
 set_target_properties(proximity_node PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
 
