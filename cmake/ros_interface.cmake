@@ -8,6 +8,7 @@ find_package(catkin REQUIRED COMPONENTS
   nodelet
   pluginlib
   roscpp
+  rosgraph_msgs
   roslib
   sensor_msgs
   std_msgs
@@ -39,6 +40,7 @@ catkin_package(
     message_runtime
     nodelet
     roscpp
+    rosgraph_msgs
     sensor_msgs
     std_msgs
     std_srvs
