@@ -101,15 +101,6 @@ foreach(source IN LISTS core_test_sources)
   set_tests_properties(${ctest_name} PROPERTIES LABELS core TIMEOUT 600)
 endforeach()
 
-# The example that links the core, from here; the step `install` of scripts/test builds it as users do.
-add_executable(direct_controller EXCLUDE_FROM_ALL examples/direct_controller.cpp)
-target_link_libraries(direct_controller PRIVATE ist_proximity_dodge)
-set_target_properties(direct_controller PROPERTIES
-  RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
-if(catkin_FOUND)
-  add_dependencies(tests direct_controller)
-endif()
-
 if(TARGET pack_robot_test)
   add_dependencies(pack_robot_test pack_robot)
   target_compile_definitions(pack_robot_test PRIVATE
