@@ -15,6 +15,10 @@ foreach(source IN LISTS benchmark_sources)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
 
+foreach(name closed_loop self_view)
+  target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
+endforeach()
+
 # What the maps are measured beside, where it is installed.
 find_path(FCL_INCLUDE_DIR fcl/fcl.h)
 find_library(FCL_LIBRARY fcl)

@@ -8,6 +8,7 @@ find_package(catkin REQUIRED COMPONENTS
   nodelet
   pluginlib
   roscpp
+  rosgraph_msgs
   sensor_msgs
   std_msgs
   std_srvs
@@ -37,6 +38,7 @@ catkin_package(
     message_runtime
     nodelet
     roscpp
+    rosgraph_msgs
     sensor_msgs
     std_msgs
     std_srvs

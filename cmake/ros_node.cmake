@@ -26,6 +26,21 @@ foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 endforeach()
 
+# The demonstration of a controller: simulated robot, example controller.
+add_executable(simulator_node simulator/nodes/simulator_node.cpp)
+target_link_libraries(simulator_node PRIVATE ist_proximity_simulator ${catkin_LIBRARIES})
+add_executable(dodge_node examples/dodge_node.cpp)
+target_link_libraries(dodge_node PRIVATE ist_proximity_dodge ${catkin_LIBRARIES})
+# The same controller without ROS; examples/CMakeLists.txt builds it against the installed core.
+add_executable(direct_controller examples/direct_controller.cpp)
+target_link_libraries(direct_controller PRIVATE ist_proximity_dodge)
+foreach(target simulator_node dodge_node direct_controller)
+  target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  add_dependencies(${target} ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
+  set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
+  install(TARGETS ${target} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endforeach()
+
 set_target_properties(ist_proximity_ros ist_proximity_nodelet PROPERTIES INSTALL_RPATH "$ORIGIN")
 set_target_properties(proximity_node PROPERTIES INSTALL_RPATH "$ORIGIN/${bin_to_lib}")
 
@@ -37,7 +52,7 @@ install(TARGETS proximity_node RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINAT
 install(DIRECTORY include/ist_proximity/ros/
   DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION}/ros FILES_MATCHING PATTERN "*.h")
 install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION})
-install(DIRECTORY config demo launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
+install(DIRECTORY config demo examples launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
   USE_SOURCE_PERMISSIONS
   PATTERN __pycache__ EXCLUDE)
 catkin_install_python(PROGRAMS scripts/proximity_table

@@ -1,0 +1,131 @@
+// Does a robot that follows the answers dodge? 50 seeded scenes in the simulator, each without
+// avoidance, with the blended repulsion, and with the nearest pair's direction: as Markdown.
+//
+// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each]
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+#include "closed_loop.h"
+#include "support.h"
+
+namespace {
+
+using ist::sim::Avoidance;
+using ist::sim::ClosedLoopResult;
+
+constexpr Avoidance kModes[] = {Avoidance::kNone, Avoidance::kBlend, Avoidance::kNearest};
+constexpr const char* kNames[] = {"none", "blend (`repulsion`)", "nearest pair (`direction`)"};
+
+struct SceneResult {
+  ClosedLoopResult modes[3];
+};
+
+ist::RobotDescription read_robot() {
+  const std::string folder = IST_PROXIMITY_SOURCE_DIR;
+  std::ifstream file(folder + "/demo/demo_arm.urdf");
+  std::stringstream text;
+  text << file.rdbuf();
+  return ist::parse_urdf(text.str(), ist::GeometrySource::kCollision,
+                         [folder](const std::string&) { return folder; });
+}
+
+void print_each(const std::vector<SceneResult>& results, std::uint64_t first) {
+  std::printf("| seed | avoidance | smallest distance | at | between | goals |\n");
+  std::printf("|---|---|---|---|---|---|\n");
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    for (std::size_t m = 0; m < 3; ++m) {
+      const ClosedLoopResult& r = results[i].modes[m];
+      std::printf("| %d | %s | %.1f mm | %.2f s | %s, %s | %d |\n", static_cast<int>(first + i),
+                  kNames[m], 1e3 * r.smallest_distance, r.when, r.link.c_str(), r.obstacle.c_str(),
+                  r.goals);
+    }
+  }
+}
+
+void print_table(const std::vector<SceneResult>& results) {
+  std::printf(
+      "\n| avoidance | collisions | smallest true distance, least / median | task done | goals | "
+      "acceleration noise | command steps |\n|---|---|---|---|---|---|---|\n");
+  for (std::size_t m = 0; m < 3; ++m) {
+    int collisions = 0, done = 0, goals = 0;
+    std::vector<double> distance, noise, steps;
+    for (const SceneResult& result : results) {
+      const ClosedLoopResult& r = result.modes[m];
+      collisions += r.smallest_distance <= 0.0 ? 1 : 0;
+      done += r.goals >= ist::sim::Scene().task ? 1 : 0;
+      goals += r.goals;
+      distance.push_back(1e3 * r.smallest_distance);
+      noise.push_back(r.acceleration_noise);
+      steps.push_back(r.largest_command_step);
+    }
+    std::printf("| %s | %d | %.0f / %.0f mm | %d | %d | %.2f rad/s^2 | %.3f rad/s |\n", kNames[m],
+                collisions, *std::min_element(distance.begin(), distance.end()),
+                ist::benchmark::quantile(distance, 0.5), done, goals, ist::benchmark::mean(noise),
+                ist::benchmark::quantile(steps, 0.5));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::uint64_t first = 1;
+  std::size_t count = 50;
+  int threads = 1;
+  double noise = -1.0;  // [m] negative: as the cameras have it
+  bool each = false;
+  for (int i = 1; i < argc; ++i) {
+    const bool has_value = i + 1 < argc;
+    if (std::strcmp(argv[i], "--each") == 0) {
+      each = true;
+    } else if (std::strcmp(argv[i], "--first") == 0 && has_value) {
+      first = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+    } else if (std::strcmp(argv[i], "--count") == 0 && has_value) {
+      count = static_cast<std::size_t>(std::atoll(argv[++i]));
+    } else if (std::strcmp(argv[i], "--threads") == 0 && has_value) {
+      threads = std::atoi(argv[++i]);
+    } else if (std::strcmp(argv[i], "--noise") == 0 && has_value) {
+      noise = 1e-3 * std::atof(argv[++i]);
+    } else {
+      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
+      return 1;
+    }
+  }
+
+  const ist::RobotDescription robot = read_robot();
+  const auto model = ist::build_robot_model(robot, {});
+  std::vector<SceneResult> results(count);
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < count; i = next++) {
+      ist::sim::ClosedLoopConfig config;
+      const auto nominal = [&](const ist::sim::Scene& scene) {
+        return ist::sim::nominal_motion(robot, scene, config.controller);
+      };
+      const std::uint64_t seed = first + i;
+      ist::sim::Scene scene = ist::sim::make_scene(robot, seed, {}, nominal);
+      for (ist::sim::DepthCameraConfig& camera : scene.cameras) {
+        if (noise >= 0.0) camera.noise = noise;
+      }
+      for (std::size_t m = 0; m < 3; ++m) {
+        config.avoidance = kModes[m];
+        results[i].modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
+      }
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int t = 1; t < threads; ++t) pool.emplace_back(work);
+  work();
+  for (std::thread& thread : pool) thread.join();
+
+  if (each) print_each(results, first);
+  print_table(results);
+  return 0;
+}

@@ -1,0 +1,213 @@
+// The example controller as a node: it reads nothing but ~proximity of the proximity node and the
+// joint states.
+//
+//   proximity     subscribed, ist_proximity/ProximityArray; its fixed frame is the root link
+//   joint_states  subscribed, sensor_msgs/JointState
+//   joint_velocity_controller/command
+//                 published, std_msgs/Float64MultiArray [rad/s], by ~joints; with each
+//                 ProximityArray
+//   ~state        published, std_msgs/String: moving, or why it stands still; with each command
+//   ~goals        published, std_msgs/UInt32, latched: how many goals were reached
+//
+// Parameters: ~joints (names), ~goals (a list of joint positions, gone to in turn), and those of
+// DodgeConfig by name.
+
+#include <ros/ros.h>
+#include <sensor_msgs/JointState.h>
+#include <std_msgs/Float64MultiArray.h>
+#include <std_msgs/String.h>
+#include <std_msgs/UInt32.h>
+
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "dodge_controller.h"
+#include "ist_proximity/ProximityArray.h"
+
+namespace ist::example {
+namespace {
+
+using ist_proximity::ProximityArray;
+
+DodgeConfig read_config(const ros::NodeHandle& nh) {
+  DodgeConfig config;
+  const auto read = [&nh](const char* name, double* value) {
+    *value = nh.param(name, *value);
+    if (!(*value > 0.0)) {
+      throw std::runtime_error(std::string("~") + name + " must be a number above 0.");
+    }
+  };
+  read("task_speed", &config.task_speed);
+  read("task_gain", &config.task_gain);
+  read("reached", &config.reached);
+  read("slow_distance", &config.slow_distance);
+  read("stop_distance", &config.stop_distance);
+  read("keep_distance", &config.keep_distance);
+  read("damping", &config.damping);
+  read("escape_speed", &config.escape_speed);
+  read("softness", &config.softness);
+  read("max_joint_speed", &config.max_joint_speed);
+  read("limit_gain", &config.limit_gain);
+  read("max_message_age", &config.max_message_age);
+  read("max_cloud_age", &config.max_cloud_age);
+  if (config.slow_distance <= config.stop_distance) {
+    throw std::runtime_error("~slow_distance must be more than ~stop_distance.");
+  }
+  return config;
+}
+
+std::vector<Eigen::VectorXd> read_goals(const ros::NodeHandle& nh, std::size_t joints) {
+  XmlRpc::XmlRpcValue list;
+  std::vector<Eigen::VectorXd> goals;
+  const std::string wanted =
+      "~goals must be a list of lists of " + std::to_string(joints) + " joint positions.";
+  if (!nh.getParam("goals", list) || list.getType() != XmlRpc::XmlRpcValue::TypeArray) {
+    throw std::runtime_error(wanted);
+  }
+  for (int i = 0; i < list.size(); ++i) {
+    XmlRpc::XmlRpcValue& one = list[i];
+    if (one.getType() != XmlRpc::XmlRpcValue::TypeArray || one.size() != static_cast<int>(joints)) {
+      throw std::runtime_error(wanted);
+    }
+    Eigen::VectorXd goal(one.size());
+    for (int j = 0; j < one.size(); ++j) {
+      const bool is_int = one[j].getType() == XmlRpc::XmlRpcValue::TypeInt;
+      if (!is_int && one[j].getType() != XmlRpc::XmlRpcValue::TypeDouble) {
+        throw std::runtime_error(wanted);
+      }
+      goal[j] = is_int ? static_cast<int>(one[j]) : static_cast<double>(one[j]);
+    }
+    goals.push_back(goal);
+  }
+  if (goals.empty()) throw std::runtime_error(wanted);
+  return goals;
+}
+
+RobotDescription read_robot(const ros::NodeHandle& nh) {
+  std::string urdf;
+  if (!nh.getParam("robot_description", urdf)) {
+    throw std::runtime_error("the parameter robot_description is not set.");
+  }
+  return parse_urdf(urdf, GeometrySource::kCollision, environment_package_finder());
+}
+
+}  // namespace
+
+class DodgeNode {
+ public:
+  DodgeNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+      : DodgeNode(nh, private_nh, read_robot(nh)) {}
+
+ private:
+  DodgeNode(ros::NodeHandle nh, ros::NodeHandle private_nh, const RobotDescription& robot)
+      : config_(read_config(private_nh)),
+        root_(robot.root_link),
+        arm_(robot, private_nh.param("joints", std::vector<std::string>())),
+        goals_(read_goals(private_nh, arm_.joints.size())),
+        q_(arm_.kinematics.joints().size(), std::numeric_limits<double>::quiet_NaN()) {
+    command_ = nh.advertise<std_msgs::Float64MultiArray>("joint_velocity_controller/command", 1);
+    state_ = private_nh.advertise<std_msgs::String>("state", 10);
+    reached_ = private_nh.advertise<std_msgs::UInt32>("goals", 1, true);
+    const auto no_delay = ros::TransportHints().tcpNoDelay();
+    joints_ = nh.subscribe("joint_states", 10, &DodgeNode::on_joints, this, no_delay);
+    proximity_ = nh.subscribe("proximity", 1, &DodgeNode::on_proximity, this, no_delay);
+    // When nothing comes any more, somebody has to say stop.
+    timer_ = nh.createWallTimer(ros::WallDuration(0.05), &DodgeNode::on_timer, this);
+  }
+
+  void on_joints(const sensor_msgs::JointState& message) {
+    if (message.name.size() != message.position.size()) return;
+    for (std::size_t i = 0; i < message.name.size(); ++i) {
+      const auto joint = arm_.kinematics.find_joint(message.name[i]);
+      if (joint) q_[*joint] = message.position[i];
+    }
+    joint_stamp_ = message.header.stamp;
+  }
+
+  void on_proximity(const ProximityArray& message) {
+    stamp_ = message.header.stamp;
+    cloud_stamp_ = message.cloud_stamp;
+    problem_ = message.status_text;
+    reading_ = Reading();
+    reading_.is_ok =
+        message.status == ProximityArray::OK || message.status == ProximityArray::DEGRADED;
+    if (message.header.frame_id != root_) {
+      reading_.is_ok = false;
+      problem_ = "~proximity is in frame '" + message.header.frame_id + "', not in '" + root_ + "'";
+    }
+    for (const ist_proximity::LinkProximity& one : message.links) {
+      const auto link = arm_.kinematics.find_link(one.link);
+      if (!link) continue;
+      LinkReading reading;
+      reading.link = *link;
+      reading.lower_bound = one.lower_bound;
+      const auto& p = one.point_on_link_local;
+      const auto& r = one.repulsion;
+      reading.p_LL = {p.x, p.y, p.z};
+      reading.away = {r.x, r.y, r.z};
+      reading_.links.push_back(reading);
+    }
+    act();
+  }
+
+  void on_timer(const ros::WallTimerEvent& /*event*/) {
+    if ((ros::Time::now() - stamp_).toSec() > 0.5 * config_.max_message_age) act();
+  }
+
+  void act() {
+    const ros::Time now = ros::Time::now();
+    reading_.message_age = stamp_.isZero() ? std::numeric_limits<double>::infinity()
+                                           : (now - std::min(stamp_, joint_stamp_)).toSec();
+    reading_.cloud_age = (now - cloud_stamp_).toSec();
+    if (has_reached(arm_, q_, goals_[goal_], config_)) {
+      goal_ = (goal_ + 1) % goals_.size();
+      ++count_.data;
+      reached_.publish(count_);
+    }
+    const Eigen::VectorXd dq = dodge(arm_, q_, goals_[goal_], reading_, config_);
+    std_msgs::Float64MultiArray command;
+    command.data.assign(dq.data(), dq.data() + dq.size());
+    command_.publish(command);
+
+    std_msgs::String state;
+    if (is_known(reading_, config_)) {
+      state.data = "moving";
+    } else if (reading_.message_age > config_.max_message_age) {
+      state.data = "stopped: no message of late";
+    } else {
+      state.data = "stopped: " + (problem_.empty() ? "the cloud is too old" : problem_);
+    }
+    state_.publish(state);
+  }
+
+  DodgeConfig config_;
+  std::string root_;
+  ControlledArm arm_;
+  std::vector<Eigen::VectorXd> goals_;
+  std::size_t goal_ = 0;
+  std::vector<double> q_;  // by joint of the kinematics
+  Reading reading_;
+  std::string problem_;
+  ros::Time stamp_, joint_stamp_, cloud_stamp_;
+  std_msgs::UInt32 count_;
+  ros::Publisher command_, state_, reached_;
+  ros::Subscriber joints_, proximity_;
+  ros::WallTimer timer_;
+};
+
+}  // namespace ist::example
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "dodge");
+  try {
+    const ist::example::DodgeNode node(ros::NodeHandle(), ros::NodeHandle("~"));
+    ros::spin();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM("dodge_node cannot start:\n" << error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,148 @@
+#include "self_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "scene.h"
+
+namespace ist::sim {
+namespace {
+
+constexpr double kNear = 0.05;  // [m]
+constexpr double kBallRadius = 0.05;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Sums of two sines each, in no simple ratio.
+const double kMean[] = {0.0, 0.35, 1.1, 0.0, 0.1, 0.0};
+const double kAmplitude[2][6] = {{0.6, 0.25, 0.3, 0.7, 0.4, 0.9}, {0.2, 0.15, 0.2, 0.3, 0.3, 0.4}};
+const double kRate[2][6] = {{0.83, 0.71, 0.97, 0.61, 1.13, 0.53}, {1.9, 1.7, 1.6, 1.3, 2.1, 1.1}};
+
+Eigen::VectorXd positions(double t) {
+  Eigen::VectorXd q(6);
+  for (int j = 0; j < 6; ++j) {
+    q[j] = kMean[j];
+    for (int k = 0; k < 2; ++k) q[j] += kAmplitude[k][j] * std::sin(kRate[k][j] * t);
+  }
+  return q;
+}
+
+struct Trial {
+  Ingest ingest;
+  ProximityQuery query;
+  CloudSnapshot cloud;
+  SelfViewResult result;
+  std::vector<LinkProximity> answers;
+
+  Trial(const std::shared_ptr<const RobotModel>& model, const IngestConfig& config)
+      : ingest(config), query(model, {}) {
+    cloud.stamp = kNan;
+    result.padding = config.self_filter_padding;
+    result.smallest_distance = std::numeric_limits<double>::infinity();
+  }
+};
+
+double smallest(const std::vector<LinkProximity>& answers) {
+  double distance = std::numeric_limits<double>::infinity();
+  for (const LinkProximity& link : answers) {
+    if (link.state != LinkState::kUnknown) distance = std::min(distance, link.distance);
+  }
+  return distance;
+}
+
+// Points that are not the ball's are the robot's own: nothing else is there.
+std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, double stamp,
+                             double noise) {
+  std::uint64_t count = 0;
+  for (const PointTile& tile : index.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      const Eigen::Vector3d p = index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]);
+      const bool is_ball = ball != nullptr &&
+                           (p - ball->pose(stamp).translation()).norm() < kBallRadius + 6.0 * noise;
+      count += is_ball ? 0 : 1;
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
+                                          const std::shared_ptr<const RobotModel>& model,
+                                          const SelfViewConfig& config) {
+  DepthCameraConfig camera = demo_cameras()[0];
+  camera.noise = config.noise;
+  camera.flying_pixels = config.flying_pixels;
+  camera.latency = config.latency;
+  camera.period = config.camera_period;
+
+  const Arm model_arm(robot, demo_arm());
+  std::vector<Obstacle> obstacles;
+  if (config.ball_distance > 0.0) {
+    // Beside the forearm's tube, as seen from the camera, so that the gap is in view.
+    const auto is_forearm = [](const LinkDescription& l) { return l.name == "forearm_link"; };
+    const auto forearm = static_cast<std::size_t>(
+        std::find_if(robot.links.begin(), robot.links.end(), is_forearm) - robot.links.begin());
+    const double beside = 0.026 + config.ball_distance + kBallRadius;
+    const Eigen::Vector3d eye = camera.X_FC.translation();
+    Obstacle ball;
+    ball.name = "ball";
+    ball.shape = Sphere{kBallRadius};
+    ball.path = [model_arm, forearm, beside, eye](double t) -> Eigen::Vector3d {
+      const Eigen::Isometry3d X_FL = model_arm.link_poses(positions(t))[forearm];
+      const Eigen::Vector3d p = X_FL * Eigen::Vector3d(0.0, 0.0, 0.170);
+      const Eigen::Vector3d side = X_FL.linear().col(2).cross(p - eye).normalized();
+      return p + beside * (side.z() < 0.0 ? -side : side);
+    };
+    obstacles.push_back(ball);
+  }
+  const Obstacle* ball = obstacles.empty() ? nullptr : obstacles.data();
+
+  Simulation world(robot, demo_arm(), obstacles, {camera}, config.seed);
+  world.arm().reset(positions(0.0));
+  std::vector<Trial> trials;
+  for (const double padding : config.paddings) {
+    IngestConfig ingest;
+    ingest.self_filter_padding = padding;
+    trials.emplace_back(model, ingest);
+  }
+  const std::vector<bool> known(robot.links.size(), true);
+  const auto steps = static_cast<int>(config.duration / Simulation::kStep);
+  for (int step = 0; step < steps; ++step) {
+    const double t = world.time();
+    world.step((positions(t + Simulation::kStep) - world.arm().positions()) / Simulation::kStep);
+    for (const Picture& picture : world.take_pictures()) {
+      const PosedRobot posed{model.get(), world.link_poses(picture.stamp), known};
+      for (Trial& trial : trials) {
+        trial.ingest.run(picture.raw(), camera.X_FC, posed, picture.stamp, &trial.cloud);
+        trial.result.pictures += 1;
+        trial.result.on_robot += trial.cloud.counts.on_robot;
+        trial.result.phantoms +=
+            count_phantoms(trial.cloud.index, ball, picture.stamp, config.noise);
+      }
+    }
+    if (step % config.query_period != 0 || std::isnan(trials[0].cloud.stamp)) continue;
+    const bool is_near = ball != nullptr && world.nearest(kNear).distance < kNear;
+    const double then = is_near ? world.nearest_then(1.0, trials[0].cloud.stamp).distance : kNan;
+    const std::vector<Eigen::Isometry3d> X_FL = world.link_poses();
+    for (Trial& trial : trials) {
+      trial.query.run(X_FL, known, {&trial.cloud}, &trial.answers);
+      SelfViewResult& result = trial.result;
+      const double distance = smallest(trial.answers);
+      result.answers += 1;
+      result.contacts += distance < 0.0 ? 1 : 0;
+      result.smallest_distance = std::min(result.smallest_distance, distance);
+      if (!is_near) continue;
+      result.near += 1;
+      result.largest_excess = std::max(result.largest_excess, distance - then);
+    }
+  }
+  std::vector<SelfViewResult> results;
+  results.reserve(trials.size());
+  for (const Trial& trial : trials) results.push_back(trial.result);
+  return results;
+}
+
+}  // namespace ist::sim

@@ -1,0 +1,77 @@
+// The robot dodges, and does not see itself: simulator, ingest, query, repulsion and the example
+// controller together. benchmark/closed_loop.cpp and benchmark/self_view.cpp have it at length.
+
+#include "closed_loop.h"
+
+#include <gtest/gtest.h>
+
+#include "self_view.h"
+#include "support/demo_arm.h"
+#include "support/sanitizers.h"
+
+namespace ist::sim {
+namespace {
+
+// One obstacle each, that hits an arm that does not see it.
+TEST(ClosedLoop, TheArmDodges) {
+  const RobotDescription robot = test::demo_robot();
+  ClosedLoopConfig config;
+  const auto nominal = [&](const Scene& scene) {
+    return nominal_motion(robot, scene, config.controller);
+  };
+  SceneRules rules;
+  rules.obstacles = 1;
+  rules.first_aim = 2.0;
+  int collisions = 0;
+  const std::uint64_t scenes = test::kSanitized ? 1 : 2;
+  for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
+    Scene scene = make_scene(robot, seed, rules, nominal);
+    scene.duration = scene.patience = 4.0;
+    config.avoidance = Avoidance::kNone;
+    const ClosedLoopResult blind = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+    collisions += blind.smallest_distance <= 0.0 ? 1 : 0;
+    config.avoidance = Avoidance::kBlend;
+    const ClosedLoopResult seeing = run_closed_loop(robot, test::demo_model(), scene, seed, config);
+    EXPECT_GT(seeing.smallest_distance, 0.02) << "seed " << seed << ": " << seeing.link;
+    EXPECT_LT(seeing.smallest_distance, 0.3) << "seed " << seed << ": nothing came near";
+  }
+  EXPECT_GT(collisions, 0);
+}
+
+TEST(ClosedLoop, ASceneFollowsFromItsSeed) {
+  const RobotDescription robot = test::demo_robot();
+  const auto nominal = [&](const Scene& scene) { return nominal_motion(robot, scene, {}); };
+  const Scene a = make_scene(robot, 7, {}, nominal), b = make_scene(robot, 7, {}, nominal);
+  ASSERT_EQ(a.obstacles.size(), b.obstacles.size());
+  EXPECT_EQ(a.goals, b.goals);
+  for (std::size_t i = 0; i < a.obstacles.size(); ++i) {
+    EXPECT_EQ(a.obstacles[i].from, b.obstacles[i].from);
+    EXPECT_EQ(a.obstacles[i].start, b.obstacles[i].start);
+  }
+  EXPECT_NE(a.goals, make_scene(robot, 8, {}, nominal).goals);
+}
+
+// A minute of moving in view of a camera with 5 mm of noise and 50 ms of latency.
+TEST(SelfView, NoFalseContactInAMinute) {
+  SelfViewConfig config;
+  config.duration = test::kSanitized ? 3.0 : 60.0;
+  const SelfViewResult result = run_self_view(test::demo_robot(), test::demo_model(), config).at(0);
+  EXPECT_GT(result.on_robot, test::kSanitized ? 10000U : 400000U);
+  EXPECT_EQ(result.phantoms, 0U);
+  EXPECT_EQ(result.contacts, 0);
+  EXPECT_TRUE(std::isinf(result.smallest_distance)) << result.smallest_distance;
+}
+
+// The filter that lets none of the robot's own points through still lets a ball's, 4 cm away.
+TEST(SelfView, WhatComesNearIsStillSeen) {
+  SelfViewConfig config;
+  config.duration = test::kSanitized ? 3.0 : 20.0;
+  config.ball_distance = 0.042;
+  const SelfViewResult result = run_self_view(test::demo_robot(), test::demo_model(), config).at(0);
+  EXPECT_GT(result.near, result.answers / 2);
+  EXPECT_LT(result.largest_excess, 0.03);
+  EXPECT_EQ(result.phantoms, 0U);
+}
+
+}  // namespace
+}  // namespace ist::sim
