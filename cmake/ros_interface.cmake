@@ -14,6 +14,7 @@ find_package(catkin REQUIRED COMPONENTS
   std_srvs
   tf2
   tf2_msgs
+  tf2_ros
   topic_tools
   visualization_msgs)
 
@@ -44,6 +45,7 @@ catkin_package(
     std_srvs
     tf2
     tf2_msgs
+    tf2_ros
     topic_tools
     visualization_msgs
   DEPENDS EIGEN3)

@@ -28,7 +28,7 @@ struct IngestCounts {
 /// solid boxes in a frame of its own.
 struct CloudSnapshot {
   PointIndex index;        ///< all points used
-  PointIndex coarse;       ///< the same, thinned to one point per cell of the thinning grid
+  PointIndex coarse;       ///< the same, thinned to one point per cell; empty where not asked for
   double thinning = 0.01;  ///< [m] edge of such a cell
   std::shared_ptr<const BoxIndex> boxes;                   ///< of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
