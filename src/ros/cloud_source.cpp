@@ -17,7 +17,7 @@ namespace ist {
 namespace {
 
 constexpr std::size_t kMaxWaiting = 10;
-constexpr std::chrono::milliseconds kGrace(500), kCountPeriod(500);
+constexpr std::chrono::milliseconds kGrace(500);
 const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 
 }  // namespace
@@ -174,14 +174,11 @@ void CloudSource::run() {
   }
 }
 
-/// Not in facts(): roscpp's answer can wait for the master.
 void CloudSource::count_publishers() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < next_count_) return;
-  next_count_ = now + kCountPeriod;
-  const std::uint32_t publishers = subscriber_.getNumPublishers();
+  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
+  if (!publishers) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  facts_.publishers = publishers;
+  facts_.publishers = *publishers;
 }
 
 /// Drops what belongs to another model or to the time before the clock's jump, and what has waited

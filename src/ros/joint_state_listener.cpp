@@ -17,7 +17,6 @@ namespace {
 constexpr double kMaxAhead = 1.0;     // [s] as for transforms
 constexpr double kLimitSlack = 1e-3;  // [rad, m] encoders and controllers are not that exact
 constexpr std::chrono::seconds kProblemAge(1);
-constexpr std::chrono::milliseconds kCountPeriod(500);
 
 geometry_msgs::TransformStamped to_message(const Eigen::Isometry3d& X) {
   geometry_msgs::TransformStamped message;
@@ -106,12 +105,10 @@ void JointStateListener::notice_clock_jump() {
 
 /// Not in facts(): roscpp's answer can wait for the master.
 void JointStateListener::count_publishers() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < next_count_) return;
-  next_count_ = now + kCountPeriod;
-  const std::uint32_t publishers = subscriber_.getNumPublishers();
+  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
+  if (!publishers) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  facts_.publishers = publishers;
+  facts_.publishers = *publishers;
 }
 
 void JointStateListener::drop(const std::string& problem, std::size_t count) {

@@ -18,6 +18,7 @@
 #include "ist_proximity/cloud/snapshot_channel.h"
 #include "ist_proximity/ros/measurement.h"
 #include "ist_proximity/ros/parameters.h"
+#include "ist_proximity/ros/publisher_count.h"
 #include "ist_proximity/ros/status.h"
 
 namespace ist {
@@ -133,7 +134,8 @@ class CloudSource {
   Waiting kept_;                 ///< the last map
   bool kept_is_new_ = false;     ///< it is not in use with this model yet
   ros::Time in_use_;             ///< stamp of the newest snapshot of this generation
-  std::chrono::steady_clock::time_point target_since_, next_count_;
+  std::chrono::steady_clock::time_point target_since_;
+  PublisherCount publisher_count_;
   std::atomic<bool> running_{true};
   std::thread thread_;
 };

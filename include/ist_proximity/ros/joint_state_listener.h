@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/ros/publisher_count.h"
 
 namespace ist {
 
@@ -86,7 +87,7 @@ class JointStateListener {
   std::chrono::steady_clock::time_point problem_time_;
   ros::Time last_now_;
 
-  std::chrono::steady_clock::time_point next_count_;  // the listener's thread alone
+  PublisherCount publisher_count_;  // the listener's thread alone
   std::atomic<bool> running_{true};
   std::thread thread_;
 };
