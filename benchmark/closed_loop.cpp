@@ -1,7 +1,8 @@
 // Does a robot that follows the answers dodge? 50 seeded scenes in the simulator, each without
 // avoidance, with the blended repulsion, and with the nearest pair's direction: as Markdown.
 //
-// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each]
+// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each] [--self]
+//   --self  only the blend, and whether links of the arm come near one another
 
 #include <algorithm>
 #include <atomic>
@@ -80,11 +81,13 @@ int main(int argc, char** argv) {
   std::size_t count = 50;
   int threads = 1;
   double noise = -1.0;  // [m] negative: as the cameras have it
-  bool each = false;
+  bool each = false, only_self = false;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
     if (std::strcmp(argv[i], "--each") == 0) {
       each = true;
+    } else if (std::strcmp(argv[i], "--self") == 0) {
+      only_self = true;
     } else if (std::strcmp(argv[i], "--first") == 0 && has_value) {
       first = static_cast<std::uint64_t>(std::atoll(argv[++i]));
     } else if (std::strcmp(argv[i], "--count") == 0 && has_value) {
@@ -114,8 +117,10 @@ int main(int argc, char** argv) {
       for (ist::sim::DepthCameraConfig& camera : scene.cameras) {
         if (noise >= 0.0) camera.noise = noise;
       }
+      config.check_self = only_self;
       for (std::size_t m = 0; m < 3; ++m) {
         config.avoidance = kModes[m];
+        if (only_self && config.avoidance != Avoidance::kBlend) continue;
         results[i].modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
       }
     }
@@ -125,6 +130,14 @@ int main(int argc, char** argv) {
   work();
   for (std::thread& thread : pool) thread.join();
 
+  if (only_self) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const ClosedLoopResult& r = results[i].modes[1];
+      std::printf("seed %d: obstacles %.1f mm, own links %.1f mm\n", static_cast<int>(first + i),
+                  1e3 * r.smallest_distance, 1e3 * r.smallest_self_distance);
+    }
+    return 0;
+  }
   if (each) print_each(results, first);
   print_table(results);
   return 0;
