@@ -1,26 +1,25 @@
 # What other ROS packages see of this one: its dependencies, messages and exports.
 
 find_package(catkin REQUIRED COMPONENTS
-  diagnostic_updater
+  diagnostic_msgs
+  dynamic_reconfigure
   geometry_msgs
-  message_filters
   message_generation
   nodelet
   pluginlib
   roscpp
   rosgraph_msgs
-  roslib
   sensor_msgs
   std_msgs
   std_srvs
-  tf2_eigen
+  tf2
+  tf2_msgs
   tf2_ros
-  tf2_sensor_msgs
   topic_tools
-  urdf
   visualization_msgs)
 
 add_message_files(DIRECTORY msg FILES
+  JointRepulsion.msg
   LinkProximity.msg
   ProximityArray.msg
   SourceStatus.msg)
@@ -34,9 +33,9 @@ catkin_package(
   INCLUDE_DIRS include
   LIBRARIES ist_proximity_core ist_proximity_ros
   CATKIN_DEPENDS
-    diagnostic_updater
+    diagnostic_msgs
+    dynamic_reconfigure
     geometry_msgs
-    message_filters
     message_runtime
     nodelet
     roscpp
@@ -44,6 +43,8 @@ catkin_package(
     sensor_msgs
     std_msgs
     std_srvs
+    tf2
+    tf2_msgs
     tf2_ros
     topic_tools
     visualization_msgs

@@ -5,6 +5,16 @@ add_library(ist_proximity_ros ${ros_sources})
 add_dependencies(ist_proximity_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
 target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRARIES})
 
+# The noise filter is PCL's, and off unless a parameter asks for it: without PCL all else is there.
+find_package(PCL QUIET COMPONENTS common filters)
+if(PCL_FOUND)
+  target_compile_definitions(ist_proximity_ros PRIVATE IST_PROXIMITY_WITH_PCL)
+  target_include_directories(ist_proximity_ros SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
+  target_link_libraries(ist_proximity_ros PRIVATE ${PCL_LIBRARIES})
+else()
+  message(STATUS "ist_proximity: PCL not found, no noise filter")
+endif()
+
 add_executable(proximity_node src/nodes/proximity_node.cpp)
 target_link_libraries(proximity_node PRIVATE ist_proximity_ros)
 

@@ -7,13 +7,13 @@
 #include <limits>
 #include <type_traits>
 
+#include "cloud/crop_kernel.h"
+
 namespace ist {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFarFromSensor = 1000.0;  // [m]
 constexpr std::size_t kSamples = 1024;     // points that the middle of a cloud is made of
-constexpr std::size_t kBlock = 256;        // points at a time: fits the first-level cache
 
 template <typename Bits>
 Bits swapped(Bits bits) {
@@ -37,6 +37,137 @@ Scalar read(const std::uint8_t* bytes) {
   return value;
 }
 
+const std::uint8_t* bytes_of(const RawCloud& cloud, std::size_t row, std::size_t column) {
+  return cloud.data + row * cloud.row_step + column * cloud.point_step;
+}
+
+template <typename Scalar, bool kSwap>
+Eigen::Vector3d read_point(const RawCloud& cloud, const std::uint8_t* bytes) {
+  return {static_cast<double>(read<Scalar, kSwap>(bytes + cloud.x)),
+          static_cast<double>(read<Scalar, kSwap>(bytes + cloud.y)),
+          static_cast<double>(read<Scalar, kSwap>(bytes + cloud.z))};
+}
+
+Eigen::Vector3d point_at(const RawCloud& cloud, std::size_t i) {
+  const std::uint8_t* bytes = bytes_of(cloud, i / cloud.width, i % cloud.width);
+  if (cloud.is_double) {
+    return cloud.swap_bytes ? read_point<double, true>(cloud, bytes)
+                            : read_point<double, false>(cloud, bytes);
+  }
+  return cloud.swap_bytes ? read_point<float, true>(cloud, bytes)
+                          : read_point<float, false>(cloud, bytes);
+}
+
+// Where a cloud is that does not lie about its sensor: the median, axis by axis, of some of its
+// points. In the sensor frame [m]; zero where the cloud is about its sensor.
+Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max_range_sq) {
+  std::array<std::array<double, kSamples>, 3> samples;
+  std::size_t count = 0;
+  const std::size_t n = cloud.size();
+  const std::size_t stride = (n + kSamples - 1) / kSamples;
+  for (std::size_t i = 0; i < n; i += stride) {
+    const Eigen::Vector3d p = point_at(cloud, i);
+    const double range_sq = p.squaredNorm();
+    if (!(range_sq >= min_range_sq && range_sq <= max_range_sq)) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      samples[axis][count] = p[static_cast<Eigen::Index>(axis)];
+    }
+    ++count;
+  }
+  if (count == 0) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d median;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto begin = samples[axis].begin();
+    const auto half = static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(begin, begin + half, begin + static_cast<std::ptrdiff_t>(count));
+    median[static_cast<Eigen::Index>(axis)] = samples[axis][count / 2];
+  }
+  return median.norm() > kFarFromSensor ? median : Eigen::Vector3d::Zero();
+}
+
+CropRange range_of(const CropPose& pose) {
+  CropRange range;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      range.R[3 * row + column] = pose.X_OS.linear()(row, column);
+    }
+    range.t[row] = pose.X_OS.translation()[row];
+  }
+  range.min_range_sq = pose.min_range_sq;
+  range.max_range_sq = pose.max_range_sq;
+  return range;
+}
+
+// A block as it is read: in the sensor frame [m].
+template <typename Scalar>
+struct alignas(64) SensorBlock {
+  Scalar x[kCropBlock], y[kCropBlock], z[kCropBlock];
+};
+
+// Four floats a point, as most drivers write them.
+bool is_four_floats(const RawCloud& cloud) {
+  return cloud.point_step == 4 * sizeof(float) && cloud.x == 0 && cloud.y == sizeof(float) &&
+         cloud.z == 2 * sizeof(float) &&
+         reinterpret_cast<std::uintptr_t>(cloud.data) % sizeof(float) == 0 &&
+         cloud.row_step % sizeof(float) == 0;
+}
+
+template <typename Scalar, bool kSwap>
+void load(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t first, std::size_t count,
+          SensorBlock<Scalar>* block) {
+  bytes += first * cloud.point_step;
+  for (std::size_t i = first; i < count; ++i, bytes += cloud.point_step) {
+    block->x[i] = read<Scalar, kSwap>(bytes + cloud.x);
+    block->y[i] = read<Scalar, kSwap>(bytes + cloud.y);
+    block->z[i] = read<Scalar, kSwap>(bytes + cloud.z);
+  }
+}
+
+// What fills up the last eight: nothing measured.
+template <typename Scalar>
+void fill_up(std::size_t count, SensorBlock<Scalar>* block) {
+  for (std::size_t i = count; i % 8 != 0; ++i) {
+    block->x[i] = block->y[i] = block->z[i] = std::numeric_limits<Scalar>::quiet_NaN();
+  }
+}
+
+// Not merely so large that its square is.
+template <typename Scalar>
+std::uint32_t count_infinite(const SensorBlock<Scalar>& block, std::size_t count) {
+  std::uint32_t infinite = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_nan = std::isnan(block.x[i]) || std::isnan(block.y[i]) || std::isnan(block.z[i]);
+    const bool is_infinite =
+        std::isinf(block.x[i]) || std::isinf(block.y[i]) || std::isinf(block.z[i]);
+    infinite += static_cast<std::uint32_t>(is_infinite && !is_nan);
+  }
+  return infinite;
+}
+
+template <typename Scalar, bool kSwap>
+std::size_t crop_as(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t count,
+                    const CropPose& pose, CropBlock* out, IngestCounts* counts) {
+  SensorBlock<Scalar> block;
+  std::size_t done = 0;
+  if constexpr (std::is_same_v<Scalar, float> && !kSwap) {
+    if (is_four_floats(cloud)) {
+      done = count / 16 * 16;
+      split_floats(reinterpret_cast<const float*>(bytes), done, block.x, block.y, block.z);
+    }
+  }
+  load<Scalar, kSwap>(cloud, bytes, done, count, &block);
+  fill_up(count, &block);
+  CropTally tally;
+  if constexpr (std::is_same_v<Scalar, float>) {
+    tally = crop_floats(range_of(pose), block.x, block.y, block.z, count, out);
+  } else {
+    tally = crop_doubles(range_of(pose), block.x, block.y, block.z, count, out);
+  }
+  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
+  if (tally.endless > 0) counts->infinite += count_infinite(block, count);
+  return tally.kept;
+}
+
 // One row of points where the rows follow each other without gaps, and a column is a row as well:
 // blocks are to be full.
 RawCloud flattened(RawCloud cloud) {
@@ -50,137 +181,49 @@ RawCloud flattened(RawCloud cloud) {
   return cloud;
 }
 
-template <typename Scalar, bool kSwap>
-class Cropper {
- public:
-  Cropper(const RawCloud& cloud, double min_range, double max_range)
-      : cloud_(flattened(cloud)),
-        min_range_sq_(min_range * min_range),
-        max_range_sq_(std::min(max_range, kLargestRange) * std::min(max_range, kLargestRange)) {}
-
-  // Where a cloud is that does not lie about its sensor: the median, axis by axis, of some of its
-  // points. In the sensor frame [m]; zero where the cloud is about its sensor.
-  Eigen::Vector3d middle() const {
-    std::array<std::array<double, kSamples>, 3> samples;
-    std::size_t count = 0;
-    const std::size_t n = cloud_.width * cloud_.height;
-    const std::size_t stride = (n + kSamples - 1) / kSamples;
-    for (std::size_t i = 0; i < n; i += stride) {
-      const Eigen::Vector3d p = point(i);
-      if (!in_range(p.squaredNorm())) continue;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        samples[axis][count] = p[static_cast<Eigen::Index>(axis)];
-      }
-      ++count;
-    }
-    if (count == 0) return Eigen::Vector3d::Zero();
-    Eigen::Vector3d median;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto begin = samples[axis].begin();
-      const auto half = static_cast<std::ptrdiff_t>(count / 2);
-      std::nth_element(begin, begin + half, begin + static_cast<std::ptrdiff_t>(count));
-      median[static_cast<Eigen::Index>(axis)] = samples[axis][count / 2];
-    }
-    return median.norm() > kFarFromSensor ? median : Eigen::Vector3d::Zero();
+// Writes every point and moves on only past those to keep: no branch to mispredict.
+void append(const CropBlock& block, std::size_t count, std::uint32_t first_id, CroppedCloud* out) {
+  std::size_t size = out->size;
+  for (std::size_t i = 0; i < count; ++i) {
+    out->x[size] = block.x[i];
+    out->y[size] = block.y[i];
+    out->z[size] = block.z[i];
+    out->id[size] = first_id + static_cast<std::uint32_t>(i);
+    size += static_cast<std::size_t>(block.x[i] == block.x[i]);
   }
-
-  // @param X_OS  sensor frame -> fixed frame's axes at the origin
-  void run(const Eigen::Isometry3d& X_OS, CroppedCloud* out, IngestCounts* counts) {
-    std::uint32_t id = 0;
-    for (std::size_t row = 0; row < cloud_.height; ++row) {
-      for (std::size_t column = 0; column < cloud_.width; column += kBlock) {
-        const std::size_t count = std::min(kBlock, cloud_.width - column);
-        load(cloud_.data + row * cloud_.row_step + column * cloud_.point_step, count);
-        transform(X_OS, count);
-        append(count, id, out, counts);
-        id += static_cast<std::uint32_t>(count);
-      }
-    }
-  }
-
- private:
-  Eigen::Vector3d point(std::size_t i) const {
-    const std::uint8_t* bytes =
-        cloud_.data + i / cloud_.width * cloud_.row_step + i % cloud_.width * cloud_.point_step;
-    return Eigen::Matrix<Scalar, 3, 1>(read<Scalar, kSwap>(bytes + cloud_.x),
-                                       read<Scalar, kSwap>(bytes + cloud_.y),
-                                       read<Scalar, kSwap>(bytes + cloud_.z))
-        .template cast<double>();
-  }
-
-  // False for NaN, and for what overflows. Without a branch.
-  bool in_range(double range_sq) const {
-    return static_cast<bool>(static_cast<int>(range_sq >= min_range_sq_) &
-                             static_cast<int>(range_sq <= max_range_sq_));
-  }
-
-  void load(const std::uint8_t* bytes, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i, bytes += cloud_.point_step) {
-      x_S_[i] = read<Scalar, kSwap>(bytes + cloud_.x);
-      y_S_[i] = read<Scalar, kSwap>(bytes + cloud_.y);
-      z_S_[i] = read<Scalar, kSwap>(bytes + cloud_.z);
-    }
-  }
-
-  void transform(const Eigen::Isometry3d& X_OS, std::size_t count) {
-    const Eigen::Matrix3d R = X_OS.linear();
-    const Eigen::Vector3d t = X_OS.translation();
-    for (std::size_t i = 0; i < count; ++i) {
-      const double x = x_S_[i], y = y_S_[i], z = z_S_[i];
-      range_sq_[i] = x * x + y * y + z * z;
-      x_[i] = static_cast<float>(R(0, 0) * x + R(0, 1) * y + R(0, 2) * z + t[0]);
-      y_[i] = static_cast<float>(R(1, 0) * x + R(1, 1) * y + R(1, 2) * z + t[1]);
-      z_[i] = static_cast<float>(R(2, 0) * x + R(2, 1) * y + R(2, 2) * z + t[2]);
-    }
-  }
-
-  // Writes every point and moves on only past those to keep: no branch to mispredict.
-  void append(std::size_t count, std::uint32_t first_id, CroppedCloud* out, IngestCounts* counts) {
-    std::size_t size = out->size;
-    std::uint32_t not_a_number = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      out->x[size] = x_[i];
-      out->y[size] = y_[i];
-      out->z[size] = z_[i];
-      out->id[size] = first_id + static_cast<std::uint32_t>(i);
-      const double range_sq = range_sq_[i];
-      size += static_cast<std::size_t>(in_range(range_sq));
-      not_a_number += static_cast<std::uint32_t>(range_sq != range_sq);
-      if (range_sq == kInfinity) counts->infinite += static_cast<std::uint32_t>(is_infinite(i));
-    }
-    counts->not_a_number += not_a_number;
-    out->size = size;
-  }
-
-  // Not merely so large that its square is.
-  bool is_infinite(std::size_t i) const {
-    return std::isinf(x_S_[i]) || std::isinf(y_S_[i]) || std::isinf(z_S_[i]);
-  }
-
-  const RawCloud cloud_;
-  const double min_range_sq_, max_range_sq_;  // [m^2]
-  std::array<Scalar, kBlock> x_S_, y_S_, z_S_;
-  std::array<double, kBlock> range_sq_;  // [m^2]
-  std::array<float, kBlock> x_, y_, z_;
-};
-
-template <typename Scalar, bool kSwap>
-void crop_as(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
-             double max_range, CroppedCloud* cropped, IngestCounts* counts) {
-  Cropper<Scalar, kSwap> cropper(cloud, min_range, max_range);
-  Eigen::Vector3d near_S = Eigen::Vector3d::Zero();
-  if (max_range > kFarFromSensor) near_S = cropper.middle();
-  cropped->origin = (X_FS * near_S).array().round();
-  Eigen::Isometry3d X_OS = X_FS;
-  X_OS.translation() -= cropped->origin;
-  cropper.run(X_OS, cropped, counts);
+  out->size = size;
 }
 
 }  // namespace
 
-void crop(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range, double max_range,
-          CroppedCloud* cropped, IngestCounts* counts) {
-  const std::size_t n = cloud.size();
+CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
+                   double max_range) {
+  const double largest = std::min(max_range, kLargestRange);
+  CropPose pose;
+  pose.min_range_sq = min_range * min_range;
+  pose.max_range_sq = largest * largest;
+  Eigen::Vector3d near_S = Eigen::Vector3d::Zero();
+  if (max_range > kFarFromSensor) near_S = middle_of(cloud, pose.min_range_sq, pose.max_range_sq);
+  pose.origin = (X_FS * near_S).array().round();
+  pose.X_OS = X_FS;
+  pose.X_OS.translation() -= pose.origin;
+  return pose;
+}
+
+std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
+                        std::size_t count, const CropPose& pose, CropBlock* block,
+                        IngestCounts* counts) {
+  const std::uint8_t* bytes = bytes_of(cloud, row, column);
+  if (cloud.is_double) {
+    return (cloud.swap_bytes ? crop_as<double, true> : crop_as<double, false>)(cloud, bytes, count,
+                                                                               pose, block, counts);
+  }
+  return (cloud.swap_bytes ? crop_as<float, true> : crop_as<float, false>)(cloud, bytes, count,
+                                                                           pose, block, counts);
+}
+
+void crop(const RawCloud& raw, const CropPose& pose, CroppedCloud* cropped, IngestCounts* counts) {
+  const std::size_t n = raw.size();
   if (cropped->x.size() <= n) {  // one slot to spare, for the point after the last that is kept
     cropped->x.resize(n + 1);
     cropped->y.resize(n + 1);
@@ -188,16 +231,18 @@ void crop(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range
     cropped->id.resize(n + 1);
   }
   cropped->size = 0;
-  counts->received = static_cast<std::uint32_t>(n);
-  if (cloud.is_double) {
-    (cloud.swap_bytes ? crop_as<double, true> : crop_as<double, false>)(cloud, X_FS, min_range,
-                                                                        max_range, cropped, counts);
-  } else {
-    (cloud.swap_bytes ? crop_as<float, true> : crop_as<float, false>)(cloud, X_FS, min_range,
-                                                                      max_range, cropped, counts);
+  const RawCloud cloud = flattened(raw);
+  CropBlock block;
+  std::uint32_t id = 0;
+  for (std::size_t row = 0; row < cloud.height; ++row) {
+    for (std::size_t column = 0; column < cloud.width; column += kCropBlock) {
+      const std::size_t count = std::min(kCropBlock, cloud.width - column);
+      if (crop_points(cloud, row, column, count, pose, &block, counts) > 0) {
+        append(block, count, id, cropped);
+      }
+      id += static_cast<std::uint32_t>(count);
+    }
   }
-  counts->out_of_range = counts->received - counts->not_a_number - counts->infinite -
-                         static_cast<std::uint32_t>(cropped->size);
 }
 
 }  // namespace ist

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,21 +11,17 @@
 
 namespace ist {
 
-/// The points of a cloud that are finite and in range, in the fixed frame.
-struct CroppedCloud {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [m] in the fixed frame
-  std::vector<float> x, y, z;     ///< [m] from the origin along the fixed frame's axes
-  std::vector<std::uint32_t> id;  ///< index of the point in the message
-  std::size_t size = 0;           ///< points; the vectors may be longer
-};
-
 /// No sensor sees farther; what claims to be beyond is out of range whatever the configuration.
 /// Keeps coordinates far below kFarAway.
 constexpr double kLargestRange = 1e9;  // [m]
 
-/// Reads a message's bytes once: drops what is not finite or not in range, moves the rest to the
-/// fixed frame in double, and counts `received`, `not_a_number`, `infinite` and `out_of_range`.
-///
+/// Which points of a cloud to keep, and where they go.
+struct CropPose {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [m] in the fixed frame
+  Eigen::Isometry3d X_OS;  ///< sensor frame -> the fixed frame's axes at the origin
+  double min_range_sq = 0.0, max_range_sq = 0.0;  ///< [m^2] of the points kept, bounds included
+};
+
 /// The origin, on whole metres, is the sensor's own position, unless most points are more than a
 /// kilometre from it (a cloud that comes in a map's coordinates with a sensor frame to match); then
 /// it is their middle. Either way it is subtracted before double becomes float, so that what is
@@ -32,7 +29,35 @@ constexpr double kLargestRange = 1e9;  // [m]
 /// @param cloud      checked by check_layout
 /// @param X_FS       sensor frame -> fixed frame, rigid and finite
 /// @param min_range, max_range  [m] of the points kept, bounds included
-void crop(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range, double max_range,
-          CroppedCloud* cropped, IngestCounts* counts);
+CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
+                   double max_range);
+
+/// Points that are read at a time: they fit the first-level cache.
+constexpr std::size_t kCropBlock = 256;
+
+/// Coordinates of a block [m], from the origin along the fixed frame's axes. Where `x` is NaN, the
+/// point is to be dropped; its y and z have no meaning.
+struct alignas(64) CropBlock {
+  float x[kCropBlock], y[kCropBlock], z[kCropBlock];
+};
+
+/// Reads some points of one row from the message's bytes, moves them to the fixed frame in double,
+/// and counts `not_a_number` and `infinite`.
+/// @param count  at most kCropBlock
+/// @returns how many are kept
+std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
+                        std::size_t count, const CropPose& pose, CropBlock* block,
+                        IngestCounts* counts);
+
+/// The points of a cloud that are finite and in range, in the fixed frame.
+struct CroppedCloud {
+  std::vector<float> x, y, z;     ///< [m] from the origin along the fixed frame's axes
+  std::vector<std::uint32_t> id;  ///< index of the point in the message
+  std::size_t size = 0;           ///< points; the vectors may be longer
+};
+
+/// Reads a message's bytes once: drops what is not finite or not in range, and counts
+/// `not_a_number` and `infinite`.
+void crop(const RawCloud& cloud, const CropPose& pose, CroppedCloud* cropped, IngestCounts* counts);
 
 }  // namespace ist

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "cloud/crop.h"
+#include "cloud/image_tiles.h"
 #include "cloud/point_index_builder.h"
 #include "cloud/self_filter.h"
 #include "cloud/thinning.h"
@@ -58,23 +59,39 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
   }
   const IngestConfig& config = impl_->config;
-  CroppedCloud& points = impl_->cropped;
-  IngestCounts counts;
-  crop(cloud, X_FS, config.min_range, config.max_range, &points, &counts);
+  const CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
 
   PointFilter on_robot;
   if (config.self_filter && robot.model != nullptr) {
-    impl_->self_filter.pose(robot, points.origin, config.self_filter_padding);
-    for (const PosedRobot& later : also) impl_->self_filter.add(later, points.origin);
+    impl_->self_filter.pose(robot, pose.origin, config.self_filter_padding);
+    for (const PosedRobot& later : also) impl_->self_filter.add(later, pose.origin);
     on_robot = [filter = &impl_->self_filter](const PointTile& tile, const PaddedBox& box) {
       return filter->on_robot(tile, box);
     };
   }
-  impl_->builder.build(points.origin, points.x.data(), points.y.data(), points.z.data(),
-                       points.id.data(), points.size, on_robot, &snapshot->index);
+  IngestCounts counts;
+  std::size_t kept = 0;
+  if (is_image(cloud, pose)) {
+    kept = index_image(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
+  } else {
+    CroppedCloud& points = impl_->cropped;
+    crop(cloud, pose, &points, &counts);
+    kept = points.size;
+    impl_->builder.build(pose.origin, points.x.data(), points.y.data(), points.z.data(),
+                         points.id.data(), kept, on_robot, &snapshot->index);
+  }
+  counts.received = static_cast<std::uint32_t>(cloud.size());
+  counts.out_of_range =
+      counts.received - counts.not_a_number - counts.infinite - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
-  counts.on_robot = static_cast<std::uint32_t>(points.size) - counts.used;
-  impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
+  counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
+  snapshot->thinning = config.thinning;
+  if (config.thin) {
+    impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
+  } else {
+    impl_->builder.start(pose.origin, &snapshot->coarse);
+    impl_->builder.finish();
+  }
 
   snapshot->counts = counts;
   snapshot->stamp = stamp;

@@ -4,32 +4,18 @@
 #include <cmath>
 #include <limits>
 
+#include "cloud/tile_box.h"
+
 namespace ist {
 namespace {
 
 constexpr auto kWidth = static_cast<std::uint32_t>(kPointWidth);
-
-// A run is cut at its longest leap if the diagonals of the two parts add up to less than this share
-// of the whole's. Four by four points of a plane, halved, come to 1.6; a leap to 0.3. Measured on
-// depth images and lidar scans, 0.6 to 0.8 is best: fewer cuts leave long tiles, more leave tiles
-// half empty.
-constexpr float kCutBelow = 0.7F;
-
-// Sixteen numbers side by side; Eigen turns them into SIMD.
-using Lanes = Eigen::Array<float, kPointWidth, 1>;
-using LaneMap = Eigen::Map<const Lanes>;
 
 // The box of the slots that `mask` leaves: -inf where a slot belongs, inf where not.
 PaddedBox box_of(const PointTile& tile, const Lanes& mask) {
   const LaneMap x(tile.x), y(tile.y), z(tile.z);
   return {{x.max(mask).minCoeff(), y.max(mask).minCoeff(), z.max(mask).minCoeff(), 0.0F},
           {x.min(-mask).maxCoeff(), y.min(-mask).maxCoeff(), z.min(-mask).maxCoeff(), 0.0F}};
-}
-
-PaddedBox box_of(const PointTile& tile) {
-  const LaneMap x(tile.x), y(tile.y), z(tile.z);
-  return {{x.minCoeff(), y.minCoeff(), z.minCoeff(), 0.0F},
-          {x.maxCoeff(), y.maxCoeff(), z.maxCoeff(), 0.0F}};
 }
 
 // The mask of the first `count` slots; negated, of the others.
@@ -40,16 +26,6 @@ Lanes mask_of_first(std::int32_t count) {
                                                     kOut, kOut, kOut, kOut, kOut, kOut, kOut, kOut,
                                                     kOut, kOut, kOut, kOut, kOut, kOut, kOut, kOut};
   return LaneMap(kMasks + kPointWidth - count);
-}
-
-// Slots from `count` on become the one before: they add nothing to the box, and no step.
-void repeat_last(std::uint32_t count, PointTile* tile) {
-  for (std::uint32_t k = count; k < kWidth; ++k) {
-    tile->x[k] = tile->x[count - 1];
-    tile->y[k] = tile->y[count - 1];
-    tile->z[k] = tile->z[count - 1];
-  }
-  tile->count = static_cast<std::int32_t>(count);
 }
 
 // Where the second part begins when points are parted at the longest step between neighbours.
@@ -81,8 +57,9 @@ PaddedBox cut(PointTile* tile) {
     const std::int32_t front = longest_leap(*tile);
     const Lanes mask = mask_of_first(front);
     const PaddedBox front_box = box_of(*tile, mask), back_box = box_of(*tile, -mask);
-    if (!(front_box.diagonal() + back_box.diagonal() < kCutBelow * box.diagonal())) break;
-    repeat_last(static_cast<std::uint32_t>(front), tile);
+    if (!is_worth_a_cut(front_box, back_box, box)) break;
+    tile->count = front;
+    repeat_last(tile);
     box = front_box;
   }
   return box;
@@ -100,7 +77,7 @@ void remove(std::uint32_t dropped, PointTile* tile) {
     ++kept;
   }
   tile->count = static_cast<std::int32_t>(kept);
-  if (kept > 0) repeat_last(kept, tile);
+  if (kept > 0) repeat_last(tile);
 }
 
 void put_unused_far_away(PointTile* tile) {
@@ -112,21 +89,58 @@ void put_unused_far_away(PointTile* tile) {
 
 }  // namespace
 
-void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, const float* y,
-                              const float* z, const std::uint32_t* id, std::size_t n,
-                              const PointFilter& drop, PointIndex* index) {
-  morton_.sort(x, y, z, n, &order_);
+void PointIndexBuilder::start(const Eigen::Vector3d& origin, PointIndex* index) {
+  index_ = index;
+  used_ = 0;
   index->generation_ = next_generation();
   index->origin_ = origin;
   index->size_ = 0;
   boxes_.clear();
   items_.clear();
-  // Tiles of the last time are overwritten in place, which saves clearing them first.
-  std::vector<PointTile>& tiles = index->tiles_;
-  std::size_t used = 0;
+}
+
+PointTile& PointIndexBuilder::next() {
+  std::vector<PointTile>& tiles = index_->tiles_;
+  if (used_ == tiles.size()) tiles.emplace_back();
+  return tiles[used_];
+}
+
+void PointIndexBuilder::keep(const PaddedBox& all, const PointFilter& drop) {
+  PointTile& tile = index_->tiles_[used_];
+  PaddedBox box = all;
+  if (drop) {
+    const std::uint32_t dropped = drop(tile, box);
+    if (dropped != 0) {
+      remove(dropped, &tile);
+      if (tile.count == 0) return;
+      box = box_of(tile);
+    }
+  }
+  put_unused_far_away(&tile);
+  index_->size_ += static_cast<std::size_t>(tile.count);
+  items_.push_back({(box.min + box.max).head<3>(), static_cast<std::int32_t>(used_)});
+  boxes_.push_back(box);
+  ++used_;
+}
+
+void PointIndexBuilder::finish() {
+  index_->tiles_.resize(used_);
+  arrange(&items_);
+  write_nodes(items_, boxes_, &index_->nodes_);
+  index_->root_ = static_cast<std::int32_t>(index_->nodes_.size()) - 1;
+  index_->bounds_.setEmpty();
+  if (index_->root_ < 0) return;
+  const PaddedBox box = box_of(index_->nodes_.back());
+  index_->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
+}
+
+void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, const float* y,
+                              const float* z, const std::uint32_t* id, std::size_t n,
+                              const PointFilter& drop, PointIndex* index) {
+  morton_.sort(x, y, z, n, &order_);
+  start(origin, index);
   for (std::size_t first = 0; first < n;) {
-    if (used == tiles.size()) tiles.emplace_back();
-    PointTile& tile = tiles[used];
+    PointTile& tile = next();
     const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kWidth, n - first));
     for (std::uint32_t k = 0; k < count; ++k) {
       const std::uint32_t point = order_[first + k];
@@ -135,31 +149,13 @@ void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, con
       tile.z[k] = z[point];
       tile.id[k] = id[point];
     }
-    repeat_last(count, &tile);
-    PaddedBox box = cut(&tile);
+    tile.count = static_cast<std::int32_t>(count);
+    repeat_last(&tile);
+    const PaddedBox box = cut(&tile);
     first += static_cast<std::size_t>(tile.count);
-    if (drop) {
-      const std::uint32_t dropped = drop(tile, box);
-      if (dropped != 0) {
-        remove(dropped, &tile);
-        if (tile.count == 0) continue;
-        box = box_of(tile);
-      }
-    }
-    put_unused_far_away(&tile);
-    index->size_ += static_cast<std::size_t>(tile.count);
-    items_.push_back({(box.min + box.max).head<3>(), static_cast<std::int32_t>(used)});
-    boxes_.push_back(box);
-    ++used;
+    keep(box, drop);
   }
-  tiles.resize(used);
-  arrange(&items_);
-  write_nodes(items_, boxes_, &index->nodes_);
-  index->root_ = static_cast<std::int32_t>(index->nodes_.size()) - 1;
-  index->bounds_.setEmpty();
-  if (index->root_ < 0) return;
-  const PaddedBox box = box_of(index->nodes_.back());
-  index->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
+  finish();
 }
 
 }  // namespace ist

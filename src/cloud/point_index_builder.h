@@ -27,17 +27,27 @@ class PointIndexBuilder {
  public:
   /// As PointIndex::build.
   /// @param drop   may be empty. Called once for each tile-to-be, before boxes are made: to filter
-  /// a
-  ///               tile at a time is much cheaper than a point at a time.
+  ///               a tile at a time is much cheaper than a point at a time.
   /// @param index  overwritten, its buffers reused
   void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
              const std::uint32_t* id, std::size_t n, const PointFilter& drop, PointIndex* index);
+
+  /// The same tile by tile, for who knows which points are neighbours: start(), then next() and
+  /// keep() for each tile, then finish(). Before finish(), the index is not to be read.
+  void start(const Eigen::Vector3d& origin, PointIndex* index);
+  /// To be filled: points, ids and count; until keep() it is the same.
+  PointTile& next();
+  /// @param box  of exactly the points in next()
+  void keep(const PaddedBox& box, const PointFilter& drop);
+  void finish();
 
  private:
   MortonOrder morton_;
   std::vector<std::uint32_t> order_;  ///< numbers of the points, in Morton order
   std::vector<PaddedBox> boxes_;      ///< by tile
   std::vector<HierarchyItem> items_;  ///< one for each tile
+  PointIndex* index_ = nullptr;       ///< in work
+  std::size_t used_ = 0;              ///< its tiles that are complete; later ones are of last time
 };
 
 }  // namespace ist

@@ -79,13 +79,14 @@ HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* 
 class Closest {
  public:
   Closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_sq,
-          ClosestPoint* result)
+          const Eigen::Vector3d& toward, ClosestPoint* result)
       : tree_(tree), p_(p), best_sq_(max_sq), result_(*result) {
     const Eigen::Vector3d local = p - tree.origin;
     for (int axis = 0; axis < 3; ++axis) p_float_[axis] = static_cast<float>(local[axis]);
     // What float loses, in distance.
     rounding_ = 2e-6 * (local.norm() + tree.radius);
     Tighten();
+    Aim(toward);
   }
 
   void Run() {
@@ -122,6 +123,32 @@ class Closest {
   void Tighten() {
     const double limit = std::sqrt(best_sq_) + rounding_;
     limit_sq_ = static_cast<float>(std::min(1.00001 * limit * limit, 1e30));
+    limit_ = static_cast<float>(std::min(1.00001 * limit, 1e15));
+  }
+
+  // What is seen from p lies at least as far as it is along any direction: triangles aside of the
+  // nearest one are told by that, though their boxes reach as near.
+  void Aim(const Eigen::Vector3d& toward) {
+    for (int axis = 0; axis < 3; ++axis) toward_[axis] = static_cast<float>(toward[axis]);
+    height_ = toward_[0] * p_float_[0] + toward_[1] * p_float_[1] + toward_[2] * p_float_[2];
+  }
+
+  // Whether all triangles of a leaf are too far along that direction.
+  HWY_INLINE bool IsBeyond(const TriangleBvh::Leaf& leaf) const {
+    const TriangleTag d;
+    for (std::size_t k = 0; k < kTriangleWidth; k += hn::Lanes(d)) {
+      const auto along = [&](int row) {
+        return hn::MulAdd(
+            hn::Set(d, toward_[0]), hn::Load(d, leaf.corner[row] + k),
+            hn::MulAdd(hn::Set(d, toward_[1]), hn::Load(d, leaf.corner[row + 1] + k),
+                       hn::Mul(hn::Set(d, toward_[2]), hn::Load(d, leaf.corner[row + 2] + k))));
+      };
+      const auto highest = hn::Max(along(0), hn::Max(along(3), along(6)));
+      if (!hn::AllTrue(d, hn::Gt(hn::Sub(hn::Set(d, height_), highest), hn::Set(d, limit_)))) {
+        return false;
+      }
+    }
+    return true;
   }
 
   HWY_INLINE void BoxDistancesSq(const TriangleBvh::Boxes& boxes, float* out) const {
@@ -141,6 +168,7 @@ class Closest {
 
   // Float decides which triangles can be nearest, double which one is.
   void Visit(const TriangleBvh::Leaf& leaf) {
+    if (IsBeyond(leaf)) return;
     alignas(32) float distance_sq[kTriangleWidth];
     TriangleDistancesSq(leaf, p_float_, distance_sq);
     for (std::uint32_t k = 0; k < leaf.count; ++k) {
@@ -155,6 +183,7 @@ class Closest {
         result_.distance_sq = exact_sq;
         result_.triangle = triangle.index;
         Tighten();
+        if (exact_sq > 0.0) Aim((p_ - q) / std::sqrt(exact_sq));
       }
     }
   }
@@ -164,13 +193,15 @@ class Closest {
   float p_float_[3];
   double best_sq_;
   double rounding_;
-  float limit_sq_ = 0.0F;
+  float limit_sq_ = 0.0F, limit_ = 0.0F;
+  float toward_[3];
+  float height_;  // of p along that
   ClosestPoint& result_;
 };
 
 void FindClosest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_distance_sq,
-                 ClosestPoint* closest) {
-  Closest(tree, p, max_distance_sq, closest).Run();
+                 const Eigen::Vector3d& toward, ClosestPoint* closest) {
+  Closest(tree, p, max_distance_sq, toward, closest).Run();
 }
 
 }  // namespace HWY_NAMESPACE
@@ -183,8 +214,8 @@ namespace ist {
 HWY_EXPORT(FindClosest);
 
 void find_closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, double max_distance_sq,
-                  ClosestPoint* closest) {
-  HWY_DYNAMIC_DISPATCH(FindClosest)(tree, p_M, max_distance_sq, closest);
+                  const Eigen::Vector3d& toward_M, ClosestPoint* closest) {
+  HWY_DYNAMIC_DISPATCH(FindClosest)(tree, p_M, max_distance_sq, toward_M, closest);
 }
 
 }  // namespace ist

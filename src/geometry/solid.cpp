@@ -83,6 +83,15 @@ SignedDistance to_primitive(const Shape& shape, const Eigen::Vector3d& p) {
   return {};
 }
 
+double primitive_support(const Shape& shape, const Eigen::Vector3d& n) {
+  if (const auto* box = std::get_if<Box>(&shape)) return 0.5 * box->size.dot(n.cwiseAbs());
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
+    return cylinder->radius * std::hypot(n.x(), n.y()) + 0.5 * cylinder->length * std::abs(n.z());
+  }
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius * n.norm();
+  return -std::numeric_limits<double>::infinity();
+}
+
 std::vector<Eigen::Vector3d> face_normals(const TriangleMesh& mesh) {
   std::vector<Eigen::Vector3d> normals;
   normals.reserve(mesh.triangles.size());
@@ -106,9 +115,10 @@ Eigen::Vector3d normal_at_touch(const TriangleBvh& bvh, const Eigen::Vector3d& f
 }
 
 SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
-                       const Eigen::Vector3d& p, double max_distance, bool inside) {
+                       const Eigen::Vector3d& p, double max_distance, bool inside,
+                       const Eigen::Vector3d& toward = Eigen::Vector3d::Zero()) {
   const double bound = std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
-  const ClosestPoint closest = bvh.closest(p, bound);
+  const ClosestPoint closest = bvh.closest(p, bound, toward);
   SignedDistance result;
   if (!std::isfinite(closest.distance_sq)) return result;
   const double distance = std::sqrt(closest.distance_sq);
@@ -169,14 +179,16 @@ SignedDistance Solid::signed_distance(const Eigen::Vector3d& p_L) const {
   return best;
 }
 
-SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_distance) const {
+SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_distance,
+                                       const Eigen::Vector3d& toward_L) const {
   SignedDistance best;
   if (!(max_distance > 0.0)) return best;
   double bound = max_distance;
   for (const Element& element : elements_) {
     const Eigen::Vector3d p_E = element.X_EL * p_L;
     const SignedDistance candidate = element.bvh.size() > 0
-                                         ? to_mesh(element.bvh, element.normals, p_E, bound, false)
+                                         ? to_mesh(element.bvh, element.normals, p_E, bound, false,
+                                                   element.X_EL.linear() * toward_L)
                                          : to_primitive(element.primitive, p_E);
     if (candidate.distance < bound) {
       bound = candidate.distance;
@@ -186,6 +198,17 @@ SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_di
     }
   }
   return best;
+}
+
+double Solid::support(const Eigen::Vector3d& n_L, double slack) const {
+  double farthest = -std::numeric_limits<double>::infinity();
+  for (const Element& element : elements_) {
+    const Eigen::Vector3d n_E = element.X_EL.linear() * n_L;
+    const double reach = element.bvh.size() > 0 ? element.bvh.support(n_E, slack)
+                                                : primitive_support(element.primitive, n_E);
+    farthest = std::max(farthest, reach + n_L.dot(element.X_LE.translation()));
+  }
+  return farthest;
 }
 
 BoxDistance Solid::distance_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OL,

@@ -9,6 +9,6 @@ double sum_winding(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, fl
 
 /// Nearest point within max_distance_sq. The tree must not be empty.
 void find_closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, double max_distance_sq,
-                  ClosestPoint* closest);
+                  const Eigen::Vector3d& toward_M, ClosestPoint* closest);
 
 }  // namespace ist

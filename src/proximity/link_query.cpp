@@ -15,6 +15,12 @@ constexpr double kFloatError = 1e-6;
 // A stored point is within half a unit in the last place of the measured one, in each coordinate.
 constexpr double kPointError = 1.1e-7;
 
+// Directions this close [rad] serve as one: at 5 cm aside that makes 0.5 mm.
+constexpr double kSameAim = 0.01;
+constexpr std::uint64_t kPairsBeforeAim = 8;
+// Planes may be this much [m] too far.
+constexpr double kSupportSlack = 1e-4;
+
 float round_up(double value) {
   const auto nearest = static_cast<float>(value);
   return nearest >= value ? nearest : std::nextafter(nearest, std::numeric_limits<float>::max());
@@ -110,10 +116,11 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside) {
     const double interior = link_->tree.interior_gap();
     is_outside = link_->tree.outer_distance(p_L, interior) > interior;
   }
-  const SignedDistance exact =
-      is_outside ? link_->solid.distance_outside(
-                       p_L, std::min(nearest_.exact.distance, range() + rounding_))
-                 : link_->solid.signed_distance(p_L);
+  const double limit = std::min(nearest_.exact.distance, range() + rounding_);
+  const Eigen::Vector3d& toward =
+      nearest_.exact.distance == kInfinity ? aim_L_ : nearest_.exact.normal;
+  const SignedDistance exact = is_outside ? link_->solid.distance_outside(p_L, limit, toward)
+                                          : link_->solid.signed_distance(p_L);
   take(exact, p_L, p_O, tile, lane);
 }
 
@@ -130,7 +137,34 @@ void LinkQuery::take(const SignedDistance& exact, const Eigen::Vector3d& p_L,
   nearest_.part = boxes_ != nullptr ? Part::kBoxes : Part::kPoints;
   if (traversal_ != nullptr) {
     traversal_->threshold = std::min(traversal_->threshold, round_up(threshold() + rounding_));
+    aim_later(traversal_);
   }
+}
+
+// Planes across the way to the nearest point, moved to where the link and its parts end. If the
+// link is convex there, its plane touches the witness, and what lies beyond the nearest point's own
+// plane is farther. They belong to the link and stay from query to query; new ones cost as much as
+// some dozens of pairs, so a descent has to last, without a nearer point, before they are made.
+void LinkQuery::aim_later(Traversal* traversal) const {
+  if (!(nearest_.exact.distance > 0.0) || nearest_.exact.distance == kInfinity) return;
+  if ((nearest_.exact.normal - aim_L_).squaredNorm() <= kSameAim * kSameAim) return;
+  traversal->aim_after = traversal->node_pairs + kPairsBeforeAim;
+}
+
+void LinkQuery::on_aim(void* context) {
+  auto* self = static_cast<LinkQuery*>(context);
+  self->aim_L_ = self->nearest_.exact.normal;
+  const Eigen::Vector3f n = self->aim_L_.cast<float>();
+  const double most = self->link_->solid.support(self->aim_L_, kSupportSlack);
+  find_support(self->link_->tree, n.data(), round_up(most), self->support_.data());
+  self->set_planes(self->traversal_);
+}
+
+void LinkQuery::set_planes(Traversal* traversal) const {
+  if (aim_L_.isZero()) return;
+  const Eigen::Vector3d n_O = X_OL_.linear() * aim_L_;
+  for (int axis = 0; axis < 3; ++axis) traversal->normal[axis] = static_cast<float>(n_O[axis]);
+  traversal->offset = round_up(n_O.dot(X_OL_.translation()) + rounding_);
 }
 
 void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float /*bound*/) {
@@ -142,10 +176,12 @@ bool LinkQuery::on_expired(void* context) {
   return static_cast<LinkQuery*>(context)->deadline_->passed();
 }
 
-// Without a last answer: the inner balls find a point that is near, its exact distance is a bound.
+// Without a last answer: the inner balls find a point that is near, its exact
+// distance is a bound.
 void LinkQuery::find_first(Traversal* traversal) {
   Traversal inner = *traversal;
   inner.expired = nullptr;
+  inner.aim_after = kNever;
   descend_inner(&inner);
   if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false);
   if (inner.inner_distance < 0.0F && boxes_ != nullptr) {
@@ -195,6 +231,9 @@ Traversal LinkQuery::make_traversal() {
     }
     traversal.p_OL[row] = static_cast<float>(X_OL_.translation()[row]);
   }
+  traversal.support = support_.data();
+  set_planes(&traversal);
+  traversal.aim = &LinkQuery::on_aim;
   traversal.threshold = round_up(threshold() + rounding_);
   traversal.interior = round_up(link_->tree.interior_gap() + rounding_);
   traversal.candidate = &LinkQuery::on_candidate;
@@ -208,6 +247,7 @@ bool LinkQuery::search(Deadline* deadline) {
   Traversal traversal = make_traversal();
   traversal_ = &traversal;
   if (nearest_.exact.distance == kInfinity) find_first(&traversal);
+  aim_later(&traversal);
   descend_exact(&traversal);
   traversal_ = nullptr;
   statistics_->node_pairs += traversal.node_pairs;

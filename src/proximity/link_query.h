@@ -28,7 +28,8 @@ class Deadline {
 /// The query of one link: warm start, descent against every cloud and map, exact refinement, depth.
 class LinkQuery {
  public:
-  explicit LinkQuery(const LinkModel& link) : link_(&link) {}
+  explicit LinkQuery(const LinkModel& link)
+      : link_(&link), support_(link.tree.nodes().size() * kSphereWidth, kNowhere) {}
 
   /// Sets the pose and evaluates the last answer's point at it, if that point is still there.
   void start(const Eigen::Isometry3d& X_FL, const std::vector<const CloudSnapshot*>& clouds,
@@ -64,6 +65,9 @@ class LinkQuery {
             std::int32_t tile, int lane);
   bool search(Deadline* deadline);
   Traversal make_traversal();
+  void aim_later(Traversal* traversal) const;
+  void set_planes(Traversal* traversal) const;
+  static void on_aim(void* context);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
   void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
@@ -115,6 +119,10 @@ class LinkQuery {
   std::uint64_t last_generation_ = 0;
   std::int32_t last_tile_ = 0;
   int last_lane_ = 0;
+
+  // How far the link's parts reach toward the nearest point.
+  std::vector<float> support_;
+  Eigen::Vector3d aim_L_ = Eigen::Vector3d::Zero();  ///< direction, in the link's frame
 
   // Points or boxes evaluated in this descent: several ball leaves meet the same one.
   static constexpr std::size_t kVisitedSize = 512;

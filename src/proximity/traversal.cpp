@@ -19,6 +19,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // touch the other's memory.
 struct Pair {
   float bound;
+  std::int32_t slot;         // of the sphere in `support`
   std::int32_t sphere, box;  // child indices: >= 0 node, < 0 leaf or tile
   float x, y, z, radius;     // the sphere, posed
   float min[3], max[3];
@@ -74,6 +75,10 @@ class Descent {
       if (!(pair.bound < Limit())) {
         Drop(pair.bound);
         continue;
+      }
+      if (t_.node_pairs >= t_.aim_after) {
+        t_.aim_after = kNever;
+        t_.aim(t_.context);
       }
       if (kExact && t_.may_be_inside && t_.threshold <= t_.interior) {
         // What is left is outside and too far, or is the depth query's.
@@ -133,11 +138,27 @@ class Descent {
     stack_[at] = pair;
   }
 
+  // Bit k for a bound below the limit; the least of the others is kept, of unused slots too, which
+  // are far away.
+  template <class D, class V>
+  static HWY_INLINE std::uint32_t Below(D d, V bound, float limit, V* dropped) {
+    const auto below = hn::Lt(bound, hn::Set(d, limit));
+    *dropped = hn::Min(*dropped, hn::IfThenElse(below, *dropped, bound));
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, below, bits);
+    return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
+  }
+
   void ExpandSphere(const Pair& pair) {
     const SphereNode& node = t_.sphere_nodes[pair.sphere];
     const SphereTag d;
     Posed posed;
     Pose(t_, node.x, node.y, node.z, &posed);
+    const auto ahead = hn::Set(d, Ahead(pair));
+    const float* support = t_.support + pair.sphere * kSphereWidth;
+    const float limit = Limit();
+    std::uint32_t near = 0;
+    auto dropped = hn::Set(d, kFarAway);
     alignas(64) float bound[kSphereWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
       const auto dx =
@@ -146,17 +167,19 @@ class Descent {
           Gap(d, hn::Set(d, pair.min[1]), hn::Set(d, pair.max[1]), hn::Load(d, posed.y + k));
       const auto dz =
           Gap(d, hn::Set(d, pair.min[2]), hn::Set(d, pair.max[2]), hn::Load(d, posed.z + k));
-      hn::Store(hn::Sub(Norm(dx, dy, dz), hn::Load(d, node.radius + k)), d, bound + k);
+      const auto apart = hn::Sub(Norm(dx, dy, dz), hn::Load(d, node.radius + k));
+      const auto least = hn::Max(apart, hn::Sub(ahead, hn::Load(d, support + k)));
+      near |= Below(d, least, limit, &dropped) << k;
+      hn::Store(least, d, bound + k);
     }
+    near &= (1U << static_cast<std::uint32_t>(node.count)) - 1U;
+    Drop(hn::GetLane(hn::MinOfLanes(d, dropped)));
     Pair child = pair;
     const std::size_t begin = top_;
-    const float limit = Limit();
-    for (int k = 0; k < node.count; ++k) {
-      if (!(bound[k] < limit)) {
-        Drop(bound[k]);
-        continue;
-      }
+    for (; near != 0; near &= near - 1) {
+      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
       child.bound = bound[k];
+      child.slot = pair.sphere * kSphereWidth + k;
       child.sphere = node.child[k];
       child.x = posed.x[k];
       child.y = posed.y[k];
@@ -169,6 +192,10 @@ class Descent {
   void ExpandBox(const Pair& pair) {
     const BoxNode& node = t_.box_nodes[pair.box];
     const PointTag d;
+    const float offset = t_.offset + t_.support[pair.slot];
+    const float limit = Limit();
+    std::uint32_t near = 0;
+    auto dropped = hn::Set(d, kFarAway);
     alignas(64) float bound[kPointWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
       const auto dx =
@@ -177,16 +204,17 @@ class Descent {
           Gap(d, hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k), hn::Set(d, pair.y));
       const auto dz =
           Gap(d, hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, pair.z));
-      hn::Store(hn::Sub(Norm(dx, dy, dz), hn::Set(d, pair.radius)), d, bound + k);
+      const auto apart = hn::Sub(Norm(dx, dy, dz), hn::Set(d, pair.radius));
+      const auto least = hn::Max(apart, Ahead(node, k, offset));
+      near |= Below(d, least, limit, &dropped) << k;
+      hn::Store(least, d, bound + k);
     }
+    near &= (1U << static_cast<std::uint32_t>(node.count)) - 1U;
+    Drop(hn::GetLane(hn::MinOfLanes(d, dropped)));
     Pair child = pair;
     const std::size_t begin = top_;
-    const float limit = Limit();
-    for (int k = 0; k < node.count; ++k) {
-      if (!(bound[k] < limit)) {
-        Drop(bound[k]);
-        continue;
-      }
+    for (; near != 0; near &= near - 1) {
+      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
       child.bound = bound[k];
       child.box = node.child[k];
       child.min[0] = node.min_x[k];
@@ -197,6 +225,33 @@ class Descent {
       child.max[2] = node.max_z[k];
       Insert(begin, child);
     }
+  }
+
+  // Of a box before the plane through the link's origin.
+  HWY_INLINE float Ahead(const Pair& pair) const {
+    float ahead = -t_.offset;
+    for (int i = 0; i < 3; ++i) {
+      ahead += t_.normal[i] * (t_.normal[i] > 0.0F ? pair.min[i] : pair.max[i]);
+    }
+    return ahead;
+  }
+  // Of sixteen points, or boxes, before the plane at `offset`.
+  HWY_INLINE hn::Vec<PointTag> Ahead(const float* x, const float* y, const float* z,
+                                     float offset) const {
+    const PointTag d;
+    return hn::MulAdd(
+        hn::Set(d, t_.normal[0]), hn::Load(d, x),
+        hn::MulAdd(hn::Set(d, t_.normal[1]), hn::Load(d, y),
+                   hn::MulAdd(hn::Set(d, t_.normal[2]), hn::Load(d, z), hn::Set(d, -offset))));
+  }
+  HWY_INLINE hn::Vec<PointTag> Ahead(const PointTile& tile, std::size_t k, float offset) const {
+    return Ahead(tile.x + k, tile.y + k, tile.z + k, offset);
+  }
+  template <class Boxes>
+  HWY_INLINE hn::Vec<PointTag> Ahead(const Boxes& boxes, std::size_t k, float offset) const {
+    return Ahead((t_.normal[0] > 0.0F ? boxes.min_x : boxes.max_x) + k,
+                 (t_.normal[1] > 0.0F ? boxes.min_y : boxes.max_y) + k,
+                 (t_.normal[2] > 0.0F ? boxes.min_z : boxes.max_z) + k, offset);
   }
 
   // From sixteen points, or boxes, to a place.
@@ -232,15 +287,17 @@ class Descent {
     Posed posed;
     Pose(t_, leaf.x, leaf.y, leaf.z, &posed);
     const float* radius = kExact ? leaf.outer : leaf.inner;
+    const float offset = t_.offset + t_.support[pair.slot];
     const PointTag d;
     alignas(64) float distance[kPointWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
+      const auto ahead = Ahead(tile, k, offset);
       auto nearest = hn::Set(d, kFarAway);
       for (int b = 0; b < leaf.count; ++b) {
         const auto to_center = Distance(tile, k, posed.x[b], posed.y[b], posed.z[b]);
         nearest = hn::Min(nearest, hn::Sub(to_center, hn::Set(d, radius[b])));
       }
-      hn::Store(nearest, d, distance + k);
+      hn::Store(hn::Max(nearest, ahead), d, distance + k);
     }
     if (kExact) {
       Candidates(tile_index, tile.count, distance);
@@ -255,15 +312,23 @@ class Descent {
     }
   }
 
+  // The most promising first: it may spare the others.
   void Candidates(std::int32_t tile, int count, const float* bound) {
+    int first = 0;
+    for (int k = 1; k < count; ++k) first = bound[k] < bound[first] ? k : first;
+    Candidate(tile, first, bound[first]);
     for (int k = 0; k < count; ++k) {
-      if (bound[k] <= t_.interior) {
-        t_.may_be_inside = true;
-      } else if (bound[k] < t_.threshold) {
-        t_.candidate(t_.context, tile, k, bound[k]);
-      } else {
-        Drop(bound[k]);
-      }
+      if (k != first) Candidate(tile, k, bound[k]);
+    }
+  }
+
+  HWY_INLINE void Candidate(std::int32_t tile, int k, float bound) {
+    if (bound <= t_.interior) {
+      t_.may_be_inside = true;
+    } else if (bound < t_.threshold) {
+      t_.candidate(t_.context, tile, k, bound);
+    } else {
+      Drop(bound);
     }
   }
 
@@ -271,6 +336,34 @@ class Descent {
   std::size_t top_ = 0;
   Pair stack_[kStackSize];
 };
+
+// Nodes follow their parents. Unused slots reach nowhere: balls by their radius, children by what
+// `support` is filled with.
+void FindSupport(const InnerSphereTree& tree, const float* n, float most, float* support) {
+  const SphereTag d;
+  const auto nx = hn::Set(d, n[0]), ny = hn::Set(d, n[1]), nz = hn::Set(d, n[2]);
+  for (std::size_t i = tree.nodes().size(); i-- > 0;) {
+    const SphereNode& node = tree.nodes()[i];
+    float* here = support + i * static_cast<std::size_t>(kSphereWidth);
+    for (int k = 0; k < node.count; ++k) {
+      const std::int32_t child = node.child[k];
+      auto farthest = hn::Set(d, -kFarAway);
+      for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(d)) {
+        if (child >= 0) {
+          farthest = hn::Max(farthest, hn::Load(d, support + child * kSphereWidth + b));
+          continue;
+        }
+        const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
+        const auto along = hn::MulAdd(
+            nx, hn::Load(d, leaf.x + b),
+            hn::MulAdd(ny, hn::Load(d, leaf.y + b),
+                       hn::MulAdd(nz, hn::Load(d, leaf.z + b), hn::Load(d, leaf.outer + b))));
+        farthest = hn::Max(farthest, along);
+      }
+      here[k] = std::min(hn::GetLane(hn::MaxOfLanes(d, farthest)), most);
+    }
+  }
+}
 
 void DescendInner(Traversal* traversal) { Descent<false, false>(traversal).Run(); }
 void DescendExact(Traversal* traversal) { Descent<true, false>(traversal).Run(); }
@@ -284,10 +377,15 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
+HWY_EXPORT(FindSupport);
 HWY_EXPORT(DescendInner);
 HWY_EXPORT(DescendExact);
 HWY_EXPORT(DescendInnerBoxes);
 HWY_EXPORT(DescendExactBoxes);
+
+void find_support(const InnerSphereTree& tree, const float n[3], float most, float* support) {
+  HWY_DYNAMIC_DISPATCH(FindSupport)(tree, n, most, support);
+}
 
 void descend_inner(Traversal* traversal) {
   if (traversal->box_tiles != nullptr) {

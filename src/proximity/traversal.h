@@ -9,6 +9,8 @@
 
 namespace ist {
 
+constexpr std::uint64_t kNever = std::numeric_limits<std::uint64_t>::max();
+
 /// One descent of a link's tree against one index of points or boxes, in its own float coordinates
 /// (frame O). Everything that a query decides by comparing is here; what it decides exactly is
 /// left to `candidate`.
@@ -23,6 +25,14 @@ struct Traversal {
   float R_OL[9] = {};  ///< rotation, row-major
   float p_OL[3] = {};  ///< [m] translation
 
+  /// Every part of the link lies behind a plane across `normal`: none of its points x has
+  /// normal . x > offset + support [m]. So a point p is at least normal . p - offset - support away
+  /// from the part, which tells more than spheres do where obstacles are flat and far. May change
+  /// from `aim`. Unit vector; zero, and infinite: no planes are known.
+  float normal[3] = {};
+  float offset = std::numeric_limits<float>::infinity();
+  const float* support = nullptr;  ///< by node and child, see find_support
+
   /// [m] Pairs whose bound is not below it are dropped; may only shrink, also from `candidate`.
   float threshold = std::numeric_limits<float>::infinity();
   /// [m] A point (or part of a box) whose bound is at most this may be inside; pairs that may hold
@@ -31,6 +41,9 @@ struct Traversal {
 
   /// Called for each point whose lower bound is below the threshold (exact descent only).
   void (*candidate)(void* context, std::int32_t tile, int lane, float bound) = nullptr;
+  /// Called once when so many node pairs have been expanded: to choose `normal` anew.
+  void (*aim)(void* context) = nullptr;
+  std::uint64_t aim_after = kNever;
   /// Called every few pairs; true ends the descent.
   bool (*expired)(void* context) = nullptr;
   void* context = nullptr;
@@ -45,6 +58,16 @@ struct Traversal {
   std::int32_t inner_leaf = -1;  ///< of the ball
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
 };
+
+constexpr float kNowhere = -1e15F;  ///< [m] how far nothing reaches
+
+/// How far the parts of a link reach along a direction: for each child of each node the largest
+/// n . x of its outer balls, or `most` if that is less.
+/// @param n        unit vector in the link's frame
+/// @param most     [m] how far the link's geometry itself reaches
+/// @param support  [m] kSphereWidth for each node, overwritten where there is a child; elsewhere
+///                 it must be kNowhere or less
+void find_support(const InnerSphereTree& tree, const float n[3], float most, float* support);
 
 /// Finds the point (or box) of least inner distance: an upper bound, cheaply. Fills `inner_*`.
 void descend_inner(Traversal* traversal);

@@ -92,7 +92,8 @@ PlacedBall place(const Ball& ball, const Eigen::Isometry3d& X_OL) {
   return {c.x(), c.y(), c.z(), static_cast<float>(ball.radius)};
 }
 
-// Calls visit(index, placed ball, X_FO) for each thinned cloud and each map, and each ball.
+// Calls visit(index, ball, the same in the index's frame, R_FO) for each thinned cloud and each
+// map, and each ball.
 template <typename Visit>
 void for_each_pair(const std::vector<const CloudSnapshot*>& clouds, const std::vector<Ball>& balls,
                    const Eigen::Isometry3d& X_FL, const Visit& visit) {
@@ -102,12 +103,12 @@ void for_each_pair(const std::vector<const CloudSnapshot*>& clouds, const std::v
     if (!cloud->coarse.empty()) {
       Eigen::Isometry3d X_OL = X_FL;
       X_OL.translation() -= cloud->coarse.origin();
-      for (const Ball& ball : balls) visit(cloud->coarse, place(ball, X_OL), X_FO.linear());
+      for (const Ball& ball : balls) visit(cloud->coarse, ball, place(ball, X_OL), X_FO.linear());
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
     const Eigen::Isometry3d X_OL = X_FO.inverse() * X_FL;
-    for (const Ball& ball : balls) visit(*cloud->boxes, place(ball, X_OL), X_FO.linear());
+    for (const Ball& ball : balls) visit(*cloud->boxes, ball, place(ball, X_OL), X_FO.linear());
   }
 }
 
@@ -132,23 +133,36 @@ struct Blend {
   Eigen::Vector3d sum() const { return Eigen::Vector3f(x.sum(), y.sum(), z.sum()).cast<double>(); }
 };
 
-// Of all indices, in the fixed frame.
+// Of all indices, in the fixed frame. A pair's line of action goes through its ball's centre, and
+// so does that of the ball's sum.
 struct Total {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double weight = 0.0, undirected = 0.0;
+  Eigen::Vector3d fallback;  // direction of what has none
+  Push push;                 // times `weight`
+  double weight = 0.0;
 
-  void add(const Blend& blend, const Eigen::Matrix3d& R_FO) {
-    sum += R_FO * blend.sum();
+  // arm: from the link's origin to the ball's centre.
+  void add(const Blend& blend, const Eigen::Matrix3d& R_FO, const Eigen::Vector3d& arm) {
+    const Eigen::Vector3d sum =
+        R_FO * blend.sum() + static_cast<double>(blend.undirected.sum()) * fallback;
+    push.force += sum;
+    push.torque += arm.cross(sum);
     weight += static_cast<double>(blend.weight.sum());
-    undirected += static_cast<double>(blend.undirected.sum());
-  }
-
-  Eigen::Vector3d direction(const Eigen::Vector3d& fallback) const {
-    return weight > 0.0 ? Eigen::Vector3d((sum + undirected * fallback) / weight) : fallback;
   }
 };
 
+Push scaled(const Push& push, double factor) { return {factor * push.force, factor * push.torque}; }
+
 }  // namespace
+
+Push Push::unknown() {
+  const Eigen::Vector3d nan = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return {nan, nan};
+}
+
+double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig& config) {
+  if (proximity.state < LinkState::kNear) return 0.0;
+  return std::clamp(1.0 - proximity.distance / config.influence_distance, 0.0, 1.0);
+}
 
 Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
   coarse_.reserve(model->links.size());
@@ -157,40 +171,39 @@ Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
   }
 }
 
-Eigen::Vector3d Repulsion::operator()(std::size_t link, const Eigen::Isometry3d& X_FL,
-                                      const std::vector<const CloudSnapshot*>& clouds,
-                                      const LinkProximity& proximity,
-                                      const RepulsionConfig& config) const {
-  if (proximity.state == LinkState::kUnknown) {
-    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  }
-  if (proximity.state == LinkState::kClear) return Eigen::Vector3d::Zero();
-  const double strength =
-      std::clamp(1.0 - proximity.distance / config.influence_distance, 0.0, 1.0);
-  if (!(strength > 0.0)) return Eigen::Vector3d::Zero();
+Push Repulsion::push(std::size_t link, const Eigen::Isometry3d& X_FL,
+                     const std::vector<const CloudSnapshot*>& clouds,
+                     const LinkProximity& proximity, const RepulsionConfig& config) const {
+  if (proximity.state == LinkState::kUnknown) return Push::unknown();
+  const double strength = repulsion_strength(proximity, config);
+  if (!(strength > 0.0)) return {};
 
   const std::vector<Ball>& balls = coarse_[link];
   float nearest = std::numeric_limits<float>::infinity();
   for_each_pair(clouds, balls, X_FL,
-                [&nearest](const auto& index, const PlacedBall& ball, const auto&) {
+                [&nearest](const auto& index, const Ball&, const PlacedBall& ball, const auto&) {
                   visit_tiles(index, ball, nearest, [&nearest, &ball](const auto& tile) {
                     nearest = std::min(nearest, ToBall(tile, ball).distance.minCoeff());
                   });
                 });
-  Total total;
-  if (std::isfinite(nearest)) {
-    const auto smoothing = static_cast<float>(std::max(config.smoothing, 1e-6));
-    const float limit = nearest + smoothing;
-    for_each_pair(clouds, balls, X_FL,
-                  [&](const auto& index, const PlacedBall& ball, const auto& R_FO) {
-                    Blend blend;
-                    visit_tiles(index, ball, limit, [&](const auto& tile) {
-                      blend.add(ToBall(tile, ball), nearest, 1.0F / smoothing);
-                    });
-                    total.add(blend, R_FO);
-                  });
+  const double length = config.gain * strength;
+  if (!std::isfinite(nearest)) {
+    const Eigen::Vector3d arm = proximity.p_FL - X_FL.translation();
+    return scaled({proximity.direction, arm.cross(proximity.direction)}, length);
   }
-  return config.gain * strength * total.direction(proximity.direction);
+  Total total{proximity.direction, {}, 0.0};
+  const auto smoothing = static_cast<float>(std::max(config.smoothing, 1e-6));
+  const float limit = nearest + smoothing;
+  for_each_pair(clouds, balls, X_FL,
+                [&](const auto& index, const Ball& ball_L, const PlacedBall& ball,
+                    const Eigen::Matrix3d& R_FO) {
+                  Blend blend;
+                  visit_tiles(index, ball, limit, [&](const auto& tile) {
+                    blend.add(ToBall(tile, ball), nearest, 1.0F / smoothing);
+                  });
+                  total.add(blend, R_FO, X_FL.linear() * ball_L.center);
+                });
+  return scaled(total.push, length / total.weight);
 }
 
 }  // namespace ist

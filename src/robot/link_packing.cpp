@@ -63,6 +63,15 @@ std::vector<PackingConfig> element_configs(const LinkGeometry& geometry,
   return configs;
 }
 
+std::vector<PackingConfig> link_configs(const LinkGeometry& geometry, std::size_t attached,
+                                        const PackingConfig& config) {
+  if (attached == 0) return element_configs(geometry, config);
+  const LinkGeometry own(geometry.begin(), geometry.end() - static_cast<std::ptrdiff_t>(attached));
+  std::vector<PackingConfig> configs = element_configs(own, config);
+  configs.resize(geometry.size(), config);
+  return configs;
+}
+
 Packing combine(const LinkGeometry& geometry, const std::vector<const Packing*>& packings) {
   std::vector<Rank> order;
   Packing link;

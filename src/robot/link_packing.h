@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "ist_proximity/geometry/shapes.h"
@@ -11,6 +12,11 @@ namespace ist {
 /// is shared by surface area (a URDF sphere needs one), at least one each.
 std::vector<PackingConfig> element_configs(const LinkGeometry& geometry,
                                            const PackingConfig& config);
+
+/// As element_configs, where the last `attached` elements are attached objects: these take no
+/// spheres from their link, whose packings so stay as they are.
+std::vector<PackingConfig> link_configs(const LinkGeometry& geometry, std::size_t attached,
+                                        const PackingConfig& config);
 
 /// The packings of a link's elements as one, in the link's frame. Balls are interleaved so that
 /// every prefix packs all elements about equally coarsely; each element's largest ball comes first.

@@ -84,16 +84,6 @@ std::vector<MonitoredLink> select_links(const RobotDescription& robot,
   return links;
 }
 
-// An attached object does not take spheres from its link, whose packings so stay as they are.
-std::vector<PackingConfig> configs_of(const LinkDescription& link, const PackingConfig& config) {
-  if (link.attached == 0) return element_configs(link.geometry, config);
-  const LinkGeometry own(link.geometry.begin(),
-                         link.geometry.end() - static_cast<std::ptrdiff_t>(link.attached));
-  std::vector<PackingConfig> configs = element_configs(own, config);
-  configs.resize(link.geometry.size(), config);
-  return configs;
-}
-
 // One job per distinct shape and configuration: two equal fingers are packed once.
 std::vector<PackingJob> make_jobs(const PackingConfig& config, std::vector<MonitoredLink>* links) {
   std::vector<PackingJob> jobs;
@@ -102,7 +92,8 @@ std::vector<PackingJob> make_jobs(const PackingConfig& config, std::vector<Monit
     MonitoredLink& link = (*links)[l];
     if (!link.error.empty()) continue;
     const LinkGeometry& geometry = link.description->geometry;
-    const std::vector<PackingConfig> configs = configs_of(*link.description, config);
+    const std::vector<PackingConfig> configs =
+        link_configs(geometry, link.description->attached, config);
     for (std::size_t e = 0; e < geometry.size(); ++e) {
       const Shape& shape = geometry[e].shape;
       PackingJob job;

@@ -10,6 +10,7 @@
 #include "ist_proximity/ros/cloud_conversion.h"
 #include "ist_proximity/ros/map_measurement.h"
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/thread_name.h"
 #include "ist_proximity/ros/transforms.h"
 
 namespace ist {
@@ -35,6 +36,7 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
   facts_.noun = noun(config.type);
   facts_.timeout = config.timeout;
   facts_.required = config.required;
+  if (config.ingest.self_filter) facts_.blind_skin = config.ingest.self_filter_padding;
   nh.setCallbackQueue(&queue_);
   if (!facts_.is_file)
     subscriber_ = subscribe(config, &nh, [this](const Received& received) { receive(received); });
@@ -155,6 +157,7 @@ void CloudSource::set_problem(const std::string& problem, bool dropped) {
 }
 
 void CloudSource::run() {
+  name_thread("ist " + config_.name);
   if (!config_.file.empty()) {
     const Received received = read_map_file(config_.file, without_slash(config_.frame_id));
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -370,11 +373,11 @@ std::string CloudSource::ingest(const Measurement& waiting) {
   }
   snapshot.generation = target_.generation;
   in_use_ = stamp;
-  if (!is_map_ && filtered_.getNumSubscribers() > 0) {
-    filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
-  }
+  const bool show = !is_map_ && filtered_.getNumSubscribers() > 0;
+  if (show) filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    facts_.shown += show;
     shared_ = shared;
   }
   channel_.publish();

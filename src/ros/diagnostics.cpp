@@ -46,6 +46,61 @@ std::string number(const char* format, double value) {
 std::string milliseconds(double seconds) { return number("%.3f ms", 1e3 * seconds); }
 std::string millimetres(double metres) { return number("%.2f mm", 1e3 * metres); }
 
+/// A share of the cloud on the robot that speaks of a wrong transform or model; empty: none.
+std::string doubt_of_self_filter(const SourceFacts& source) {
+  constexpr double kNearlyAll = 0.95;
+  const IngestCounts& counts = source.counts;
+  if (!source.has_snapshot || std::isnan(source.blind_skin)) return "";
+  const std::size_t in_range =
+      counts.received - counts.not_a_number - counts.noise - counts.infinite - counts.out_of_range;
+  if (in_range == 0) return "";
+  const double share = static_cast<double>(counts.on_robot) / static_cast<double>(in_range);
+  if (share >= kNearlyAll) {
+    return number("%.1f %% of the ", 100.0 * share) + source.noun +
+           " are on the robot and filtered out: check the sensor's transform, the URDF and "
+           "self_filter_padding";
+  }
+  // A laser scanner may well never see the robot.
+  if (counts.on_robot == 0 && source.noun == "cloud") {
+    return "no point of the cloud is on the robot: if the sensor sees the robot, its transform or "
+           "the URDF is wrong; if it does not, self_filter: false says so";
+  }
+  return "";
+}
+
+// Why `penetration` is NaN in contact, where it is.
+void add_contacts(const ModelState& state, const ContactModel* contacts, bool wanted,
+                  DiagnosticStatus* status) {
+  if (!wanted) {
+    add("contact volumes", "off, ~penetration/enabled is false: penetration is NaN in contact",
+        status);
+    return;
+  }
+  if (!state.robot) return;
+  const bool is_there = contacts != nullptr && contacts->robot == state.robot;
+  std::size_t usable = 0, ready = 0;
+  for (const std::size_t i : state.monitored) {
+    if (!state.robot->links[i].usable()) continue;
+    ++usable;
+    if (!is_there || !contacts->bodies[i]) continue;
+    ++ready;
+    const ContactBody& body = *contacts->bodies[i];
+    std::string text;
+    if (body.has_volume()) {
+      text = std::to_string(body.ball_count) + number(" spheres, %.3f l", 1e3 * body.volume) +
+             number(", filled to %.0f %%", 100.0 * body.packed_volume / body.volume) +
+             (body.from_cache ? ", from the cache" : number(", packed in %.1f s", body.time));
+    }
+    if (!body.note.empty()) text += (text.empty() ? "" : "; ") + body.note;
+    add("volume of " + state.robot->links[i].name, text, status);
+  }
+  add("contact volumes",
+      ready == usable ? "ready"
+                      : std::to_string(ready) + " of " + std::to_string(usable) +
+                            " links; penetration is NaN in contact for those to come",
+      status);
+}
+
 }  // namespace
 
 void CycleTimes::add(double seconds) {
@@ -66,7 +121,7 @@ double CycleTimes::quantile(double q) const {
 }
 
 DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& source,
-                                   const Verdict& verdict, double now) {
+                                   const Verdict& verdict, double rate, double now) {
   DiagnosticStatus status = make(node, "input " + source.name);
   if (verdict.status == ProximityArray::STALE_CLOUD) {
     set(source.required ? DiagnosticStatus::STALE : DiagnosticStatus::WARN, verdict.text, &status);
@@ -75,19 +130,27 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& s
   } else if (!source.problem.empty()) {
     set(DiagnosticStatus::WARN, "the newest cloud is not in use: " + source.problem, &status);
   }
+  const std::string doubt = doubt_of_self_filter(source);
+  if (!doubt.empty()) set(DiagnosticStatus::WARN, doubt, &status);
   add("topic", source.topic, &status);
   add("required", source.required ? "true" : "false", &status);
   add("publishers", source.publishers, &status);
   add("messages received", source.messages, &status);
+  if (!source.is_file) add("rate", number("%.1f Hz", rate), &status);
   add("dropped: unusable", source.unusable, &status);
   add("dropped: out of order", source.out_of_order, &status);
   add("dropped: overtaken by a newer one", source.overtaken, &status);
+  add("shown on ~filtered_cloud", source.shown, &status);
+  if (!std::isnan(source.blind_skin)) {
+    add("blind skin about the robot", millimetres(source.blind_skin), &status);
+  }
   if (source.has_snapshot) {
     if (!source.is_file) add("age", number("%.3f s", now - source.stamp.toSec()), &status);
     add("points received", source.counts.received, &status);
     add("points used", source.counts.used, &status);
     add("points on the robot", source.counts.on_robot, &status);
     add("points out of range", source.counts.out_of_range, &status);
+    if (source.counts.noise > 0) add("points taken for noise", source.counts.noise, &status);
     add("points NaN", source.counts.not_a_number, &status);
     add("points infinite", source.counts.infinite, &status);
     add("time to ingest", milliseconds(source.ingest_time), &status);
@@ -137,12 +200,15 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   }
   add("rate", number("%.1f Hz", rate), &status);
   add(wanted, number("%.1f Hz", wanted_rate), &status);
+  add("deadlines missed", report.deadlines_missed, &status);
+  add("markers drawn", report.markers_drawn, &status);
   add("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
   add("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)), &status);
   return status;
 }
 
-DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state) {
+DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
+                                   const ContactModel* contacts, bool contacts_wanted) {
   DiagnosticStatus status = make(node, "model");
   const bool ready = state.phase == ModelState::Phase::kReady;
   if (!state.problem.empty()) {
@@ -175,6 +241,7 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
     text += link.from_cache ? ", from the cache" : number(", packed in %.1f s", link.packing_time);
     add(link.name, text, &status);
   }
+  add_contacts(state, contacts, contacts_wanted, &status);
   for (const std::string& warning : state.warnings) {
     set(DiagnosticStatus::WARN, warning, &status);
     add("warning", warning, &status);

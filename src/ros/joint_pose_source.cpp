@@ -83,11 +83,13 @@ bool JointPoseSource::ask_tf(const std::string& parent, const std::string& child
 
 void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   poses->reset(now, places_.size());
+  tf_is_behind_ = false;
+  X_FL_.assign(kinematics_->links().size(), Eigen::Isometry3d::Identity());
+  known_.assign(X_FL_.size(), false);
   if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
 
   const ros::Time instant = read_positions(now);
   kinematics_->place_joints(q_, &joints_);
-  tf_is_behind_ = false;
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].has_unstated_pose()) continue;
@@ -116,6 +118,13 @@ void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
       poses->problems[i] = joint_problems_[joints[joint].source];
     }
   }
+}
+
+void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                                  std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
+  if (tf_is_behind_) return behind_.look_up_all(kinematics, instant, X_FL, known);
+  *X_FL = X_FL_;
+  *known = known_;
 }
 
 }  // namespace ist

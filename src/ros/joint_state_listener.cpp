@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 namespace {
@@ -41,6 +42,7 @@ JointStateListener::JointStateListener(tf2::BufferCore* buffer, ros::NodeHandle 
   subscriber_ = nh.subscribe("joint_states", 100, &JointStateListener::receive, this,
                              ros::TransportHints().tcpNoDelay());
   thread_ = std::thread([this] {
+    name_thread("ist joints");
     while (running_) {
       queue_.callAvailable(ros::WallDuration(0.05));
       count_publishers();

@@ -3,10 +3,12 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <boost/function.hpp>
+#include <chrono>
 #include <limits>
 
 #include "ist_proximity/ros/cloud_conversion.h"
 #include "ist_proximity/ros/map_measurement.h"
+#include "ist_proximity/ros/noise_filter.h"
 #include "ist_proximity/ros/scan_measurement.h"
 
 namespace ist {
@@ -17,23 +19,34 @@ constexpr std::uint32_t kQueue = 2;
 
 class CloudMeasurement : public Measurement {
  public:
-  CloudMeasurement(const sensor_msgs::PointCloud2ConstPtr& message, const RawCloud& raw)
-      : Measurement(message->header), message_(message), raw_(raw) {}
+  /// @param noise  null: none
+  CloudMeasurement(const sensor_msgs::PointCloud2ConstPtr& message, const RawCloud& raw,
+                   std::shared_ptr<NoiseFilter> noise)
+      : Measurement(message->header), message_(message), raw_(raw), noise_(std::move(noise)) {}
 
   void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
-    ingest->run(raw_, placement.X_FS, placement.robot, header().stamp.toSec(), snapshot);
+    const auto begin = std::chrono::steady_clock::now();
+    std::uint32_t dropped = 0;
+    const RawCloud cloud = noise_ ? noise_->run(raw_, ingest->config().max_range, &dropped) : raw_;
+    const std::chrono::duration<double> filtering = std::chrono::steady_clock::now() - begin;
+    ingest->run(cloud, placement.X_FS, placement.robot, header().stamp.toSec(), snapshot);
+    snapshot->counts.noise = dropped;
+    snapshot->counts.not_a_number -= dropped;
+    snapshot->ingest_time += filtering.count();
   }
 
  private:
   sensor_msgs::PointCloud2ConstPtr message_;
   RawCloud raw_;  ///< views the message
+  std::shared_ptr<NoiseFilter> noise_;
 };
 
-Received read_cloud(const sensor_msgs::PointCloud2ConstPtr& message) {
+Received read_cloud(const sensor_msgs::PointCloud2ConstPtr& message,
+                    const std::shared_ptr<NoiseFilter>& noise) {
   RawCloud raw;
   const std::string fault = view_cloud(*message, &raw);
   if (!fault.empty()) return {message->header, "malformed cloud: " + fault, nullptr};
-  return {message->header, "", std::make_shared<CloudMeasurement>(message, raw)};
+  return {message->header, "", std::make_shared<CloudMeasurement>(message, raw, noise)};
 }
 
 template <typename Message, typename Read>
@@ -70,7 +83,12 @@ ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh,
         config, nh, receive,
         [](const topic_tools::ShapeShifter::ConstPtr& message) { return read_map(*message); });
   }
-  return subscribe_as<sensor_msgs::PointCloud2>(config, nh, receive, read_cloud);
+  const std::shared_ptr<NoiseFilter> noise =
+      config.noise.radius > 0.0 ? std::make_shared<NoiseFilter>(config.noise) : nullptr;
+  return subscribe_as<sensor_msgs::PointCloud2>(
+      config, nh, receive, [noise](const sensor_msgs::PointCloud2ConstPtr& message) {
+        return read_cloud(message, noise);
+      });
 }
 
 }  // namespace ist

@@ -1,6 +1,7 @@
 #include "ist_proximity/ros/message_conversion.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "ist_proximity/ros/ros_time.h"
@@ -20,19 +21,28 @@ void assign(const Eigen::Vector3d& v, Message* message) {
   message->z = v.z();
 }
 
-void assign(const Eigen::Vector3d& v, geometry_msgs::Wrench* wrench) {
-  assign(v, &wrench->force);
-  assign(v, &wrench->torque);
+void assign(const Wrench& from, geometry_msgs::Wrench* wrench) {
+  assign(from.force, &wrench->force);
+  assign(from.torque, &wrench->torque);
+}
+
+void assign(const ClosingRates& closing, LinkMessage* message) {
+  message->closing_speed = closing.total;
+  message->closing_speed_robot = closing.robot;
+  message->closing_speed_obstacles = closing.obstacles;
+  message->time_to_contact = closing.time_to_contact;
+  if (std::isnan(closing.robot)) message->closing_unknown |= LinkMessage::ROBOT_UNKNOWN;
+  if (std::isnan(closing.obstacles)) message->closing_unknown |= LinkMessage::OBSTACLES_UNKNOWN;
 }
 
 }  // namespace
 
 LinkMessage unknown_link(const std::string& name) {
-  return to_message(name, LinkProximity(), Eigen::Vector3d::Constant(kNaN), kNaN, "");
+  return to_message(name, LinkProximity(), Push::unknown(), Wrench::unknown(), {}, "");
 }
 
-LinkMessage to_message(const std::string& name, const LinkProximity& result,
-                       const Eigen::Vector3d& repulsion, double closing_speed,
+LinkMessage to_message(const std::string& name, const LinkProximity& result, const Push& repulsion,
+                       const Wrench& penetration, const ClosingRates& closing,
                        const std::string& source) {
   LinkMessage message;
   message.link = name;
@@ -43,12 +53,11 @@ LinkMessage to_message(const std::string& name, const LinkProximity& result,
   assign(result.p_LL, &message.point_on_link_local);
   assign(result.p_FO, &message.point_on_obstacle);
   assign(result.direction, &message.direction);
-  assign(repulsion, &message.repulsion);
-  message.closing_speed = closing_speed;
+  assign(repulsion.force, &message.repulsion);
+  assign(repulsion.torque, &message.repulsion_torque);
+  assign(penetration, &message.penetration);
+  assign(closing, &message);
   if (result.state >= LinkState::kNear) message.source = source;
-  // The force in contact comes from volumes, which are not computed yet: not known, so NaN.
-  const bool no_contact = result.state == LinkState::kClear || result.state == LinkState::kNear;
-  assign(Eigen::Vector3d::Constant(no_contact ? 0.0 : kNaN), &message.penetration);
   return message;
 }
 

@@ -10,6 +10,7 @@
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/ros/progress_report.h"
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 namespace {
@@ -115,6 +116,7 @@ void ModelLoader::wait() {
 }
 
 void ModelLoader::run() {
+  name_thread("ist model");
   while (!stop_) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -103,6 +103,25 @@ void ParameterReader::wrong(const std::string& name, const XmlRpcValue& value,
 }
 
 void ParameterReader::read(const std::string& name, const Range& range, double* value) {
+  const double standard = *value;
+  read_number(name, range, value);
+  tunables_.push_back({name, Tunable::Kind::kDouble, range, standard, *value});
+}
+
+void ParameterReader::read(const std::string& name, const Range& range, int* value) {
+  const double standard = *value;
+  read_whole(name, range, value);
+  tunables_.push_back({name, Tunable::Kind::kInt, range, standard, static_cast<double>(*value)});
+}
+
+void ParameterReader::read(const std::string& name, bool* value) {
+  const double standard = *value ? 1.0 : 0.0;
+  read_truth(name, value);
+  tunables_.push_back(
+      {name, Tunable::Kind::kBool, Range{"", 0.0, 1.0}, standard, *value ? 1.0 : 0.0});
+}
+
+void ParameterReader::read_number(const std::string& name, const Range& range, double* value) {
   const XmlRpcValue* found = ask(name);
   if (!found) return;
   double number_found;
@@ -121,7 +140,7 @@ void ParameterReader::read(const std::string& name, const Range& range, double* 
   *value = number_found;
 }
 
-void ParameterReader::read(const std::string& name, const Range& range, int* value) {
+void ParameterReader::read_whole(const std::string& name, const Range& range, int* value) {
   const XmlRpcValue* found = ask(name);
   if (!found) return;
   // A whole number is one however it was written: 20000, 20000.0 or 2e4.
@@ -136,7 +155,7 @@ void ParameterReader::read(const std::string& name, const Range& range, int* val
   *value = static_cast<int>(as_double);
 }
 
-void ParameterReader::read(const std::string& name, bool* value) {
+void ParameterReader::read_truth(const std::string& name, bool* value) {
   const XmlRpcValue* found = ask(name);
   if (!found) return;
   if (found->getType() != XmlRpcValue::TypeBoolean) {

@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "ist_proximity/packing/packing_cache.h"
-#include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
 namespace {
@@ -33,6 +32,16 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
          << " m: it must be more than min_range, which is " << ingest->min_range << " m";
     reader->add_error(text.str());
     ingest->max_range = default_max_range;
+  }
+}
+
+void read_noise(ParameterReader* reader, const std::string& prefix, NoiseFilterConfig* noise) {
+  reader->read(prefix + "noise_filter/radius", from_zero("m", 1.0), &noise->radius);
+  reader->read(prefix + "noise_filter/neighbors", Range{"", 1.0, 1000.0}, &noise->neighbors);
+  if (noise->radius > 0.0 && !has_noise_filter()) {
+    reader->add_error("~" + prefix +
+                      "noise_filter/radius is set, but this build has no noise filter: it was made "
+                      "without PCL (libpcl-dev)");
   }
 }
 
@@ -78,6 +87,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
     read_map(reader, prefix, source);
   } else {
     read_ingest(reader, prefix, &source->ingest);
+    if (source->type == SourceType::kCloud) read_noise(reader, prefix, &source->noise);
   }
   reader->read(prefix + "topic", &source->topic);
   if (source->topic.empty()) {
@@ -94,6 +104,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   SourceConfig single;
   reader->read("cloud_timeout", more_than_zero("s", kInf, true), &single.timeout);
   read_ingest(reader, "", &single.ingest);
+  read_noise(reader, "", &single.noise);
   if (!reader->has("sources")) return {single};
 
   std::vector<SourceConfig> sources;
@@ -116,6 +127,7 @@ bool read_repulsion(ParameterReader* reader, double max_distance, RepulsionConfi
                &repulsion->influence_distance);
   reader->read("repulsion/gain", from_zero("", 1e6), &repulsion->gain);
   reader->read("repulsion/smoothing", more_than_zero("m", 10.0), &repulsion->smoothing);
+  reader->read("repulsion/filter_time", from_zero("s", 10.0), &repulsion->filter_time);
   const bool clamped = repulsion->influence_distance > max_distance;
   if (clamped) repulsion->influence_distance = max_distance;
   return clamped && reader->has("repulsion/influence_distance");
@@ -152,6 +164,19 @@ void read_query(ParameterReader* reader, QueryConfig* query) {
   reader->read("query/margin", from_zero("m", 1.0), &query->margin);
 }
 
+void read_penetration(ParameterReader* reader, PenetrationConfig* penetration) {
+  reader->read("penetration/stiffness", from_zero("N/m^3", 1e12), &penetration->stiffness);
+}
+
+void read_contacts(ParameterReader* reader, ServerConfig* config) {
+  reader->read("penetration/enabled", &config->contacts_wanted);
+  reader->read("penetration/max_error", more_than_zero("m", 1.0),
+               &config->contacts.packing.max_error);
+  reader->read("penetration/max_spheres", Range{"", 1.0, 1e5},
+               &config->contacts.packing.max_spheres);
+  read_penetration(reader, &config->penetration);
+}
+
 void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/enabled", &config->enabled);
   reader->read("self_collision/rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
@@ -165,13 +190,13 @@ std::string joined(const std::vector<std::string>& lines) {
   return text;
 }
 
-XmlRpc::XmlRpcValue fetch(const ros::NodeHandle& private_nh) {
+}  // namespace
+
+XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh) {
   XmlRpc::XmlRpcValue tree;
-  ros::param::get(private_nh.getNamespace(), tree);  // one call: a consistent view
+  ros::param::get(private_nh.getNamespace(), tree);
   return tree;
 }
-
-}  // namespace
 
 const char* message_type(SourceType type) {
   switch (type) {
@@ -209,6 +234,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
         "~repulsion/influence_distance is more than ~max_distance, where measuring "
         "ends; ~max_distance is used");
   }
+  read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
   read_self_collision(&reader, &config.self_collision);
 
@@ -222,17 +248,20 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 
 ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   std::vector<std::string> warnings;
-  ServerConfig config = parse_parameters(fetch(private_nh), &warnings);
+  ServerConfig config = parse_parameters(fetch_parameters(private_nh), &warnings);
   for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
   return config;
 }
 
-LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance) {
-  ParameterReader reader(fetch(private_nh));
+LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
+                      std::vector<Tunable>* tunables) {
+  ParameterReader reader(tree);
   LiveConfig live;
   live.query.max_distance = max_distance;
   read_query(&reader, &live.query);
   read_repulsion(&reader, max_distance, &live.repulsion);
+  read_penetration(&reader, &live.penetration);
+  if (tunables) *tunables = reader.tunables();
   if (!reader.errors().empty()) throw ParameterError(joined(reader.errors()));
   return live;
 }

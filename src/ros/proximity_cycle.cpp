@@ -73,8 +73,11 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pose_timeout_(config.pose_timeout),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
+      filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
-      results_(robot_.links.size()) {
+      joint_repulsion_(*model_),
+      results_(robot_.links.size()),
+      pushes_(robot_.links.size(), Push::unknown()) {
   situation_.model_problem = model_->problem;
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
@@ -93,18 +96,14 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
     situation_.pose_problems.push_back(report->transform_problem);
   }
 
-  // A link in tf, but whose own points are still in the cloud, would be found touching itself.
-  std::vector<bool> known = poses_.known;
-  for (const SourceSnapshot* snapshot : snapshots_) {
-    if (!snapshot || clouds_.empty() || snapshot->filtered.empty()) continue;
-    for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && snapshot->filtered[i];
-  }
+  std::vector<bool> known = measurable();
+  for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && poses_.known[i];
   situation_.deadline_passed =
       !query_.run(poses_.X_FL, known, clouds_, &results_) && !clouds_.empty();
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;
-  fill_links(config.repulsion, message);
+  fill_links(config, message);
   fill_sources(situation_, message);
   message->cloud_stamp = ros::Time();
   for (std::size_t i = 0; i < snapshots_.size(); ++i) {
@@ -123,6 +122,19 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   report->links_known = poses_.count_known();
   report->pose_age = seconds_between(poses_.stamp, now);
   report->times.add(took.count());
+  if (situation_.deadline_passed) ++report->deadlines_missed;
+}
+
+std::vector<bool> ProximityCycle::measurable() const {
+  // A link in tf, but whose own points are still in the cloud, would be found touching itself.
+  std::vector<bool> measurable = wanted_links(*model_);
+  for (const SourceSnapshot* snapshot : snapshots_) {
+    if (!snapshot || clouds_.empty() || snapshot->filtered.empty()) continue;
+    for (std::size_t i = 0; i < measurable.size(); ++i) {
+      measurable[i] = measurable[i] && snapshot->filtered[i];
+    }
+  }
+  return measurable;
 }
 
 void ProximityCycle::look_at_poses(const ros::Time& now) {
@@ -204,18 +216,48 @@ std::vector<std::string> ProximityCycle::pose_problems() const {
   return sentences;
 }
 
-void ProximityCycle::fill_links(const RepulsionConfig& repulsion, ProximityArray* message) {
+/// The usable cloud that holds the nearest point.
+ClosingSpeed::Nearest ProximityCycle::nearest_source(const LinkProximity& result) const {
+  const auto source = static_cast<std::size_t>(result.source);
+  if (result.source < 0 || source >= clouds_.size()) return {};
+  return {cloud_names_[source], obstacles_key({clouds_[source]}), clouds_[source]->stamp};
+}
+
+void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* message) {
   message->links.clear();
+  const std::uint64_t obstacles = obstacles_key(clouds_);
   for (const std::size_t i : model_->monitored) {
     const LinkProximity& result = results_[i];
-    const std::string source =
-        result.source >= 0 && static_cast<std::size_t>(result.source) < cloud_names_.size()
-            ? cloud_names_[static_cast<std::size_t>(result.source)]
-            : std::string();
+    const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
+    const ClosingSpeed::Nearest nearest = nearest_source(result);
+    pushes_[i] = filters_[i].update(message->header.stamp.toSec(), obstacles,
+                                    repulsion_.push(i, X_FL, clouds_, result, config.repulsion),
+                                    result, config.repulsion);
     message->links.push_back(to_message(
-        robot_.links[i].name, result, repulsion_(i, poses_.X_FL[i], clouds_, result, repulsion),
-        speeds_[i].update(message->header.stamp, result.distance), source));
+        robot_.links[i].name, result, pushes_[i], penetration(i, config),
+        speeds_[i].update(message->header.stamp, result, X_FL, nearest), nearest.source));
   }
+}
+
+/// Not known in contact until the link's disjoint packing is there.
+Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) const {
+  const LinkProximity& result = results_[link];
+  const ContactBody* body = find_body(config.contacts.get(), robot_, link);
+  ContactVolume volume;
+  const bool is_known = result.state == LinkState::kContact && body != nullptr;
+  if (is_known) volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], clouds_);
+  return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
+                            config.penetration);
+}
+
+void ProximityCycle::forget() {
+  speeds_.assign(speeds_.size(), ClosingSpeed());
+  filters_.assign(filters_.size(), RepulsionFilter());
+}
+
+void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
+                                          ist_proximity::JointRepulsion* message) {
+  joint_repulsion_.fill(pose_source_.get(), pushes_, proximity, message);
 }
 
 void say_no_model(const ModelState& model, const std::string& fixed_frame, const ros::Time& now,

@@ -10,6 +10,7 @@
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/object_conversion.h"
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 namespace {
@@ -40,8 +41,9 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       buffer_(ros::Duration(10.0)),
       listener_(&buffer_, nh_),
       loader_(config, nh),
-      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)),
-      live_{config.query, config.repulsion} {
+      live_(private_nh, config),
+      contact_loader_(config, loader_),
+      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
   advertise();
   for (const SourceConfig& source : config_.sources) {
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
@@ -55,13 +57,11 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
       state_signal_.notify_one();
     });
   }
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, [this] {
-    const std::lock_guard<std::mutex> lock(shared_mutex_);
-    return live_;
-  });
+  const auto live = [this] { return live_config(); };
+  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live);
   if (config_.self_collision.enabled) {
-    self_proximity_ =
-        std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_, joint_states_.get());
+    self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
+                                                      joint_states_.get(), live);
   }
   cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
   diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
@@ -84,6 +84,7 @@ ProximityServer::~ProximityServer() {
 
 void ProximityServer::advertise() {
   proximity_ = private_nh_.advertise<ProximityArray>("proximity", 10);
+  joint_repulsion_ = private_nh_.advertise<ist_proximity::JointRepulsion>("joint_repulsion", 10);
   min_distance_ = private_nh_.advertise<std_msgs::Float64>("min_distance", 10);
   markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
   spheres_ = private_nh_.advertise<visualization_msgs::MarkerArray>("spheres", 1, true);
@@ -115,6 +116,7 @@ bool ProximityServer::wait_for_joint_states() {
 }
 
 void ProximityServer::run_cycles() {
+  name_thread("ist cycle");
   if (joint_states_) {
     do {
       run_cycle();
@@ -131,6 +133,12 @@ void ProximityServer::run_cycles() {
   } while (sleep_until(next));
 }
 
+LiveConfig ProximityServer::live_config() const {
+  LiveConfig live = live_.get();
+  live.contacts = contact_loader_.contacts();
+  return live;
+}
+
 void ProximityServer::run_cycle() {
   const ros::Time now = ros::Time::now();
   notice_clock_jump(now);
@@ -138,11 +146,12 @@ void ProximityServer::run_cycle() {
   publish_spheres_again();
   const auto message = boost::make_shared<ProximityArray>();
   const std::string transform_problem = listener_.problem();
+  const LiveConfig live = live_config();
   {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, live_, message.get(), &report_);
+      cycle_->run(now, sources_, live, message.get(), &report_);
     } else {
       say_no_model(*model_, config_.fixed_frame, now, sources_, message.get(), &report_);
     }
@@ -197,13 +206,27 @@ void ProximityServer::take_model() {
 
 void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& message) {
   proximity_.publish(message);
+  publish_joint_repulsion(*message);
   std_msgs::Float64 smallest;
   smallest.data = min_distance(*message);
   min_distance_.publish(smallest);
   if (markers_.getNumSubscribers() > 0 && Clock::now() >= next_markers_) {
     next_markers_ = Clock::now() + kMarkerPeriod;
     markers_.publish(marker_drawer_.draw(*message));
+    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    ++report_.markers_drawn;
   }
+}
+
+/// The Jacobians are worth computing only while somebody listens.
+void ProximityServer::publish_joint_repulsion(const ProximityArray& proximity) {
+  if (joint_repulsion_.getNumSubscribers() == 0) return;
+  ist_proximity::JointRepulsion message;
+  message.header.stamp = proximity.header.stamp;
+  message.status = proximity.status;
+  message.status_text = proximity.status_text;
+  if (cycle_) cycle_->fill_joint_repulsion(proximity, &message);
+  joint_repulsion_.publish(message);
 }
 
 void ProximityServer::publish_spheres() {
@@ -215,11 +238,13 @@ void ProximityServer::publish_spheres() {
 }
 
 void ProximityServer::run_diagnostics() {
+  name_thread("ist diagnostics");
   std::size_t cycles_before = 0;
   std::uint64_t states_before = 0;
+  std::vector<std::uint64_t> messages_before;
   Clock::time_point before = Clock::now();
   while (sleep_until(before + std::chrono::seconds(1))) {
-    read_live_again();
+    live_.read_again();
     CycleReport report;
     {
       const std::lock_guard<std::mutex> lock(shared_mutex_);
@@ -240,24 +265,20 @@ void ProximityServer::run_diagnostics() {
 
     diagnostic_msgs::DiagnosticArray message;
     message.header.stamp = ros::Time::now();
+    messages_before.resize(report.sources.size());
     for (std::size_t i = 0; i < report.sources.size(); ++i) {
-      message.status.push_back(input_diagnostics(name_, report.sources[i], report.verdicts[i],
+      const SourceFacts& source = report.sources[i];
+      const auto come = static_cast<double>(source.messages - messages_before[i]);
+      messages_before[i] = source.messages;
+      message.status.push_back(input_diagnostics(name_, source, report.verdicts[i],
+                                                 come / interval.count(),
                                                  message.header.stamp.toSec()));
     }
     message.status.push_back(pose_diagnostics(name_, report));
     message.status.push_back(query_diagnostics(name_, report, rate, wanted_rate));
-    message.status.push_back(model_diagnostics(name_, *loader_.state()));
+    message.status.push_back(model_diagnostics(
+        name_, *loader_.state(), contact_loader_.contacts().get(), config_.contacts_wanted));
     diagnostics_.publish(message);
-  }
-}
-
-void ProximityServer::read_live_again() {
-  try {
-    const LiveConfig live = read_live(private_nh_, config_.query.max_distance);
-    const std::lock_guard<std::mutex> lock(shared_mutex_);
-    live_ = live;
-  } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "the last valid ~query and ~repulsion go on: " << error.what());
   }
 }
 

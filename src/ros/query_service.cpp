@@ -1,11 +1,37 @@
 #include "ist_proximity/ros/query_service.h"
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
+#include <limits>
+
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 
 using ist_proximity::ProximityArray;
+
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// Empty, or what is wrong with the times of a motion.
+std::string check_times(const std::vector<double>& times, std::size_t states) {
+  if (times.empty()) return "";
+  if (times.size() != states || states < 2) {
+    return std::to_string(times.size()) + " times and " + std::to_string(states) +
+           " states: a motion needs one time per state, and two states";
+  }
+  for (std::size_t i = 0; i < states; ++i) {
+    if (!std::isfinite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) {
+      return "times[" + std::to_string(i) + "] is " + std::to_string(times[i]) +
+             ": times have to be finite and to rise";
+    }
+  }
+  return "";
+}
+
+}  // namespace
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
                            const CloudSources& sources, const tf2::BufferCore& buffer,
@@ -14,6 +40,7 @@ QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& confi
   private_nh.setCallbackQueue(&queue_);
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_ = std::thread([this] {
+    name_thread("ist query");
     while (running_) queue_.callAvailable(ros::WallDuration(0.05));
   });
 }
@@ -39,6 +66,8 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   }
   if (!response.success) {
     response.results.clear();
+    response.impact_links.clear();
+    response.impact_times.clear();
     return true;
   }
   const auto bad =
@@ -70,6 +99,7 @@ std::string QueryService::take_model() {
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
                                             ProximityCycle::Reader::kOther);
+  impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }
 
@@ -90,16 +120,19 @@ std::string QueryService::choose_links(const std::vector<std::string>& links) {
 }
 
 std::string QueryService::run(const Service::Request& request, Service::Response* response) {
-  std::string problem = take_model();
+  std::string problem = check_times(request.times, request.states.size());
+  if (problem.empty()) problem = take_model();
   if (problem.empty()) problem = choose_links(request.links);
   if (!problem.empty()) return problem;
 
   LiveConfig live = live_();
   live.query.deadline = 0.0;
   CycleReport ignored;
+  std::vector<std::vector<double>> positions;
   for (std::size_t i = 0; i < request.states.size(); ++i) {
     problem = poses_->state(request.states[i]);
     if (!problem.empty()) return "states[" + std::to_string(i) + "]: " + problem;
+    positions.push_back(poses_->positions());
     response->results.emplace_back();
     ProximityArray& result = response->results.back();
     cycle_->forget();  // one configuration after the other is no motion
@@ -108,6 +141,49 @@ std::string QueryService::run(const Service::Request& request, Service::Response
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
     if (!running_) return "the node ends";
+  }
+  if (request.times.empty()) return "";
+  impacts_->set_config(live.query);
+  return find_impacts(request, positions, response);
+}
+
+/// Against the obstacles of the last result, straight from state to state.
+std::string QueryService::find_impacts(const Service::Request& request,
+                                       const std::vector<std::vector<double>>& positions,
+                                       Service::Response* response) {
+  const auto& joints = model_->kinematics->joints();
+  std::vector<bool> wanted = cycle_->measurable();
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const std::size_t link = model_->monitored[i];
+    wanted[link] = wanted[link] && chosen_[i];
+  }
+  std::vector<double> first;
+  for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
+  std::vector<ImpactTime> impacts;
+  for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
+    const JointMotion motion{positions[k], positions[k + 1],
+                             request.times[k + 1] - request.times[k]};
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j].is_free() || std::isnan(motion.from[j]) == std::isnan(motion.to[j])) continue;
+      return "joint '" + joints[j].name + "' is stated in one of states[" + std::to_string(k) +
+             "] and states[" + std::to_string(k + 1) + "] only: a motion has to state it in all";
+    }
+    impacts_->run(motion, poses_->joints(), poses_->root(), wanted, cycle_->clouds(), &impacts);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      if (std::isfinite(impacts[i].time)) {
+        first[i] = request.times[k] + impacts[i].time;
+        wanted[i] = false;  // the first contact is what is asked for
+      } else if (std::isnan(impacts[i].time) && first[i] == kInf) {
+        first[i] = impacts[i].time;
+        wanted[i] = false;
+      }
+    }
+    if (!running_) return "the node ends";
+  }
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    if (!chosen_[i]) continue;
+    response->impact_links.push_back(model_->links[i]);
+    response->impact_times.push_back(first[model_->monitored[i]]);
   }
   return "";
 }

@@ -11,6 +11,7 @@
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/proximity_cycle.h"
 #include "ist_proximity/ros/status.h"
+#include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
 
@@ -19,8 +20,8 @@ using Clock = std::chrono::steady_clock;
 
 SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
                              const ServerConfig& config, const tf2::BufferCore& buffer,
-                             JointStateListener* joints)
-    : config_(config), nh_(nh), buffer_(buffer), joints_(joints) {
+                             JointStateListener* joints, std::function<LiveConfig()> live)
+    : config_(config), nh_(nh), buffer_(buffer), joints_(joints), live_(std::move(live)) {
   publisher_ = private_nh.advertise<ProximityArray>("self_proximity", 10);
   thread_ = std::thread(&SelfProximity::run, this);
 }
@@ -40,6 +41,7 @@ void SelfProximity::set_model(std::shared_ptr<const ModelState> model) {
 }
 
 void SelfProximity::run() {
+  name_thread("ist self");
   const auto period = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(1.0 / config_.self_collision.rate));
   Clock::time_point next = Clock::now();
@@ -136,6 +138,38 @@ LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const
   return answer;
 }
 
+void SelfProximity::find_wrenches(const LiveConfig& live) {
+  const RobotModel& robot = *model_->robot;
+  wrenches_.assign(results_.size(), Wrench::zero());
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    if (results_[i].state != LinkState::kContact) continue;
+    const LinkPair& pair = query_->pairs()[i];
+    const ContactBody* first = find_body(live.contacts.get(), robot, pair.first);
+    const ContactBody* second = find_body(live.contacts.get(), robot, pair.second);
+    const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
+    wrenches_[i] = first == nullptr || second == nullptr
+                       ? Wrench::unknown()
+                       : contact_wrench(contact_volume(*first, *second,
+                                                       X_FA.inverse() * poses_.X_FL[pair.second]),
+                                        X_FA, live.penetration);
+  }
+}
+
+/// Of all links that touch this one.
+Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer) const {
+  if (answer.state == LinkState::kUnknown) return Wrench::unknown();
+  Wrench all = Wrench::zero();
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    const LinkPair& pair = query_->pairs()[i];
+    if (pair.first == link) all += wrenches_[i];
+    if (pair.second != link) continue;
+    const Eigen::Vector3d p_SecondFirst =
+        poses_.X_FL[pair.first].translation() - poses_.X_FL[pair.second].translation();
+    all += reaction(wrenches_[i], p_SecondFirst);
+  }
+  return all;
+}
+
 void SelfProximity::run_once() {
   const ros::Time now = ros::Time::now();
   if (now < last_now_) speeds_.assign(speeds_.size(), ClosingSpeed());
@@ -151,8 +185,8 @@ void SelfProximity::run_once() {
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
     query_->run(poses_.X_FL, poses_.known, &results_);
+    find_wrenches(live_());
     message->header.stamp = poses_.stamp;
-    const Eigen::Vector3d no_repulsion = Eigen::Vector3d::Constant(std::nan(""));
     for (const std::size_t i : model_->monitored) {
       const LinkModel& link = model_->robot->links[i];
       if (!link.usable()) situation.link_errors.push_back(link.error);
@@ -162,9 +196,12 @@ void SelfProximity::run_once() {
       }
       std::size_t other = i;
       const LinkProximity answer = nearest(i, &other);
-      message->links.push_back(to_message(link.name, answer, no_repulsion,
-                                          speeds_[i].update(poses_.stamp, answer.distance),
-                                          model_->robot->links[other].name));
+      const std::string& name = model_->robot->links[other].name;
+      ClosingRates closing =
+          speeds_[i].update(poses_.stamp, answer, poses_.X_FL[i], {name, 0, 0.0});
+      closing.robot = ClosingRates::kNaN;  // both links move: it has no parts
+      message->links.push_back(
+          to_message(link.name, answer, Push::unknown(), penetration(i, answer), closing, name));
     }
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();

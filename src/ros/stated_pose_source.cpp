@@ -50,10 +50,11 @@ std::string StatedPoseSource::hint() const {
 
 void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   poses->reset(now, places_.size());
+  X_FL_.assign(kinematics_->links().size(), Eigen::Isometry3d::Identity());
+  known_.assign(X_FL_.size(), false);
   if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
-  Eigen::Isometry3d X_FR;
   const std::string problem =
-      look_up_newest(buffer_, fixed_frame_, kinematics_->links()[0], now, timeout_, &X_FR);
+      look_up_newest(buffer_, fixed_frame_, kinematics_->links()[0], now, timeout_, &X_FR_);
   if (!problem.empty()) return poses->blame(wanted_, problem);
 
   kinematics_->place_joints(q_, &joints_);
@@ -69,20 +70,24 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
       joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
     }
   }
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
-  kinematics_->place_links(joints_, X_FR, &X_FL, &known);
+  kinematics_->place_links(joints_, X_FR_, &X_FL_, &known_);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (!wanted_[i]) continue;
-    if (places_[i] == X_FL.size()) {
+    if (places_[i] == X_FL_.size()) {
       poses->problems[i] = "it is not in the URDF";
-    } else if (known[places_[i]]) {
-      poses->X_FL[i] = X_FL[places_[i]];
+    } else if (known_[places_[i]]) {
+      poses->X_FL[i] = X_FL_[places_[i]];
       poses->known[i] = true;
     } else {
       poses->problems[i] = joint_problems[*kinematics_->first_unknown(joints_, places_[i])];
     }
   }
+}
+
+void StatedPoseSource::look_up_all(const Kinematics& /*kinematics*/, const ros::Time& /*instant*/,
+                                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
+  *X_FL = X_FL_;
+  *known = known_;
 }
 
 }  // namespace ist

@@ -52,6 +52,16 @@ void TfPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   }
 }
 
+void TfPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                               std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
+  const auto& links = kinematics.links();
+  X_FL->resize(links.size());
+  known->resize(links.size());
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    (*known)[i] = ist::look_up(buffer_, fixed_frame_, links[i], instant, &(*X_FL)[i]).empty();
+  }
+}
+
 std::string TfPoseSource::hint() const {
   return "is robot_state_publisher running, with joint states coming in?";
 }

@@ -7,6 +7,7 @@
 #include <exception>
 
 #include "ist_proximity/ros/ros_time.h"
+#include "ist_proximity/ros/thread_name.h"
 #include "ist_proximity/ros/transforms.h"
 
 namespace ist {
@@ -32,6 +33,7 @@ TransformListener::TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh
   moving_ = nh.subscribe<tf2_msgs::TFMessage>("/tf", 100, receive_moving, {}, hints);
   static_ = nh.subscribe<tf2_msgs::TFMessage>("/tf_static", 100, receive_static, {}, hints);
   thread_ = std::thread([this] {
+    name_thread("ist tf");
     while (running_) queue_.callAvailable(ros::WallDuration(0.05));
   });
 }

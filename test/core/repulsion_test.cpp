@@ -155,6 +155,40 @@ TEST(Repulsion, agreesWithTheFormula) {
   }
 }
 
+// Each pair's force acts at its own witness on the ball's surface.
+TEST(Repulsion, torqueIsThatOfAllPairs) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-0.4, 0.4);
+  const std::vector<Ball> balls = bar();
+  const Repulsion repulsion(robot_of(balls));
+  RepulsionConfig config;
+  config.influence_distance = 1.0;
+  config.gain = 2.0;
+  for (int trial = 0; trial < 20; ++trial) {
+    std::vector<Vector3d> points;
+    for (int i = 0; i < 300; ++i) points.emplace_back(u(random), u(random), u(random));
+    const CloudSnapshot cloud = cloud_of(points, {1.0, 0.0, -2.0});
+    Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
+    X_FL.rotate(Eigen::AngleAxisd(5.0 * u(random), Vector3d(1, 2, 3).normalized()));
+    const double nearest = expected(balls, X_FL, points, config.smoothing).nearest;
+    Vector3d torque = Vector3d::Zero();
+    double weights = 0.0;
+    for (const Ball& b : balls) {
+      for (const Vector3d& p : points) {
+        const Vector3d n = (X_FL * b.center - p).normalized();
+        const Vector3d witness = X_FL * b.center - b.radius * n;
+        const double root = 1.0 - (n.dot(witness - p) - nearest) / config.smoothing;
+        if (root <= 0.0) continue;
+        torque += root * root * (witness - X_FL.translation()).cross(n);
+        weights += root * root;
+      }
+    }
+    const Push push = repulsion.push(0, X_FL, {&cloud}, near_by(nearest), config);
+    const double length = config.gain * std::min(1.0, 1.0 - nearest);
+    ASSERT_LT((push.torque - length * torque / weights).norm(), 1e-4) << trial;
+  }
+}
+
 // A bar slides between two walls, and past a third. The direction of the nearest pair jumps by 94
 // degrees in one step of 0.12 mm where two walls are equally near, and the vector with it by 0.79;
 // blended it moves by 0.005 at most.

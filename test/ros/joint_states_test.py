@@ -44,6 +44,20 @@ def arm_poses(turn, slide):
     }
 
 
+def arm_jacobians(turn, slide):
+    """Of the links' origins in base, by link; columns turn, slide."""
+    out = np.array([np.cos(turn), np.sin(turn), 0.0])  # the way that the slide goes
+    left = np.array([-np.sin(turn), np.cos(turn), 0.0])
+
+    def jacobian(reach, factor):
+        J = np.zeros((6, 2))
+        J[:3, 0], J[5, 0] = reach * left, 1.0
+        J[:3, 1] = factor * out
+        return J
+
+    return {"ball_link": jacobian(slide, 1.0), "box_link": jacobian(-1.5 * slide - 0.5, -1.5)}
+
+
 def motion(t):
     """Positions at a time [s]."""
     return {"turn": np.sin(0.7 * t), "slide": 0.4 + 0.2 * np.sin(t)}
@@ -197,6 +211,49 @@ class JointStatesTest(unittest.TestCase):
             self.assertEqual(message.sources[0].points_on_robot, 2)
             speeds.append(pt.link(message, "ball_link").closing_speed)
         self.assertGreater(np.isfinite(speeds).mean(), 0.8)
+
+    def test_joint_repulsion(self):
+        """Efforts of moving joints, a mimic among them; what is not known is NaN, with a reason."""
+        node = self.start(max_distance=2.0)
+        node.wait_for_status(ProximityArray.NO_CLOUD)
+        publisher = self.world.cloud_publisher
+        points = np.array([[0.75, 0.1, 0.5], [-1.2, 0.1, 0.5], [-1.3, 0.05, 0.9]])
+        self.world.repeat(20, lambda: publisher.publish(pt.cloud(points, "base")))
+        joints = self.world.repeat(100, lambda: self.send("turn", "slide"))
+        node.wait_for_status(ProximityArray.OK)
+        check = pt.check_joint_repulsion(self, node, lambda t: arm_jacobians(**motion(t)))
+        self.assertEqual(check.joints, ["turn", "slide"])
+
+        # Links that are not known leave nothing to say of the joints that move them.
+        received = []
+        node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
+        joints.stop()
+        node.wait_until(lambda: received and np.isnan(received[-1].effort).all(), "NaN efforts")
+        self.assertEqual(received[-1].status, ProximityArray.NO_POSE)
+        self.assertNotEqual(received[-1].status_text, "")
+
+    def test_joint_repulsion_from_tf(self):
+        """The same from link poses alone; a joint whose axis tf does not tell is NaN."""
+        node = self.start(max_distance=2.0, pose_source="tf")
+        still = {"turn": 0.3, "slide": 0.5}
+        X = arm_poses(**still)
+        points = np.array([[0.75, 0.1, 0.5], [-1.2, 0.1, 0.5], [-1.3, 0.05, 0.9]])
+        publisher = self.world.cloud_publisher
+        self.world.repeat(20, lambda: publisher.publish(pt.cloud(points, "base")))
+        for name in ("ball_link", "box_link"):
+            self.world.poses[name] = ("base", X[name])
+        self.world.start_tf()
+        node.wait_for_status(ProximityArray.OK)
+        received = []
+        node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
+        node.wait_until(lambda: received and received[-1].status != ProximityArray.OK, "a reason")
+        self.assertEqual(received[-1].status, ProximityArray.NO_POSE)
+        self.assertIn("where link 'column' is is not known", received[-1].status_text)
+        self.assertTrue(np.isnan(received[-1].effort).all())
+
+        self.world.poses["column"] = ("base", pt.transform((0, 0, 0.5), angle=still["turn"]))
+        node.wait_until(lambda: received[-1].status == ProximityArray.OK, "the column")
+        pt.check_joint_repulsion(self, node, lambda t: arm_jacobians(**still))
 
     def test_floating(self):
         """A floating joint's pose comes from tf, and is said to be missing where it is not there."""

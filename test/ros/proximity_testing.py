@@ -21,7 +21,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
-from ist_proximity.msg import LinkProximity, ProximityArray
+from ist_proximity.msg import JointRepulsion, LinkProximity, ProximityArray
 
 TIMEOUT = 30.0  # [s] for anything to happen
 
@@ -337,6 +337,44 @@ def vector(v):
     return np.array([v.x, v.y, v.z])
 
 
+def closing_rates(one):
+    """The parts of the closing speed and what they lead to."""
+    return np.array([one.closing_speed_robot, one.closing_speed_obstacles, one.time_to_contact])
+
+
+def check_joint_repulsion(test, node, jacobians, count=20):
+    """~joint_repulsion against J^T of what ~proximity says at the same stamp.
+
+    jacobians(stamp): by link the 6 x n Jacobian of its origin, columns as the message's joints.
+    """
+    received, largest = {}, [0.0]
+    subscriber = node.subscribe(
+        "joint_repulsion", JointRepulsion, lambda m: received.setdefault(m.header.stamp, m)
+    )
+    begin, checked = len(node.messages), set()
+
+    def check_new():
+        for message in list(node.messages[begin:]):
+            stamp = message.header.stamp
+            efforts = received.get(stamp)
+            if efforts is None or stamp in checked or message.status != ProximityArray.OK:
+                continue
+            J = jacobians(stamp.to_sec())
+            expected = sum(
+                J[one.link].T @ np.hstack([vector(one.repulsion), vector(one.repulsion_torque)])
+                for one in message.links
+            )
+            test.assertEqual(efforts.status, ProximityArray.OK, efforts.status_text)
+            np.testing.assert_allclose(efforts.effort, expected, atol=1e-6)
+            largest[0] = max(largest[0], abs(expected).max())
+            checked.add(stamp)
+        return len(checked) >= count and largest[0] > 0.05
+
+    node.wait_until(check_new, "%d efforts with the poses of a ~proximity" % count)
+    subscriber.unregister()
+    return received[max(received)]
+
+
 def states(message):
     return [one.state for one in message.links]
 
@@ -352,27 +390,33 @@ def check_invariants(test, message, max_distance=1.0):
         direction, local = vector(one.direction), vector(one.point_on_link_local)
         wrench = np.hstack([vector(one.penetration.force), vector(one.penetration.torque)])
         repulsion = vector(one.repulsion)
+        torque, rates = vector(one.repulsion_torque), closing_rates(one)
+        test.assertEqual(bool(one.closing_unknown & one.ROBOT_UNKNOWN), np.isnan(rates[0]))
+        test.assertEqual(bool(one.closing_unknown & one.OBSTACLES_UNKNOWN), np.isnan(rates[1]))
+        if np.isfinite(rates[:2]).all():
+            test.assertAlmostEqual(one.closing_speed, sum(rates[:2]), 9)
+        test.assertFalse(one.time_to_contact < 0)
         if one.state == LinkProximity.UNKNOWN:
             test.assertTrue(np.isnan(one.distance))
             test.assertEqual(one.lower_bound, -np.inf)
             test.assertTrue(np.isnan(one.closing_speed))
-            for v in (p_link, p_obstacle, direction, local, repulsion, wrench):
+            for v in (p_link, p_obstacle, direction, local, repulsion, torque, wrench, rates):
                 test.assertTrue(np.isnan(v).all(), one)
             test.assertEqual(one.source, "")
         elif one.state == LinkProximity.CLEAR:
             test.assertEqual(one.distance, np.inf)
             test.assertGreaterEqual(one.lower_bound, max_distance)
             test.assertTrue(np.isnan(one.closing_speed))
-            for v in (p_link, p_obstacle, direction, local):
+            for v in (p_link, p_obstacle, direction, local, rates):
                 test.assertTrue(np.isnan(v).all(), one)
-            test.assertFalse(repulsion.any() or wrench.any(), one)
+            test.assertFalse(repulsion.any() or torque.any() or wrench.any(), one)
             test.assertEqual(one.source, "")
         else:
             test.assertTrue(np.isfinite(one.distance))
             test.assertLessEqual(one.lower_bound, one.distance)
             test.assertAlmostEqual(np.linalg.norm(direction), 1.0, 6)
             np.testing.assert_allclose(p_link - p_obstacle, one.distance * direction, atol=1e-6)
-            test.assertTrue(np.isfinite(repulsion).all())
+            test.assertTrue(np.isfinite(repulsion).all() and np.isfinite(torque).all())
             test.assertNotEqual(one.source, "")
             if one.state == LinkProximity.NEAR:
                 test.assertGreaterEqual(one.distance, 0.0)

@@ -112,11 +112,59 @@ class QueryTest(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertIn("'ball' is not monitored", answer.message)
 
+    def check_motion(self):
+        """Times of impact along straight motions: at that time, and not before, a link is touched."""
+        states = [{"turn": 0.3, "slide": 0.5}, {"turn": 2.5, "slide": 0.9}, {"turn": 0.0, "slide": 0.2}]
+        times = [1.0, 3.0, 6.0]
+
+        def at(t):
+            q = {name: np.interp(t, times, [q[name] for q in states]) for name in NOW}
+            return arm_poses(**q)
+
+        answer = self.ask(*states, times=times)
+        self.assertTrue(answer.success)
+        self.assertEqual(answer.message, "")
+        self.assertEqual(len(answer.results), 3)
+        self.assertEqual(answer.impact_links, ["ball_link", "box_link"])
+        for name, impact in zip(answer.impact_links, answer.impact_times):
+            samples = np.arange(1.0, 6.0, 0.002)
+            every = np.array(
+                [
+                    pt.DISTANCE[name](pt.apply(pt.inverse(at(t)[name]), self.points)).min()
+                    for t in samples
+                ]
+            )
+            self.assertTrue((every <= 0).any(), "a motion that touches something")
+            first = samples[np.argmax(every <= 0)]
+            self.assertLessEqual(impact, first)
+            self.assertGreater(impact, first - 0.007)
+        answer = self.ask(*states, times=times, links=["box_link"])
+        self.assertEqual(answer.impact_links, ["box_link"])
+        # Nothing moves: in contact, or never.
+        answer = self.ask(states[0], states[0], times=[5.0, 6.0])
+        for name, impact in zip(answer.impact_links, answer.impact_times):
+            every = pt.DISTANCE[name](pt.apply(pt.inverse(at(1.0)[name]), self.points))
+            self.assertEqual(impact, 5.0 if every.min() <= 0 else np.inf)
+
+        for times, words in (
+            ([1.0], "1 times and 2 states"),
+            ([1.0, 1.0], "times[1] is 1.000000: times have to be finite and to rise"),
+            ([np.nan, 1.0], "times[0] is nan"),
+        ):
+            answer = self.ask(NOW, NOW, times=times)
+            self.assertFalse(answer.success)
+            self.assertIn(words, answer.message)
+            self.assertEqual(len(answer.impact_times), 0)
+        answer = self.ask(NOW, {"turn": 1.0}, times=[0.0, 1.0])
+        self.assertFalse(answer.success)
+        self.assertIn("joint 'slide' is stated in one of states[0] and states[1]", answer.message)
+
     def test_tf(self):
         self.start()
         self.tf()
         self.node.wait_for_status(ProximityArray.OK)
         self.check_all()
+        self.check_motion()
 
         # A planner's batch does not hold up the cycle.
         begin, start = len(self.node.messages), time.monotonic()
@@ -135,6 +183,8 @@ class QueryTest(unittest.TestCase):
         self.assertEqual(answer.results[0].status, ProximityArray.STALE_CLOUD)
         self.assertTrue(pt.all_unknown(answer.results[0]))
         self.assertIn("results[0]: source 'cloud'", answer.message)
+        answer = self.ask(NOW, {"turn": 1.0, "slide": 0.5}, times=[0.0, 1.0])
+        self.assertTrue(np.isnan(answer.impact_times).all())
 
     def test_joint_states(self):
         self.start(pose_source="joint_states")

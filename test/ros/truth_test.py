@@ -212,8 +212,46 @@ class TruthTest(unittest.TestCase):
             checked += 1
             sign = 1 if t % turn < turn / 2 else -1
             self.assertAlmostEqual(one.closing_speed, sign * speed, delta=0.01)
+            self.assertAlmostEqual(one.closing_speed_robot, sign * speed, delta=0.01)
+            if not one.closing_unknown & LinkProximity.OBSTACLES_UNKNOWN:
+                self.assertAlmostEqual(one.closing_speed_obstacles, 0.0, delta=0.01)
+            if sign < 0:
+                self.assertEqual(one.time_to_contact, np.inf)
+            else:
+                self.assertAlmostEqual(
+                    one.time_to_contact, max(one.lower_bound, 0) / one.closing_speed, 6
+                )
         # CLEAR, although it is the same cloud.
         self.assertEqual(pt.link(message, "box_link").state, LinkProximity.CLEAR)
+
+    def test_moving_obstacle(self):
+        """What the cloud's change adds to the closing speed, from the clouds' own stamps."""
+        speed, turn = 0.1, 4.0
+
+        def send():  # to and fro along y, 0.1 m/s
+            stamp = rospy.Time.now()
+            phase = stamp.to_sec() % turn
+            y = 0.5 - speed * (phase if phase < turn / 2 else turn - phase)
+            self.world.cloud_publisher.publish(pt.cloud([[0.0, y, 0.0]], "base", stamp))
+
+        self.max_distance = 1.0
+        self.world.stand(pt.transform((0, 0, 0)), pt.transform((5, 5, 5)))
+        self.node = pt.ProximityNode(self.namespace, {}, pt.urdf())
+        self.world.start_tf()
+        self.world.repeat(20, send)
+        checked = 0
+        while checked < 30:
+            message = self.node.wait_for_status(ProximityArray.OK)
+            one = pt.link(message, "ball_link")
+            phase = message.cloud_stamp.to_sec() % turn
+            # From the cloud before, which may be late, to this one: within one way.
+            if not 1.0 < phase % (turn / 2) or np.isnan(one.closing_speed_obstacles):
+                continue
+            checked += 1
+            sign = 1 if phase < turn / 2 else -1
+            self.assertAlmostEqual(one.closing_speed_obstacles, sign * speed, delta=0.01)
+            if not one.closing_unknown:
+                self.assertAlmostEqual(one.closing_speed_robot, 0.0, delta=0.001)
 
     def test_self_filter(self):
         """Points on the robot, of both links, are dropped; those beyond the padding stay."""

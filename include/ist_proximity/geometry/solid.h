@@ -37,13 +37,20 @@ class Solid {
 
   /// As signed_distance, for a point known to be outside (no inside test is made), and only if it
   /// is nearer than `max_distance` [m]; otherwise `distance` is inf.
-  SignedDistance distance_outside(const Eigen::Vector3d& p_L, double max_distance) const;
+  /// @param toward_L  unit, about the way from the surface to p_L; a guess for speed, or zero
+  SignedDistance distance_outside(const Eigen::Vector3d& p_L, double max_distance,
+                                  const Eigen::Vector3d& toward_L = Eigen::Vector3d::Zero()) const;
 
   /// [m] A lower bound that holds nearby too: no point has a signed distance below this minus its
   /// way to p_L. The signed distance itself, but for meshes with holes: through a hole it jumps
   /// from the distance of a point outside to minus that.
   /// @param measured  signed_distance(p_L)
   double distance_floor(const Eigen::Vector3d& p_L, const SignedDistance& measured) const;
+
+  /// [m] How far the solid reaches along a direction: the largest n.x of its points. A point p that
+  /// is farther that way is outside, and its distance is at least n.p less this for a unit n.
+  /// @param slack  [m] the result may be this much too large, which is found sooner
+  double support(const Eigen::Vector3d& n_L, double slack = 0.0) const;
 
   /// The nearest pair of points of the solid and a solid box, if nearer than `max_distance` [m];
   /// `lower_bound` holds in any case.

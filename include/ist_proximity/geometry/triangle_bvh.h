@@ -34,9 +34,11 @@ class TriangleBvh {
   explicit TriangleBvh(const TriangleMesh& mesh);
 
   /// Nearest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
+  /// @param toward_M  unit, about the way from the surface to p_M; a guess for speed, or zero
   /// @returns distance_sq = inf when there is none.
   ClosestPoint closest(const Eigen::Vector3d& p_M,
-                       double max_distance_sq = std::numeric_limits<double>::infinity()) const;
+                       double max_distance_sq = std::numeric_limits<double>::infinity(),
+                       const Eigen::Vector3d& toward_M = Eigen::Vector3d::Zero()) const;
 
   /// The surface and a solid box: the nearest pair of points, exact in double, if nearer than
   /// `max_distance` [m]. 0 where the surface touches or crosses the box; a box that lies within a
@@ -45,6 +47,11 @@ class TriangleBvh {
   /// @param X_OM   the mesh's frame -> O
   BoxDistance closest_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OM,
                              double max_distance) const;
+
+  /// [m] How far the surface reaches along a direction: the largest n.x of its points; -inf without
+  /// triangles.
+  /// @param slack  [m] the result may be this much too large, which is found sooner
+  double support(const Eigen::Vector3d& n_M, double slack = 0.0) const;
 
   /// Generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. By a hierarchical expansion of second order (Barill et al. 2018); error

@@ -20,6 +20,16 @@ struct RepulsionConfig {
   double influence_distance = 0.3;
   double gain = 1.0;        ///< length of the vector at touch and in contact; >= 0
   double smoothing = 0.05;  ///< [m] > 0: pairs this much farther than the nearest still count
+  /// [s] >= 0: mean delay of what a new cloud changes, see RepulsionFilter; 0: no filter.
+  double filter_time = 0.05;
+};
+
+/// What pushes a link away from obstacles, in the fixed frame. NaN where it is not known.
+struct Push {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< unit of the gain
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< [that unit * m] about the link's origin
+
+  static Push unknown();
 };
 
 /// Blended repulsion, continuous in the robot's motion.
@@ -34,6 +44,11 @@ struct RepulsionConfig {
 /// stays at the gain (how deep is for the penetration wrench to say), and in a symmetric squeeze
 /// the terms cancel.
 ///
+/// The torque is that of the same terms, each with its own witness on the link: the terms of a ball
+/// act along lines through its centre, so no other witness than the centre is needed. With J the
+/// Jacobian of the link's origin, J^T (force; torque) is the sum of every term through the Jacobian
+/// at its own witness: as continuous as the force, which the nearest pair's witness is not.
+///
 /// A point at a ball's very centre has no direction, nor has a box that holds the centre; it takes
 /// the link's `direction`.
 class Repulsion {
@@ -44,16 +59,26 @@ class Repulsion {
   /// @param link      index in the model
   /// @param X_FL      link frame -> fixed frame, rigid
   /// @param clouds    as given to ProximityQuery::run
-  /// @param proximity the link's answer: supplies state, distance and direction
-  /// @returns the vector in the fixed frame; zero when CLEAR, NaN when UNKNOWN
+  /// @param proximity the link's answer: supplies state, distance, direction and witness
+  /// @returns zero when CLEAR, NaN when UNKNOWN
   /// Allocates nothing. Thread safe.
+  Push push(std::size_t link, const Eigen::Isometry3d& X_FL,
+            const std::vector<const CloudSnapshot*>& clouds, const LinkProximity& proximity,
+            const RepulsionConfig& config) const;
+
+  /// The force alone.
   Eigen::Vector3d operator()(std::size_t link, const Eigen::Isometry3d& X_FL,
                              const std::vector<const CloudSnapshot*>& clouds,
-                             const LinkProximity& proximity, const RepulsionConfig& config) const;
+                             const LinkProximity& proximity, const RepulsionConfig& config) const {
+    return push(link, X_FL, clouds, proximity, config).force;
+  }
 
  private:
   std::vector<std::vector<Ball>> coarse_;  ///< by link, at most kCoarseBalls
 };
+
+/// 1 - distance / influence_distance, from 0 to 1: 0 when CLEAR or UNKNOWN, 1 in contact.
+double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig& config);
 
 /// Balls that stand for a link.
 constexpr std::size_t kCoarseBalls = 50;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/robot/contact_model.h"
 #include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/status.h"
@@ -39,15 +40,19 @@ struct CycleReport {
   std::optional<JointStateFacts> joint_states;  ///< with pose_source joint_states
   std::uint64_t states_skipped = 0;  ///< joint states that a newer one overtook before its cycle
   std::size_t links_known = 0, links_monitored = 0;
-  double pose_age = 0.0;   ///< [s] of the common instant, when any link is known
-  std::size_t cycles = 0;  ///< since the start, those without a model too
-  CycleTimes times;        ///< of those with one
+  double pose_age = 0.0;             ///< [s] of the common instant, when any link is known
+  std::size_t cycles = 0;            ///< since the start, those without a model too
+  CycleTimes times;                  ///< of those with one
+  std::size_t deadlines_missed = 0;  ///< cycles whose query was broken off, since the start
+  std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while somebody listens
 };
 
 // One DiagnosticStatus each; `node` goes before every name. Pure functions.
+/// @param rate  [Hz] of its messages since the last call
 diagnostic_msgs::DiagnosticStatus input_diagnostics(const std::string& node,
                                                     const SourceFacts& source,
-                                                    const Verdict& verdict, double now);
+                                                    const Verdict& verdict, double rate,
+                                                    double now);
 diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
                                                    const CycleReport& report);
 /// @param rate         [Hz] that was reached since the last call
@@ -55,7 +60,10 @@ diagnostic_msgs::DiagnosticStatus pose_diagnostics(const std::string& node,
 diagnostic_msgs::DiagnosticStatus query_diagnostics(const std::string& node,
                                                     const CycleReport& report, double rate,
                                                     double wanted_rate);
+/// @param contacts  null: none yet, or not wanted
 diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
-                                                    const ModelState& state);
+                                                    const ModelState& state,
+                                                    const ContactModel* contacts,
+                                                    bool contacts_wanted);
 
 }  // namespace ist

@@ -8,6 +8,9 @@
 #include <string>
 
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/penetration.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/ros/closing_speed.h"
 #include "ist_proximity/ros/status.h"
 
 namespace ist {
@@ -17,11 +20,12 @@ ist_proximity::LinkProximity unknown_link(const std::string& name);
 
 /// @param result         in the fixed frame
 /// @param repulsion      of the same link
-/// @param closing_speed  [m/s]
+/// @param penetration    of the same link, in the fixed frame
+/// @param closing        of the same link
 /// @param source         name of the source of the nearest point; ignored unless NEAR or CONTACT
 ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
-                                        const Eigen::Vector3d& repulsion, double closing_speed,
-                                        const std::string& source);
+                                        const Push& repulsion, const Wrench& penetration,
+                                        const ClosingRates& closing, const std::string& source);
 
 /// @param stamp  of the ProximityArray, which `age` counts from
 ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict& verdict,

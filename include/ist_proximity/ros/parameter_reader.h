@@ -20,6 +20,16 @@ struct Range {
   bool infinite = false;  ///< whether inf itself is allowed
 };
 
+/// A number or truth value that was asked for, what it may be, and what it is.
+struct Tunable {
+  enum class Kind { kDouble, kInt, kBool };
+  std::string name;
+  Kind kind = Kind::kDouble;
+  Range range;            ///< of kBool: 0 to 1
+  double standard = 0.0;  ///< its default
+  double value = 0.0;     ///< what holds: the default, too, where the one that is set is wrong
+};
+
 /// Reads typed values from a tree of parameters: what the parameter server holds under one
 /// namespace. A parameter that is absent leaves the caller's default; one that is there but wrong
 /// adds a sentence to errors(), with its name, value, unit and what is allowed, and leaves the
@@ -44,6 +54,9 @@ class ParameterReader {
   /// Names of the parameters one level below `name`; an error when it is no dictionary.
   std::vector<std::string> children(const std::string& name);
 
+  /// Every double, int and bool that was asked for, in that order.
+  const std::vector<Tunable>& tunables() const { return tunables_; }
+
   void add_error(const std::string& sentence) { errors_.push_back(sentence); }
   const std::vector<std::string>& errors() const { return errors_; }
 
@@ -56,9 +69,13 @@ class ParameterReader {
   const XmlRpc::XmlRpcValue* ask(const std::string& name);
   void wrong(const std::string& name, const XmlRpc::XmlRpcValue& value,
              const std::string& expected);
+  void read_number(const std::string& name, const Range& range, double* value);
+  void read_whole(const std::string& name, const Range& range, int* value);
+  void read_truth(const std::string& name, bool* value);
 
   XmlRpc::XmlRpcValue tree_;
   std::set<std::string> asked_;
+  std::vector<Tunable> tunables_;
   std::vector<std::string> errors_;
 };
 

@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -10,9 +11,13 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/penetration.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/contact_model.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ist_proximity/ros/noise_filter.h"
+#include "ist_proximity/ros/parameter_reader.h"
 
 namespace ist {
 
@@ -34,6 +39,7 @@ struct SourceConfig {
   double timeout = 0.5;          ///< [s] older than this is STALE_CLOUD; > 0, may be inf
   bool required = true;          ///< false: its absence is reported in its own status only
   IngestConfig ingest;
+  NoiseFilterConfig noise;  ///< of clouds
 };
 
 /// Where link poses come from.
@@ -59,6 +65,9 @@ struct ServerConfig {
   RobotModelConfig model;
   QueryConfig query;
   RepulsionConfig repulsion;
+  bool contacts_wanted = true;  ///< ~penetration/enabled
+  ContactConfig contacts;
+  PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
   std::vector<SourceConfig> sources;
 };
@@ -84,13 +93,21 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 struct LiveConfig {
   QueryConfig query;  ///< but for max_distance
   RepulsionConfig repulsion;
+  PenetrationConfig penetration;
+  /// Not a parameter: what contact volumes are computed with, as far as it is there; may be null.
+  std::shared_ptr<const ContactModel> contacts;
 };
 
-/// Reads ~query/* and ~repulsion/* again.
+/// What the parameter server holds in the private namespace, in one call: a consistent view.
+XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh);
+
+/// Reads ~query/*, ~repulsion/* and ~penetration/stiffness again.
+/// @param tree          as fetch_parameters() returns it
 /// @param max_distance  [m] as it was at the start. The influence distance ends there at the
-/// latest:
-///                      beyond it nothing is measured, and the vector could not end in zero
+///                      latest: beyond it nothing is measured, and the vector could not end in zero
+/// @param tunables      if not null: each of them, with its range
 /// @throws ParameterError
-LiveConfig read_live(const ros::NodeHandle& private_nh, double max_distance);
+LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
+                      std::vector<Tunable>* tunables = nullptr);
 
 }  // namespace ist

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/robot/kinematics.h"
+
 namespace ist {
 
 /// Where the links are at one common instant.
@@ -31,6 +33,14 @@ class PoseSource {
 
   /// @param now  of the ROS clock; 0 (no clock yet) makes every link unknown
   virtual void look_up(const ros::Time& now, LinkPoses* poses) = 0;
+
+  /// Where all links of the robot are, those without geometry too, at the instant of the last
+  /// look_up(): what a Jacobian needs.
+  /// @param instant  the stamp that look_up() gave
+  /// @param X_FL     by link of the kinematics: link frame -> fixed frame; valid where known
+  /// @param known    by link of the kinematics
+  virtual void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                           std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) = 0;
 
   /// For a person whose links have no pose: what may be missing.
   virtual std::string hint() const = 0;

@@ -10,9 +10,11 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/repulsion/repulsion_filter.h"
 #include "ist_proximity/ros/closing_speed.h"
 #include "ist_proximity/ros/cloud_source.h"
 #include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/joint_repulsion.h"
 #include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
@@ -42,14 +44,26 @@ class ProximityCycle {
   void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
            ist_proximity::ProximityArray* message, CycleReport* report);
 
-  /// After the clock has jumped: no speed across the jump.
-  void forget() { speeds_.assign(speeds_.size(), ClosingSpeed()); }
+  /// After the clock has jumped: no speed across the jump, and the repulsion's filter starts anew.
+  void forget();
+
+  /// What the last run() has measured with; valid until the next one.
+  const std::vector<const CloudSnapshot*>& clouds() const { return clouds_; }
+  /// By link of the robot: whether the last run() could measure it, if it had a pose.
+  std::vector<bool> measurable() const;
+
+  /// The repulsion of the last run(), in the joints.
+  /// @param proximity  what run() has filled in
+  void fill_joint_repulsion(const ist_proximity::ProximityArray& proximity,
+                            ist_proximity::JointRepulsion* message);
 
  private:
   void look_at_sources(const ros::Time& now, const CloudSources& sources);
   void look_at_poses(const ros::Time& now);
   std::vector<std::string> pose_problems() const;
-  void fill_links(const RepulsionConfig& repulsion, ist_proximity::ProximityArray* message);
+  ClosingSpeed::Nearest nearest_source(const LinkProximity& result) const;
+  void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
+  Wrench penetration(std::size_t link, const LiveConfig& config) const;
 
   std::shared_ptr<const ModelState> model_;
   const RobotModel& robot_;
@@ -59,7 +73,9 @@ class ProximityCycle {
   const double pose_timeout_;  ///< [s]
   ProximityQuery query_;
   Repulsion repulsion_;
-  std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
+  std::vector<RepulsionFilter> filters_;  ///< by link of the robot
+  std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
+  JointRepulsion joint_repulsion_;
 
   // Of this cycle.
   LinkPoses poses_;
@@ -69,6 +85,7 @@ class ProximityCycle {
   std::vector<const CloudSnapshot*> clouds_;                 ///< what the query sees
   std::vector<std::string> cloud_names_;                     ///< of `clouds_`
   std::vector<LinkProximity> results_;                       ///< by link of the robot
+  std::vector<Push> pushes_;                                 ///< by link of the robot, filtered
 };
 
 /// Frame of all results.

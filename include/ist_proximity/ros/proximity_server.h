@@ -14,8 +14,10 @@
 #include <mutex>
 #include <thread>
 
+#include "ist_proximity/ros/contact_loader.h"
 #include "ist_proximity/ros/diagnostics.h"
 #include "ist_proximity/ros/joint_state_listener.h"
+#include "ist_proximity/ros/live_parameters.h"
 #include "ist_proximity/ros/markers.h"
 #include "ist_proximity/ros/model_loader.h"
 #include "ist_proximity/ros/parameters.h"
@@ -32,11 +34,10 @@ namespace ist {
 ///     pose_source joint_states at each joint state (and, while none come, ten times a second);
 ///   - one per source, for receiving and ingesting clouds;
 ///   - ~query, with a query of its own; - ~self_proximity, where it is enabled;
-///   - the model loader; - the listeners of tf and joint_states;
-///   - once a second: diagnostics, and ~query/* and ~repulsion/* read again from the parameter
-///   server, which is
-///     how these change while running (`rosparam set`; no dynamic_reconfigure, whose generator
-///     not every ROS 1 distribution has).
+///   - the model loader; - the contact loader, which begins when the model is ready;
+///   - the listeners of tf and joint_states;
+///   - once a second: diagnostics, and what may change while running is read again
+///     (LiveParameters).
 /// The other services are answered from the queue of the node handles.
 class ProximityServer {
  public:
@@ -55,14 +56,15 @@ class ProximityServer {
   void advertise();
   void run_cycles();
   bool wait_for_joint_states();
+  LiveConfig live_config() const;
   void run_cycle();
   void notice_clock_jump(const ros::Time& now);
   void take_model();
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
+  void publish_joint_repulsion(const ist_proximity::ProximityArray& proximity);
   void publish_spheres();
   void publish_spheres_again();
   void run_diagnostics();
-  void read_live_again();
   bool reload_model(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
   bool attach_object(ist_proximity::AttachObject::Request& request,
                      ist_proximity::AttachObject::Response& response);
@@ -74,12 +76,15 @@ class ProximityServer {
   ros::NodeHandle nh_, private_nh_;
   const std::string name_;  ///< in diagnostics
 
-  ros::Publisher proximity_, min_distance_, markers_, spheres_, filtered_cloud_, diagnostics_;
+  ros::Publisher proximity_, joint_repulsion_, min_distance_, markers_, spheres_, filtered_cloud_,
+      diagnostics_;
   ros::ServiceServer reload_service_, attach_service_, detach_service_;
   tf2::BufferCore buffer_;
   TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
+  LiveParameters live_;
+  ContactLoader contact_loader_;
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   // The cycle thread's own.
@@ -94,7 +99,6 @@ class ProximityServer {
 
   std::mutex shared_mutex_;  // for what cycle and diagnostics threads share
   CycleReport report_;
-  LiveConfig live_;
 
   std::mutex stop_mutex_;
   std::condition_variable stop_signal_;

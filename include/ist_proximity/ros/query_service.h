@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "ist_proximity/proximity/time_of_impact.h"
 #include "ist_proximity/ros/parameters.h"
 #include "ist_proximity/ros/proximity_cycle.h"
 #include "ist_proximity/ros/stated_pose_source.h"
@@ -39,6 +40,9 @@ class QueryService {
 
   bool answer(Service::Request& request, Service::Response& response);
   std::string run(const Service::Request& request, Service::Response* response);
+  std::string find_impacts(const Service::Request& request,
+                           const std::vector<std::vector<double>>& positions,
+                           Service::Response* response);
   std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
 
@@ -56,6 +60,7 @@ class QueryService {
   std::shared_ptr<const ModelState> model_;
   StatedPoseSource* poses_ = nullptr;  ///< the cycle's
   std::unique_ptr<ProximityCycle> cycle_;
+  std::unique_ptr<TimeOfImpact> impacts_;
   std::vector<bool> chosen_;  ///< by monitored link
   std::atomic<bool> running_{true};
   std::thread thread_;

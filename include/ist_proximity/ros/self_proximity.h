@@ -5,6 +5,7 @@
 #include <tf2/buffer_core.h>
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -30,8 +31,10 @@ class SelfProximity {
   /// @param nh       where `robot_description_semantic` is searched, and above
   /// @param buffer   outlives this
   /// @param joints   outlives this; null: link poses come from the buffer
+  /// @param live     what is configured now; called from the thread
   SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
-                const tf2::BufferCore& buffer, JointStateListener* joints);
+                const tf2::BufferCore& buffer, JointStateListener* joints,
+                std::function<LiveConfig()> live);
   ~SelfProximity();
   SelfProximity(const SelfProximity&) = delete;
   SelfProximity& operator=(const SelfProximity&) = delete;
@@ -46,11 +49,14 @@ class SelfProximity {
   std::vector<LinkPair> choose_pairs() const;
   NamePairs ignored_pairs() const;
   LinkProximity nearest(std::size_t link, std::size_t* other) const;
+  void find_wrenches(const LiveConfig& live);
+  Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
   const ServerConfig config_;
   ros::NodeHandle nh_;
   const tf2::BufferCore& buffer_;
   JointStateListener* const joints_;
+  const std::function<LiveConfig()> live_;
   ros::Publisher publisher_;
 
   std::mutex mutex_;
@@ -66,6 +72,7 @@ class SelfProximity {
   ros::Time last_now_;
   LinkPoses poses_;
   std::vector<PairProximity> results_;
+  std::vector<Wrench> wrenches_;  ///< by pair, on its first link
   std::thread thread_;
 };
 

@@ -32,7 +32,15 @@ class StatedPoseSource : public PoseSource {
   /// @returns empty on success, else a sentence; then the configuration before goes on
   std::string state(const sensor_msgs::JointState& configuration);
 
+  /// Of the configuration stated: by joint, NaN where it is left out.
+  const std::vector<double>& positions() const { return q_; }
+  /// Of the last look_up(): all joints, and the root link -> fixed frame.
+  const JointPoses& joints() const { return joints_; }
+  const Eigen::Isometry3d& root() const { return X_FR_; }
+
   void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
   std::string hint() const override;
 
  private:
@@ -44,6 +52,9 @@ class StatedPoseSource : public PoseSource {
   double timeout_;
   std::vector<double> q_;  ///< by joint; NaN: left out
   JointPoses joints_;
+  Eigen::Isometry3d X_FR_ = Eigen::Isometry3d::Identity();
+  std::vector<Eigen::Isometry3d> X_FL_;  ///< by link of the kinematics, of the last look_up()
+  std::vector<bool> known_;
 };
 
 }  // namespace ist

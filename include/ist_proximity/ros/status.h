@@ -23,9 +23,13 @@ struct SourceFacts {
   bool is_file = false;        ///< `topic` is a file's path, read once and never stale
   double timeout = 0.5;        ///< [s]
   bool required = true;
+  /// [m] how far from a link a point is taken for the robot: in that skin no obstacle is seen.
+  /// NaN: without self-filter.
+  double blind_skin = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t messages = 0;      ///< received
   std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use
   std::uint64_t overtaken = 0;     ///< dropped: a newer one was ready first
+  std::uint64_t shown = 0;         ///< on ~filtered_cloud, which is made while somebody listens
   std::uint64_t unusable = 0;      ///< dropped: malformed, in the future, or without transform
   std::uint32_t publishers = 0;
   /// Newest stamp received, those far in the future aside; NaN: none.

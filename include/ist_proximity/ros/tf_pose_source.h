@@ -26,6 +26,8 @@ class TfPoseSource : public PoseSource {
                std::vector<std::string> link_frames, std::vector<bool> wanted, double timeout);
 
   void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
   std::string hint() const override;
 
  private:

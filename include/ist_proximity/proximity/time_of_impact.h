@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// A straight motion in joint space at constant speeds.
+struct JointMotion {
+  std::vector<double> from, to;  ///< [rad, m] by joint of the kinematics, read for free joints; NaN
+                                 ///< in both: it stands still
+  double duration = 1.0;         ///< [s] > 0
+};
+
+/// When a link first touches an obstacle.
+struct ImpactTime {
+  /// [s] from the start of the motion, never later than the first contact; 0 in contact, +inf
+  /// without contact, NaN when not known.
+  double time = std::numeric_limits<double>::quiet_NaN();
+  /// False: given up after many steps; the contact, if there is one, may be much later.
+  bool converged = true;
+  int steps = 0;  ///< distance queries
+};
+
+/// Conservative time of impact of a robot's links with standing obstacles along a joint motion.
+///
+/// Conservative advancement (Mirtich 1996): a link that has a proven distance d cannot touch
+/// anything before one of its points has gone as far. How fast its points can be is bounded at each
+/// step by the distances of its bounding sphere from the axes of all joints that move it, and by
+/// how fast those can grow. Distances are lower bounds of ProximityQuery: what they promise, the
+/// time promises, margin included. It ends where the bound is below 1 um: along glancing motions
+/// that may be long before a contact, or without one. One object per thread.
+class TimeOfImpact {
+ public:
+  /// @param config  max_distance and margin are read: the time is that of a distance of `margin`
+  TimeOfImpact(std::shared_ptr<const RobotModel> model,
+               std::shared_ptr<const Kinematics> kinematics, const QueryConfig& config);
+  ~TimeOfImpact();
+  TimeOfImpact(TimeOfImpact&&) noexcept;
+  TimeOfImpact& operator=(TimeOfImpact&&) noexcept;
+
+  /// @param motion   sizes as the kinematics' joints
+  /// @param still    where joints are that the motion does not move; planar and floating ones too
+  /// @param X_FR     root link -> fixed frame
+  /// @param wanted   by link of the model: false leaves it out (NaN)
+  /// @param clouds   as for ProximityQuery::run; none makes every link unknown
+  /// @param results  by link of the model, overwritten
+  void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
+           const std::vector<bool>& wanted, const std::vector<const CloudSnapshot*>& clouds,
+           std::vector<ImpactTime>* results);
+
+  void set_config(const QueryConfig& config);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ist

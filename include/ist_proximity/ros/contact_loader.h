@@ -1,0 +1,45 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "ist_proximity/robot/contact_model.h"
+#include "ist_proximity/ros/model_loader.h"
+#include "ist_proximity/ros/parameters.h"
+
+namespace ist {
+
+/// Makes what contact volumes need, in a thread of its own, after the node answers already: packs
+/// one monitored link after the other disjointly, or takes them from the cache. Whatever becomes of
+/// the robot's model, it follows. All members are thread safe.
+class ContactLoader {
+ public:
+  /// @param loader  outlives this
+  ContactLoader(const ServerConfig& config, const ModelLoader& loader);
+  /// Stops packing.
+  ~ContactLoader();
+  ContactLoader(const ContactLoader&) = delete;
+  ContactLoader& operator=(const ContactLoader&) = delete;
+
+  /// As far as they are; null until a model is ready, and where they are not wanted.
+  std::shared_ptr<const ContactModel> contacts() const;
+
+ private:
+  void run();
+  void load(const std::shared_ptr<const ModelState>& state);
+  void set(std::shared_ptr<const ContactModel> contacts);
+  bool is_current(const ModelState& state) const;
+
+  const ServerConfig config_;
+  const ModelLoader& loader_;
+  mutable std::mutex mutex_;
+  std::condition_variable stop_signal_;
+  std::atomic<bool> stop_{false};
+  std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
+  std::thread thread_;                            ///< none where they are not wanted
+};
+
+}  // namespace ist

@@ -1,0 +1,130 @@
+#include "ist_proximity/proximity/time_of_impact.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "proximity/motion_bound.h"
+
+namespace ist {
+namespace {
+
+constexpr double kTouch = 1e-6;  // [m] a bound below it is contact
+constexpr int kMaxSteps = 4000;
+// Of the last bound: how exact the next distance has to be; and at first [m].
+constexpr double kRelativeTolerance = 0.1, kFirstTolerance = 0.01;
+
+}  // namespace
+
+struct TimeOfImpact::Impl {
+  Impl(std::shared_ptr<const RobotModel> robot, std::shared_ptr<const Kinematics> tree,
+       const QueryConfig& query_config)
+      : model(std::move(robot)),
+        kinematics(std::move(tree)),
+        config(query_config),
+        query(model, config),
+        known(model->links.size(), false) {
+    config.deadline = 0.0;
+    for (const LinkModel& link : model->links) {
+      places.push_back(kinematics->find_link(link.name).value_or(kinematics->links().size()));
+    }
+  }
+
+  // Where all links are after `time` [s].
+  void place(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
+             double time) {
+    const auto& joints = kinematics->joints();
+    const double s = std::min(time / motion.duration, 1.0);
+    moved = still;
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!(joint_speed(joints[j], motion) > 0.0)) continue;
+      const std::size_t source = joints[j].source;
+      const double q = (1.0 - s) * motion.from[source] + s * motion.to[source];
+      moved.X_PC[j] = kinematics->joint_pose(j, joints[j].multiplier * q + joints[j].offset);
+      moved.known[j] = true;
+    }
+    kinematics->place_links(moved, X_FR, &X_FL, &placed);
+  }
+
+  const LinkProximity& measure(std::size_t link, const std::vector<const CloudSnapshot*>& clouds,
+                               double tolerance) {
+    config.tolerance = tolerance;
+    query.set_config(config);
+    X_FM[link] = X_FL[places[link]];
+    query.run(X_FM, known, clouds, &answers);
+    return answers[link];
+  }
+
+  ImpactTime find(std::size_t link, const JointMotion& motion, const JointPoses& still,
+                  const Eigen::Isometry3d& X_FR, const std::vector<const CloudSnapshot*>& clouds) {
+    ImpactTime impact;
+    place(motion, still, X_FR, 0.0);
+    if (!placed[places[link]]) return impact;
+    const InnerSphereTree& tree = model->links[link].tree;
+    const MotionBound bound(*kinematics, motion, still, places[link], tree.center(), tree.radius());
+    double time = 0.0, tolerance = kFirstTolerance;
+    for (; impact.steps < kMaxSteps; ++impact.steps) {
+      if (impact.steps > 0) place(motion, still, X_FR, time);
+      const LinkProximity* answer = &measure(link, clouds, tolerance);
+      if (answer->lower_bound <= kTouch && tolerance > 0.0) answer = &measure(link, clouds, 0.0);
+      if (answer->state == LinkState::kUnknown) return impact;
+      impact.time = time;
+      if (answer->lower_bound <= kTouch) return impact;
+      time += bound.time_for(answer->lower_bound, X_FL);
+      if (time >= motion.duration) {
+        impact.time = std::numeric_limits<double>::infinity();
+        return impact;
+      }
+      tolerance = std::min(kFirstTolerance, kRelativeTolerance * answer->lower_bound);
+    }
+    impact.converged = false;
+    return impact;
+  }
+
+  std::shared_ptr<const RobotModel> model;
+  std::shared_ptr<const Kinematics> kinematics;
+  QueryConfig config;
+  ProximityQuery query;
+  std::vector<std::size_t> places;  // by link of the model: where the kinematics has it
+
+  // Of this call.
+  std::vector<bool> known;  // the link at work
+  JointPoses moved;
+  std::vector<Eigen::Isometry3d> X_FL;  // by link of the kinematics
+  std::vector<bool> placed;
+  std::vector<Eigen::Isometry3d> X_FM;  // by link of the model
+  std::vector<LinkProximity> answers;
+};
+
+TimeOfImpact::TimeOfImpact(std::shared_ptr<const RobotModel> model,
+                           std::shared_ptr<const Kinematics> kinematics, const QueryConfig& config)
+    : impl_(std::make_unique<Impl>(std::move(model), std::move(kinematics), config)) {}
+TimeOfImpact::~TimeOfImpact() = default;
+TimeOfImpact::TimeOfImpact(TimeOfImpact&&) noexcept = default;
+TimeOfImpact& TimeOfImpact::operator=(TimeOfImpact&&) noexcept = default;
+
+void TimeOfImpact::set_config(const QueryConfig& config) {
+  impl_->config = config;
+  impl_->config.deadline = 0.0;
+}
+
+void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
+                       const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted,
+                       const std::vector<const CloudSnapshot*>& clouds,
+                       std::vector<ImpactTime>* results) {
+  const std::size_t count = impl_->model->links.size();
+  assert(wanted.size() == count && motion.duration > 0.0);
+  assert(motion.from.size() == impl_->kinematics->joints().size());
+  assert(motion.to.size() == motion.from.size() && still.X_PC.size() == motion.from.size());
+  results->assign(count, ImpactTime());
+  impl_->X_FM.assign(count, Eigen::Isometry3d::Identity());
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool in_tree = impl_->places[i] < impl_->kinematics->links().size();
+    if (!wanted[i] || !in_tree || !impl_->model->links[i].usable()) continue;
+    impl_->known[i] = true;
+    (*results)[i] = impl_->find(i, motion, still, X_FR, clouds);
+    impl_->known[i] = false;
+  }
+}
+
+}  // namespace ist

@@ -1,0 +1,167 @@
+#include "ist_proximity/robot/contact_model.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+#include "ist_proximity/packing/packer.h"
+#include "ist_proximity/packing/packing_cache.h"
+#include "link_packing.h"
+#include "volume_share.h"
+#include "way_out.h"
+
+namespace ist {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Smaller balls than this share of the largest one hold next to nothing.
+constexpr double kSmallest = 1e-3;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// The balls that have a volume, without their gaps, which would loosen the tree.
+Packing solid_balls(const Packing& packing) {
+  double largest = 0.0;
+  for (const Ball& ball : packing.balls) largest = std::max(largest, ball.radius);
+  Packing tight;
+  for (const Ball& ball : packing.balls) {
+    if (ball.radius > kSmallest * largest) {
+      tight.balls.push_back({ball.center, ball.radius, ball.radius});
+    }
+  }
+  return tight;
+}
+
+ContactLeaf make_leaf(const SphereLeaf& leaf) {
+  ContactLeaf result{};
+  for (int k = 0; k < kSphereWidth; ++k) {
+    result.x[k] = leaf.x[k];
+    result.y[k] = leaf.y[k];
+    result.z[k] = leaf.z[k];
+    result.radius[k] = k < leaf.count ? leaf.inner[k] : -1.0F;
+  }
+  return result;
+}
+
+/// The ball that a slot of the tree's leaves holds: the tree sorts them anew.
+std::size_t find_ball(const std::vector<Ball>& balls, const Eigen::Vector3f& center) {
+  std::size_t best = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const double squared = (balls[i].center - center.cast<double>()).squaredNorm();
+    if (squared >= nearest) continue;
+    nearest = squared;
+    best = i;
+  }
+  return best;
+}
+
+/// One element's packing, from the cache or made. Null: cancelled.
+std::optional<Packing> pack(const Shape& shape, const PackingConfig& config, double time_limit,
+                            const PackingCache& cache, const std::function<bool()>& cancelled,
+                            ContactBody* body) {
+  const std::string key = packing_key(shape, config);
+  std::string warning;
+  std::optional<Packing> packing = cache.load(key, &warning);
+  body->from_cache = body->from_cache && packing.has_value();
+  if (packing) return packing;
+  const auto start = Clock::now();
+  bool is_cancelled = false, is_late = false;
+  packing = pack_element(shape, config, [&](double) {
+    is_cancelled = is_cancelled || (cancelled && cancelled());
+    is_late = is_late || seconds_since(start) > time_limit;
+    return !is_cancelled && !is_late;
+  });
+  if (is_cancelled) return std::nullopt;
+  if (is_late) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "packing its volume was broken off after %.0f s, with %zu balls; less for "
+                  "~penetration/max_spheres is quicker",
+                  time_limit, packing->balls.size());
+    body->note = text;
+    return packing;  // how far it got is the machine's matter: not for the cache
+  }
+  cache.store(key, *packing, &warning);
+  return packing;
+}
+
+}  // namespace
+
+const ContactBody* find_body(const ContactModel* contacts, const RobotModel& robot,
+                             std::size_t link) {
+  if (contacts == nullptr || contacts->robot.get() != &robot) return nullptr;
+  const ContactBody* body = contacts->bodies[link].get();
+  return body != nullptr && body->has_volume() ? body : nullptr;
+}
+
+ContactBody make_contact_body(const LinkGeometry& geometry, const Solid& solid,
+                              const Packing& packing) {
+  ContactBody body;
+  const Packing tight = solid_balls(packing);
+  if (tight.balls.empty()) {
+    body.note = "has no volume (sheets): no penetration wrench";
+    return body;
+  }
+  body.tree = InnerSphereTree(tight);
+  body.ball_count = tight.balls.size();
+  const VolumeShares shares = volume_shares(tight.balls, solid);
+  body.volume = shares.volume;
+  body.packed_volume = shares.packed_volume;
+  const WayOut way_out(geometry, solid);
+  for (const SphereLeaf& source : body.tree.leaves()) {
+    ContactLeaf leaf = make_leaf(source);
+    for (int k = 0; k < source.count; ++k) {
+      const Ball& ball =
+          tight.balls[find_ball(tight.balls, {source.x[k], source.y[k], source.z[k]})];
+      leaf.share[k] =
+          static_cast<float>(shares.share[static_cast<std::size_t>(&ball - tight.balls.data())]);
+      const Eigen::Vector3f out = way_out(ball.center).cast<float>();
+      const Eigen::Matrix3f slope = way_out.slope(ball.center, ball.radius).cast<float>();
+      for (int row = 0; row < 3; ++row) {
+        leaf.out[row][k] = out[row];
+        for (int column = 0; column < 3; ++column) {
+          leaf.slope[3 * row + column][k] = slope(row, column);
+        }
+      }
+    }
+    body.leaves.push_back(leaf);
+  }
+  return body;
+}
+
+std::shared_ptr<const ContactBody> build_contact_body(const LinkGeometry& geometry,
+                                                      std::size_t attached, const Solid& solid,
+                                                      const ContactConfig& config,
+                                                      const std::string& cache_directory,
+                                                      const std::function<bool()>& cancelled) {
+  const auto start = Clock::now();
+  const PackingCache cache(cache_directory);
+  const std::vector<PackingConfig> configs = link_configs(geometry, attached, config.packing);
+  ContactBody progress;
+  progress.from_cache = true;
+  std::vector<Packing> packings;
+  for (std::size_t e = 0; e < geometry.size(); ++e) {
+    std::optional<Packing> one =
+        pack(geometry[e].shape, configs[e], config.time_limit, cache, cancelled, &progress);
+    if (!one) return nullptr;
+    packings.push_back(std::move(*one));
+  }
+  std::vector<const Packing*> pointers;
+  pointers.reserve(packings.size());
+  for (const Packing& packing : packings) pointers.push_back(&packing);
+  auto body = std::make_shared<ContactBody>(
+      make_contact_body(geometry, solid, combine(geometry, pointers)));
+  body->from_cache = progress.from_cache;
+  if (body->note.empty()) body->note = progress.note;
+  body->time = seconds_since(start);
+  return body;
+}
+
+}  // namespace ist

@@ -1,0 +1,100 @@
+#include "ist_proximity/ros/contact_loader.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <string>
+
+#include "ist_proximity/robot/attached_object.h"
+
+namespace ist {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll(200);
+
+const LinkDescription* find_link(const RobotDescription& description, const std::string& name) {
+  const auto found = std::find_if(description.links.begin(), description.links.end(),
+                                  [&](const LinkDescription& link) { return link.name == name; });
+  return found != description.links.end() ? &*found : nullptr;
+}
+
+/// A link that has no body, and why.
+std::shared_ptr<const ContactBody> no_body(const std::string& note) {
+  auto body = std::make_shared<ContactBody>();
+  body->note = note;
+  return body;
+}
+
+}  // namespace
+
+ContactLoader::ContactLoader(const ServerConfig& config, const ModelLoader& loader)
+    : config_(config), loader_(loader) {
+  if (config_.contacts_wanted) thread_ = std::thread(&ContactLoader::run, this);
+}
+
+ContactLoader::~ContactLoader() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  stop_signal_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+std::shared_ptr<const ContactModel> ContactLoader::contacts() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return contacts_;
+}
+
+void ContactLoader::set(std::shared_ptr<const ContactModel> contacts) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  contacts_ = std::move(contacts);
+}
+
+bool ContactLoader::is_current(const ModelState& state) const {
+  return !stop_ && loader_.state()->robot == state.robot;
+}
+
+void ContactLoader::run() {
+  while (!stop_) {
+    const auto state = loader_.state();
+    const auto contacts = this->contacts();
+    if (state->robot && (!contacts || contacts->robot != state->robot)) load(state);
+    std::unique_lock<std::mutex> lock(mutex_);
+    stop_signal_.wait_for(lock, kPoll, [this] { return stop_.load(); });
+  }
+}
+
+void ContactLoader::load(const std::shared_ptr<const ModelState>& state) {
+  const auto begin = std::chrono::steady_clock::now();
+  const RobotModel& robot = *state->robot;
+  ContactModel contacts;
+  contacts.robot = state->robot;
+  contacts.bodies.resize(robot.links.size());
+  set(std::make_shared<const ContactModel>(contacts));
+  const RobotDescription description = with_objects(*state->description, state->objects);
+  const auto cancelled = [&] { return !is_current(*state); };
+  std::size_t count = 0;
+  for (const std::size_t i : state->monitored) {
+    const LinkDescription* link = find_link(description, robot.links[i].name);
+    if (link == nullptr || !robot.links[i].usable()) continue;
+    std::shared_ptr<const ContactBody> body;
+    try {
+      body = build_contact_body(link->geometry, link->attached, robot.links[i].solid,
+                                config_.contacts, config_.model.cache_directory, cancelled);
+    } catch (const std::exception& error) {  // ModelError, or no memory
+      body = no_body(std::string("its volume cannot be packed: ") + error.what());
+    }
+    if (!body || cancelled()) return;
+    if (!body->note.empty()) ROS_WARN_STREAM("link '" << link->name << "': " << body->note);
+    contacts.bodies[i] = body;
+    set(std::make_shared<const ContactModel>(contacts));
+    ++count;
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  ROS_INFO("contact volumes of %zu links ready after %.1f s", count, took.count());
+}
+
+}  // namespace ist

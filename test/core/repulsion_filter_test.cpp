@@ -1,0 +1,147 @@
+#include "ist_proximity/repulsion/repulsion_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kStep = 1e-3;  // [s]
+
+LinkProximity near_by(double distance) {
+  LinkProximity proximity;
+  proximity.state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
+  proximity.distance = proximity.lower_bound = distance;
+  return proximity;
+}
+
+// Deep in the influence distance, where nothing fades.
+const LinkProximity kNear = near_by(0.1);
+
+Push push(double x) { return {Vector3d(x, 0.0, -0.5 * x), Vector3d(0.0, 2.0 * x, 0.0)}; }
+
+TEST(RepulsionFilter, passesWhatTheRobotsMotionChanges) {
+  RepulsionFilter filter;
+  for (int i = 0; i < 200; ++i) {
+    const Push raw = push(0.3 * std::sin(0.1 * i));
+    const Push out = filter.update(kStep * i, 7, raw, kNear, {});
+    EXPECT_EQ(out.force, raw.force);
+    EXPECT_EQ(out.torque, raw.torque);
+  }
+}
+
+TEST(RepulsionFilter, spreadsWhatACloudChanges) {
+  RepulsionConfig config;
+  config.filter_time = 0.08;
+  RepulsionFilter filter;
+  filter.update(0.0, 1, push(0.0), kNear, config);
+  double last = 0.0, delay = 0.0;
+  for (int i = 1; i <= 1000; ++i) {
+    const Push out = filter.update(kStep * i, 2, push(0.5), kNear, config);
+    const double done = out.force.x() / 0.5;
+    EXPECT_GE(done, last) << i;
+    EXPECT_LE(done, 1.0) << "no overshoot";
+    EXPECT_LE(done - last, 0.74 * kStep / config.filter_time + 1e-12) << i;
+    // The closed form, and force and torque as one.
+    const double t = kStep * i / (0.5 * config.filter_time);
+    EXPECT_NEAR(done, 1.0 - (1.0 + t) * std::exp(-t), 1e-12);
+    EXPECT_NEAR(out.torque.y(), 2.0 * out.force.x(), 1e-12);
+    delay += (1.0 - done) * kStep;
+    last = done;
+  }
+  EXPECT_NEAR(delay, config.filter_time, kStep) << "the mean delay is what the parameter says";
+}
+
+// A cloud at every update, and longer than the filter's time between them: no delay builds up.
+TEST(RepulsionFilter, slowUpdatesAreHardlyDelayed) {
+  RepulsionFilter filter;
+  for (int i = 0; i < 20; ++i) {
+    const Push out =
+        filter.update(0.5 * i, static_cast<std::uint64_t>(i), push(0.5 * (i % 2)), kNear, {});
+    EXPECT_NEAR(out.force.x(), 0.5 * (i % 2), 1e-6);
+  }
+}
+
+// Changes of many clouds add up: the filter is linear.
+TEST(RepulsionFilter, followsARampWithItsDelay) {
+  RepulsionFilter filter;
+  RepulsionConfig config;
+  config.filter_time = 0.05;
+  Push out;
+  for (int i = 0; i <= 1000; ++i) {  // an obstacle that nears for a second, seen anew every 2 ms
+    out = filter.update(kStep * i, static_cast<std::uint64_t>(i / 2), push(0.4e-3 * (i - i % 2)),
+                        kNear, config);
+  }
+  EXPECT_NEAR(out.force.x(), 0.4 * (1.0 - config.filter_time), 0.4 * 2.1e-3);
+}
+
+TEST(RepulsionFilter, whatIsBeyondTheInfluenceDistanceRepelsNothingAtOnce) {
+  LinkProximity clear;
+  clear.state = LinkState::kClear;
+  clear.distance = std::numeric_limits<double>::infinity();
+  for (const LinkProximity& gone : {clear, near_by(0.3), near_by(0.5)}) {
+    RepulsionFilter filter;
+    filter.update(0.0, 1, push(0.8), kNear, {});
+    EXPECT_TRUE(filter.update(kStep, 2, {}, gone, {}).force.isZero(0.0));
+    // And comes back smoothly: what is seen in one cloud and not in the next one flickers less.
+    const Push back = filter.update(2 * kStep, 3, push(0.8), kNear, {});
+    EXPECT_GT(back.force.x(), 0.0);
+    EXPECT_LT(back.force.x(), 0.01);
+  }
+  // On the way there the length fades, however much the filter holds.
+  RepulsionFilter filter;
+  filter.update(0.0, 1, push(0.8), kNear, {});
+  double last = filter.update(kStep, 2, push(0.01), near_by(0.269), {}).force.norm();
+  EXPECT_GT(last, 0.8);
+  for (double distance = 0.27; distance < 0.3; distance += 0.001) {
+    const double length = filter.update(kStep, 2, push(0.01), near_by(distance), {}).force.norm();
+    EXPECT_LE(length, (1.0 - distance / 0.3) / 0.1 + 1e-12);
+    EXPECT_LT(last - length, 0.04) << distance;
+    last = length;
+  }
+}
+
+TEST(RepulsionFilter, startsAnew) {
+  const Push raw = push(0.5);
+  const auto fresh = [](const Push& out, const Push& expected) {
+    EXPECT_EQ(out.force, expected.force);
+    EXPECT_EQ(out.torque, expected.torque);
+  };
+  RepulsionFilter filter;
+  fresh(filter.update(5.0, 1, raw, kNear, {}), raw);
+  fresh(filter.update(4.0, 2, push(0.1), kNear, {}), push(0.1));  // the clock has jumped back
+  EXPECT_TRUE(
+      filter.update(4.1, 3, Push::unknown(), LinkProximity(), {}).force.array().isNaN().all());
+  fresh(filter.update(4.2, 4, raw, kNear, {}), raw);
+  filter.reset();
+  fresh(filter.update(4.3, 5, push(0.2), kNear, {}), push(0.2));
+  RepulsionConfig off;
+  off.filter_time = 0.0;
+  fresh(filter.update(4.4, 6, raw, kNear, off), raw);
+}
+
+TEST(RepulsionFilter, tellsCloudsApart) {
+  const CloudSnapshot a = test::make_snapshot({{0, 0, 0}}), b = test::make_snapshot({{0, 0, 0}});
+  CloudSnapshot map;
+  auto boxes = std::make_shared<BoxIndex>();
+  boxes->build({Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 1, 1))});
+  map.boxes = boxes;
+  const std::uint64_t key = obstacles_key({&a, &map});
+  EXPECT_EQ(key, obstacles_key({&a, &map}));
+  CloudSnapshot moved = map;  // a map's frame moves as the robot drives: no other map
+  moved.X_FM.translation().x() = 1.0;
+  EXPECT_EQ(key, obstacles_key({&a, &moved}));
+  for (const auto& other : {obstacles_key({&b, &map}), obstacles_key({&a}),
+                            obstacles_key({&map, &a}), obstacles_key({})}) {
+    EXPECT_NE(key, other);
+  }
+}
+
+}  // namespace
+}  // namespace ist

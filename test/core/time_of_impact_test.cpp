@@ -1,0 +1,118 @@
+#include "ist_proximity/proximity/time_of_impact.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "support/motions.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// Never later than what dense sampling finds, and in 99 % of the motions no more than 5 ms before.
+TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
+  test::Rng rng(66);
+  int contacts = 0, close = 0, motions = 0, late = 0, alarms = 0;
+  while (motions < test::scaled(1000)) {
+    const test::Arm arm = test::random_arm(&rng);
+    QueryConfig config;
+    config.max_distance = 0.5;
+    TimeOfImpact impacts(arm.model, arm.kinematics, config);
+    for (int i = 0; i < 25 && motions < test::scaled(1000); ++i) {
+      const test::ArmMotion motion = test::random_motion(&rng, arm);
+      const CloudSnapshot cloud = test::make_snapshot(motion.points);
+      std::vector<ImpactTime> found;
+      impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true),
+                  {&cloud}, &found);
+      double first = kInf;
+      for (const ImpactTime& one : found) first = std::min(first, one.time);
+      const double truth = test::sampled_impact(arm, motion);
+      if (truth == 0.0) {
+        EXPECT_EQ(first, 0.0);
+        continue;  // in contact from the start: no motion to speak of
+      }
+      ++motions;
+      late += first > truth ? 1 : 0;
+      if (truth == kInf) {
+        alarms += first < kInf ? 1 : 0;
+        close += first == kInf ? 1 : 0;
+        continue;
+      }
+      ++contacts;
+      close += truth - first <= 0.005 ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(late, 0);
+  EXPECT_GE(close, 0.99 * motions);
+  EXPECT_LE(alarms, 0.01 * motions);
+  EXPECT_GT(contacts, motions / 4) << "motions must be hard ones";
+  EXPECT_GT(motions - contacts, motions / 10);
+}
+
+// A ball on an arm of 1 m that turns, by hand: it touches the point when they are 0.1 m apart.
+TEST(TimeOfImpact, handComputed) {
+  RobotDescription robot;
+  robot.root_link = "base";
+  JointDescription joint;
+  joint.name = "turn";
+  joint.type = JointType::kRevolute;
+  joint.parent_link = "base";
+  joint.child_link = "arm";
+  joint.axis = {0, 0, 1};
+  robot.joints = {joint};
+  joint = {};
+  joint.name = "tip";
+  joint.parent_link = "arm";
+  joint.child_link = "ball";
+  joint.X_PJ.translation() = Eigen::Vector3d(1, 0, 0);
+  robot.joints.push_back(joint);
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  model->links[0].name = "ball";
+  const auto kinematics = std::make_shared<const Kinematics>(robot);
+  JointPoses still;
+  kinematics->place_joints({0.0, 0.0}, &still);
+  const CloudSnapshot cloud = test::make_snapshot({{0, 1, 0}});
+  const double angle = EIGEN_PI / 2.0 - 2.0 * std::asin(0.05);  // chord of 0.1
+  JointMotion motion{{0.0, 0.0}, {2.0, 0.0}, 4.0};              // 0.5 rad/s
+  std::vector<ImpactTime> impact;
+  QueryConfig config;
+  TimeOfImpact impacts(model, kinematics, config);
+  const auto run = [&](const std::vector<const CloudSnapshot*>& clouds) {
+    impacts.run(motion, still, Eigen::Isometry3d::Identity(), {true}, clouds, &impact);
+    return impact[0].time;
+  };
+  const double time = run({&cloud});
+  EXPECT_LE(time, angle / 0.5);
+  EXPECT_GT(time, angle / 0.5 - 1e-4);
+  EXPECT_TRUE(impact[0].converged);
+  EXPECT_LT(impact[0].steps, 100);
+
+  // A margin comes earlier by as much.
+  config.margin = 0.02;
+  impacts = TimeOfImpact(model, kinematics, config);
+  EXPECT_NEAR(run({&cloud}), (EIGEN_PI / 2.0 - 2.0 * std::asin(0.06)) / 0.5, 1e-4);
+  config.margin = 0.0;
+  impacts = TimeOfImpact(model, kinematics, config);
+
+  motion.to[0] = 0.5 * angle;  // stops before
+  EXPECT_EQ(run({&cloud}), kInf);
+  motion.to[0] = -1.0;  // goes away
+  EXPECT_EQ(run({&cloud}), kInf);
+  EXPECT_TRUE(std::isnan(run({}))) << "no cloud";
+  const CloudSnapshot touching = test::make_snapshot({{1.05, 0, 0}});
+  EXPECT_EQ(run({&touching}), 0.0);
+  // Nothing moves: apart for ever.
+  motion.to = motion.from;
+  EXPECT_EQ(run({&cloud}), kInf);
+  motion.from = motion.to = {std::nan(""), std::nan("")};
+  EXPECT_EQ(run({&cloud}), kInf);
+  still.known[0] = false;
+  EXPECT_TRUE(std::isnan(run({&cloud}))) << "where the joint is is not known";
+}
+
+}  // namespace
+}  // namespace ist

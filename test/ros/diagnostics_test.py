@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""/diagnostics: what is counted, what is doubted, and that idle topics are not computed."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import ProximityArray
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+ON_BALL = [[0.0, 0.0, 0.1]]
+BESIDE = [[0.0, 0.0, 0.3]]
+OK, WARN = 0, 1
+
+
+class DiagnosticsTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 0.8, 0)))
+
+    def tearDown(self):
+        self.world.stop()
+        self.assertEqual(self.node.stop(), 0)
+
+    def start(self, points, status=ProximityArray.OK, **parameters):
+        self.world.points = np.array(points)
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        self.world.start_tf()
+        self.world.start_clouds()
+        self.node.wait_for_status(status)
+
+    def value(self, status, key):
+        if status not in self.node.diagnostics:
+            return None
+        return {v.key: v.value for v in self.node.diagnostics[status].values}.get(key)
+
+    def count(self, status, key):
+        return int(self.value(status, key) or 0)
+
+    def wait_for_input(self, level, words):
+        def said():
+            status = self.node.diagnostics.get("input cloud")
+            return status and status.level == level and words in status.message
+
+        self.node.wait_until(said, words)
+
+    def test_idle_topics(self):
+        """With nobody on ~markers and ~filtered_cloud they are not computed."""
+        self.start(ON_BALL + BESIDE)
+        markers = lambda: self.count("query", "markers drawn")  # noqa: E731
+        clouds = lambda: self.count("input cloud", "shown on ~filtered_cloud")  # noqa: E731
+        received = lambda: self.count("input cloud", "messages received")  # noqa: E731
+        self.node.wait_until(lambda: received() > 20, "clouds")
+        self.assertEqual((markers(), clouds()), (0, 0))
+
+        seen = []
+        subscribers = [
+            self.node.subscribe("markers", MarkerArray, seen.append),
+            self.node.subscribe("filtered_cloud", PointCloud2, seen.append),
+        ]
+        self.node.wait_until(lambda: markers() > 3 and clouds() > 3 and seen, "both topics")
+        for subscriber in subscribers:
+            subscriber.unregister()
+        # Once the node has noticed, the counts stand still while clouds go on.
+        last = [None, 0]
+
+        def stands_still():
+            now = (markers(), clouds())
+            if now != last[0]:
+                last[:] = [now, received()]
+            return received() > last[1] + 20
+
+        self.node.wait_until(stands_still, "no markers and no clouds")
+
+    def test_values(self):
+        short = {"query/deadline": 1e-9, "query/tolerance": 0.0}
+        self.start(ON_BALL + BESIDE, ProximityArray.DEGRADED, **short)
+        self.node.wait_until(lambda: self.count("query", "deadlines missed") > 10, "deadlines")
+        self.assertEqual(self.value("input cloud", "blind skin about the robot"), "20.00 mm")
+        self.node.wait_until(
+            lambda: (self.value("input cloud", "rate") or "0").split()[0] > "0", "a rate"
+        )
+
+    def test_doubts_of_the_self_filter(self):
+        self.start(ON_BALL + BESIDE)
+        self.wait_for_input(OK, "OK")
+        self.world.points = np.array(BESIDE * 10)
+        self.wait_for_input(WARN, "no point of the cloud is on the robot")
+        self.world.points = np.array(ON_BALL * 99 + BESIDE)
+        self.wait_for_input(WARN, "99.0 % of the cloud are on the robot")
+        self.world.points = np.array(ON_BALL + BESIDE)
+        self.wait_for_input(OK, "OK")
+        # Nothing in range is no reason for doubt.
+        self.world.points = np.array([[1e9, 0.0, 0.0]])
+        self.node.wait_for(lambda m: m.sources[0].points_used == 0, "the empty cloud")
+        self.wait_for_input(OK, "OK")
+
+    def test_without_self_filter(self):
+        self.start(BESIDE, self_filter=False)
+        self.wait_for_input(OK, "OK")
+        self.assertIsNone(self.value("input cloud", "blind skin about the robot"))
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("diagnostics_test")
+    rostest.rosrun("ist_proximity", "diagnostics_test", DiagnosticsTest, sys.argv)

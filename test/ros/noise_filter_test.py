@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+"""The noise filter: lone points go, surfaces stay, and a cloud of noise is no clear view."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+
+LONE = np.array([[0.0, 0.0, 0.3]])  # 0.2 m from the ball at the origin
+SIDE = 0.005 * np.arange(-5, 6)
+PATCH = np.array([[x, y, 0.5] for x in SIDE for y in SIDE])  # 0.4 m from it
+
+
+class NoiseFilterTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 0.8, 0)))
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        for message in self.node.messages:
+            pt.check_invariants(self, message)
+        self.assertEqual(self.node.stop(), 0)
+
+    def start(self, dtype="<f4", **parameters):
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        self.world.start_tf()
+        self.world.repeat(
+            20,
+            lambda: self.world.cloud_publisher.publish(pt.cloud(self.world.points, dtype=dtype)),
+        )
+
+    def check(self, distance, used):
+        message = self.node.wait_for(
+            lambda m: m.status == ProximityArray.OK and m.sources[0].points_used == used, "the cloud"
+        )
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, distance, 4)
+
+    def check_all(self, **parameters):
+        nan = np.full((3, 3), np.nan)
+        self.world.points = np.vstack([LONE, PATCH, nan, [[0.0, 0.0, 1e6]]])
+        self.start(**parameters)
+        self.check(0.4, len(PATCH))
+        self.node.wait_until(
+            lambda: "input cloud" in self.node.diagnostics
+            and {v.key: v.value for v in self.node.diagnostics["input cloud"].values}.get(
+                "points taken for noise"
+            )
+            == "1",
+            "the count",
+        )
+        # As many points as it takes are no noise.
+        self.world.points = LONE + 0.002 * np.arange(5)[:, None]
+        message = self.node.wait_for(lambda m: m.sources[0].points_used == 5, "five points")
+        self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
+        # Nothing but noise: nothing is known.
+        self.world.points = np.vstack([LONE, nan])
+        message = self.node.wait_for_status(ProximityArray.NO_CLOUD)
+        self.assertTrue(pt.all_unknown(message))
+
+    def test_single_source(self):
+        self.check_all(**{"noise_filter/radius": 0.02, "noise_filter/neighbors": 4})
+
+    def test_other_layouts(self):
+        source = {"topic": "cloud", "noise_filter": {"radius": 0.02}}
+        self.check_all(dtype=">f8", sources={"camera": source, "cloud": dict(source)})
+
+    def test_off(self):
+        self.world.points = np.vstack([LONE, PATCH])
+        self.start()
+        self.check(0.2, len(PATCH) + 1)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("noise_filter_test")
+    rostest.rosrun("ist_proximity", "noise_filter_test", NoiseFilterTest, sys.argv)

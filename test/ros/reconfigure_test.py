@@ -1,0 +1,88 @@
+#!/usr/bin/env python3
+"""dynamic_reconfigure: what may change while the node runs, at once and within its ranges."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from proximity_testing import ProximityArray
+
+
+class ReconfigureTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self.id().split(".")[-1]
+        self.world = pt.World(self.namespace)
+        self.world.stand(pt.transform(), pt.transform((0, 5, 0))).start_tf()
+        self.world.points = np.array([[0.3, 0.0, 0.0]])  # 0.2 m from the ball
+        self.world.start_clouds()
+        self.node = pt.ProximityNode(
+            self.namespace, {"query/margin": 0.02, "max_distance": 0.6}, pt.urdf()
+        )
+        self.node.wait_for_status(ProximityArray.OK)
+
+    def tearDown(self):
+        self.node.stop()
+        self.world.stop()
+
+    def client(self, group):
+        return Client(self.node.name + "/" + group, timeout=30)
+
+    def ball(self, words, check):
+        return self.node.wait_for(lambda m: check(pt.link(m, "ball_link")), words)
+
+    def test_groups(self):
+        query, repulsion = self.client("query"), self.client("repulsion")
+        # What was set at the start, and the defaults.
+        pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
+        self.assertAlmostEqual(query.get_configuration()["margin"], 0.02)
+        self.assertAlmostEqual(query.get_configuration()["tolerance"], 0.001)
+        described = {d["name"]: d for d in query.get_parameter_descriptions(timeout=30)}
+        self.assertEqual(described["tolerance"]["min"], 0.0)
+        self.assertEqual(described["tolerance"]["max"], 1.0)
+        self.assertAlmostEqual(described["margin"]["default"], 0.0)
+        self.assertEqual(described["margin"]["description"], "~query/margin [m]")
+
+        answer = query.update_configuration({"margin": 0.05, "tolerance": 0.0})
+        self.assertAlmostEqual(answer["margin"], 0.05)
+        self.ball("the margin", lambda ball: abs(ball.lower_bound - 0.15) < 1e-4)
+        self.assertAlmostEqual(rospy.get_param(self.node.name + "/query/margin"), 0.05)
+        answer = repulsion.update_configuration({"gain": 0.0})
+        self.ball("no gain", lambda ball: not pt.vector(ball.repulsion).any())
+
+        # Somebody else's change is shown, and not written over.
+        rospy.set_param(self.node.name + "/query/margin", 0.1)
+        pt.wait_until(lambda: query.get_configuration()["margin"] == 0.1, "the update")
+        query.update_configuration({"deadline": 0.5})
+        self.assertAlmostEqual(rospy.get_param(self.node.name + "/query/margin"), 0.1)
+        self.ball("the other margin", lambda ball: abs(ball.lower_bound - 0.1) < 1e-4)
+
+    def test_refusals(self):
+        """All of a request or nothing of it, and the answer says what holds."""
+        query = self.client("query")
+        pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
+        service = query._set_service  # the client itself would leave these out
+        for name, value in (
+            ("tolerance", -1.0),
+            ("tolerance", float("nan")),
+        ):
+            wrong = [DoubleParameter("margin", 0.07), DoubleParameter(name, value)]
+            answer = service(Config(doubles=wrong)).config
+            values = {one.name: one.value for one in answer.doubles}
+            self.assertAlmostEqual(values["margin"], 0.02)
+            self.assertAlmostEqual(values["tolerance"], 0.001)
+            self.assertNotAlmostEqual(
+                rospy.get_param(self.node.name + "/query").get("margin"), 0.07
+            )
+        self.node.wait_until(lambda: "~query/tolerance is -1 m" in self.node.log(), "the refusal")
+        self.ball("as before", lambda ball: abs(ball.distance - ball.lower_bound - 0.02) < 0.0011)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("reconfigure_test")
+    rostest.rosrun("ist_proximity", "reconfigure_test", ReconfigureTest, sys.argv)
