@@ -1,15 +1,19 @@
 // Does a robot that follows the answers dodge? 50 seeded scenes in the simulator, each without
 // avoidance, with the blended repulsion, and with the nearest pair's direction: as Markdown.
 //
-// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each]
+// Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each] [--self]
+//                    [--update-doc doc/dodge.md]
+//   --self  only the blend, and whether links of the arm come near one another
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -50,10 +54,10 @@ void print_each(const std::vector<SceneResult>& results, std::uint64_t first) {
   }
 }
 
-void print_table(const std::vector<SceneResult>& results) {
-  std::printf(
-      "\n| avoidance | collisions | smallest true distance, least / median | task done | goals | "
-      "acceleration noise | command steps |\n|---|---|---|---|---|---|---|\n");
+std::string table(const std::vector<SceneResult>& results) {
+  std::string text =
+      "| avoidance | collisions | smallest true distance, least / median | task done | goals | "
+      "acceleration noise | command steps |\n|---|---|---|---|---|---|---|\n";
   for (std::size_t m = 0; m < 3; ++m) {
     int collisions = 0, done = 0, goals = 0;
     std::vector<double> distance, noise, steps;
@@ -66,11 +70,27 @@ void print_table(const std::vector<SceneResult>& results) {
       noise.push_back(r.acceleration_noise);
       steps.push_back(r.largest_command_step);
     }
-    std::printf("| %s | %d | %.0f / %.0f mm | %d | %d | %.2f rad/s^2 | %.3f rad/s |\n", kNames[m],
-                collisions, *std::min_element(distance.begin(), distance.end()),
-                ist::benchmark::quantile(distance, 0.5), done, goals, ist::benchmark::mean(noise),
-                ist::benchmark::quantile(steps, 0.5));
+    std::array<char, 256> row{};
+    std::snprintf(row.data(), row.size(),
+                  "| %s | %d | %.0f / %.0f mm | %d | %d | %.2f rad/s^2 | %.3f rad/s |\n", kNames[m],
+                  collisions, *std::min_element(distance.begin(), distance.end()),
+                  ist::benchmark::quantile(distance, 0.5), done, goals, ist::benchmark::mean(noise),
+                  ist::benchmark::quantile(steps, 0.5));
+    text += row.data();
   }
+  return text;
+}
+
+/// Puts the table between its marks in a document.
+bool update(const std::string& path, const std::string& text) {
+  const std::string begin = "<!-- closed loop -->\n", end = "<!-- end of closed loop -->";
+  std::stringstream content;
+  content << std::ifstream(path).rdbuf();
+  std::string document = content.str();
+  const std::size_t from = document.find(begin), to = document.find(end);
+  if (from == std::string::npos || to == std::string::npos || to < from) return false;
+  document.replace(from + begin.size(), to - from - begin.size(), text);
+  return static_cast<bool>(std::ofstream(path) << document);
 }
 
 }  // namespace
@@ -80,15 +100,20 @@ int main(int argc, char** argv) {
   std::size_t count = 50;
   int threads = 1;
   double noise = -1.0;  // [m] negative: as the cameras have it
-  bool each = false;
+  std::string document;
+  bool each = false, only_self = false;
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
     if (std::strcmp(argv[i], "--each") == 0) {
       each = true;
+    } else if (std::strcmp(argv[i], "--self") == 0) {
+      only_self = true;
     } else if (std::strcmp(argv[i], "--first") == 0 && has_value) {
       first = static_cast<std::uint64_t>(std::atoll(argv[++i]));
     } else if (std::strcmp(argv[i], "--count") == 0 && has_value) {
       count = static_cast<std::size_t>(std::atoll(argv[++i]));
+    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
+      document = argv[++i];
     } else if (std::strcmp(argv[i], "--threads") == 0 && has_value) {
       threads = std::atoi(argv[++i]);
     } else if (std::strcmp(argv[i], "--noise") == 0 && has_value) {
@@ -114,8 +139,10 @@ int main(int argc, char** argv) {
       for (ist::sim::DepthCameraConfig& camera : scene.cameras) {
         if (noise >= 0.0) camera.noise = noise;
       }
+      config.check_self = only_self;
       for (std::size_t m = 0; m < 3; ++m) {
         config.avoidance = kModes[m];
+        if (only_self && config.avoidance != Avoidance::kBlend) continue;
         results[i].modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
       }
     }
@@ -125,7 +152,20 @@ int main(int argc, char** argv) {
   work();
   for (std::thread& thread : pool) thread.join();
 
+  if (only_self) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const ClosedLoopResult& r = results[i].modes[1];
+      std::printf("seed %d: obstacles %.1f mm, own links %.1f mm\n", static_cast<int>(first + i),
+                  1e3 * r.smallest_distance, 1e3 * r.smallest_self_distance);
+    }
+    return 0;
+  }
   if (each) print_each(results, first);
-  print_table(results);
+  std::printf("\n%s", table(results).c_str());
+  if (!document.empty() && !update(document, table(results))) {
+    std::fprintf(stderr, "%s cannot be written, or lacks the marks of the table\n",
+                 document.c_str());
+    return 1;
+  }
   return 0;
 }
