@@ -79,6 +79,7 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
   SurfaceCover cover(mesh, finder, &balls);
   std::optional<VolumeFiller> holes;
   if (!may_overlap) holes.emplace(bvh, finder, balls, kHoleShare * config.max_error);
+  if (holes) holes->stop_with(progress);
   cover.refine(config, holes ? &*holes : nullptr, share_of(progress, 0.0, kSurfaceShare));
   cover.sharpen();
   Packing packing;

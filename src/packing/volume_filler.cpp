@@ -15,6 +15,8 @@ constexpr double kClimbAt = 0.5;
 // In an open mesh, what is less inside than this has no inside nearby.
 constexpr double kHardlyInside = 0.2;
 constexpr double kFinestSearch = 0.25;
+// Steps of a search between two questions whether to go on.
+constexpr std::uint32_t kStopInterval = 256;
 
 }  // namespace
 
@@ -90,8 +92,14 @@ void VolumeFiller::revise_prototypes() {
   }
 }
 
+bool VolumeFiller::is_stopped() {
+  if (!stopped_ && ++steps_ % kStopInterval == 0 && progress_) stopped_ = !progress_(0.0);
+  return stopped_;
+}
+
 std::optional<MedialBallFinder::InnerBall> VolumeFiller::next(double at_least) {
   for (;;) {
+    if (is_stopped()) return std::nullopt;
     revise_prototypes();
     const double found = prototypes_.empty() ? 0.0 : prototypes_.front().ball.radius;
     if (cells_.empty() || cells_.front().bound <= std::max(found / kEnough, at_least)) {

@@ -3,10 +3,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "ball_search.h"
 #include "ist_proximity/geometry/triangle_bvh.h"
+#include "ist_proximity/packing/packing.h"
 #include "medial_ball.h"
 
 namespace ist {
@@ -23,6 +25,10 @@ class VolumeFiller {
   /// @param min_radius  [m] smaller balls are not looked for
   VolumeFiller(const TriangleBvh& bvh, const MedialBallFinder& finder, const BallSearch& balls,
                double min_radius);
+
+  /// Ends the search when `progress` returns false, which is asked every now and then: on a mesh
+  /// with holes one search can take minutes.
+  void stop_with(PackingProgress progress) { progress_ = std::move(progress); }
 
   /// The next ball, which must be added to `balls`; nothing when none of radius `at_least` [m]
   /// fits.
@@ -54,6 +60,7 @@ class VolumeFiller {
   void add_cell(const Eigen::Vector3d& center, double half, const Cell* parent);
   void add_prototype(const Eigen::Vector3d& start);
   void revise_prototypes();
+  bool is_stopped();
   bool update(Cell* cell) const;
   std::uint32_t count() const { return static_cast<std::uint32_t>(balls_.size()); }
 
@@ -63,6 +70,9 @@ class VolumeFiller {
   const double min_radius_;
   std::vector<Cell> cells_;            // heap
   std::vector<Prototype> prototypes_;  // heap
+  PackingProgress progress_;
+  std::uint32_t steps_ = 0;
+  bool stopped_ = false;
 };
 
 }  // namespace ist

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
+#include <limits>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "ist_proximity/packing/packer.h"
@@ -38,6 +39,16 @@ Packing solid_balls(const Packing& packing) {
   return tight;
 }
 
+/// Holds the surface, where the packing covers it.
+Eigen::AlignedBox3d covered_box(const Packing& packing) {
+  Eigen::AlignedBox3d box;
+  for (const Ball& ball : packing.balls) {
+    box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
+    box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
+  }
+  return box;
+}
+
 ContactLeaf make_leaf(const SphereLeaf& leaf) {
   ContactLeaf result{};
   for (int k = 0; k < kSphereWidth; ++k) {
@@ -62,34 +73,48 @@ std::size_t find_ball(const std::vector<Ball>& balls, const Eigen::Vector3f& cen
   return best;
 }
 
-/// One element's packing, from the cache or made. Null: cancelled.
-std::optional<Packing> pack(const Shape& shape, const PackingConfig& config, double time_limit,
-                            const PackingCache& cache, const std::function<bool()>& cancelled,
-                            ContactBody* body) {
+enum class Outcome { kDone, kLate, kCancelled };
+
+/// One element's packing, from the cache or made.
+Outcome pack(const Shape& shape, const PackingConfig& config, double time_limit,
+             const PackingCache& cache, const std::function<bool()>& cancelled, bool* from_cache,
+             Packing* packing) {
   const std::string key = packing_key(shape, config);
   std::string warning;
-  std::optional<Packing> packing = cache.load(key, &warning);
-  body->from_cache = body->from_cache && packing.has_value();
-  if (packing) return packing;
+  if (std::optional<Packing> cached = cache.load(key, &warning)) {
+    *packing = std::move(*cached);
+    return Outcome::kDone;
+  }
+  *from_cache = false;
   const auto start = Clock::now();
   bool is_cancelled = false, is_late = false;
-  packing = pack_element(shape, config, [&](double) {
+  *packing = pack_element(shape, config, [&](double) {
     is_cancelled = is_cancelled || (cancelled && cancelled());
     is_late = is_late || seconds_since(start) > time_limit;
     return !is_cancelled && !is_late;
   });
-  if (is_cancelled) return std::nullopt;
-  if (is_late) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "packing its volume was broken off after %.0f s, with %zu balls; less for "
-                  "~penetration/max_spheres is quicker",
-                  time_limit, packing->balls.size());
-    body->note = text;
-    return packing;  // how far it got is the machine's matter: not for the cache
-  }
+  if (is_cancelled) return Outcome::kCancelled;
+  // How far it got is the machine's matter: not for the cache.
+  if (is_late) return Outcome::kLate;
   cache.store(key, *packing, &warning);
-  return packing;
+  return Outcome::kDone;
+}
+
+/// The packing of all elements.
+Outcome pack_link(const LinkGeometry& geometry, std::size_t attached, const ContactConfig& config,
+                  const PackingCache& cache, const std::function<bool()>& cancelled,
+                  bool* from_cache, Packing* packing) {
+  const std::vector<PackingConfig> configs = link_configs(geometry, attached, config.packing);
+  std::vector<Packing> packings(geometry.size());
+  std::vector<const Packing*> pointers;
+  for (std::size_t e = 0; e < geometry.size(); ++e) {
+    const Outcome outcome = pack(geometry[e].shape, configs[e], config.time_limit, cache, cancelled,
+                                 from_cache, &packings[e]);
+    if (outcome != Outcome::kDone) return outcome;
+    pointers.push_back(&packings[e]);
+  }
+  *packing = combine(geometry, pointers);
+  return Outcome::kDone;
 }
 
 }  // namespace
@@ -111,7 +136,7 @@ ContactBody make_contact_body(const LinkGeometry& geometry, const Solid& solid,
   }
   body.tree = InnerSphereTree(tight);
   body.ball_count = tight.balls.size();
-  const VolumeShares shares = volume_shares(tight.balls, solid);
+  const VolumeShares shares = volume_shares(tight.balls, covered_box(packing), solid);
   body.volume = shares.volume;
   body.packed_volume = shares.packed_volume;
   const WayOut way_out(geometry, solid);
@@ -136,30 +161,44 @@ ContactBody make_contact_body(const LinkGeometry& geometry, const Solid& solid,
   return body;
 }
 
+Packing disjoint_part(const Packing& packing, std::size_t count) {
+  std::vector<Ball> balls = packing.balls;
+  std::stable_sort(balls.begin(), balls.end(),
+                   [](const Ball& a, const Ball& b) { return a.radius > b.radius; });
+  Packing part;
+  for (const Ball& ball : balls) {
+    if (part.balls.size() == count || !(ball.radius > 0.0)) break;
+    const bool fits = std::all_of(part.balls.begin(), part.balls.end(), [&](const Ball& other) {
+      return (ball.center - other.center).norm() >= ball.radius + other.radius;
+    });
+    if (fits) part.balls.push_back(ball);
+  }
+  return part;
+}
+
 std::shared_ptr<const ContactBody> build_contact_body(const LinkGeometry& geometry,
-                                                      std::size_t attached, const Solid& solid,
+                                                      std::size_t attached, const LinkModel& link,
                                                       const ContactConfig& config,
                                                       const std::string& cache_directory,
                                                       const std::function<bool()>& cancelled) {
   const auto start = Clock::now();
-  const PackingCache cache(cache_directory);
-  const std::vector<PackingConfig> configs = link_configs(geometry, attached, config.packing);
-  ContactBody progress;
-  progress.from_cache = true;
-  std::vector<Packing> packings;
-  for (std::size_t e = 0; e < geometry.size(); ++e) {
-    std::optional<Packing> one =
-        pack(geometry[e].shape, configs[e], config.time_limit, cache, cancelled, &progress);
-    if (!one) return nullptr;
-    packings.push_back(std::move(*one));
+  Packing packing;
+  bool from_cache = true;
+  const Outcome outcome = pack_link(geometry, attached, config, PackingCache(cache_directory),
+                                    cancelled, &from_cache, &packing);
+  if (outcome == Outcome::kCancelled) return nullptr;
+  const bool is_late = outcome == Outcome::kLate;
+  if (is_late) {
+    packing = disjoint_part(link.packing, static_cast<std::size_t>(config.packing.max_spheres));
   }
-  std::vector<const Packing*> pointers;
-  pointers.reserve(packings.size());
-  for (const Packing& packing : packings) pointers.push_back(&packing);
-  auto body = std::make_shared<ContactBody>(
-      make_contact_body(geometry, solid, combine(geometry, pointers)));
-  body->from_cache = progress.from_cache;
-  if (body->note.empty()) body->note = progress.note;
+  auto body = std::make_shared<ContactBody>(make_contact_body(geometry, link.solid, packing));
+  if (is_late && body->note.empty()) {
+    std::ostringstream text;
+    text << "packing its volume was broken off after " << config.time_limit
+         << " s; a disjoint part of its packing for distances, coarser, takes its place";
+    body->note = text.str();
+  }
+  body->from_cache = from_cache;
   body->time = seconds_since(start);
   return body;
 }

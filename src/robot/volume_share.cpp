@@ -1,6 +1,6 @@
 #include "volume_share.h"
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -23,27 +23,27 @@ double kept(const std::vector<Ball>& balls, std::size_t i) {
   return ball_volume(balls[i].radius) / shared;
 }
 
-/// The ball of least power, and whether it holds the point.
-std::size_t least_power(const std::vector<Ball>& balls, const Eigen::Vector3d& p, double* power) {
+/// The ball of least power.
+std::size_t least_power(const std::vector<Ball>& balls, const Eigen::Vector3d& p) {
   std::size_t best = 0;
-  *power = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const double own = (p - balls[i].center).squaredNorm() - balls[i].radius * balls[i].radius;
-    if (own >= *power) continue;
-    *power = own;
+    if (own >= least) continue;
+    least = own;
     best = i;
   }
   return best;
 }
 
+/// How much of a grid cell is beyond a surface, as if that were flat and parallel to the grid. All
+/// or nothing would miss half a cell along whole faces.
+double beyond(double distance, double step) { return std::clamp(0.5 + distance / step, 0.0, 1.0); }
+
 }  // namespace
 
-VolumeShares volume_shares(const std::vector<Ball>& balls, const Solid& solid) {
-  Eigen::AlignedBox3d box;
-  for (const Ball& ball : balls) {
-    box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
-    box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
-  }
+VolumeShares volume_shares(const std::vector<Ball>& balls, const Eigen::AlignedBox3d& box,
+                           const Solid& solid) {
   std::vector<double> voids(balls.size(), 0.0);
   const double step = std::cbrt(box.volume() / kGridPoints);
   const Eigen::Array3d counts = (box.sizes().array() / step).ceil().max(1.0);
@@ -52,9 +52,12 @@ VolumeShares volume_shares(const std::vector<Ball>& balls, const Solid& solid) {
     for (double y = 0.5; y < counts.y(); ++y) {
       for (double z = 0.5; z < counts.z(); ++z) {
         const Eigen::Vector3d p = box.min() + (Eigen::Array3d(x, y, z) * steps).matrix();
-        double power;
-        const std::size_t ball = least_power(balls, p, &power);
-        if (power > 0.0 && solid.is_inside(p)) voids[ball] += steps.prod();
+        const std::size_t i = least_power(balls, p);
+        const double outside = beyond((p - balls[i].center).norm() - balls[i].radius, step);
+        if (!(outside > 0.0)) continue;
+        const double inside = beyond(-solid.signed_distance(p).distance, step);
+        // Where a void is thinner than a cell, ball and surface are about parallel.
+        voids[i] += steps.prod() * std::max(outside + inside - 1.0, 0.0);
       }
     }
   }

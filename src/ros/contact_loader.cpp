@@ -82,8 +82,8 @@ void ContactLoader::load(const std::shared_ptr<const ModelState>& state) {
     if (link == nullptr || !robot.links[i].usable()) continue;
     std::shared_ptr<const ContactBody> body;
     try {
-      body = build_contact_body(link->geometry, link->attached, robot.links[i].solid,
-                                config_.contacts, config_.model.cache_directory, cancelled);
+      body = build_contact_body(link->geometry, link->attached, robot.links[i], config_.contacts,
+                                config_.model.cache_directory, cancelled);
     } catch (const std::exception& error) {  // ModelError, or no memory
       body = no_body(std::string("its volume cannot be packed: ") + error.what());
     }

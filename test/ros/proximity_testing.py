@@ -421,6 +421,8 @@ def check_invariants(test, message, max_distance=1.0):
             if one.state == LinkProximity.NEAR:
                 test.assertGreaterEqual(one.distance, 0.0)
                 test.assertFalse(wrench.any())
+            else:  # all or nothing is known
+                test.assertIn(np.isfinite(wrench).sum(), (0, 6))
     if message.status == ProximityArray.OK:
         test.assertEqual(message.status_text, "")
         test.assertFalse(all_unknown(message) and message.links)

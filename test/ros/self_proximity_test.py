@@ -78,6 +78,13 @@ class SelfProximityTest(unittest.TestCase):
         self.assertLess(one.distance, 0.0)
         self.check_vectors(one)
 
+        message = node.wait_for(
+            lambda m: np.isfinite(pt.vector(pt.link(m, "ball_link").penetration.force)).all(),
+            "contact forces",
+        )
+        forces = [pt.vector(one.penetration.force) for one in message.links]
+        np.testing.assert_allclose(forces[0], -forces[1], atol=1e-9)
+
         self.joints.paused = True
         message = node.wait_for_status(ProximityArray.NO_POSE, "'turn'")
         self.assertTrue(pt.all_unknown(message))

@@ -16,8 +16,9 @@ namespace ist {
 /// How the balls that contact volumes are summed over are made.
 struct ContactConfig {
   PackingConfig packing = {0.002, 500, PackingOrder::kDisjoint};
-  /// [s] packing of one element is broken off after it, and goes on with the balls there are; > 0.
-  double time_limit = 60.0;
+  /// [s] packing of one element is broken off after it, and a disjoint part of the packing for
+  /// distances taken in its place; > 0.
+  double time_limit = 30.0;
 };
 
 /// Up to eight balls of a disjoint packing, side by side for SIMD, in the link's frame.
@@ -68,14 +69,18 @@ const ContactBody* find_body(const ContactModel* contacts, const RobotModel& rob
 /// has a body without balls and a note.
 /// @param geometry   of the link, attached objects last
 /// @param attached   number of attached objects
+/// @param link       the same link, packed for distances
 /// @param cancelled  may be empty
 /// @returns null when cancelled
 /// @throws ModelError when an element cannot be packed
 std::shared_ptr<const ContactBody> build_contact_body(const LinkGeometry& geometry,
-                                                      std::size_t attached, const Solid& solid,
+                                                      std::size_t attached, const LinkModel& link,
                                                       const ContactConfig& config,
                                                       const std::string& cache_directory,
                                                       const std::function<bool()>& cancelled = {});
+
+/// The largest balls of a packing that do not overlap, `count` at most, the largest first.
+Packing disjoint_part(const Packing& packing, std::size_t count);
 
 /// Of a packing that is there.
 /// @param packing  disjoint within each element

@@ -1,0 +1,256 @@
+// doc/contact.md states how near contact volumes come to the true ones, and how smooth wrenches
+// are. This measures it again: what is measured must stay below what is stated, and every row must
+// be known here. IST_PROXIMITY_UPDATE_DOC=1 writes the tables.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "support/accuracy.h"
+#include "support/contact_oracle.h"
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+
+namespace ist {
+namespace {
+
+using test::ContactLink;
+using test::one;
+
+const std::string kDocument = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/contact.md";
+
+bool updating() { return std::getenv("IST_PROXIMITY_UPDATE_DOC") != nullptr; }
+
+// What a row states, in its last columns.
+using Rows = std::map<std::string, std::vector<double>>;
+
+// What is stated of a value: half as much again, two digits.
+double limit(double value) {
+  const double wanted = std::max(1.5 * value, 0.01);
+  const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1.0);
+  return std::ceil(wanted / unit) * unit;
+}
+
+std::string table(const std::string& header, const Rows& rows) {
+  const auto columns = std::count(header.begin(), header.end(), '|') - 1;
+  std::string text = header + "\n|";
+  for (long i = 0; i < columns; ++i) text += "---|";
+  text += "\n";
+  for (const auto& [key, values] : rows) {
+    text += "| " + key;
+    for (const double value : values) text += " | " + test::number(limit(value));
+    text += " |\n";
+  }
+  return text;
+}
+
+void check(const std::string& name, const std::string& header, const Rows& rows) {
+  if (updating()) {
+    std::string text = test::read_text(kDocument);
+    const auto [first, last] = test::table_place(text, name);
+    ASSERT_GT(last, 0U) << kDocument << " lacks the marks of " << name;
+    text.replace(first, last - first, table(header, rows));
+    std::ofstream(kDocument) << text;
+  }
+  std::size_t known = 0;
+  for (const std::vector<std::string>& row : test::parse_table(test::read_text(kDocument), name)) {
+    const std::size_t width = rows.begin()->second.size();
+    ASSERT_GT(row.size(), width);
+    std::string key = row[0];
+    for (std::size_t i = 1; i + width < row.size(); ++i) key += " | " + row[i];
+    SCOPED_TRACE(key);
+    const auto found = rows.find(key);
+    ASSERT_NE(found, rows.end()) << "a row that no test measures";
+    ++known;
+    for (std::size_t i = 0; i < width; ++i) {
+      if (test::kSanitized) continue;  // packings are coarser there
+      EXPECT_LE(found->second[i], std::stod(row[row.size() - width + i])) << "column " << i;
+    }
+  }
+  EXPECT_EQ(known, rows.size()) << "a row that is not stated";
+}
+
+bool holds(const Shape& shape, const Eigen::Vector3d& p) {
+  if (const auto* ball = std::get_if<Sphere>(&shape)) return p.norm() < ball->radius;
+  return (p.cwiseAbs() - 0.5 * std::get<Box>(shape).size).maxCoeff() < 0.0;
+}
+
+Eigen::Vector3d half_extent(const Shape& shape) {
+  if (const auto* ball = std::get_if<Sphere>(&shape))
+    return Eigen::Vector3d::Constant(ball->radius);
+  return 0.5 * std::get<Box>(shape).size;
+}
+
+// The overlap of two bodies by counting eighty steps along each axis of the first one's box.
+double true_overlap(const Shape& a, const Shape& b, const Eigen::Isometry3d& X_AB) {
+  constexpr int kSteps = 80;
+  const Eigen::Vector3d half = half_extent(a), step = 2.0 * half / kSteps;
+  const Eigen::Isometry3d X_BA = X_AB.inverse();
+  long inside = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      for (int k = 0; k < kSteps; ++k) {
+        const Eigen::Vector3d p =
+            step.cwiseProduct(Eigen::Vector3d(i + 0.5, j + 0.5, k + 0.5)) - half;
+        if (holds(a, p) && holds(b, X_BA * p)) ++inside;
+      }
+    }
+  }
+  return static_cast<double>(inside) * step.prod();
+}
+
+// A ball as a mesh of its volume, so that its packing has many balls.
+LinkGeometry packed_shape(const Shape& shape) {
+  const auto* ball = std::get_if<Sphere>(&shape);
+  if (ball == nullptr) return one(shape);
+  TriangleMesh mesh = test::icosphere(ball->radius, 3);
+  const double volume = 4.0 * M_PI / 3.0 * std::pow(ball->radius, 3);
+  const double scale = std::cbrt(volume / test::signed_volume(mesh));
+  for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
+  return one(mesh);
+}
+
+struct Pair {
+  std::string name;
+  Shape first, second;
+};
+
+std::vector<Pair> pairs() {
+  return {{"two balls", Sphere{0.1}, Sphere{0.07}},
+          {"ball and box", Sphere{0.1}, Box{{0.2, 0.15, 0.1}}},
+          {"box and box", Box{{0.2, 0.15, 0.1}}, Box{{0.15, 0.1, 0.12}}}};
+}
+
+// Overlaps of at least a twentieth of the smaller body, at random.
+std::vector<Eigen::Isometry3d> overlapping_poses(const Pair& pair, int count) {
+  test::Rng rng(401);
+  const auto volume = [](const Shape& shape) {
+    return true_overlap(shape, shape, Eigen::Isometry3d::Identity());
+  };
+  const double enough = 0.05 * std::min(volume(pair.first), volume(pair.second));
+  std::vector<Eigen::Isometry3d> poses;
+  while (static_cast<int>(poses.size()) < count) {
+    const Eigen::Isometry3d X = test::random_pose(&rng, 0.1);
+    if (true_overlap(pair.first, pair.second, X) > enough) poses.push_back(X);
+  }
+  return poses;
+}
+
+TEST(ContactDocument, BodyAgainstBody) {
+  Rows rows;
+  for (const Pair& pair : pairs()) {
+    const auto poses = overlapping_poses(pair, test::scaled(20));
+    for (const int spheres : {50, 200, 1000}) {
+      const ContactLink a(packed_shape(pair.first), spheres), b(packed_shape(pair.second), spheres);
+      double sum = 0.0, largest = 0.0;
+      for (const Eigen::Isometry3d& X_AB : poses) {
+        const double truth = true_overlap(pair.first, pair.second, X_AB);
+        const ContactVolume found = contact_volume(*a.body, *b.body, X_AB);
+        const double error = found.volume / truth - 1.0;
+        sum += std::abs(error);
+        largest = std::max(largest, std::abs(error));
+      }
+      const auto count = static_cast<double>(poses.size());
+      char key[64];
+      std::snprintf(key, sizeof key, "%s | %d", pair.name.c_str(), spheres);
+      rows[key] = {100.0 * sum / count, 100.0 * largest};
+    }
+  }
+  check("bodies", "| bodies | spheres each | mean error [%] | largest error [%] |", rows);
+}
+
+std::vector<Eigen::Vector3d> samples(const Shape& shape, double spacing) {
+  const Eigen::Vector3d half = half_extent(shape);
+  std::vector<Eigen::Vector3d> points;
+  for (double x = -half.x() + 0.5 * spacing; x < half.x(); x += spacing) {
+    for (double y = -half.y() + 0.5 * spacing; y < half.y(); y += spacing) {
+      for (double z = -half.z() + 0.5 * spacing; z < half.z(); z += spacing) {
+        if (holds(shape, {x, y, z})) points.emplace_back(x, y, z);
+      }
+    }
+  }
+  return points;
+}
+
+// The second body is a cloud that fills it, its points three to a cell's edge.
+TEST(ContactDocument, CloudThatFillsABody) {
+  Rows rows;
+  for (const Pair& pair : pairs()) {
+    const auto poses = overlapping_poses(pair, test::scaled(10));
+    const ContactLink link(packed_shape(pair.first), 500, 0.002);
+    for (const int cell : {20, 10}) {
+      const double thinning = 1e-3 * cell;
+      const CloudSnapshot cloud = test::thinned(samples(pair.second, thinning / 3.0), thinning);
+      double sum = 0.0, largest = 0.0;
+      for (const Eigen::Isometry3d& X_AB : poses) {
+        const ContactVolume found =
+            contact_volume(link.link(), *link.body, X_AB.inverse(), {&cloud});
+        const double truth = true_overlap(pair.first, pair.second, X_AB);
+        sum += std::abs(found.volume / truth - 1.0);
+        largest = std::max(largest, std::abs(found.volume / truth - 1.0));
+      }
+      rows[pair.name + " | " + std::to_string(cell)] = {
+          100.0 * sum / static_cast<double>(poses.size()), 100.0 * largest};
+    }
+  }
+  check("clouds", "| bodies | cell [mm] | mean error [%] | largest error [%] |", rows);
+}
+
+// The largest changes of a force along a way, per step, as a share of the largest force on it.
+std::vector<double> jumps(const std::function<ContactVolume(double)>& at, double from, double to) {
+  constexpr double kStep = 1e-4;  // [m]
+  ContactVolume before = at(from);
+  double force = 0.0, step = 0.0, turn = 0.0, turn_step = 0.0;
+  for (double s = from + kStep; s <= to; s += kStep) {
+    const ContactVolume now = at(s);
+    force = std::max(force, now.push.norm());
+    turn = std::max(turn, now.turn.norm());
+    step = std::max(step, (now.push - before.push).norm());
+    turn_step = std::max(turn_step, (now.turn - before.turn).norm());
+    before = now;
+  }
+  // Where nothing turns but rounding.
+  const double percent = turn > 0.01 * force * 0.1 ? 100.0 * turn_step / turn : 0.0;
+  return {100.0 * step / force, percent};
+}
+
+Eigen::Isometry3d along(double s) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = s * Eigen::Vector3d(1.0, 0.3, -0.2).normalized();
+  return X;
+}
+
+TEST(ContactDocument, ForcesDoNotJump) {
+  Rows rows;
+  const ContactLink big(one(Sphere{0.1}), 1), small(one(Sphere{0.04}), 1);
+  const ContactLink box(one(Box{{0.2, 0.15, 0.1}}), 500),
+      small_box(one(Box{{0.05, 0.04, 0.03}}), 200);
+  const auto bodies = [](const ContactLink& a, const ContactLink& b) {
+    return [&a, &b](double s) { return contact_volume(*a.body, *b.body, along(s)); };
+  };
+  rows["ball through a ball, concentric"] = jumps(bodies(big, small), -0.15, 0.15);
+  rows["ball through a ball of its size, concentric"] = jumps(bodies(big, big), -0.21, 0.21);
+  rows["ball through a box"] = jumps(bodies(box, small), -0.16, 0.16);
+  rows["small box through a box, wholly inside"] = jumps(bodies(box, small_box), -0.15, 0.15);
+  const CloudSnapshot point = test::thinned({Eigen::Vector3d::Zero()});
+  const CloudSnapshot block = test::thinned(samples(Box{{0.06, 0.06, 0.06}}, 0.003));
+  const auto cloud = [](const ContactLink& a, const CloudSnapshot& obstacle) {
+    return [&a, &obstacle](double s) {
+      return contact_volume(a.link(), *a.body, along(-s), {&obstacle});
+    };
+  };
+  rows["one point through a ball, concentric"] = jumps(cloud(big, point), -0.12, 0.12);
+  rows["one point through a box"] = jumps(cloud(box, point), -0.12, 0.12);
+  rows["filled cloud through a box"] = jumps(cloud(box, block), -0.15, 0.15);
+  check("jumps", "| way | force [%] | torque [%] |", rows);
+}
+
+}  // namespace
+}  // namespace ist

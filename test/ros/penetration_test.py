@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+"""The contact wrench: zero apart, out of the obstacle in contact, without jumps, NaN where unknown."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+
+# A wall across x = 0, larger than the box's side.
+Y, Z = np.meshgrid(np.arange(-0.3, 0.3, 0.005), np.arange(-0.4, 0.4, 0.005))
+WALL = np.column_stack([np.zeros(Y.size), Y.ravel(), Z.ravel()])
+TILT = pt.transform((0.4, -0.3, 0.2), axis=(0.6, 0.0, 0.8), angle=0.5)  # of the scene in base
+
+
+def box_at(depth):
+    """The box reaches `depth` through the wall from its +x side, with its middle at y = z = 0."""
+    x = pt.BOX_SIZE[0] / 2 - depth - pt.BOX_OFFSET[0]
+    return TILT @ pt.transform((x, -pt.BOX_OFFSET[1], -pt.BOX_OFFSET[2]))
+
+
+def wrench(message, name="box_link"):
+    one = pt.link(message, name).penetration
+    return np.hstack([pt.vector(one.force), pt.vector(one.torque)])
+
+
+class PenetrationTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace, TILT).stand(pt.transform((5, 0, 0)), box_at(-0.1))
+        self.world.points = WALL
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        for message in self.node.messages:
+            pt.check_invariants(self, message)
+        self.assertEqual(self.node.stop(), 0)
+
+    def start(self, **parameters):
+        parameters = {"self_filter": False, "query/tolerance": 0.0, **parameters}
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        self.world.start_tf()
+        self.world.start_clouds()
+        return self.node
+
+    def move(self, depth, known=True):
+        """The first message with the box there."""
+        self.world.poses["box_link"] = ("base", box_at(depth))
+        return self.node.wait_for(
+            lambda m: m.status == ProximityArray.OK
+            and abs(pt.link(m, "box_link").distance + depth) < 1e-4
+            and np.isfinite(wrench(m)).all() == known,
+            "the box %.3f m in the wall" % depth,
+        )
+
+    def test_through_touch_and_back(self):
+        node = self.start()
+        message = self.move(-0.1)
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.NEAR)
+        self.assertFalse(wrench(message).any())
+        self.move(0.03)  # the disjoint packing is there when this is finite
+        out = TILT[:3, 0]
+        forces = []
+        depths = np.arange(-0.002, 0.0201, 0.001)
+        for depth in depths:
+            message = self.move(depth)
+            box = pt.link(message, "box_link")
+            self.assertEqual(box.state == LinkProximity.CONTACT, depth > 0)
+            found = wrench(message)
+            forces.append(found[:3] @ out)
+            if depth <= 0:
+                self.assertFalse(found.any())
+            elif depth >= 0.01:
+                self.assertGreater(found[:3] @ out, 0.98 * np.linalg.norm(found[:3]))
+                # The wall is the same on all sides of the box's middle, which is off the origin.
+                middle = box_at(depth)[:3, :3] @ pt.BOX_OFFSET
+                moment = found[3:] - np.cross(middle, found[:3])
+                self.assertLess(np.linalg.norm(moment), 0.02 * np.linalg.norm(found[:3]))
+        self.assertGreater(forces[-1], 0.0)
+        self.assertLess(np.abs(np.diff(forces)).max(), 0.35 * max(forces))
+
+        rospy.set_param(node.name + "/penetration/stiffness", 3e5)
+        message = node.wait_for(
+            lambda m: np.linalg.norm(wrench(m)[:3]) > 2.5 * forces[-1], "three times the stiffness"
+        )
+        self.assertAlmostEqual(wrench(message)[:3] @ out / forces[-1], 3.0, 1)
+        node.wait_until(
+            lambda: "model" in node.diagnostics
+            and any(
+                v.key == "contact volumes" and v.value == "ready"
+                for v in node.diagnostics["model"].values
+            ),
+            "the volumes in the diagnostics",
+        )
+
+    def test_switched_off(self):
+        node = self.start(**{"penetration/enabled": False})
+        self.assertFalse(wrench(self.move(-0.05)).any())
+        message = self.move(0.03, known=False)
+        self.assertTrue(np.isnan(wrench(message)).all())
+        node.wait_until(
+            lambda: "model" in node.diagnostics
+            and any(
+                v.key == "contact volumes" and "penetration/enabled" in v.value
+                for v in node.diagnostics["model"].values
+            ),
+            "why, in the diagnostics",
+        )
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("penetration_test")
+    rostest.rosrun("ist_proximity", "penetration_test", PenetrationTest, sys.argv)

@@ -1,0 +1,191 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/geometry/lens.h"
+#include "ist_proximity/proximity/contact_volume.h"
+#include "support/random_links.h"
+#include "support/scene.h"
+
+/// Contact volumes by brute force in double: all balls of the link against all of the obstacle.
+namespace ist::test {
+
+/// A ball of a contact body, taken out of its leaves.
+struct OracleBall {
+  Eigen::Vector3d center;  ///< [m] link frame
+  double radius, share;
+  Eigen::Vector3d out;
+  Eigen::Matrix3d slope;
+
+  /// The way out at p, shortened where it is undecided.
+  Eigen::Vector3d way_out(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d o = out + slope * (p - center);
+    return o / std::sqrt(o.squaredNorm() + 0.2 * 0.2);
+  }
+};
+
+inline std::vector<OracleBall> balls_of(const ContactBody& body) {
+  std::vector<OracleBall> balls;
+  for (const ContactLeaf& leaf : body.leaves) {
+    for (int k = 0; k < kSphereWidth; ++k) {
+      if (!(leaf.radius[k] > 0.0F)) continue;
+      OracleBall ball{{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.radius[k], leaf.share[k], {}, {}};
+      for (int i = 0; i < 3; ++i) ball.out[i] = leaf.out[i][k];
+      for (int i = 0; i < 9; ++i) ball.slope(i / 3, i % 3) = leaf.slope[i][k];
+      balls.push_back(ball);
+    }
+  }
+  return balls;
+}
+
+/// The lens's middle, from the extents of both balls along the line of their centres.
+inline Eigen::Vector3d oracle_lens_middle(const Eigen::Vector3d& a, double R,
+                                          const Eigen::Vector3d& b, double r) {
+  const double d = (b - a).norm();
+  if (!(d > 0.0)) return a;
+  const double low = std::max(-R, d - r), high = std::min(R, d + r);
+  return a + 0.5 * (low + high) / d * (b - a);
+}
+
+/// pi s^2 (...) / 12 d with the smaller ball where the other one holds it, as the formula stands.
+inline double oracle_lens(double R, double r, double d) {
+  if (d >= R + r) return 0.0;
+  if (d <= std::abs(R - r)) return 4.0 * M_PI / 3.0 * std::pow(std::min(R, r), 3);
+  return M_PI * (R + r - d) * (R + r - d) * (d * d + 2.0 * d * (R + r) - 3.0 * (R - r) * (R - r)) /
+         (12.0 * d);
+}
+
+/// A ball of the obstacle and its weight, in the link's frame.
+inline void oracle_add(const std::vector<OracleBall>& balls, const Eigen::Vector3d& center,
+                       double radius, double weight, ContactVolume* sum) {
+  for (const OracleBall& ball : balls) {
+    const double volume =
+        weight * ball.share * oracle_lens(ball.radius, radius, (center - ball.center).norm());
+    if (!(volume > 0.0)) continue;
+    const Eigen::Vector3d middle = oracle_lens_middle(ball.center, ball.radius, center, radius);
+    const Eigen::Vector3d push = -volume * ball.way_out(middle);
+    sum->volume += volume;
+    sum->push += push;
+    sum->turn += middle.cross(push);
+  }
+}
+
+inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
+  std::vector<Eigen::Vector3d> points;
+  for (const PointTile& tile : cloud.coarse.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      points.push_back(cloud.coarse.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]));
+    }
+  }
+  return points;
+}
+
+/// How much of a ball's weight its depth in the link leaves.
+inline double oracle_depth_weight(const LinkModel& link, const Eigen::Vector3d& p_L,
+                                  double radius) {
+  double depth = 0.0;
+  for (const Ball& ball : link.packing.balls) {
+    depth = std::max(depth, ball.radius - (p_L - ball.center).norm());
+  }
+  return std::min(depth / (kFullDepth * radius), 1.0);
+}
+
+inline ContactVolume oracle_contact(const LinkModel& link, const ContactBody& body,
+                                    const Eigen::Isometry3d& X_FL,
+                                    const std::vector<const CloudSnapshot*>& clouds) {
+  const std::vector<OracleBall> balls = balls_of(body);
+  ContactVolume sum;
+  for (const CloudSnapshot* cloud : clouds) {
+    const double radius = kBallPerCell * cloud->thinning;
+    for (const Eigen::Vector3d& p_F : points_F(*cloud)) {
+      const Eigen::Vector3d p_L = X_FL.inverse() * p_F;
+      const double weight = oracle_depth_weight(link, p_L, radius);
+      if (!(weight > 0.0)) continue;
+      double shared = 0.0;
+      for (const CloudSnapshot* other : clouds) {
+        const double other_radius = kBallPerCell * other->thinning;
+        for (const Eigen::Vector3d& q_F : points_F(*other)) {
+          shared += oracle_lens(radius, other_radius, (q_F - p_F).norm());
+        }
+      }
+      const double own = 4.0 * M_PI / 3.0 * std::pow(radius, 3);
+      oracle_add(balls, p_L, radius, weight * own / shared, &sum);
+    }
+  }
+  return sum;
+}
+
+/// Of two links, all balls against all.
+inline ContactVolume oracle_contact(const ContactBody& a, const ContactBody& b,
+                                    const Eigen::Isometry3d& X_AB) {
+  ContactVolume sum;
+  const std::vector<OracleBall> second = balls_of(b);
+  for (const OracleBall& ball : balls_of(a)) {
+    for (const OracleBall& other : second) {
+      const Eigen::Vector3d center = X_AB * other.center;
+      const double volume = ball.share * other.share *
+                            oracle_lens(ball.radius, other.radius, (center - ball.center).norm());
+      if (!(volume > 0.0)) continue;
+      const Eigen::Vector3d middle =
+          oracle_lens_middle(ball.center, ball.radius, center, other.radius);
+      const Eigen::Vector3d push =
+          0.5 * volume *
+          (X_AB.linear() * other.way_out(X_AB.inverse() * middle) - ball.way_out(middle));
+      sum.volume += volume;
+      sum.push += push;
+      sum.turn += middle.cross(push);
+    }
+  }
+  return sum;
+}
+
+/// Points as a sensor at the origin would deliver them, thinned.
+inline CloudSnapshot thinned(const std::vector<Eigen::Vector3d>& points, double thinning = 0.01,
+                             const Eigen::Vector3d& far = Eigen::Vector3d::Zero()) {
+  std::vector<double> xyz;
+  for (const Eigen::Vector3d& p : points) xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
+  RawCloud raw;
+  raw.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
+  raw.width = points.size();
+  raw.height = 1;
+  raw.point_step = 3 * sizeof(double);
+  raw.row_step = raw.width * raw.point_step;
+  raw.y = sizeof(double);
+  raw.z = 2 * sizeof(double);
+  raw.is_double = true;
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = std::numeric_limits<double>::infinity();
+  config.self_filter = false;
+  config.thinning = thinning;
+  CloudSnapshot snapshot;
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  X_FS.translation() = far;
+  Ingest(config).run(raw, X_FS, {}, 0.0, &snapshot);
+  return snapshot;
+}
+
+/// A link of one or more elements with its body.
+struct ContactLink {
+  explicit ContactLink(const LinkGeometry& link_geometry, int spheres = 200,
+                       double max_error = 0.005)
+      : geometry(link_geometry), model(model_of({link_geometry}, max_error)) {
+    ContactConfig config;
+    config.packing.max_spheres = spheres;
+    body = build_contact_body(geometry, 0, link(), config, "");
+  }
+  const LinkModel& link() const { return model->links[0]; }
+
+  LinkGeometry geometry;
+  std::shared_ptr<const RobotModel> model;
+  std::shared_ptr<const ContactBody> body;
+};
+
+}  // namespace ist::test
