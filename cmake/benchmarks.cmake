@@ -34,6 +34,11 @@ else()
   message(STATUS "ist_proximity: benchmark/octomap without FCL (apt install libfcl-dev)")
 endif()
 
+target_sources(benchmark_repulsion PRIVATE
+  benchmark/repulsion/measure.cpp
+  benchmark/repulsion/reference.cpp
+  benchmark/repulsion/scene.cpp)
+
 # A yardstick, where it is installed (libembree-dev).
 find_package(embree 3 QUIET)
 if(TARGET embree)

@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "ist_proximity/cloud/ingest.h"
+
 namespace ist {
 namespace {
 
@@ -247,6 +249,62 @@ TEST(Repulsion, doesNotDependOnDensity) {
     EXPECT_GT(sparse.norm(), 0.3);
     EXPECT_LT((sparse - dense).norm(), 0.03 * sparse.norm());
   }
+}
+
+// A ball of radius 0.15 m, seen at `count` points, thinned as clouds are.
+CloudSnapshot seen_ball(int count) {
+  std::mt19937 random(9);  // fewer points are the first of more
+  std::normal_distribution<double> normal;
+  std::vector<float> data;
+  for (int i = 0; i < count; ++i) {
+    const Vector3d p = 0.15 * Vector3d(normal(random), normal(random), normal(random)).normalized();
+    for (int k = 0; k < 3; ++k) data.push_back(static_cast<float>(p[k]));
+  }
+  RawCloud raw;
+  raw.data = reinterpret_cast<const std::uint8_t*>(data.data());
+  raw.width = static_cast<std::size_t>(count);
+  raw.height = 1;
+  raw.point_step = 12;
+  raw.row_step = 12 * raw.width;
+  raw.y = 4;
+  raw.z = 8;
+  IngestConfig config;
+  config.self_filter = false;
+  config.min_range = 0.0;
+  CloudSnapshot cloud;
+  Ingest(config).run(raw, Eigen::Isometry3d::Identity(), {}, 0.0, &cloud);
+  return cloud;
+}
+
+// At 1 m/s and 1 kHz, past a ball and turning: direction and length change little in each step, and
+// half or twice as many points change either little (doc/repulsion.md).
+TEST(Repulsion, isSmoothAndIndependentOfTheNumberOfPoints) {
+  const CloudSnapshot cloud = seen_ball(12000), half = seen_ball(6000), twice = seen_ball(24000);
+  const std::vector<Ball> balls = bar();
+  const Repulsion repulsion(robot_of(balls));
+  Vector3d last = Vector3d::Zero();
+  double turn = 0.0, length = 0.0;
+  for (int i = -250; i <= 250; ++i) {
+    Eigen::Isometry3d X_FL = at({0.001 * i, 0.02, 0.22});
+    X_FL.rotate(Eigen::AngleAxisd(0.002 * i, Vector3d(1, 2, 3).normalized()));
+    double distance = kInf;
+    for (const Ball& b : balls) {
+      distance = std::min(distance, (X_FL * b.center).norm() - b.radius - 0.15);
+    }
+    const auto ask = [&](const CloudSnapshot& c) {
+      return repulsion(0, X_FL, {&c}, near_by(distance), {});
+    };
+    const Vector3d v = ask(cloud);
+    EXPECT_LT((ask(half) - v).norm(), 0.02) << i;
+    EXPECT_LT((ask(twice) - v).norm(), 0.02) << i;
+    if (!last.isZero()) {
+      turn = std::max(turn, degrees_between(v, last));
+      length = std::max(length, std::abs(v.norm() - last.norm()));
+    }
+    last = v;
+  }
+  EXPECT_LT(turn, 2.0);
+  EXPECT_LT(length, 0.01);
 }
 
 TEST(Repulsion, contactIsBoundedAndContinuous) {

@@ -1,0 +1,137 @@
+// How smooth the repulsion is along motions, what it costs, and what the number of points changes,
+// beside the nearest pair and exact geometry: tables for doc/repulsion.md.
+//
+// Usage: repulsion CACHE_FOLDER [DOCUMENT]; scripts/benchmark --repulsion calls it. The recorded
+// scenes need the test data: IST_PROXIMITY_DATA, or ../shared/data.
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "repulsion/measure.h"
+#include "repulsion/scene.h"
+#include "support.h"
+#include "support/accuracy.h"
+#include "support/data_dir.h"
+
+namespace {
+
+using ist::benchmark::Measured;
+using ist::benchmark::Noise;
+using ist::benchmark::quantile;
+
+constexpr double kMaxErrors[] = {0.02, 0.01, 0.005};  // [m] the resolutions
+
+std::string text(const char* format, double value) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, format, value);
+  return buffer;
+}
+
+std::string row(const std::vector<std::string>& cells) {
+  std::string line = "|";
+  for (const std::string& cell : cells) line += " " + cell + " |";
+  return line + "\n";
+}
+
+std::string head(const std::vector<std::string>& cells) {
+  std::string rule = "|";
+  for (std::size_t i = 0; i < cells.size(); ++i) rule += "---|";
+  return row(cells) + rule + "\n";
+}
+
+std::vector<std::string> noise_cells(const Noise& noise, double reference) {
+  return {std::to_string(noise.angles.size()),
+          text("%.2f", quantile(noise.angles, 0.999)),
+          text("%.2f", quantile(noise.angles, 1.0)),
+          text("%.2f", 100.0 * quantile(noise.magnitudes, 0.999)),
+          text("%.2f", 100.0 * quantile(noise.magnitudes, 1.0)),
+          reference > 0.0 ? text("%.2f", noise.variation / reference) : "",
+          text("%.1f", 100.0 * static_cast<double>(noise.short_steps) /
+                           static_cast<double>(noise.short_steps + noise.angles.size() + 1))};
+}
+
+struct Tables {
+  std::string smoothness =
+      head({"scene", "max_error [mm]", "vector", "steps", "angle p99.9 [°]", "largest [°]",
+            "length p99.9 [%]", "largest [%]", "variation / exact", "too short [%]"});
+  std::string cost = head({"scene", "max_error [mm]", "query, median / p99 [us]",
+                           "blend, median / p99 [us]", "ratio of medians", "ratio of p99"});
+  std::string density = head({"scene", "half: median [%]", "p99 [%]", "largest [%]",
+                              "twice: median [%]", "p99 [%]", "largest [%]"});
+
+  void add(const std::string& scene, double max_error, const Measured& measured) {
+    const std::string resolution = text("%g", 1e3 * max_error);
+    // A row for the penetration wrench belongs here, where there is one.
+    for (const auto& [name, noise] : {std::make_pair("nearest pair", &measured.nearest),
+                                      std::make_pair("blend", &measured.blend)}) {
+      std::vector<std::string> cells = {scene, resolution, name};
+      for (const std::string& cell : noise_cells(*noise, measured.reference_variation)) {
+        cells.push_back(cell);
+      }
+      smoothness += row(cells);
+    }
+    const auto times = [](const std::vector<double>& us) {
+      return text("%.1f", quantile(us, 0.5)) + " / " + text("%.1f", quantile(us, 0.99));
+    };
+    const auto ratio = [&measured](double q) {
+      return text("%.2f", quantile(measured.blend_us, q) / quantile(measured.query_us, q));
+    };
+    cost += row({scene, resolution, times(measured.query_us), times(measured.blend_us), ratio(0.5),
+                 ratio(0.99)});
+    if (max_error != kMaxErrors[2]) return;
+    std::vector<std::string> cells = {scene};
+    for (const std::vector<double>* change : {&measured.half, &measured.twice}) {
+      for (const double q : {0.5, 0.99, 1.0}) {
+        cells.push_back(text("%.2f", 100.0 * quantile(*change, q)));
+      }
+    }
+    density += row(cells);
+  }
+};
+
+bool write(const std::string& document, const std::string& name, const std::string& table) {
+  std::string all = ist::test::read_text(document);
+  const auto [first, last] = ist::test::table_place(all, name);
+  if (last == 0) {
+    std::fprintf(stderr, "%s lacks the marks of '%s'\n", document.c_str(), name.c_str());
+    return false;
+  }
+  all.replace(first, last - first, table);
+  std::ofstream(document) << all;
+  return true;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: repulsion CACHE_FOLDER [DOCUMENT]\n");
+    return 1;
+  }
+  Tables tables;
+  const auto measure = [&](const std::vector<ist::benchmark::MovingScene>& scenes) {
+    for (const ist::benchmark::MovingScene& scene : scenes) {
+      for (const double max_error : kMaxErrors) {
+        std::fprintf(stderr, "%s, packed to %g mm: %zu steps\n", scene.name.c_str(),
+                     1e3 * max_error, scene.steps.size());
+        tables.add(
+            scene.name, max_error,
+            ist::benchmark::measure(scene, ist::benchmark::pack(scene.robot, max_error, argv[1])));
+      }
+    }
+  };
+  measure(ist::benchmark::analytic_scenes());
+  if (const auto data = ist::test::data_dir()) {
+    measure(ist::benchmark::recorded_scenes(*data));
+  } else {
+    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
+  }
+  std::printf("%s\n%s\n%s", tables.smoothness.c_str(), tables.cost.c_str(), tables.density.c_str());
+  if (argc < 3) return 0;
+  const bool written = write(argv[2], "smoothness", tables.smoothness) &&
+                       write(argv[2], "cost", tables.cost) &&
+                       write(argv[2], "density", tables.density);
+  return written ? 0 : 1;
+}

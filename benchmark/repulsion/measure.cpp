@@ -1,0 +1,114 @@
+#include "repulsion/measure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "support.h"
+
+namespace ist::benchmark {
+namespace {
+
+constexpr std::size_t kDensityStride = 25;  // steps
+
+double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / EIGEN_PI;
+}
+
+// Of one cloud: each link is asked on its own, from its own last answer, as in a 1 kHz cycle.
+class Asker {
+ public:
+  Asker(const std::shared_ptr<const RobotModel>& model, const CloudSnapshot& cloud)
+      : repulsion_(model), clouds_{&cloud}, known_(model->links.size(), false) {
+    for (std::size_t i = 0; i < known_.size(); ++i) queries_.emplace_back(model, QueryConfig());
+  }
+
+  Eigen::Vector3d ask(std::size_t link, const std::vector<Eigen::Isometry3d>& X_FL) {
+    known_[link] = true;
+    timer_.lap();
+    queries_[link].run(X_FL, known_, clouds_, &answers_);
+    query_us = timer_.lap();
+    const Eigen::Vector3d blend = repulsion_(link, X_FL[link], clouds_, answers_[link], {});
+    blend_us = timer_.lap();
+    known_[link] = false;
+    return blend;
+  }
+  const LinkProximity& answer(std::size_t link) const { return answers_[link]; }
+
+  double query_us = 0.0, blend_us = 0.0;  // of the last ask()
+
+ private:
+  std::vector<ProximityQuery> queries_;
+  Repulsion repulsion_;
+  std::vector<const CloudSnapshot*> clouds_;
+  std::vector<bool> known_;
+  std::vector<LinkProximity> answers_;
+  ThreadTimer timer_;
+};
+
+// The nearest pair alone, as long as the blend would be.
+Eigen::Vector3d nearest_pair(const LinkProximity& answer) {
+  const double strength = repulsion_strength(answer, {});
+  return strength > 0.0 ? Eigen::Vector3d(strength * answer.direction) : Eigen::Vector3d::Zero();
+}
+
+bool moves(const MovingScene& scene, std::size_t link) {
+  return !scene.steps.front()[link].isApprox(scene.steps.back()[link], 1e-9);
+}
+
+}  // namespace
+
+void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool in_reference) {
+  const double shorter = std::min(before.norm(), now.norm());
+  if (shorter == 0.0 && before.norm() + now.norm() == 0.0) return;
+  magnitudes.push_back(std::abs(now.norm() - before.norm()));
+  if (shorter < kShort) {
+    ++short_steps;
+    return;
+  }
+  angles.push_back(degrees_between(before, now));
+  if (in_reference) variation += angles.back();
+}
+
+Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model) {
+  Measured measured;
+  const std::size_t links = model->links.size();
+  Asker full(model, scene.cloud), half(model, scene.half), twice(model, scene.twice);
+  std::vector<Eigen::Vector3d> blends(links), nearests(links);
+  std::vector<std::vector<bool>> counts;
+  for (std::size_t step = 0; step < scene.steps.size(); ++step) {
+    const std::vector<Eigen::Isometry3d>& X_FL = scene.steps[step];
+    const bool in_reference =
+        step >= scene.reference_begin && step < scene.reference_begin + scene.reference_count;
+    if (in_reference) counts.emplace_back(links, false);
+    for (std::size_t i = 0; i < links; ++i) {
+      if (!moves(scene, i)) continue;
+      const Eigen::Vector3d blend = full.ask(i, X_FL);
+      const LinkProximity& answer = full.answer(i);
+      const Eigen::Vector3d nearest = nearest_pair(answer);
+      const bool compared = in_reference && answer.state == LinkState::kNear &&
+                            blend.norm() > kShort && step > scene.reference_begin &&
+                            !scene.begins[step];
+      if (in_reference) counts.back()[i] = compared;
+      if (nearest.norm() > 0.0) {
+        measured.query_us.push_back(full.query_us);
+        measured.blend_us.push_back(full.blend_us);
+        if (step % kDensityStride == 0) {
+          measured.half.push_back((half.ask(i, X_FL) - blend).norm());
+          measured.twice.push_back((twice.ask(i, X_FL) - blend).norm());
+        }
+      }
+      if (!scene.begins[step]) {
+        measured.blend.add(blends[i], blend, compared);
+        measured.nearest.add(nearests[i], nearest, compared);
+      }
+      blends[i] = blend;
+      nearests[i] = nearest;
+    }
+  }
+  measured.reference_variation = reference_variation(scene, counts);
+  return measured;
+}
+
+}  // namespace ist::benchmark

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/robot/robot_model.h"
+#include "repulsion/scene.h"
+
+namespace ist::benchmark {
+
+/// How a vector changes along a motion, step by step.
+struct Noise {
+  std::vector<double> angles;  ///< [deg] per step, where the vector is long enough before and after
+  std::vector<double> magnitudes;  ///< change of length per step, of the gain
+  std::size_t short_steps = 0;     ///< where it is not long enough, though not zero
+  double variation = 0.0;  ///< [deg] of the direction in all, along the steps of the reference
+
+  /// @param in_reference  whether this step counts for `variation`
+  void add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool in_reference);
+};
+
+/// Shorter than this, of the gain, a direction means nothing: obstacles push from both sides.
+constexpr double kShort = 0.05;
+
+/// Of one scene at one resolution.
+struct Measured {
+  Noise nearest, blend;
+  double reference_variation = 0.0;        ///< [deg] from exact geometry
+  std::vector<double> query_us, blend_us;  ///< of one link within the influence distance
+  std::vector<double> half, twice;         ///< change of the blend, of the gain
+};
+
+Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model);
+
+/// Variation of the direction [deg] along the reference steps, from exact geometry: the same blend
+/// over dense samples of the links' exact surfaces, in double, pair by pair.
+/// @param counts  by step of the reference and link: whether the step to it counts
+double reference_variation(const MovingScene& scene, const std::vector<std::vector<bool>>& counts);
+
+}  // namespace ist::benchmark
