@@ -47,15 +47,7 @@ std::uint64_t LinkQuery::generation(const CloudSnapshot& cloud, Part part) {
 
 void LinkQuery::start(const Eigen::Isometry3d& X_FL,
                       const std::vector<const CloudSnapshot*>& clouds, const QueryConfig& config) {
-  X_FL_ = X_FL;
-  config_ = config;
-  nearest_ = Nearest{};
-  nearest_.exact.distance = kInfinity;
-  complete_ = false;
-  ++epoch_;
-  // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
-  dropped_ = -link_->tree.radius();
-  rounding_ = reach_ = 0.0;
+  start_cold(X_FL, config, kInfinity);
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     for (const Part part : {Part::kPoints, Part::kBoxes}) {
       if (last_generation_ == 0 || generation(*clouds[i], part) != last_generation_) continue;
@@ -63,6 +55,20 @@ void LinkQuery::start(const Eigen::Isometry3d& X_FL,
       consider(last_tile_, last_lane_, false);
     }
   }
+}
+
+void LinkQuery::start_cold(const Eigen::Isometry3d& X_FL, const QueryConfig& config,
+                           double nearest) {
+  X_FL_ = X_FL;
+  config_ = config;
+  others_ = nearest;
+  nearest_ = Nearest{};
+  nearest_.exact.distance = kInfinity;
+  complete_ = false;
+  ++epoch_;
+  // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
+  dropped_ = -link_->tree.radius();
+  rounding_ = reach_ = 0.0;
 }
 
 bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part) {
@@ -91,12 +97,15 @@ Eigen::Vector3d LinkQuery::point_O(std::int32_t tile, int lane) const {
   return {points.x[lane], points.y[lane], points.z[lane]};
 }
 
-double LinkQuery::threshold() const {
-  const double distance = nearest_.exact.distance;
-  if (distance > range()) return range();
+double LinkQuery::wanted_below(double distance) const {
+  const double width = std::max(config_.tolerance, config_.relative_tolerance * distance);
   // Whether any point is inside is always decided, however wide the tolerance.
-  const double wanted = distance - config_.tolerance;
-  return distance > 0.0 ? std::max(wanted, 0.0) : wanted;
+  return distance > 0.0 ? std::max(distance - width, 0.0) : distance - config_.tolerance;
+}
+
+double LinkQuery::threshold() const {
+  const double distance = std::min(nearest_.exact.distance, others_);
+  return distance > range() ? range() : wanted_below(distance);
 }
 
 bool LinkQuery::first_visit(std::int32_t tile, int lane) {
@@ -116,7 +125,7 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside) {
     const double interior = link_->tree.interior_gap();
     is_outside = link_->tree.outer_distance(p_L, interior) > interior;
   }
-  const double limit = std::min(nearest_.exact.distance, range() + rounding_);
+  const double limit = std::min({nearest_.exact.distance, others_, range() + rounding_});
   const Eigen::Vector3d& toward =
       nearest_.exact.distance == kInfinity ? aim_L_ : nearest_.exact.normal;
   const SignedDistance exact = is_outside ? link_->solid.distance_outside(p_L, limit, toward)
@@ -246,7 +255,7 @@ Traversal LinkQuery::make_traversal() {
 bool LinkQuery::search(Deadline* deadline) {
   Traversal traversal = make_traversal();
   traversal_ = &traversal;
-  if (nearest_.exact.distance == kInfinity) find_first(&traversal);
+  if (std::min(nearest_.exact.distance, others_) == kInfinity) find_first(&traversal);
   aim_later(&traversal);
   descend_exact(&traversal);
   traversal_ = nullptr;
@@ -261,6 +270,12 @@ bool LinkQuery::search(Deadline* deadline) {
   // A pair that was left may hold a point inside.
   if (stopped && dropped_ <= link_->tree.interior_gap() + rounding_) drop(-link_->tree.radius());
   return stopped;
+}
+
+double LinkQuery::proven() const {
+  const double bound = std::min(nearest_.exact.distance, dropped_);
+  if (bound == kInfinity) return bound;
+  return bound - kPointError * (reach_ + std::abs(bound)) - config_.margin;
 }
 
 void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result) {

@@ -35,6 +35,16 @@ class LinkQuery {
   void start(const Eigen::Isometry3d& X_FL, const std::vector<const CloudSnapshot*>& clouds,
              const QueryConfig& config);
 
+  /// As start(), without the last answer's point: for a link that need only be known where it is
+  /// nearer than another.
+  /// @param nearest  [m] that another link is known to be at
+  void start_cold(const Eigen::Isometry3d& X_FL, const QueryConfig& config, double nearest);
+
+  /// [m] of the nearest point found; inf: none.
+  double distance() const { return nearest_.exact.distance; }
+  /// [m] Proven: the link's distance is not below it. Inf where nothing is in range.
+  double proven() const;
+
   /// The descent. False: the deadline passed first; what is known by then still holds.
   bool refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
               QueryStatistics* statistics);
@@ -88,6 +98,7 @@ class LinkQuery {
   BoxCell make_cell(const Eigen::AlignedBox3d& box, std::int32_t tile, int lane);
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
+  double wanted_below(double distance) const;
   /// [m] bounds from here on cannot change the answer by more than the tolerance.
   double threshold() const;
   bool first_visit(std::int32_t tile, int lane);
@@ -100,6 +111,7 @@ class LinkQuery {
   Nearest nearest_;
   double dropped_ = 0.0;   ///< [m] smallest bound of all that was not evaluated
   double rounding_ = 0.0;  ///< [m] largest error of a float bound
+  double others_ = 0.0;    ///< [m] distance of other links, that this one need not be beyond
   double reach_ = 0.0;     ///< [m] largest coordinate of the link in the index's frame
   bool complete_ = false;
 

@@ -30,7 +30,12 @@ struct ProximityQuery::Impl {
 
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
+  bool refine(std::size_t i, const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline) {
+    return links[i].refine(clouds, deadline, &statistics);
+  }
+
   std::vector<LinkQuery> links;
+  std::size_t last_nearest = 0;  // link
   QueryStatistics statistics;
 };
 
@@ -61,9 +66,75 @@ bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
       impl_->links[i].forget();
       continue;
     }
-    complete = impl_->links[i].refine(clouds, &deadline, &impl_->statistics) && complete;
+    complete = impl_->refine(i, clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
   }
+  return complete;
+}
+
+bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
+                                 const std::vector<bool>& known,
+                                 const std::vector<const CloudSnapshot*>& clouds,
+                                 RobotProximity* result) {
+  const std::size_t count = impl_->links.size();
+  assert(X_FL.size() == count && known.size() == count);
+  impl_->statistics = {};
+  *result = RobotProximity();
+  result->all_known = true;
+  Deadline deadline(impl_->config.deadline);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double nearest = kInfinity, proven = kInfinity;
+  std::size_t best = count;
+  bool complete = true;
+  // Begins with the link that was nearest last time: its bound rules most of the others out.
+  const std::size_t first = impl_->last_nearest;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = k == 0 ? first : k <= first ? k - 1 : k;
+    if (!impl_->can_query(i, known, !clouds.empty())) {
+      result->all_known = false;
+      continue;
+    }
+    LinkQuery& link = impl_->links[i];
+    if (best == count) {
+      link.start(X_FL[i], clouds, impl_->config);
+    } else {
+      link.start_cold(X_FL[i], impl_->config, nearest);
+    }
+    complete = impl_->refine(i, clouds, &deadline) && complete;
+    proven = std::min(proven, link.proven());
+    if (best == count || link.distance() < nearest) {
+      best = i;
+      nearest = link.distance();
+    }
+  }
+  if (best == count) return complete;
+  impl_->links[best].answer(clouds, &result->nearest);
+  LinkProximity& answer = result->nearest;
+  if (answer.state == LinkState::kNear || answer.state == LinkState::kContact) {
+    result->link = static_cast<std::int32_t>(best);
+    answer.lower_bound = std::min(answer.lower_bound, proven);
+    impl_->last_nearest = best;
+  } else if (!complete) {
+    answer.reset();
+  }
+  return complete;
+}
+
+bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL,
+                              const std::vector<const CloudSnapshot*>& clouds,
+                              LinkProximity* result) {
+  assert(link < impl_->links.size());
+  impl_->statistics = {};
+  const LinkModel& model = impl_->model->links[link];
+  if (clouds.empty() || !model.usable() || model.tree.empty()) {
+    result->reset();
+    impl_->links[link].forget();
+    return true;
+  }
+  Deadline deadline(impl_->config.deadline);
+  impl_->links[link].start(X_FL, clouds, impl_->config);
+  const bool complete = impl_->refine(link, clouds, &deadline);
+  impl_->links[link].answer(clouds, result);
   return complete;
 }
 

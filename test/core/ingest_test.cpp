@@ -279,6 +279,68 @@ TEST(Ingest, pointsAreInTheFixedFrame) {
 }
 
 // Four ways to be far away. In float, a coordinate of 4e6 m is off by up to 0.25 m.
+// What a depth camera sees: a wall and a board before it, and nothing at some pixels.
+Points depth_image(std::size_t width, std::size_t height) {
+  std::mt19937 random(8);
+  Points points;
+  for (std::size_t v = 0; v < height; ++v) {
+    for (std::size_t u = 0; u < width; ++u) {
+      const double a = static_cast<double>(u) / 80.0 - 1.0, b = static_cast<double>(v) / 80.0 - 0.7;
+      const double depth = a > 0.1 && b < 0.2 ? 0.9 : 1.5 + 0.1 * a;
+      const double x = random() % 10 == 0 ? kNan : a * depth;
+      points.emplace_back(static_cast<double>(static_cast<float>(x)),
+                          static_cast<double>(static_cast<float>(b * depth)),
+                          static_cast<double>(static_cast<float>(depth)));
+    }
+  }
+  return points;
+}
+
+// An image goes another way than a list of points; sizes that are no multiple of anything as well.
+TEST(Ingest, imageHoldsTheSamePointsAsAList) {
+  for (const auto& [width, height] :
+       {std::pair<std::size_t, std::size_t>{160, 120}, {163, 41}, {300, 5}, {17, 90}, {257, 64}}) {
+    SCOPED_TRACE(std::to_string(width) + " x " + std::to_string(height));
+    Format image;
+    image.width = width;
+    const Points points = depth_image(width, height);
+    IngestConfig config;
+    config.max_range = 1.7;
+    const CloudSnapshot a = ingest(points, config, {}, pose(0.5, 0.2, 1.0));
+    const CloudSnapshot b = ingest(points, config, image, pose(0.5, 0.2, 1.0));
+    EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
+    EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
+    EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
+    // Tiles do not span the edge of the board, 0.6 m deep.
+    for (const PointTile& tile : b.index.tiles()) {
+      Eigen::AlignedBox3f box;
+      for (int k = 0; k < tile.count; ++k) {
+        box.extend(Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]));
+      }
+      ASSERT_LT(box.diagonal().norm(), 0.25F);
+    }
+  }
+}
+
+// Rows and columns that say nothing about space: the index must be as good as that of a list.
+TEST(Ingest, shuffledImageIsIndexedAsAList) {
+  Points points = depth_image(160, 120);
+  std::shuffle(points.begin(), points.end(), std::mt19937(9));
+  Format image;
+  image.width = 160;
+  const CloudSnapshot a = ingest(points), b = ingest(points, {}, image);
+  EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
+  EXPECT_EQ(a.index.tiles().size(), b.index.tiles().size());
+}
+
+TEST(Ingest, thinnedCloudCanBeLeftOut) {
+  IngestConfig config;
+  config.thin = false;
+  const CloudSnapshot snapshot = ingest(random_points(1000, 1.0, 3), config);
+  EXPECT_FALSE(snapshot.index.empty());
+  EXPECT_TRUE(snapshot.coarse.empty());
+}
+
 TEST(Ingest, farSensorLosesNothing) {
   const Points points = random_points(500, 2.0, 3);
   const Eigen::Isometry3d X_FS = pose(691000.123, 5334000.456, 520.789);

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "support/meshes.h"
@@ -47,6 +49,39 @@ TEST(TriangleBvh, ClosestPointKeepsToItsRange) {
   EXPECT_TRUE(std::isinf(bvh.closest({3, 0, 0}, 3.9).distance_sq));
   EXPECT_DOUBLE_EQ(bvh.closest({3, 0, 0}, 4.0).distance_sq, 4.0);
   EXPECT_TRUE(std::isinf(TriangleBvh().closest({0, 0, 0}).distance_sq));
+}
+
+TEST(TriangleBvh, DirectionNeverChangesTheClosestPoint) {
+  test::Rng rng(3);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 300; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, i % 3 == 0 ? 2.0 : 0.3);
+      const Eigen::Vector3d toward = test::random_vector(&rng, 1.0).normalized();
+      const double expected = test::oracle_distance(mesh, p);
+      ASSERT_NEAR(std::sqrt(bvh.closest(p, 100.0, toward).distance_sq), expected, 1e-12);
+    }
+  }
+}
+
+TEST(TriangleBvh, SupportEqualsBruteForce) {
+  test::Rng rng(4);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 300; ++i) {
+      Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
+      if (i < 6) n = (i % 2 == 0 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(i / 2);
+      double expected = -std::numeric_limits<double>::infinity();
+      for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        for (int k = 0; k < 3; ++k) expected = std::max(expected, n.dot(mesh.corner(t, k)));
+      }
+      ASSERT_NEAR(bvh.support(n), expected, 1e-12);
+      const double loose = bvh.support(n, 0.01);
+      ASSERT_GE(loose, expected);
+      ASSERT_LE(loose, expected + 0.01 + 1e-12);
+    }
+  }
+  EXPECT_EQ(TriangleBvh().support({1, 0, 0}), -std::numeric_limits<double>::infinity());
 }
 
 TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {

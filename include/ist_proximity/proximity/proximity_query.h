@@ -22,6 +22,8 @@ struct QueryConfig {
   /// [m] taken off every lower bound: for what geometry does not know (sensor noise, calibration,
   /// latency). >= 0.
   double margin = 0.0;
+  /// The same width as a share of the distance, where that is more than `tolerance`; from 0 to 1.
+  double relative_tolerance = 0.0;
 };
 
 enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kContact = 3 };
@@ -43,6 +45,13 @@ struct LinkProximity {
   void reset();  ///< to UNKNOWN
 };
 
+/// Answer for the whole robot: its nearest link.
+struct RobotProximity {
+  std::int32_t link = -1;  ///< the link that `nearest` belongs to; -1 when UNKNOWN or CLEAR
+  LinkProximity nearest;   ///< its answer; `lower_bound` is proven for every link that is known
+  bool all_known = false;  ///< false: links without pose or geometry were left out
+};
+
 /// What a query cost, for tuning and tests.
 struct QueryStatistics {
   std::uint64_t node_pairs = 0;         ///< pairs of tree node and box expanded
@@ -57,7 +66,7 @@ struct QueryStatistics {
 /// always the exact distance of one obstacle point. Points that may lie inside the link are a
 /// query of their own (branch and bound on the exact signed distance).
 ///
-/// run() allocates nothing, locks nothing and never throws; one object per thread. The last answer
+/// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
 /// starts the next query's bound (warm start) and never changes the result.
 class ProximityQuery {
  public:
@@ -74,6 +83,18 @@ class ProximityQuery {
   /// @returns false when the deadline passed before every link met its tolerance
   bool run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
            const std::vector<const CloudSnapshot*>& clouds, std::vector<LinkProximity>* results);
+
+  /// The robot's minimum only, several times faster than all links: they share one bound.
+  /// @param result  overwritten; UNKNOWN when no link is known or no cloud is given
+  /// @returns as run()
+  bool run_minimum(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+                   const std::vector<const CloudSnapshot*>& clouds, RobotProximity* result);
+
+  /// One link only.
+  /// @param link  index in the model
+  /// @returns as run()
+  bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL,
+                const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result);
 
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);

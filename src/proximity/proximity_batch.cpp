@@ -1,0 +1,106 @@
+#include "ist_proximity/proximity/proximity_batch.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <cstddef>
+#include <system_error>
+#include <thread>
+
+namespace ist {
+namespace {
+
+// Configurations that a thread takes at a time: enough to start from each other's answers.
+constexpr std::size_t kAtATime = 8;
+
+}  // namespace
+
+struct ProximityBatch::Impl {
+  /// What a thread works with.
+  struct Worker {
+    ProximityQuery query;
+    std::vector<Eigen::Isometry3d> X_FL;  // of one configuration
+    std::vector<LinkProximity> results;
+  };
+
+  /// Calls answer(worker, k) for each configuration k, which returns whether it was complete.
+  template <class Answer>
+  bool run(std::size_t count, const Answer& answer) {
+    std::atomic<std::size_t> next{0};
+    std::atomic<bool> complete{true};
+    const auto work = [&](Worker* worker) {
+      for (std::size_t k; (k = next.fetch_add(kAtATime)) < count;) {
+        const std::size_t end = std::min(k + kAtATime, count);
+        for (; k < end; ++k) {
+          if (!answer(worker, k)) complete = false;
+        }
+      }
+    };
+    const std::size_t useful = std::min(workers.size(), (count + kAtATime - 1) / kAtATime);
+    std::vector<std::thread> others;
+    try {
+      while (others.size() + 1 < useful) others.emplace_back(work, &workers[others.size() + 1]);
+    } catch (const std::system_error&) {
+      // No more threads to be had: fewer do the same.
+    }
+    work(&workers[0]);
+    for (std::thread& other : others) other.join();
+    return complete;
+  }
+
+  void take(const std::vector<Eigen::Isometry3d>& X_FL, std::size_t k, Worker* worker) const {
+    const auto first = X_FL.begin() + static_cast<std::ptrdiff_t>(k * links);
+    std::copy(first, first + static_cast<std::ptrdiff_t>(links), worker->X_FL.begin());
+  }
+
+  /// How many configurations there are.
+  std::size_t count(const std::vector<Eigen::Isometry3d>& X_FL) const {
+    assert(links == 0 ? X_FL.empty() : X_FL.size() % links == 0);
+    return links == 0 ? 0 : X_FL.size() / links;
+  }
+
+  std::size_t links = 0;
+  std::vector<Worker> workers;
+};
+
+ProximityBatch::ProximityBatch(std::shared_ptr<const RobotModel> model, const QueryConfig& config,
+                               int threads)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->links = model->links.size();
+  const std::size_t count = threads > 0 ? static_cast<std::size_t>(threads)
+                                        : std::max(1U, std::thread::hardware_concurrency());
+  for (std::size_t i = 0; i < count; ++i) {
+    impl_->workers.push_back({ProximityQuery(model, config),
+                              std::vector<Eigen::Isometry3d>(impl_->links),
+                              std::vector<LinkProximity>(impl_->links)});
+  }
+}
+ProximityBatch::~ProximityBatch() = default;
+ProximityBatch::ProximityBatch(ProximityBatch&&) noexcept = default;
+ProximityBatch& ProximityBatch::operator=(ProximityBatch&&) noexcept = default;
+
+bool ProximityBatch::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+                         const std::vector<const CloudSnapshot*>& clouds,
+                         std::vector<LinkProximity>* results) {
+  results->resize(X_FL.size());
+  return impl_->run(impl_->count(X_FL), [&](Impl::Worker* worker, std::size_t k) {
+    impl_->take(X_FL, k, worker);
+    const bool complete = worker->query.run(worker->X_FL, known, clouds, &worker->results);
+    std::copy(worker->results.begin(), worker->results.end(),
+              results->begin() + static_cast<std::ptrdiff_t>(k * impl_->links));
+    return complete;
+  });
+}
+
+bool ProximityBatch::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
+                                 const std::vector<bool>& known,
+                                 const std::vector<const CloudSnapshot*>& clouds,
+                                 std::vector<RobotProximity>* results) {
+  results->resize(impl_->count(X_FL));
+  return impl_->run(results->size(), [&](Impl::Worker* worker, std::size_t k) {
+    impl_->take(X_FL, k, worker);
+    return worker->query.run_minimum(worker->X_FL, known, clouds, &(*results)[k]);
+  });
+}
+
+}  // namespace ist

@@ -1,0 +1,231 @@
+// The robot's minimum, one link, tolerances as a share, and batches, against brute force.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_batch.h"
+#include "support/allocations.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr double kRounding = 1e-6;  // [m]
+
+std::vector<TriangleMesh> link_meshes() {
+  return {test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 24, 12), test::box({0.05, 0.1, 0.2}),
+          test::thin_plate(0.1, 0.001), test::icosphere(0.08, 2)};
+}
+
+std::shared_ptr<RobotModel> model_of(const std::vector<TriangleMesh>& meshes) {
+  return test::make_model({meshes.begin(), meshes.end()}, 0.005);
+}
+
+// A table below and things about, in the fixed frame.
+std::vector<Eigen::Vector3d> random_points(test::Rng* rng, int count) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) {
+    Eigen::Vector3d p = test::random_vector(rng, 0.6);
+    if (i % 2 == 0) p.z() = -0.4;
+    points.push_back(p);
+  }
+  return points;
+}
+
+std::vector<Eigen::Isometry3d> random_poses(test::Rng* rng, std::size_t links) {
+  std::vector<Eigen::Isometry3d> X_FL(links);
+  for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(rng, 0.4);
+  return X_FL;
+}
+
+double truth_of(const TriangleMesh& mesh, const Eigen::Isometry3d& X_FL,
+                const std::vector<Eigen::Vector3d>& points_F) {
+  std::vector<Eigen::Vector3d> points_L;
+  for (const Eigen::Vector3d& p : points_F) points_L.push_back(X_FL.inverse() * p);
+  return test::oracle_minimum(mesh, points_L);
+}
+
+class QueryModes : public ::testing::TestWithParam<double> {};
+
+TEST_P(QueryModes, AgainstBruteForce) {
+  const double tolerance = GetParam();
+  test::Rng rng(31);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  const auto model = model_of(meshes);
+  QueryConfig config;
+  config.tolerance = tolerance;
+  config.max_distance = 0.3;
+  ProximityQuery query(model, config);
+  const std::vector<bool> known(meshes.size(), true);
+  int near = 0, contact = 0, clear = 0;
+  for (int scene = 0; scene < 24; scene += test::kSanitized ? 6 : 1) {
+    const std::vector<Eigen::Vector3d> points = random_points(&rng, scene < 8 ? 2 : 4 * scene);
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
+    for (int step = 0; step < 3; ++step) {  // later steps start warm
+      for (Eigen::Isometry3d& X : X_FL) X = X * test::random_pose(&rng, 0.01);
+      double least = std::numeric_limits<double>::infinity();
+      for (std::size_t i = 0; i < meshes.size(); ++i) {
+        const double truth = truth_of(meshes[i], X_FL[i], points);
+        least = std::min(least, truth);
+        LinkProximity link;
+        ASSERT_TRUE(query.run_link(i, X_FL[i], {&cloud}, &link));
+        ASSERT_LE(link.lower_bound, truth + kRounding);
+        if (link.state == LinkState::kClear) {
+          ASSERT_GE(truth, config.max_distance - kRounding);
+        } else {
+          ASSERT_GE(link.distance, truth - kRounding);
+          ASSERT_LE(link.distance, truth + tolerance + kRounding);
+        }
+      }
+      RobotProximity robot;
+      ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));
+      EXPECT_TRUE(robot.all_known);
+      const LinkProximity& answer = robot.nearest;
+      ASSERT_LE(answer.lower_bound, least + kRounding);
+      if (answer.state == LinkState::kClear) {
+        ++clear;
+        ASSERT_EQ(robot.link, -1);
+        ASSERT_GE(least, config.max_distance - kRounding);
+        continue;
+      }
+      answer.state == LinkState::kContact ? ++contact : ++near;
+      ASSERT_EQ(answer.state == LinkState::kContact, least < 0.0);
+      ASSERT_GE(answer.distance, least - kRounding);
+      ASSERT_LE(answer.distance, least + tolerance + kRounding);
+      ASSERT_LE(answer.distance - answer.lower_bound, tolerance + 3e-6);
+      const auto i = static_cast<std::size_t>(robot.link);
+      ASSERT_NEAR((answer.p_FL - answer.p_FO).norm(), std::abs(answer.distance), 1e-9);
+      ASSERT_GE(answer.distance, truth_of(meshes[i], X_FL[i], points) - kRounding);
+    }
+  }
+  EXPECT_GT(near, test::scaled(4));
+  EXPECT_GT(contact, test::scaled(4));
+  EXPECT_GT(clear, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, QueryModes, ::testing::Values(0.0, 0.001, 0.02));
+
+TEST(RobotMinimum, SaysWhatItDoesNotKnow) {
+  const auto model = model_of({test::box({0.2, 0.2, 0.2}), test::box({0.2, 0.2, 0.2})});
+  ProximityQuery query(model, {});
+  std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+  X_FL[1].translation().x() = 0.3;
+  const CloudSnapshot cloud = test::make_snapshot({{0.6, 0, 0}}), nothing = test::make_snapshot({});
+  RobotProximity robot;
+  query.run_minimum(X_FL, {true, true}, {&cloud}, &robot);
+  EXPECT_EQ(robot.link, 1);
+  EXPECT_NEAR(robot.nearest.distance, 0.2, kRounding);
+  query.run_minimum(X_FL, {true, false}, {&cloud}, &robot);
+  EXPECT_EQ(robot.link, 0);
+  EXPECT_NEAR(robot.nearest.distance, 0.5, kRounding);
+  EXPECT_FALSE(robot.all_known);
+  query.run_minimum(X_FL, {false, false}, {&cloud}, &robot);
+  EXPECT_EQ(robot.nearest.state, LinkState::kUnknown);
+  query.run_minimum(X_FL, {true, true}, {}, &robot);
+  EXPECT_EQ(robot.nearest.state, LinkState::kUnknown);
+  EXPECT_FALSE(robot.all_known);
+  query.run_minimum(X_FL, {true, true}, {&nothing}, &robot);
+  EXPECT_EQ(robot.nearest.state, LinkState::kClear);
+  EXPECT_EQ(robot.link, -1);
+}
+
+TEST(RelativeTolerance, WidensWithTheDistance) {
+  test::Rng rng(32);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  QueryConfig config;
+  config.tolerance = 0.001;
+  config.relative_tolerance = 0.1;
+  config.max_distance = 5.0;
+  const auto model = model_of(meshes);
+  ProximityQuery query(model, config), narrow(model, {});
+  const std::vector<bool> known(meshes.size(), true);
+  std::vector<LinkProximity> results, ignored;
+  std::uint64_t wide_pairs = 0, narrow_pairs = 0;
+  for (int scene = 0; scene < test::scaled(12); ++scene) {
+    const std::vector<Eigen::Vector3d> points = random_points(&rng, 150);
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    const std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
+    ASSERT_TRUE(query.run(X_FL, known, {&cloud}, &results));
+    ASSERT_TRUE(narrow.run(X_FL, known, {&cloud}, &ignored));
+    wide_pairs += query.statistics().node_pairs;
+    narrow_pairs += narrow.statistics().node_pairs;
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+      const double truth = truth_of(meshes[i], X_FL[i], points);
+      const double width = std::max(0.001, 0.1 * results[i].distance);
+      ASSERT_LE(results[i].lower_bound, truth + kRounding);
+      ASSERT_GE(results[i].distance, truth - kRounding);
+      ASSERT_LE(results[i].distance - results[i].lower_bound, width + 3e-6);
+      ASSERT_EQ(results[i].state == LinkState::kContact, truth < 0.0);
+    }
+  }
+  EXPECT_LT(wide_pairs, narrow_pairs) << "the tolerance is made use of";
+}
+
+TEST(ProximityBatch, EqualsOneByOne) {
+  test::Rng rng(33);
+  const auto model = model_of(link_meshes());
+  const std::size_t links = model->links.size();
+  QueryConfig config;
+  config.tolerance = 0.0;
+  const CloudSnapshot cloud = test::make_snapshot(random_points(&rng, 500));
+  std::vector<bool> known(links, true);
+  known[1] = false;
+  for (const std::size_t count : {0, 1, 7, 50}) {
+    std::vector<Eigen::Isometry3d> X_FL;
+    for (std::size_t k = 0; k < count; ++k) {
+      for (const Eigen::Isometry3d& X : random_poses(&rng, links)) X_FL.push_back(X);
+    }
+    for (const int threads : {1, 2, 5}) {
+      ProximityBatch batch(model, config, threads);
+      std::vector<LinkProximity> results, one;
+      std::vector<RobotProximity> minima;
+      ASSERT_TRUE(batch.run(X_FL, known, {&cloud}, &results));
+      ASSERT_TRUE(batch.run_minimum(X_FL, known, {&cloud}, &minima));
+      ASSERT_EQ(results.size(), X_FL.size());
+      ASSERT_EQ(minima.size(), count);
+      for (std::size_t k = 0; k < count; ++k) {
+        const auto first = X_FL.begin() + static_cast<std::ptrdiff_t>(k * links);
+        const std::vector<Eigen::Isometry3d> X(first, first + static_cast<std::ptrdiff_t>(links));
+        ProximityQuery(model, config).run(X, known, {&cloud}, &one);
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < links; ++i) {
+          ASSERT_EQ(results[k * links + i].state, one[i].state);
+          if (one[i].state < LinkState::kNear) continue;
+          ASSERT_NEAR(results[k * links + i].distance, one[i].distance, 1e-9);
+          least = std::min(least, one[i].distance);
+        }
+        if (std::isinf(least)) continue;
+        ASSERT_NEAR(minima[k].nearest.distance, least, 1e-9);
+      }
+    }
+  }
+}
+
+TEST(QueryModes, AllocateNothing) {
+  test::Rng rng(34);
+  const auto model = model_of(link_meshes());
+  const std::size_t links = model->links.size();
+  ProximityQuery query(model, {});
+  const std::vector<bool> known(links, true);
+  const CloudSnapshot cloud = test::make_snapshot(random_points(&rng, 500));
+  const std::vector<const CloudSnapshot*> clouds = {&cloud};
+  std::vector<std::vector<Eigen::Isometry3d>> poses;
+  for (int k = 0; k < 20; ++k) poses.push_back(random_poses(&rng, links));
+  RobotProximity robot;
+  LinkProximity link;
+  const long before = test::allocations;
+  for (const std::vector<Eigen::Isometry3d>& X_FL : poses) {
+    query.run_minimum(X_FL, known, clouds, &robot);
+    query.run_link(0, X_FL[0], clouds, &link);
+  }
+  EXPECT_EQ(test::allocations - before, 0);
+}
+
+}  // namespace
+}  // namespace ist
