@@ -75,7 +75,8 @@ int main(int argc, char** argv) {
       }
     }
   }
-  std::printf("%zu cases of a link in contact\n\n| | median | 99th percentile | largest |\n", query_us.size());
+  std::printf("%zu cases of a link in contact\n\n| | median | 99th percentile | largest |\n",
+              query_us.size());
   std::printf("|---|---|---|---|\n");
   const auto row = [](const char* what, const std::vector<double>& values, const char* format) {
     std::printf("| %s", what);

@@ -161,6 +161,18 @@ ContactBody make_contact_body(const LinkGeometry& geometry, const Solid& solid,
   return body;
 }
 
+std::string contact_body_key(const LinkGeometry& geometry, std::size_t attached,
+                             const ContactConfig& config) {
+  const std::vector<PackingConfig> configs = link_configs(geometry, attached, config.packing);
+  std::ostringstream key;
+  key.precision(17);
+  for (std::size_t e = 0; e < geometry.size(); ++e) {
+    key << packing_key(geometry[e].shape, configs[e]);
+    key << '\n' << geometry[e].X_LE.matrix() << '\n';
+  }
+  return key.str();
+}
+
 Packing disjoint_part(const Packing& packing, std::size_t count) {
   std::vector<Ball> balls = packing.balls;
   std::stable_sort(balls.begin(), balls.end(),

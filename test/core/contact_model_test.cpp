@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "support/contact_oracle.h"
@@ -132,6 +133,19 @@ TEST(ContactBody, TakesTheOtherPackingWhenTimeIsUp) {
                 balls[i].radius + balls[j].radius - 1e-6);
     }
   }
+}
+
+TEST(ContactBody, HasAKeyOfAllThatMakesIt) {
+  LinkGeometry geometry = one(Box{{0.2, 0.1, 0.05}});
+  ContactConfig config;
+  const std::string key = contact_body_key(geometry, 0, config);
+  EXPECT_EQ(contact_body_key(one(Box{{0.2, 0.1, 0.05}}), 0, config), key);
+  config.packing.max_spheres = 99;
+  EXPECT_NE(contact_body_key(geometry, 0, config), key);
+  config = {};
+  geometry[0].X_LE.translation().x() = 1e-9;
+  EXPECT_NE(contact_body_key(geometry, 0, config), key);
+  EXPECT_NE(contact_body_key(one(Box{{0.2, 0.1, 0.06}}), 0, config), key);
 }
 
 TEST(ContactModel, KnowsTheRobotThatItBelongsTo) {

@@ -79,6 +79,10 @@ std::shared_ptr<const ContactBody> build_contact_body(const LinkGeometry& geomet
                                                       const std::string& cache_directory,
                                                       const std::function<bool()>& cancelled = {});
 
+/// Links with the same key have the same body: shapes, their places, and how they are packed.
+std::string contact_body_key(const LinkGeometry& geometry, std::size_t attached,
+                             const ContactConfig& config);
+
 /// The largest balls of a packing that do not overlap, `count` at most, the largest first.
 Packing disjoint_part(const Packing& packing, std::size_t count);
 

@@ -2,8 +2,11 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "ist_proximity/robot/contact_model.h"
@@ -14,7 +17,8 @@ namespace ist {
 
 /// Makes what contact volumes need, in a thread of its own, after the node answers already: packs
 /// one monitored link after the other disjointly, or takes them from the cache. Whatever becomes of
-/// the robot's model, it follows. All members are thread safe.
+/// the robot's model, it follows; links that stay as they are keep what they have. All members are
+/// thread safe.
 class ContactLoader {
  public:
   /// @param loader  outlives this
@@ -30,6 +34,8 @@ class ContactLoader {
  private:
   void run();
   void load(const std::shared_ptr<const ModelState>& state);
+  std::shared_ptr<const ContactBody> build(const LinkDescription& link, const LinkModel& model,
+                                           const std::function<bool()>& cancelled) const;
   void set(std::shared_ptr<const ContactModel> contacts);
   bool is_current(const ModelState& state) const;
 
@@ -39,7 +45,9 @@ class ContactLoader {
   std::condition_variable stop_signal_;
   std::atomic<bool> stop_{false};
   std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
-  std::thread thread_;                            ///< none where they are not wanted
+  /// Of the last model by key, for the next one; the thread's own.
+  std::map<std::string, std::shared_ptr<const ContactBody>> known_;
+  std::thread thread_;  ///< none where they are not wanted
 };
 
 }  // namespace ist
