@@ -42,11 +42,19 @@ std::string head(const std::vector<std::string>& cells) {
 }
 
 std::vector<std::string> noise_cells(const Noise& noise, double reference) {
+  const auto angle = [](const std::vector<double>& values, double q) {
+    return values.empty() ? std::string() : text("%.2f", quantile(values, q));
+  };
+  const auto length = [](const std::vector<double>& values) {
+    return values.empty() ? std::string() : text("%.2f", 100.0 * quantile(values, 1.0));
+  };
   return {std::to_string(noise.angles.size()),
-          text("%.2f", quantile(noise.angles, 0.999)),
-          text("%.2f", quantile(noise.angles, 1.0)),
-          text("%.2f", 100.0 * quantile(noise.magnitudes, 0.999)),
-          text("%.2f", 100.0 * quantile(noise.magnitudes, 1.0)),
+          angle(noise.free_angles, 0.999),
+          angle(noise.free_angles, 1.0),
+          length(noise.free_lengths),
+          angle(noise.angles, 0.999),
+          angle(noise.angles, 1.0),
+          length(noise.lengths),
           reference > 0.0 ? text("%.2f", noise.variation / reference) : "",
           text("%.1f", 100.0 * static_cast<double>(noise.short_steps) /
                            static_cast<double>(noise.short_steps + noise.angles.size() + 1))};
@@ -54,18 +62,20 @@ std::vector<std::string> noise_cells(const Noise& noise, double reference) {
 
 struct Tables {
   std::string smoothness =
-      head({"scene", "max_error [mm]", "vector", "steps", "angle p99.9 [°]", "largest [°]",
-            "length p99.9 [%]", "largest [%]", "variation / exact", "too short [%]"});
+      head({"scene", "max_error [mm]", "vector", "steps", "no contact: angle p99.9 [°]",
+            "largest [°]", "length, largest [%]", "all: angle p99.9 [°]", "largest [°]",
+            "length, largest [%]", "variation / exact", "too short [%]"});
   std::string cost = head({"scene", "max_error [mm]", "query, median / p99 [us]",
                            "blend, median / p99 [us]", "ratio of medians", "ratio of p99"});
-  std::string density = head({"scene", "half: median [%]", "p99 [%]", "largest [%]",
-                              "twice: median [%]", "p99 [%]", "largest [%]"});
+  std::string density = head({"scene", "smoothing [mm]", "half: median [%]", "p99 [%]",
+                              "largest [%]", "twice: median [%]", "p99 [%]", "largest [%]"});
 
   void add(const std::string& scene, double max_error, const Measured& measured) {
     const std::string resolution = text("%g", 1e3 * max_error);
     // A row for the penetration wrench belongs here, where there is one.
     for (const auto& [name, noise] : {std::make_pair("nearest pair", &measured.nearest),
-                                      std::make_pair("blend", &measured.blend)}) {
+                                      std::make_pair("blend", &measured.blend),
+                                      std::make_pair("blend, 100 mm", &measured.wide)}) {
       std::vector<std::string> cells = {scene, resolution, name};
       for (const std::string& cell : noise_cells(*noise, measured.reference_variation)) {
         cells.push_back(cell);
@@ -81,8 +91,14 @@ struct Tables {
     cost += row({scene, resolution, times(measured.query_us), times(measured.blend_us), ratio(0.5),
                  ratio(0.99)});
     if (max_error != kMaxErrors[2]) return;
-    std::vector<std::string> cells = {scene};
-    for (const std::vector<double>* change : {&measured.half, &measured.twice}) {
+    add_density(scene, "50", measured.half, measured.twice);
+    add_density(scene, "100", measured.wide_half, measured.wide_twice);
+  }
+
+  void add_density(const std::string& scene, const std::string& smoothing,
+                   const std::vector<double>& half, const std::vector<double>& twice) {
+    std::vector<std::string> cells = {scene, smoothing};
+    for (const std::vector<double>* change : {&half, &twice}) {
       for (const double q : {0.5, 0.99, 1.0}) {
         cells.push_back(text("%.2f", 100.0 * quantile(*change, q)));
       }

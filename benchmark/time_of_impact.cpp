@@ -23,7 +23,7 @@ namespace {
 using ist::benchmark::quantile;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr int kMotions = 1000;
+constexpr int kMotions = 1000, kPandaMotions = 200;
 
 struct Tally {
   int motions = 0, contacts = 0, late = 0, close = 0, alarms = 0;
@@ -112,7 +112,7 @@ class Panda {
     ist::TimeOfImpact impacts(model_, kinematics_, {});
     ist::benchmark::ThreadTimer timer;
     const auto configurations = static_cast<double>(joints_.shape[0]);
-    while (tally.motions < kMotions) {
+    while (tally.motions < kPandaMotions) {
       const auto choose = [&] {
         return static_cast<std::size_t>(ist::test::uniform(&rng, 0.0, 0.9999) * configurations);
       };

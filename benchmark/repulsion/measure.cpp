@@ -34,6 +34,12 @@ class Asker {
     known_[link] = false;
     return blend;
   }
+  /// The blend of the last ask() with another smoothing.
+  Eigen::Vector3d wide(std::size_t link, const std::vector<Eigen::Isometry3d>& X_FL) const {
+    RepulsionConfig config;
+    config.smoothing = kWide;
+    return repulsion_(link, X_FL[link], clouds_, answers_[link], config);
+  }
   const LinkProximity& answer(std::size_t link) const { return answers_[link]; }
 
   double query_us = 0.0, blend_us = 0.0;  // of the last ask()
@@ -59,15 +65,17 @@ bool moves(const MovingScene& scene, std::size_t link) {
 
 }  // namespace
 
-void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool in_reference) {
-  const double shorter = std::min(before.norm(), now.norm());
-  if (shorter == 0.0 && before.norm() + now.norm() == 0.0) return;
-  magnitudes.push_back(std::abs(now.norm() - before.norm()));
-  if (shorter < kShort) {
+void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool is_free,
+                bool in_reference) {
+  if (before.isZero(0.0) && now.isZero(0.0)) return;
+  lengths.push_back(std::abs(now.norm() - before.norm()));
+  if (is_free) free_lengths.push_back(lengths.back());
+  if (std::min(before.norm(), now.norm()) < kShort) {
     ++short_steps;
     return;
   }
   angles.push_back(degrees_between(before, now));
+  if (is_free) free_angles.push_back(angles.back());
   if (in_reference) variation += angles.back();
 }
 
@@ -75,7 +83,7 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
   Measured measured;
   const std::size_t links = model->links.size();
   Asker full(model, scene.cloud), half(model, scene.half), twice(model, scene.twice);
-  std::vector<Eigen::Vector3d> blends(links), nearests(links);
+  std::vector<Eigen::Vector3d> blends(links), nearests(links), wides(links);
   std::vector<std::vector<bool>> counts;
   for (std::size_t step = 0; step < scene.steps.size(); ++step) {
     const std::vector<Eigen::Isometry3d>& X_FL = scene.steps[step];
@@ -86,7 +94,8 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
       if (!moves(scene, i)) continue;
       const Eigen::Vector3d blend = full.ask(i, X_FL);
       const LinkProximity& answer = full.answer(i);
-      const Eigen::Vector3d nearest = nearest_pair(answer);
+      const Eigen::Vector3d nearest = nearest_pair(answer), wide = full.wide(i, X_FL);
+      const bool is_free = answer.state != LinkState::kContact;
       const bool compared = in_reference && answer.state == LinkState::kNear &&
                             blend.norm() > kShort && step > scene.reference_begin &&
                             !scene.begins[step];
@@ -96,14 +105,18 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
         measured.blend_us.push_back(full.blend_us);
         if (step % kDensityStride == 0) {
           measured.half.push_back((half.ask(i, X_FL) - blend).norm());
+          measured.wide_half.push_back((half.wide(i, X_FL) - wide).norm());
           measured.twice.push_back((twice.ask(i, X_FL) - blend).norm());
+          measured.wide_twice.push_back((twice.wide(i, X_FL) - wide).norm());
         }
       }
       if (!scene.begins[step]) {
-        measured.blend.add(blends[i], blend, compared);
-        measured.nearest.add(nearests[i], nearest, compared);
+        measured.blend.add(blends[i], blend, is_free, compared);
+        measured.wide.add(wides[i], wide, is_free, compared);
+        measured.nearest.add(nearests[i], nearest, is_free, compared);
       }
       blends[i] = blend;
+      wides[i] = wide;
       nearests[i] = nearest;
     }
   }

@@ -12,24 +12,31 @@ namespace ist::benchmark {
 
 /// How a vector changes along a motion, step by step.
 struct Noise {
-  std::vector<double> angles;  ///< [deg] per step, where the vector is long enough before and after
-  std::vector<double> magnitudes;  ///< change of length per step, of the gain
-  std::size_t short_steps = 0;     ///< where it is not long enough, though not zero
+  /// [deg] per step, where the vector is long enough before and after: all, and out of contact.
+  std::vector<double> angles, free_angles;
+  std::vector<double> lengths, free_lengths;  ///< change of length per step, of the gain
+  std::size_t short_steps = 0;                ///< where it is not long enough, though not zero
   double variation = 0.0;  ///< [deg] of the direction in all, along the steps of the reference
 
+  /// @param is_free       whether the link is out of contact
   /// @param in_reference  whether this step counts for `variation`
-  void add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool in_reference);
+  void add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool is_free,
+           bool in_reference);
 };
 
 /// Shorter than this, of the gain, a direction means nothing: obstacles push from both sides.
 constexpr double kShort = 0.05;
 
+/// [m] Another smoothing than the default.
+constexpr double kWide = 0.1;
+
 /// Of one scene at one resolution.
 struct Measured {
-  Noise nearest, blend;
+  Noise nearest, blend, wide;              ///< wide: the blend with kWide for smoothing
   double reference_variation = 0.0;        ///< [deg] from exact geometry
   std::vector<double> query_us, blend_us;  ///< of one link within the influence distance
   std::vector<double> half, twice;         ///< change of the blend, of the gain
+  std::vector<double> wide_half, wide_twice;
 };
 
 Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model);

@@ -182,7 +182,7 @@ std::vector<MovingScene> analytic_scenes() {
 
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
   const test::Npy poses = test::read_npy((data / "poses/traj.npy").string());
-  constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 40, kWidth = 640;
+  constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 25, kWidth = 640;
   std::vector<std::vector<Eigen::Isometry3d>> way(kPoses);
   for (std::size_t k = 0; k < kPoses; ++k) {
     for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
@@ -234,7 +234,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
       set_steps({first, first + kLength}, &scene);
     }
     scene.reference_begin = scene.steps.size() / 2;
-    scene.reference_count = 100;
+    scene.reference_count = 60;
     scenes.push_back(std::move(scene));
   }
   return scenes;
