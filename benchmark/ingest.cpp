@@ -50,11 +50,12 @@ double copy_us(const Frame& frame, int repetitions) {
   return quantile(us, 0.5);
 }
 
-double ingest_us(const Frame& frame, int repetitions) {
+double ingest_us(const Frame& frame, bool thin, int repetitions) {
   ist::IngestConfig config;
   config.min_range = 0.0;
   config.max_range = std::numeric_limits<double>::infinity();
   config.self_filter = false;
+  config.thin = thin;
   ist::Ingest ingest(config);
   ist::CloudSnapshot snapshot;
   ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
@@ -70,10 +71,11 @@ double ingest_us(const Frame& frame, int repetitions) {
 
 void print(const std::string& name, const Frame& frame, int repetitions) {
   const double copy = copy_us(frame, repetitions);
-  const double image = ingest_us(frame, repetitions);
-  const double mixed = ingest_us(shuffled(frame), repetitions);
-  std::printf("| %s | %.0f us | %.0f us | %.1f | %.0f us | %.1f |\n", name.c_str(), copy, image,
-              image / copy, mixed, mixed / copy);
+  const double image = ingest_us(frame, false, repetitions);
+  const double thinned = ingest_us(frame, true, repetitions);
+  const double mixed = ingest_us(shuffled(frame), false, repetitions);
+  std::printf("| %s | %.0f us | %.0f us | %.1f | %.0f us | %.1f | %.0f us |\n", name.c_str(), copy,
+              image, image / copy, mixed, mixed / copy, thinned);
 }
 
 }  // namespace
@@ -81,8 +83,8 @@ void print(const std::string& name, const Frame& frame, int repetitions) {
 int main(int argc, char** argv) {
   const int repetitions = argc > 1 ? std::atoi(argv[1]) : 50;
   std::printf(
-      "| frame | memcpy | organized | / memcpy | shuffled | / memcpy |\n"
-      "|---|---|---|---|---|---|\n");
+      "| frame | memcpy | organized | / memcpy | shuffled | / memcpy | organized, and thinned |\n"
+      "|---|---|---|---|---|---|---|\n");
   print("synthetic", ist::benchmark::synthetic_frame(640, 480), repetitions);
   if (const auto data = ist::test::data_dir()) {
     for (const auto& scene : ist::benchmark::kinect_data(*data, "").scenes) {

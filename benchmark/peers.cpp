@@ -191,6 +191,7 @@ Methods all_methods(const DataSet& set) {
 #ifdef IST_BENCHMARK_NANOFLANN
   add_nanoflann(spheres, &methods);
 #endif
+  add_signed_grid(set.robot, &methods);
 #ifdef IST_BENCHMARK_EMBREE
   add_embree(set.robot, &methods);
 #endif

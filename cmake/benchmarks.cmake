@@ -54,9 +54,14 @@ target_sources(benchmark_peers PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/ours.cpp
   benchmark/peers/scene.cpp
+  benchmark/peers/signed_grid.cpp
   benchmark/peers/synthetic.cpp)
 target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_ingest PRIVATE
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
+target_sources(benchmark_modes PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp
   benchmark/peers/synthetic.cpp)

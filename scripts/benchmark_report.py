@@ -278,6 +278,7 @@ def main():
     parser.add_argument("peers", type=Path)
     parser.add_argument("growth", type=Path)
     parser.add_argument("ingest", type=Path, help="a table in Markdown")
+    parser.add_argument("modes", type=Path, help="tables in Markdown, each after a line '# NAME'")
     for name in ("commit", "machine", "date"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--folder", type=Path, required=True)
@@ -295,6 +296,9 @@ def main():
             parts[f"benchmark motion {name}"] = motion_table(rows)
     shown = sets["kinect"] or sets["synthetic"]
     parts["benchmark ingest"] = arguments.ingest.read_text(encoding="utf-8")
+    for section in arguments.modes.read_text(encoding="utf-8").split("# ")[1:]:
+        name, content = section.split("\n", 1)
+        parts[f"benchmark {name}"] = content
     parts["benchmark ratios"] = ratios(shown)
     parts["benchmark short"] = short_table(shown)
     for what, unit in (("spheres", ""), ("points", ""), ("links", ""), ("distance", " [m]")):

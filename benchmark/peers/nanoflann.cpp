@@ -1,10 +1,15 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <nanoflann.hpp>
 #include <optional>
+#include <vector>
 
 #include "peers/flat.h"
 
-// A k-d tree over all points, asked for the point nearest to each sphere.
+// A k-d tree over all points, or over the middles of occupied voxels, asked for what is nearest to
+// each sphere.
 namespace ist::benchmark {
 namespace {
 
@@ -25,17 +30,20 @@ using Tree =
 
 class Nanoflann : public Method {
  public:
-  explicit Nanoflann(const SphereSet& set) : set_(set) {
-    name = "nanoflann";
+  // @param voxel  [m] edge of the voxels; 0: all points
+  Nanoflann(const SphereSet& set, float voxel) : set_(set), voxel_(voxel) {
+    name = voxel > 0.0F ? "nanoflann on voxels of 1 cm" : "nanoflann";
     kind = Kind::kSpheres;
     spheres = set.size();
-    largest_error = set.gap + kRounding;
-    least_error = -set.gap;
+    const double off = 0.5 * std::sqrt(3.0) * static_cast<double>(voxel);
+    largest_error = set.gap + off + kRounding;
+    least_error = -set.gap - off;
   }
 
   void ingest(const Frame& frame) override {
     tree_.reset();
     cloud_.points.read(frame);
+    if (voxel_ > 0.0F) keep_voxels();
     tree_.emplace(3, cloud_, nanoflann::KDTreeSingleIndexAdaptorParams(16));
     tree_->buildIndex();
   }
@@ -65,7 +73,35 @@ class Nanoflann : public Method {
   }
 
  private:
+  // The middle of each occupied voxel: sorted keys, each once.
+  void keep_voxels() {
+    Points& points = cloud_.points;
+    constexpr std::int64_t kHalf = 1 << 20;
+    keys_.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto cell = [this](float v) {
+        return static_cast<std::int64_t>(std::floor(v / voxel_)) + kHalf;
+      };
+      keys_.push_back(cell(points.x[i]) << 42 | cell(points.y[i]) << 21 | cell(points.z[i]));
+    }
+    std::sort(keys_.begin(), keys_.end());
+    keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+    const auto middle = [this](std::int64_t cell) {
+      return (static_cast<float>((cell & (2 * kHalf - 1)) - kHalf) + 0.5F) * voxel_;
+    };
+    points.x.resize(keys_.size());
+    points.y.resize(keys_.size());
+    points.z.resize(keys_.size());
+    for (std::size_t i = 0; i < keys_.size(); ++i) {
+      points.x[i] = middle(keys_[i] >> 42);
+      points.y[i] = middle(keys_[i] >> 21);
+      points.z[i] = middle(keys_[i]);
+    }
+  }
+
   SphereSet set_;
+  float voxel_;
+  std::vector<std::int64_t> keys_;
   Cloud cloud_;
   std::optional<Tree> tree_;
 };
@@ -73,7 +109,9 @@ class Nanoflann : public Method {
 }  // namespace
 
 void add_nanoflann(const SphereSet& spheres, Methods* methods) {
-  methods->push_back(std::make_unique<Nanoflann>(spheres));
+  for (const float voxel : {0.0F, 0.01F}) {
+    methods->push_back(std::make_unique<Nanoflann>(spheres, voxel));
+  }
 }
 
 }  // namespace ist::benchmark

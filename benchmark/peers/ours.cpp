@@ -16,6 +16,7 @@ IngestConfig everything() {
   config.min_range = 0.0;
   config.max_range = std::numeric_limits<double>::infinity();
   config.self_filter = false;  // the truth is of all points
+  config.thin = false;         // no distance needs it
   return config;
 }
 

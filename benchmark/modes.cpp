@@ -1,0 +1,290 @@
+// What the ways to ask cost, as Markdown tables: every link, the robot's minimum, one link; one
+// thread and two; each instruction set. On a motion at 1 kHz among the test data's depth images where
+// they are (IST_PROXIMITY_DATA, or ../shared/data), else in the synthetic scene.
+//
+// Usage: modes CACHE_FOLDER, for the tables; modes CACHE_FOLDER exact|1mm|minimum|ingest, for that
+// alone, a hundred times, for a profiler to count. scripts/benchmark calls both.
+
+#include <hwy/highway.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/proximity/proximity_batch.h"
+#include "peers/scene.h"
+#include "support.h"
+#include "support/data_dir.h"
+
+namespace {
+
+using ist::CloudSnapshot;
+using ist::LinkProximity;
+using ist::LinkState;
+using ist::ProximityQuery;
+using ist::QueryConfig;
+using ist::benchmark::Clock;
+using ist::benchmark::DataSet;
+using ist::benchmark::microseconds_since;
+using ist::benchmark::quantile;
+using ist::benchmark::ThreadTimer;
+using Poses = std::vector<Eigen::Isometry3d>;
+
+constexpr double kMaxError = 0.002;  // [m] packing
+constexpr std::size_t kCounted = 100;
+
+ist::IngestConfig everything() {
+  ist::IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = std::numeric_limits<double>::infinity();
+  config.self_filter = false;
+  config.thin = false;
+  return config;
+}
+
+QueryConfig query_config(double tolerance, double relative = 0.0) {
+  QueryConfig config;
+  config.max_distance = 10.0;
+  config.tolerance = tolerance;
+  config.relative_tolerance = relative;
+  return config;
+}
+
+struct Bench {
+  explicit Bench(const std::string& cache) {
+    const auto data = ist::test::data_dir();
+    set = data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
+    model = set.robot.pack(kMaxError);
+    known.assign(model->links.size(), true);
+    clouds.resize(set.scenes.size());
+    for (std::size_t s = 0; s < clouds.size(); ++s) {
+      const ist::benchmark::Frame& frame = set.scenes[s].frame;
+      ist::Ingest(everything()).run(frame.raw(), frame.X_FS, {}, 0.0, &clouds[s]);
+    }
+    find_free();
+  }
+
+  // What of the motion touches nothing: where the ways to ask can be compared.
+  void find_free() {
+    ProximityQuery query(model, query_config(0.001));
+    std::vector<LinkProximity> results;
+    free.resize(clouds.size());
+    for (std::size_t s = 0; s < clouds.size(); ++s) {
+      for (const Poses& X_FL : set.motion) {
+        query.run(X_FL, known, {&clouds[s]}, &results);
+        const bool contact =
+            std::any_of(results.begin(), results.end(),
+                        [](const auto& link) { return link.state == LinkState::kContact; });
+        if (!contact) free[s].push_back(&X_FL);
+      }
+    }
+  }
+
+  // [us] of each free configuration; `ask` is made anew for each cloud.
+  using Ask = std::function<void(const Poses&, const CloudSnapshot&)>;
+  std::vector<double> time(const std::function<Ask()>& make) const {
+    std::vector<double> us;
+    for (std::size_t s = 0; s < clouds.size(); ++s) {
+      const Ask ask = make();
+      ThreadTimer timer;
+      for (const Poses* X_FL : free[s]) {
+        timer.lap();
+        ask(*X_FL, clouds[s]);
+        us.push_back(timer.lap());
+      }
+    }
+    return us;
+  }
+
+  Ask every_link(const QueryConfig& config) const {
+    auto query = std::make_shared<ProximityQuery>(model, config);
+    auto results = std::make_shared<std::vector<LinkProximity>>();
+    return [this, query, results](const Poses& X_FL, const CloudSnapshot& cloud) {
+      query->run(X_FL, known, {&cloud}, results.get());
+    };
+  }
+
+  Ask minimum(const QueryConfig& config) const {
+    auto query = std::make_shared<ProximityQuery>(model, config);
+    auto result = std::make_shared<ist::RobotProximity>();
+    return [this, query, result](const Poses& X_FL, const CloudSnapshot& cloud) {
+      query->run_minimum(X_FL, known, {&cloud}, result.get());
+    };
+  }
+
+  Ask last_link(const QueryConfig& config) const {
+    auto query = std::make_shared<ProximityQuery>(model, config);
+    auto result = std::make_shared<LinkProximity>();
+    return [query, result](const Poses& X_FL, const CloudSnapshot& cloud) {
+      query->run_link(X_FL.size() - 1, X_FL.back(), {&cloud}, result.get());
+    };
+  }
+
+  DataSet set;
+  std::shared_ptr<const ist::RobotModel> model;
+  std::vector<bool> known;
+  std::vector<CloudSnapshot> clouds;
+  std::vector<std::vector<const Poses*>> free;  // by cloud
+};
+
+void print_modes(const Bench& bench) {
+  const auto all = [&](double tolerance, double relative = 0.0) {
+    return bench.time([&] { return bench.every_link(query_config(tolerance, relative)); });
+  };
+  const auto minimum = [&](double tolerance) {
+    return bench.time([&] { return bench.minimum(query_config(tolerance)); });
+  };
+  std::printf("# modes\n| asked for | median | p99 | all links / this |\n|---|---|---|---|\n");
+  const auto exact = all(0.0), coarse = all(0.001);
+  const auto print = [](const char* what, const std::vector<double>& us,
+                        const std::vector<double>& reference) {
+    std::printf("| %s | %.1f µs | %.0f µs | %.1f |\n", what, quantile(us, 0.5), quantile(us, 0.99),
+                quantile(reference, 0.5) / quantile(us, 0.5));
+  };
+  print("all links, exact", exact, exact);
+  print("all links, to 1 mm", coarse, coarse);
+  print("all links, to 1 mm or 5 %", all(0.001, 0.05), coarse);
+  print("the robot's minimum, exact", minimum(0.0), exact);
+  print("the robot's minimum, to 1 mm", minimum(0.001), coarse);
+  print("the last link alone, to 1 mm",
+        bench.time([&] { return bench.last_link(query_config(0.001)); }), coarse);
+}
+
+double batch_us(const Bench& bench, int threads) {
+  Poses X_FL;
+  for (const auto& configuration : bench.set.scenes[0].configurations) {
+    X_FL.insert(X_FL.end(), configuration.X_FL.begin(), configuration.X_FL.end());
+  }
+  ist::ProximityBatch batch(bench.model, query_config(0.001), threads);
+  std::vector<LinkProximity> results;
+  std::vector<double> us;
+  for (int i = 0; i < 7; ++i) {
+    const Clock::time_point start = Clock::now();
+    batch.run(X_FL, bench.known, {&bench.clouds[0]}, &results);
+    us.push_back(microseconds_since(start));
+  }
+  return quantile(us, 0.5);
+}
+
+// Two sensors' images, each with an Ingest of its own.
+double ingest_us(const Bench& bench, bool side_by_side) {
+  const ist::benchmark::Frame& frame = bench.set.scenes[0].frame;
+  ist::Ingest ingests[2] = {ist::Ingest(everything()), ist::Ingest(everything())};
+  CloudSnapshot snapshots[2];
+  constexpr int kImages = 20;
+  const auto work = [&](int i) {
+    for (int k = 0; k < kImages; ++k) {
+      ingests[i].run(frame.raw(), frame.X_FS, {}, 0.0, &snapshots[i]);
+    }
+  };
+  work(0);
+  work(1);
+  const Clock::time_point start = Clock::now();
+  if (side_by_side) {
+    std::thread other(work, 1);
+    work(0);
+    other.join();
+  } else {
+    work(0);
+    work(1);
+  }
+  return microseconds_since(start) / (2 * kImages);
+}
+
+void print_threads(const Bench& bench) {
+  std::printf("# threads\n| wall time of | one thread | two | one / two |\n|---|---|---|---|\n");
+  const double one = batch_us(bench, 1), two = batch_us(bench, 2);
+  std::printf("| a batch of %zu configurations, to 1 mm | %.1f ms | %.1f ms | %.2f |\n",
+              bench.set.scenes[0].configurations.size(), 1e-3 * one, 1e-3 * two, one / two);
+  const double alone = ingest_us(bench, false), beside = ingest_us(bench, true);
+  std::printf("| an image, of two sensors | %.2f ms | %.2f ms | %.2f |\n", 1e-3 * alone,
+              1e-3 * beside, alone / beside);
+}
+
+void choose(std::int64_t targets) {
+  hwy::SetSupportedTargetsForTest(targets);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+void print_instruction_sets(const Bench& bench) {
+  std::printf(
+      "# instruction sets\n| instruction set | image | all links, exact | to 1 mm | largest "
+      "difference of a distance |\n|---|---|---|---|---|\n");
+  choose(0);
+  std::vector<double> first;
+  const std::int64_t all = hwy::SupportedTargets();
+  for (std::int64_t left = all; left != 0; left &= left - 1) {
+    const std::int64_t target = left & -left;
+    choose(target);
+    const double image = ingest_us(bench, false);
+    std::vector<double> distances;
+    ProximityQuery query(bench.model, query_config(0.0));
+    std::vector<LinkProximity> results;
+    for (const Poses* X_FL : bench.free[0]) {
+      query.run(*X_FL, bench.known, {&bench.clouds[0]}, &results);
+      for (const LinkProximity& link : results) distances.push_back(link.distance);
+    }
+    if (first.empty()) first = distances;
+    double difference = 0.0;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      difference = std::max(difference, std::abs(distances[i] - first[i]));
+    }
+    const auto median = [&](double tolerance) {
+      return quantile(bench.time([&] { return bench.every_link(query_config(tolerance)); }), 0.5);
+    };
+    std::printf("| %s | %.2f ms | %.0f µs | %.0f µs | %.1g m |\n", hwy::TargetName(target),
+                1e-3 * image, median(0.0), median(0.001), difference);
+  }
+  choose(0);
+}
+
+// For a profiler that counts only while ProximityQuery::run and the like are at work.
+void count(const std::string& cache, const std::string& what) {
+  const auto data = ist::test::data_dir();
+  const DataSet set =
+      data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
+  const ist::benchmark::Frame& frame = set.scenes[0].frame;
+  ist::Ingest ingest(everything());
+  CloudSnapshot cloud;
+  for (std::size_t k = 0; k < (what == "ingest" ? kCounted / 10 : 1); ++k) {
+    ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &cloud);
+  }
+  if (what == "ingest") return;
+  const auto model = set.robot.pack(kMaxError);
+  const std::vector<bool> known(model->links.size(), true);
+  ProximityQuery query(model, query_config(what == "1mm" ? 0.001 : 0.0));
+  std::vector<LinkProximity> results;
+  ist::RobotProximity robot;
+  for (std::size_t k = 0; k < kCounted; ++k) {
+    if (what == "minimum") {
+      query.run_minimum(set.motion[k], known, {&cloud}, &robot);
+    } else {
+      query.run(set.motion[k], known, {&cloud}, &results);
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "Usage: modes CACHE_FOLDER [exact|1mm|minimum|ingest]\n");
+    return 2;
+  }
+  if (argc > 2) {
+    count(argv[1], argv[2]);
+    return 0;
+  }
+  const Bench bench(argv[1]);
+  print_modes(bench);
+  print_threads(bench);
+  print_instruction_sets(bench);
+  return 0;
+}
