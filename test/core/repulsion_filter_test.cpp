@@ -62,7 +62,8 @@ TEST(RepulsionFilter, spreadsWhatACloudChanges) {
 TEST(RepulsionFilter, slowUpdatesAreHardlyDelayed) {
   RepulsionFilter filter;
   for (int i = 0; i < 20; ++i) {
-    const Push out = filter.update(0.5 * i, static_cast<std::uint64_t>(i), push(0.5 * (i % 2)), kNear, {});
+    const Push out =
+        filter.update(0.5 * i, static_cast<std::uint64_t>(i), push(0.5 * (i % 2)), kNear, {});
     EXPECT_NEAR(out.force.x(), 0.5 * (i % 2), 1e-6);
   }
 }
