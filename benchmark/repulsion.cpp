@@ -74,8 +74,8 @@ struct Tables {
     const std::string resolution = text("%g", 1e3 * max_error);
     // A row for the penetration wrench belongs here, where there is one.
     for (const auto& [name, noise] : {std::make_pair("nearest pair", &measured.nearest),
-                                      std::make_pair("blend", &measured.blend),
-                                      std::make_pair("blend, 100 mm", &measured.wide)}) {
+                                      std::make_pair("blend, 50 mm", &measured.narrow),
+                                      std::make_pair("blend", &measured.blend)}) {
       std::vector<std::string> cells = {scene, resolution, name};
       for (const std::string& cell : noise_cells(*noise, measured.reference_variation)) {
         cells.push_back(cell);
@@ -91,8 +91,8 @@ struct Tables {
     cost += row({scene, resolution, times(measured.query_us), times(measured.blend_us), ratio(0.5),
                  ratio(0.99)});
     if (max_error != kMaxErrors[2]) return;
-    add_density(scene, "50", measured.half, measured.twice);
-    add_density(scene, "100", measured.wide_half, measured.wide_twice);
+    add_density(scene, "50", measured.narrow_half, measured.narrow_twice);
+    add_density(scene, "100", measured.half, measured.twice);
   }
 
   void add_density(const std::string& scene, const std::string& smoothing,

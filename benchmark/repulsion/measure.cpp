@@ -35,9 +35,9 @@ class Asker {
     return blend;
   }
   /// The blend of the last ask() with another smoothing.
-  Eigen::Vector3d wide(std::size_t link, const std::vector<Eigen::Isometry3d>& X_FL) const {
+  Eigen::Vector3d narrow(std::size_t link, const std::vector<Eigen::Isometry3d>& X_FL) const {
     RepulsionConfig config;
-    config.smoothing = kWide;
+    config.smoothing = kNarrow;
     return repulsion_(link, X_FL[link], clouds_, answers_[link], config);
   }
   const LinkProximity& answer(std::size_t link) const { return answers_[link]; }
@@ -83,7 +83,7 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
   Measured measured;
   const std::size_t links = model->links.size();
   Asker full(model, scene.cloud), half(model, scene.half), twice(model, scene.twice);
-  std::vector<Eigen::Vector3d> blends(links), nearests(links), wides(links);
+  std::vector<Eigen::Vector3d> blends(links), nearests(links), narrows(links);
   std::vector<std::vector<bool>> counts;
   for (std::size_t step = 0; step < scene.steps.size(); ++step) {
     const std::vector<Eigen::Isometry3d>& X_FL = scene.steps[step];
@@ -94,7 +94,7 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
       if (!moves(scene, i)) continue;
       const Eigen::Vector3d blend = full.ask(i, X_FL);
       const LinkProximity& answer = full.answer(i);
-      const Eigen::Vector3d nearest = nearest_pair(answer), wide = full.wide(i, X_FL);
+      const Eigen::Vector3d nearest = nearest_pair(answer), narrow = full.narrow(i, X_FL);
       const bool is_free = answer.state != LinkState::kContact;
       const bool compared = in_reference && answer.state == LinkState::kNear &&
                             blend.norm() > kShort && step > scene.reference_begin &&
@@ -105,18 +105,18 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
         measured.blend_us.push_back(full.blend_us);
         if (step % kDensityStride == 0) {
           measured.half.push_back((half.ask(i, X_FL) - blend).norm());
-          measured.wide_half.push_back((half.wide(i, X_FL) - wide).norm());
+          measured.narrow_half.push_back((half.narrow(i, X_FL) - narrow).norm());
           measured.twice.push_back((twice.ask(i, X_FL) - blend).norm());
-          measured.wide_twice.push_back((twice.wide(i, X_FL) - wide).norm());
+          measured.narrow_twice.push_back((twice.narrow(i, X_FL) - narrow).norm());
         }
       }
       if (!scene.begins[step]) {
         measured.blend.add(blends[i], blend, is_free, compared);
-        measured.wide.add(wides[i], wide, is_free, compared);
+        measured.narrow.add(narrows[i], narrow, is_free, compared);
         measured.nearest.add(nearests[i], nearest, is_free, compared);
       }
       blends[i] = blend;
-      wides[i] = wide;
+      narrows[i] = narrow;
       nearests[i] = nearest;
     }
   }

@@ -28,15 +28,15 @@ struct Noise {
 constexpr double kShort = 0.05;
 
 /// [m] Another smoothing than the default.
-constexpr double kWide = 0.1;
+constexpr double kNarrow = 0.05;
 
 /// Of one scene at one resolution.
 struct Measured {
-  Noise nearest, blend, wide;              ///< wide: the blend with kWide for smoothing
+  Noise nearest, blend, narrow;            ///< narrow: the blend with kNarrow for smoothing
   double reference_variation = 0.0;        ///< [deg] from exact geometry
   std::vector<double> query_us, blend_us;  ///< of one link within the influence distance
   std::vector<double> half, twice;         ///< change of the blend, of the gain
-  std::vector<double> wide_half, wide_twice;
+  std::vector<double> narrow_half, narrow_twice;
 };
 
 Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model);
