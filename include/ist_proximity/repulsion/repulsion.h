@@ -18,8 +18,8 @@ struct RepulsionConfig {
   /// [m] > 0: at and beyond it the vector is zero. Not more than the query's max_distance: what is
   /// CLEAR repels nothing.
   double influence_distance = 0.3;
-  double gain = 1.0;        ///< length of the vector at touch and in contact; >= 0
-  double smoothing = 0.1;   ///< [m] > 0: pairs this much farther than the nearest still count
+  double gain = 1.0;       ///< length of the vector at touch and in contact; >= 0
+  double smoothing = 0.1;  ///< [m] > 0: pairs this much farther than the nearest still count
   /// [s] >= 0: mean delay of what a new cloud changes, see RepulsionFilter; 0: no filter.
   double filter_time = 0.05;
 };
