@@ -97,15 +97,19 @@ ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
 ist_proximity_peer(dynamic_edt dynamicEDT3D/dynamicEDTOctomap.h dynamicedt3d octomap octomath)
 
-# Through ROS: needs a roscore while it runs.
+# Through ROS: they need a roscore while they run.
 if(catkin_FOUND)
-  add_executable(benchmark_latency EXCLUDE_FROM_ALL benchmark/ros/latency.cpp)
-  target_include_directories(benchmark_latency PRIVATE benchmark test)
-  target_include_directories(benchmark_latency SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-  target_link_libraries(benchmark_latency PRIVATE ist_proximity_ros)
-  target_compile_definitions(benchmark_latency PRIVATE
-    IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
-  set_target_properties(benchmark_latency PROPERTIES
-    OUTPUT_NAME latency RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
-  add_dependencies(benchmarks benchmark_latency)
+  file(GLOB ros_benchmark_sources CONFIGURE_DEPENDS benchmark/ros/*.cpp)
+  foreach(source IN LISTS ros_benchmark_sources)
+    get_filename_component(name ${source} NAME_WE)
+    add_executable(benchmark_${name} EXCLUDE_FROM_ALL ${source})
+    target_include_directories(benchmark_${name} PRIVATE benchmark test)
+    target_include_directories(benchmark_${name} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+    target_link_libraries(benchmark_${name} PRIVATE ist_proximity_ros)
+    target_compile_definitions(benchmark_${name} PRIVATE
+      IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+    set_target_properties(benchmark_${name} PROPERTIES
+      OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
+    add_dependencies(benchmarks benchmark_${name})
+  endforeach()
 endif()

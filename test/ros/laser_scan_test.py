@@ -102,8 +102,10 @@ class LaserScanTest(unittest.TestCase):
     def test_distances_and_silence(self):
         # Which of two it says depends on whether it has met this test's publisher yet.
         words = re.compile("'laser'.*(sensor_msgs/LaserScan|there is a publisher)")
-        message = self.node.wait_for(lambda m: words.search(m.status_text), "no scan yet")
-        self.assertEqual(message.status, ProximityArray.NO_CLOUD)
+        message = self.node.wait_for(
+            lambda m: m.status == ProximityArray.NO_CLOUD and words.search(m.status_text),
+            "no scan yet",
+        )
         self.assertTrue(pt.all_unknown(message))
         self.check_wall()
         message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "the newest scan is")

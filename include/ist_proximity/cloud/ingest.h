@@ -17,7 +17,8 @@ struct IngestConfig {
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: a point at most this far from a link is its own
-  bool thin = true;  ///< make the thinned cloud; without it repulsion and contact volumes see nothing
+  bool thin =
+      true;  ///< make the thinned cloud; without it repulsion and contact volumes see nothing
   double thinning = 0.01;  ///< [m] > 0: cell of the thinned cloud that repulsion sums over
 };
 
