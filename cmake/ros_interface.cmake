@@ -13,6 +13,7 @@ find_package(catkin REQUIRED COMPONENTS
   std_msgs
   std_srvs
   tf2
+  tf2_eigen
   tf2_msgs
   tf2_ros
   topic_tools
