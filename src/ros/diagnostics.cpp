@@ -178,7 +178,7 @@ DiagnosticStatus pose_diagnostics(const std::string& node, const CycleReport& re
     add("publishers", joints.publishers, &status);
     add("joint states received", joints.messages, &status);
     add("joint states used", joints.used, &status);
-    add("joint states skipped: a newer one came first", report.states_skipped, &status);
+    add("joint states skipped: more came than can be answered", joints.skipped, &status);
     add("positions that cannot be used", joints.dropped, &status);
   }
   for (const std::string& problem : report.pose_problems) add("problem", problem, &status);

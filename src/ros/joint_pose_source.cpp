@@ -10,12 +10,13 @@
 namespace ist {
 
 JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
-                                 JointStateListener* joints, const tf2::BufferCore& buffer,
-                                 const std::string& fixed_frame,
+                                 JointStateListener* joints, Which which,
+                                 const tf2::BufferCore& buffer, const std::string& fixed_frame,
                                  const std::vector<std::string>& links,
                                  const std::vector<bool>& wanted, double timeout)
     : kinematics_(std::move(kinematics)),
       listener_(*joints),
+      which_(which),
       buffer_(buffer),
       fixed_frame_(fixed_frame),
       wanted_(wanted),
@@ -35,7 +36,11 @@ std::string JointPoseSource::hint() const {
 /// @returns the newest stamp; `now` when nothing is fresh
 ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   const auto& joints = kinematics_->joints();
-  listener_.newest(*kinematics_, &newest_);
+  if (which_ == Which::kTaken) {
+    listener_.taken(*kinematics_, &newest_);
+  } else {
+    listener_.newest(*kinematics_, &newest_);
+  }
   newest_.resize(joints.size());
   q_.assign(joints.size(), std::nan(""));
   joint_problems_.assign(joints.size(), std::string());

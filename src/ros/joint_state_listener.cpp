@@ -17,6 +17,7 @@ namespace {
 constexpr double kMaxAhead = 1.0;     // [s] as for transforms
 constexpr double kLimitSlack = 1e-3;  // [rad, m] encoders and controllers are not that exact
 constexpr std::chrono::seconds kProblemAge(1);
+constexpr std::size_t kMaxWaiting = 10;
 
 geometry_msgs::TransformStamped to_message(const Eigen::Isometry3d& X) {
   geometry_msgs::TransformStamped message;
@@ -62,12 +63,14 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
   index_.clear();
   moved_by_.clear();
   positions_.clear();
-  facts_.messages = facts_.used = facts_.dropped = 0;
+  forget();
+  facts_.messages = facts_.used = facts_.dropped = facts_.skipped = 0;
   facts_.problem.clear();
   if (!kinematics_) return;
   const std::size_t count = kinematics_->joints().size();
   moved_by_.resize(count);
   positions_.resize(count);
+  taken_ = positions_;
   for (std::size_t j = 0; j < count; ++j) {
     const Kinematics::Joint& joint = kinematics_->joints()[j];
     index_[joint.name] = j;
@@ -89,6 +92,28 @@ void JointStateListener::newest(const Kinematics& kinematics, std::vector<Positi
   }
 }
 
+void JointStateListener::take_next() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  if (waiting_.empty()) {
+    taken_ = positions_;
+    return;
+  }
+  taken_.swap(waiting_.front());
+  waiting_.pop_front();
+  waiting_count_ = waiting_.size();
+}
+
+void JointStateListener::taken(const Kinematics& kinematics, std::vector<Position>* positions) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  if (&kinematics == kinematics_.get()) {
+    *positions = taken_;
+  } else {
+    positions->clear();
+  }
+}
+
 JointStateFacts JointStateListener::facts() {
   const std::lock_guard<std::mutex> lock(mutex_);
   JointStateFacts facts = facts_;
@@ -99,8 +124,25 @@ JointStateFacts JointStateListener::facts() {
 /// With mutex_ held.
 void JointStateListener::notice_clock_jump() {
   const ros::Time now = ros::Time::now();
-  if (now < last_now_) positions_.assign(positions_.size(), Position());
+  if (now < last_now_) forget();
   last_now_ = now;
+}
+
+/// With mutex_ held, as enqueue().
+void JointStateListener::forget() {
+  positions_.assign(positions_.size(), Position());
+  taken_ = positions_;
+  waiting_.clear();
+  waiting_count_ = 0;
+}
+
+void JointStateListener::enqueue() {
+  if (waiting_.size() == kMaxWaiting) {
+    facts_.skipped += waiting_.size();
+    waiting_.clear();
+  }
+  waiting_.push_back(positions_);
+  waiting_count_ = waiting_.size();
 }
 
 /// Not in facts(): roscpp's answer can wait for the master.
@@ -126,7 +168,10 @@ void JointStateListener::receive(const sensor_msgs::JointStateConstPtr& message)
     if (!kinematics_) return;
     ++facts_.messages;
     is_new = read(*message);
-    if (is_new) ++facts_.used;
+    if (is_new) {
+      ++facts_.used;
+      enqueue();
+    }
   }
   if (is_new) on_state_();
 }

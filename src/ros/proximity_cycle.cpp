@@ -51,7 +51,8 @@ std::string fixed_frame_of(const ModelState& model, const ServerConfig& config) 
 
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
                                              const tf2::BufferCore& buffer,
-                                             JointStateListener* joints) {
+                                             JointStateListener* joints,
+                                             JointPoseSource::Which which) {
   const std::string fixed_frame = fixed_frame_of(model, config);
   const std::vector<std::string> names = link_names(*model.robot);
   const std::vector<bool> wanted = wanted_links(model);
@@ -59,8 +60,8 @@ std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const Serv
     return std::make_unique<TfPoseSource>(buffer, fixed_frame, names, wanted, config.pose_timeout);
   }
   if (!model.kinematics) return nullptr;
-  return std::make_unique<JointPoseSource>(model.kinematics, joints, buffer, fixed_frame, names,
-                                           wanted, config.pose_timeout);
+  return std::make_unique<JointPoseSource>(model.kinematics, joints, which, buffer, fixed_frame,
+                                           names, wanted, config.pose_timeout);
 }
 
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,

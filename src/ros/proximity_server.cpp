@@ -104,14 +104,12 @@ bool ProximityServer::sleep_until(Clock::time_point time) {
 }
 
 /// With pose_source joint_states: until one comes; after a while without, all the same. What came
-/// during the last cycle is taken at once, as one.
+/// during the last cycle is taken at once, one after the other.
 bool ProximityServer::wait_for_joint_states() {
   std::unique_lock<std::mutex> lock(stop_mutex_);
   state_signal_.wait_for(lock, kStatePatience,
-                         [this] { return stop_ || states_come_ != states_taken_; });
-  const std::uint64_t come = states_come_ - states_taken_;
-  if (come > 1) states_skipped_ += come - 1;
-  states_taken_ = states_come_;
+                         [this] { return stop_ || joint_states_->is_waiting(); });
+  joint_states_->take_next();
   return !stop_;
 }
 
@@ -187,7 +185,9 @@ void ProximityServer::take_model() {
   model_ = std::move(model);
   if (model_->phase == ModelState::Phase::kReady) {
     cycle_ = std::make_unique<ProximityCycle>(
-        model_, config_, make_pose_source(*model_, config_, buffer_, joint_states_.get()),
+        model_, config_,
+        make_pose_source(*model_, config_, buffer_, joint_states_.get(),
+                         JointPoseSource::Which::kTaken),
         ProximityCycle::Reader::kOnly);
   } else {
     cycle_.reset();
@@ -260,7 +260,6 @@ void ProximityServer::run_diagnostics() {
       const std::lock_guard<std::mutex> lock(stop_mutex_);
       wanted_rate = static_cast<double>(states_come_ - states_before) / interval.count();
       states_before = states_come_;
-      report.states_skipped = states_skipped_;
     }
 
     diagnostic_msgs::DiagnosticArray message;

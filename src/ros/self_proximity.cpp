@@ -65,7 +65,8 @@ void SelfProximity::take_model() {
   query_.reset();
   if (!model_->robot || !model_->kinematics) return;
   query_ = std::make_unique<SelfQuery>(model_->robot, choose_pairs(), config_.query);
-  pose_source_ = make_pose_source(*model_, config_, buffer_, joints_);
+  pose_source_ =
+      make_pose_source(*model_, config_, buffer_, joints_, JointPoseSource::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
 }
 

@@ -212,6 +212,25 @@ class JointStatesTest(unittest.TestCase):
             speeds.append(pt.link(message, "ball_link").closing_speed)
         self.assertGreater(np.isfinite(speeds).mean(), 0.8)
 
+    def test_burst(self):
+        """Joint states that come all at once are answered one by one, in their order."""
+        node = self.start(pose_timeout=5.0)
+        self.world.points = np.array([[0.6, 0.6, 0.6]])
+        self.world.start_clouds()
+        steady = self.world.repeat(20, lambda: self.send("turn", "slide"))
+        node.wait_for_status(ProximityArray.OK)
+        steady.stop()
+        begin = len(node.messages)
+        stamp, sent = rospy.Time.now(), []
+        for i in range(8):
+            stamp += rospy.Duration(0.001)
+            sent.append(stamp)
+            self.publisher.publish(joint_state(motion(stamp.to_sec()), stamp))
+        node.wait_for(lambda m: m.header.stamp == sent[-1], "the last answer", start=begin)
+        stamps = [m.header.stamp for m in node.messages[begin:]]
+        self.assertEqual([s for s in stamps if s in sent][:8], sent)
+        self.assertEqual(stamps, sorted(stamps))
+
     def test_joint_repulsion(self):
         """Efforts of moving joints, a mimic among them; what is not known is NaN, with a reason."""
         node = self.start(max_distance=2.0)

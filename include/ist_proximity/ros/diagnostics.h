@@ -38,7 +38,6 @@ struct CycleReport {
   std::vector<std::string> pose_problems;
   std::string transform_problem;                ///< what tf's listener kept out
   std::optional<JointStateFacts> joint_states;  ///< with pose_source joint_states
-  std::uint64_t states_skipped = 0;  ///< joint states that a newer one overtook before its cycle
   std::size_t links_known = 0, links_monitored = 0;
   double pose_age = 0.0;             ///< [s] of the common instant, when any link is known
   std::size_t cycles = 0;            ///< since the start, those without a model too

@@ -14,20 +14,25 @@ namespace ist {
 
 /// Computes link poses from joint states.
 ///
-/// They belong to the stamp of the newest joint state. A joint that came earlier, from a slower
-/// publisher, keeps its last position until that is older than the timeout; then the links below it
-/// are not known. What joint states cannot tell comes from tf at the same instant: planar and
-/// floating joints, and where the root link is in the fixed frame. While tf is behind the joint
-/// states, all poses are those of the newest instant at which tf and joints are known.
+/// They belong to the stamp of the newest joint state, or of the one whose turn it is. A joint that
+/// came earlier, from a slower publisher, keeps its last position until that is older than the
+/// timeout; then the links below it are not known. What joint states cannot tell comes from tf at
+/// the same instant: planar and floating joints, and where the root link is in the fixed frame.
+/// While tf is behind the joint states, all poses are those of the newest instant at which tf and
+/// joints are known.
 class JointPoseSource : public PoseSource {
  public:
+  /// kTaken: of the message that JointStateListener::take_next() has come to.
+  enum class Which { kNewest, kTaken };
+
   /// @param joints       feeds `buffer`; both outlive this
+  /// @param which        joint states it looks at
   /// @param fixed_frame  frame F
   /// @param links        names
   /// @param wanted       by link: false leaves it unknown and out of everything
   /// @param timeout      [s]
   JointPoseSource(std::shared_ptr<const Kinematics> kinematics, JointStateListener* joints,
-                  const tf2::BufferCore& buffer, const std::string& fixed_frame,
+                  Which which, const tf2::BufferCore& buffer, const std::string& fixed_frame,
                   const std::vector<std::string>& links, const std::vector<bool>& wanted,
                   double timeout);
 
@@ -43,6 +48,7 @@ class JointPoseSource : public PoseSource {
 
   std::shared_ptr<const Kinematics> kinematics_;
   JointStateListener& listener_;
+  const Which which_;
   const tf2::BufferCore& buffer_;
   std::string fixed_frame_;
   std::vector<std::size_t> places_;  ///< by link: where the kinematics has it; none: its size

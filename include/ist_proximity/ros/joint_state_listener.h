@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -29,6 +30,7 @@ struct JointStateFacts {
   std::uint64_t messages = 0;    ///< received
   std::uint64_t used = 0;        ///< messages that told something new
   std::uint64_t dropped = 0;     ///< positions that could not be used
+  std::uint64_t skipped = 0;     ///< used, but not answered: more came than could be
   std::string problem;           ///< during the last second; empty when there was none
 };
 
@@ -39,6 +41,10 @@ struct JointStateFacts {
 ///
 /// Every joint's pose goes into a tf buffer too, where it is found again at the stamps of clouds,
 /// interpolated, with all that tf knows besides: cameras on links, the frame the robot stands in.
+///
+/// Every message that told something new waits for its turn, take_next(), so that what follows the
+/// robot answers each of them, also after a moment without a processor. Who is ten messages late
+/// has lost the robot: they are skipped, all but the newest.
 ///
 /// When the ROS clock jumps back, all positions are forgotten. Thread safe.
 class JointStateListener {
@@ -61,6 +67,14 @@ class JointStateListener {
   /// By joint of `kinematics`; empty when that is not what messages are read with.
   void newest(const Kinematics& kinematics, std::vector<Position>* positions);
 
+  /// Whether a message waits for its turn.
+  bool is_waiting() const { return waiting_count_ > 0; }
+  /// To the oldest message that waits; to the newest positions when none does.
+  void take_next();
+  /// As newest(), just after the message that take_next() has come to. What came before it counts,
+  /// what came after it does not.
+  void taken(const Kinematics& kinematics, std::vector<Position>* positions);
+
   JointStateFacts facts();
 
  private:
@@ -70,6 +84,8 @@ class JointStateListener {
   bool read_joint(const std::string& name, double q, const ros::Time& stamp);
   void put_into_tf(std::size_t joint, const ros::Time& stamp, bool is_static);
   void notice_clock_jump();
+  void forget();
+  void enqueue();
   void count_publishers();
   void drop(const std::string& problem, std::size_t count);
 
@@ -83,6 +99,9 @@ class JointStateListener {
   std::unordered_map<std::string, std::size_t> index_;  ///< of a joint, by name
   std::vector<std::vector<std::size_t>> moved_by_;      ///< by joint: those that it moves
   std::vector<Position> positions_;                     ///< by joint
+  std::vector<Position> taken_;                         ///< the same, at the turn of a message
+  std::deque<std::vector<Position>> waiting_;           ///< the same, after each that waits
+  std::atomic<std::size_t> waiting_count_{0};
   JointStateFacts facts_;
   std::chrono::steady_clock::time_point problem_time_;
   ros::Time last_now_;

@@ -14,6 +14,7 @@
 #include "ist_proximity/ros/closing_speed.h"
 #include "ist_proximity/ros/cloud_source.h"
 #include "ist_proximity/ros/diagnostics.h"
+#include "ist_proximity/ros/joint_pose_source.h"
 #include "ist_proximity/ros/joint_repulsion.h"
 #include "ist_proximity/ros/joint_state_listener.h"
 #include "ist_proximity/ros/model_loader.h"
@@ -94,10 +95,12 @@ std::string fixed_frame_of(const ModelState& model, const ServerConfig& config);
 /// @param model   ready
 /// @param buffer  outlives the result
 /// @param joints  outlives the result; null: link poses come from the buffer
+/// @param which   of the joint states
 /// @returns null when the URDF's kinematics is needed and faulty
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
                                              const tf2::BufferCore& buffer,
-                                             JointStateListener* joints);
+                                             JointStateListener* joints,
+                                             JointPoseSource::Which which);
 
 /// By link of model.robot: names, and whether its pose is asked for.
 std::vector<std::string> link_names(const RobotModel& robot);

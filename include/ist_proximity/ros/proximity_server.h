@@ -104,7 +104,7 @@ class ProximityServer {
   std::condition_variable stop_signal_;
   bool stop_ = false;
   std::condition_variable state_signal_;  ///< to stop, or a joint state has come
-  std::uint64_t states_come_ = 0, states_taken_ = 0, states_skipped_ = 0;
+  std::uint64_t states_come_ = 0;
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
   std::thread cycle_thread_, diagnostics_thread_;
