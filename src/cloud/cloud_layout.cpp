@@ -41,7 +41,8 @@ std::string find_coordinate(const CloudLayout& layout, const char* name, const R
     return field_name + " has datatype " + datatype_name(field.datatype) +
            ", it must be float32 (7) or float64 (8).";
   }
-  if (field.count != 1) return field_name + " has count " + text(field.count) + ", it must be 1.";
+  // 0 is what drivers leave that know of no other count; PCL takes it for 1, too.
+  if (field.count > 1) return field_name + " has count " + text(field.count) + ", it must be 1.";
   const std::uint64_t end = std::uint64_t{field.offset} + size_of(field);
   if (end > layout.point_step) {
     return field_name + " of type " + datatype_name(field.datatype) + " at offset " +

@@ -12,6 +12,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -54,11 +55,57 @@ void check_scale(const std::string& path, const Eigen::Vector3d& scale) {
   fail(path, text.str());
 }
 
-bool is_collada(const std::string& path) {
-  std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".dae";
+  return text;
+}
+
+bool is_collada(const std::string& path) {
+  return lower_case(fs::path(path).extension().string()) == ".dae";
+}
+
+std::string read_bytes(std::ifstream* file, std::uint64_t begin, std::uint64_t count) {
+  std::string bytes(count, '\0');
+  file->clear();
+  file->seekg(static_cast<std::streamoff>(begin));
+  file->read(&bytes[0], static_cast<std::streamsize>(count));
+  bytes.resize(static_cast<std::size_t>(file->gcount()));
+  return bytes;
+}
+
+// Whether the last thing that a text of STL tells is a solid's end.
+bool ends_solid(std::string text) {
+  std::replace(text.begin(), text.end(), '\r', '\n');
+  bool ends = false;
+  std::istringstream lines(lower_case(text));
+  for (std::string line; std::getline(lines, line);) {
+    std::string word, next;
+    std::istringstream(line) >> word >> next;
+    if (word == "endsolid" || (word == "end" && next == "solid")) ends = true;
+    if (word == "solid" || word == "facet" || word == "vertex") ends = false;
+  }
+  return ends;
+}
+
+// Assimp takes the first half of a text for a mesh; half a link would be an unsafe link.
+void check_end_of_stl(const std::string& path) {
+  constexpr std::uint64_t kBinaryHead = 84, kBinaryFacet = 50, kTail = 4096;
+  if (lower_case(fs::path(path).extension().string()) != ".stl") return;
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const auto size = static_cast<std::uint64_t>(file.tellg());
+  const std::string head = read_bytes(&file, 0, kBinaryHead);
+  if (head.compare(0, 5, "solid") != 0) return;
+  if (head.size() == kBinaryHead) {  // binary files may begin so, too
+    std::uint32_t facets = 0;
+    std::memcpy(&facets, &head[kBinaryHead - sizeof facets], sizeof facets);
+    if (size == kBinaryHead + kBinaryFacet * facets) return;
+  }
+  const std::uint64_t tail = std::min(kTail, size);
+  if (ends_solid(read_bytes(&file, size - tail, tail))) return;
+  fail(path,
+       "is cut off: an STL file that begins with 'solid' ends with 'endsolid'; export or "
+       "download it again");
 }
 
 // Metres per unit of a Collada file. Read here, as rviz does, and the root node into which assimp
@@ -195,6 +242,7 @@ void turn_outside_out(TriangleMesh* mesh) {
 TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
   check_scale(path, scale);
   check_file(path);
+  check_end_of_stl(path);
   Assimp::Importer importer;
   const aiScene& scene = read_scene(path, &importer);
   const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();

@@ -188,12 +188,16 @@ SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;
 SelfQuery& SelfQuery::operator=(SelfQuery&&) noexcept = default;
 
+void SelfQuery::set_config(const QueryConfig& config) { impl_->config = config; }
+
 const std::vector<LinkPair>& SelfQuery::pairs() const { return impl_->pairs; }
 
 void SelfQuery::Impl::run(const LinkPair& pair, const std::vector<Eigen::Isometry3d>& X_FL,
                           PairProximity* result) {
+  QueryConfig range = config;  // bounds have the margin taken off
+  range.max_distance += config.margin;
   const auto search = [&](std::size_t a, std::size_t b) {
-    PairSearch found(model->links[a], model->links[b], X_FL[b].inverse() * X_FL[a], config, &queue);
+    PairSearch found(model->links[a], model->links[b], X_FL[b].inverse() * X_FL[a], range, &queue);
     found.run();
     return found;
   };
@@ -213,9 +217,9 @@ void SelfQuery::Impl::run(const LinkPair& pair, const std::vector<Eigen::Isometr
   const PairSearch one_way = search(a, b);
   double lower = one_way.lower();
   result->distance = kInf;
-  if (lower >= config.max_distance) {
+  if (lower >= range.max_distance) {
     result->state = LinkState::kClear;
-    result->lower_bound = config.max_distance - config.margin;
+    result->lower_bound = config.max_distance;
     return;
   }
   report(one_way, b, sign);

@@ -35,6 +35,7 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
   facts_.type = message_type(config.type);
   facts_.noun = noun(config.type);
   facts_.timeout = config.timeout;
+  facts_.timeout_parameter = config.timeout_parameter;
   facts_.required = config.required;
   if (config.ingest.self_filter) facts_.blind_skin = config.ingest.self_filter_padding;
   nh.setCallbackQueue(&queue_);
@@ -220,8 +221,8 @@ void CloudSource::receive(const Received& received) {
       ++facts_.out_of_order;
       return;
     }
-    facts_.problem = problem;
-    if (!problem.empty()) {
+    if (!problem.empty()) {  // which passes when one is in use again
+      facts_.problem = problem;
       ++facts_.unusable;
       return;
     }
@@ -253,13 +254,19 @@ std::string CloudSource::why_unusable(const Received& received) const {
   return "";
 }
 
+/// That the newest one waits for tf a while is no problem yet.
 void CloudSource::use_newest_ready() {
+  const auto now = std::chrono::steady_clock::now();
+  if (waiting_.empty()) waits_since_ = now;
+  const std::chrono::duration<double> waits = now - waits_since_;
+  const bool is_usual = waits.count() < 0.5 * std::min(config_.timeout, 1.0);
   for (std::size_t i = waiting_.size(); i-- > 0;) {
     std::string problem = missing_transform(*waiting_[i]);
     if (!problem.empty()) {
-      if (i + 1 == waiting_.size()) set_problem(problem, false);
+      if (i + 1 == waiting_.size() && !is_usual) set_problem(problem, false);
       continue;
     }
+    waits_since_ = now;
     problem = ingest(*waiting_[i]);
     set_problem(problem, !problem.empty());
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -10,6 +10,7 @@
 
 #include "ist_proximity/ros/ros_time.h"
 #include "ist_proximity/ros/thread_name.h"
+#include "ist_proximity/ros/transforms.h"
 
 namespace ist {
 namespace {
@@ -255,7 +256,8 @@ void JointStateListener::put_into_tf(std::size_t joint, const ros::Time& stamp, 
 std::vector<std::string> computed_frames(const Kinematics& kinematics) {
   std::vector<std::string> frames;
   for (const Kinematics::Joint& joint : kinematics.joints()) {
-    if (!joint.has_unstated_pose()) frames.push_back(kinematics.links()[joint.child]);
+    if (!joint.has_unstated_pose())
+      frames.push_back(without_slash(kinematics.links()[joint.child]));
   }
   return frames;
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "ist_proximity/ros/transforms.h"
+
 namespace ist {
 namespace {
 
@@ -141,7 +143,8 @@ MarkerArray sphere_markers(const RobotModel& model, const std::vector<std::size_
     if (balls.size() > max_per_link) balls.resize(max_per_link);
     for (std::size_t k = 0; k < balls.size() && balls[k].radius > 0.0; ++k) {
       Marker marker;
-      marker.header.frame_id = link.name;  // stamp 0: rviz takes the newest transform
+      marker.header.frame_id =
+          without_slash(link.name);  // stamp 0: rviz takes the newest transform
       marker.ns = link.name;
       marker.id = static_cast<int>(k);
       marker.type = Marker::SPHERE;

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/robot/mesh_size.h"
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/ros/progress_report.h"
@@ -238,6 +239,8 @@ void ModelLoader::load(const std::string& urdf) {
   state.problem = "packing of the robot '" + description.name + "' begins";
   state.root_link = description.root_link;
   state.links = monitored_links(description, config_.model.links);
+  state.warnings = doubtful_sizes(description, model_config(description, state.objects).links);
+  for (const std::string& doubt : state.warnings) ROS_WARN_STREAM(doubt);
   try {
     state.kinematics = std::make_shared<const Kinematics>(description);
   } catch (const ModelError& error) {

@@ -112,6 +112,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
     SourceConfig source = single;
     source.name = source.topic = name;
     const std::string prefix = "sources/" + name;
+    source.timeout_parameter = prefix + "/timeout";
     reader->children(prefix);  // complains unless it is a dictionary
     read_source(reader, prefix + "/", &source);
     sources.push_back(source);
@@ -156,6 +157,11 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
   reader->read("packing/threads", from_zero("", 256), &config->model.threads);
   config->model.cache_directory = default_cache_directory();
   reader->read("cache_directory", &config->model.cache_directory);
+  const std::string& cache = config->model.cache_directory;
+  if (!cache.empty() && cache[0] != '/' && reader->has("cache_directory")) {
+    reader->add_error("~cache_directory is \"" + cache +
+                      "\": an absolute path is needed, or an empty one for no cache");
+  }
 }
 
 void read_query(ParameterReader* reader, QueryConfig* query) {

@@ -7,6 +7,7 @@
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/ros_time.h"
 #include "ist_proximity/ros/tf_pose_source.h"
+#include "ist_proximity/ros/transforms.h"
 
 namespace ist {
 namespace {
@@ -46,7 +47,7 @@ std::vector<bool> wanted_links(const ModelState& model) {
 }
 
 std::string fixed_frame_of(const ModelState& model, const ServerConfig& config) {
-  return config.fixed_frame.empty() ? model.root_link : config.fixed_frame;
+  return config.fixed_frame.empty() ? without_slash(model.root_link) : config.fixed_frame;
 }
 
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
@@ -272,7 +273,7 @@ void say_no_model(const ModelState& model, const std::string& fixed_frame, const
   }
   *message = ProximityArray();
   message->header.stamp = now;
-  message->header.frame_id = fixed_frame.empty() ? model.root_link : fixed_frame;
+  message->header.frame_id = fixed_frame.empty() ? without_slash(model.root_link) : fixed_frame;
   for (const std::string& link : model.links) message->links.push_back(unknown_link(link));
   fill_sources(situation, message);
   fill_status(situation, now, message, report);

@@ -117,7 +117,7 @@ LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const
   if (!poses_.known[link]) return answer;
   answer.state = LinkState::kClear;
   answer.distance = std::numeric_limits<double>::infinity();
-  answer.lower_bound = config_.query.max_distance - config_.query.margin;
+  answer.lower_bound = config_.query.max_distance;
   for (std::size_t i = 0; i < results_.size(); ++i) {
     const LinkPair& pair = query_->pairs()[i];
     if (pair.first != link && pair.second != link) continue;
@@ -185,8 +185,10 @@ void SelfProximity::run_once() {
   if (query_) {
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
+    const LiveConfig live = live_();
+    query_->set_config(live.query);
     query_->run(poses_.X_FL, poses_.known, &results_);
-    find_wrenches(live_());
+    find_wrenches(live);
     message->header.stamp = poses_.stamp;
     for (const std::size_t i : model_->monitored) {
       const LinkModel& link = model_->robot->links[i];

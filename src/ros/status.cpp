@@ -23,6 +23,10 @@ std::string title(const SourceFacts& source) {
   return "source '" + source.name + "' on " + source.topic;
 }
 
+std::string allowed(const SourceFacts& source) {
+  return seconds(source.timeout) + " (~" + source.timeout_parameter + ")";
+}
+
 std::string because(const std::string& problem) {
   return problem.empty() ? std::string() : ": " + problem;
 }
@@ -53,7 +57,7 @@ Verdict judge_source(const SourceFacts& source, double now) {
   if (newest_age > source.timeout) {
     return {ProximityArray::STALE_CLOUD,
             title(source) + ": the newest " + source.noun + " is " + seconds(newest_age) +
-                " old, allowed is " + seconds(source.timeout) +
+                " old, allowed is " + allowed(source) +
                 (source.problem.empty() ? source.noun == "map"
                                               ? "; is it latched, and sent once? Then its timeout "
                                                 "should be .inf"
@@ -69,7 +73,7 @@ Verdict judge_source(const SourceFacts& source, double now) {
   if (age > source.timeout) {
     return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
                                              " is " + seconds(age) + " old, allowed is " +
-                                             seconds(source.timeout) + because(source.problem)};
+                                             allowed(source) + because(source.problem)};
   }
   if (source.counts.saw_nothing()) {
     return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +

@@ -62,7 +62,28 @@ void TfPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& in
   }
 }
 
+/// A frame of tf that ends in a link's name.
+std::string TfPoseSource::with_prefix() const {
+  std::vector<std::string> known;
+  buffer_._getFrameStrings(known);
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (!wanted_[i] || buffer_._frameExists(without_slash(frames_[i]))) continue;
+    const std::string end = "/" + without_slash(frames_[i]);
+    for (const std::string& frame : known) {
+      const bool fits = frame.size() > end.size() &&
+                        frame.compare(frame.size() - end.size(), end.size(), end) == 0;
+      if (fits) return frame;
+    }
+  }
+  return "";
+}
+
 std::string TfPoseSource::hint() const {
+  const std::string other = with_prefix();
+  if (!other.empty()) {
+    return "tf has '" + other +
+           "': is a tf_prefix set? Frames have to have the names of the URDF's links";
+  }
   return "is robot_state_publisher running, with joint states coming in?";
 }
 

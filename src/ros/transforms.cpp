@@ -8,6 +8,12 @@
 #include "ist_proximity/ros/ros_time.h"
 
 namespace ist {
+namespace {
+
+// tf2 knows frames without the slash that older URDFs put in front of links.
+bool has_slash(const std::string& frame) { return !frame.empty() && frame[0] == '/'; }
+
+}  // namespace
 
 std::string trimmed(std::string tf_error) {
   while (!tf_error.empty() && (tf_error.back() == ' ' || tf_error.back() == '.')) {
@@ -19,6 +25,9 @@ std::string trimmed(std::string tf_error) {
 std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
                     const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
                     ros::Time* stamp) {
+  if (has_slash(fixed) || has_slash(frame)) {
+    return look_up(buffer, without_slash(fixed), without_slash(frame), time, X_FT, stamp);
+  }
   if (frame == fixed) {  // tf2 would give the stamp of what moves the fixed frame itself
     X_FT->setIdentity();
     if (stamp) *stamp = ros::Time();
@@ -59,6 +68,9 @@ std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fix
 
 bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem) {
+  if (has_slash(fixed) || has_slash(frame)) {
+    return is_known(buffer, without_slash(fixed), without_slash(frame), time, problem);
+  }
   if (frame == fixed) return true;
   std::string error;
   try {
@@ -87,7 +99,7 @@ std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isomet
 }
 
 std::string without_slash(const std::string& frame) {
-  return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
+  return has_slash(frame) ? frame.substr(1) : frame;
 }
 
 }  // namespace ist

@@ -15,6 +15,7 @@
 
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/packing/packing_cache.h"
+#include "ist_proximity/robot/mesh_size.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "pack_robot/input.h"
 #include "pack_robot/output.h"
@@ -90,6 +91,9 @@ int pack(Options options) {
                                                            : ist::GeometrySource::kCollision);
   options.model.packing.order = kOrders.at(options.order);
   if (options.no_cache) options.model.cache_directory.clear();
+  for (const std::string& doubt : ist::doubtful_sizes(input.robot, options.model.links)) {
+    std::cerr << "warning: " << doubt << '\n';
+  }
   int status = 0;
   std::ostringstream csv;
   std::vector<std::shared_ptr<const ist::RobotModel>> models;

@@ -193,6 +193,34 @@ TEST_F(MeshIo, saysWhatIsWrongWithAFile) {
               "cannot be read as a mesh");
 }
 
+// What is left of a download or a full disk is no mesh: the rest of the link would be missing.
+TEST_F(MeshIo, refusesAnAsciiStlThatIsCutOff) {
+  const std::string whole = ascii_stl(sample_box());
+  for (std::size_t size = 80; size < whole.size() - std::string("endsolid test\n").size(); ++size) {
+    const std::string error = error_of(dir_.write("cut.stl", whole.substr(0, size)));
+    ASSERT_NE(error.find("cut off"), std::string::npos) << size << ": " << error;
+  }
+  const std::string two = whole + whole.substr(0, whole.size() / 2);
+  expect_says(error_of(dir_.write("cut.stl", two)), "cut off");
+  const std::string binary = binary_stl(sample_box(), "solid binary");
+  expect_says(error_of(dir_.write("cut.stl", binary.substr(0, binary.size() - 60))), "cut off");
+}
+
+TEST_F(MeshIo, readsAsciiStlHoweverItEnds) {
+  const std::string whole = ascii_stl(sample_box());
+  const std::string body = whole.substr(0, whole.rfind("endsolid"));
+  for (const char* end :
+       {"endsolid", "end solid", "endsolid vertex cover", "ENDSOLID test\n\n", "  endsolid\r\n"}) {
+    expect_box(load("mesh.stl", body + end), kMin, kMax);
+  }
+  std::string dos;
+  for (const char c : whole) dos += c == '\n' ? "\r\n" : std::string(1, c);
+  expect_box(load("mesh.stl", dos), kMin, kMax);
+  EXPECT_EQ(load("mesh.stl", whole + whole).triangles.size(), 24U);
+  EXPECT_EQ(load("mesh.stl", whole + body + "endsolid " + std::string(3000, 'x')).triangles.size(),
+            24U);
+}
+
 TEST_F(MeshIo, saysWhenThereIsNoTriangle) {
   const TriangleMesh none;
   for (const auto& [name, content] : std::initializer_list<std::pair<std::string, std::string>>{

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -247,6 +248,47 @@ TEST(PackingKey, isTheSameForTheSameNumbers) {
   TriangleMesh minus_zero = zero;
   minus_zero.vertices[0].x() = -0.0;
   EXPECT_EQ(packing_key(zero, config), packing_key(minus_zero, config));
+}
+
+// Sets a variable of the environment, or removes it, while it lives.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) {
+    const char* old = std::getenv(name);
+    was_set_ = old != nullptr;
+    if (was_set_) old_ = old;
+    set(value);
+  }
+  ~Environment() { set(was_set_ ? old_.c_str() : nullptr); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  void set(const char* value) const {
+    if (value != nullptr) {
+      setenv(name_, value, 1);
+    } else {
+      unsetenv(name_);
+    }
+  }
+
+  const char* name_;
+  bool was_set_;
+  std::string old_;
+};
+
+TEST(DefaultCacheDirectory, IsInRosHome) {
+  const Environment home("HOME", "/home/robot");
+  {
+    const Environment ros_home("ROS_HOME", "/var/ros");
+    EXPECT_EQ(default_cache_directory(), "/var/ros/ist_proximity");
+  }
+  for (const char* value : {static_cast<const char*>(nullptr), ""}) {
+    const Environment ros_home("ROS_HOME", value);
+    EXPECT_EQ(default_cache_directory(), "/home/robot/.ros/ist_proximity");
+    const Environment homeless("HOME", nullptr);
+    EXPECT_EQ(default_cache_directory(), "");
+  }
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/robot/mesh_size.h"
 #include "support/data_dir.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
@@ -205,6 +206,31 @@ TEST(RobotDescription, loadsMeshesWithTheirScale) {
   const GeometryElement& element = description.links[0].geometry.at(0);
   EXPECT_EQ(element.source, "package://arm/meshes/a%20b.stl");
   EXPECT_NEAR(test::signed_volume(std::get<TriangleMesh>(element.shape)), 0.006, 1e-9);
+}
+
+TEST(RobotDescription, doubtsMeshesInMillimetres) {
+  const test::TempDir dir;
+  const std::string file = dir.write("a.stl", test::binary_stl(test::box({100, 200, 300})));
+  const auto mesh = [&](const std::string& scale) {
+    return collision("<mesh filename=\"" + file + "\" scale=\"" + scale + "\"/>");
+  };
+  const RobotDescription description = parse(robot(
+      "<link name=\"right\">" + mesh("0.001 0.001 -0.001") + "</link>" + "<link name=\"floor\">" +
+      collision("<box size=\"50 50 0.01\"/>") + "</link>" + "<link name=\"large\">" +
+      collision("<sphere radius=\"0.1\"/>") + mesh("1 1 1") + "</link><link name=\"small\">" +
+      mesh("1e-6 1e-6 1e-6") + "</link>" + fixed_joint("right", "floor") +
+      fixed_joint("right", "large") + fixed_joint("right", "small")));
+  const std::vector<std::string> doubts = doubtful_sizes(description);
+  ASSERT_EQ(doubts.size(), 2U);
+  for (const char* part :
+       {"link 'large'", file.c_str(), "100 x 200 x 300 m", "0.001 0.001 0.001"}) {
+    expect_says(doubts[0], part);
+  }
+  for (const char* part : {"link 'small'", "0.0001 x 0.0002 x 0.0003 m", "scaled twice"}) {
+    expect_says(doubts[1], part);
+  }
+  EXPECT_EQ(doubtful_sizes(description, {"small"}).size(), 1U);
+  EXPECT_TRUE(doubtful_sizes(description, {"right", "floor"}).empty());
 }
 
 TEST(RobotDescription, refusesWhatIsNoUrdf) {

@@ -229,6 +229,18 @@ TEST(SelfQuery, unknownAndMargin) {
   EXPECT_NEAR(results[0].lower_bound, 0.08, 1e-5);
   EXPECT_TRUE(results[0].direction.isApprox(-Eigen::Vector3d::UnitX(), 1e-6));
   EXPECT_EQ(results[1].state, LinkState::kClear);
+  EXPECT_EQ(results[1].lower_bound, with_margin.max_distance);
+
+  // Beyond the largest distance, but not by the margin.
+  X_FL[1].translation().x() = 0.2 + with_margin.max_distance + 0.01;
+  query.run(X_FL, {true, true, true}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kNear);
+  EXPECT_NEAR(results[0].lower_bound, with_margin.max_distance - 0.01, 1e-5);
+  query.set_config(config());
+  query.run(X_FL, {true, true, true}, &results);
+  EXPECT_EQ(results[0].state, LinkState::kClear);
+  EXPECT_EQ(results[0].lower_bound, with_margin.max_distance);
+
   query.run(X_FL, {true, false, true}, &results);
   for (const PairProximity& result : results) {
     EXPECT_EQ(result.state, LinkState::kUnknown);

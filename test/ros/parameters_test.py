@@ -2,12 +2,14 @@
 """Wrong parameters: the node does not start, and says which, why, and what is allowed."""
 
 import os
+import re
 import sys
 import unittest
 
 import proximity_testing as pt
 import rospy
 import rosparam
+import yaml
 
 # Parameters, and words of the message. Several mistakes in one start are all told.
 WRONG = [
@@ -74,7 +76,8 @@ WRONG = [
                 "range": {"min_range": 2.0, "max_range": 1.0},
                 "padding": {"self_filter_padding": -0.01, "topic": ""},
                 "flat": 3,
-            }
+            },
+            "cache_directory": "~/packings",
         },
         [
             '~sources/scan/max_range is "far"',
@@ -89,6 +92,7 @@ WRONG = [
             "~sources/padding/self_filter_padding is -0.01 m",
             "~sources/padding/topic",
             "~sources/flat",
+            '~cache_directory is "~/packings": an absolute path is needed',
         ],
     ),
     ({"sources": [1, 2]}, ["~sources"]),
@@ -136,6 +140,25 @@ class ParametersTest(unittest.TestCase):
                 node.wait_for(lambda m: m.links, "the model")
                 self.assertNotIn("unknown parameter", node.log())
                 self.assertEqual(node.stop(), 0)
+
+    def test_every_parameter_is_explained(self):
+        """In config/proximity.yaml, whose example of sources is valid as it stands."""
+        package = os.path.join(os.path.dirname(__file__), "..", "..")
+        with open(os.path.join(package, "config", "proximity.yaml")) as f:
+            text = f.read()
+        with open(os.path.join(package, "src", "ros", "parameters.cpp")) as f:
+            read = re.findall(r'read(?:_choice)?\((?:prefix \+ )?"([a-z_/]+)"', f.read())
+        self.assertGreater(len(read), 30)
+        for name in read:
+            self.assertRegex(text, r"\b%s:" % name.split("/")[-1], name)
+
+        commented = text[text.index("# sources:") :].splitlines()
+        parameters = yaml.safe_load("\n".join(line[2:] for line in commented))
+        node = pt.ProximityNode("/example", parameters, pt.urdf())
+        message = node.wait_for(lambda m: m.links, "the model")
+        self.assertEqual({s.name for s in message.sources}, set(parameters["sources"]))
+        self.assertNotIn("unknown parameter", node.log())
+        self.assertEqual(node.stop(), 0)
 
 
 if __name__ == "__main__":

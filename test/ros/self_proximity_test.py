@@ -69,6 +69,13 @@ class SelfProximityTest(unittest.TestCase):
             one = pt.link(message, "ball_link")
             np.testing.assert_allclose(pt.vector(one.direction), expected, atol=1e-3)
 
+        # ~query/margin can be set while the node runs, here too.
+        rospy.set_param(node.name + "/query/margin", 0.05)
+        node.wait_for(
+            lambda m: pt.link(m, "ball_link").lower_bound < truth - 0.05, "a bound with the margin"
+        )
+        rospy.set_param(node.name + "/query/margin", 0.0)
+
         self.q = {"turn": 0.7, "slide": -0.2}  # the ball in the box
         message = node.wait_for(
             lambda m: pt.states(m) == [LinkProximity.CONTACT] * 2, "contact of both"

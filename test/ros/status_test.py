@@ -10,6 +10,7 @@ import rospy
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
+from visualization_msgs.msg import MarkerArray
 
 FAR_BOX = pt.transform((0, 0.8, 0))
 POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
@@ -57,6 +58,7 @@ class StatusTest(unittest.TestCase):
         clouds.paused = True
         begin = len(node.messages)
         message = node.wait_for_status(ProximityArray.STALE_CLOUD, "'cloud'")
+        self.assertIn("allowed is 0.50 s (~cloud_timeout)", message.status_text)
         self.assertTrue(pt.all_unknown(message))
         self.assertEqual(message.sources[0].status, ProximityArray.STALE_CLOUD)
         self.assertFalse(message.sources[0].stamp.is_zero())
@@ -156,6 +158,39 @@ class StatusTest(unittest.TestCase):
         tf.paused = False
         node.wait_for_status(ProximityArray.OK)
 
+    def test_frames_with_a_prefix(self):
+        """A tf_prefix is not followed, and the text says so."""
+        node = self.start()
+        self.world.poses = {
+            "left/" + child: ("left/" + parent, X) for child, (parent, X) in self.world.poses.items()
+        }
+        self.world.start_tf()
+        self.world.start_clouds()
+        message = node.wait_for_status(ProximityArray.NO_POSE, "tf_prefix")
+        self.assertIn("tf has 'left/ball_link'", message.status_text)
+
+    def test_links_with_slashes(self):
+        """In front of a link's name it is not part of its frame, elsewhere it is."""
+        urdf = pt.urdf().replace("ball_link", "/ball_link").replace("box_link", "box/link")
+        urdf = urdf.replace('"base"', '"/base"')
+        self.world.poses["box/link"] = self.world.poses.pop("box_link")
+        self.world.start_tf()
+        self.world.start_clouds()
+        for pose_source in ("tf", "joint_states"):
+            with self.subTest(pose_source):
+                parameters = {"pose_source": pose_source}
+                self.nodes.append(pt.ProximityNode(self.namespace, parameters, urdf))
+                spheres = []
+                self.nodes[-1].subscribe("spheres", MarkerArray, spheres.append)
+                message = self.nodes[-1].wait_for_status(ProximityArray.OK)
+                self.assertEqual([one.link for one in message.links], ["/ball_link", "box/link"])
+                self.assertEqual(message.header.frame_id, "base")
+                self.assertAlmostEqual(pt.link(message, "/ball_link").distance, 0.2, 5)
+                self.nodes[-1].wait_until(lambda spheres=spheres: spheres, "~spheres")
+                frames = {marker.header.frame_id for marker in spheres[-1].markers}
+                self.assertEqual(frames, {"ball_link", "box/link"})
+                self.nodes.pop().stop()
+
     def test_late_tf(self):
         """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""
         node = self.start()
@@ -176,6 +211,13 @@ class StatusTest(unittest.TestCase):
         node.wait_for(lambda m: len(node.messages) > begin + 150, "150 messages")
         late = [m for m in node.messages[begin:] if m.status != ProximityArray.OK]
         self.assertLess(len(late), 15, late[-1].status_text if late else "")
+        # Nor is it anything to warn of.
+        node.diagnostics.pop("input cloud", None)
+        node.wait_until(
+            lambda: "input cloud" in node.diagnostics
+            and "not in use" not in node.diagnostics["input cloud"].message,
+            "diagnostics without a word on the wait",
+        )
 
     def test_rate(self):
         """Each cycle is published, with nothing at all as with everything."""

@@ -62,6 +62,9 @@ class SelfQuery {
   void run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
            std::vector<PairProximity>* results);
 
+  /// For the runs to come.
+  void set_config(const QueryConfig& config);
+
   const std::vector<LinkPair>& pairs() const;
 
  private:

@@ -135,6 +135,7 @@ class CloudSource {
   bool kept_is_new_ = false;     ///< it is not in use with this model yet
   ros::Time in_use_;             ///< stamp of the newest snapshot of this generation
   std::chrono::steady_clock::time_point target_since_;
+  std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
   PublisherCount publisher_count_;
   std::atomic<bool> running_{true};
   std::thread thread_;

@@ -37,7 +37,8 @@ struct SourceConfig {
   std::string file;
   std::string frame_id = "map";  ///< of the file's map
   double timeout = 0.5;          ///< [s] older than this is STALE_CLOUD; > 0, may be inf
-  bool required = true;          ///< false: its absence is reported in its own status only
+  std::string timeout_parameter = "cloud_timeout";
+  bool required = true;  ///< false: its absence is reported in its own status only
   IngestConfig ingest;
   NoiseFilterConfig noise;  ///< of clouds
 };

@@ -22,6 +22,7 @@ struct SourceFacts {
   std::string noun = "cloud";  ///< what one message is called
   bool is_file = false;        ///< `topic` is a file's path, read once and never stale
   double timeout = 0.5;        ///< [s]
+  std::string timeout_parameter = "cloud_timeout";  ///< its name
   bool required = true;
   /// [m] how far from a link a point is taken for the robot: in that skin no obstacle is seen.
   /// NaN: without self-filter.

@@ -31,6 +31,7 @@ class TfPoseSource : public PoseSource {
   std::string hint() const override;
 
  private:
+  std::string with_prefix() const;
   /// Newest instant of one link; false and a sentence when there is none or it is too old.
   bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, std::string* problem);
 

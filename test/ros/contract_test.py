@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""What other programs rely on by name: fields, constants, topics, services, and parameters' effects."""
+
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rosgraph
+import rospy
+import rosservice
+from ist_proximity.msg import LinkProximity, ProximityArray, SourceStatus
+from ist_proximity.srv import QueryProximity
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64
+from visualization_msgs.msg import MarkerArray
+
+POINTS = [[0.0, 0.0, 0.3], [0.0, 0.0, 0.1]]  # 0.2 m from the ball, and on it
+
+# More fields may stand beside these.
+FIELDS = {
+    LinkProximity: """string link; uint8 state; float64 distance; float64 lower_bound;
+        geometry_msgs/Point point_on_link; geometry_msgs/Point point_on_link_local;
+        geometry_msgs/Point point_on_obstacle; geometry_msgs/Vector3 direction;
+        geometry_msgs/Vector3 repulsion; geometry_msgs/Wrench penetration; float64 closing_speed;
+        string source""",
+    ProximityArray: """std_msgs/Header header; uint8 status; string status_text; time cloud_stamp;
+        ist_proximity/SourceStatus[] sources; float64 computation_time;
+        ist_proximity/LinkProximity[] links""",
+    SourceStatus: """string name; uint8 status; time stamp; float64 age; uint32 points_received;
+        uint32 points_used; uint32 points_on_robot""",
+}
+CONSTANTS = {
+    LinkProximity: ["UNKNOWN", "CLEAR", "NEAR", "CONTACT"],
+    ProximityArray: ["OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR"],
+}
+# Below the node's name: type, and whether it is latched.
+TOPICS = {
+    "proximity": (ProximityArray, False),
+    "self_proximity": (ProximityArray, False),
+    "min_distance": (Float64, False),
+    "markers": (MarkerArray, False),
+    "spheres": (MarkerArray, True),
+    "filtered_cloud": (PointCloud2, False),
+}
+SERVICES = {"reload_model": "std_srvs/Trigger", "query": "ist_proximity/QueryProximity"}
+
+
+class ContractTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 0.8, 0)))
+        self.world.points = np.array(POINTS)
+        self.world.start_tf()
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        if self.node:
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, urdf=None, **parameters):
+        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        self.world.start_clouds()
+        return self.node
+
+    def test_messages(self):
+        for kind, text in FIELDS.items():
+            fields = dict(zip(kind.__slots__, kind._slot_types))
+            for field in text.split(";"):
+                type_name, name = field.split()
+                self.assertEqual(fields.get(name), type_name, "%s.%s" % (kind._type, name))
+        for kind, names in CONSTANTS.items():
+            self.assertEqual([getattr(kind, name) for name in names], list(range(len(names))))
+        self.assertEqual(QueryProximity._request_class.__slots__[0], "states")
+
+    def test_topics_and_services(self):
+        node = self.start(pt.urdf(), **{"self_collision/enabled": True})
+        node.wait_for_status(ProximityArray.OK)
+        headers = {}
+        for topic, (kind, _) in TOPICS.items():
+            keep = lambda m, topic=topic: headers.setdefault(topic, m._connection_header)  # noqa: E731
+            node.subscribe(topic, kind, keep)
+        node.wait_until(lambda: len(headers) == len(TOPICS), "a message on each topic")
+        for topic, (kind, latched) in TOPICS.items():
+            self.assertEqual(headers[topic]["type"], kind._type, topic)
+            self.assertEqual(headers[topic]["latching"], str(int(latched)), topic)
+        for service, type_name in SERVICES.items():
+            self.assertEqual(rosservice.get_service_type(node.name + "/" + service), type_name)
+        node.wait_until(
+            lambda: {"input cloud", "pose", "query", "model"} <= set(node.diagnostics),
+            "all diagnostics",
+        )
+        subscribed = rosgraph.Master(rospy.get_name()).getSystemState()[1]
+        topics = {topic for topic, nodes in subscribed if node.name in nodes}
+        for name in ("cloud", "tf", "tf_static"):  # the last two are remapped
+            self.assertIn(self.namespace + "/" + name, topics)
+
+    def test_name_of_the_description(self):
+        """A robot_description of another name, in a namespace above the node's."""
+        rospy.set_param("/urdf_of_another_name", pt.urdf())
+        node = self.start(robot_description="urdf_of_another_name")
+        node.wait_for_status(ProximityArray.OK)
+
+    def test_links(self):
+        """Only those named are told, but points on the others are no obstacles either."""
+        node = self.start(pt.urdf(), links=["box_link"])
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual([one.link for one in message.links], ["box_link"])
+        self.assertEqual(message.sources[0].points_on_robot, 1)
+        truth = pt.distance_to_box(np.array(POINTS[:1]) - [0, 0.8, 0])[0]
+        self.assertAlmostEqual(message.links[0].distance, truth, delta=0.0011)
+
+    def test_geometry(self):
+        """The visual geometry is taken where it is asked for, or the only one."""
+        visual = '<visual><geometry><sphere radius="%g"/></geometry></visual></link>'
+        both = pt.urdf().replace("</collision></link>", "</collision>" + visual % 0.15, 1)
+        only = '<link name="hat">' + visual % 0.05
+        only += """<joint name="to_hat" type="fixed"><parent link="base"/><child link="hat"/>
+            <origin xyz="0 0 0.5"/></joint>"""
+        urdf = both.replace("</robot>", only + "</robot>")
+        self.world.poses["hat"] = ("base", pt.transform((0, 0, 0.5)))
+        for geometry, ball in (("collision", 0.2), ("visual", 0.15)):
+            with self.subTest(geometry):
+                node = self.start(urdf, geometry=geometry, self_filter=False)
+                self.world.points = np.array(POINTS[:1])
+                message = node.wait_for(
+                    lambda m: m.links and all(one.state for one in m.links[::2]), "ball and hat"
+                )
+                self.assertAlmostEqual(pt.link(message, "ball_link").distance, ball, 5)
+                self.assertAlmostEqual(pt.link(message, "hat").distance, 0.15, 5)
+                said = "'hat' has no collision geometry" in node.log()
+                self.assertEqual(said, geometry == "collision", node.log())
+                self.assertEqual(node.stop(), 0)
+                self.node = None
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("contract_test")
+    rostest.rosrun("ist_proximity", "contract_test", ContractTest, sys.argv)
