@@ -21,7 +21,12 @@ using ist::benchmark::Measured;
 using ist::benchmark::Noise;
 using ist::benchmark::quantile;
 
-constexpr double kMaxErrors[] = {0.02, 0.01, 0.005};  // [m] the resolutions
+// The resolutions: [m] of the packing for distances, and balls of the disjoint one.
+struct Resolution {
+  double max_error;
+  std::size_t balls;
+};
+constexpr Resolution kResolutions[] = {{0.02, 125}, {0.01, 250}, {0.005, 500}};
 
 std::string text(const char* format, double value) {
   char buffer[64];
@@ -72,15 +77,16 @@ struct Tables {
 
   void add(const std::string& scene, double max_error, const Measured& measured) {
     const std::string resolution = text("%g", 1e3 * max_error);
-    // A row for the penetration wrench belongs here, where there is one.
-    for (const auto& [name, noise] : {std::make_pair("nearest pair", &measured.nearest),
-                                      std::make_pair("blend, 50 mm", &measured.narrow),
-                                      std::make_pair("blend", &measured.blend)}) {
+    const auto add_row = [&](const char* name, const Noise& noise, double reference) {
       std::vector<std::string> cells = {scene, resolution, name};
-      for (const std::string& cell : noise_cells(*noise, measured.reference_variation)) {
-        cells.push_back(cell);
-      }
+      for (const std::string& cell : noise_cells(noise, reference)) cells.push_back(cell);
       smoothness += row(cells);
+    };
+    add_row("nearest pair", measured.nearest, measured.reference_variation);
+    add_row("blend, 50 mm", measured.narrow, measured.reference_variation);
+    add_row("blend", measured.blend, measured.reference_variation);
+    if (!measured.wrench.lengths.empty()) {
+      add_row("wrench", measured.wrench, measured.wrench_reference_variation);
     }
     const auto times = [](const std::vector<double>& us) {
       return text("%.1f", quantile(us, 0.5)) + " / " + text("%.1f", quantile(us, 0.99));
@@ -90,7 +96,7 @@ struct Tables {
     };
     cost += row({scene, resolution, times(measured.query_us), times(measured.blend_us), ratio(0.5),
                  ratio(0.99)});
-    if (max_error != kMaxErrors[2]) return;
+    if (max_error != kResolutions[2].max_error) return;
     add_density(scene, "50", measured.narrow_half, measured.narrow_twice);
     add_density(scene, "100", measured.half, measured.twice);
   }
@@ -129,12 +135,14 @@ int main(int argc, char** argv) {
   Tables tables;
   const auto measure = [&](const std::vector<ist::benchmark::MovingScene>& scenes) {
     for (const ist::benchmark::MovingScene& scene : scenes) {
-      for (const double max_error : kMaxErrors) {
+      for (const Resolution& resolution : kResolutions) {
         std::fprintf(stderr, "%s, packed to %g mm: %zu steps\n", scene.name.c_str(),
-                     1e3 * max_error, scene.steps.size());
-        tables.add(
-            scene.name, max_error,
-            ist::benchmark::measure(scene, ist::benchmark::pack(scene.robot, max_error, argv[1])));
+                     1e3 * resolution.max_error, scene.steps.size());
+        const auto model = ist::benchmark::pack(scene.robot, resolution.max_error, argv[1]);
+        tables.add(scene.name, resolution.max_error,
+                   ist::benchmark::measure(scene, model,
+                                           ist::benchmark::pack_disjoint(
+                                               scene.robot, *model, resolution.balls, argv[1])));
       }
     }
   };

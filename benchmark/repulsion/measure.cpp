@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ist_proximity/proximity/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "support.h"
@@ -63,6 +64,49 @@ bool moves(const MovingScene& scene, std::size_t link) {
   return !scene.steps.front()[link].isApprox(scene.steps.back()[link], 1e-9);
 }
 
+// The wrench's force of one link along the motion [m^3], times any stiffness.
+class Contact {
+ public:
+  Contact(const LinkModel& link, const ContactBody& body, const MovingScene& scene)
+      : link_(link), body_(body), clouds_{&scene.cloud} {}
+
+  void ask(const Eigen::Isometry3d& X_FL, LinkState state, bool begins, bool in_reference) {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    if (state == LinkState::kContact) {
+      force = X_FL.linear() * contact_volume(link_, body_, X_FL, clouds_).push;
+    }
+    largest_ = std::max(largest_, force.norm());
+    steps_.push_back({force, begins, in_reference});
+  }
+
+  /// Adds the steps, of the largest force.
+  /// @param counts  by step of the reference: whether the step to it counts; overwritten
+  void add_to(Noise* noise, std::vector<bool>* counts) const {
+    counts->clear();
+    for (std::size_t k = 0; k < steps_.size(); ++k) {
+      const bool follows = k > 0 && !steps_[k].begins && largest_ > 0.0;
+      const Eigen::Vector3d before = follows ? steps_[k - 1].force / largest_ : steps_[k].force,
+                            now = follows ? steps_[k].force / largest_ : steps_[k].force;
+      const bool in_reference = follows && steps_[k].in_reference && steps_[k - 1].in_reference &&
+                                std::min(before.norm(), now.norm()) >= kShort;
+      if (follows) noise->add(before, now, false, in_reference);
+      if (steps_[k].in_reference) counts->push_back(in_reference);
+    }
+  }
+
+ private:
+  struct Step {
+    Eigen::Vector3d force;
+    bool begins, in_reference;
+  };
+
+  const LinkModel& link_;
+  const ContactBody& body_;
+  std::vector<const CloudSnapshot*> clouds_;
+  std::vector<Step> steps_;
+  double largest_ = 0.0;
+};
+
 }  // namespace
 
 void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool is_free,
@@ -79,12 +123,15 @@ void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool 
   if (in_reference) variation += angles.back();
 }
 
-Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model) {
+Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model,
+                 const std::vector<std::shared_ptr<const ContactBody>>& bodies) {
   Measured measured;
   const std::size_t links = model->links.size();
   Asker full(model, scene.cloud), half(model, scene.half), twice(model, scene.twice);
   std::vector<Eigen::Vector3d> blends(links), nearests(links), narrows(links);
   std::vector<std::vector<bool>> counts;
+  std::vector<Contact> contacts;
+  for (std::size_t i = 0; i < links; ++i) contacts.emplace_back(model->links[i], *bodies[i], scene);
   for (std::size_t step = 0; step < scene.steps.size(); ++step) {
     const std::vector<Eigen::Isometry3d>& X_FL = scene.steps[step];
     const bool in_reference =
@@ -95,6 +142,7 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
       const Eigen::Vector3d blend = full.ask(i, X_FL);
       const LinkProximity& answer = full.answer(i);
       const Eigen::Vector3d nearest = nearest_pair(answer), narrow = full.narrow(i, X_FL);
+      contacts[i].ask(X_FL[i], answer.state, scene.begins[step], in_reference);
       const bool is_free = answer.state != LinkState::kContact;
       const bool compared = in_reference && answer.state == LinkState::kNear &&
                             blend.norm() > kShort && step > scene.reference_begin &&
@@ -121,6 +169,14 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
     }
   }
   measured.reference_variation = reference_variation(scene, counts);
+  for (std::size_t i = 0; i < links; ++i) {
+    std::vector<bool> of_link;
+    contacts[i].add_to(&measured.wrench, &of_link);
+    for (std::size_t k = 0; k < counts.size(); ++k) {
+      counts[k][i] = k < of_link.size() && of_link[k];
+    }
+  }
+  measured.wrench_reference_variation = wrench_reference_variation(scene, *model, counts);
   return measured;
 }
 

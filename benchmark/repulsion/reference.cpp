@@ -3,6 +3,7 @@
 #include <limits>
 #include <random>
 
+#include "ist_proximity/proximity/contact_volume.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "repulsion/measure.h"
 
@@ -11,10 +12,11 @@ namespace {
 
 using Matrix3X = Eigen::Matrix3Xd;
 
-constexpr int kSamples = 200;  // on a link's surface
+constexpr int kSamples = 200;        // on a link's surface
+constexpr int kWayInSamples = 5000;  // the same, for what is as near as points inside are
 
 // Points of the exact surface, evenly by area, the same for every run.
-Matrix3X surface_samples(const LinkGeometry& geometry, std::mt19937_64* rng) {
+Matrix3X surface_samples(const LinkGeometry& geometry, int count, std::mt19937_64* rng) {
   struct Triangle {
     Eigen::Vector3d a, b, c;
   };
@@ -32,8 +34,8 @@ Matrix3X surface_samples(const LinkGeometry& geometry, std::mt19937_64* rng) {
   }
   std::discrete_distribution<std::size_t> choose(areas.begin(), areas.end());
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  Matrix3X samples(3, kSamples);
-  for (int i = 0; i < kSamples; ++i) {
+  Matrix3X samples(3, count);
+  for (int i = 0; i < count; ++i) {
     const Triangle& t = triangles[choose(*rng)];
     const double root = std::sqrt(unit(*rng)), v = unit(*rng);
     samples.col(i) = (1.0 - root) * t.a + root * (1.0 - v) * t.b + root * v * t.c;
@@ -77,30 +79,81 @@ Eigen::Vector3d direction(const Matrix3X& samples, const Matrix3X& points, doubl
 
 }  // namespace
 
+namespace {
+
+// [deg] Sum of the angles between what at(k) and at(k - 1) return, over the steps that count.
+template <typename At>
+double variation(const std::vector<std::vector<bool>>& counts, std::size_t link, const At& at) {
+  double sum = 0.0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();  // unless the last step counted
+  for (std::size_t k = 1; k < counts.size(); ++k) {
+    if (!counts[k][link]) {
+      before.setZero();
+      continue;
+    }
+    if (before.isZero()) before = at(k - 1);
+    const Eigen::Vector3d now = at(k);
+    sum += std::atan2(before.cross(now).norm(), before.dot(now));
+    before = now;
+  }
+  return sum * 180.0 / EIGEN_PI;
+}
+
+// A point counts from the surface on, in full from kFullDepth of its ball's radius.
+Eigen::Vector3d contact_direction(const Solid& solid, const Matrix3X& samples,
+                                  const Matrix3X& points_L, double full) {
+  const Eigen::Vector3d middle = samples.rowwise().mean();
+  const double radius = (samples.colwise() - middle).colwise().norm().maxCoeff();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (Eigen::Index i = 0; i < points_L.cols(); ++i) {
+    const Eigen::Vector3d p = points_L.col(i);
+    if ((p - middle).norm() > radius) continue;
+    const double depth = -solid.signed_distance(p).distance;
+    if (!(depth > 0.0)) continue;
+    const Matrix3X out = samples.colwise() - p;
+    const Eigen::ArrayXd length = out.colwise().norm().transpose().array().max(1e-6);
+    const Eigen::ArrayXd weight = length.pow(-4);
+    const Eigen::Vector3d mean = out * (weight / length).matrix() / weight.sum();
+    sum -= std::min(depth / full, 1.0) * mean;
+  }
+  return sum.norm() > 0.0 ? Eigen::Vector3d(sum.normalized()) : sum;
+}
+
+}  // namespace
+
 double reference_variation(const MovingScene& scene, const std::vector<std::vector<bool>>& counts) {
   std::mt19937_64 rng(5);
   const Matrix3X points = thinned_points(scene.cloud);
-  double variation = 0.0;
+  double sum = 0.0;
   for (std::size_t link = 0; link < scene.robot.links.size(); ++link) {
-    const Matrix3X samples = surface_samples(scene.robot.links[link].geometry, &rng);
-    const auto at = [&](std::size_t k) {
+    const Matrix3X samples = surface_samples(scene.robot.links[link].geometry, kSamples, &rng);
+    sum += variation(counts, link, [&](std::size_t k) {
       const Eigen::Isometry3d& X_FL = scene.steps[scene.reference_begin + k][link];
       return direction((X_FL.linear() * samples).colwise() + X_FL.translation(), points,
                        RepulsionConfig().smoothing);
-    };
-    Eigen::Vector3d before = Eigen::Vector3d::Zero();  // unless the last step counted
-    for (std::size_t k = 1; k < counts.size(); ++k) {
-      if (!counts[k][link]) {
-        before.setZero();
-        continue;
-      }
-      if (before.isZero()) before = at(k - 1);
-      const Eigen::Vector3d now = at(k);
-      variation += std::atan2(before.cross(now).norm(), before.dot(now));
-      before = now;
-    }
+    });
   }
-  return variation * 180.0 / EIGEN_PI;
+  return sum;
+}
+
+double wrench_reference_variation(const MovingScene& scene, const RobotModel& model,
+                                  const std::vector<std::vector<bool>>& counts) {
+  std::mt19937_64 rng(6);
+  const Matrix3X points = thinned_points(scene.cloud);
+  const double full = kFullDepth * kBallPerCell * scene.cloud.thinning;
+  double sum = 0.0;
+  for (std::size_t link = 0; link < scene.robot.links.size(); ++link) {
+    const Matrix3X samples = surface_samples(scene.robot.links[link].geometry, kWayInSamples, &rng);
+    sum += variation(counts, link, [&](std::size_t k) {
+      const Eigen::Isometry3d& X_FL = scene.steps[scene.reference_begin + k][link];
+      const Eigen::Isometry3d X_LF = X_FL.inverse();
+      return Eigen::Vector3d(
+          X_FL.linear() * contact_direction(model.links[link].solid, samples,
+                                            (X_LF.linear() * points).colwise() + X_LF.translation(),
+                                            full));
+    });
+  }
+  return sum;
 }
 
 }  // namespace ist::benchmark

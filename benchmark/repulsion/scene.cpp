@@ -177,6 +177,13 @@ std::vector<MovingScene> analytic_scenes() {
       analytic("bar into a corner", bar, points,
                {pose({0.45, 0.4, 0.2}, {0, 0, 0.5}), pose({0.25, 0.15, 0.1}, {0.5, 0, 0}),
                 pose({0.2, 0.4, 0.3}, {0.5, 0.7, 0.9})}));
+  // Down into the plate, along it and round, and up again.
+  points.clear();
+  add_plate({0, 0, 0}, 0.6 * x, 0.6 * y, &rng, &points);
+  scenes.push_back(
+      analytic("bar dips into a plate", bar, points,
+               {pose({-0.1, 0, 0.05}, {0, 0, 0}), pose({-0.05, 0, 0.015}, {0, 0.1, 0.2}),
+                pose({0.05, 0.05, 0.01}, {0.3, 0.1, 0.6}), pose({0.1, 0.1, 0.06}, {0.4, 0, 0.8})}));
   return scenes;
 }
 
@@ -238,6 +245,20 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
     scenes.push_back(std::move(scene));
   }
   return scenes;
+}
+
+std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
+                                                              const RobotModel& model,
+                                                              std::size_t balls,
+                                                              const std::string& cache_directory) {
+  ContactConfig config;
+  config.packing.max_spheres = balls;
+  std::vector<std::shared_ptr<const ContactBody>> bodies;
+  for (std::size_t i = 0; i < robot.links.size(); ++i) {
+    bodies.push_back(
+        build_contact_body(robot.links[i].geometry, 0, model.links[i], config, cache_directory));
+  }
+  return bodies;
 }
 
 std::shared_ptr<const RobotModel> pack(const RobotDescription& robot, double max_error,

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ist_proximity/repulsion/repulsion.h"
 #include "support/box_oracle.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
@@ -121,6 +122,43 @@ TEST_F(InstructionSets, SameDistancesToBoxes) {
     }
   }
   EXPECT_GT(near, 10);
+}
+
+TEST_F(InstructionSets, SameRepulsion) {
+  test::Rng rng(84);
+  const std::vector<LinkGeometry> links = test::random_links(&rng);
+  const auto model = test::model_of(links, 0.01);
+  const Repulsion repulsion(model);
+  LinkProximity proximity;
+  proximity.state = LinkState::kNear;
+  proximity.distance = 0.1;
+  proximity.direction = Eigen::Vector3d::UnitX();
+  for (int scene = 0; scene < test::scaled(100); ++scene) {
+    CloudSnapshot cloud;
+    if (scene % 2 == 0) {
+      std::vector<Eigen::Vector3d> points(static_cast<std::size_t>(1 + 10 * scene));
+      for (Eigen::Vector3d& p : points) p = test::random_vector(&rng, 0.3);
+      cloud = test::make_snapshot(points);
+      cloud.coarse = cloud.index;
+    } else {
+      std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(1 + scene));
+      for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(&rng, 0.8, 0.02, 4);
+      cloud = test::make_map(boxes, test::random_pose(&rng, 0.2));
+    }
+    const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.3);
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      choose(0);
+      const Push first = repulsion.push(i, X_FL, {&cloud}, proximity, {});
+      ASSERT_TRUE(first.force.allFinite());
+      for (const std::int64_t target : machine_targets()) {
+        SCOPED_TRACE(hwy::TargetName(target));
+        choose(target);
+        const Push push = repulsion.push(i, X_FL, {&cloud}, proximity, {});
+        ASSERT_LT((push.force - first.force).norm(), 1e-4);
+        ASSERT_LT((push.torque - first.torque).norm(), 1e-4);
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -18,8 +18,9 @@ struct RepulsionConfig {
   /// [m] > 0: at and beyond it the vector is zero. Not more than the query's max_distance: what is
   /// CLEAR repels nothing.
   double influence_distance = 0.3;
-  double gain = 1.0;       ///< length of the vector at touch and in contact; >= 0
-  double smoothing = 0.1;  ///< [m] > 0: pairs this much farther than the nearest still count
+  double gain = 1.0;  ///< length of the vector at touch and in contact; >= 0
+  /// [m] > 0: pairs this much farther than the nearest still count. Less than 1 mm is as 1 mm.
+  double smoothing = 0.1;
   /// [s] >= 0: mean delay of what a new cloud changes, see RepulsionFilter; 0: no filter.
   double filter_time = 0.05;
 };
@@ -32,13 +33,25 @@ struct Push {
   static Push unknown();
 };
 
+constexpr int kBallWidth = 16;
+
+/// Balls side by side for SIMD, in metres in the link's frame. Unused slots are far away.
+struct alignas(64) BallGroup {
+  float x[kBallWidth], y[kBallWidth], z[kBallWidth], radius[kBallWidth];
+  float center[3], reach;  ///< a ball around all of them
+};
+
 /// Blended repulsion, continuous in the robot's motion.
 ///
 /// A link is a fixed, coarse set of its inner balls, an obstacle the thinned points; of a map, each
 /// box's point that is nearest to the ball, so that a large leaf counts once. With d the distance
 /// of a pair (negative for a point in a ball) and n its unit vector from point to ball centre,
-///   u = sum(w n) / sum(w),  w = max(0, 1 - (d - d_min) / smoothing)^2,
-/// over all pairs: the nearest pair alone would jump when two obstacles are equally near. The
+///   u = sum(a w n) / sum(a w),  w = max(0, 1 - (d - d_min) / smoothing)^2,
+/// over all pairs: the nearest pair alone would jump when two obstacles are equally near. a is how
+/// much of its cell a surface through the thinned point covers, about (1 - rho^2)^2 with rho = 0 in
+/// the cell's middle and 1 in a corner: cells that a surface hardly cuts, which more points would
+/// find and fewer would not, count little. Up to four neighbours within smoothing / 4 of their mean
+/// are taken together there. Both depend on the cloud alone, not on where the link is. The
 /// vector is gain * s * u with s = 1 - distance / influence_distance, not below 0 and not above 1:
 /// its length is 0 at and beyond the influence distance and never more than the gain. In contact it
 /// stays at the gain (how deep is for the penetration wrench to say), and in a symmetric squeeze
@@ -74,18 +87,21 @@ class Repulsion {
   }
 
  private:
-  std::vector<std::vector<Ball>> coarse_;  ///< by link, at most kCoarseBalls
+  std::vector<std::vector<BallGroup>> groups_;  ///< by link, of at most kCoarseBalls balls
 };
 
 /// 1 - distance / influence_distance, from 0 to 1: 0 when CLEAR or UNKNOWN, 1 in contact.
 double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig& config);
 
-/// Balls that stand for a link.
-constexpr std::size_t kCoarseBalls = 50;
+/// Balls that stand for a link: whole groups.
+constexpr std::size_t kCoarseBalls = 48;
 
 /// The first `count` balls of those that stand for a link best: starting with the largest, the ball
 /// that reaches farthest beyond the chosen ones is next. Unlike the first balls of the packing,
 /// which may be those of the link's first element, they are spread over the whole link.
 std::vector<Ball> coarse_balls(const Packing& packing, std::size_t count);
+
+/// The same balls in groups of neighbours.
+std::vector<BallGroup> group_balls(std::vector<Ball> balls);
 
 }  // namespace ist

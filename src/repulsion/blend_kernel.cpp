@@ -1,0 +1,450 @@
+// Compiled once per instruction set; the best one there is gets chosen at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "repulsion/blend_kernel.cpp"
+#include "repulsion/blend_kernel.h"
+
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <type_traits>
+
+HWY_BEFORE_NAMESPACE();
+namespace ist {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Both sides are sixteen wide: children of a node beside each other, and balls of a group.
+static_assert(kBallWidth == kPointWidth);
+constexpr auto kWidth = static_cast<std::size_t>(kBallWidth);
+constexpr std::size_t kMostGroups = kCoarseBalls / kWidth;
+using Tag = hn::CappedTag<float, kWidth>;
+using V = hn::Vec<Tag>;
+
+struct Offset {
+  V x, y, z;
+};
+
+HWY_INLINE V SquaredNorm(const Offset& o) {
+  return hn::MulAdd(o.x, o.x, hn::MulAdd(o.y, o.y, hn::Mul(o.z, o.z)));
+}
+
+// Within 3e-7 of 1 / sqrt(v): one step of Newton's method.
+HWY_INLINE V InverseRoot(V v) {
+  const Tag d;
+  const V guess = hn::ApproximateReciprocalSqrt(v);
+  const V half = hn::Mul(hn::Mul(v, hn::Set(d, 0.5F)), guess);
+  return hn::Mul(guess, hn::NegMulAdd(half, guess, hn::Set(d, 1.5F)));
+}
+
+// A group in the index's frame. Arms are from the link's origin to the centres.
+struct Posed {
+  alignas(64) float x[kWidth], y[kWidth], z[kWidth];
+  alignas(64) float arm_x[kWidth], arm_y[kWidth], arm_z[kWidth];
+  const float* radius;
+  float center[3], reach;
+};
+
+HWY_INLINE void Pose(const PosedBalls& balls, const BallGroup& group, Posed* posed) {
+  const Tag d;
+  float* center[3] = {posed->x, posed->y, posed->z};
+  float* arm[3] = {posed->arm_x, posed->arm_y, posed->arm_z};
+  for (int row = 0; row < 3; ++row) {
+    const float* r = balls.R_OL + 3 * row;
+    for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+      const V sum = hn::MulAdd(hn::Set(d, r[0]), hn::Load(d, group.x + k),
+                               hn::MulAdd(hn::Set(d, r[1]), hn::Load(d, group.y + k),
+                                          hn::Mul(hn::Set(d, r[2]), hn::Load(d, group.z + k))));
+      hn::Store(sum, d, arm[row] + k);
+      hn::Store(hn::Add(sum, hn::Set(d, balls.p_OL[row])), d, center[row] + k);
+    }
+    posed->center[row] =
+        r[0] * group.center[0] + r[1] * group.center[1] + r[2] * group.center[2] + balls.p_OL[row];
+  }
+  posed->radius = group.radius;
+  posed->reach = group.reach;
+}
+
+// A tile's points, gathered by fours.
+struct Patches {
+  alignas(64) float x[kWidth], y[kWidth], z[kWidth], weight[kWidth];
+  int count = 0;
+
+  void add(float px, float py, float pz, float w) {
+    x[count] = px;
+    y[count] = py;
+    z[count] = pz;
+    weight[count++] = w;
+  }
+};
+
+HWY_INLINE V Gap(V low, V high, V value) {
+  const Tag d;
+  return hn::Max(hn::Max(hn::Sub(low, value), hn::Sub(value, high)), hn::Zero(d));
+}
+
+// From a point, or from the nearest point of a box, to the centres of balls k, k + 1, ...
+template <class Points>
+HWY_INLINE Offset ToPoint(const Points& points, int i, const Posed& balls, std::size_t k) {
+  const Tag d;
+  return {hn::Sub(hn::Load(d, balls.x + k), hn::Set(d, points.x[i])),
+          hn::Sub(hn::Load(d, balls.y + k), hn::Set(d, points.y[i])),
+          hn::Sub(hn::Load(d, balls.z + k), hn::Set(d, points.z[i]))};
+}
+HWY_INLINE Offset ToBalls(const PointTile& tile, int i, const Posed& balls, std::size_t k) {
+  return ToPoint(tile, i, balls, k);
+}
+HWY_INLINE Offset ToBalls(const Patches& patches, int i, const Posed& balls, std::size_t k) {
+  return ToPoint(patches, i, balls, k);
+}
+
+HWY_INLINE V Beyond(float low, float high, V v) {
+  const Tag d;
+  return hn::Sub(v, hn::Min(hn::Max(v, hn::Set(d, low)), hn::Set(d, high)));
+}
+
+template <class Boxes>
+HWY_INLINE Offset ToBalls(const Boxes& boxes, int box, const Posed& balls, std::size_t k) {
+  const Tag d;
+  return {Beyond(boxes.min_x[box], boxes.max_x[box], hn::Load(d, balls.x + k)),
+          Beyond(boxes.min_y[box], boxes.max_y[box], hn::Load(d, balls.y + k)),
+          Beyond(boxes.min_z[box], boxes.max_z[box], hn::Load(d, balls.z + k))};
+}
+
+// [m] Smallest distance of points (or boxes) begin to end to a ball of the group.
+template <class Tile>
+HWY_INLINE float Nearest(const Tile& tile, int begin, int end, const Posed& balls) {
+  const Tag d;
+  V nearest = hn::Set(d, kFarAway);
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    const V radius = hn::Load(d, balls.radius + k);
+    for (int i = begin; i < end; ++i) {
+      const V length = hn::Sqrt(SquaredNorm(ToBalls(tile, i, balls, k)));
+      nearest = hn::Min(nearest, hn::Sub(length, radius));
+    }
+  }
+  return hn::GetLane(hn::MinOfLanes(d, nearest));
+}
+
+// Bit k for a child whose box is nearer to the group's centre than `reach`.
+HWY_INLINE std::uint32_t Near(const BoxNode& node, const Posed& balls, float reach) {
+  const Tag d;
+  const V limit = hn::Set(d, reach * reach);
+  std::uint32_t near = 0;
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    const Offset gap = {
+        Gap(hn::Load(d, node.min_x + k), hn::Load(d, node.max_x + k), hn::Set(d, balls.center[0])),
+        Gap(hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k), hn::Set(d, balls.center[1])),
+        Gap(hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, balls.center[2]))};
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, hn::Lt(SquaredNorm(gap), limit), bits);
+    near |= (bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U) << k;
+  }
+  return near & ((1U << static_cast<std::uint32_t>(node.count)) - 1U);
+}
+
+// A link's groups in the index's frame.
+struct PosedLink {
+  std::array<Posed, kMostGroups> groups;
+  std::size_t count;
+};
+
+HWY_INLINE void Pose(const PosedBalls& balls, PosedLink* link) {
+  link->count = std::min(balls.count, kMostGroups);
+  for (std::size_t g = 0; g < link->count; ++g) Pose(balls, balls.groups[g], &link->groups[g]);
+}
+
+// Calls visit(tile, groups) for the tiles that may hold a point nearer to a ball's surface than
+// `limit`, the nearest first; bit g of `groups`: to a ball of group g. The limit may shrink
+// meanwhile.
+template <class Index, class Visit>
+HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const float& limit,
+                           const Visit& visit) {
+  struct Entry {
+    std::int32_t child;
+    std::uint32_t groups;
+    float bound;
+  };
+  std::array<Entry, 160> stack;  // sixteen on each of the levels that 2^31 tiles can have
+  std::size_t top = 0;
+  stack[top++] = {index.root(), (1U << link.count) - 1U, -kFarAway};
+  while (top > 0) {
+    const Entry entry = stack[--top];
+    if (!(entry.bound < limit)) continue;
+    if (entry.child < 0) {
+      visit(index.tiles()[static_cast<std::size_t>(~entry.child)], entry.groups);
+      continue;
+    }
+    const BoxNode& node = index.nodes()[static_cast<std::size_t>(entry.child)];
+    std::array<Entry, kWidth> found{};
+    std::uint32_t any = 0;
+    for (std::uint32_t left = entry.groups; left != 0; left &= left - 1) {
+      const Posed& balls = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(left)];
+      const float reach = std::min(std::max(limit + balls.reach, 0.0F), kFarAway);
+      for (std::uint32_t near = Near(node, balls, reach); near != 0; near &= near - 1) {
+        const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
+        const auto child = static_cast<int>(k);
+        const float bound = Nearest(node, child, child + 1, balls);
+        if (!(bound < limit)) continue;
+        found[k].bound = found[k].groups == 0 ? bound : std::min(bound, found[k].bound);
+        found[k].groups |= left & (0U - left);
+        any |= 1U << k;
+      }
+    }
+    const std::size_t begin = top;
+    for (; any != 0; any &= any - 1) {
+      const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(any);
+      found[k].child = node.child[k];
+      std::size_t at = top++;
+      for (; at > begin && stack[at - 1].bound < found[k].bound; --at) stack[at] = stack[at - 1];
+      stack[at] = found[k];
+    }
+  }
+}
+
+template <class Index>
+HWY_INLINE float NearestPair(const Index& index, const PosedBalls& balls, float limit) {
+  PosedLink link;
+  Pose(balls, &link);
+  VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
+    for (; groups != 0; groups &= groups - 1) {
+      const Posed& posed = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(groups)];
+      limit = std::min(limit, Nearest(tile, 0, tile.count, posed));
+    }
+  });
+  return limit;
+}
+
+// How much of its cell a surface through each point covers; 0 for unused slots.
+HWY_INLINE void CellWeights(const PointTile& tile, const CellGrid& grid, float* weights) {
+  const Tag d;
+  const V half = hn::Set(d, 0.5F), scale = hn::Set(d, grid.per_meter);
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    const auto off = [&](const float* v, float offset) {
+      const V cells = hn::MulAdd(hn::Load(d, v + k), scale, hn::Set(d, offset));
+      return hn::Sub(hn::Sub(cells, hn::Floor(cells)), half);
+    };
+    const Offset off_centre = {off(tile.x, grid.offset[0]), off(tile.y, grid.offset[1]),
+                               off(tile.z, grid.offset[2])};
+    // Squared distance to the centre over that of a corner, 3/4.
+    const V part = hn::Mul(SquaredNorm(off_centre), hn::Set(d, 1.0F / kCornerSquared));
+    const V section = hn::Max(hn::Sub(hn::Set(d, 1.0F), part), hn::Zero(d));
+    const V weight = hn::MulAdd(hn::Mul(section, section), hn::Set(d, 1.0F - kLeastCellWeight),
+                                hn::Set(d, kLeastCellWeight));
+    const auto used =
+        hn::Lt(hn::Iota(d, static_cast<float>(k)), hn::Set(d, static_cast<float>(tile.count)));
+    hn::Store(hn::IfThenElseZero(used, weight), d, weights + k);
+  }
+}
+
+// Four neighbours that lie within `radius` of their mean are one patch there.
+HWY_INLINE void Gather(const PointTile& tile, const CellGrid& grid, float radius,
+                       Patches* patches) {
+  // Lane q holds every fourth point from 4 q on in four vectors, so that sums stay within lanes.
+  const hn::CappedTag<float, kWidth / 4> d;
+  using Quads = hn::Vec<decltype(d)>;
+  alignas(64) float weights[kWidth];
+  CellWeights(tile, grid, weights);
+  struct {
+    alignas(16) float x[kWidth / 4], y[kWidth / 4], z[kWidth / 4];
+    alignas(16) float weight[kWidth / 4], spread_sq[kWidth / 4];
+  } mean;
+  for (std::size_t q = 0; q < kWidth / 4; q += hn::Lanes(d)) {
+    Quads w[4], spread[4];
+    hn::LoadInterleaved4(d, weights + 4 * q, w[0], w[1], w[2], w[3]);
+    const Quads all = hn::Add(hn::Add(w[0], w[1]), hn::Add(w[2], w[3]));
+    const Quads per_weight = hn::Div(hn::Set(d, 1.0F), hn::Max(all, hn::Set(d, kLeastCellWeight)));
+    for (Quads& value : spread) value = hn::Zero(d);
+    const auto average = [&](const float* v, float* into) {
+      Quads of[4];
+      hn::LoadInterleaved4(d, v + 4 * q, of[0], of[1], of[2], of[3]);
+      const Quads sum = hn::MulAdd(w[0], of[0], hn::Mul(w[1], of[1]));
+      const Quads middle =
+          hn::Mul(hn::Add(sum, hn::MulAdd(w[2], of[2], hn::Mul(w[3], of[3]))), per_weight);
+      hn::Store(middle, d, into + q);
+      for (int i = 0; i < 4; ++i) {
+        const Quads off = hn::IfThenElseZero(hn::Gt(w[i], hn::Zero(d)), hn::Sub(of[i], middle));
+        spread[i] = hn::MulAdd(off, off, spread[i]);
+      }
+    };
+    average(tile.x, mean.x);
+    average(tile.y, mean.y);
+    average(tile.z, mean.z);
+    hn::Store(all, d, mean.weight + q);
+    hn::Store(hn::Max(hn::Max(spread[0], spread[1]), hn::Max(spread[2], spread[3])), d,
+              mean.spread_sq + q);
+  }
+  for (int first = 0; first < tile.count; first += 4) {
+    const int q = first / 4;
+    if (mean.spread_sq[q] <= radius * radius) {
+      patches->add(mean.x[q], mean.y[q], mean.z[q], mean.weight[q]);
+      continue;
+    }
+    for (int i = first; i < std::min(first + 4, tile.count); ++i) {
+      patches->add(tile.x[i], tile.y[i], tile.z[i], weights[i]);
+    }
+  }
+}
+
+// The sums of each ball of a group.
+struct BallSums {
+  alignas(64) float x[kWidth] = {}, y[kWidth] = {}, z[kWidth] = {};
+  alignas(64) float weight[kWidth] = {}, undirected[kWidth] = {};
+};
+
+HWY_INLINE float Weight(const Patches& patches, int i) { return patches.weight[i]; }
+HWY_INLINE float Weight(const BoxTile&, int) { return 1.0F; }
+
+template <class Items>
+HWY_INLINE void AddItems(const Items& items, const Posed& balls, float nearest, float per_smoothing,
+                         BallSums* sums) {
+  const Tag d;
+  // Shorter than this a direction is noise; the weight moves over to the fallback smoothly.
+  constexpr float kTiny = 1e-6F;  // [m]
+  const V one = hn::Set(d, 1.0F), falls = hn::Set(d, per_smoothing);
+  const V tiny_sq = hn::Set(d, kTiny * kTiny), per_tiny_sq = hn::Set(d, 1.0F / (kTiny * kTiny));
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    V x = hn::Load(d, sums->x + k), y = hn::Load(d, sums->y + k), z = hn::Load(d, sums->z + k);
+    V weight = hn::Load(d, sums->weight + k), undirected = hn::Load(d, sums->undirected + k);
+    // 1 - (d - nearest) / smoothing = start - length / smoothing.
+    const V start =
+        hn::MulAdd(hn::Add(hn::Load(d, balls.radius + k), hn::Set(d, nearest)), falls, one);
+    for (int i = 0; i < items.count; ++i) {
+      const Offset o = ToBalls(items, i, balls, k);
+      const V raw = SquaredNorm(o), squared = hn::Max(raw, tiny_sq);
+      const V inverse = InverseRoot(squared);
+      const V length = hn::Mul(squared, inverse);
+      const V root = hn::Max(hn::NegMulAdd(length, falls, start), hn::Zero(d));
+      const V w = hn::Mul(hn::Mul(root, root), hn::Set(d, Weight(items, i)));
+      const V directed = hn::Mul(w, inverse);
+      x = hn::MulAdd(directed, o.x, x);
+      y = hn::MulAdd(directed, o.y, y);
+      z = hn::MulAdd(directed, o.z, z);
+      weight = hn::Add(weight, w);
+      const V lost = hn::Max(hn::NegMulAdd(raw, per_tiny_sq, one), hn::Zero(d));
+      undirected = hn::MulAdd(w, lost, undirected);
+    }
+    hn::Store(x, d, sums->x + k);
+    hn::Store(y, d, sums->y + k);
+    hn::Store(z, d, sums->z + k);
+    hn::Store(weight, d, sums->weight + k);
+    hn::Store(undirected, d, sums->undirected + k);
+  }
+}
+
+HWY_INLINE float Sum(V v) { return hn::GetLane(hn::SumOfLanes(Tag(), v)); }
+
+HWY_INLINE PairSums Total(const BallSums& sums, const Posed& balls) {
+  const Tag d;
+  PairSums total;
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    const V x = hn::Load(d, sums.x + k), y = hn::Load(d, sums.y + k), z = hn::Load(d, sums.z + k);
+    const V ax = hn::Load(d, balls.arm_x + k), ay = hn::Load(d, balls.arm_y + k),
+            az = hn::Load(d, balls.arm_z + k);
+    const V undirected = hn::Load(d, sums.undirected + k);
+    total.weight += Sum(hn::Load(d, sums.weight + k));
+    total.force[0] += Sum(x);
+    total.force[1] += Sum(y);
+    total.force[2] += Sum(z);
+    total.torque[0] += Sum(hn::NegMulAdd(az, y, hn::Mul(ay, z)));
+    total.torque[1] += Sum(hn::NegMulAdd(ax, z, hn::Mul(az, x)));
+    total.torque[2] += Sum(hn::NegMulAdd(ay, x, hn::Mul(ax, y)));
+    total.undirected += Sum(undirected);
+    total.undirected_arm[0] += Sum(hn::Mul(undirected, ax));
+    total.undirected_arm[1] += Sum(hn::Mul(undirected, ay));
+    total.undirected_arm[2] += Sum(hn::Mul(undirected, az));
+  }
+  return total;
+}
+
+template <class Index>
+HWY_INLINE PairSums BlendPairs(const Index& index, const PosedBalls& balls, const Band& band) {
+  PosedLink link;
+  Pose(balls, &link);
+  std::array<BallSums, kMostGroups> sums;
+  const float limit = band.nearest + band.smoothing;
+  VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
+    const auto add = [&](const auto& items) {
+      for (; groups != 0; groups &= groups - 1) {
+        const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
+        AddItems(items, link.groups[g], band.nearest, 1.0F / band.smoothing, &sums[g]);
+      }
+    };
+    if constexpr (std::is_same_v<Index, PointIndex>) {
+      Patches patches;
+      Gather(tile, band.grid, kPatchPerSmoothing * band.smoothing, &patches);
+      add(patches);
+    } else {
+      add(tile);
+    }
+  });
+  PairSums total;
+  for (std::size_t g = 0; g < link.count; ++g) total.add(Total(sums[g], link.groups[g]));
+  return total;
+}
+
+float NearestPoint(const PointIndex& index, const PosedBalls& balls, float limit) {
+  return NearestPair(index, balls, limit);
+}
+float NearestBox(const BoxIndex& index, const PosedBalls& balls, float limit) {
+  return NearestPair(index, balls, limit);
+}
+PairSums BlendPoints(const PointIndex& index, const PosedBalls& balls, const Band& band) {
+  return BlendPairs(index, balls, band);
+}
+PairSums BlendBoxes(const BoxIndex& index, const PosedBalls& balls, const Band& band) {
+  return BlendPairs(index, balls, band);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace ist
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+CellGrid::CellGrid(const Eigen::Vector3d& origin, double cell)
+    : per_meter(static_cast<float>(1.0 / cell)) {
+  for (int i = 0; i < 3; ++i) {
+    offset[i] = static_cast<float>(origin[i] / cell - std::floor(origin[i] / cell));
+  }
+}
+
+HWY_EXPORT(NearestPoint);
+HWY_EXPORT(NearestBox);
+HWY_EXPORT(BlendPoints);
+HWY_EXPORT(BlendBoxes);
+
+void PairSums::add(const PairSums& other) {
+  weight += other.weight;
+  undirected += other.undirected;
+  for (int i = 0; i < 3; ++i) {
+    force[i] += other.force[i];
+    torque[i] += other.torque[i];
+    undirected_arm[i] += other.undirected_arm[i];
+  }
+}
+
+float nearest_pair(const PointIndex& index, const PosedBalls& balls, float limit) {
+  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestPoint)(index, balls, limit);
+}
+
+float nearest_pair(const BoxIndex& index, const PosedBalls& balls, float limit) {
+  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestBox)(index, balls, limit);
+}
+
+PairSums blend_pairs(const PointIndex& index, const PosedBalls& balls, const Band& band) {
+  if (index.empty()) return {};
+  return HWY_DYNAMIC_DISPATCH(BlendPoints)(index, balls, band);
+}
+
+PairSums blend_pairs(const BoxIndex& index, const PosedBalls& balls, const Band& band) {
+  if (index.empty()) return {};
+  return HWY_DYNAMIC_DISPATCH(BlendBoxes)(index, balls, band);
+}
+
+}  // namespace ist
+#endif
