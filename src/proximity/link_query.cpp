@@ -241,6 +241,7 @@ Traversal LinkQuery::make_traversal() {
     }
     traversal.p_OL[row] = static_cast<float>(X_OL_.translation()[row]);
   }
+  traversal.rounding = round_up(rounding_);
   traversal.support = support_.data();
   set_planes(&traversal);
   traversal.aim = &LinkQuery::on_aim;
