@@ -79,8 +79,8 @@ HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* 
 class Closest {
  public:
   Closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_sq,
-          const Eigen::Vector3d& toward, ClosestPoint* result)
-      : tree_(tree), p_(p), best_sq_(max_sq), result_(*result) {
+          const Eigen::Vector3d& toward, double enough_sq, ClosestPoint* result)
+      : tree_(tree), p_(p), best_sq_(max_sq), enough_sq_(enough_sq), result_(*result) {
     const Eigen::Vector3d local = p - tree.origin;
     for (int axis = 0; axis < 3; ++axis) p_float_[axis] = static_cast<float>(local[axis]);
     // What float loses, in distance.
@@ -98,6 +98,7 @@ class Closest {
       if (entry.distance_sq > limit_sq_) continue;
       if (entry.child < 0) {
         Visit(tree_.leaves[~entry.child]);
+        if (result_.distance_sq <= enough_sq_) return;
         continue;
       }
       const TriangleBvh::Boxes& boxes = tree_.boxes[entry.child];
@@ -192,6 +193,7 @@ class Closest {
   const Eigen::Vector3d& p_;
   float p_float_[3];
   double best_sq_;
+  double enough_sq_;
   double rounding_;
   float limit_sq_ = 0.0F, limit_ = 0.0F;
   float toward_[3];
@@ -200,8 +202,8 @@ class Closest {
 };
 
 void FindClosest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_distance_sq,
-                 const Eigen::Vector3d& toward, ClosestPoint* closest) {
-  Closest(tree, p, max_distance_sq, toward, closest).Run();
+                 const Eigen::Vector3d& toward, double enough_sq, ClosestPoint* closest) {
+  Closest(tree, p, max_distance_sq, toward, enough_sq, closest).Run();
 }
 
 }  // namespace HWY_NAMESPACE
@@ -214,8 +216,9 @@ namespace ist {
 HWY_EXPORT(FindClosest);
 
 void find_closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, double max_distance_sq,
-                  const Eigen::Vector3d& toward_M, ClosestPoint* closest) {
-  HWY_DYNAMIC_DISPATCH(FindClosest)(tree, p_M, max_distance_sq, toward_M, closest);
+                  const Eigen::Vector3d& toward_M, double enough_sq, ClosestPoint* closest) {
+  HWY_DYNAMIC_DISPATCH(FindClosest)
+  (tree, p_M, max_distance_sq, toward_M, enough_sq, closest);
 }
 
 }  // namespace ist

@@ -114,11 +114,9 @@ Eigen::Vector3d normal_at_touch(const TriangleBvh& bvh, const Eigen::Vector3d& f
   return front <= back ? face_normal : Eigen::Vector3d(-face_normal);
 }
 
-SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
-                       const Eigen::Vector3d& p, double max_distance, bool inside,
-                       const Eigen::Vector3d& toward = Eigen::Vector3d::Zero()) {
-  const double bound = std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
-  const ClosestPoint closest = bvh.closest(p, bound, toward);
+// `closest` gives the distance a sign and a way.
+SignedDistance with_sign(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
+                         const Eigen::Vector3d& p, const ClosestPoint& closest, bool inside) {
   SignedDistance result;
   if (!std::isfinite(closest.distance_sq)) return result;
   const double distance = std::sqrt(closest.distance_sq);
@@ -130,6 +128,13 @@ SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d
     result.normal = normal_at_touch(bvh, normals[closest.triangle], closest.point);
   }
   return result;
+}
+
+SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
+                       const Eigen::Vector3d& p, double max_distance, bool inside,
+                       const Eigen::Vector3d& toward = Eigen::Vector3d::Zero()) {
+  const double bound = std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
+  return with_sign(bvh, normals, p, bvh.closest(p, bound, toward), inside);
 }
 
 }  // namespace
@@ -200,13 +205,50 @@ SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_di
   return best;
 }
 
-double Solid::support(const Eigen::Vector3d& n_L, double slack) const {
-  double farthest = -std::numeric_limits<double>::infinity();
+// Inside comes last: it is asked of few.
+PointDepth Solid::depth(const Eigen::Vector3d& p_L, double enough) const {
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  const double enough_sq = enough > 0.0 ? enough * enough : -1.0;
+  PointDepth result;
+  bool is_known = true;
+  for (const Element& element : elements_) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    SignedDistance candidate;
+    if (element.bvh.size() == 0) {
+      candidate = to_primitive(element.primitive, p_E);
+      result.floor = std::min(result.floor, candidate.distance);
+    } else {
+      const ClosestPoint closest =
+          element.bvh.closest(p_E, kAnywhere, Eigen::Vector3d::Zero(), enough_sq);
+      const double distance = std::sqrt(closest.distance_sq);
+      if (closest.distance_sq <= enough_sq) {
+        is_known = false;
+        result.floor = std::min(result.floor, -distance);
+        continue;
+      }
+      const bool inside = element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
+      candidate = with_sign(element.bvh, element.normals, p_E, closest, inside);
+      result.floor = std::min(result.floor, element.is_closed && !inside ? distance : -distance);
+    }
+    if (candidate.distance < result.exact.distance) {
+      result.exact.distance = candidate.distance;
+      result.exact.witness = element.X_LE * candidate.witness;
+      result.exact.normal = element.X_LE.linear() * candidate.normal;
+    }
+  }
+  // What was not sought is not as deep as `enough`.
+  if (!is_known && result.exact.distance >= -enough) result.exact = SignedDistance();
+  return result;
+}
+
+double Solid::support(const Eigen::Vector3d& n_L, double slack, double reached) const {
+  double farthest = reached;
   for (const Element& element : elements_) {
     const Eigen::Vector3d n_E = element.X_EL.linear() * n_L;
-    const double reach = element.bvh.size() > 0 ? element.bvh.support(n_E, slack)
+    const double offset = n_L.dot(element.X_LE.translation());
+    const double reach = element.bvh.size() > 0 ? element.bvh.support(n_E, slack, farthest - offset)
                                                 : primitive_support(element.primitive, n_E);
-    farthest = std::max(farthest, reach + n_L.dot(element.X_LE.translation()));
+    farthest = std::max(farthest, reach + offset);
   }
   return farthest;
 }

@@ -97,59 +97,15 @@ TriangleBvh::View TriangleBvh::view() const {
 }
 
 ClosestPoint TriangleBvh::closest(const Eigen::Vector3d& p_M, double max_distance_sq,
-                                  const Eigen::Vector3d& toward_M) const {
+                                  const Eigen::Vector3d& toward_M, double enough_sq) const {
   ClosestPoint closest;
-  if (!triangles_.empty()) find_closest(view(), p_M, max_distance_sq, toward_M, &closest);
+  if (!triangles_.empty())
+    find_closest(view(), p_M, max_distance_sq, toward_M, enough_sq, &closest);
   return closest;
 }
 
-double TriangleBvh::support(const Eigen::Vector3d& n_M, double slack) const {
-  struct Entry {
-    std::int32_t child;
-    double reach;  // [m] of its box
-  };
-  const double at_origin = n_M.dot(bounds_.isEmpty() ? n_M : bounds_.center());
-  // Boxes beyond `farthest` by at most the slack are left out, but for how far they reach.
-  double farthest = -std::numeric_limits<double>::infinity(), left_out = farthest;
-  if (triangles_.empty()) return farthest;
-  std::array<Entry, 512> stack;  // as in the search for the closest point
-  std::size_t top = 0;
-  stack[top++] = {0, std::numeric_limits<double>::infinity()};
-  while (top > 0) {
-    const Entry entry = stack[--top];
-    if (entry.reach <= farthest + slack) {
-      left_out = std::max(left_out, entry.reach);
-      continue;
-    }
-    if (entry.child < 0) {
-      const Leaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
-      for (std::uint32_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
-        const Triangle& t = triangles_[k];
-        farthest = std::max({farthest, n_M.dot(t.a), n_M.dot(t.b), n_M.dot(t.c)});
-      }
-      continue;
-    }
-    const Boxes& boxes = boxes_[static_cast<std::size_t>(entry.child)];
-    std::array<double, kWidth> reach;
-    reach.fill(at_origin);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double n = n_M[static_cast<Eigen::Index>(axis)];
-      const float* side = n > 0.0 ? boxes.max[axis] : boxes.min[axis];
-      for (std::size_t k = 0; k < kWidth; ++k) reach[k] += n * static_cast<double>(side[k]);
-    }
-    const std::size_t begin = top;
-    for (int k = 0; k < boxes.count; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      if (reach[i] <= farthest + slack) {
-        left_out = std::max(left_out, reach[i]);
-        continue;
-      }
-      std::size_t at = top++;  // the farthest on top
-      for (; at > begin && stack[at - 1].reach > reach[i]; --at) stack[at] = stack[at - 1];
-      stack[at] = {boxes.child[k], reach[i]};
-    }
-  }
-  return std::max(farthest, left_out);
+double TriangleBvh::support(const Eigen::Vector3d& n_M, double slack, double reached) const {
+  return triangles_.empty() ? reached : find_farthest(view(), n_M, slack, reached);
 }
 
 double TriangleBvh::winding_number(const Eigen::Vector3d& p_M) const {

@@ -10,10 +10,12 @@
 namespace ist {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 struct Entry {
   double bound;            ///< [m] no point below has a smaller signed distance
   Eigen::Vector3d center;  ///< of the box, link frame
-  double floor;            ///< [m] at the centre, see Solid::distance_floor
+  double floor;            ///< [m] at the centre, see PointDepth
   double guess;            ///< [m] as `bound`, holes left out of account: which to visit first
   std::int32_t child;
 };
@@ -32,11 +34,10 @@ Around around_box(const BoxNode& node, int k) {
 }  // namespace
 
 // Culling by unsigned distance fails inside, where the deepest point is wanted. The signed distance
-// falls by no more than the way between two points (but for holes, see Solid::distance_floor), so
-// its exact value at a box's middle bounds all of the box: branch and bound over the boxes that may
-// hold points inside.
+// falls by no more than the way between two points (but for holes, see PointDepth), so its exact
+// value at a box's middle bounds all of the box: branch and bound over the boxes that may hold
+// points inside. Most are done with as soon as any triangle is found too near for them to matter.
 void LinkQuery::find_depth(Deadline* deadline) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
   std::array<Entry, 512> stack;  // 16 children on each of at most 8 levels, and room
   std::size_t top = 0;
@@ -67,19 +68,18 @@ void LinkQuery::find_depth(Deadline* deadline) {
       }
       // Farther boxes hold no point inside; what they hold outside the descent has seen.
       const double near = interior + ball.radius;
-      if (link_->tree.outer_distance(center, near) > near) continue;
+      if (link_->tree.is_beyond(center, near)) continue;
       ++statistics_->exact_evaluations;
-      const Solid& solid = link_->solid;
-      const SignedDistance exact = solid.signed_distance(center);
-      const double floor = solid.distance_floor(center, exact);
-      const double bound = floor - ball.radius, guess = exact.distance - ball.radius;
+      const PointDepth depth = link_->solid.depth(center, -threshold() - ball.radius);
+      const double bound = depth.floor - ball.radius;
+      const double guess = std::min(depth.exact.distance, std::abs(depth.floor)) - ball.radius;
       if (bound >= threshold()) {
         drop(bound);
         continue;
       }
       std::size_t at = top++;
       for (; at > begin && stack[at - 1].guess < guess; --at) stack[at] = stack[at - 1];
-      stack[at] = {bound, center, floor, guess, node.child[k]};
+      stack[at] = {bound, center, depth.floor, guess, node.child[k]};
     }
   }
 }
@@ -109,14 +109,17 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& cen
       return;
     }
     open[i] = false;
-    if (link_->tree.outer_distance(p_L[i], interior) > interior) continue;
+    if (link_->tree.is_beyond(p_L[i], interior)) continue;
     ++statistics_->exact_evaluations;
-    const SignedDistance measured = link_->solid.signed_distance(p_L[i]);
-    take(measured, p_L[i], point_O(tile, next), tile, next);
-    const double nearby = link_->solid.distance_floor(p_L[i], measured);
+    const PointDepth depth = link_->solid.depth(p_L[i], -threshold());
+    if (depth.exact.distance < kInfinity) {
+      take(depth.exact, p_L[i], point_O(tile, next), tile, next);
+    } else {
+      drop(std::max(depth.floor, threshold()));
+    }
     for (int k = 0; k < count; ++k) {
       const auto j = static_cast<std::size_t>(k);
-      bound[j] = std::max(bound[j], nearby - (p_L[j] - p_L[i]).norm());
+      bound[j] = std::max(bound[j], depth.floor - (p_L[j] - p_L[i]).norm());
     }
   }
 }

@@ -123,7 +123,7 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside) {
   if (statistics_ != nullptr) ++statistics_->exact_evaluations;
   if (!is_outside) {
     const double interior = link_->tree.interior_gap();
-    is_outside = link_->tree.outer_distance(p_L, interior) > interior;
+    is_outside = link_->tree.is_beyond(p_L, interior);
   }
   const double limit = std::min({nearest_.exact.distance, others_, range() + rounding_});
   const Eigen::Vector3d& toward =
@@ -164,7 +164,8 @@ void LinkQuery::on_aim(void* context) {
   auto* self = static_cast<LinkQuery*>(context);
   self->aim_L_ = self->nearest_.exact.normal;
   const Eigen::Vector3f n = self->aim_L_.cast<float>();
-  const double most = self->link_->solid.support(self->aim_L_, kSupportSlack);
+  const double reached = self->aim_L_.dot(self->nearest_.exact.witness);
+  const double most = self->link_->solid.support(self->aim_L_, kSupportSlack, reached);
   find_support(self->link_->tree, n.data(), round_up(most), self->support_.data());
   self->set_planes(self->traversal_);
 }
@@ -240,6 +241,7 @@ Traversal LinkQuery::make_traversal() {
     }
     traversal.p_OL[row] = static_cast<float>(X_OL_.translation()[row]);
   }
+  traversal.rounding = round_up(rounding_);
   traversal.support = support_.data();
   set_planes(&traversal);
   traversal.aim = &LinkQuery::on_aim;

@@ -41,6 +41,34 @@ HWY_INLINE V Norm(V x, V y, V z) {
   return hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))));
 }
 
+// The circle in which a plane `height` above a ball's centre cuts it: its radius, at least.
+template <class D>
+HWY_INLINE hn::Vec<D> RimRadius(D d, hn::Vec<D> radius, hn::Vec<D> height, float rounding) {
+  const auto slack = hn::Set(d, rounding);
+  const auto least = hn::Max(hn::Sub(hn::Abs(height), slack), hn::Zero(d));
+  const auto squared = hn::NegMulAdd(least, least, hn::Mul(radius, radius));
+  return hn::Add(hn::Sqrt(hn::Max(squared, hn::Zero(d))), slack);
+}
+
+// How far what is `ahead` of the plane, and `aside` of the ball's axis across it, is from what the
+// plane leaves of the ball: from the rim, where the ball's nearest point is cut off. Otherwise only
+// the plane tells.
+template <class D>
+HWY_INLINE hn::Vec<D> CutDistance(D d, hn::Vec<D> ahead, hn::Vec<D> aside, hn::Vec<D> radius,
+                                  hn::Vec<D> height, hn::Vec<D> rim) {
+  const auto zero = hn::Zero(d);
+  const auto over_center = hn::Add(ahead, height);
+  const auto over_sq = hn::Mul(over_center, over_center);
+  const auto lowest = hn::Min(ahead, over_center);
+  const auto is_cut =
+      hn::And(hn::Gt(lowest, zero),
+              hn::Gt(hn::Mul(hn::Mul(radius, radius), over_sq),
+                     hn::Mul(hn::Mul(height, hn::Abs(height)), hn::MulAdd(aside, aside, over_sq))));
+  const auto beyond = hn::Max(hn::Sub(aside, rim), zero);
+  const auto to_rim = hn::Sqrt(hn::MulAdd(ahead, ahead, hn::Mul(beyond, beyond)));
+  return hn::IfThenElse(is_cut, to_rim, ahead);
+}
+
 struct Posed {
   alignas(64) float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];
 };
@@ -155,6 +183,7 @@ class Descent {
     Posed posed;
     Pose(t_, node.x, node.y, node.z, &posed);
     const auto ahead = hn::Set(d, Ahead(pair));
+    const Middle box = MiddleOf(pair);
     const float* support = t_.support + pair.sphere * kSphereWidth;
     const float limit = Limit();
     std::uint32_t near = 0;
@@ -167,8 +196,18 @@ class Descent {
           Gap(d, hn::Set(d, pair.min[1]), hn::Set(d, pair.max[1]), hn::Load(d, posed.y + k));
       const auto dz =
           Gap(d, hn::Set(d, pair.min[2]), hn::Set(d, pair.max[2]), hn::Load(d, posed.z + k));
-      const auto apart = hn::Sub(Norm(dx, dy, dz), hn::Load(d, node.radius + k));
-      const auto least = hn::Max(apart, hn::Sub(ahead, hn::Load(d, support + k)));
+      const auto x = hn::Load(d, posed.x + k), y = hn::Load(d, posed.y + k),
+                 z = hn::Load(d, posed.z + k), radius = hn::Load(d, node.radius + k);
+      const auto reach = hn::LoadU(d, support + k);
+      const auto apart = hn::Sub(Norm(dx, dy, dz), radius);
+      const auto height = hn::Sub(hn::Add(hn::Set(d, t_.offset), reach), Along(d, x, y, z));
+      const auto aside =
+          hn::Sub(Aside(d, hn::Sub(hn::Set(d, box.x), x), hn::Sub(hn::Set(d, box.y), y),
+                        hn::Sub(hn::Set(d, box.z), z)),
+                  hn::Set(d, box.radius));
+      const auto least =
+          hn::Max(apart, CutDistance(d, hn::Sub(ahead, reach), hn::Max(aside, hn::Zero(d)), radius,
+                                     height, RimRadius(d, radius, height, t_.rounding)));
       near |= Below(d, least, limit, &dropped) << k;
       hn::Store(least, d, bound + k);
     }
@@ -193,6 +232,11 @@ class Descent {
     const BoxNode& node = t_.box_nodes[pair.box];
     const PointTag d;
     const float offset = t_.offset + t_.support[pair.slot];
+    const float center[3] = {pair.x, pair.y, pair.z};
+    const auto radius = hn::Set(d, pair.radius);
+    const auto height = hn::Sub(
+        hn::Set(d, offset), Along(d, hn::Set(d, pair.x), hn::Set(d, pair.y), hn::Set(d, pair.z)));
+    const auto rim = RimRadius(d, radius, height, t_.rounding);
     const float limit = Limit();
     std::uint32_t near = 0;
     auto dropped = hn::Set(d, kFarAway);
@@ -204,8 +248,9 @@ class Descent {
           Gap(d, hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k), hn::Set(d, pair.y));
       const auto dz =
           Gap(d, hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, pair.z));
-      const auto apart = hn::Sub(Norm(dx, dy, dz), hn::Set(d, pair.radius));
-      const auto least = hn::Max(apart, Ahead(node, k, offset));
+      const auto apart = hn::Sub(Norm(dx, dy, dz), radius);
+      const auto least = hn::Max(apart, CutDistance(d, Ahead(node, k, offset),
+                                                    Aside(node, k, center), radius, height, rim));
       near |= Below(d, least, limit, &dropped) << k;
       hn::Store(least, d, bound + k);
     }
@@ -225,6 +270,18 @@ class Descent {
       child.max[2] = node.max_z[k];
       Insert(begin, child);
     }
+  }
+
+  struct Middle {
+    float x, y, z, radius;
+  };
+  static Middle MiddleOf(const Pair& pair) {
+    float size_sq = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      size_sq += (pair.max[i] - pair.min[i]) * (pair.max[i] - pair.min[i]);
+    }
+    return {0.5F * (pair.min[0] + pair.max[0]), 0.5F * (pair.min[1] + pair.max[1]),
+            0.5F * (pair.min[2] + pair.max[2]), 0.5F * std::sqrt(size_sq)};
   }
 
   // Of a box before the plane through the link's origin.
@@ -252,6 +309,48 @@ class Descent {
     return Ahead((t_.normal[0] > 0.0F ? boxes.min_x : boxes.max_x) + k,
                  (t_.normal[1] > 0.0F ? boxes.min_y : boxes.max_y) + k,
                  (t_.normal[2] > 0.0F ? boxes.min_z : boxes.max_z) + k, offset);
+  }
+
+  template <class D>
+  HWY_INLINE hn::Vec<D> Along(D d, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) const {
+    return hn::MulAdd(
+        hn::Set(d, t_.normal[0]), x,
+        hn::MulAdd(hn::Set(d, t_.normal[1]), y, hn::Mul(hn::Set(d, t_.normal[2]), z)));
+  }
+
+  // Length of what is left of vectors across the normal.
+  template <class D>
+  HWY_INLINE hn::Vec<D> Aside(D d, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) const {
+    const auto along = Along(d, x, y, z);
+    return Norm(hn::NegMulAdd(hn::Set(d, t_.normal[0]), along, x),
+                hn::NegMulAdd(hn::Set(d, t_.normal[1]), along, y),
+                hn::NegMulAdd(hn::Set(d, t_.normal[2]), along, z));
+  }
+  // How far sixteen boxes, or points, are aside of the pair's ball, at least.
+  HWY_INLINE hn::Vec<PointTag> Aside(const PointTile& tile, std::size_t k,
+                                     const float* center) const {
+    const PointTag d;
+    return Aside(d, hn::Sub(hn::Load(d, tile.x + k), hn::Set(d, center[0])),
+                 hn::Sub(hn::Load(d, tile.y + k), hn::Set(d, center[1])),
+                 hn::Sub(hn::Load(d, tile.z + k), hn::Set(d, center[2])));
+  }
+  template <class Boxes>
+  HWY_INLINE hn::Vec<PointTag> Aside(const Boxes& boxes, std::size_t k, const float* center) const {
+    const PointTag d;
+    const auto half = hn::Set(d, 0.5F);
+    const auto middle = [&](const float* min, const float* max, float c) {
+      return hn::Sub(hn::Mul(half, hn::Add(hn::Load(d, min + k), hn::Load(d, max + k))),
+                     hn::Set(d, c));
+    };
+    const auto extent = [&](const float* min, const float* max) {
+      return hn::Mul(half, hn::Sub(hn::Load(d, max + k), hn::Load(d, min + k)));
+    };
+    const auto aside = Aside(d, middle(boxes.min_x, boxes.max_x, center[0]),
+                             middle(boxes.min_y, boxes.max_y, center[1]),
+                             middle(boxes.min_z, boxes.max_z, center[2]));
+    const auto around = Norm(extent(boxes.min_x, boxes.max_x), extent(boxes.min_y, boxes.max_y),
+                             extent(boxes.min_z, boxes.max_z));
+    return hn::Max(hn::Sub(aside, around), hn::Zero(d));
   }
 
   // From sixteen points, or boxes, to a place.
@@ -300,6 +399,7 @@ class Descent {
       hn::Store(hn::Max(nearest, ahead), d, distance + k);
     }
     if (kExact) {
+      CutBalls(leaf, posed, tile, offset, distance);
       Candidates(tile_index, tile.count, distance);
     } else {
       for (int k = 0; k < tile.count; ++k) {
@@ -309,6 +409,39 @@ class Descent {
         t_.inner_lane = k;
         t_.inner_leaf = ~pair.sphere;
       }
+    }
+  }
+
+  // What is left before the threshold, against what the plane leaves of the balls.
+  template <class Tile>
+  HWY_INLINE void CutBalls(const SphereLeaf& leaf, const Posed& posed, const Tile& tile,
+                           float offset, float* distance) const {
+    if (!(offset < kFarAway)) return;
+    const PointTag d;
+    const SphereTag balls;
+    alignas(64) float height[kSphereWidth], rim[kSphereWidth];
+    for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(balls)) {
+      const auto over = hn::Sub(hn::Set(balls, offset),
+                                Along(balls, hn::Load(balls, posed.x + b),
+                                      hn::Load(balls, posed.y + b), hn::Load(balls, posed.z + b)));
+      hn::Store(over, balls, height + b);
+      hn::Store(RimRadius(balls, hn::Load(balls, leaf.outer + b), over, t_.rounding), balls,
+                rim + b);
+    }
+    for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
+      const auto known = hn::Load(d, distance + k);
+      if (hn::AllFalse(d, hn::Lt(known, hn::Set(d, t_.threshold)))) continue;
+      const auto ahead = Ahead(tile, k, offset);
+      auto nearest = hn::Set(d, kFarAway);
+      for (int b = 0; b < leaf.count; ++b) {
+        const float center[3] = {posed.x[b], posed.y[b], posed.z[b]};
+        const auto radius = hn::Set(d, leaf.outer[b]);
+        const auto apart = hn::Sub(Distance(tile, k, center[0], center[1], center[2]), radius);
+        const auto cut = CutDistance(d, ahead, Aside(tile, k, center), radius,
+                                     hn::Set(d, height[b]), hn::Set(d, rim[b]));
+        nearest = hn::Min(nearest, hn::Max(apart, cut));
+      }
+      hn::Store(hn::Max(nearest, known), d, distance + k);
     }
   }
 
@@ -350,7 +483,7 @@ void FindSupport(const InnerSphereTree& tree, const float* n, float most, float*
       auto farthest = hn::Set(d, -kFarAway);
       for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(d)) {
         if (child >= 0) {
-          farthest = hn::Max(farthest, hn::Load(d, support + child * kSphereWidth + b));
+          farthest = hn::Max(farthest, hn::LoadU(d, support + child * kSphereWidth + b));
           continue;
         }
         const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];

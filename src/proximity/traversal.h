@@ -27,10 +27,12 @@ struct Traversal {
 
   /// Every part of the link lies behind a plane across `normal`: none of its points x has
   /// normal . x > offset + support [m]. So a point p is at least normal . p - offset - support away
-  /// from the part, which tells more than spheres do where obstacles are flat and far. May change
-  /// from `aim`. Unit vector; zero, and infinite: no planes are known.
+  /// from the part, and at least as far as from what the plane leaves of its ball. Balls alone tell
+  /// little where obstacles are flat and far: their caps before the plane are nearer than the part.
+  /// May change from `aim`. Unit vector; zero, and infinite: no planes are known.
   float normal[3] = {};
   float offset = std::numeric_limits<float>::infinity();
+  float rounding = 0.0F;           ///< [m] largest error of a coordinate
   const float* support = nullptr;  ///< by node and child, see find_support
 
   /// [m] Pairs whose bound is not below it are dropped; may only shrink, also from `candidate`.

@@ -102,6 +102,8 @@ void expect_tree(const BallLink& link, test::Rng* rng, int points) {
     const double stop = outer + test::uniform(rng, -1, 1) * std::abs(outer);
     const double stopped = tree.outer_distance(p, stop);
     EXPECT_EQ(stopped > stop, tree.outer_distance(p) > stop) << "stopping early decides the same";
+    EXPECT_FALSE(tree.is_beyond(p, stop) && outer <= stop);
+    EXPECT_TRUE(tree.is_beyond(p, stop) || outer - rounding <= stop);
   }
 }
 

@@ -81,6 +81,33 @@ TEST(Solid, UnionTakesTheNearestOutsideAndTheDeepestInside) {
   EXPECT_NEAR(solid.signed_distance({0.15, 0, 0}).distance, -0.1, 1e-15);
 }
 
+// With and without holes, alone and together: the depth where it may matter, a bound elsewhere.
+TEST(Solid, DepthEqualsTheSignedDistanceWhereItIsAsked) {
+  test::Rng rng(8);
+  const GeometryElement closed{test::box({0.2, 0.2, 0.4}), Eigen::Isometry3d::Identity(), "box"};
+  const GeometryElement open{test::open_box({0.2, 0.3, 0.2}), test::random_pose(&rng, 0.1), "open"};
+  const GeometryElement round{Cylinder{0.1, 0.3}, test::random_pose(&rng, 0.1), "cylinder"};
+  const std::vector<LinkGeometry> links = {{closed}, {open}, {round}, {closed, open, round}};
+  for (const LinkGeometry& link : links) {
+    const Solid solid(link);
+    for (int i = 0; i < 1000; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.2);
+      const double enough = test::uniform(&rng, -0.1, 0.1);
+      const double expected = solid.signed_distance(p).distance;
+      const PointDepth depth = solid.depth(p, enough);
+      if (std::isfinite(depth.exact.distance)) {
+        ASSERT_NEAR(depth.exact.distance, expected, 1e-12);
+        expect_consistent(depth.exact, p);
+      } else {
+        ASSERT_GE(expected, -enough - 1e-12);
+      }
+      ASSERT_LE(depth.floor, expected + 1e-12);
+      const Eigen::Vector3d q = p + test::random_vector(&rng, 0.05);
+      ASSERT_LE(depth.floor - (q - p).norm(), solid.signed_distance(q).distance + 1e-12);
+    }
+  }
+}
+
 TEST(Solid, MeshEqualsBruteForceInsideAndOut) {
   test::Rng rng(5);
   for (const TriangleMesh& mesh : {test::l_shape(0.3, 0.06), test::torus(0.2, 0.06, 30, 16),

@@ -64,6 +64,22 @@ TEST(TriangleBvh, DirectionNeverChangesTheClosestPoint) {
   }
 }
 
+TEST(TriangleBvh, ClosestPointStopsWhereItIsNearEnough) {
+  test::Rng rng(5);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 300; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
+      const double expected = test::oracle_distance(mesh, p);
+      const double enough = expected * test::uniform(&rng, 0.5, 2.0);
+      const double found =
+          std::sqrt(bvh.closest(p, 100.0, Eigen::Vector3d::Zero(), enough * enough).distance_sq);
+      ASSERT_GE(found, expected - 1e-12);
+      ASSERT_LE(found, std::max(expected, enough) + 1e-12);
+    }
+  }
+}
+
 TEST(TriangleBvh, SupportEqualsBruteForce) {
   test::Rng rng(4);
   for (const TriangleMesh& mesh : meshes()) {
@@ -77,8 +93,11 @@ TEST(TriangleBvh, SupportEqualsBruteForce) {
       }
       ASSERT_NEAR(bvh.support(n), expected, 1e-12);
       const double loose = bvh.support(n, 0.01);
-      ASSERT_GE(loose, expected);
+      ASSERT_GE(loose, expected - 1e-15);
       ASSERT_LE(loose, expected + 0.01 + 1e-12);
+      const double reached = n.dot(mesh.corner(0, 0));
+      ASSERT_NEAR(bvh.support(n, 0.0, reached), expected, 1e-12);
+      ASSERT_EQ(bvh.support(n, 0.0, expected + 0.1), expected + 0.1);
     }
   }
   EXPECT_EQ(TriangleBvh().support({1, 0, 0}), -std::numeric_limits<double>::infinity());

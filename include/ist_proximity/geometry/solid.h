@@ -20,6 +20,17 @@ struct SignedDistance {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
 };
 
+/// What a search for the deepest point wants to know of a point.
+struct PointDepth {
+  /// signed_distance(p); `distance` is inf where all that is known is that it is not below what the
+  /// search asks for.
+  SignedDistance exact;
+  /// [m] No point has a signed distance below this minus its way to p. The signed distance itself,
+  /// but for meshes with holes: through a hole it jumps from the distance of a point outside to
+  /// minus that.
+  double floor = std::numeric_limits<double>::infinity();
+};
+
 /// The exact geometry of one link: the union of its elements, primitives evaluated in closed form
 /// and meshes through a BVH in double precision.
 ///
@@ -47,10 +58,17 @@ class Solid {
   /// @param measured  signed_distance(p_L)
   double distance_floor(const Eigen::Vector3d& p_L, const SignedDistance& measured) const;
 
+  /// signed_distance and distance_floor at once, for points deeper than `enough` [m]: an element
+  /// whose surface is found to be no farther is left at that, so that `exact` may stay unknown and
+  /// `floor` a little low. Below 0, everything is sought.
+  PointDepth depth(const Eigen::Vector3d& p_L, double enough) const;
+
   /// [m] How far the solid reaches along a direction: the largest n.x of its points. A point p that
   /// is farther that way is outside, and its distance is at least n.p less this for a unit n.
-  /// @param slack  [m] the result may be this much too large, which is found sooner
-  double support(const Eigen::Vector3d& n_L, double slack = 0.0) const;
+  /// @param slack    [m] the result may be this much too large, which is found sooner
+  /// @param reached  [m] what it is known to reach: the least that is returned
+  double support(const Eigen::Vector3d& n_L, double slack = 0.0,
+                 double reached = -std::numeric_limits<double>::infinity()) const;
 
   /// The nearest pair of points of the solid and a solid box, if nearer than `max_distance` [m];
   /// `lower_bound` holds in any case.

@@ -34,11 +34,13 @@ class TriangleBvh {
   explicit TriangleBvh(const TriangleMesh& mesh);
 
   /// Nearest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
-  /// @param toward_M  unit, about the way from the surface to p_M; a guess for speed, or zero
+  /// @param toward_M   unit, about the way from the surface to p_M; a guess for speed, or zero
+  /// @param enough_sq  [m^2] the first point found that is no farther than this will do
   /// @returns distance_sq = inf when there is none.
   ClosestPoint closest(const Eigen::Vector3d& p_M,
                        double max_distance_sq = std::numeric_limits<double>::infinity(),
-                       const Eigen::Vector3d& toward_M = Eigen::Vector3d::Zero()) const;
+                       const Eigen::Vector3d& toward_M = Eigen::Vector3d::Zero(),
+                       double enough_sq = 0.0) const;
 
   /// The surface and a solid box: the nearest pair of points, exact in double, if nearer than
   /// `max_distance` [m]. 0 where the surface touches or crosses the box; a box that lies within a
@@ -50,8 +52,10 @@ class TriangleBvh {
 
   /// [m] How far the surface reaches along a direction: the largest n.x of its points; -inf without
   /// triangles.
-  /// @param slack  [m] the result may be this much too large, which is found sooner
-  double support(const Eigen::Vector3d& n_M, double slack = 0.0) const;
+  /// @param slack    [m] the result may be this much too large, which is found sooner
+  /// @param reached  [m] what it is known to reach: the least that is returned
+  double support(const Eigen::Vector3d& n_M, double slack = 0.0,
+                 double reached = -std::numeric_limits<double>::infinity()) const;
 
   /// Generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. By a hierarchical expansion of second order (Barill et al. 2018); error

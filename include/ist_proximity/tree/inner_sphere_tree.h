@@ -56,6 +56,8 @@ class InnerSphereTree {
   /// an outside p_L to the solid. A value above interior_gap() proves that p_L is outside.
   /// Stops early, with any value below `stop_below`, once it cannot exceed that.
   double outer_distance(const Eigen::Vector3d& p_L, double stop_below = -1e30) const;
+  /// outer_distance(p_L) > distance, found sooner.
+  bool is_beyond(const Eigen::Vector3d& p_L, double distance) const;
 
  private:
   std::vector<SphereNode> nodes_;
