@@ -4,38 +4,19 @@
 #include <cmath>
 #include <tuple>
 
+#include "cloud/thinning_kernel.h"
+
 namespace ist {
 namespace {
 
-// Sixteen numbers side by side; Eigen turns them into SIMD.
-using Lanes = Eigen::Array<float, kPointWidth, 1>;
-using Ints = Eigen::Array<std::int32_t, kPointWidth, 1>;
-
 constexpr std::size_t kSmallestTable = 64;  // a power of two, as all of them
 constexpr double kMostCells = 1 << 30;      // from the origin to either side
-constexpr float kUnused = 1.5e9F;           // cell of unused slots: fits, and is beyond all others
 
-// The grid along one axis, relative to an origin that lies anywhere in it. Float is enough: cells
-// come out no less exact than the coordinates are.
-struct Axis {
-  Axis(double origin, double cell) : scale(static_cast<float>(1.0 / cell)) {
-    const double cells = origin / cell;
-    offset = static_cast<float>(cells - std::floor(cells));
-  }
-
-  // The cells of a tile's coordinates, and the squared distances to their centres are added up.
-  void divide(const float* v, Ints* cell, Lanes* off_centre) const {
-    const Lanes cells = (Eigen::Map<const Lanes>(v) * scale + offset).min(kUnused);
-    // Floor, which has no SIMD before SSE4.1: one less where rounding toward zero went up.
-    const Lanes toward_zero = cells.cast<std::int32_t>().cast<float>();
-    const Lanes floor = toward_zero - ((toward_zero - cells) * 1e38F).max(0.0F).min(1.0F);
-    *cell = floor.cast<std::int32_t>();
-    *off_centre += (cells - floor - 0.5F).square();
-  }
-
-  float scale;   // [1/m]
-  float offset;  // of the origin, in cells
-};
+// Of the origin, in cells from the one it lies in.
+float offset_in_cell(double origin, double edge) {
+  const double cells = origin / edge;
+  return static_cast<float>(cells - std::floor(cells));
+}
 
 // Cells are larger where their numbers would not fit: across more than two billion of them.
 double fitting(double cell, const PointIndex& all) {
@@ -61,17 +42,16 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
   recent_.fill(0);
   const Eigen::Vector3d& origin = all.origin();
   const double edge = fitting(cell_size, all);
-  const Axis axis_x(origin.x(), edge), axis_y(origin.y(), edge), axis_z(origin.z(), edge);
+  CellGrid grid{static_cast<float>(1.0 / edge), {}};
+  for (int i = 0; i < 3; ++i) grid.offset[i] = offset_in_cell(origin[i], edge);
+  TileCells cells;
   for (const PointTile& tile : all.tiles()) {
-    Ints x, y, z;
-    Lanes off_centre = Lanes::Zero();
-    axis_x.divide(tile.x, &x, &off_centre);
-    axis_y.divide(tile.y, &y, &off_centre);
-    axis_z.divide(tile.z, &z, &off_centre);
-    for (int k = 0; k < tile.count; ++k) {
-      const Cell cell{x[k], y[k], z[k]};
-      if (is_beaten(cell, off_centre[k])) continue;
-      add({cell, off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
+    for (std::uint32_t left = find_cells(grid, tile, &cells), k = 0; left != 0; left >>= 1U, ++k) {
+      if ((left & 1U) == 0) continue;
+      const Cell cell{static_cast<std::int32_t>(cells.x[k]), static_cast<std::int32_t>(cells.y[k]),
+                      static_cast<std::int32_t>(cells.z[k])};
+      if (is_beaten(cell, cells.off_centre[k])) continue;
+      add({cell, cells.off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
     }
   }
 
@@ -86,7 +66,8 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
     z_[i] = entries_[i].z;
     id_[i] = entries_[i].id;
   }
-  builder->build(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, {}, thin);
+  // Neighbours among the tiles have given neighbours.
+  builder->build_in_order(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, thin);
 }
 
 // The usual case, on its own for speed: a cell seen a moment ago has a better point already.
