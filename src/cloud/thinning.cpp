@@ -35,8 +35,9 @@ bool Thinning::Entry::better_than(const Entry& other) const {
 
 void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* builder,
                    PointIndex* thin) {
+  // As many cells as last time; a third of the table stays empty even then.
   std::size_t table_size = kSmallestTable;
-  while (8 * table_size < all.size()) table_size *= 2;
+  while (table_size < 3 * entries_.size()) table_size *= 2;
   table_.assign(table_size, 0U);
   entries_.clear();
   recent_.fill(0);
@@ -46,8 +47,9 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
   for (int i = 0; i < 3; ++i) grid.offset[i] = offset_in_cell(origin[i], edge);
   TileCells cells;
   for (const PointTile& tile : all.tiles()) {
-    for (std::uint32_t left = find_cells(grid, tile, &cells), k = 0; left != 0; left >>= 1U, ++k) {
-      if ((left & 1U) == 0) continue;
+    const std::size_t count = find_cells(grid, tile, &cells);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t k = cells.nearest[i];
       const Cell cell{static_cast<std::int32_t>(cells.x[k]), static_cast<std::int32_t>(cells.y[k]),
                       static_cast<std::int32_t>(cells.z[k])};
       if (is_beaten(cell, cells.off_centre[k])) continue;
@@ -72,14 +74,14 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
 
 // The usual case, on its own for speed: a cell seen a moment ago has a better point already.
 inline bool Thinning::is_beaten(const Cell& cell, float off_centre) const {
-  const std::uint32_t recent = recent_[cell.parity()];
+  const std::uint32_t recent = recent_[cell.place()];
   return recent < entries_.size() && entries_[recent].cell == cell &&
          entries_[recent].off_centre < off_centre;
 }
 
 void Thinning::add(const Entry& entry) {
   const Cell& cell = entry.cell;
-  std::uint32_t& recent = recent_[cell.parity()];
+  std::uint32_t& recent = recent_[cell.place()];
   if (recent >= entries_.size() || !(entries_[recent].cell == cell)) {
     std::uint32_t* slot = find(cell);
     if (*slot == 0) {
@@ -94,13 +96,17 @@ void Thinning::add(const Entry& entry) {
   if (entry.better_than(entries_[recent])) entries_[recent] = entry;
 }
 
+// Cells of a cube of 4 x 4 x 4 are neighbours in the table: what is near in space is in the cache.
 std::size_t Thinning::hash(const Cell& cell) {
+  constexpr std::uint32_t kBits = 2;
+  const auto x = static_cast<std::uint32_t>(cell.x), y = static_cast<std::uint32_t>(cell.y),
+             z = static_cast<std::uint32_t>(cell.z);
   // Odd numbers near 2^64 over the golden ratio, the plastic number and its square.
-  std::uint64_t h = static_cast<std::uint32_t>(cell.x) * 0x9E3779B97F4A7C15ULL ^
-                    static_cast<std::uint32_t>(cell.y) * 0xC13FA9A902A6328FULL ^
-                    static_cast<std::uint32_t>(cell.z) * 0x91E10DA5C79E7B1DULL;
+  std::uint64_t h = (x >> kBits) * 0x9E3779B97F4A7C15ULL ^ (y >> kBits) * 0xC13FA9A902A6328FULL ^
+                    (z >> kBits) * 0x91E10DA5C79E7B1DULL;
   h ^= h >> 32;
-  return static_cast<std::size_t>(h * 0x9E3779B97F4A7C15ULL >> 20);
+  const std::uint32_t within = (x & 3U) | (y & 3U) << 2 | (z & 3U) << 4;
+  return static_cast<std::size_t>((h * 0x9E3779B97F4A7C15ULL >> 26) << (3 * kBits) | within);
 }
 
 // The slot that holds a cell, or the empty one where it belongs.

@@ -61,7 +61,7 @@ HWY_INLINE Cell CellOf(const TileCells& cells, std::size_t k) {
   return cell;
 }
 
-std::uint32_t FindCells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
+std::size_t FindCells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
   const CellTag d;
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
     const auto x = Divide(grid, 0, tile.x + i, cells->x + i);
@@ -69,13 +69,16 @@ std::uint32_t FindCells(const CellGrid& grid, const PointTile& tile, TileCells* 
     const auto z = Divide(grid, 2, tile.z + i, cells->z + i);
     hn::Store(hn::Add(hn::Add(x, y), z), d, cells->off_centre + i);
   }
-  std::uint32_t nearest = 0;
+  std::size_t count = 0;
   for (std::uint32_t left = (1U << static_cast<std::uint32_t>(tile.count)) - 1U; left != 0;) {
     const Cell cell = CellOf(*cells, hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
-    nearest |= cell.nearest;
+    for (std::uint32_t best = cell.nearest; best != 0; best &= best - 1) {
+      const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(best);
+      cells->nearest[count++] = static_cast<std::uint8_t>(k);
+    }
     left &= ~cell.slots;
   }
-  return nearest;
+  return count;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -87,7 +90,7 @@ namespace ist {
 
 HWY_EXPORT(FindCells);
 
-std::uint32_t find_cells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
+std::size_t find_cells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
   return HWY_DYNAMIC_DISPATCH(FindCells)(grid, tile, cells);
 }
 

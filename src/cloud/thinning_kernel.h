@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "ist_proximity/cloud/point_index.h"
@@ -17,10 +18,12 @@ struct CellGrid {
 struct alignas(64) TileCells {
   float x[kPointWidth], y[kPointWidth], z[kPointWidth];  ///< numbers of the cells, whole
   float off_centre[kPointWidth];  ///< squared distance to the cell's centre, in cells
+  /// Slots of the points than which none of the tile is nearer to the centre of its cell: one for
+  /// each cell, or all that are as near.
+  std::uint8_t nearest[kPointWidth];
 };
 
-/// @returns bit k: no other point of the tile is nearer to the centre of its cell than that in slot
-///          k; where several are as near, all of them
-std::uint32_t find_cells(const CellGrid& grid, const PointTile& tile, TileCells* cells);
+/// Fills in `cells`. @returns how many of `nearest` count
+std::size_t find_cells(const CellGrid& grid, const PointTile& tile, TileCells* cells);
 
 }  // namespace ist
