@@ -6,90 +6,75 @@
 namespace ist {
 namespace {
 
-constexpr auto kWidth = static_cast<std::uint32_t>(kPointWidth);
-
-std::size_t nodes_over(std::size_t children) { return (children + kWidth - 1) / kWidth; }
+constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
 
 void clear(BoxNode* node) {
-  for (int k = 0; k < kPointWidth; ++k) {
-    node->min_x[k] = node->min_y[k] = node->min_z[k] = kFarAway;
-    node->max_x[k] = node->max_y[k] = node->max_z[k] = kFarAway;
-    node->child[k] = 0;
+  clear_boxes(node);
+  std::fill_n(node->child, kPointWidth, 0);
+}
+
+}  // namespace
+
+const std::vector<std::uint32_t>& BoxHierarchy::arrange(
+    const std::vector<HierarchyChild>& children) {
+  items_.clear();
+  for (const HierarchyChild& child : children) {
+    items_.push_back(
+        {(child.box.min + child.box.max).head<3>(), static_cast<std::uint32_t>(items_.size())});
   }
-  node->count = 0;
+  arrange_range(0, items_.size());
+  order_.clear();
+  for (const Item& item : items_) order_.push_back(item.number);
+  return order_;
 }
 
-void append(std::int32_t child, const PaddedBox& box, BoxNode* node) {
-  const int k = node->count++;
-  node->min_x[k] = box.min[0];
-  node->min_y[k] = box.min[1];
-  node->min_z[k] = box.min[2];
-  node->max_x[k] = box.max[0];
-  node->max_y[k] = box.max[1];
-  node->max_z[k] = box.max[2];
-  node->child[k] = child;
-}
-
-PaddedBox child_box(const BoxNode& node, int k) {
-  return {{node.min_x[k], node.min_y[k], node.min_z[k], 0.0F},
-          {node.max_x[k], node.max_y[k], node.max_z[k], 0.0F}};
-}
-
-void arrange_range(std::vector<HierarchyItem>* items, std::size_t first, std::size_t last) {
+void BoxHierarchy::arrange_range(std::size_t first, std::size_t last) {
   while (last - first > kWidth) {
     const std::size_t count = last - first;
     std::size_t unit = kWidth;
     while (unit * kWidth < count) unit *= kWidth;
     const std::size_t half = std::max<std::size_t>((count / 2 + unit / 2) / unit, 1) * unit;
 
-    Eigen::Array3f min = (*items)[first].center, max = min;
+    Eigen::Array3f min = items_[first].center, max = min;
     for (std::size_t i = first + 1; i < last; ++i) {
-      min = min.min((*items)[i].center.array());
-      max = max.max((*items)[i].center.array());
+      min = min.min(items_[i].center.array());
+      max = max.max(items_[i].center.array());
     }
     Eigen::Index axis;
     (max - min).maxCoeff(&axis);
-    const auto at = [items](std::size_t i) {
-      return items->begin() + static_cast<std::ptrdiff_t>(i);
+    const auto at = [this](std::size_t i) {
+      return items_.begin() + static_cast<std::ptrdiff_t>(i);
     };
-    std::nth_element(at(first), at(first + half), at(last),
-                     [axis](const HierarchyItem& a, const HierarchyItem& b) {
-                       return a.center[axis] < b.center[axis];
-                     });
-    arrange_range(items, first, first + half);
+    std::nth_element(at(first), at(first + half), at(last), [axis](const Item& a, const Item& b) {
+      return a.center[axis] < b.center[axis];
+    });
+    arrange_range(first, first + half);
     first += half;
   }
 }
 
-}  // namespace
-
-void arrange(std::vector<HierarchyItem>* items) { arrange_range(items, 0, items->size()); }
-
-PaddedBox box_of(const BoxNode& node) {
-  PaddedBox box = child_box(node, 0);
-  for (int k = 1; k < node.count; ++k) box.extend(child_box(node, k));
-  return box;
+void BoxHierarchy::append_nodes(const std::vector<HierarchyChild>& children,
+                                std::vector<BoxNode>* nodes) {
+  const std::vector<std::uint32_t>& order = arrange(children);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i % kWidth == 0) {
+      nodes->emplace_back();
+      clear(&nodes->back());
+    }
+    BoxNode& node = nodes->back();
+    const HierarchyChild& child = children[order[i]];
+    node.child[append_box(child.box, &node)] = child.child;
+  }
 }
 
-void write_nodes(const std::vector<HierarchyItem>& items, const std::vector<PaddedBox>& boxes,
-                 std::vector<BoxNode>* nodes) {
-  nodes->resize(nodes_over(items.size()));
-  if (nodes->empty()) return;
-  for (BoxNode& node : *nodes) clear(&node);
-  for (std::size_t i = 0; i < items.size(); ++i) {
-    const std::int32_t leaf = items[i].leaf;
-    append(~leaf, boxes[static_cast<std::size_t>(leaf)], &(*nodes)[i / kWidth]);
-  }
-  std::size_t begin = 0, end = nodes->size();
-  while (end - begin > 1) {
-    nodes->resize(end + nodes_over(end - begin));
-    for (std::size_t i = end; i < nodes->size(); ++i) clear(&(*nodes)[i]);
-    for (std::size_t i = begin; i < end; ++i) {
-      append(static_cast<std::int32_t>(i), box_of((*nodes)[i]),
-             &(*nodes)[end + (i - begin) / kWidth]);
+void BoxHierarchy::append_levels(std::vector<BoxNode>* nodes) {
+  for (std::size_t begin = 0; nodes->size() - begin > 1;) {
+    level_.clear();
+    for (std::size_t i = begin; i < nodes->size(); ++i) {
+      level_.push_back({box_around((*nodes)[i]), static_cast<std::int32_t>(i)});
     }
-    begin = end;
-    end = nodes->size();
+    begin = nodes->size();
+    append_nodes(level_, nodes);
   }
 }
 

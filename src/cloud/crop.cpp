@@ -106,27 +106,27 @@ struct alignas(64) SensorBlock {
 
 // Four floats a point, as most drivers write them.
 bool is_four_floats(const RawCloud& cloud) {
-  return cloud.point_step == 4 * sizeof(float) && cloud.x == 0 && cloud.y == sizeof(float) &&
-         cloud.z == 2 * sizeof(float) &&
+  return !cloud.is_double && !cloud.swap_bytes && cloud.point_step == 4 * sizeof(float) &&
+         cloud.x == 0 && cloud.y == sizeof(float) && cloud.z == 2 * sizeof(float) &&
          reinterpret_cast<std::uintptr_t>(cloud.data) % sizeof(float) == 0 &&
          cloud.row_step % sizeof(float) == 0;
 }
 
+// Some points of a row, as they are in the message.
 template <typename Scalar, bool kSwap>
-void load(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t first, std::size_t count,
+void load(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t count, std::size_t slot,
           SensorBlock<Scalar>* block) {
-  bytes += first * cloud.point_step;
-  for (std::size_t i = first; i < count; ++i, bytes += cloud.point_step) {
+  for (std::size_t i = slot; i < slot + count; ++i, bytes += cloud.point_step) {
     block->x[i] = read<Scalar, kSwap>(bytes + cloud.x);
     block->y[i] = read<Scalar, kSwap>(bytes + cloud.y);
     block->z[i] = read<Scalar, kSwap>(bytes + cloud.z);
   }
 }
 
-// What fills up the last eight: nothing measured.
+// What fills up a block: nothing measured.
 template <typename Scalar>
-void fill_up(std::size_t count, SensorBlock<Scalar>* block) {
-  for (std::size_t i = count; i % 8 != 0; ++i) {
+void fill(std::size_t first, std::size_t last, SensorBlock<Scalar>* block) {
+  for (std::size_t i = first; i < last; ++i) {
     block->x[i] = block->y[i] = block->z[i] = std::numeric_limits<Scalar>::quiet_NaN();
   }
 }
@@ -144,28 +144,54 @@ std::uint32_t count_infinite(const SensorBlock<Scalar>& block, std::size_t count
   return infinite;
 }
 
+// A rectangle of a cloud. Where there are more rows than one, each takes kPatchSide slots.
+struct Window {
+  const std::uint8_t* bytes;
+  std::size_t rows, columns;
+};
+
 template <typename Scalar, bool kSwap>
-std::size_t crop_as(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t count,
-                    const CropPose& pose, CropBlock* out, IngestCounts* counts) {
+std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropPose& pose,
+                    CropBlock* out, IngestCounts* counts) {
   SensorBlock<Scalar> block;
-  std::size_t done = 0;
-  if constexpr (std::is_same_v<Scalar, float> && !kSwap) {
-    if (is_four_floats(cloud)) {
-      done = count / 16 * 16;
-      split_floats(reinterpret_cast<const float*>(bytes), done, block.x, block.y, block.z);
-    }
+  const std::size_t used = (window.rows - 1) * kPatchSide + window.columns;
+  for (std::size_t row = 0; row < window.rows; ++row) {
+    const std::size_t slot = row * kPatchSide;
+    load<Scalar, kSwap>(cloud, window.bytes + row * cloud.row_step, window.columns, slot, &block);
+    if (row + 1 < window.rows) fill(slot + window.columns, slot + kPatchSide, &block);
   }
-  load<Scalar, kSwap>(cloud, bytes, done, count, &block);
-  fill_up(count, &block);
+  fill(used, (used + 7) / 8 * 8, &block);
   CropTally tally;
   if constexpr (std::is_same_v<Scalar, float>) {
-    tally = crop_floats(range_of(pose), block.x, block.y, block.z, count, out);
+    tally = crop_floats(range_of(pose), block.x, block.y, block.z, used, out);
   } else {
-    tally = crop_doubles(range_of(pose), block.x, block.y, block.z, count, out);
+    tally = crop_doubles(range_of(pose), block.x, block.y, block.z, used, out);
   }
-  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
-  if (tally.endless > 0) counts->infinite += count_infinite(block, count);
+  const std::size_t never_received = used - window.rows * window.columns;
+  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number - never_received);
+  if (tally.endless > 0) counts->infinite += count_infinite(block, used);
   return tally.kept;
+}
+
+std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropPose& pose,
+                        CropBlock* block, IngestCounts* counts) {
+  const auto crop = cloud.is_double
+                        ? cloud.swap_bytes ? &crop_as<double, true> : &crop_as<double, false>
+                    : cloud.swap_bytes ? &crop_as<float, true>
+                                       : &crop_as<float, false>;
+  return crop(cloud, window, pose, block, counts);
+}
+
+// Whole rows of sixteen points of four floats.
+// @param stride  [bytes] from row to row
+// @returns how many are kept; a negative number: to be done the other way
+std::ptrdiff_t crop_quads(const std::uint8_t* bytes, std::size_t stride, std::size_t rows,
+                          const CropPose& pose, CropBlock* block, IngestCounts* counts) {
+  const CropTally tally = crop_rows(range_of(pose), reinterpret_cast<const float*>(bytes),
+                                    stride / sizeof(float), rows, block);
+  if (tally.endless > 0) return -1;  // rare; they have to be looked at
+  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
+  return static_cast<std::ptrdiff_t>(tally.kept);
 }
 
 // One row of points where the rows follow each other without gaps, and a column is a row as well:
@@ -214,12 +240,28 @@ std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t colu
                         std::size_t count, const CropPose& pose, CropBlock* block,
                         IngestCounts* counts) {
   const std::uint8_t* bytes = bytes_of(cloud, row, column);
-  if (cloud.is_double) {
-    return (cloud.swap_bytes ? crop_as<double, true> : crop_as<double, false>)(cloud, bytes, count,
-                                                                               pose, block, counts);
+  if (is_four_floats(cloud) && count % kPatchSide == 0) {
+    const std::ptrdiff_t kept =
+        crop_quads(bytes, kPatchSide * cloud.point_step, count / kPatchSide, pose, block, counts);
+    if (kept >= 0) return static_cast<std::size_t>(kept);
   }
-  return (cloud.swap_bytes ? crop_as<float, true> : crop_as<float, false>)(cloud, bytes, count,
-                                                                           pose, block, counts);
+  return crop_window(cloud, {bytes, 1, count}, pose, block, counts);
+}
+
+std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t column,
+                       const CropPose& pose, CropBlock* block, IngestCounts* counts) {
+  const Window window = {bytes_of(cloud, row, column), std::min(kPatchSide, cloud.height - row),
+                         std::min(kPatchSide, cloud.width - column)};
+  std::ptrdiff_t kept = -1;
+  if (is_four_floats(cloud) && window.columns == kPatchSide) {
+    kept = crop_quads(window.bytes, cloud.row_step, window.rows, pose, block, counts);
+  }
+  if (kept < 0) {
+    kept = static_cast<std::ptrdiff_t>(crop_window(cloud, window, pose, block, counts));
+  }
+  const std::size_t used = (window.rows - 1) * kPatchSide + window.columns;
+  std::fill(block->x + used, block->x + kCropBlock, std::numeric_limits<float>::quiet_NaN());
+  return static_cast<std::size_t>(kept);
 }
 
 void crop(const RawCloud& raw, const CropPose& pose, CroppedCloud* cropped, IngestCounts* counts) {

@@ -49,6 +49,14 @@ std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t colu
                         std::size_t count, const CropPose& pose, CropBlock* block,
                         IngestCounts* counts);
 
+constexpr std::size_t kPatchSide = 16;  ///< pixels; a patch is a block
+
+/// The same for a square of an image: the pixel in row r and column c of it goes to slot
+/// 16 r + c. Pixels beyond the image's edges are dropped, and count for nothing.
+/// @param row, column  of the first pixel
+std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t column,
+                       const CropPose& pose, CropBlock* block, IngestCounts* counts);
+
 /// The points of a cloud that are finite and in range, in the fixed frame.
 struct CroppedCloud {
   std::vector<float> x, y, z;     ///< [m] from the origin along the fixed frame's axes

@@ -3,6 +3,7 @@
 #define HWY_TARGET_INCLUDE "cloud/crop_kernel.cpp"
 #include "cloud/crop_kernel.h"
 
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -23,37 +24,63 @@ HWY_INLINE hn::Vec<DoubleTag> LoadAsDouble(DoubleTag d, const float* from) {
   return hn::PromoteTo(d, hn::Load(FloatTag(), from));
 }
 
+// What is asked of every point, and where it goes, in registers.
+class Cropper {
+ public:
+  Cropper(const CropRange& range, CropBlock* block) : range_(range), block_(*block) {}
+
+  // Takes as many points as a vector holds, to slots from k on.
+  template <class V>
+  HWY_INLINE void Take(V x, V y, V z, std::size_t k) {
+    const DoubleTag d;
+    const FloatTag f;
+    const auto sq = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
+    // False for NaN, and for what overflows.
+    const auto keep = hn::And(hn::Ge(sq, hn::Set(d, range_.min_range_sq)),
+                              hn::Le(sq, hn::Set(d, range_.max_range_sq)));
+    const auto nan = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
+    const std::size_t kept = hn::CountTrue(d, keep);
+    auto to_x = nan;
+    if (kept > 0) {
+      to_x = hn::IfThenElse(keep, Moved(0, x, y, z), nan);
+      hn::Store(hn::DemoteTo(f, Moved(1, x, y, z)), f, block_.y + k);
+      hn::Store(hn::DemoteTo(f, Moved(2, x, y, z)), f, block_.z + k);
+      tally.kept += kept;
+    }
+    hn::Store(hn::DemoteTo(f, to_x), f, block_.x + k);
+    if (kept == hn::Lanes(d)) return;
+    const auto endless = hn::Set(d, std::numeric_limits<double>::infinity());
+    tally.not_a_number += hn::CountTrue(d, hn::Not(hn::Eq(sq, sq)));
+    tally.endless += hn::CountTrue(d, hn::Eq(sq, endless));
+  }
+
+  CropTally tally;
+
+ private:
+  template <class V>
+  HWY_INLINE V Moved(int row, V x, V y, V z) const {
+    const DoubleTag d;
+    const double* r = range_.R + 3 * row;
+    const auto sum = hn::Add(hn::Add(hn::Mul(hn::Set(d, r[0]), x), hn::Mul(hn::Set(d, r[1]), y)),
+                             hn::Mul(hn::Set(d, r[2]), z));
+    return hn::Add(sum, hn::Set(d, range_.t[row]));
+  }
+
+  const CropRange range_;
+  CropBlock& block_;
+};
+
 template <typename Scalar>
 HWY_INLINE CropTally Crop(const CropRange& range, const Scalar* x_S, const Scalar* y_S,
                           const Scalar* z_S, std::size_t count, CropBlock* block) {
   const DoubleTag d;
-  const FloatTag f;
-  const auto least = hn::Set(d, range.min_range_sq), most = hn::Set(d, range.max_range_sq);
-  const auto nan = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
-  const auto endless = hn::Set(d, std::numeric_limits<double>::infinity());
-  CropTally tally;
+  Cropper cropper(range, block);
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
-    const auto x = LoadAsDouble(d, x_S + k), y = LoadAsDouble(d, y_S + k),
-               z = LoadAsDouble(d, z_S + k);
-    const auto sq = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
-    const auto moved = [&](int row) {
-      const double* r = range.R + 3 * row;
-      const auto sum = hn::Add(hn::Add(hn::Mul(hn::Set(d, r[0]), x), hn::Mul(hn::Set(d, r[1]), y)),
-                               hn::Mul(hn::Set(d, r[2]), z));
-      return hn::Add(sum, hn::Set(d, range.t[row]));
-    };
-    // False for NaN, and for what overflows.
-    const auto keep = hn::And(hn::Ge(sq, least), hn::Le(sq, most));
-    hn::Store(hn::DemoteTo(f, hn::IfThenElse(keep, moved(0), nan)), f, block->x + k);
-    hn::Store(hn::DemoteTo(f, moved(1)), f, block->y + k);
-    hn::Store(hn::DemoteTo(f, moved(2)), f, block->z + k);
-    tally.kept += hn::CountTrue(d, keep);
-    tally.not_a_number += hn::CountTrue(d, hn::Not(hn::Eq(sq, sq)));
-    tally.endless += hn::CountTrue(d, hn::Eq(sq, endless));
+    cropper.Take(LoadAsDouble(d, x_S + k), LoadAsDouble(d, y_S + k), LoadAsDouble(d, z_S + k), k);
   }
   // What fills up the last vector was never received.
-  tally.not_a_number -= (hn::Lanes(d) - count % hn::Lanes(d)) % hn::Lanes(d);
-  return tally;
+  cropper.tally.not_a_number -= (hn::Lanes(d) - count % hn::Lanes(d)) % hn::Lanes(d);
+  return cropper.tally;
 }
 
 CropTally CropFloats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
@@ -66,15 +93,21 @@ CropTally CropDoubles(const CropRange& range, const double* x_S, const double* y
   return Crop(range, x_S, y_S, z_S, count, block);
 }
 
-void SplitFloats(const float* points, std::size_t count, float* x, float* y, float* z) {
-  const hn::CappedTag<float, 16> d;
-  for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
-    hn::Vec<decltype(d)> vx, vy, vz, unused;
-    hn::LoadInterleaved4(d, points + 4 * k, vx, vy, vz, unused);
-    hn::Store(vx, d, x + k);
-    hn::Store(vy, d, y + k);
-    hn::Store(vz, d, z + k);
+CropTally CropRows(const CropRange& range, const float* points, std::size_t stride,
+                   std::size_t rows, CropBlock* block) {
+  const DoubleTag d;
+  const FloatTag f;
+  Cropper cropper(range, block);
+  for (std::size_t row = 0; row < rows; ++row, points += stride) {
+    // The next sixteen points of the row are what is asked for next.
+    for (std::size_t line = 4; line < 8; ++line) hwy::Prefetch(points + 16 * line);
+    for (std::size_t k = 0; k < 16; k += hn::Lanes(f)) {
+      hn::Vec<FloatTag> x, y, z, unused;
+      hn::LoadInterleaved4(f, points + 4 * k, x, y, z, unused);
+      cropper.Take(hn::PromoteTo(d, x), hn::PromoteTo(d, y), hn::PromoteTo(d, z), 16 * row + k);
+    }
   }
+  return cropper.tally;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -86,7 +119,7 @@ namespace ist {
 
 HWY_EXPORT(CropFloats);
 HWY_EXPORT(CropDoubles);
-HWY_EXPORT(SplitFloats);
+HWY_EXPORT(CropRows);
 
 CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
                       std::size_t count, CropBlock* block) {
@@ -98,8 +131,9 @@ CropTally crop_doubles(const CropRange& range, const double* x_S, const double* 
   return HWY_DYNAMIC_DISPATCH(CropDoubles)(range, x_S, y_S, z_S, count, block);
 }
 
-void split_floats(const float* points, std::size_t count, float* x, float* y, float* z) {
-  HWY_DYNAMIC_DISPATCH(SplitFloats)(points, count, x, y, z);
+CropTally crop_rows(const CropRange& range, const float* points, std::size_t stride,
+                    std::size_t rows, CropBlock* block) {
+  return HWY_DYNAMIC_DISPATCH(CropRows)(range, points, stride, rows, block);
 }
 
 }  // namespace ist

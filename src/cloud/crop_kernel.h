@@ -29,7 +29,11 @@ CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S
 CropTally crop_doubles(const CropRange& range, const double* x_S, const double* y_S,
                        const double* z_S, std::size_t count, CropBlock* block);
 
-/// Takes points of four floats apart (x, y, z and padding), `count` a multiple of sixteen.
-void split_floats(const float* points, std::size_t count, float* x, float* y, float* z);
+/// The same for rows of sixteen points of four floats each (x, y, z and padding).
+/// @param points  of the first row, aligned as floats are
+/// @param stride  [floats] from row to row
+/// @param rows    at most kCropBlock / 16
+CropTally crop_rows(const CropRange& range, const float* points, std::size_t stride,
+                    std::size_t rows, CropBlock* block);
 
 }  // namespace ist

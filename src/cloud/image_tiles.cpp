@@ -15,168 +15,177 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSampledBlocks = 64;
 
-// A plane's block is at most three times as long as its two steps from pixel to pixel together;
-// what is longer is looked at closely.
-constexpr float kLongest = 2.0F * 3.0F * 3.0F;
+// A tile in which pixels are missing may be this many times as long as full ones.
+constexpr float kAsLong = 1.5F;
 
-float squared_step(const PointTile& tile, int a, int b) {
-  const float x = tile.x[a] - tile.x[b], y = tile.y[a] - tile.y[b], z = tile.z[a] - tile.z[b];
-  return x * x + y * y + z * z;
+// Bits of the slots in the lower half of a box, across its longest side.
+std::uint32_t lower_half(const PointTile& tile, const PaddedBox& box) {
+  Eigen::Index axis;
+  (box.max - box.min).maxCoeff(&axis);
+  const float* along = axis == 0 ? tile.x : axis == 1 ? tile.y : tile.z;
+  const float middle = 0.5F * (box.min[axis] + box.max[axis]);
+  std::uint32_t bits = 0;
+  for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(kPointWidth); ++k) {
+    bits |= static_cast<std::uint32_t>(along[k] < middle) << k;
+  }
+  return bits;
 }
 
-// Whether a full block may span an edge in depth: at opposite corners the steps tell how far apart
-// pixels are on its surfaces.
-bool is_suspicious(const PointTile& tile, const PaddedBox& box) {
-  const float across = std::min(squared_step(tile, 0, 1), squared_step(tile, 14, 15));
-  const float down = std::min(squared_step(tile, 0, 4), squared_step(tile, 11, 15));
-  return (box.max - box.min).matrix().squaredNorm() > kLongest * (across + down);
+// Of the points whose bit is set, one at least. Number by number: a vector made of three numbers
+// that were just written waits for them.
+PaddedBox box_of(const PointTile& tile, std::uint32_t points) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  float min_x = kInfinity, min_y = kInfinity, min_z = kInfinity;
+  float max_x = -kInfinity, max_y = -kInfinity, max_z = -kInfinity;
+  for (std::uint32_t k = 0; points >> k != 0; ++k) {
+    if ((points >> k & 1U) == 0) continue;
+    min_x = std::min(min_x, tile.x[k]);
+    min_y = std::min(min_y, tile.y[k]);
+    min_z = std::min(min_z, tile.z[k]);
+    max_x = std::max(max_x, tile.x[k]);
+    max_y = std::max(max_y, tile.y[k]);
+    max_z = std::max(max_z, tile.z[k]);
+  }
+  return {{min_x, min_y, min_z, 0.0F}, {max_x, max_y, max_z, 0.0F}};
 }
 
-void copy_point(const PointTile& from, int k, PointTile* to) {
-  const int n = to->count++;
-  to->x[n] = from.x[k];
-  to->y[n] = from.y[k];
-  to->z[n] = from.z[k];
-  to->id[n] = from.id[k];
+void copy_points(const PointTile& from, std::uint32_t points, PointTile* to) {
+  to->count = 0;
+  for (std::uint32_t k = 0; points >> k != 0; ++k) {
+    if ((points >> k & 1U) == 0) continue;
+    const std::int32_t n = to->count++;
+    to->x[n] = from.x[k];
+    to->y[n] = from.y[k];
+    to->z[n] = from.z[k];
+    to->id[n] = from.id[k];
+  }
 }
 
 class ImageReader {
  public:
-  ImageReader(const RawCloud& cloud, const CropPose& pose, const PointFilter& drop,
+  ImageReader(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
               PointIndexBuilder* builder, IngestCounts* counts)
-      : cloud_(cloud), pose_(pose), drop_(drop), builder_(*builder), counts_(*counts) {}
+      : cloud_(cloud), pose_(pose), on_robot_(on_robot), builder_(*builder), counts_(*counts) {
+    if (on_robot != nullptr) drop_ = on_robot->as_filter();
+  }
 
   std::size_t run() {
-    for (std::size_t row = 0; row < cloud_.height; row += kTileSide) {
-      for (std::size_t column = 0; column < cloud_.width; column += kCropBlock) {
-        band(row, column, std::min(kCropBlock, cloud_.width - column));
+    for (std::size_t row = 0; row < cloud_.height; row += kPatchSide) {
+      for (std::size_t column = 0; column < cloud_.width; column += kPatchSide) {
+        const std::size_t kept = crop_patch(cloud_, row, column, pose_, &block_, &counts_);
+        if (kept == 0) continue;
+        kept_ += kept;
+        patch(row * cloud_.width + column);
       }
     }
     return kept_;
   }
 
  private:
-  void band(std::size_t first_row, std::size_t first_column, std::size_t count) {
-    const std::size_t padded = (count + kTileColumns - 1) / kTileColumns * kTileColumns;
-    std::size_t kept = 0;
-    for (std::size_t row = 0; row < kTileSide; ++row) {
-      const bool is_there = first_row + row < cloud_.height;
-      if (is_there) {
-        kept +=
-            crop_points(cloud_, first_row + row, first_column, count, pose_, &rows_[row], &counts_);
-      }
-      const std::size_t filled = is_there ? count : 0;
-      std::fill(rows_[row].x + filled, rows_[row].x + padded, kNaN);
-    }
-    kept_ += kept;
-    if (kept == 0) return;
-    for (std::size_t column = 0; column < padded; column += kTileColumns) {
-      tile_boxes(rows_.data(), column, &boxes_);
-      for (std::size_t i = 0; i < kTilesAtOnce; ++i) {
-        block(first_row * cloud_.width + first_column + column + kTileSide * i,
-              column + kTileSide * i, kTileSide * i);
-      }
-    }
-  }
-
-  // @param id      of the first pixel
-  // @param column  of the rows in work, @param slot  of the boxes
-  void block(std::size_t id, std::size_t column, std::size_t slot) {
-    std::uint32_t kept = 0;
-    for (std::size_t row = 0; row < kTileSide; ++row) {
-      kept |= (boxes_.kept[row] >> slot & 0xFU) << (kTileSide * row);
-    }
-    if (kept == 0) return;
-    PointTile& tile = builder_.next();
-    const bool is_full = kept == 0xFFFFU;
-    if (is_full) {
-      take_all(id, column, &tile);
+  // @param first  pixel
+  void patch(std::size_t first) {
+    const auto id = static_cast<std::uint32_t>(first);
+    const auto width = static_cast<std::uint32_t>(cloud_.width);
+    find_tiles(block_, &tiles_);
+    const Choice choice = choose();
+    PointTile* room = builder_.room(kPointWidth);
+    write_tiles(block_, tiles_, choice.as_they_are, id, width, room);
+    tiles_.boxes.count = kPointWidth;
+    if (on_robot_ != nullptr && on_robot_->may_drop(box_around(tiles_.boxes))) {
+      keep_one_by_one(choice.as_they_are);
     } else {
-      take(kept, id, column, &tile);
+      builder_.keep_written(tiles_.boxes, choice.as_they_are);
     }
-    const PaddedBox box = {{boxes_.min[0][slot], boxes_.min[1][slot], boxes_.min[2][slot], 0.0F},
-                           {boxes_.max[0][slot], boxes_.max[1][slot], boxes_.max[2][slot], 0.0F}};
-    if (is_full && !is_suspicious(tile, box)) {
-      builder_.keep(box, drop_);
-    } else {
-      keep_parts(tile, box);
+    for (std::size_t slot = 0; slot < kPatchTiles * kPatchTiles; ++slot) {
+      if ((choice.to_be_parted >> slot & 1U) == 0) continue;
+      PointTile tile;
+      write_tiles(block_, tiles_, 1U << slot, id, width, &tile);
+      keep_parts(tile, box_in(tiles_.boxes, static_cast<int>(slot)));
     }
+    builder_.end_neighbours();
   }
 
-  void take_all(std::size_t id, std::size_t column, PointTile* tile) const {
-    for (std::size_t row = 0; row < kTileSide; ++row) {
-      constexpr std::size_t kBytes = kTileSide * sizeof(float);
-      std::memcpy(tile->x + kTileSide * row, rows_[row].x + column, kBytes);
-      std::memcpy(tile->y + kTileSide * row, rows_[row].y + column, kBytes);
-      std::memcpy(tile->z + kTileSide * row, rows_[row].z + column, kBytes);
-      for (std::size_t k = 0; k < kTileSide; ++k) {
-        tile->id[kTileSide * row + k] = static_cast<std::uint32_t>(id + row * cloud_.width + k);
+  // Slots of the tiles that stay as they are, and of those that may have a gap.
+  struct Choice {
+    std::uint32_t as_they_are = 0, to_be_parted = 0;
+  };
+
+  // Full tiles are known; others are good when they are no longer than full ones are.
+  Choice choose() const {
+    const float* diagonal_sq = tiles_.diagonal_sq;
+    Choice choice;
+    std::uint32_t partial = 0;
+    float sum = 0.0F, count = 0.0F;
+    for (std::size_t slot = 0; slot < kPatchTiles * kPatchTiles; ++slot) {
+      const std::uint32_t kept = tiles_.kept_of(slot), bit = 1U << slot;
+      if (kept == 0) continue;
+      if (kept != 0xFFFFU) {
+        partial |= bit;
+      } else if ((tiles_.suspicious & bit) != 0) {
+        choice.to_be_parted |= bit;
+      } else {
+        choice.as_they_are |= bit;
+        sum += diagonal_sq[slot];
+        count += 1.0F;
       }
     }
-    tile->count = kPointWidth;
+    const float longest_sq = kAsLong * kAsLong * sum;
+    for (std::size_t slot = 0; partial >> slot != 0; ++slot) {
+      if ((partial >> slot & 1U) == 0) continue;
+      const bool good = diagonal_sq[slot] * count <= longest_sq;
+      (good && count > 0.0F ? choice.as_they_are : choice.to_be_parted) |= 1U << slot;
+    }
+    return choice;
   }
 
-  void take(std::uint32_t kept, std::size_t id, std::size_t column, PointTile* tile) const {
-    std::int32_t n = 0;
-    for (std::size_t pixel = 0; pixel < kTileSide * kTileSide; ++pixel) {
-      if ((kept >> pixel & 1U) == 0) continue;
-      const std::size_t row = pixel / kTileSide, k = pixel % kTileSide;
-      tile->x[n] = rows_[row].x[column + k];
-      tile->y[n] = rows_[row].y[column + k];
-      tile->z[n] = rows_[row].z[column + k];
-      tile->id[n] = static_cast<std::uint32_t>(id + row * cloud_.width + k);
-      ++n;
+  // What the filter drops moves all that follow.
+  void keep_one_by_one(std::uint32_t which) {
+    std::array<PointTile, kPointWidth> tiles;
+    const PointTile* written = builder_.room(kPointWidth);
+    std::copy_n(written, kPointWidth, tiles.begin());
+    std::size_t i = 0;
+    for (std::size_t slot = 0; which >> slot != 0; ++slot) {
+      if ((which >> slot & 1U) == 0) continue;
+      *builder_.room(1) = tiles[i++];
+      builder_.keep(box_in(tiles_.boxes, static_cast<int>(slot)), drop_);
     }
-    tile->count = n;
   }
 
   // Halves what has a gap in the middle of its longest side, and keeps the parts.
   void keep_parts(const PointTile& whole, const PaddedBox& whole_box) {
     struct Part {
-      PointTile tile;
+      std::uint32_t points;  // bit k: that in slot k
       PaddedBox box;
     };
     std::array<Part, kPointWidth> parts;
     std::size_t count = 0;
-    parts[count++] = {whole, whole_box};
+    parts[count++] = {(1U << static_cast<std::uint32_t>(whole.count)) - 1U, whole_box};
     while (count > 0) {
       Part& part = parts[count - 1];
-      Part low, high;
-      if (halve(part.tile, part.box, &low.tile, &high.tile)) {
-        low.box = box_of(low.tile);
-        high.box = box_of(high.tile);
-        if (is_worth_a_cut(low.box, high.box, part.box)) {
-          part = low;
-          parts[count++] = high;
+      const std::uint32_t low = lower_half(whole, part.box) & part.points;
+      const std::uint32_t high = part.points & ~low;
+      if (low != 0 && high != 0) {
+        const PaddedBox low_box = box_of(whole, low), high_box = box_of(whole, high);
+        if (is_worth_a_cut(low_box, high_box, part.box)) {
+          part = {low, low_box};
+          parts[count++] = {high, high_box};
           continue;
         }
       }
-      builder_.next() = part.tile;
+      copy_points(whole, part.points, builder_.room(1));
       builder_.keep(part.box, drop_);
       --count;
     }
   }
 
-  static bool halve(const PointTile& tile, const PaddedBox& box, PointTile* low, PointTile* high) {
-    Eigen::Index axis;
-    (box.max - box.min).maxCoeff(&axis);
-    const float* along = axis == 0 ? tile.x : axis == 1 ? tile.y : tile.z;
-    const float middle = 0.5F * (box.min[axis] + box.max[axis]);
-    low->count = high->count = 0;
-    for (int k = 0; k < tile.count; ++k) copy_point(tile, k, along[k] < middle ? low : high);
-    if (low->count == 0 || high->count == 0) return false;
-    repeat_last(low);
-    repeat_last(high);
-    return true;
-  }
-
   const RawCloud& cloud_;
   const CropPose& pose_;
-  const PointFilter& drop_;
+  const SelfFilter* on_robot_;
+  PointFilter drop_;
   PointIndexBuilder& builder_;
   IngestCounts& counts_;
-  std::array<CropBlock, kTileSide> rows_;
-  TileBoxes boxes_;
+  CropBlock block_;
+  PatchTiles tiles_;
   std::size_t kept_ = 0;
 };
 
@@ -201,7 +210,7 @@ class Numbers {
 }  // namespace
 
 bool is_image(const RawCloud& cloud, const CropPose& pose) {
-  if (cloud.width < kTileColumns || cloud.height < kTileSide) return false;
+  if (cloud.width < kPatchSide || cloud.height < kTileSide) return false;
   const std::size_t across = cloud.width / kTileSide, blocks = across * (cloud.height / kTileSide);
   // Not a divisor of the row: the samples are to be spread over the columns, too.
   const std::size_t step = std::max<std::size_t>(1, blocks / kSampledBlocks) | 1U;
@@ -239,10 +248,10 @@ bool is_image(const RawCloud& cloud, const CropPose& pose) {
   return size_sq.quantile(5) <= largest_sq;
 }
 
-std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const PointFilter& drop,
+std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
                         PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {
   builder->start(pose.origin, index);
-  const std::size_t kept = ImageReader(cloud, pose, drop, builder, counts).run();
+  const std::size_t kept = ImageReader(cloud, pose, on_robot, builder, counts).run();
   builder->finish();
   return kept;
 }

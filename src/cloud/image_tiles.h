@@ -4,6 +4,7 @@
 
 #include "cloud/crop.h"
 #include "cloud/point_index_builder.h"
+#include "cloud/self_filter.h"
 
 namespace ist {
 
@@ -11,11 +12,13 @@ namespace ist {
 /// at some blocks of pixels only; a matter of speed.
 bool is_image(const RawCloud& cloud, const CropPose& pose);
 
-/// Reads an image once and makes an index of it: blocks of 4 x 4 pixels become tiles, without any
-/// sorting of points; at edges in depth a block is split. Counts as crop().
+/// Reads an image once and makes an index of it, without any sorting of points: squares of 4 x 4
+/// pixels become tiles, squares of 4 x 4 tiles become nodes; at edges in depth a tile is split, and
+/// tiles that no longer fill a node are grouped by where they are. Counts as crop().
+/// @param on_robot  null: no self-filter
 /// @param index  overwritten, its buffers reused
-/// @returns how many points were kept before `drop`
-std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const PointFilter& drop,
+/// @returns how many points were kept before the self-filter
+std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
                         PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts);
 
 }  // namespace ist

@@ -61,13 +61,11 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   const IngestConfig& config = impl_->config;
   const CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
 
-  PointFilter on_robot;
+  const SelfFilter* on_robot = nullptr;
   if (config.self_filter && robot.model != nullptr) {
     impl_->self_filter.pose(robot, pose.origin, config.self_filter_padding);
     for (const PosedRobot& later : also) impl_->self_filter.add(later, pose.origin);
-    on_robot = [filter = &impl_->self_filter](const PointTile& tile, const PaddedBox& box) {
-      return filter->on_robot(tile, box);
-    };
+    on_robot = &impl_->self_filter;
   }
   IngestCounts counts;
   std::size_t kept = 0;
@@ -77,8 +75,9 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
     CroppedCloud& points = impl_->cropped;
     crop(cloud, pose, &points, &counts);
     kept = points.size;
-    impl_->builder.build(pose.origin, points.x.data(), points.y.data(), points.z.data(),
-                         points.id.data(), kept, on_robot, &snapshot->index);
+    impl_->builder.build(
+        pose.origin, points.x.data(), points.y.data(), points.z.data(), points.id.data(), kept,
+        on_robot == nullptr ? PointFilter() : on_robot->as_filter(), &snapshot->index);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range =

@@ -87,6 +87,21 @@ void put_unused_far_away(PointTile* tile) {
   }
 }
 
+// Whether tiles that are neighbours shall be a node: most of it is used, and they lie side by side.
+// Four by four squares are four times as long as one of them; where they are much longer, there is
+// a leap between them.
+bool make_a_node(const HierarchyChild* tiles, std::size_t count) {
+  constexpr float kLongest = 6.0F;
+  if (count < kWidth / 2 || count > kWidth) return false;
+  PaddedBox around = tiles[0].box;
+  float sum = 0.0F;
+  for (std::size_t i = 0; i < count; ++i) {
+    around.extend(tiles[i].box);
+    sum += tiles[i].box.diagonal();
+  }
+  return around.diagonal() <= kLongest * sum / static_cast<float>(count);
+}
+
 }  // namespace
 
 void PointIndexBuilder::start(const Eigen::Vector3d& origin, PointIndex* index) {
@@ -95,14 +110,15 @@ void PointIndexBuilder::start(const Eigen::Vector3d& origin, PointIndex* index) 
   index->generation_ = next_generation();
   index->origin_ = origin;
   index->size_ = 0;
-  boxes_.clear();
-  items_.clear();
+  index->nodes_.clear();
+  loose_.clear();
+  neighbours_ = 0;
 }
 
-PointTile& PointIndexBuilder::next() {
+PointTile* PointIndexBuilder::room(std::size_t count) {
   std::vector<PointTile>& tiles = index_->tiles_;
-  if (used_ == tiles.size()) tiles.emplace_back();
-  return tiles[used_];
+  if (used_ + count > tiles.size()) tiles.resize(used_ + count);
+  return &tiles[used_];
 }
 
 void PointIndexBuilder::keep(const PaddedBox& all, const PointFilter& drop) {
@@ -118,20 +134,62 @@ void PointIndexBuilder::keep(const PaddedBox& all, const PointFilter& drop) {
   }
   put_unused_far_away(&tile);
   index_->size_ += static_cast<std::size_t>(tile.count);
-  items_.push_back({(box.min + box.max).head<3>(), static_cast<std::int32_t>(used_)});
-  boxes_.push_back(box);
+  loose_.push_back({box, ~static_cast<std::int32_t>(used_)});
   ++used_;
+}
+
+void PointIndexBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) {
+  for (int k = 0; which >> k != 0; ++k) {
+    if ((which >> k & 1U) == 0) continue;
+    index_->size_ += static_cast<std::size_t>(index_->tiles_[used_].count);
+    loose_.emplace_back();
+    HierarchyChild& child = loose_.back();
+    child.box.min << boxes.min_x[k], boxes.min_y[k], boxes.min_z[k], 0.0F;
+    child.box.max << boxes.max_x[k], boxes.max_y[k], boxes.max_z[k], 0.0F;
+    child.child = ~static_cast<std::int32_t>(used_);
+    ++used_;
+  }
+}
+
+void PointIndexBuilder::end_neighbours() {
+  const std::size_t count = loose_.size() - neighbours_;
+  if (make_a_node(loose_.data() + neighbours_, count)) {
+    index_->nodes_.emplace_back();
+    BoxNode& node = index_->nodes_.back();
+    clear_boxes(&node);
+    for (std::size_t i = neighbours_; i < loose_.size(); ++i) {
+      node.child[append_box(loose_[i].box, &node)] = loose_[i].child;
+    }
+    loose_.resize(neighbours_);
+  }
+  neighbours_ = loose_.size();
 }
 
 void PointIndexBuilder::finish() {
   index_->tiles_.resize(used_);
-  arrange(&items_);
-  write_nodes(items_, boxes_, &index_->nodes_);
-  index_->root_ = static_cast<std::int32_t>(index_->nodes_.size()) - 1;
+  std::vector<BoxNode>& nodes = index_->nodes_;
+  hierarchy_.append_nodes(loose_, &nodes);
+  hierarchy_.append_levels(&nodes);
+  index_->root_ = static_cast<std::int32_t>(nodes.size()) - 1;
   index_->bounds_.setEmpty();
-  if (index_->root_ < 0) return;
-  const PaddedBox box = box_of(index_->nodes_.back());
+  if (nodes.empty()) return;
+  const PaddedBox box = box_around(nodes.back());
   index_->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
+}
+
+// Runs of sixteen, cut where the order leaps. load(i, tile, k) puts the i-th point into slot k.
+template <typename Load>
+void PointIndexBuilder::add_runs(std::size_t n, const PointFilter& drop, const Load& load) {
+  for (std::size_t first = 0; first < n;) {
+    PointTile& tile = *room(1);
+    const std::size_t count = std::min<std::size_t>(kWidth, n - first);
+    for (std::size_t k = 0; k < count; ++k) load(first + k, &tile, k);
+    tile.count = static_cast<std::int32_t>(count);
+    repeat_last(&tile);
+    const PaddedBox box = cut(&tile);
+    first += static_cast<std::size_t>(tile.count);
+    keep(box, drop);
+  }
 }
 
 void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, const float* y,
@@ -139,22 +197,26 @@ void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, con
                               const PointFilter& drop, PointIndex* index) {
   morton_.sort(x, y, z, n, &order_);
   start(origin, index);
-  for (std::size_t first = 0; first < n;) {
-    PointTile& tile = next();
-    const auto count = static_cast<std::uint32_t>(std::min<std::size_t>(kWidth, n - first));
-    for (std::uint32_t k = 0; k < count; ++k) {
-      const std::uint32_t point = order_[first + k];
-      tile.x[k] = x[point];
-      tile.y[k] = y[point];
-      tile.z[k] = z[point];
-      tile.id[k] = id[point];
-    }
-    tile.count = static_cast<std::int32_t>(count);
-    repeat_last(&tile);
-    const PaddedBox box = cut(&tile);
-    first += static_cast<std::size_t>(tile.count);
-    keep(box, drop);
-  }
+  add_runs(n, drop, [&](std::size_t i, PointTile* tile, std::size_t k) {
+    const std::uint32_t point = order_[i];
+    tile->x[k] = x[point];
+    tile->y[k] = y[point];
+    tile->z[k] = z[point];
+    tile->id[k] = id[point];
+  });
+  finish();
+}
+
+void PointIndexBuilder::build_in_order(const Eigen::Vector3d& origin, const float* x,
+                                       const float* y, const float* z, const std::uint32_t* id,
+                                       std::size_t n, PointIndex* index) {
+  start(origin, index);
+  add_runs(n, {}, [&](std::size_t i, PointTile* tile, std::size_t k) {
+    tile->x[k] = x[i];
+    tile->y[k] = y[i];
+    tile->z[k] = z[i];
+    tile->id[k] = id[i];
+  });
   finish();
 }
 

@@ -22,7 +22,7 @@ using PointFilter = std::function<std::uint32_t(const PointTile& tile, const Pad
 /// Morton order brings neighbours together. Runs of 16 become tiles, but a run is cut where the
 /// order leaps, so that no tile has a big box. Above the tiles, space is divided at medians across
 /// the longest side: grouping along the Morton order alone makes boxes that overlap, and doubles
-/// what a query visits. Every node is full but the last of each level.
+/// what a query visits.
 class PointIndexBuilder {
  public:
   /// As PointIndex::build.
@@ -32,22 +32,38 @@ class PointIndexBuilder {
   void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
              const std::uint32_t* id, std::size_t n, const PointFilter& drop, PointIndex* index);
 
-  /// The same tile by tile, for who knows which points are neighbours: start(), then next() and
+  /// The same for points of which neighbours in the list are mostly neighbours in space.
+  void build_in_order(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
+                      const std::uint32_t* id, std::size_t n, PointIndex* index);
+
+  /// The same tile by tile, for who knows which points are neighbours: start(), then room() and
   /// keep() for each tile, then finish(). Before finish(), the index is not to be read.
   void start(const Eigen::Vector3d& origin, PointIndex* index);
-  /// To be filled: points, ids and count; until keep() it is the same.
-  PointTile& next();
-  /// @param box  of exactly the points in next()
+  /// The next tiles, to be filled: points, ids and count.
+  PointTile* room(std::size_t tiles);
+  /// Keeps the first tile of room().
+  /// @param box  of exactly its points
   void keep(const PaddedBox& box, const PointFilter& drop);
+  /// Keeps the first tiles of room(), whose unused slots are far away, without a filter.
+  /// @param boxes  of exactly the points of each tile, in order; others between them
+  /// @param which  bit k: slot k of `boxes` is a tile's
+  void keep_written(const BoxNode& boxes, std::uint32_t which);
+  /// The tiles kept since the last call are neighbours: they become a node of their own if they
+  /// fill it and lie close together, else they are grouped with others at the end.
+  void end_neighbours();
   void finish();
 
  private:
+  template <typename Load>
+  void add_runs(std::size_t n, const PointFilter& drop, const Load& load);
+
   MortonOrder morton_;
-  std::vector<std::uint32_t> order_;  ///< numbers of the points, in Morton order
-  std::vector<PaddedBox> boxes_;      ///< by tile
-  std::vector<HierarchyItem> items_;  ///< one for each tile
-  PointIndex* index_ = nullptr;       ///< in work
-  std::size_t used_ = 0;              ///< its tiles that are complete; later ones are of last time
+  std::vector<std::uint32_t> order_;   ///< numbers of the points, in Morton order
+  std::vector<HierarchyChild> loose_;  ///< tiles that no node holds yet
+  std::size_t neighbours_ = 0;         ///< first of them since the last end_neighbours()
+  BoxHierarchy hierarchy_;
+  PointIndex* index_ = nullptr;  ///< in work
+  std::size_t used_ = 0;         ///< its tiles that are complete; later ones are of last time
 };
 
 }  // namespace ist

@@ -45,13 +45,26 @@ void SelfFilter::add(const PosedRobot& robot, const Eigen::Vector3d& origin) {
   }
 }
 
+// Whether a ball may touch what the link claims.
+bool SelfFilter::is_near(const PosedLink& link, const Eigen::Vector3f& center_O, float radius) {
+  const float reach = link.reach + radius * (1.0F + static_cast<float>(kRounding));
+  return !((center_O - link.center_O).squaredNorm() > reach * reach);
+}
+
+bool SelfFilter::may_drop(const PaddedBox& box) const {
+  const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
+  const float radius = 0.5F * box.diagonal();
+  return std::any_of(links_.begin(), links_.end(), [&center, radius](const PosedLink& link) {
+    return is_near(link, center, radius);
+  });
+}
+
 std::uint32_t SelfFilter::on_robot(const PointTile& tile, const PaddedBox& box) const {
   const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
   const float radius = 0.5F * box.diagonal();
   std::uint32_t mask = 0;
   for (const PosedLink& link : links_) {
-    const float reach = link.reach + radius * (1.0F + static_cast<float>(kRounding));
-    if ((center - link.center_O).squaredNorm() > reach * reach) continue;
+    if (!is_near(link, center, radius)) continue;
     mask |= on_link(link, tile, center.cast<double>(), static_cast<double>(radius));
     if (mask == all_of(tile)) break;
   }

@@ -26,9 +26,17 @@ class SelfFilter {
   /// The robot at one more instant, beside those before.
   void add(const PosedRobot& robot, const Eigen::Vector3d& origin);
 
+  /// False: none of the points in this box is the robot's.
+  bool may_drop(const PaddedBox& box) const;
+
   /// Bit k: the point in slot k is the robot's.
   /// @param box  of the tile's points
   std::uint32_t on_robot(const PointTile& tile, const PaddedBox& box) const;
+
+  /// on_robot() of this filter, which must live as long.
+  PointFilter as_filter() const {
+    return [this](const PointTile& tile, const PaddedBox& box) { return on_robot(tile, box); };
+  }
 
  private:
   enum class Verdict { kClear, kOnLink, kOpen };
@@ -42,6 +50,7 @@ class SelfFilter {
     float clear_beyond;        ///< [m] outer distance that proves a point clear
   };
 
+  static bool is_near(const PosedLink& link, const Eigen::Vector3f& center_O, float radius);
   Verdict ask_tree(const PosedLink& link, const Eigen::Vector3d& center_L, double radius) const;
   bool ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L) const;
   std::uint32_t on_link(const PosedLink& link, const PointTile& tile,

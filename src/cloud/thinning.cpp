@@ -4,38 +4,19 @@
 #include <cmath>
 #include <tuple>
 
+#include "cloud/thinning_kernel.h"
+
 namespace ist {
 namespace {
 
-// Sixteen numbers side by side; Eigen turns them into SIMD.
-using Lanes = Eigen::Array<float, kPointWidth, 1>;
-using Ints = Eigen::Array<std::int32_t, kPointWidth, 1>;
-
 constexpr std::size_t kSmallestTable = 64;  // a power of two, as all of them
 constexpr double kMostCells = 1 << 30;      // from the origin to either side
-constexpr float kUnused = 1.5e9F;           // cell of unused slots: fits, and is beyond all others
 
-// The grid along one axis, relative to an origin that lies anywhere in it. Float is enough: cells
-// come out no less exact than the coordinates are.
-struct Axis {
-  Axis(double origin, double cell) : scale(static_cast<float>(1.0 / cell)) {
-    const double cells = origin / cell;
-    offset = static_cast<float>(cells - std::floor(cells));
-  }
-
-  // The cells of a tile's coordinates, and the squared distances to their centres are added up.
-  void divide(const float* v, Ints* cell, Lanes* off_centre) const {
-    const Lanes cells = (Eigen::Map<const Lanes>(v) * scale + offset).min(kUnused);
-    // Floor, which has no SIMD before SSE4.1: one less where rounding toward zero went up.
-    const Lanes toward_zero = cells.cast<std::int32_t>().cast<float>();
-    const Lanes floor = toward_zero - ((toward_zero - cells) * 1e38F).max(0.0F).min(1.0F);
-    *cell = floor.cast<std::int32_t>();
-    *off_centre += (cells - floor - 0.5F).square();
-  }
-
-  float scale;   // [1/m]
-  float offset;  // of the origin, in cells
-};
+// Of the origin, in cells from the one it lies in.
+float offset_in_cell(double origin, double edge) {
+  const double cells = origin / edge;
+  return static_cast<float>(cells - std::floor(cells));
+}
 
 // Cells are larger where their numbers would not fit: across more than two billion of them.
 double fitting(double cell, const PointIndex& all) {
@@ -54,24 +35,25 @@ bool Thinning::Entry::better_than(const Entry& other) const {
 
 void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* builder,
                    PointIndex* thin) {
+  // As many cells as last time; a third of the table stays empty even then.
   std::size_t table_size = kSmallestTable;
-  while (8 * table_size < all.size()) table_size *= 2;
+  while (table_size < 3 * entries_.size()) table_size *= 2;
   table_.assign(table_size, 0U);
   entries_.clear();
   recent_.fill(0);
   const Eigen::Vector3d& origin = all.origin();
   const double edge = fitting(cell_size, all);
-  const Axis axis_x(origin.x(), edge), axis_y(origin.y(), edge), axis_z(origin.z(), edge);
+  CellGrid grid{static_cast<float>(1.0 / edge), {}};
+  for (int i = 0; i < 3; ++i) grid.offset[i] = offset_in_cell(origin[i], edge);
+  TileCells cells;
   for (const PointTile& tile : all.tiles()) {
-    Ints x, y, z;
-    Lanes off_centre = Lanes::Zero();
-    axis_x.divide(tile.x, &x, &off_centre);
-    axis_y.divide(tile.y, &y, &off_centre);
-    axis_z.divide(tile.z, &z, &off_centre);
-    for (int k = 0; k < tile.count; ++k) {
-      const Cell cell{x[k], y[k], z[k]};
-      if (is_beaten(cell, off_centre[k])) continue;
-      add({cell, off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
+    const std::size_t count = find_cells(grid, tile, &cells);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t k = cells.nearest[i];
+      const Cell cell{static_cast<std::int32_t>(cells.x[k]), static_cast<std::int32_t>(cells.y[k]),
+                      static_cast<std::int32_t>(cells.z[k])};
+      if (is_beaten(cell, cells.off_centre[k])) continue;
+      add({cell, cells.off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
     }
   }
 
@@ -86,19 +68,20 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
     z_[i] = entries_[i].z;
     id_[i] = entries_[i].id;
   }
-  builder->build(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, {}, thin);
+  // Neighbours among the tiles have given neighbours.
+  builder->build_in_order(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, thin);
 }
 
 // The usual case, on its own for speed: a cell seen a moment ago has a better point already.
 inline bool Thinning::is_beaten(const Cell& cell, float off_centre) const {
-  const std::uint32_t recent = recent_[cell.parity()];
+  const std::uint32_t recent = recent_[cell.place()];
   return recent < entries_.size() && entries_[recent].cell == cell &&
          entries_[recent].off_centre < off_centre;
 }
 
 void Thinning::add(const Entry& entry) {
   const Cell& cell = entry.cell;
-  std::uint32_t& recent = recent_[cell.parity()];
+  std::uint32_t& recent = recent_[cell.place()];
   if (recent >= entries_.size() || !(entries_[recent].cell == cell)) {
     std::uint32_t* slot = find(cell);
     if (*slot == 0) {
@@ -113,13 +96,17 @@ void Thinning::add(const Entry& entry) {
   if (entry.better_than(entries_[recent])) entries_[recent] = entry;
 }
 
+// Cells of a cube of 4 x 4 x 4 are neighbours in the table: what is near in space is in the cache.
 std::size_t Thinning::hash(const Cell& cell) {
+  constexpr std::uint32_t kBits = 2;
+  const auto x = static_cast<std::uint32_t>(cell.x), y = static_cast<std::uint32_t>(cell.y),
+             z = static_cast<std::uint32_t>(cell.z);
   // Odd numbers near 2^64 over the golden ratio, the plastic number and its square.
-  std::uint64_t h = static_cast<std::uint32_t>(cell.x) * 0x9E3779B97F4A7C15ULL ^
-                    static_cast<std::uint32_t>(cell.y) * 0xC13FA9A902A6328FULL ^
-                    static_cast<std::uint32_t>(cell.z) * 0x91E10DA5C79E7B1DULL;
+  std::uint64_t h = (x >> kBits) * 0x9E3779B97F4A7C15ULL ^ (y >> kBits) * 0xC13FA9A902A6328FULL ^
+                    (z >> kBits) * 0x91E10DA5C79E7B1DULL;
   h ^= h >> 32;
-  return static_cast<std::size_t>(h * 0x9E3779B97F4A7C15ULL >> 20);
+  const std::uint32_t within = (x & 3U) | (y & 3U) << 2 | (z & 3U) << 4;
+  return static_cast<std::size_t>((h * 0x9E3779B97F4A7C15ULL >> 26) << (3 * kBits) | within);
 }
 
 // The slot that holds a cell, or the empty one where it belongs.

@@ -27,8 +27,9 @@ class Thinning {
     bool operator==(const Cell& other) const {
       return x == other.x && y == other.y && z == other.z;
     }
-    std::size_t parity() const {
-      return static_cast<std::size_t>((x & 1) | (y & 1) << 1 | (z & 1) << 2);
+    /// In a cube of 8 x 8 x 8 that is repeated all over space.
+    std::size_t place() const {
+      return static_cast<std::size_t>((x & 7) | (y & 7) << 3 | (z & 7) << 6);
     }
   };
 
@@ -50,8 +51,8 @@ class Thinning {
 
   std::vector<Entry> entries_;
   std::vector<std::uint32_t> table_;  ///< open addressing: number of an entry plus one, or 0
-  /// Entries of the cells seen last, by the parity of their numbers: neighbours share cells.
-  std::array<std::uint32_t, 8> recent_{};
+  /// Entries of the cells seen last, by their place: neighbours share cells.
+  std::array<std::uint32_t, 512> recent_{};
   std::vector<float> x_, y_, z_;
   std::vector<std::uint32_t> id_;
 };

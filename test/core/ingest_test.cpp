@@ -1,6 +1,8 @@
 #include "ist_proximity/cloud/ingest.h"
 
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
@@ -27,6 +29,7 @@ struct Format {
   std::size_t x = 0, y = 4, z = 8, point_step = 12;
   std::size_t width = 0;        // 0: one row
   std::size_t row_padding = 0;  // bytes after each row
+  std::size_t misaligned = 1;   // bytes before the first point; 1: nothing is aligned
 };
 
 template <typename T>
@@ -50,11 +53,10 @@ class Message {
     layout.fields = {{"x", static_cast<std::uint32_t>(format.x), type, 1},
                      {"y", static_cast<std::uint32_t>(format.y), type, 1},
                      {"z", static_cast<std::uint32_t>(format.z), type, 1}};
-    // One byte more in front, so that nothing is aligned.
-    bytes_.assign(1 + std::size_t{layout.height} * layout.row_step, 0xFF);
+    bytes_.assign(format.misaligned + std::size_t{layout.height} * layout.row_step, 0xFF);
     for (std::size_t i = 0; i < points.size(); ++i) {
       std::uint8_t* point =
-          &bytes_[1] + i / width * layout.row_step + i % width * format.point_step;
+          &bytes_[format.misaligned] + i / width * layout.row_step + i % width * format.point_step;
       for (const auto& [offset, value] :
            {std::pair{format.x, points[i].x()}, std::pair{format.y, points[i].y()},
             std::pair{format.z, points[i].z()}}) {
@@ -65,8 +67,8 @@ class Message {
         }
       }
     }
-    layout.data = bytes_.data() + 1;
-    layout.data_size = bytes_.size() - 1;
+    layout.data = bytes_.data() + format.misaligned;
+    layout.data_size = bytes_.size() - format.misaligned;
     EXPECT_EQ(check_layout(layout, &raw), "");
   }
   Message(const Message&) = delete;
@@ -218,6 +220,8 @@ TEST(Ingest, everyFormatReadsTheSame) {
   points[45].z() = kInf;
   std::map<std::string, Format> formats;
   formats["float64"] = float64();
+  formats["four floats"].point_step = 16;
+  formats["four floats"].misaligned = 0;
   for (const bool is_bigendian : {false, true}) {
     for (const bool is_double : {false, true}) {
       const std::size_t size = is_double ? 8 : 4;
@@ -278,7 +282,60 @@ TEST(Ingest, pointsAreInTheFixedFrame) {
   expect_transformed(points, X_FS, ingest(points, without_limits(), {}, X_FS).index, 5e-7);
 }
 
-// Four ways to be far away. In float, a coordinate of 4e6 m is off by up to 0.25 m.
+// Every tile has one parent, every box is that of the points below, unused slots are far away.
+void expect_hierarchy(const PointIndex& index) {
+  const std::size_t tiles = index.tiles().size();
+  std::vector<Eigen::AlignedBox3f> boxes(tiles + index.nodes().size());
+  std::vector<int> parents(boxes.size(), 0);
+  for (std::size_t i = 0; i < tiles; ++i) {
+    const PointTile& tile = index.tiles()[i];
+    for (int k = 0; k < kPointWidth; ++k) {
+      const Eigen::Vector3f p(tile.x[k], tile.y[k], tile.z[k]);
+      if (k < tile.count) boxes[i].extend(p);
+      ASSERT_TRUE(k < tile.count || p == Eigen::Vector3f::Constant(kFarAway));
+    }
+  }
+  for (std::size_t i = 0; i < index.nodes().size(); ++i) {
+    const BoxNode& node = index.nodes()[i];
+    for (int k = 0; k < kPointWidth; ++k) {
+      const Eigen::Vector3f min(node.min_x[k], node.min_y[k], node.min_z[k]);
+      const Eigen::Vector3f max(node.max_x[k], node.max_y[k], node.max_z[k]);
+      if (k >= node.count) {
+        ASSERT_TRUE(min == max && min == Eigen::Vector3f::Constant(kFarAway));
+        continue;
+      }
+      const std::int32_t child = node.child[k];
+      const std::size_t at =
+          child < 0 ? static_cast<std::size_t>(~child) : tiles + static_cast<std::size_t>(child);
+      ASSERT_TRUE(child < static_cast<std::int32_t>(i)) << "children come before their parent";
+      ++parents[at];
+      ASSERT_TRUE(min == boxes[at].min() && max == boxes[at].max());
+      boxes[tiles + i].extend(boxes[at]);
+    }
+  }
+  ASSERT_EQ(index.root() + 1, static_cast<std::int32_t>(index.nodes().size()));
+  for (std::size_t i = 0; i + 1 < parents.size(); ++i) ASSERT_EQ(parents[i], 1);
+  if (!boxes.empty()) {
+    ASSERT_TRUE(boxes.back().isApprox(index.bounds(), 0.0F));
+  }
+}
+
+// What the machine's processor can do, one instruction set after the other.
+template <typename Test>
+void for_each_instruction_set(const Test& test) {
+  const auto choose = [](std::int64_t targets) {
+    hwy::SetSupportedTargetsForTest(targets);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  };
+  choose(0);
+  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
+    choose(left & -left);
+    SCOPED_TRACE(hwy::TargetName(left & -left));
+    test();
+  }
+  choose(0);
+}
+
 // What a depth camera sees: a wall and a board before it, and nothing at some pixels.
 Points depth_image(std::size_t width, std::size_t height) {
   std::mt19937 random(8);
@@ -297,18 +354,20 @@ Points depth_image(std::size_t width, std::size_t height) {
 }
 
 // An image goes another way than a list of points; sizes that are no multiple of anything as well.
-TEST(Ingest, imageHoldsTheSamePointsAsAList) {
+void check_images(const Format& format) {
   for (const auto& [width, height] :
        {std::pair<std::size_t, std::size_t>{160, 120}, {163, 41}, {300, 5}, {17, 90}, {257, 64}}) {
     SCOPED_TRACE(std::to_string(width) + " x " + std::to_string(height));
-    Format image;
+    Format image = format;
     image.width = width;
-    const Points points = depth_image(width, height);
+    Points points = depth_image(width, height);
+    points[5 * width / 2].y() = kInf;
     IngestConfig config;
     config.max_range = 1.7;
     const CloudSnapshot a = ingest(points, config, {}, pose(0.5, 0.2, 1.0));
     const CloudSnapshot b = ingest(points, config, image, pose(0.5, 0.2, 1.0));
     EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
+    EXPECT_EQ(a.counts.infinite, b.counts.infinite);
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
     EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
     // Tiles do not span the edge of the board, 0.6 m deep.
@@ -319,7 +378,22 @@ TEST(Ingest, imageHoldsTheSamePointsAsAList) {
       }
       ASSERT_LT(box.diagonal().norm(), 0.25F);
     }
+    expect_hierarchy(b.index);
   }
+}
+
+TEST(Ingest, imageHoldsTheSamePointsAsAList) {
+  for_each_instruction_set([] { check_images({}); });
+}
+
+// As drivers write it: sixteen bytes a point, read by another way.
+TEST(Ingest, imageOfFourFloatsHoldsTheSamePointsAsAList) {
+  Format four_floats;
+  four_floats.point_step = 16;
+  four_floats.misaligned = 0;
+  for_each_instruction_set([&] { check_images(four_floats); });
+  four_floats.row_padding = 48;
+  for_each_instruction_set([&] { check_images(four_floats); });
 }
 
 // Rows and columns that say nothing about space: the index must be as good as that of a list.
@@ -341,6 +415,7 @@ TEST(Ingest, thinnedCloudCanBeLeftOut) {
   EXPECT_TRUE(snapshot.coarse.empty());
 }
 
+// Four ways to be far away. In float, a coordinate of 4e6 m is off by up to 0.25 m.
 TEST(Ingest, farSensorLosesNothing) {
   const Points points = random_points(500, 2.0, 3);
   const Eigen::Isometry3d X_FS = pose(691000.123, 5334000.456, 520.789);
@@ -440,7 +515,7 @@ std::vector<std::int64_t> cell_of(const Eigen::Vector3d& p, double edge) {
           static_cast<std::int64_t>(std::floor(p.z() / edge))};
 }
 
-TEST(Thinning, onePointOfEachOccupiedCell) {
+void check_cells() {
   IngestConfig config = without_limits();
   config.thinning = 0.1;
   const CloudSnapshot snapshot = ingest(random_points(20000, 1.0, 9), config, {}, pose(3, -4, 5));
@@ -464,6 +539,8 @@ TEST(Thinning, onePointOfEachOccupiedCell) {
     EXPECT_EQ(thin.at(best.second), all.at(best.second));
   }
 }
+
+TEST(Thinning, onePointOfEachOccupiedCell) { for_each_instruction_set(check_cells); }
 
 TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
   IngestConfig config = without_limits();
