@@ -39,6 +39,16 @@ target_sources(benchmark_repulsion PRIVATE
   benchmark/repulsion/reference.cpp
   benchmark/repulsion/scene.cpp)
 
+target_sources(benchmark_packing PRIVATE
+  benchmark/packing/certificate.cpp
+  benchmark/packing/gaps.cpp
+  benchmark/packing/growth.cpp
+  benchmark/packing/hierarchy.cpp
+  benchmark/packing/table.cpp
+  benchmark/packing/time.cpp
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
 # A yardstick, where it is installed (libembree-dev).
 find_package(embree 3 QUIET)
 if(TARGET embree)

@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/geometry/orientation.h"
 
 namespace ist {
 namespace {
@@ -215,28 +216,6 @@ class MeshBuilder {
   std::unordered_map<std::array<double, 3>, std::uint32_t, Hash> vertices_;
 };
 
-// Some exporters write whole meshes inside out; taken at its word, such a link would have no
-// inside. Open meshes, where outside cannot be told like this, are left alone: their directed areas
-// do not cancel (an open box: 0.2 of its area; the worst of the Panda's meshes, with all their
-// holes: 0.08).
-void turn_outside_out(TriangleMesh* mesh) {
-  constexpr double kMaxOpening = 0.1;
-  Eigen::Vector3d directed_area = Eigen::Vector3d::Zero(), moment = Eigen::Vector3d::Zero();
-  double area = 0.0, volume = 0.0;
-  for (std::size_t t = 0; t < mesh->triangles.size(); ++t) {
-    const Eigen::Vector3d &a = mesh->corner(t, 0), &b = mesh->corner(t, 1), &c = mesh->corner(t, 2);
-    const Eigen::Vector3d n = (b - a).cross(c - a);
-    directed_area += n;
-    moment += n.norm() * (a + b + c) / 3.0;
-    area += n.norm();
-    volume += a.dot(n);
-  }
-  if (area <= 0.0 || directed_area.norm() > kMaxOpening * area) return;
-  volume -= directed_area.dot(moment / area);  // about the centroid, or holes count by their place
-  if (volume >= 0.0) return;
-  for (TriangleMesh::Triangle& triangle : mesh->triangles) std::swap(triangle[1], triangle[2]);
-}
-
 }  // namespace
 
 TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
@@ -260,7 +239,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
   if (mesh.triangles.empty()) {
     fail(path, "holds no triangle; export the surface as triangles or polygons");
   }
-  turn_outside_out(&mesh);
+  turn_outward(&mesh);  // some exporters write meshes inside out
   return mesh;
 }
 

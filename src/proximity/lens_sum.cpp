@@ -12,8 +12,7 @@ namespace {
 using Lanes = Eigen::Array<float, kSphereWidth, 1>;
 using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
 
-// 8 children on each of the levels that 2^31 balls can have.
-constexpr std::size_t kStackSize = 128;
+constexpr std::size_t kStackSize = kSphereWidth * kMaxTreeLevels;
 // Below this length a way out shortens towards 0 instead of turning: it has no direction any more.
 constexpr float kUndecided = 0.2F;
 constexpr float kTiny = 1e-12F;

@@ -25,7 +25,7 @@ struct Pair {
   float min[3], max[3];
 };
 
-constexpr std::size_t kStackSize = 1024;  // 15 siblings a level, 6 + 6 levels, and room
+constexpr std::size_t kStackSize = 1024;  // 7 siblings a level of spheres, 15 of boxes, and room
 constexpr std::uint64_t kExpiryInterval = 16;
 
 using SphereTag = hn::CappedTag<float, static_cast<std::size_t>(kSphereWidth)>;

@@ -111,7 +111,8 @@ std::vector<PackingJob> make_jobs(const PackingConfig& config, std::vector<Monit
   return jobs;
 }
 
-LinkModel assemble(const MonitoredLink& link, const std::vector<PackingJob>& jobs) {
+LinkModel assemble(const MonitoredLink& link, const std::vector<PackingJob>& jobs,
+                   const TreeConfig& tree) {
   LinkModel model;
   model.name = link.name;
   model.error = link.error;
@@ -132,7 +133,7 @@ LinkModel assemble(const MonitoredLink& link, const std::vector<PackingJob>& job
     model.packing_time += job.time;
   }
   model.packing = combine(geometry, packings);
-  model.tree = InnerSphereTree(model.packing);
+  model.tree = InnerSphereTree(model.packing, tree);
   model.solid = Solid(geometry);
   return model;
 }
@@ -195,7 +196,7 @@ std::shared_ptr<const RobotModel> build_robot_model(const RobotDescription& desc
   model->root_link = description.root_link;
   for (const MonitoredLink& link : links) {
     if (cancelled()) return nullptr;
-    model->links.push_back(assemble(link, jobs));
+    model->links.push_back(assemble(link, jobs, config.tree));
   }
   warn(links, jobs, *model, config.packing, callbacks.warning);
   return model;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include "tree/partition.h"
 
 namespace ist {
 namespace {
@@ -20,51 +23,70 @@ float round_up(double value) {
 
 float round_down(double value) { return -round_up(-value); }
 
+// Not to be inlined: where it meets the way back to double, GCC 12 (-O2) vectorizes the pair into
+// nothing, and the rounding is not there any more.
+[[gnu::noinline]] Eigen::Vector3f to_float(const Eigen::Vector3d& p) { return p.cast<float>(); }
+
 struct Enclosing {
   Eigen::Vector3f center;
   double radius;
 };
 
-using Range = std::pair<std::uint32_t, std::uint32_t>;
+// The ball in float: its inner ball lies in the given one, its outer ball about it.
+Ball rounded(const Ball& ball) {
+  const Eigen::Vector3d center = to_float(ball.center).cast<double>();
+  const double moved = (center - ball.center).norm();
+  return {center, round_down(ball.radius - moved), round_up(ball.cover_radius + moved)};
+}
 
 class Builder {
  public:
-  Builder(const std::vector<Ball>& balls, std::vector<SphereNode>* nodes,
+  Builder(const std::vector<Ball>& balls, const TreeConfig& config, std::vector<SphereNode>* nodes,
           std::vector<SphereLeaf>* leaves)
-      : balls_(balls), nodes_(*nodes), leaves_(*leaves), order_(balls.size()) {
-    std::iota(order_.begin(), order_.end(), 0U);
+      : config_(config),
+        nodes_(*nodes),
+        leaves_(*leaves),
+        balls_(balls.size()),
+        order_{&balls_, std::vector<std::uint32_t>(balls.size())} {
+    std::transform(balls.begin(), balls.end(), balls_.begin(), rounded);
+    std::iota(order_.indices.begin(), order_.indices.end(), 0U);
   }
+  Builder(const Builder&) = delete;
+  Builder& operator=(const Builder&) = delete;
 
   // The root is always a node, so that a query starts the same way for every link.
-  void run() { add_node({0, static_cast<std::uint32_t>(order_.size())}); }
+  void run() { add_node(all(), kMaxTreeLevels - 1); }
 
-  Enclosing enclose(const Range& range) const;
+  Enclosing enclose(const BallRange& range) const;
+  BallRange all() const { return {0, static_cast<std::uint32_t>(order_.indices.size())}; }
 
  private:
-  std::int32_t add_node(const Range& range);
-  std::int32_t add_leaf(const Range& range);
-  std::vector<Range> partition(const Range& range);
-  std::uint32_t split(const Range& range);
+  static bool is_leaf(const BallRange& range) {
+    return size(range) <= static_cast<std::uint32_t>(kSphereWidth);
+  }
+  std::int32_t add_node(const BallRange& range, int levels_left);
+  std::int32_t add_leaf(const BallRange& range);
 
-  const std::vector<Ball>& balls_;
+  const TreeConfig config_;
   std::vector<SphereNode>& nodes_;
   std::vector<SphereLeaf>& leaves_;
-  std::vector<std::uint32_t> order_;
+  std::vector<Ball> balls_;  // rounded: what the leaves hold is what the nodes enclose
+  BallOrder order_;
 };
 
 // A small sphere about the outer balls: start at the box's middle and step toward the farthest
 // ball with ever shorter steps (Badoiu and Clarkson 2003), then measure the radius in full.
-Enclosing Builder::enclose(const Range& range) const {
+Enclosing Builder::enclose(const BallRange& range) const {
   Eigen::AlignedBox3d box;
   for (std::uint32_t i = range.first; i < range.second; ++i) {
-    const Ball& ball = balls_[order_[i]];
+    const Ball& ball = order_[i];
     box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
     box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
   }
   const auto farthest = [&](const Eigen::Vector3d& center, const Ball** ball) {
     double largest = -1.0;
     for (std::uint32_t i = range.first; i < range.second; ++i) {
-      const Ball& candidate = balls_[order_[i]];
+      const Ball& candidate = order_[i];
       const double reach = (candidate.center - center).norm() + candidate.cover_radius;
       if (reach > largest) {
         largest = reach;
@@ -76,7 +98,7 @@ Enclosing Builder::enclose(const Range& range) const {
   const Ball* ball = nullptr;
   Eigen::Vector3d center = box.center(), best = center;
   double smallest = farthest(center, &ball);
-  for (int step = 1; step <= kEnclosingSteps && range.second - range.first > 1; ++step) {
+  for (int step = 1; step <= kEnclosingSteps && size(range) > 1; ++step) {
     const Eigen::Vector3d to_ball = ball->center - center;
     const double distance = to_ball.norm();
     const double reach = distance + ball->cover_radius;
@@ -87,45 +109,16 @@ Enclosing Builder::enclose(const Range& range) const {
       best = center;
     }
   }
-  const Eigen::Vector3f rounded = best.cast<float>();
+  const Eigen::Vector3f rounded = to_float(best);
   return {rounded, farthest(rounded.cast<double>(), &ball)};
 }
 
-// Median along the longest axis of the centres.
-std::uint32_t Builder::split(const Range& range) {
-  Eigen::AlignedBox3d box;
-  for (std::uint32_t i = range.first; i < range.second; ++i) box.extend(balls_[order_[i]].center);
-  Eigen::Index axis;
-  box.sizes().maxCoeff(&axis);
-  const std::uint32_t middle = range.first + (range.second - range.first) / 2;
-  std::nth_element(order_.begin() + range.first, order_.begin() + middle,
-                   order_.begin() + range.second, [&](std::uint32_t a, std::uint32_t b) {
-                     const double ca = balls_[a].center[axis], cb = balls_[b].center[axis];
-                     return ca < cb || (ca == cb && a < b);
-                   });
-  return middle;
-}
-
-// Up to eight groups: the one with the most balls is halved until there are enough.
-std::vector<Range> Builder::partition(const Range& range) {
-  std::vector<Range> groups{range};
-  while (groups.size() < static_cast<std::size_t>(kSphereWidth)) {
-    const auto largest = std::max_element(
-        groups.begin(), groups.end(),
-        [](const Range& a, const Range& b) { return a.second - a.first < b.second - b.first; });
-    if (largest->second - largest->first <= static_cast<std::uint32_t>(kSphereWidth)) break;
-    const std::uint32_t middle = split(*largest);
-    const Range upper{middle, largest->second};
-    largest->second = middle;
-    groups.insert(largest + 1, upper);
-  }
-  return groups;
-}
-
-std::int32_t Builder::add_node(const Range& range) {
+std::int32_t Builder::add_node(const BallRange& range, int levels_left) {
   const auto index = static_cast<std::int32_t>(nodes_.size());
   nodes_.emplace_back();
-  const std::vector<Range> groups = partition(range);
+  const std::vector<BallRange> groups = is_leaf(range)
+                                            ? std::vector<BallRange>{range}
+                                            : partition(config_, range, levels_left, &order_);
   SphereNode node{};
   node.count = static_cast<std::int32_t>(groups.size());
   for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
@@ -137,30 +130,27 @@ std::int32_t Builder::add_node(const Range& range) {
     node.z[k] = sphere.center.z();
     node.radius[k] = round_up(sphere.radius);
     for (std::uint32_t i = groups[k].first; i < groups[k].second; ++i) {
-      node.max_inner[k] = std::max(node.max_inner[k], round_up(balls_[order_[i]].radius));
+      node.max_inner[k] = std::max(node.max_inner[k], round_up(order_[i].radius));
     }
-    const bool is_leaf =
-        groups[k].second - groups[k].first <= static_cast<std::uint32_t>(kSphereWidth);
-    node.child[k] = is_leaf ? ~add_leaf(groups[k]) : add_node(groups[k]);
+    node.child[k] =
+        is_leaf(groups[k]) ? ~add_leaf(groups[k]) : add_node(groups[k], levels_left - 1);
   }
   nodes_[static_cast<std::size_t>(index)] = node;
   return index;
 }
 
-std::int32_t Builder::add_leaf(const Range& range) {
+std::int32_t Builder::add_leaf(const BallRange& range) {
   SphereLeaf leaf{};
-  leaf.count = static_cast<std::int32_t>(range.second - range.first);
+  leaf.count = static_cast<std::int32_t>(size(range));
   for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(kSphereWidth); ++k) {
     leaf.inner[k] = leaf.outer[k] = kNoRadius;
     if (range.first + k >= range.second) continue;
-    const Ball& ball = balls_[order_[range.first + k]];
-    const Eigen::Vector3f center = ball.center.cast<float>();
-    const double moved = (center.cast<double>() - ball.center).norm();
-    leaf.x[k] = center.x();
-    leaf.y[k] = center.y();
-    leaf.z[k] = center.z();
-    leaf.inner[k] = round_down(ball.radius - moved);
-    leaf.outer[k] = round_up(ball.cover_radius + moved);
+    const Ball& ball = order_[range.first + k];
+    leaf.x[k] = static_cast<float>(ball.center.x());
+    leaf.y[k] = static_cast<float>(ball.center.y());
+    leaf.z[k] = static_cast<float>(ball.center.z());
+    leaf.inner[k] = static_cast<float>(ball.radius);
+    leaf.outer[k] = static_cast<float>(ball.cover_radius);
   }
   leaves_.push_back(leaf);
   return static_cast<std::int32_t>(leaves_.size()) - 1;
@@ -168,11 +158,12 @@ std::int32_t Builder::add_leaf(const Range& range) {
 
 }  // namespace
 
-InnerSphereTree::InnerSphereTree(const Packing& packing)
+InnerSphereTree::InnerSphereTree(const Packing& packing, const TreeConfig& config)
     : interior_gap_(packing.certificate.interior_gap), ball_count_(packing.balls.size()) {
+  assert(config.magnification >= 0.0 && config.magnification <= 1.0);
   if (packing.balls.empty()) return;
-  Builder builder(packing.balls, &nodes_, &leaves_);
-  const Enclosing all = builder.enclose({0, static_cast<std::uint32_t>(packing.balls.size())});
+  Builder builder(packing.balls, config, &nodes_, &leaves_);
+  const Enclosing all = builder.enclose(builder.all());
   center_ = all.center.cast<double>();
   radius_ = round_up(all.radius);
   builder.run();
@@ -199,7 +190,7 @@ double InnerSphereTree::outer_distance(const Eigen::Vector3d& p_L, double stop_b
     std::int32_t child;
     float bound;
   };
-  std::array<Entry, 512> stack;  // 8 children on each of the levels that 2^31 balls can have
+  std::array<Entry, kSphereWidth * kMaxTreeLevels> stack;
   std::size_t top = 0;
   stack[top++] = {0, -std::numeric_limits<float>::max()};
   std::array<float, kSphereWidth> distance{};

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -55,6 +59,23 @@ inline TriangleMesh unwelded(const TriangleMesh& mesh) {
   return soup;
 }
 
+/// Vertices at the same place as one, the triangles in their order: what reading from a file does.
+inline TriangleMesh merged(const TriangleMesh& mesh) {
+  TriangleMesh result;
+  std::map<std::array<double, 3>, std::uint32_t> known;
+  std::vector<std::uint32_t> index;
+  for (const Eigen::Vector3d& v : mesh.vertices) {
+    const auto next = static_cast<std::uint32_t>(result.vertices.size());
+    const auto [place, is_new] = known.insert({{v.x(), v.y(), v.z()}, next});
+    if (is_new) result.vertices.push_back(v);
+    index.push_back(place->second);
+  }
+  for (const auto& [a, b, c] : mesh.triangles) {
+    result.triangles.push_back({index[a], index[b], index[c]});
+  }
+  return result;
+}
+
 /// With `count` triangles without area: twice the same corner, or three on a line.
 inline TriangleMesh with_degenerate_triangles(TriangleMesh mesh, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
@@ -75,6 +96,51 @@ inline TriangleMesh box_with_wall(const Eigen::Vector3d& size) {
   return joined(box(size), wall);
 }
 
+/// Every corner moved by up to `by` [m] of its own, so that no two triangles share one: seams gape.
+inline TriangleMesh cracked(const TriangleMesh& mesh, double by) {
+  TriangleMesh soup = unwelded(mesh);
+  for (std::size_t i = 0; i < soup.vertices.size(); ++i) {
+    const double k = static_cast<double>(i);
+    soup.vertices[i] += by / std::sqrt(3.0) *
+                        Eigen::Vector3d(std::sin(12.9 * k), std::sin(78.2 * k), std::sin(37.7 * k));
+  }
+  return soup;
+}
+
+/// A band of `count` quads with a half turn: it has one side only.
+inline TriangleMesh moebius_strip(double radius, double width, int count) {
+  TriangleMesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2.0 * EIGEN_PI * i / count;
+    const Eigen::Vector3d out(std::cos(angle), std::sin(angle), 0.0);
+    const Eigen::Vector3d across =
+        std::cos(0.5 * angle) * out + std::sin(0.5 * angle) * Eigen::Vector3d::UnitZ();
+    mesh.vertices.push_back(radius * out - 0.5 * width * across);
+    mesh.vertices.push_back(radius * out + 0.5 * width * across);
+  }
+  for (int i = 0; i < count; ++i) {
+    const auto a = static_cast<std::uint32_t>(2 * i), b = a + 1;
+    // Where the ends meet, the edges are exchanged.
+    const bool last = i + 1 == count;
+    const std::uint32_t c = last ? 1 : a + 2, d = last ? 0 : a + 3;
+    mesh.triangles.push_back({a, b, d});
+    mesh.triangles.push_back({a, d, c});
+  }
+  return mesh;
+}
+
+/// A box without its two ends (+-z): four faces of no thickness.
+inline TriangleMesh tube(const Eigen::Vector3d& size) {
+  const TriangleMesh whole = box(size);
+  TriangleMesh mesh{whole.vertices, {}};
+  for (std::size_t t = 0; t < whole.triangles.size(); ++t) {
+    const double z = whole.corner(t, 0).z();
+    const bool is_end = z == whole.corner(t, 1).z() && z == whole.corner(t, 2).z();
+    if (!is_end) mesh.triangles.push_back(whole.triangles[t]);
+  }
+  return mesh;
+}
+
 inline std::vector<HostileMesh> hostile_meshes() {
   const TriangleMesh ball = icosphere(0.1, 2), cube = box({0.1, 0.1, 0.1});
   const TriangleMesh sheet_on_edge = shifted(sheet(0.05), {0.12, 0, 0});
@@ -87,16 +153,26 @@ inline std::vector<HostileMesh> hostile_meshes() {
       {"two boxes that share an edge", joined(cube, shifted(cube, {0.1, 0.1, 0})), k5mm},
       {"two boxes that share a corner", joined(cube, shifted(cube, {0.1, 0.1, 0.1})), k5mm},
       {"inside out", inside_out(ball), k5mm},
+      {"two balls apart, one inside out", joined(ball, shifted(inside_out(ball), {0.3, 0, 0})),
+       k5mm},
+      {"ball with a cavity, all inside out",
+       inside_out(joined(ball, inside_out(scaled(ball, 0.5)))), k5mm},
       {"every 7th face flipped", partly_flipped(ball, 7), k5mm},
       {"every face twice", joined(ball, ball), k5mm},
       {"every face in both directions", joined(ball, inside_out(ball)), k5mm},
       {"two balls that pass through each other", joined(ball, shifted(ball, {0.1, 0, 0})), k5mm},
+      {"two boxes that share a face", joined(cube, shifted(cube, {0.1, 0, 0})), k5mm},
+      {"torus that passes through itself", torus(0.03, 0.06, 32, 16), k5mm},
       {"two balls apart", joined(ball, shifted(ball, {0.3, 0, 0})), k5mm},
       {"ball with a cavity", joined(ball, inside_out(scaled(ball, 0.5))), k5mm},
       {"ball in a cavity of a ball",
        joined(joined(ball, inside_out(scaled(ball, 0.8))), scaled(ball, 0.5)), k5mm},
       {"ball with a second one buried", joined(ball, scaled(ball, 0.5)), k5mm},
       {"no edge shared (triangle soup)", unwelded(ball), k5mm},
+      {"soup whose seams gape by 20 um", cracked(ball, 1e-5), k5mm},
+      {"hollow ball, wall of 0.5 mm", joined(ball, inside_out(scaled(ball, 0.995))), k5mm},
+      {"tube without ends", tube({0.1, 0.1, 0.2}), k5mm},
+      {"Moebius strip", moebius_strip(0.1, 0.04, 40), k5mm},
       {"60 triangles without area", with_degenerate_triangles(ball, 30), k5mm},
       {"slivers of 1:1500", sliver_plate(0.3, 0.02, 0.01, 100), k5mm},
       {"needle, 0.3 m by 20 um", needle(0.3, 1e-5), k5mm},

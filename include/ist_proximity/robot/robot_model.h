@@ -42,6 +42,7 @@ struct ModelProgress {
 
 struct RobotModelConfig {
   PackingConfig packing;
+  TreeConfig tree;
   std::string cache_directory;     ///< empty: no cache
   std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
   int threads = 0;                 ///< packing threads; 0: as many as there are cores

@@ -6,11 +6,15 @@
 #include <vector>
 
 #include "ist_proximity/packing/packing.h"
+#include "ist_proximity/tree/tree_config.h"
 
 namespace ist {
 
 /// Children of an inner node, or balls of a leaf, side by side for SIMD.
 constexpr int kSphereWidth = 8;
+/// No tree is deeper, for up to 2^31 balls: what descends needs a stack of no more than
+/// kSphereWidth * kMaxTreeLevels entries.
+constexpr int kMaxTreeLevels = 16;
 
 /// An inner node of the tree: the bounding spheres of its children. Unused slots have a radius so
 /// negative that they are farther than anything.
@@ -33,12 +37,12 @@ struct alignas(32) SphereLeaf {
 /// The Inner Sphere Tree of one link: flat, wide, float, in the link's frame.
 ///
 /// A wrapped hierarchy (Weller 2013, section 5.2): the sphere of a node encloses the outer balls
-/// of all its leaves, not its child spheres. Radii are rounded so that bounds survive float:
-/// the outer balls cover what the double balls covered. Immutable, thread safe.
+/// of all its leaves, not its child spheres. Deterministic. Radii are rounded so that bounds
+/// survive float: the outer balls cover what the double balls covered. Immutable, thread safe.
 class InnerSphereTree {
  public:
   InnerSphereTree() = default;
-  explicit InnerSphereTree(const Packing& packing);
+  explicit InnerSphereTree(const Packing& packing, const TreeConfig& config = {});
 
   bool empty() const { return leaves_.empty(); }
   const std::vector<SphereNode>& nodes() const { return nodes_; }  ///< nodes()[0] is the root

@@ -28,6 +28,8 @@ std::vector<Row> measure(const Input& input, const RobotModel& model) {
     }
     const PackingReport report = measure_packing(link.solid, link.packing.balls);
     row.spheres = link.packing.balls.size();
+    row.nodes = link.tree.nodes().size();
+    row.leaves = link.tree.leaves().size();
     row.solid_volume = report.solid_volume;
     row.filled_volume = report.filled_volume;
     row.protrusion = report.protrusion;
@@ -42,14 +44,15 @@ std::vector<Row> measure(const Input& input, const RobotModel& model) {
 }
 
 void print_table(const std::vector<Row>& rows) {
-  std::printf("%-24s %9s %8s %8s %10s %7s %8s %8s %10s %9s\n", "link", "triangles", "boundary",
-              "spheres", "filled", "", "max gap", "mean gap", "protrusion", "seconds");
-  std::printf("%-24s %9s %8s %8s %10s %7s %8s %8s %10s\n", "", "", "edges", "", "cm^3", "%", "mm",
-              "mm", "mm");
+  std::printf("%-24s %9s %8s %8s %12s %10s %7s %8s %8s %10s %9s\n", "link", "triangles", "boundary",
+              "spheres", "tree", "filled", "", "max gap", "mean gap", "protrusion", "seconds");
+  std::printf("%-24s %9s %8s %8s %12s %10s %7s %8s %8s %10s\n", "", "", "edges", "", "nodes/leaves",
+              "cm^3", "%", "mm", "mm", "mm");
   for (const Row& row : rows) {
     const double share = row.solid_volume > 0.0 ? row.filled_volume / row.solid_volume : 0.0;
-    std::printf("%-24s %9zu %8zu %8zu %10.4g %7.1f %8.3f %8.3f %10.4f %9.3f%s%s\n",
+    std::printf("%-24s %9zu %8zu %8zu %12s %10.4g %7.1f %8.3f %8.3f %10.4f %9.3f%s%s\n",
                 row.link.c_str(), row.triangles, row.boundary_edges, row.spheres,
+                (std::to_string(row.nodes) + "/" + std::to_string(row.leaves)).c_str(),
                 1e6 * row.filled_volume, 100.0 * share, 1e3 * row.max_gap, 1e3 * row.mean_gap,
                 1e3 * row.protrusion, row.seconds, row.from_cache ? " (cache)" : "",
                 row.reached ? "" : " (max_error not reached)");
@@ -59,13 +62,13 @@ void print_table(const std::vector<Row>& rows) {
 void append_csv(double max_error, const std::vector<Row>& rows, std::ostream* csv) {
   if (csv->tellp() == std::streampos(0)) {
     *csv << "max_error,link,triangles,boundary_edges,spheres,solid_volume,filled_volume,max_gap,"
-            "mean_gap,protrusion,seconds,reached,from_cache\n";
+            "mean_gap,protrusion,seconds,reached,from_cache,nodes,leaves\n";
   }
   for (const Row& row : rows) {
     *csv << max_error << ',' << row.link << ',' << row.triangles << ',' << row.boundary_edges << ','
          << row.spheres << ',' << row.solid_volume << ',' << row.filled_volume << ',' << row.max_gap
          << ',' << row.mean_gap << ',' << row.protrusion << ',' << row.seconds << ',' << row.reached
-         << ',' << row.from_cache << '\n';
+         << ',' << row.from_cache << ',' << row.nodes << ',' << row.leaves << '\n';
   }
 }
 

@@ -14,6 +14,7 @@ namespace ist::tools {
 struct Row {
   std::string link;
   std::size_t triangles = 0, boundary_edges = 0, spheres = 0;
+  std::size_t nodes = 0, leaves = 0;  ///< of the tree
   double solid_volume = 0.0, filled_volume = 0.0;
   double max_gap = 0.0, mean_gap = 0.0, protrusion = 0.0;
   double seconds = 0.0;

@@ -1,0 +1,279 @@
+#include "ist_proximity/tree/inner_sphere_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "ist_proximity/geometry/mesh_io.h"
+#include "ist_proximity/packing/packer.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr TreeConfig kTrees[] = {{TreeSplit::kMedian, 0.0},
+                                 {TreeSplit::kSurfaceArea, 0.0},
+                                 {TreeSplit::kNeuralGas, 0.0},
+                                 {TreeSplit::kNeuralGas, 1.0}};
+constexpr PackingOrder kOrders[] = {PackingOrder::kMedial, PackingOrder::kDisjoint,
+                                    PackingOrder::kVolume};
+
+struct NamedPacking {
+  std::string name;
+  Packing packing;
+};
+
+// Balls as packings have them, and as none has.
+std::vector<NamedPacking> hard_balls() {
+  test::Rng rng(11);
+  std::vector<NamedPacking> all;
+  const auto add = [&](const std::string& name, int count, const auto& make) {
+    Packing packing;
+    for (int i = 0; i < count; ++i) {
+      Ball ball = make(i);
+      ball.cover_radius = ball.radius + test::uniform(&rng, 0.0, 0.005);
+      packing.balls.push_back(ball);
+    }
+    all.push_back({name, packing});
+  };
+  const auto anywhere = [&](int) { return Ball{test::random_vector(&rng, 0.2), 0.01, 0}; };
+  for (const int count : {1, 2, 8, 9, 16, 17, 64, 65, 3000}) {
+    add(std::to_string(count) + " anywhere", count, anywhere);
+  }
+  add("all at one place", 1000, [](int) { return Ball{{0.1, 0.2, 0.3}, 0.01, 0}; });
+  add("on a line", 500, [](int i) { return Ball{{0.001 * i, 0, 0}, 0.002, 0}; });
+  add("without radius", 500, [&](int) { return Ball{test::random_vector(&rng, 0.2), 0.0, 0}; });
+  add("one giant, the rest dust", 2000, [&](int i) {
+    return Ball{test::random_vector(&rng, 0.2), i == 700 ? 1e3 : 1e-6, 0};
+  });
+  add("ever farther apart", 400, [](int i) {
+    return Ball{{1e-3 * std::pow(1.03, i), 0, 0}, 1e-3 * std::pow(1.03, i), 0};
+  });
+  add("ever nearer to a point", 2000, [](int i) {
+    return Ball{{std::pow(0.98, i), 0, 0}, 0.5 * std::pow(0.98, i), 0};
+  });
+  add("100 km away", 500, [&](int) {
+    return Ball{Eigen::Vector3d(1e5, 0, 0) + test::random_vector(&rng, 0.2), 0.01, 0};
+  });
+  return all;
+}
+
+std::vector<NamedPacking> packings() {
+  const std::string folder = std::string(IST_PROXIMITY_SOURCE_DIR) + "/demo/meshes/";
+  const Eigen::Vector3d millimetres = Eigen::Vector3d::Constant(0.001);
+  const std::vector<std::pair<std::string, TriangleMesh>> meshes = {
+      {"shoulder fork", load_mesh(folder + "shoulder_fork.stl", millimetres)},
+      {"wrist fork", load_mesh(folder + "wrist_fork.obj")},
+      {"torus", test::torus(0.1, 0.03, 32, 16)},
+      {"open box", test::open_box({0.1, 0.1, 0.2})},
+      {"sheet", test::sheet(0.1)}};
+  std::vector<NamedPacking> all;
+  for (const auto& [name, mesh] : meshes) {
+    for (const PackingOrder order : kOrders) {
+      PackingConfig config;
+      config.order = order;
+      config.max_error = test::packed_to(0.005);
+      config.max_spheres = 200;
+      all.push_back(
+          {name + ", order " + std::to_string(static_cast<int>(order)), pack_mesh(mesh, config)});
+    }
+  }
+  return all;
+}
+
+struct LeafBall {
+  Eigen::Vector3d center;
+  double inner, outer;
+};
+
+// All balls below a child, by walking the tree; with what is wrong on the way.
+class Walk {
+ public:
+  explicit Walk(const InnerSphereTree& tree) : tree_(tree) {}
+
+  void check(std::int32_t node_index, int level) {
+    deepest_ = std::max(deepest_, level);
+    const SphereNode& node = tree_.nodes()[static_cast<std::size_t>(node_index)];
+    ASSERT_GE(node.count, 1);
+    ASSERT_LE(node.count, kSphereWidth);
+    for (int k = 0; k < kSphereWidth; ++k) {
+      if (k >= node.count) {
+        ASSERT_LT(node.radius[k], -1e20F);
+        continue;
+      }
+      const std::size_t first = balls_.size();
+      if (node.child[k] < 0) {
+        add_leaf(~node.child[k], level + 1);
+      } else {
+        ASSERT_GT(node.child[k], node_index) << "nodes follow their parents";
+        check(node.child[k], level + 1);
+      }
+      if (testing::Test::HasFatalFailure()) return;
+      check_enclosed(node, k, first);
+    }
+  }
+
+  const std::vector<LeafBall>& balls() const { return balls_; }
+  int deepest() const { return deepest_; }
+
+ private:
+  void add_leaf(std::int32_t index, int level) {
+    deepest_ = std::max(deepest_, level);
+    const SphereLeaf& leaf = tree_.leaves()[static_cast<std::size_t>(index)];
+    ASSERT_GE(leaf.count, 1);
+    ASSERT_LE(leaf.count, kSphereWidth);
+    for (int k = 0; k < kSphereWidth; ++k) {
+      if (k >= leaf.count) {
+        ASSERT_LT(leaf.outer[k], -1e20F);
+        continue;
+      }
+      balls_.push_back({{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.inner[k], leaf.outer[k]});
+    }
+  }
+
+  // The node's own numbers about its leaves' own numbers: float has no part in it.
+  void check_enclosed(const SphereNode& node, int k, std::size_t first) const {
+    const Eigen::Vector3d center(node.x[k], node.y[k], node.z[k]);
+    for (std::size_t i = first; i < balls_.size(); ++i) {
+      const double reach = (balls_[i].center - center).norm() + balls_[i].outer;
+      ASSERT_LE(reach, node.radius[k] * (1.0 + 1e-14));
+      ASSERT_LE(balls_[i].inner, node.max_inner[k]);
+    }
+  }
+
+  const InnerSphereTree& tree_;
+  std::vector<LeafBall> balls_;
+  int deepest_ = 0;
+};
+
+// By place, so that the tree's order does not matter.
+bool before(const LeafBall& a, const LeafBall& b) {
+  return std::make_tuple(a.center.x(), a.center.y(), a.center.z(), a.inner, a.outer) <
+         std::make_tuple(b.center.x(), b.center.y(), b.center.z(), b.inner, b.outer);
+}
+
+// Volatile: GCC 12, vectorizing, takes two conversions to float and back for none at all.
+Eigen::Vector3d in_float(const Eigen::Vector3d& p) {
+  volatile float x = static_cast<float>(p.x()), y = static_cast<float>(p.y());
+  volatile float z = static_cast<float>(p.z());
+  return {x, y, z};
+}
+
+// Every ball once: its inner ball about the leaf's, its outer ball within the leaf's.
+void expect_every_ball(const Packing& packing, std::vector<LeafBall> found) {
+  ASSERT_EQ(found.size(), packing.balls.size());
+  std::vector<LeafBall> given;
+  for (const Ball& ball : packing.balls) {
+    const Eigen::Vector3d rounded = in_float(ball.center);
+    given.push_back({rounded, ball.radius, ball.cover_radius});
+  }
+  std::sort(found.begin(), found.end(), before);
+  std::sort(given.begin(), given.end(), before);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    ASSERT_EQ(found[i].center, given[i].center);
+  }
+  for (const Ball& ball : packing.balls) {
+    const Eigen::Vector3d rounded = in_float(ball.center);
+    const double moved = (rounded - ball.center).norm();
+    const double inner = ball.radius - moved, outer = ball.cover_radius + moved;
+    const double rounding = 1e-15 * (1.0 + outer), resolution = 2.5e-7 * (1.0 + outer);
+    const auto matches = [&](const LeafBall& leaf) {
+      return leaf.center == rounded && leaf.inner <= inner + rounding &&
+             leaf.inner >= inner - resolution && leaf.outer >= outer - rounding &&
+             leaf.outer <= outer + resolution;
+    };
+    LeafBall key{rounded, -std::numeric_limits<double>::infinity(), 0.0};
+    auto at = std::lower_bound(found.begin(), found.end(), key, before);
+    while (at != found.end() && at->center == rounded && !matches(*at)) ++at;
+    ASSERT_TRUE(at != found.end() && at->center == rounded) << ball.center.transpose();
+  }
+}
+
+void expect_sound(const Packing& packing, const TreeConfig& config) {
+  const InnerSphereTree tree(packing, config);
+  Walk walk(tree);
+  walk.check(0, 1);
+  if (testing::Test::HasFatalFailure()) return;
+  EXPECT_LE(walk.deepest(), kMaxTreeLevels);
+  expect_every_ball(packing, walk.balls());
+  for (const LeafBall& ball : walk.balls()) {
+    ASSERT_LE((ball.center - tree.center()).norm() + ball.outer, tree.radius() * (1.0 + 1e-14));
+  }
+}
+
+TEST(InnerSphereTree, EveryNodeEnclosesItsLeavesHoweverItIsSplit) {
+  for (const auto& list : {hard_balls(), packings()}) {
+    for (const auto& [name, packing] : list) {
+      for (const TreeConfig& tree : kTrees) {
+        SCOPED_TRACE(name + ", split " + std::to_string(static_cast<int>(tree.split)));
+        expect_sound(packing, tree);
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+// Without the padding behind the last member.
+constexpr std::size_t kNodeBytes = offsetof(SphereNode, count) + sizeof(SphereNode::count);
+constexpr std::size_t kLeafBytes = offsetof(SphereLeaf, count) + sizeof(SphereLeaf::count);
+
+TEST(InnerSphereTree, SameBallsSameBytes) {
+  for (const auto& [name, packing] : hard_balls()) {
+    for (const TreeConfig& tree : kTrees) {
+      SCOPED_TRACE(name);
+      const InnerSphereTree a = InnerSphereTree(packing, tree), b = InnerSphereTree(packing, tree);
+      ASSERT_EQ(a.nodes().size(), b.nodes().size());
+      ASSERT_EQ(a.leaves().size(), b.leaves().size());
+      for (std::size_t i = 0; i < a.nodes().size(); ++i) {
+        ASSERT_EQ(std::memcmp(&a.nodes()[i], &b.nodes()[i], kNodeBytes), 0);
+      }
+      for (std::size_t i = 0; i < a.leaves().size(); ++i) {
+        ASSERT_EQ(std::memcmp(&a.leaves()[i], &b.leaves()[i], kLeafBytes), 0);
+      }
+    }
+  }
+}
+
+TEST(InnerSphereTree, SplitsDoNotChangeWhatIsAnswered) {
+  auto model = test::make_model({Shape(test::torus(0.1, 0.03, 32, 16)),
+                                 Shape(test::l_shape(0.2, 0.05)), Shape(Cylinder{0.05, 0.2})},
+                                0.004);
+  test::Rng rng(3);
+  QueryConfig config;
+  config.max_distance = 10.0;
+  config.tolerance = 0.0;
+  const std::vector<bool> known(model->links.size(), true);
+  for (int scene = 0; scene < test::scaled(60); ++scene) {
+    std::vector<Eigen::Vector3d> points;
+    for (int i = 0; i < 300; ++i) points.push_back(test::random_vector(&rng, 0.5));
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    std::vector<Eigen::Isometry3d> X_FL;
+    for (std::size_t i = 0; i < known.size(); ++i) X_FL.push_back(test::random_pose(&rng, 0.6));
+    std::vector<LinkProximity> first;
+    for (const TreeConfig& tree : kTrees) {
+      const auto copy = std::make_shared<RobotModel>(*model);
+      for (LinkModel& link : copy->links) link.tree = InnerSphereTree(link.packing, tree);
+      ProximityQuery query(copy, config);
+      std::vector<LinkProximity> results;
+      query.run(X_FL, known, {&cloud}, &results);
+      if (first.empty()) first = results;
+      for (std::size_t i = 0; i < results.size(); ++i) {
+        ASSERT_EQ(results[i].state, first[i].state);
+        ASSERT_EQ(results[i].distance, first[i].distance);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist
