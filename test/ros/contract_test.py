@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What other programs rely on by name: fields, constants, topics, services, and parameters' effects."""
 
+import subprocess
 import sys
 import unittest
 
@@ -95,6 +96,20 @@ class ContractTest(unittest.TestCase):
         topics = {topic for topic, nodes in subscribed if node.name in nodes}
         for name in ("cloud", "tf", "tf_static"):  # the last two are remapped
             self.assertIn(self.namespace + "/" + name, topics)
+
+    def test_table(self):
+        """`rosrun ist_proximity proximity_table` finds the program and shows every link."""
+        node = self.start(pt.urdf())
+        node.wait_for_status(ProximityArray.OK)
+        command = ["rosrun", "ist_proximity", "proximity_table", node.name + "/proximity"]
+        command += ["--duration", "5", "--require-ok"]
+        table = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        text = table.stdout.decode(errors="replace")
+        self.assertEqual(table.returncode, 0, text)
+        for one in node.messages[-1].links:
+            self.assertIn(one.link, text)
 
     def test_name_of_the_description(self):
         """A robot_description of another name, in a namespace above the node's."""
