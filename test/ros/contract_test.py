@@ -9,11 +9,11 @@ import numpy as np
 import proximity_testing as pt
 import rosgraph
 import rospy
-import rosservice
 from ist_proximity.msg import LinkProximity, ProximityArray, SourceStatus
 from ist_proximity.srv import QueryProximity
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 POINTS = [[0.0, 0.0, 0.3], [0.0, 0.0, 0.1]]  # 0.2 m from the ball, and on it
@@ -44,7 +44,7 @@ TOPICS = {
     "spheres": (MarkerArray, True),
     "filtered_cloud": (PointCloud2, False),
 }
-SERVICES = {"reload_model": "std_srvs/Trigger", "query": "ist_proximity/QueryProximity"}
+SERVICES = {"query": QueryProximity, "reload_model": Trigger}
 
 
 class ContractTest(unittest.TestCase):
@@ -86,8 +86,8 @@ class ContractTest(unittest.TestCase):
         for topic, (kind, latched) in TOPICS.items():
             self.assertEqual(headers[topic]["type"], kind._type, topic)
             self.assertEqual(headers[topic]["latching"], str(int(latched)), topic)
-        for service, type_name in SERVICES.items():
-            self.assertEqual(rosservice.get_service_type(node.name + "/" + service), type_name)
+        for service, kind in SERVICES.items():
+            self.assertTrue(rospy.ServiceProxy(node.name + "/" + service, kind)().success)
         node.wait_until(
             lambda: {"input cloud", "pose", "query", "model"} <= set(node.diagnostics),
             "all diagnostics",
