@@ -55,5 +55,6 @@ install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION
 install(DIRECTORY config demo examples launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
   USE_SOURCE_PERMISSIONS
   PATTERN __pycache__ EXCLUDE)
+# Not executable where it stands: rosrun would find two of the name, and ask which.
 catkin_install_python(PROGRAMS scripts/proximity_table
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

@@ -27,6 +27,7 @@ class InteriorCover {
   }
 
   bool run(const PackingProgress& progress) {
+    progress_ = progress;
     packing_.certificate.interior_gap = target_;
     const Eigen::AlignedBox3d box = bvh_.bounds();
     if (box.sizes().minCoeff() <= 0.0) return true;  // flat: no interior
@@ -43,15 +44,23 @@ class InteriorCover {
           const Eigen::Vector3d cell(2.0 * i + 1.0, 2.0 * j + 1.0, 2.0 * k + 1.0);
           visit(box.min() + cell.cwiseProduct(quarter), quarter, 0);
         }
-        const double done = static_cast<double>(i * m.y() + j + 1) / (m.x() * m.y());
-        if (progress && !progress(done)) return false;
+        done_ = static_cast<double>(i * m.y() + j + 1) / (m.x() * m.y());
+        if (stopped_ || (progress && !progress(done_))) return false;
       }
     }
     return true;
   }
 
  private:
+  // A single cell of a link that is far larger than the error wanted takes long, too.
+  bool is_stopped() {
+    constexpr int kStopInterval = 1024;
+    if (!stopped_ && ++visits_ % kStopInterval == 0 && progress_) stopped_ = !progress_(done_);
+    return stopped_;
+  }
+
   void visit(const Eigen::Vector3d& center, const Eigen::Vector3d& half, std::uint32_t hint) {
+    if (is_stopped()) return;
     std::array<Eigen::Vector3d, 8> corners;
     for (std::size_t k = 0; k < 8; ++k) {
       corners[k] = center + Eigen::Vector3d((k & 1) != 0U ? half.x() : -half.x(),
@@ -106,6 +115,10 @@ class InteriorCover {
   BallSearch& balls_;
   Packing& packing_;
   BallSearch search_;  // outer balls
+  PackingProgress progress_;
+  double done_ = 0.0;
+  int visits_ = 0;
+  bool stopped_ = false;
 };
 
 }  // namespace

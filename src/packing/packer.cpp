@@ -72,6 +72,11 @@ Packing pack_sphere(const Sphere& sphere) {
 Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
                   const PackingProgress& progress) {
   check_mesh(mesh);
+  bool stopped = false;
+  const PackingProgress watched = [&](double done) {
+    stopped = stopped || (progress && !progress(done));
+    return !stopped;
+  };
   const TriangleBvh bvh(mesh);
   BallSearch balls;
   const bool may_overlap = config.order == PackingOrder::kMedial;
@@ -79,17 +84,17 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
   SurfaceCover cover(mesh, finder, &balls);
   std::optional<VolumeFiller> holes;
   if (!may_overlap) holes.emplace(bvh, finder, balls, kHoleShare * config.max_error);
-  if (holes) holes->stop_with(progress);
-  cover.refine(config, holes ? &*holes : nullptr, share_of(progress, 0.0, kSurfaceShare));
-  cover.sharpen();
+  if (holes) holes->stop_with(watched);
+  cover.refine(config, holes ? &*holes : nullptr, share_of(watched, 0.0, kSurfaceShare));
+  if (!stopped) cover.sharpen();
   Packing packing;
   cover.certify(&packing);
-  const PackingProgress rest = share_of(progress, kSurfaceShare, 1.0);
-  if (!cover_interior(bvh, finder, config, rest, &balls, &packing)) {
+  const PackingProgress rest = share_of(watched, kSurfaceShare, 1.0);
+  if (stopped || !cover_interior(bvh, finder, config, rest, &balls, &packing)) {
     packing.certificate.interior_gap = bvh.bounds().sizes().norm();
   }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;
-  if (progress) progress(1.0);
+  watched(1.0);
   return packing;
 }
 

@@ -81,18 +81,23 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   for (const auto& joint : joints) q.push_back(std::clamp(0.0, joint.lower, joint.upper));
   JointPoses poses;
   kinematics.place_joints(q, &poses);
+  // What a planar or floating joint carries is anywhere: a body of its own, without a rest.
+  std::vector<std::size_t> body = {0};
   for (std::size_t j = 0; j < joints.size(); ++j) {
+    body.push_back(joints[j].has_unstated_pose() ? j + 1 : body[joints[j].parent]);
     if (!joints[j].has_unstated_pose()) continue;
     poses.X_PC[j] = joints[j].X_PJ;
     poses.known[j] = true;
   }
   std::vector<Eigen::Isometry3d> X_RL, X_FL;
+  std::vector<std::size_t> body_of_link;
   std::vector<bool> known;
   kinematics.place_links(poses, Eigen::Isometry3d::Identity(), &X_RL, &known);
   known.assign(model->links.size(), false);
   for (std::size_t i = 0; i < model->links.size(); ++i) {
     const auto place = kinematics.find_link(model->links[i].name);
     X_FL.push_back(place ? X_RL[*place] : Eigen::Isometry3d::Identity());
+    body_of_link.push_back(place ? body[*place] : 0);
     known[i] = place.has_value();
   }
   QueryConfig config;
@@ -102,7 +107,8 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   query.run(X_FL, known, &results);
   std::vector<LinkPair> found;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (results[i].state == LinkState::kContact) found.push_back(pairs[i]);
+    const bool is_rigid_at_rest = body_of_link[pairs[i].first] == body_of_link[pairs[i].second];
+    if (is_rigid_at_rest && results[i].state == LinkState::kContact) found.push_back(pairs[i]);
   }
   return found;
 }

@@ -221,8 +221,11 @@ void CloudSource::receive(const Received& received) {
       ++facts_.out_of_order;
       return;
     }
-    if (!problem.empty()) {  // which passes when one is in use again
+    // That others wait for tf passes when one is in use, or is none of the reasons any more.
+    if (!waits_for_tf_ || ahead < -config_.timeout) facts_.problem.clear();
+    if (!problem.empty()) {
       facts_.problem = problem;
+      waits_for_tf_ = false;
       ++facts_.unusable;
       return;
     }
@@ -263,11 +266,15 @@ void CloudSource::use_newest_ready() {
   for (std::size_t i = waiting_.size(); i-- > 0;) {
     std::string problem = missing_transform(*waiting_[i]);
     if (!problem.empty()) {
-      if (i + 1 == waiting_.size() && !is_usual) set_problem(problem, false);
+      if (i + 1 == waiting_.size() && !is_usual) {
+        set_problem(problem, false);
+        waits_for_tf_ = true;
+      }
       continue;
     }
     waits_since_ = now;
     problem = ingest(*waiting_[i]);
+    waits_for_tf_ = false;
     set_problem(problem, !problem.empty());
     const std::lock_guard<std::mutex> lock(mutex_);
     facts_.overtaken += i;

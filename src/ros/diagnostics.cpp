@@ -128,7 +128,8 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& s
   } else if (!verdict.ok()) {
     set(source.required ? DiagnosticStatus::ERROR : DiagnosticStatus::WARN, verdict.text, &status);
   } else if (!source.problem.empty()) {
-    set(DiagnosticStatus::WARN, "the newest cloud is not in use: " + source.problem, &status);
+    set(DiagnosticStatus::WARN, "the newest " + source.noun + " is not in use: " + source.problem,
+        &status);
   }
   const std::string doubt = doubt_of_self_filter(source);
   if (!doubt.empty()) set(DiagnosticStatus::WARN, doubt, &status);

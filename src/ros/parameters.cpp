@@ -147,6 +147,10 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
   reader->read("robot_description", &config->robot_description);
   if (config->robot_description.empty()) {
     reader->add_error("~robot_description is empty: the name of the parameter with the URDF");
+  } else if (config->robot_description.find('<') != std::string::npos) {
+    reader->add_error(
+        "~robot_description holds a URDF: it must be the name of the parameter that holds it; set "
+        "'robot_description' outside of the node, in its namespace or above");
   }
   std::string geometry = "collision";
   reader->read_choice("geometry", {"collision", "visual"}, &geometry);

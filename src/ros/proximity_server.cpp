@@ -10,6 +10,7 @@
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/object_conversion.h"
+#include "ist_proximity/ros/status_log.h"
 #include "ist_proximity/ros/thread_name.h"
 
 namespace ist {
@@ -239,6 +240,7 @@ void ProximityServer::publish_spheres() {
 
 void ProximityServer::run_diagnostics() {
   name_thread("ist diagnostics");
+  StatusLog status_log;
   std::size_t cycles_before = 0;
   std::uint64_t states_before = 0;
   std::vector<std::uint64_t> messages_before;
@@ -249,6 +251,10 @@ void ProximityServer::run_diagnostics() {
     {
       const std::lock_guard<std::mutex> lock(shared_mutex_);
       report = report_;
+    }
+    // Before, the loader tells how far it is.
+    if (loader_.state()->phase == ModelState::Phase::kReady) {
+      status_log.update(report.status, report.text);
     }
     const std::chrono::duration<double> interval = Clock::now() - before;
     before = Clock::now();

@@ -228,6 +228,31 @@ TEST(PackMesh, ReportsProgressAndStopsWhenTold) {
   EXPECT_FALSE(stopped.certificate.reached);
 }
 
+// A mesh in millimetres takes minutes: whoever is told to stop meanwhile must not go on with the
+// rest.
+TEST(PackMesh, DoesNothingMoreOnceItIsTold) {
+  for (const double stop_at : {0.0, 0.3, 0.6, 0.9}) {
+    int calls_after = 0;
+    bool told = false;
+    const Packing stopped = pack_mesh(test::l_shape(0.2, 0.05), {}, [&](double fraction) {
+      calls_after += told ? 1 : 0;
+      told = told || fraction >= stop_at;
+      return !told;
+    });
+    EXPECT_TRUE(told);
+    EXPECT_EQ(calls_after, 0) << stop_at;
+    EXPECT_GT(stopped.certificate.interior_gap, 0.1) << stop_at;
+  }
+  PackingConfig few;
+  few.max_spheres = 200;
+  int calls = 0;
+  pack_mesh(test::l_shape(200.0, 50.0), few, [&](double fraction) {
+    calls += fraction >= 0.6 ? 1 : 0;
+    return calls < 3;
+  });
+  EXPECT_EQ(calls, 3);
+}
+
 TEST(PackMesh, RefusesAMeshWithoutTriangles) {
   EXPECT_THROW(pack_mesh(TriangleMesh{}, {}), ModelError);
 }

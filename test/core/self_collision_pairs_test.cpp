@@ -85,6 +85,34 @@ TEST(SelfCollisionPairs, inContactAtRest) {
   EXPECT_EQ(robot.names(found), Names{"a-c"});
 }
 
+// Two carts with a tool each, one cart floating: where they are at zero says nothing of where they
+// are.
+TEST(SelfCollisionPairs, floatingBodiesHaveNoRest) {
+  const auto ball = [](const std::string& name) {
+    return "<link name='" + name +
+           "'><collision><geometry><sphere radius='0.1'/></geometry></collision></link>";
+  };
+  const auto joint = [](const std::string& type, const std::string& parent,
+                        const std::string& child) {
+    return "<joint name='" + child + "' type='" + type + "'><parent link='" + parent +
+           "'/><child link='" + child + "'/></joint>";
+  };
+  const RobotDescription carts =
+      parse_urdf("<robot name='r'><link name='world'/>" + ball("a") + "<link name='a0'/>" +
+                     ball("a1") + ball("b") + "<link name='b0'/>" + ball("b1") +
+                     joint("planar", "world", "a") + joint("continuous", "a", "a0") +
+                     joint("continuous", "a0", "a1") + joint("floating", "world", "b") +
+                     joint("continuous", "b", "b0") + joint("continuous", "b0", "b1") + "</robot>",
+                 GeometrySource::kCollision, {});
+  const auto model = build_robot_model(carts, {});
+  const Kinematics kinematics(carts);
+  const std::vector<LinkPair> all = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+  const std::vector<LinkPair> found = in_contact_at_rest(model, kinematics, all);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(model->links[found[0].first].name + model->links[found[0].second].name, "aa1");
+  EXPECT_EQ(model->links[found[1].first].name + model->links[found[1].second].name, "bb1");
+}
+
 TEST(SelfCollisionPairs, srdf) {
   const NamePairs expected = {{"a", "b"}, {"c", "a"}};
   EXPECT_EQ(disabled_collisions("<robot name='r'><group name='g'/>"

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What other programs rely on by name: fields, constants, topics, services, and parameters' effects."""
 
+import subprocess
 import sys
 import unittest
 
@@ -8,11 +9,11 @@ import numpy as np
 import proximity_testing as pt
 import rosgraph
 import rospy
-import rosservice
 from ist_proximity.msg import LinkProximity, ProximityArray, SourceStatus
 from ist_proximity.srv import QueryProximity
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 POINTS = [[0.0, 0.0, 0.3], [0.0, 0.0, 0.1]]  # 0.2 m from the ball, and on it
@@ -43,7 +44,7 @@ TOPICS = {
     "spheres": (MarkerArray, True),
     "filtered_cloud": (PointCloud2, False),
 }
-SERVICES = {"reload_model": "std_srvs/Trigger", "query": "ist_proximity/QueryProximity"}
+SERVICES = {"query": QueryProximity, "reload_model": Trigger}
 
 
 class ContractTest(unittest.TestCase):
@@ -85,8 +86,8 @@ class ContractTest(unittest.TestCase):
         for topic, (kind, latched) in TOPICS.items():
             self.assertEqual(headers[topic]["type"], kind._type, topic)
             self.assertEqual(headers[topic]["latching"], str(int(latched)), topic)
-        for service, type_name in SERVICES.items():
-            self.assertEqual(rosservice.get_service_type(node.name + "/" + service), type_name)
+        for service, kind in SERVICES.items():
+            self.assertTrue(rospy.ServiceProxy(node.name + "/" + service, kind)().success)
         node.wait_until(
             lambda: {"input cloud", "pose", "query", "model"} <= set(node.diagnostics),
             "all diagnostics",
@@ -95,6 +96,20 @@ class ContractTest(unittest.TestCase):
         topics = {topic for topic, nodes in subscribed if node.name in nodes}
         for name in ("cloud", "tf", "tf_static"):  # the last two are remapped
             self.assertIn(self.namespace + "/" + name, topics)
+
+    def test_table(self):
+        """`rosrun ist_proximity proximity_table` finds the program and shows every link."""
+        node = self.start(pt.urdf())
+        node.wait_for_status(ProximityArray.OK)
+        command = ["rosrun", "ist_proximity", "proximity_table", node.name + "/proximity"]
+        command += ["--duration", "5", "--require-ok"]
+        table = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        text = table.stdout.decode(errors="replace")
+        self.assertEqual(table.returncode, 0, text)
+        for one in node.messages[-1].links:
+            self.assertIn(one.link, text)
 
     def test_name_of_the_description(self):
         """A robot_description of another name, in a namespace above the node's."""

@@ -96,6 +96,9 @@ WRONG = [
         ],
     ),
     ({"sources": [1, 2]}, ["~sources"]),
+    ({"robot_description": pt.urdf()}, ["~robot_description holds a URDF: it must be the name"]),
+    ({"robot_description": "the robot"}, ["the robot", "is not valid"]),
+    ({"sources": {"a camera": {"timeout": 1.0}}}, ["a camera", "is not valid"]),
 ]
 
 

@@ -26,9 +26,12 @@ class StatusTest(unittest.TestCase):
     def tearDown(self):
         self.world.stop()
         for node in self.nodes:
-            for message in node.messages:
-                pt.check_invariants(self, message)
-            self.assertEqual(node.stop(), 0)
+            self.finish(node)
+
+    def finish(self, node):
+        for message in node.messages:
+            pt.check_invariants(self, message)
+        self.assertEqual(node.stop(), 0)
 
     def start(self, **parameters):
         self.nodes.append(pt.ProximityNode(self.namespace, parameters, pt.urdf()))
@@ -48,6 +51,7 @@ class StatusTest(unittest.TestCase):
         self.assertEqual(source.status, ProximityArray.NO_CLOUD)
         self.assertTrue(source.stamp.is_zero() and np.isnan(source.age))
         node.wait_until(lambda: smallest and np.isnan(smallest[-1]), "NaN on ~min_distance")
+        node.wait_until(lambda: "nothing received yet" in node.log(), "the reason in the log")
 
         clouds = self.world.start_clouds()
         message = node.wait_for_status(ProximityArray.OK)
@@ -74,6 +78,9 @@ class StatusTest(unittest.TestCase):
         clouds.paused = False
         message = node.wait_for_status(ProximityArray.OK)
         self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+        node.wait_until(lambda: node.diagnostics["query"].level < 2, "no error in the diagnostics")
+        self.finish(self.nodes.pop())  # which writes out what is left of the log
+        self.assertIn("the status is OK again", node.log())
 
     def test_old_future_and_unordered_stamps(self):
         node = self.start()
@@ -88,6 +95,7 @@ class StatusTest(unittest.TestCase):
             repeater = self.world.repeat(20, lambda offset=offset: send(offset))
             message = node.wait_for_status(ProximityArray.STALE_CLOUD, text)
             self.assertTrue(pt.all_unknown(message))
+            node.wait_for_status(ProximityArray.STALE_CLOUD, "clocks of sensor and node")
             repeater.stop()
         # A cloud of the far future does not shut out those of now.
         repeater = self.world.repeat(20, lambda: send(0))
@@ -189,7 +197,7 @@ class StatusTest(unittest.TestCase):
                 self.nodes[-1].wait_until(lambda spheres=spheres: spheres, "~spheres")
                 frames = {marker.header.frame_id for marker in spheres[-1].markers}
                 self.assertEqual(frames, {"ball_link", "box/link"})
-                self.nodes.pop().stop()
+                self.finish(self.nodes.pop())
 
     def test_late_tf(self):
         """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""

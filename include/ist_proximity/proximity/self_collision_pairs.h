@@ -22,7 +22,7 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
                                            const NamePairs& ignored);
 
 /// Those of the pairs that are in contact at rest: with all joints at zero, or at the limit that is
-/// nearest to it, planar and floating ones at their origin.
+/// nearest to it. None with a planar or floating joint between its links, which has no rest.
 std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>& model,
                                          const Kinematics& kinematics,
                                          const std::vector<LinkPair>& pairs);

@@ -136,6 +136,7 @@ class CloudSource {
   ros::Time in_use_;             ///< stamp of the newest snapshot of this generation
   std::chrono::steady_clock::time_point target_since_;
   std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
+  bool waits_for_tf_ = false;                          ///< which is the problem that is told
   PublisherCount publisher_count_;
   std::atomic<bool> running_{true};
   std::thread thread_;
