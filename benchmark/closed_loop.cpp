@@ -11,14 +11,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "closed_loop.h"
+#include "document.h"
 #include "support.h"
+#include "support/demo_arm.h"
 
 namespace {
 
@@ -31,15 +31,6 @@ constexpr const char* kNames[] = {"none", "blend (`repulsion`)", "nearest pair (
 struct SceneResult {
   ClosedLoopResult modes[3];
 };
-
-ist::RobotDescription read_robot() {
-  const std::string folder = IST_PROXIMITY_SOURCE_DIR;
-  std::ifstream file(folder + "/demo/demo_arm.urdf");
-  std::stringstream text;
-  text << file.rdbuf();
-  return ist::parse_urdf(text.str(), ist::GeometrySource::kCollision,
-                         [folder](const std::string&) { return folder; });
-}
 
 void print_each(const std::vector<SceneResult>& results, std::uint64_t first) {
   std::printf("| seed | avoidance | smallest distance | at | between | goals |\n");
@@ -81,18 +72,6 @@ std::string table(const std::vector<SceneResult>& results) {
   return text;
 }
 
-/// Puts the table between its marks in a document.
-bool update(const std::string& path, const std::string& text) {
-  const std::string begin = "<!-- closed loop -->\n", end = "<!-- end of closed loop -->";
-  std::stringstream content;
-  content << std::ifstream(path).rdbuf();
-  std::string document = content.str();
-  const std::size_t from = document.find(begin), to = document.find(end);
-  if (from == std::string::npos || to == std::string::npos || to < from) return false;
-  document.replace(from + begin.size(), to - from - begin.size(), text);
-  return static_cast<bool>(std::ofstream(path) << document);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -124,7 +103,7 @@ int main(int argc, char** argv) {
     }
   }
 
-  const ist::RobotDescription robot = read_robot();
+  const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
   std::vector<SceneResult> results(count);
   std::atomic<std::size_t> next{0};
@@ -162,10 +141,7 @@ int main(int argc, char** argv) {
   }
   if (each) print_each(results, first);
   std::printf("\n%s", table(results).c_str());
-  if (!document.empty() && !update(document, table(results))) {
-    std::fprintf(stderr, "%s cannot be written, or lacks the marks of the table\n",
-                 document.c_str());
-    return 1;
-  }
-  return 0;
+  const bool fails =
+      !document.empty() && !ist::benchmark::write_table(document, "closed loop", table(results));
+  return fails ? 1 : 0;
 }

@@ -8,19 +8,17 @@
 
 namespace ist::benchmark {
 
-/// Puts a table between the marks of its name in a document; says so when it cannot.
-inline bool write_table(const std::string& path, const std::string& name,
+/// Puts a table between its marks in a document; says so where it cannot.
+inline bool write_table(const std::string& document, const std::string& name,
                         const std::string& table) {
-  std::string document = test::read_text(path);
-  const auto [first, last] = test::table_place(document, name);
-  if (last == 0) {
-    std::fprintf(stderr, "%s cannot be read, or lacks the marks of '%s'\n", path.c_str(),
-                 name.c_str());
-    return false;
+  std::string all = test::read_text(document);
+  const auto [first, last] = test::table_place(all, name);
+  if (last != 0) {
+    all.replace(first, last - first, table);
+    if (std::ofstream(document) << all) return true;
   }
-  document.replace(first, last - first, table);
-  if (std::ofstream(path) << document) return true;
-  std::fprintf(stderr, "%s cannot be written\n", path.c_str());
+  std::fprintf(stderr, "%s cannot be written, or lacks the marks of '%s'\n", document.c_str(),
+               name.c_str());
   return false;
 }
 

@@ -5,14 +5,13 @@
 // scenes need the test data: IST_PROXIMITY_DATA, or ../shared/data.
 
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <vector>
 
+#include "document.h"
 #include "repulsion/measure.h"
 #include "repulsion/scene.h"
 #include "support.h"
-#include "support/accuracy.h"
 #include "support/data_dir.h"
 
 namespace {
@@ -113,18 +112,6 @@ struct Tables {
   }
 };
 
-bool write(const std::string& document, const std::string& name, const std::string& table) {
-  std::string all = ist::test::read_text(document);
-  const auto [first, last] = ist::test::table_place(all, name);
-  if (last == 0) {
-    std::fprintf(stderr, "%s lacks the marks of '%s'\n", document.c_str(), name.c_str());
-    return false;
-  }
-  all.replace(first, last - first, table);
-  std::ofstream(document) << all;
-  return true;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -154,8 +141,8 @@ int main(int argc, char** argv) {
   }
   std::printf("%s\n%s\n%s", tables.smoothness.c_str(), tables.cost.c_str(), tables.density.c_str());
   if (argc < 3) return 0;
-  const bool written = write(argv[2], "smoothness", tables.smoothness) &&
-                       write(argv[2], "cost", tables.cost) &&
-                       write(argv[2], "density", tables.density);
+  const bool written = ist::benchmark::write_table(argv[2], "smoothness", tables.smoothness) &&
+                       ist::benchmark::write_table(argv[2], "cost", tables.cost) &&
+                       ist::benchmark::write_table(argv[2], "density", tables.density);
   return written ? 0 : 1;
 }

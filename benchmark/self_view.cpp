@@ -1,52 +1,96 @@
 // What padding does the self-filter need? The simulated arm moves in view of its noisy, late camera
 // and nothing else is there: whatever the queries find is false. As Markdown.
 //
-// Usage: self_view [SECONDS]
-
-#include <cstdio>
-#include <cstdlib>
-#include <fstream>
-#include <sstream>
+// Usage: self_view [--seconds N] [--update-doc doc/dodge.md]
 
 #include "self_view.h"
 
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "document.h"
+#include "ist_proximity/cloud/ingest.h"
+#include "support/demo_arm.h"
+
 namespace {
 
-ist::RobotDescription read_robot() {
-  const std::string folder = IST_PROXIMITY_SOURCE_DIR;
-  std::ifstream file(folder + "/demo/demo_arm.urdf");
-  std::stringstream text;
-  text << file.rdbuf();
-  return ist::parse_urdf(text.str(), ist::GeometrySource::kCollision,
-                         [folder](const std::string&) { return folder; });
+constexpr double kPaddings[] = {0.01, 0.02, 0.03, 0.04, 0.06};  // [m]
+
+struct Case {
+  double noise;   // [m] standard deviation
+  double flying;  // share of the pixels at edges
+};
+constexpr Case kCases[] = {{0.0, 0.0}, {0.002, 0.0}, {0.005, 0.0}, {0.01, 0.0}, {0.005, 0.3}};
+
+std::string millimetres(double length) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f mm", 1e3 * length);
+  return text;
+}
+
+std::string head() {
+  const double usual = ist::IngestConfig().self_filter_padding;
+  std::string names = "| noise |", rule = "|---|";
+  for (const double padding : kPaddings) {
+    names += " padding " + millimetres(padding) + (padding == usual ? " (default) |" : " |");
+    rule += "---|";
+  }
+  return names + "\n" + rule + "\n";
+}
+
+std::string row(const Case& c, const std::vector<ist::sim::SelfViewResult>& results) {
+  std::string line = "| " + millimetres(c.noise);
+  if (c.flying > 0.0) {
+    line += ", " + std::to_string(static_cast<int>(100.0 * c.flying + 0.5)) + " % flying pixels";
+  }
+  for (const ist::sim::SelfViewResult& r : results) {
+    line += " | " + std::to_string(r.phantoms) + " / " + std::to_string(r.contacts);
+  }
+  return line + " |\n";
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const double duration = argc > 1 ? std::atof(argv[1]) : 60.0;
-  const ist::RobotDescription robot = read_robot();
+  ist::sim::SelfViewConfig config;
+  config.paddings.assign(std::begin(kPaddings), std::end(kPaddings));
+  std::string document;
+  for (int i = 1; i < argc; ++i) {
+    const bool has_value = i + 1 < argc;
+    if (std::strcmp(argv[i], "--seconds") == 0 && has_value) {
+      config.duration = std::atof(argv[++i]);
+    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
+      document = argv[++i];
+    } else {
+      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
+      return 1;
+    }
+  }
+  const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
-  std::printf(
-      "| noise | flying pixels | padding | points on the robot | not dropped | false contacts | "
-      "smallest false distance |\n|---|---|---|---|---|---|---|\n");
-  struct Case {
-    double noise, flying;
-  };
-  for (const Case& c : {Case{0.0, 0.0}, {0.002, 0.0}, {0.005, 0.0}, {0.01, 0.0}, {0.005, 0.3}}) {
-    ist::sim::SelfViewConfig config;
-    config.duration = duration;
+  std::string table = head();
+  std::uint64_t points = 0;  // on the robot, in one run
+  int answers = 0;
+  for (const Case& c : kCases) {
     config.noise = c.noise;
     config.flying_pixels = c.flying;
-    config.paddings = {0.01, 0.02, 0.03, 0.04, 0.06};
-    for (const ist::sim::SelfViewResult& r : ist::sim::run_self_view(robot, model, config)) {
-      std::printf("| %.0f mm | %.0f %% | %.0f mm | %llu | %llu | %d of %d | %.0f mm |\n",
-                  1e3 * c.noise, 100.0 * c.flying, 1e3 * r.padding,
-                  static_cast<unsigned long long>(r.on_robot + r.phantoms),
-                  static_cast<unsigned long long>(r.phantoms), r.contacts, r.answers,
-                  1e3 * r.smallest_distance);
+    const auto results = ist::sim::run_self_view(robot, model, config);
+    for (const ist::sim::SelfViewResult& r : results) {
+      points = std::max(points, r.on_robot + r.phantoms);
+      answers = std::max(answers, r.answers);
     }
-    std::fflush(stdout);
+    table += row(c, results);
   }
-  return 0;
+  table += "\n" + std::to_string(points) + " points on the robot at most, " +
+           std::to_string(answers) + " answers.\n";
+  std::printf("%s", table.c_str());
+  const bool fails =
+      !document.empty() && !ist::benchmark::write_table(document, "self view", table);
+  return fails ? 1 : 0;
 }

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
 
+#include "document.h"
 #include "ist_proximity/proximity/time_of_impact.h"
 #include "support.h"
 #include "support/accuracy.h"
@@ -210,13 +210,6 @@ int main(int argc, char** argv) {
   }
   std::printf("%s", table.c_str());
   if (argc < 3) return 0;
-  std::string all = ist::test::read_text(argv[2]);
-  const auto [first, last] = ist::test::table_place(all, "time of impact");
-  if (last == 0) {
-    std::fprintf(stderr, "%s lacks the marks of 'time of impact'\n", argv[2]);
-    return 1;
-  }
-  all.replace(first, last - first, table);
-  std::ofstream(argv[2]) << all;
+  if (!ist::benchmark::write_table(argv[2], "time of impact", table)) return 1;
   return 0;
 }

@@ -11,6 +11,7 @@
 #include <exception>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -18,7 +19,9 @@
 #include "dodge_controller.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/penetration.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/contact_model.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace {
@@ -71,6 +74,30 @@ std::vector<Eigen::Isometry3d> link_poses(const ist::Kinematics& kinematics,
   return poses;
 }
 
+/// Once: the links' volumes, for forces in contact. 100 balls are quick to pack, and coarse.
+std::vector<std::shared_ptr<const ist::ContactBody>> link_volumes(
+    const ist::RobotDescription& robot, const ist::RobotModel& model) {
+  ist::ContactConfig config;
+  config.packing.max_spheres = 100;
+  std::vector<std::shared_ptr<const ist::ContactBody>> bodies;
+  for (const ist::LinkModel& link : model.links) {
+    const auto same = [&link](const ist::LinkDescription& one) { return one.name == link.name; };
+    const auto found = std::find_if(robot.links.begin(), robot.links.end(), same);
+    bodies.push_back(ist::build_contact_body(found->geometry, 0, link, config, ""));
+  }
+  return bodies;
+}
+
+/// [N] What presses on a link: 0 out of contact, NaN where it is not known.
+double contact_force(const ist::LinkModel& link, const ist::ContactBody& body,
+                     const ist::LinkProximity& answer, const Eigen::Isometry3d& X_FL,
+                     const ist::CloudSnapshot& cloud) {
+  ist::ContactVolume volume;
+  const bool is_known = answer.state == ist::LinkState::kContact && body.has_volume();
+  if (is_known) volume = ist::contact_volume(link, body, X_FL, {&cloud});
+  return ist::penetration_wrench(answer, {}, is_known ? &volume : nullptr, X_FL, {}).force.norm();
+}
+
 int run(const std::string& urdf_path) {
   std::ifstream file(urdf_path);
   std::stringstream urdf;
@@ -83,6 +110,8 @@ int run(const std::string& urdf_path) {
   const ist::example::ControlledArm arm(robot, {"shoulder_yaw", "shoulder_pitch", "elbow_pitch",
                                                 "forearm_roll", "wrist_pitch", "wrist_roll"});
   const ist::example::DodgeConfig controller;
+
+  const auto volumes = link_volumes(robot, *model);
 
   ist::RepulsionConfig repulsion_config;
   repulsion_config.influence_distance = 0.5;
@@ -100,7 +129,7 @@ int run(const std::string& urdf_path) {
     q[arm.joints[j]] = goal[static_cast<Eigen::Index>(j)];
   }
 
-  double smallest = std::numeric_limits<double>::infinity();
+  double smallest = std::numeric_limits<double>::infinity(), largest_force = 0.0;
   for (int cycle = 0; cycle * kControlPeriod < kDuration; ++cycle) {
     const double now = cycle * kControlPeriod;
     const std::vector<Eigen::Isometry3d> X_FL = link_poses(arm.kinematics, *model, q);
@@ -123,6 +152,8 @@ int run(const std::string& urdf_path) {
       const std::size_t link = *arm.kinematics.find_link(model->links[i].name);
       reading.links.push_back({link, answers[i].lower_bound, answers[i].p_LL, away});
       smallest = std::min(smallest, answers[i].lower_bound);
+      largest_force = std::max(largest_force, contact_force(model->links[i], *volumes[i],
+                                                            answers[i], X_FL[i], snapshot));
     }
     const Eigen::VectorXd dq = dodge(arm, q, goal, reading, controller);
     for (std::size_t j = 0; j < arm.joints.size(); ++j) {
@@ -130,8 +161,9 @@ int run(const std::string& urdf_path) {
     }
   }
   const bool is_back = has_reached(arm, q, goal, controller);
-  std::printf("smallest lower bound: %.3f m; back at its place: %s\n", smallest,
-              is_back ? "yes" : "no");
+  std::printf(
+      "smallest lower bound: %.3f m; largest contact force: %.1f N; back at its place: %s\n",
+      smallest, largest_force, is_back ? "yes" : "no");
   return smallest > 0.0 && smallest < controller.keep_distance && is_back ? 0 : 1;
 }
 

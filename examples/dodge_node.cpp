@@ -6,7 +6,9 @@
 //   joint_velocity_controller/command
 //                 published, std_msgs/Float64MultiArray [rad/s], by ~joints; with each
 //                 ProximityArray
-//   ~state        published, std_msgs/String: moving, or why it stands still; with each command
+//   ~state        published, std_msgs/String: moving, and what nears or touches (time_to_contact,
+//                 closing_speed and penetration of the message); or why it stands still; with each
+//                 command
 //   ~goals        published, std_msgs/UInt32, latched: how many goals were reached
 //
 // Parameters: ~joints (names), ~goals (a list of joint positions, gone to in turn), and those of
@@ -18,6 +20,8 @@
 #include <std_msgs/String.h>
 #include <std_msgs/UInt32.h>
 
+#include <cmath>
+#include <cstdio>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -33,26 +37,30 @@ namespace {
 using ist_proximity::ProximityArray;
 
 DodgeConfig read_config(const ros::NodeHandle& nh) {
+  constexpr struct {
+    const char* name;
+    double DodgeConfig::*value;
+  } kParameters[] = {{"task_speed", &DodgeConfig::task_speed},
+                     {"task_gain", &DodgeConfig::task_gain},
+                     {"reached", &DodgeConfig::reached},
+                     {"slow_distance", &DodgeConfig::slow_distance},
+                     {"stop_distance", &DodgeConfig::stop_distance},
+                     {"keep_distance", &DodgeConfig::keep_distance},
+                     {"damping", &DodgeConfig::damping},
+                     {"escape_speed", &DodgeConfig::escape_speed},
+                     {"softness", &DodgeConfig::softness},
+                     {"max_joint_speed", &DodgeConfig::max_joint_speed},
+                     {"limit_gain", &DodgeConfig::limit_gain},
+                     {"max_message_age", &DodgeConfig::max_message_age},
+                     {"max_cloud_age", &DodgeConfig::max_cloud_age}};
   DodgeConfig config;
-  const auto read = [&nh](const char* name, double* value) {
-    *value = nh.param(name, *value);
-    if (!(*value > 0.0)) {
-      throw std::runtime_error(std::string("~") + name + " must be a number above 0.");
+  for (const auto& parameter : kParameters) {
+    double& value = config.*parameter.value;
+    value = nh.param(parameter.name, value);
+    if (!(value > 0.0)) {
+      throw std::runtime_error(std::string("~") + parameter.name + " must be a number above 0.");
     }
-  };
-  read("task_speed", &config.task_speed);
-  read("task_gain", &config.task_gain);
-  read("reached", &config.reached);
-  read("slow_distance", &config.slow_distance);
-  read("stop_distance", &config.stop_distance);
-  read("keep_distance", &config.keep_distance);
-  read("damping", &config.damping);
-  read("escape_speed", &config.escape_speed);
-  read("softness", &config.softness);
-  read("max_joint_speed", &config.max_joint_speed);
-  read("limit_gain", &config.limit_gain);
-  read("max_message_age", &config.max_message_age);
-  read("max_cloud_age", &config.max_cloud_age);
+  }
   if (config.slow_distance <= config.stop_distance) {
     throw std::runtime_error("~slow_distance must be more than ~stop_distance.");
   }
@@ -94,6 +102,32 @@ RobotDescription read_robot(const ros::NodeHandle& nh) {
   return parse_urdf(urdf, GeometrySource::kCollision, environment_package_finder());
 }
 
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g", value);
+  return text;
+}
+
+// The link that comes into contact first, as the message estimates it, and what presses where one
+// touches. The control law goes by bounds, which are proven; this is for people to read.
+std::string describe(const ProximityArray& message) {
+  const ist_proximity::LinkProximity* first = nullptr;
+  std::string contacts;
+  for (const ist_proximity::LinkProximity& link : message.links) {
+    if (link.state == ist_proximity::LinkProximity::CONTACT) {
+      const auto& f = link.penetration.force;  // NaN until the link's volume is packed
+      const double force = Eigen::Vector3d(f.x, f.y, f.z).norm();
+      contacts += "; " + link.link + " is in contact";
+      if (std::isfinite(force)) contacts += ", pressed by " + number(force) + " N";
+    }
+    if (!std::isfinite(link.time_to_contact)) continue;  // not nearing, or not known
+    if (!first || link.time_to_contact < first->time_to_contact) first = &link;
+  }
+  if (!first || !contacts.empty()) return contacts;
+  return "; " + first->link + " would touch in " + number(first->time_to_contact) +
+         " s, nearing at " + number(first->closing_speed) + " m/s";
+}
+
 }  // namespace
 
 class DodgeNode {
@@ -131,6 +165,7 @@ class DodgeNode {
     stamp_ = message.header.stamp;
     cloud_stamp_ = message.cloud_stamp;
     problem_ = message.status_text;
+    description_ = describe(message);
     reading_ = Reading();
     reading_.is_ok =
         message.status == ProximityArray::OK || message.status == ProximityArray::DEGRADED;
@@ -174,7 +209,7 @@ class DodgeNode {
 
     std_msgs::String state;
     if (is_known(reading_, config_)) {
-      state.data = "moving";
+      state.data = "moving" + description_;
     } else if (reading_.message_age > config_.max_message_age) {
       state.data = "stopped: no message of late";
     } else {
@@ -190,7 +225,7 @@ class DodgeNode {
   std::size_t goal_ = 0;
   std::vector<double> q_;  // by joint of the kinematics
   Reading reading_;
-  std::string problem_;
+  std::string problem_, description_;
   ros::Time stamp_, joint_stamp_, cloud_stamp_;
   std_msgs::UInt32 count_;
   ros::Publisher command_, state_, reached_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "proximity/around.h"
 #include "proximity/kept_share.h"
 #include "proximity/lens_sum.h"
 
@@ -15,17 +16,6 @@ namespace {
 constexpr double kCellsPerLink = 1000.0;
 // 16 children on each of the levels that 2^31 tiles can have; halves of a leaf.
 constexpr std::size_t kStackSize = 160, kHalves = 128;
-
-struct Around {
-  Eigen::Vector3d center;
-  double radius;
-};
-
-Around around_child(const BoxNode& node, int k) {
-  const Eigen::Vector3d low(node.min_x[k], node.min_y[k], node.min_z[k]);
-  const Eigen::Vector3d high(node.max_x[k], node.max_y[k], node.max_z[k]);
-  return {0.5 * (low + high), 0.5 * (high - low).norm()};
-}
 
 // Calls visit(tile) for the tiles of points or boxes whose sphere `may_touch`.
 template <typename Index, typename MayTouch, typename Visit>

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "proximity/around.h"
 #include "proximity/link_query.h"
 
 namespace ist {
@@ -19,17 +20,6 @@ struct Entry {
   double guess;            ///< [m] as `bound`, holes left out of account: which to visit first
   std::int32_t child;
 };
-
-struct Around {
-  Eigen::Vector3d center;
-  double radius;
-};
-
-Around around_box(const BoxNode& node, int k) {
-  const Eigen::Vector3d low(node.min_x[k], node.min_y[k], node.min_z[k]);
-  const Eigen::Vector3d high(node.max_x[k], node.max_y[k], node.max_z[k]);
-  return {0.5 * (low + high), 0.5 * (high - low).norm()};
-}
 
 }  // namespace
 
@@ -59,7 +49,7 @@ void LinkQuery::find_depth(Deadline* deadline) {
     const BoxNode& node = index_->nodes()[static_cast<std::size_t>(entry.child)];
     const std::size_t begin = top;
     for (int k = 0; k < node.count; ++k) {
-      const Around ball = around_box(node, k);
+      const Around ball = around_child(node, k);
       const Eigen::Vector3d center = X_LO_ * ball.center;
       const double inherited = entry.floor - (center - entry.center).norm() - ball.radius;
       if (inherited >= threshold()) {
