@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_query.h"
@@ -70,14 +71,22 @@ class LinkQuery {
   static std::uint64_t generation(const CloudSnapshot& cloud, Part part);
   bool enter(const CloudSnapshot& cloud, std::int32_t index, Part part);
   Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
-  void consider(std::int32_t tile, int lane, bool is_outside);
+  void consider(std::int32_t tile, int lane, bool is_outside,
+                double below = std::numeric_limits<double>::infinity());
   void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, const Eigen::Vector3d& p_O,
             std::int32_t tile, int lane);
   bool search(Deadline* deadline);
   Traversal make_traversal();
+  bool needs_aim() const;
   void aim_later(Traversal* traversal) const;
   void set_planes(Traversal* traversal) const;
   static void on_aim(void* context);
+  static void on_nearer(void* context);
+  void keep_promise();
+  void evaluate_waiting();
+  void rule_out_waiting();
+  void drop_far_waiting();
+  void descend(Traversal* traversal);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
   void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
@@ -101,6 +110,15 @@ class LinkQuery {
   double wanted_below(double distance) const;
   /// [m] bounds from here on cannot change the answer by more than the tolerance.
   double threshold() const;
+  /// What became of a point in this descent.
+  struct Visit {
+    std::uint32_t epoch = 0, key = 0;
+    std::int32_t waiting = -1;  ///< index in `waiting_`; -1: it is done with
+  };
+  Visit& visit_of(std::uint32_t key) { return visited_[(key * 2654435761U) >> 23U]; }
+  bool is_visited(const Visit& visit, std::uint32_t key) const {
+    return visit.epoch == epoch_ && visit.key == key;
+  }
   bool first_visit(std::int32_t tile, int lane);
   static void on_candidate(void* context, std::int32_t tile, int lane, float bound);
   static bool on_expired(void* context);
@@ -131,6 +149,7 @@ class LinkQuery {
   std::uint64_t last_generation_ = 0;
   std::int32_t last_tile_ = 0;
   int last_lane_ = 0;
+  Eigen::Vector3d last_witness_L_ = Eigen::Vector3d::Zero();
 
   // How far the link's parts reach toward the nearest point.
   std::vector<float> support_;
@@ -138,11 +157,23 @@ class LinkQuery {
 
   // Points or boxes evaluated in this descent: several ball leaves meet the same one.
   static constexpr std::size_t kVisitedSize = 512;
-  struct Visit {
-    std::uint32_t epoch = 0, key = 0;
-  };
   std::array<Visit, kVisitedSize> visited_{};
   std::uint32_t epoch_ = 0;
+
+  // Points that may be nearest: they wait until the descent knows better which one.
+  struct Waiting {
+    float bound;  ///< [m]
+    std::int32_t tile;
+    int lane;
+  };
+  static constexpr std::size_t kMaxWaiting = 64;
+  std::array<Waiting, kMaxWaiting> waiting_;
+  std::size_t waiting_count_ = 0;
+
+  /// [m] What inner balls promise: the traversal's `inner` point is no farther. Where the mesh has
+  /// holes that may not be so; then the descent is made again without. Inf: nothing is promised.
+  double promised_ = 0.0;
+  bool is_broken_ = false;
 };
 
 }  // namespace ist

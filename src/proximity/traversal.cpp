@@ -389,6 +389,8 @@ class Descent {
     const float offset = t_.offset + t_.support[pair.slot];
     const PointTag d;
     alignas(64) float distance[kPointWidth];
+    bool is_near = false;
+    const auto limit = hn::Set(d, Limit());
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
       const auto ahead = Ahead(tile, k, offset);
       auto nearest = hn::Set(d, kFarAway);
@@ -396,30 +398,33 @@ class Descent {
         const auto to_center = Distance(tile, k, posed.x[b], posed.y[b], posed.z[b]);
         nearest = hn::Min(nearest, hn::Sub(to_center, hn::Set(d, radius[b])));
       }
-      hn::Store(hn::Max(nearest, ahead), d, distance + k);
+      nearest = hn::Max(nearest, ahead);
+      is_near = is_near || !hn::AllFalse(d, hn::Lt(nearest, limit));
+      hn::Store(nearest, d, distance + k);
     }
-    if (kExact) {
-      CutBalls(leaf, posed, tile, offset, distance);
-      Candidates(tile_index, tile.count, distance);
-    } else {
-      for (int k = 0; k < tile.count; ++k) {
-        if (!(distance[k] < t_.inner_distance)) continue;
-        t_.inner_distance = distance[k];
-        t_.inner_tile = tile_index;
-        t_.inner_lane = k;
-        t_.inner_leaf = ~pair.sphere;
-      }
+    if (!kExact) return Nearest(pair, distance);
+    if (is_near) LookCloser(pair, leaf, posed, tile, offset, distance);
+    Candidates(tile_index, tile.count, distance);
+  }
+
+  // Unused lanes are far away.
+  void Nearest(const Pair& pair, const float* inner) {
+    for (int k = 0; k < kPointWidth; ++k) {
+      if (!(inner[k] < t_.inner_distance)) continue;
+      t_.inner_distance = inner[k];
+      t_.inner_tile = ~pair.box;
+      t_.inner_lane = k;
+      t_.inner_leaf = ~pair.sphere;
     }
   }
 
-  // What is left before the threshold, against what the plane leaves of the balls.
+  // What the plane leaves of the balls, and how far the points are at most.
   template <class Tile>
-  HWY_INLINE void CutBalls(const SphereLeaf& leaf, const Posed& posed, const Tile& tile,
-                           float offset, float* distance) const {
-    if (!(offset < kFarAway)) return;
+  HWY_INLINE void LookCloser(const Pair& pair, const SphereLeaf& leaf, const Posed& posed,
+                             const Tile& tile, float offset, float* distance) {
     const PointTag d;
     const SphereTag balls;
-    alignas(64) float height[kSphereWidth], rim[kSphereWidth];
+    alignas(64) float height[kSphereWidth], rim[kSphereWidth], inner[kPointWidth];
     for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(balls)) {
       const auto over = hn::Sub(hn::Set(balls, offset),
                                 Along(balls, hn::Load(balls, posed.x + b),
@@ -428,21 +433,27 @@ class Descent {
       hn::Store(RimRadius(balls, hn::Load(balls, leaf.outer + b), over, t_.rounding), balls,
                 rim + b);
     }
+    bool is_nearer = false;
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
-      const auto known = hn::Load(d, distance + k);
-      if (hn::AllFalse(d, hn::Lt(known, hn::Set(d, t_.threshold)))) continue;
       const auto ahead = Ahead(tile, k, offset);
-      auto nearest = hn::Set(d, kFarAway);
+      auto nearest = hn::Set(d, kFarAway), nearest_inner = nearest;
       for (int b = 0; b < leaf.count; ++b) {
         const float center[3] = {posed.x[b], posed.y[b], posed.z[b]};
         const auto radius = hn::Set(d, leaf.outer[b]);
-        const auto apart = hn::Sub(Distance(tile, k, center[0], center[1], center[2]), radius);
+        const auto to_center = Distance(tile, k, center[0], center[1], center[2]);
         const auto cut = CutDistance(d, ahead, Aside(tile, k, center), radius,
                                      hn::Set(d, height[b]), hn::Set(d, rim[b]));
-        nearest = hn::Min(nearest, hn::Max(apart, cut));
+        nearest = hn::Min(nearest, hn::Max(hn::Sub(to_center, radius), cut));
+        nearest_inner = hn::Min(nearest_inner, hn::Sub(to_center, hn::Set(d, leaf.inner[b])));
       }
-      hn::Store(hn::Max(nearest, known), d, distance + k);
+      hn::Store(hn::Max(nearest, hn::Load(d, distance + k)), d, distance + k);
+      hn::Store(nearest_inner, d, inner + k);
+      is_nearer =
+          is_nearer || !hn::AllFalse(d, hn::Lt(nearest_inner, hn::Set(d, t_.inner_distance)));
     }
+    if (!is_nearer || t_.nearer == nullptr) return;
+    Nearest(pair, inner);
+    t_.nearer(t_.context);
   }
 
   // The most promising first: it may spare the others.

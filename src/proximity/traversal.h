@@ -43,6 +43,9 @@ struct Traversal {
 
   /// Called for each point whose lower bound is below the threshold (exact descent only).
   void (*candidate)(void* context, std::int32_t tile, int lane, float bound) = nullptr;
+  /// Called when `inner_*` have changed: that point is no farther than `inner_distance`, where the
+  /// link has no holes (exact descent only; null: nobody asks).
+  void (*nearer)(void* context) = nullptr;
   /// Called once when so many node pairs have been expanded: to choose `normal` anew.
   void (*aim)(void* context) = nullptr;
   std::uint64_t aim_after = kNever;
@@ -54,8 +57,9 @@ struct Traversal {
   float dropped = std::numeric_limits<float>::infinity();  ///< [m] smallest bound of a dropped pair
   bool may_be_inside = false;  ///< some point's bound is at most `interior`
   bool stopped = false;        ///< `expired` ended it; the bounds of what was left are in `dropped`
-  float inner_distance = std::numeric_limits<float>::infinity();  ///< [m] smallest |p - c| - inner
-  std::int32_t inner_tile = -1;                                   ///< of that point or box
+  /// [m] smallest |p - c| - inner; from an exact descent only if below what it is at first
+  float inner_distance = std::numeric_limits<float>::infinity();
+  std::int32_t inner_tile = -1;  ///< of that point or box
   int inner_lane = 0;
   std::int32_t inner_leaf = -1;  ///< of the ball
   std::uint64_t node_pairs = 0, leaf_pairs = 0;

@@ -119,6 +119,53 @@ TEST_P(AgainstOracle, RandomScenes) {
   EXPECT_GT(contact, test::scaled(50));
 }
 
+// Many points are about equally near, the more the farther they are; through a hole, inner balls
+// may come nearer to a point than the mesh.
+TEST_P(AgainstOracle, FlatObstaclesNearAndFar) {
+  const double tolerance = GetParam();
+  test::Rng rng(12);
+  std::vector<TriangleMesh> meshes = link_meshes();
+  meshes.push_back(test::open_box({0.1, 0.1, 0.2}));
+  const auto model = test::make_model(shapes_of(meshes), 0.005);
+  QueryConfig config;
+  config.tolerance = tolerance;
+  config.max_distance = 10.0;
+  ProximityQuery query(model, config);
+  std::vector<LinkProximity> results;
+  const std::vector<bool> known(meshes.size(), true);
+  for (const double height : {0.003, 0.03, 0.3, 3.0}) {
+    for (int scene = 0; scene < 6; scene += test::kSanitized ? 3 : 1) {
+      const double spacing = test::uniform(&rng, 0.003, 0.01);
+      const Eigen::Vector3d noise = Eigen::Vector3d::UnitZ() * (scene % 3 == 0 ? 0.001 : 0.0);
+      std::vector<Eigen::Vector3d> points;
+      for (int i = 0; i < 400; ++i) {
+        const Eigen::Vector3d grid(i % 20 - 10, i / 20 - 10, 0);
+        points.emplace_back(spacing * grid + test::uniform(&rng, -1, 1) * noise);
+      }
+      const CloudSnapshot snapshot = test::make_snapshot(points, Eigen::Vector3d::Zero());
+      std::vector<Eigen::Isometry3d> X_FL;
+      for (const TriangleMesh& mesh : meshes) {
+        Eigen::Isometry3d X = test::random_pose(&rng, 0.02);
+        if (scene % 4 == 0) X.linear().setIdentity();  // flat on flat
+        double lowest = kInfinity;
+        for (const Eigen::Vector3d& v : mesh.vertices) lowest = std::min(lowest, (X * v).z());
+        X.translation().z() += height - lowest;
+        X_FL.push_back(X);
+      }
+      ASSERT_TRUE(query.run(X_FL, known, {&snapshot}, &results));
+      for (std::size_t i = 0; i < meshes.size(); ++i) {
+        const double truth =
+            test::oracle_minimum(meshes[i], stored_points(snapshot, X_FL[i].inverse()));
+        expect_consistent(results[i], X_FL[i]);
+        ASSERT_EQ(results[i].state, truth < 0.0 ? LinkState::kContact : LinkState::kNear);
+        ASSERT_LE(results[i].lower_bound, truth);
+        ASSERT_GE(results[i].distance, truth - 1e-9);
+        ASSERT_LE(results[i].distance - results[i].lower_bound, tolerance + 3e-5);
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Tolerances, AgainstOracle, ::testing::Values(0.0, 0.001, 0.02));
 
 TEST(ProximityQuery, WarmStartNeverChangesTheAnswer) {
