@@ -12,7 +12,6 @@
 namespace ist {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSampledBlocks = 64;
 
 // A tile that is not known to be good may be this many times as long as those that are.
