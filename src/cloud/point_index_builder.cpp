@@ -129,20 +129,20 @@ PointTile* PointIndexBuilder::room(std::size_t count) {
   return &tiles[used_];
 }
 
-void PointIndexBuilder::keep(const PaddedBox& all, const PointFilter& drop) {
+void PointIndexBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
   PointTile& tile = index_->tiles_[used_];
-  PaddedBox box = all;
+  PaddedBox left = box;
   if (drop) {
     const std::uint32_t dropped = drop(tile, box);
     if (dropped != 0) {
       remove(dropped, &tile);
       if (tile.count == 0) return;
-      box = box_of(tile);
+      left = box_of(tile);
     }
   }
   put_unused_far_away(&tile);
   index_->size_ += static_cast<std::size_t>(tile.count);
-  loose_.push_back({box, ~static_cast<std::int32_t>(used_)});
+  loose_.push_back({left, ~static_cast<std::int32_t>(used_)});
   ++used_;
 }
 

@@ -40,7 +40,7 @@ class PointIndexBuilder {
   /// keep() for each tile, then finish(). Before finish(), the index is not to be read.
   void start(const Eigen::Vector3d& origin, PointIndex* index);
   /// The next tiles, to be filled: points, ids and count.
-  PointTile* room(std::size_t tiles);
+  PointTile* room(std::size_t count);
   /// Keeps the first tile of room().
   /// @param box  of exactly its points
   void keep(const PaddedBox& box, const PointFilter& drop);
