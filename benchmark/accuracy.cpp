@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_query.h"
-#include "support/data_dir.h"
-#include "support/truth.h"
+#include "truth_scenes.h"
 
 namespace {
 
@@ -67,24 +66,17 @@ void measure(const std::shared_ptr<const ist::RobotModel>& model, const ist::Que
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto data = ist::test::data_dir();
-  if (!data) {
-    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
-    return 1;
-  }
+  const std::filesystem::path data = ist::benchmark::data_or_exit();
   std::vector<double> max_errors;
   for (int i = 1; i < argc; ++i) max_errors.push_back(1e-3 * std::atof(argv[i]));
   if (max_errors.empty()) max_errors = {0.005, 0.002};
-  std::vector<std::pair<std::string, ist::CloudSnapshot>> clouds;
-  for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
-    clouds.emplace_back(name, ist::test::truth_cloud(*data, name));
-  }
+  const auto scenes = ist::benchmark::truth_scenes(data);
   std::printf("| max_error | balls | packing | tolerance | cases | violations | wrong state | "
               "error mean / p99 / max | width mean | query free median / p99 | in contact |\n"
               "|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const double max_error : max_errors) {
     const Clock::time_point start = Clock::now();
-    const auto model = ist::test::panda_model(*data, max_error);
+    const auto model = ist::test::panda_model(data, max_error);
     const double packing = seconds_since(start);
     std::size_t balls = 0;
     for (const ist::LinkModel& link : model->links) balls += link.tree.ball_count();
@@ -93,10 +85,8 @@ int main(int argc, char** argv) {
       config.max_distance = 10.0;
       config.tolerance = tolerance;
       Tally tally;
-      for (const auto& [name, snapshot] : clouds) {
-        for (const char* motion : {"traj", "rand"}) {
-          measure(model, config, snapshot, ist::test::truth_cases(*data, name, motion), &tally);
-        }
+      for (const auto& scene : scenes) {
+        measure(model, config, *scene.cloud, scene.cases, &tally);
       }
       std::printf("| %.0f mm | %zu | %.1f s | %.0f mm | %zu | %d | %d | %.4f / %.4f / %.4f mm | "
                   "%.3f mm | %.0f / %.0f us | %.0f / %.0f us |\n",

@@ -9,8 +9,7 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
-#include "support/data_dir.h"
-#include "support/truth.h"
+#include "truth_scenes.h"
 
 namespace {
 
@@ -30,39 +29,33 @@ constexpr Mode kModes[] = {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto data = ist::test::data_dir();
-  if (!data) {
-    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
-    return 1;
-  }
+  const std::filesystem::path data = ist::benchmark::data_or_exit();
   const double max_error = argc > 1 ? 1e-3 * std::atof(argv[1]) : 0.005;
-  const auto model = ist::test::panda_model(*data, max_error);
+  const auto model = ist::test::panda_model(data, max_error);
   const std::vector<bool> known(ist::test::kPandaLinks, true);
+  const auto scenes = ist::benchmark::truth_scenes(data);
   std::printf(
       "| wanted | free median / p99 | in contact median / p99 | exact evaluations free / in "
       "contact |\n|---|---|---|---|\n");
   for (const Mode& mode : kModes) {
     std::vector<double> us[2], evaluations[2];  // free, in contact
-    for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
-      const ist::CloudSnapshot cloud = ist::test::truth_cloud(*data, name);
-      for (const char* motion : {"traj", "rand"}) {
-        ist::QueryConfig config;
-        config.max_distance = 10.0;
-        config.tolerance = mode.tolerance;
-        ist::ProximityQuery query(model, config);
-        std::vector<ist::LinkProximity> results;
-        for (const ist::test::TruthCase& truth : ist::test::truth_cases(*data, name, motion)) {
-          const Clock::time_point start = Clock::now();
-          query.run(truth.X_FL, known, {&cloud}, &results);
-          const double elapsed = microseconds_since(start);
-          bool contact = false;
-          for (const ist::test::TruthRecord& link : truth.links) {
-            contact = contact || link.points_inside > 0;
-          }
-          us[contact ? 1 : 0].push_back(elapsed);
-          evaluations[contact ? 1 : 0].push_back(
-              static_cast<double>(query.statistics().exact_evaluations));
+    for (const auto& scene : scenes) {
+      ist::QueryConfig config;
+      config.max_distance = 10.0;
+      config.tolerance = mode.tolerance;
+      ist::ProximityQuery query(model, config);
+      std::vector<ist::LinkProximity> results;
+      for (const ist::test::TruthCase& truth : scene.cases) {
+        const Clock::time_point start = Clock::now();
+        query.run(truth.X_FL, known, {scene.cloud.get()}, &results);
+        const double elapsed = microseconds_since(start);
+        bool contact = false;
+        for (const ist::test::TruthRecord& link : truth.links) {
+          contact = contact || link.points_inside > 0;
         }
+        us[contact ? 1 : 0].push_back(elapsed);
+        evaluations[contact ? 1 : 0].push_back(
+            static_cast<double>(query.statistics().exact_evaluations));
       }
     }
     std::printf("| %s | %.0f / %.0f us | %.0f / %.0f us | %.0f / %.0f |\n", mode.name,

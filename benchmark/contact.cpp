@@ -13,8 +13,7 @@
 #include "cloud/thinning.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
-#include "support/data_dir.h"
-#include "support/truth.h"
+#include "truth_scenes.h"
 
 namespace {
 
@@ -40,38 +39,34 @@ std::vector<std::shared_ptr<const ist::ContactBody>> bodies(const std::filesyste
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto data = ist::test::data_dir();
-  if (!data) {
-    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
-    return 1;
-  }
+  const std::filesystem::path data = ist::benchmark::data_or_exit();
   const std::size_t poses = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 100;
-  const auto model = ist::test::panda_model(*data, 0.005);
-  const auto contacts = bodies(*data, *model);
+  const auto model = ist::test::panda_model(data, 0.005);
+  const auto contacts = bodies(data, *model);
   std::vector<double> query_us, contact_us, ratios, points;
-  for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
-    ist::CloudSnapshot cloud = ist::test::truth_cloud(*data, name);
+  for (const auto& scene : ist::benchmark::truth_scenes(data)) {
+    ist::CloudSnapshot& cloud = *scene.cloud;
     ist::PointIndexBuilder builder;
-    ist::Thinning().run(cloud.index, cloud.thinning, &builder, &cloud.coarse);
-    for (const char* motion : {"traj", "rand"}) {
-      ist::ProximityQuery query(model, {});
-      std::vector<ist::LinkProximity> results;
-      std::size_t pose = 0;
-      for (const ist::test::TruthCase& truth : ist::test::truth_cases(*data, name, motion)) {
-        if (pose++ == poses) break;
-        for (std::size_t i = 0; i < truth.X_FL.size(); ++i) {
-          if (truth.links[i].points_inside == 0) continue;
-          std::vector<bool> known(truth.X_FL.size(), false);
-          known[i] = true;
-          ThreadTimer timer;
-          query.run(truth.X_FL, known, {&cloud}, &results);
-          query_us.push_back(timer.lap());
-          const ist::ContactVolume found =
-              ist::contact_volume(model->links[i], *contacts[i], truth.X_FL[i], {&cloud});
-          contact_us.push_back(timer.lap());
-          ratios.push_back(contact_us.back() / query_us.back());
-          points.push_back(static_cast<double>(found.balls));
-        }
+    if (cloud.coarse.empty()) {
+      ist::Thinning().run(cloud.index, cloud.thinning, &builder, &cloud.coarse);
+    }
+    ist::ProximityQuery query(model, {});
+    std::vector<ist::LinkProximity> results;
+    std::size_t pose = 0;
+    for (const ist::test::TruthCase& truth : scene.cases) {
+      if (pose++ == poses) break;
+      for (std::size_t i = 0; i < truth.X_FL.size(); ++i) {
+        if (truth.links[i].points_inside == 0) continue;
+        std::vector<bool> known(truth.X_FL.size(), false);
+        known[i] = true;
+        ThreadTimer timer;
+        query.run(truth.X_FL, known, {&cloud}, &results);
+        query_us.push_back(timer.lap());
+        const ist::ContactVolume found =
+            ist::contact_volume(model->links[i], *contacts[i], truth.X_FL[i], {&cloud});
+        contact_us.push_back(timer.lap());
+        ratios.push_back(contact_us.back() / query_us.back());
+        points.push_back(static_cast<double>(found.balls));
       }
     }
   }

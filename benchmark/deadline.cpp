@@ -11,8 +11,7 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
-#include "support/data_dir.h"
-#include "support/truth.h"
+#include "truth_scenes.h"
 
 namespace {
 
@@ -59,15 +58,12 @@ void measure(ist::ProximityQuery* query, ist::QueryConfig config, const ist::tes
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto data = ist::test::data_dir();
-  if (!data) {
-    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
-    return 1;
-  }
+  const std::filesystem::path data = ist::benchmark::data_or_exit();
   const int count = argc > 1 ? std::atoi(argv[1]) : 10000;
   constexpr int kCases = 6 * static_cast<int>(ist::test::kTruthPoses);
   const int per_case = (count + kCases - 1) / kCases;
-  const auto model = ist::test::panda_model(*data, 0.005);
+  const auto model = ist::test::panda_model(data, 0.005);
+  const auto scenes = ist::benchmark::truth_scenes(data);
   std::printf(
       "| tolerance | deadlines | stopped | violations | full query median | overrun median | "
       "p99 | p99 / full median |\n|---|---|---|---|---|---|---|---|\n");
@@ -75,17 +71,14 @@ int main(int argc, char** argv) {
     std::mt19937_64 rng(1);
     Tally tally;
     int deadlines = 0;
-    for (const char* name : {"mosd0", "mosd10", "mosd40"}) {
-      const ist::CloudSnapshot cloud = ist::test::truth_cloud(*data, name);
-      for (const char* motion : {"traj", "rand"}) {
-        ist::QueryConfig config;
-        config.max_distance = 10.0;
-        config.tolerance = tolerance;
-        ist::ProximityQuery query(model, config);
-        for (const ist::test::TruthCase& truth : ist::test::truth_cases(*data, name, motion)) {
-          measure(&query, config, truth, cloud, per_case, &rng, &tally);
-          deadlines += per_case;
-        }
+    for (const auto& scene : scenes) {
+      ist::QueryConfig config;
+      config.max_distance = 10.0;
+      config.tolerance = tolerance;
+      ist::ProximityQuery query(model, config);
+      for (const ist::test::TruthCase& truth : scene.cases) {
+        measure(&query, config, truth, *scene.cloud, per_case, &rng, &tally);
+        deadlines += per_case;
       }
     }
     const double full = quantile(tally.full_us, 0.5), p99 = quantile(tally.overrun_us, 0.99);

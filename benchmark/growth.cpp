@@ -142,11 +142,11 @@ int main(int argc, char** argv) {
   const Model model = robot.pack(kMaxError);
   const ist::CloudSnapshot cloud = ingested(ist::benchmark::synthetic_frame(640, 480));
   const Poses poses = free_poses(model, cloud);
-  for (const double max_error : {0.013, 0.005, 0.002, 0.0009}) {
+  for (const double max_error : {0.013, 0.005, 0.002, 0.0009, 0.0006}) {
     const Model packed = robot.pack(max_error);
     measure(csv, "spheres", static_cast<double>(spheres_of(packed)), packed, cloud, poses);
   }
-  for (const std::size_t width : {160, 320, 640, 1280, 2560}) {
+  for (const std::size_t width : {160, 320, 640, 1280, 2560, 3200}) {
     const ist::CloudSnapshot other =
         ingested(ist::benchmark::synthetic_frame(width, width * 3 / 4));
     measure(csv, "points", static_cast<double>(other.index.size()), model, other, poses);

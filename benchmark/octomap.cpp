@@ -16,8 +16,7 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
-#include "support/data_dir.h"
-#include "support/truth.h"
+#include "truth_scenes.h"
 
 #ifdef IST_PROXIMITY_HAS_FCL
 #include <fcl/fcl.h>
@@ -124,17 +123,13 @@ class Fcl {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto data = ist::test::data_dir();
-  if (!data) {
-    std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
-    return 1;
-  }
+  const std::filesystem::path data = ist::benchmark::data_or_exit();
   const std::size_t leaves = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1000000;
   const int queries = argc > 2 ? std::atoi(argv[2]) : 10;
-  const auto model = ist::test::panda_model(*data, 0.005);
+  const auto model = ist::test::panda_model(data, 0.005);
   std::vector<Eigen::AlignedBox3d> boxes = make_room(leaves);
 #ifdef IST_PROXIMITY_HAS_FCL
-  Fcl fcl(boxes, panda_meshes(*data));
+  Fcl fcl(boxes, panda_meshes(data));
   boxes = fcl.leaves();
 #endif
   ist::BoxIndex index;
@@ -161,7 +156,7 @@ int main(int argc, char** argv) {
       std::vector<ist::LinkProximity> results;
       int apart = 0, count = 0;
       double largest = 0.0;
-      for (const ist::test::TruthCase& truth : ist::test::truth_cases(*data, "mosd0", motion)) {
+      for (const ist::test::TruthCase& truth : ist::test::truth_cases(data, "mosd0", motion)) {
         Clock::time_point start = Clock::now();
         query.run(truth.X_FL, known, {&map}, &results);
         us.push_back(microseconds_since(start));

@@ -191,6 +191,9 @@ Methods all_methods(const DataSet& set) {
 #ifdef IST_BENCHMARK_NANOFLANN
   add_nanoflann(spheres, &methods);
 #endif
+#ifdef IST_BENCHMARK_PCL
+  add_pcl(spheres, &methods);
+#endif
   add_signed_grid(set.robot, &methods);
 #ifdef IST_BENCHMARK_EMBREE
   add_embree(set.robot, &methods);

@@ -102,6 +102,12 @@ function(ist_proximity_peer name header)
 endfunction()
 
 ist_proximity_peer(nanoflann nanoflann.hpp)
+# PCL's headers are in a folder with its version: Ubuntu 20.04, 22.04, Debian 12, Ubuntu 24.04.
+find_path(IST_PROXIMITY_pcl_INCLUDE_DIR pcl/kdtree/kdtree_flann.h
+  PATH_SUFFIXES pcl-1.10 pcl-1.12 pcl-1.13 pcl-1.14)
+set_source_files_properties(benchmark/peers/pcl.cpp PROPERTIES
+  INCLUDE_DIRECTORIES "${IST_PROXIMITY_pcl_INCLUDE_DIR}")
+ist_proximity_peer(pcl pcl/kdtree/kdtree_flann.h pcl_kdtree pcl_octree pcl_common)
 ist_proximity_peer(embree embree3/rtcore.h embree3)
 ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)

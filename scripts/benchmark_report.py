@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Makes tables and plot of what scripts/benchmark measured. Needs nothing but Python.
 
-Writes FOLDER/benchmark.csv and benchmark_growth.csv (with commit and machine), FOLDER/benchmark.svg,
-and the tables between the markers `<!-- NAME -->` and `<!-- end of NAME -->` of FOLDER/benchmark.md
+Writes FOLDER/benchmark.csv and benchmark_growth.csv (with commit and machine), the plots
+FOLDER/benchmark.svg and benchmark_growth.svg, and the tables between the markers `<!-- NAME -->` and `<!-- end of NAME -->` of FOLDER/benchmark.md
 and of the README.
 """
 
@@ -263,6 +263,76 @@ class Plot:
                 "\n</svg>\n")
 
 
+class GrowthPlot:
+    """Median and 99th percentile of a query against what grows: four panels, axes logarithmic."""
+
+    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM, GAP = 860, 330, 70, 20, 60, 50, 22
+    PANELS = (("spheres", "spheres"), ("points", "points"), ("links", "links"),
+              ("distance", "distance [m]"))
+    COLOURS = {0.0: ("exact", "#c0392b"), 1.0: ("to 1 mm", "#2980b9")}  # by tolerance [mm]
+
+    def __init__(self, rows, title):
+        self.rows = rows
+        self.title = title
+        times = [r[key] for r in rows for key in ("query_us", "query_p99_us")]
+        self.y = (math.log10(min(times)) - 0.1, math.log10(max(times)) + 0.1)
+        self.parts = []
+
+    def py(self, us):
+        share = (math.log10(us) - self.y[0]) / (self.y[1] - self.y[0])
+        return self.HEIGHT - self.BOTTOM - share * (self.HEIGHT - self.TOP - self.BOTTOM)
+
+    def text(self, x, y, words, anchor="middle", colour="#333", extra=""):
+        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"'
+                          f'{extra}>{escape(words)}</text>')
+
+    def line(self, points, colour, extra=""):
+        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+        self.parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}"{extra}/>')
+
+    def panel(self, number, what, words):
+        width = (self.WIDTH - self.LEFT - self.RIGHT) / len(self.PANELS)
+        left, right = self.LEFT + number * width, self.LEFT + (number + 1) * width - self.GAP
+        rows = [r for r in self.rows if r["what"] == what]
+        values = sorted({r["value"] for r in rows})
+        low, high = math.log10(values[0]), math.log10(values[-1])
+        bottom = self.HEIGHT - self.BOTTOM
+
+        def px(value):
+            return left + (math.log10(value) - low) / (high - low) * (right - left)
+
+        for decade in range(math.ceil(self.y[0]), math.floor(self.y[1]) + 1):
+            y = self.py(10.0 ** decade)
+            self.line([(left, y), (right, y)], "#ddd")
+            if number == 0:
+                self.text(left - 8, y + 4, time(10.0 ** decade).replace(".0", ""), "end")
+        for value in (values[0], values[-1]):
+            self.line([(px(value), self.TOP), (px(value), bottom)], "#ddd")
+            anchor = "start" if value == values[0] else "end"
+            self.text(px(value), bottom + 18, f"{value:,.0f}" if value >= 1 else f"{value:g}",
+                      anchor)
+        self.text((left + right) / 2, self.HEIGHT - 12, words)
+        for tolerance, (_, colour) in self.COLOURS.items():
+            of = sorted((r for r in rows if r["tolerance_mm"] == tolerance),
+                        key=lambda r: r["value"])
+            self.line([(px(r["value"]), self.py(r["query_us"])) for r in of], colour,
+                      ' stroke-width="2"')
+            self.line([(px(r["value"]), self.py(r["query_p99_us"])) for r in of], colour,
+                      ' stroke-dasharray="3 3"')
+
+    def svg(self):
+        for number, (what, words) in enumerate(self.PANELS):
+            self.panel(number, what, words)
+        self.text(self.WIDTH / 2, 22, self.title, extra=' font-weight="bold"')
+        for number, (words, colour) in enumerate(self.COLOURS.values()):
+            self.text(self.LEFT + 270 * number, 44, f"{words}: median (99th percentile dashed)",
+                      "start", colour)
+        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
+                'font-family="sans-serif" font-size="12">\n'
+                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
+                "\n</svg>\n")
+
+
 def fill(path, parts):
     """Replaces what is between the markers; a document without some of them is left so there."""
     text = path.read_text(encoding="utf-8")
@@ -308,6 +378,9 @@ def main():
         fill(arguments.readme, parts)
     title = f"Speed against error: {NAMES[shown[0]['data']]}, {arguments.commit}"
     (arguments.folder / "benchmark.svg").write_text(Plot(shown, title).svg(), encoding="utf-8")
+    (arguments.folder / "benchmark_growth.svg").write_text(
+        GrowthPlot(growth, f"Time of a query as things grow, {arguments.commit}").svg(),
+        encoding="utf-8")
 
 
 if __name__ == "__main__":

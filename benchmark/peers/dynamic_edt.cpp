@@ -2,7 +2,6 @@
 #include <octomap/octomap.h>
 
 #include <cmath>
-#include <limits>
 #include <memory>
 
 #include "peers/flat.h"
@@ -11,12 +10,11 @@
 namespace ist::benchmark {
 namespace {
 
-class DynamicEdt : public Method {
+class DynamicEdt : public BySpheres {
  public:
-  explicit DynamicEdt(const SphereSet& set) : set_(set) {
+  explicit DynamicEdt(const SphereSet& set) : BySpheres(set) {
     name = "dynamicEDT3D of 2 cm";
     kind = Kind::kGrid;
-    spheres = set.size();
     // From the centre of the sphere's cell to that of the nearest point's cell.
     const double diagonal = std::sqrt(3.0) * kCell;
     least_error = -set.gap - diagonal;
@@ -39,23 +37,14 @@ class DynamicEdt : public Method {
     field_->update();
   }
 
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
-    for (std::size_t link = 0; link < X_FL.size(); ++link) {
-      Answer& best = (*answers)[link];
-      best.distance = std::numeric_limits<double>::infinity();
-      for (const SphereSet::Sphere& sphere : set_.links[link]) {
-        const Eigen::Vector3d center = X_FL[link] * sphere.center;
-        const Eigen::Vector3f c = center.cast<float>();
-        float distance = 0.0F;
-        octomap::point3d cell;
-        field_->getDistanceAndClosestObstacle(octomap::point3d(c.x(), c.y(), c.z()), distance,
-                                              cell);
-        if (distance < 0.0F) continue;  // out of the grid
-        if (static_cast<double>(distance) - sphere.radius >= best.distance) continue;
-        best = sphere_answer(center, sphere.radius, {cell.x(), cell.y(), cell.z()});
-        best.distance = static_cast<double>(distance) - sphere.radius;
-      }
-    }
+ protected:
+  bool nearest(const Eigen::Vector3d& center, double /*reach*/, Nearest* found) override {
+    const Eigen::Vector3f c = center.cast<float>();
+    float distance = 0.0F;
+    octomap::point3d cell;
+    field_->getDistanceAndClosestObstacle(octomap::point3d(c.x(), c.y(), c.z()), distance, cell);
+    *found = {{cell.x(), cell.y(), cell.z()}, static_cast<double>(distance)};
+    return distance >= 0.0F;  // else out of the grid
   }
 
  private:
@@ -63,7 +52,6 @@ class DynamicEdt : public Method {
   static constexpr float kReach = 1.3F;     // [m] of the robot
   static constexpr float kFarthest = 2.0F;  // [m] beyond that it does not tell
 
-  SphereSet set_;
   Points points_;
   std::unique_ptr<octomap::OcTree> tree_;
   std::unique_ptr<DynamicEDTOctomap> field_;

@@ -77,12 +77,22 @@ std::size_t nearest_of_all(const Points& points, const Eigen::Vector3f& center) 
   return nearest;
 }
 
-Answer sphere_answer(const Eigen::Vector3d& center, double radius, const Eigen::Vector3d& p_FO) {
-  const Eigen::Vector3d way = p_FO - center;
-  const double length = way.norm();
-  const Eigen::Vector3d direction =
-      length > 0.0 ? Eigen::Vector3d(way / length) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-  return {length - radius, center + radius * direction, p_FO};
+void BySpheres::query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) {
+  for (std::size_t link = 0; link < X_FL.size(); ++link) {
+    Answer& best = (*answers)[link];
+    best.distance = std::numeric_limits<double>::infinity();
+    for (const SphereSet::Sphere& sphere : set_.links[link]) {
+      const Eigen::Vector3d center = X_FL[link] * sphere.center;
+      const double reach = best.distance + sphere.radius;
+      Nearest found;
+      if (reach <= 0.0 || !nearest(center, reach, &found) || found.distance >= reach) continue;
+      const Eigen::Vector3d way = found.p_FO - center;
+      const double length = way.norm();
+      const Eigen::Vector3d direction =
+          length > 0.0 ? Eigen::Vector3d(way / length) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+      best = {found.distance - sphere.radius, center + sphere.radius * direction, found.p_FO};
+    }
+  }
 }
 
 PrunedByBox::PrunedByBox(const Robot& robot) : last_(robot.meshes.size(), 0) {

@@ -25,8 +25,25 @@ void box_distances_sq(const Points& points, const Eigen::Isometry3d& X_LF,
 /// Index of the point nearest to `center`.
 std::size_t nearest_of_all(const Points& points, const Eigen::Vector3f& center);
 
-/// The answer of a sphere about `center` (fixed frame), for the obstacle point nearest to it.
-Answer sphere_answer(const Eigen::Vector3d& center, double radius, const Eigen::Vector3d& p_FO);
+/// Spheres that stand for the links, one after the other; each is only asked for what is nearer than
+/// the link's spheres before it.
+class BySpheres : public Method {
+ public:
+  explicit BySpheres(const SphereSet& set) : set_(set) { spheres = set.size(); }
+  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override;
+
+ protected:
+  struct Nearest {
+    Eigen::Vector3d p_FO;
+    double distance;  ///< [m]
+  };
+  /// What is nearest to `center` (fixed frame). @returns false where it can tell that nothing is
+  /// within `reach` [m] > 0, which may be infinite
+  virtual bool nearest(const Eigen::Vector3d& center, double reach, Nearest* found) = 0;
+
+ private:
+  SphereSet set_;
+};
 
 /// A link's exact distance, point by point: what the box leaves, the last answer's point first.
 class PrunedByBox : public Method {

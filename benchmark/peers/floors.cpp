@@ -1,5 +1,4 @@
 #include <cstring>
-#include <limits>
 
 #include "peers/flat.h"
 
@@ -24,31 +23,24 @@ class Memcpy : public Method {
   std::vector<float> copy_;
 };
 
-class BruteForce : public Method {
+class BruteForce : public BySpheres {
  public:
-  explicit BruteForce(const SphereSet& set) : set_(set) {
+  explicit BruteForce(const SphereSet& set) : BySpheres(set) {
     name = "brute force, SIMD";
     kind = Kind::kSpheres;
-    spheres = set.size();
     largest_error = set.gap + kRounding;
     least_error = -set.gap;  // a ball may come out through a hole of the mesh
   }
   void ingest(const Frame& frame) override { points_.read(frame); }
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
-    for (std::size_t link = 0; link < X_FL.size(); ++link) {
-      Answer& best = (*answers)[link];
-      best.distance = std::numeric_limits<double>::infinity();
-      for (const SphereSet::Sphere& sphere : set_.links[link]) {
-        const Eigen::Vector3d center = X_FL[link] * sphere.center;
-        const std::size_t i = nearest_of_all(points_, center.cast<float>());
-        const Answer answer = sphere_answer(center, sphere.radius, points_.at(i).cast<double>());
-        if (answer.distance < best.distance) best = answer;
-      }
-    }
+
+ protected:
+  bool nearest(const Eigen::Vector3d& center, double /*reach*/, Nearest* found) override {
+    found->p_FO = points_.at(nearest_of_all(points_, center.cast<float>())).cast<double>();
+    found->distance = (found->p_FO - center).norm();
+    return true;
   }
 
  private:
-  SphereSet set_;
   Points points_;
 };
 

@@ -66,6 +66,7 @@ using Methods = std::vector<std::unique_ptr<Method>>;
 void add_floors(const Robot& robot, const SphereSet& spheres, Methods* methods);
 void add_ours(const Robot& robot, Methods* methods);
 void add_nanoflann(const SphereSet& spheres, Methods* methods);
+void add_pcl(const SphereSet& spheres, Methods* methods);
 void add_signed_grid(const Robot& robot, Methods* methods);
 void add_embree(const Robot& robot, Methods* methods);
 void add_cgal(const Robot& robot, Methods* methods);

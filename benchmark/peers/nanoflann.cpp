@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <nanoflann.hpp>
 #include <optional>
 #include <vector>
@@ -28,13 +27,12 @@ struct Cloud {
 using Tree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud, 3>;
 
-class Nanoflann : public Method {
+class Nanoflann : public BySpheres {
  public:
   // @param voxel  [m] edge of the voxels; 0: all points
-  Nanoflann(const SphereSet& set, float voxel) : set_(set), voxel_(voxel) {
+  Nanoflann(const SphereSet& set, float voxel) : BySpheres(set), voxel_(voxel) {
     name = voxel > 0.0F ? "nanoflann on voxels of 1 cm" : "nanoflann";
     kind = Kind::kSpheres;
-    spheres = set.size();
     const double off = 0.5 * std::sqrt(3.0) * static_cast<double>(voxel);
     largest_error = set.gap + off + kRounding;
     least_error = -set.gap - off;
@@ -48,28 +46,19 @@ class Nanoflann : public Method {
     tree_->buildIndex();
   }
 
-  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
-    for (std::size_t link = 0; link < X_FL.size(); ++link) {
-      Answer& best = (*answers)[link];
-      best.distance = std::numeric_limits<double>::infinity();
-      for (const SphereSet::Sphere& sphere : set_.links[link]) {
-        const Eigen::Vector3d center = X_FL[link] * sphere.center;
-        const Eigen::Vector3f c = center.cast<float>();
-        std::size_t index = 0;
-        float distance_sq = 0.0F;
-        nanoflann::KNNResultSet<float> found(1);
-        found.init(&index, &distance_sq);
-        // Only what is nearer than the link's other spheres are.
-        const auto bound = static_cast<float>(best.distance + sphere.radius);
-        if (bound <= 0.0F) continue;
-        if (bound < 1e15F) distance_sq = bound * bound;
-        tree_->findNeighbors(found, c.data(), nanoflann::SearchParams());
-        if (found.size() == 0) continue;
-        const Answer answer =
-            sphere_answer(center, sphere.radius, cloud_.points.at(index).cast<double>());
-        if (answer.distance < best.distance) best = answer;
-      }
-    }
+ protected:
+  bool nearest(const Eigen::Vector3d& center, double reach, Nearest* found) override {
+    const Eigen::Vector3f c = center.cast<float>();
+    std::size_t index = 0;
+    float distance_sq = 0.0F;
+    nanoflann::KNNResultSet<float> result(1);
+    result.init(&index, &distance_sq);
+    if (reach < 1e15) distance_sq = static_cast<float>(reach * reach);
+    tree_->findNeighbors(result, c.data(), nanoflann::SearchParams());
+    if (result.size() == 0) return false;
+    found->p_FO = cloud_.points.at(index).cast<double>();
+    found->distance = (found->p_FO - center).norm();
+    return true;
   }
 
  private:
@@ -99,7 +88,6 @@ class Nanoflann : public Method {
     }
   }
 
-  SphereSet set_;
   float voxel_;
   std::vector<std::int64_t> keys_;
   Cloud cloud_;

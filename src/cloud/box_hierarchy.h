@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -17,7 +18,12 @@ struct PaddedBox {
     min = min.min(other.min);
     max = max.max(other.max);
   }
-  float diagonal() const { return (max - min).matrix().norm(); }
+  /// Number by number: often they were just written so, and a vector of them would have to wait.
+  float diagonal_sq() const {
+    const float x = max[0] - min[0], y = max[1] - min[1], z = max[2] - min[2];
+    return x * x + y * y + z * z;
+  }
+  float diagonal() const { return std::sqrt(diagonal_sq()); }
 };
 
 /// Of a BoxNode or BoxTile: all its slots far away.

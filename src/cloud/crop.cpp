@@ -208,16 +208,15 @@ RawCloud flattened(RawCloud cloud) {
 }
 
 // Writes every point and moves on only past those to keep: no branch to mispredict.
-void append(const CropBlock& block, std::size_t count, std::uint32_t first_id, CroppedCloud* out) {
-  std::size_t size = out->size;
+// @returns how many are kept
+std::size_t append(const CropBlock& block, std::size_t count, std::uint32_t first_id,
+                   CloudPoint* to) {
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    out->x[size] = block.x[i];
-    out->y[size] = block.y[i];
-    out->z[size] = block.z[i];
-    out->id[size] = first_id + static_cast<std::uint32_t>(i);
-    size += static_cast<std::size_t>(block.x[i] == block.x[i]);
+    to[kept] = {block.x[i], block.y[i], block.z[i], first_id + static_cast<std::uint32_t>(i)};
+    kept += static_cast<std::size_t>(block.x[i] == block.x[i]);
   }
-  out->size = size;
+  return kept;
 }
 
 }  // namespace
@@ -264,15 +263,11 @@ std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t colum
   return static_cast<std::size_t>(kept);
 }
 
-void crop(const RawCloud& raw, const CropPose& pose, CroppedCloud* cropped, IngestCounts* counts) {
-  const std::size_t n = raw.size();
-  if (cropped->x.size() <= n) {  // one slot to spare, for the point after the last that is kept
-    cropped->x.resize(n + 1);
-    cropped->y.resize(n + 1);
-    cropped->z.resize(n + 1);
-    cropped->id.resize(n + 1);
-  }
-  cropped->size = 0;
+std::size_t crop(const RawCloud& raw, const CropPose& pose, std::vector<CloudPoint>* points,
+                 IngestCounts* counts) {
+  // One to spare, for the point after the last that is kept.
+  if (points->size() <= raw.size()) points->resize(raw.size() + 1);
+  CloudPoint* to = points->data();
   const RawCloud cloud = flattened(raw);
   CropBlock block;
   std::uint32_t id = 0;
@@ -280,11 +275,12 @@ void crop(const RawCloud& raw, const CropPose& pose, CroppedCloud* cropped, Inge
     for (std::size_t column = 0; column < cloud.width; column += kCropBlock) {
       const std::size_t count = std::min(kCropBlock, cloud.width - column);
       if (crop_points(cloud, row, column, count, pose, &block, counts) > 0) {
-        append(block, count, id, cropped);
+        to += append(block, count, id, to);
       }
       id += static_cast<std::uint32_t>(count);
     }
   }
+  return static_cast<std::size_t>(to - points->data());
 }
 
 }  // namespace ist

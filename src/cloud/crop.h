@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "cloud/morton_order.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/cloud/raw_cloud.h"
 
@@ -57,15 +58,12 @@ constexpr std::size_t kPatchSide = 16;  ///< pixels; a patch is a block
 std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t column,
                        const CropPose& pose, CropBlock* block, IngestCounts* counts);
 
-/// The points of a cloud that are finite and in range, in the fixed frame.
-struct CroppedCloud {
-  std::vector<float> x, y, z;     ///< [m] from the origin along the fixed frame's axes
-  std::vector<std::uint32_t> id;  ///< index of the point in the message
-  std::size_t size = 0;           ///< points; the vectors may be longer
-};
-
 /// Reads a message's bytes once: drops what is not finite or not in range, and counts
 /// `not_a_number` and `infinite`.
-void crop(const RawCloud& cloud, const CropPose& pose, CroppedCloud* cropped, IngestCounts* counts);
+/// @param points  relative to the origin, along the fixed frame's axes; the id is the number of the
+///                point in the message. Grows to more than are kept, and never shrinks
+/// @returns how many are kept
+std::size_t crop(const RawCloud& cloud, const CropPose& pose, std::vector<CloudPoint>* points,
+                 IngestCounts* counts);
 
 }  // namespace ist

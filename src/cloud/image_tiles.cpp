@@ -12,10 +12,9 @@
 namespace ist {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t kSampledBlocks = 64;
 
-// A tile in which pixels are missing may be this many times as long as full ones.
+// A tile that is not known to be good may be this many times as long as those that are.
 constexpr float kAsLong = 1.5F;
 
 // Bits of the slots in the lower half of a box, across its longest side.
@@ -110,30 +109,28 @@ class ImageReader {
     std::uint32_t as_they_are = 0, to_be_parted = 0;
   };
 
-  // Full tiles are known; others are good when they are no longer than full ones are.
+  // Full tiles that are as long as their pixels are apart are good; others are when they are no
+  // longer than those.
   Choice choose() const {
-    const float* diagonal_sq = tiles_.diagonal_sq;
     Choice choice;
-    std::uint32_t partial = 0;
+    std::uint32_t open = 0;
     float sum = 0.0F, count = 0.0F;
     for (std::size_t slot = 0; slot < kPatchTiles * kPatchTiles; ++slot) {
       const std::uint32_t kept = tiles_.kept_of(slot), bit = 1U << slot;
       if (kept == 0) continue;
-      if (kept != 0xFFFFU) {
-        partial |= bit;
-      } else if ((tiles_.suspicious & bit) != 0) {
-        choice.to_be_parted |= bit;
+      if (kept != 0xFFFFU || (tiles_.suspicious & bit) != 0) {
+        open |= bit;
       } else {
         choice.as_they_are |= bit;
-        sum += diagonal_sq[slot];
+        sum += tiles_.diagonal_sq[slot];
         count += 1.0F;
       }
     }
     const float longest_sq = kAsLong * kAsLong * sum;
-    for (std::size_t slot = 0; partial >> slot != 0; ++slot) {
-      if ((partial >> slot & 1U) == 0) continue;
-      const bool good = diagonal_sq[slot] * count <= longest_sq;
-      (good && count > 0.0F ? choice.as_they_are : choice.to_be_parted) |= 1U << slot;
+    for (std::size_t slot = 0; open >> slot != 0; ++slot) {
+      if ((open >> slot & 1U) == 0) continue;
+      const bool good = count > 0.0F && tiles_.diagonal_sq[slot] * count <= longest_sq;
+      (good ? choice.as_they_are : choice.to_be_parted) |= 1U << slot;
     }
     return choice;
   }

@@ -35,7 +35,7 @@ void check(const IngestConfig& config) {
 
 struct Ingest::Impl {
   IngestConfig config;
-  CroppedCloud cropped;
+  std::vector<CloudPoint> points;
   PointIndexBuilder builder;
   SelfFilter self_filter;
   Thinning thinning;
@@ -72,12 +72,10 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   if (is_image(cloud, pose)) {
     kept = index_image(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
   } else {
-    CroppedCloud& points = impl_->cropped;
-    crop(cloud, pose, &points, &counts);
-    kept = points.size;
-    impl_->builder.build(
-        pose.origin, points.x.data(), points.y.data(), points.z.data(), points.id.data(), kept,
-        on_robot == nullptr ? PointFilter() : on_robot->as_filter(), &snapshot->index);
+    kept = crop(cloud, pose, &impl_->points, &counts);
+    impl_->builder.build(pose.origin, impl_->points.data(), kept,
+                         on_robot == nullptr ? PointFilter() : on_robot->as_filter(),
+                         &snapshot->index);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range =

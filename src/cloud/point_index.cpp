@@ -6,7 +6,9 @@ namespace ist {
 
 void PointIndex::build(const Eigen::Vector3d& origin, const float* x, const float* y,
                        const float* z, const std::uint32_t* id, std::size_t n) {
-  PointIndexBuilder().build(origin, x, y, z, id, n, {}, this);
+  std::vector<CloudPoint> points(n);
+  for (std::size_t i = 0; i < n; ++i) points[i] = {x[i], y[i], z[i], id[i]};
+  PointIndexBuilder().build(origin, points.data(), n, {}, this);
 }
 
 }  // namespace ist

@@ -28,8 +28,13 @@ Lanes mask_of_first(std::int32_t count) {
   return LaneMap(kMasks + kPointWidth - count);
 }
 
-// Where the second part begins when points are parted at the longest step between neighbours.
-std::int32_t longest_leap(const PointTile& tile) {
+// The longest step between neighbours.
+struct Leap {
+  std::int32_t to;  // the point after it
+  float length_sq;  // [m^2]
+};
+
+Leap longest_leap(const PointTile& tile) {
   // Fifteen steps, in two overlapping halves.
   constexpr int kHalf = kPointWidth / 2;
   using Half = Eigen::Array<float, kHalf, 1>;
@@ -47,18 +52,21 @@ std::int32_t longest_leap(const PointTile& tile) {
   const float longest = in_front ? front_longest : back_longest;
   int k = 0;
   while (k < kHalf - 1 && half[k] != longest) ++k;
-  return k + (in_front ? 1 : kHalf);
+  return {k + (in_front ? 1 : kHalf), longest};
 }
 
 // Shortens a tile until no leap is worth a cut; gives its box.
 PaddedBox cut(PointTile* tile) {
   PaddedBox box = box_of(*tile);
   while (tile->count > 1) {
-    const std::int32_t front = longest_leap(*tile);
-    const Lanes mask = mask_of_first(front);
+    // The whole is no longer than both parts and the leap together: a short leap is not worth it.
+    constexpr float kShort = 0.99F * (1.0F - kCutBelow);
+    const Leap leap = longest_leap(*tile);
+    if (leap.length_sq < kShort * kShort * box.diagonal_sq()) break;
+    const Lanes mask = mask_of_first(leap.to);
     const PaddedBox front_box = box_of(*tile, mask), back_box = box_of(*tile, -mask);
     if (!is_worth_a_cut(front_box, back_box, box)) break;
-    tile->count = front;
+    tile->count = leap.to;
     repeat_last(tile);
     box = front_box;
   }
@@ -121,20 +129,20 @@ PointTile* PointIndexBuilder::room(std::size_t count) {
   return &tiles[used_];
 }
 
-void PointIndexBuilder::keep(const PaddedBox& all, const PointFilter& drop) {
+void PointIndexBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
   PointTile& tile = index_->tiles_[used_];
-  PaddedBox box = all;
+  PaddedBox left = box;
   if (drop) {
     const std::uint32_t dropped = drop(tile, box);
     if (dropped != 0) {
       remove(dropped, &tile);
       if (tile.count == 0) return;
-      box = box_of(tile);
+      left = box_of(tile);
     }
   }
   put_unused_far_away(&tile);
   index_->size_ += static_cast<std::size_t>(tile.count);
-  loose_.push_back({box, ~static_cast<std::int32_t>(used_)});
+  loose_.push_back({left, ~static_cast<std::int32_t>(used_)});
   ++used_;
 }
 
@@ -177,46 +185,51 @@ void PointIndexBuilder::finish() {
   index_->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
 }
 
-// Runs of sixteen, cut where the order leaps. load(i, tile, k) puts the i-th point into slot k.
-template <typename Load>
-void PointIndexBuilder::add_runs(std::size_t n, const PointFilter& drop, const Load& load) {
-  for (std::size_t first = 0; first < n;) {
+// Runs of sixteen, cut where the order leaps.
+void PointIndexBuilder::add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop) {
+  while (n > 0) {
     PointTile& tile = *room(1);
-    const std::size_t count = std::min<std::size_t>(kWidth, n - first);
-    for (std::size_t k = 0; k < count; ++k) load(first + k, &tile, k);
+    const std::size_t count = std::min<std::size_t>(kWidth, n);
+    for (std::size_t k = 0; k < count; ++k) {
+      tile.x[k] = points[k].x;
+      tile.y[k] = points[k].y;
+      tile.z[k] = points[k].z;
+      tile.id[k] = points[k].id;
+    }
     tile.count = static_cast<std::int32_t>(count);
     repeat_last(&tile);
     const PaddedBox box = cut(&tile);
-    first += static_cast<std::size_t>(tile.count);
+    points += tile.count;
+    n -= static_cast<std::size_t>(tile.count);
     keep(box, drop);
   }
 }
 
-void PointIndexBuilder::build(const Eigen::Vector3d& origin, const float* x, const float* y,
-                              const float* z, const std::uint32_t* id, std::size_t n,
-                              const PointFilter& drop, PointIndex* index) {
-  morton_.sort(x, y, z, n, &order_);
+// Nodes over the tiles of some cells, when there are enough to fill them.
+void PointIndexBuilder::end_cell() {
+  constexpr std::size_t kEnough = 4 * kWidth;
+  if (loose_.size() < kEnough) return;
+  hierarchy_.append_nodes(loose_, &index_->nodes_);
+  loose_.clear();
+}
+
+void PointIndexBuilder::build(const Eigen::Vector3d& origin, const CloudPoint* points,
+                              std::size_t n, const PointFilter& drop, PointIndex* index) {
+  const CloudPoint* sorted = morton_.sort(points, n);
   start(origin, index);
-  add_runs(n, drop, [&](std::size_t i, PointTile* tile, std::size_t k) {
-    const std::uint32_t point = order_[i];
-    tile->x[k] = x[point];
-    tile->y[k] = y[point];
-    tile->z[k] = z[point];
-    tile->id[k] = id[point];
-  });
+  std::size_t begin = 0;
+  for (const std::size_t end : morton_.cell_ends()) {
+    add_runs(sorted + begin, end - begin, drop);
+    begin = end;
+    end_cell();
+  }
   finish();
 }
 
-void PointIndexBuilder::build_in_order(const Eigen::Vector3d& origin, const float* x,
-                                       const float* y, const float* z, const std::uint32_t* id,
-                                       std::size_t n, PointIndex* index) {
+void PointIndexBuilder::build_in_order(const Eigen::Vector3d& origin,
+                                       const std::vector<CloudPoint>& points, PointIndex* index) {
   start(origin, index);
-  add_runs(n, {}, [&](std::size_t i, PointTile* tile, std::size_t k) {
-    tile->x[k] = x[i];
-    tile->y[k] = y[i];
-    tile->z[k] = z[i];
-    tile->id[k] = id[i];
-  });
+  add_runs(points.data(), points.size(), {});
   finish();
 }
 

@@ -21,26 +21,26 @@ using PointFilter = std::function<std::uint32_t(const PointTile& tile, const Pad
 ///
 /// Morton order brings neighbours together. Runs of 16 become tiles, but a run is cut where the
 /// order leaps, so that no tile has a big box. Above the tiles, space is divided at medians across
-/// the longest side: grouping along the Morton order alone makes boxes that overlap, and doubles
-/// what a query visits.
+/// the longest side, cell by cell of the order's coarsest grid: grouping along the Morton order
+/// alone makes boxes that overlap, and doubles what a query visits.
 class PointIndexBuilder {
  public:
   /// As PointIndex::build.
-  /// @param drop   may be empty. Called once for each tile-to-be, before boxes are made: to filter
-  ///               a tile at a time is much cheaper than a point at a time.
-  /// @param index  overwritten, its buffers reused
-  void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
-             const std::uint32_t* id, std::size_t n, const PointFilter& drop, PointIndex* index);
+  /// @param drop    may be empty. Called once for each tile-to-be, before boxes are made: to filter
+  ///                a tile at a time is much cheaper than a point at a time.
+  /// @param index   overwritten, its buffers reused
+  void build(const Eigen::Vector3d& origin, const CloudPoint* points, std::size_t n,
+             const PointFilter& drop, PointIndex* index);
 
   /// The same for points of which neighbours in the list are mostly neighbours in space.
-  void build_in_order(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
-                      const std::uint32_t* id, std::size_t n, PointIndex* index);
+  void build_in_order(const Eigen::Vector3d& origin, const std::vector<CloudPoint>& points,
+                      PointIndex* index);
 
   /// The same tile by tile, for who knows which points are neighbours: start(), then room() and
   /// keep() for each tile, then finish(). Before finish(), the index is not to be read.
   void start(const Eigen::Vector3d& origin, PointIndex* index);
   /// The next tiles, to be filled: points, ids and count.
-  PointTile* room(std::size_t tiles);
+  PointTile* room(std::size_t count);
   /// Keeps the first tile of room().
   /// @param box  of exactly its points
   void keep(const PaddedBox& box, const PointFilter& drop);
@@ -54,11 +54,10 @@ class PointIndexBuilder {
   void finish();
 
  private:
-  template <typename Load>
-  void add_runs(std::size_t n, const PointFilter& drop, const Load& load);
+  void add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop);
+  void end_cell();
 
   MortonOrder morton_;
-  std::vector<std::uint32_t> order_;   ///< numbers of the points, in Morton order
   std::vector<HierarchyChild> loose_;  ///< tiles that no node holds yet
   std::size_t neighbours_ = 0;         ///< first of them since the last end_neighbours()
   BoxHierarchy hierarchy_;

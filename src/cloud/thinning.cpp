@@ -57,19 +57,10 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
     }
   }
 
-  const std::size_t n = entries_.size();
-  x_.resize(n);
-  y_.resize(n);
-  z_.resize(n);
-  id_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    x_[i] = entries_[i].x;
-    y_[i] = entries_[i].y;
-    z_[i] = entries_[i].z;
-    id_[i] = entries_[i].id;
-  }
+  points_.clear();
+  for (const Entry& entry : entries_) points_.push_back({entry.x, entry.y, entry.z, entry.id});
   // Neighbours among the tiles have given neighbours.
-  builder->build_in_order(origin, x_.data(), y_.data(), z_.data(), id_.data(), n, thin);
+  builder->build_in_order(origin, points_, thin);
 }
 
 // The usual case, on its own for speed: a cell seen a moment ago has a better point already.

@@ -53,8 +53,7 @@ class Thinning {
   std::vector<std::uint32_t> table_;  ///< open addressing: number of an entry plus one, or 0
   /// Entries of the cells seen last, by their place: neighbours share cells.
   std::array<std::uint32_t, 512> recent_{};
-  std::vector<float> x_, y_, z_;
-  std::vector<std::uint32_t> id_;
+  std::vector<CloudPoint> points_;
 };
 
 }  // namespace ist

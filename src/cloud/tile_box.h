@@ -31,8 +31,8 @@ inline PaddedBox box_of(const PointTile& tile) {
 /// the whole's. Four by four points of a plane, halved, come to 1.6; a leap to 0.3. Measured on
 /// depth images and lidar scans, 0.6 to 0.8 is best: fewer cuts leave long tiles, more leave tiles
 /// half empty.
+constexpr float kCutBelow = 0.7F;
 inline bool is_worth_a_cut(const PaddedBox& front, const PaddedBox& back, const PaddedBox& whole) {
-  constexpr float kCutBelow = 0.7F;
   return front.diagonal() + back.diagonal() < kCutBelow * whole.diagonal();
 }
 

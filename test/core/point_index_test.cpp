@@ -24,6 +24,11 @@ struct Points {
     id.push_back(7 + 3 * static_cast<std::uint32_t>(id.size()));  // not the position
   }
   std::size_t size() const { return x.size(); }
+  std::vector<CloudPoint> list() const {
+    std::vector<CloudPoint> points;
+    for (std::size_t i = 0; i < size(); ++i) points.push_back({x[i], y[i], z[i], id[i]});
+    return points;
+  }
 };
 
 PointIndex build(const Points& points) {
@@ -292,8 +297,8 @@ TEST(PointIndex, dependsOnNothingButItsArguments) {
   PointIndexBuilder builder;
   PointIndex index;
   for (const Points* points : {&small, &large, &small, &small}) {
-    builder.build({1.0, 2.0, 3.0}, points->x.data(), points->y.data(), points->z.data(),
-                  points->id.data(), points->size(), {}, &index);
+    const std::vector<CloudPoint> list = points->list();
+    builder.build({1.0, 2.0, 3.0}, list.data(), list.size(), {}, &index);
   }
   EXPECT_TRUE(same(index, expected));
 }
@@ -303,8 +308,8 @@ TEST(PointIndex, buffersAreReused) {
   PointIndexBuilder builder;
   PointIndex index;
   const auto run = [&](const Points& points) {
-    builder.build({1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(),
-                  points.id.data(), points.size(), {}, &index);
+    const std::vector<CloudPoint> list = points.list();
+    builder.build({1.0, 2.0, 3.0}, list.data(), list.size(), {}, &index);
   };
   run(large);
   const auto* tiles = index.tiles().data();
@@ -321,9 +326,9 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
   const auto is_dropped = [](float x, float y) { return x > 0.2F || y < -0.9F; };
   PointIndex index;
   std::size_t asked = 0;
+  const std::vector<CloudPoint> list = points.list();
   PointIndexBuilder().build(
-      {1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
-      points.size(),
+      {1.0, 2.0, 3.0}, list.data(), list.size(),
       [&](const PointTile& tile, const PaddedBox& box) {
         asked += static_cast<std::size_t>(tile.count);
         Eigen::AlignedBox3f exact;
@@ -359,9 +364,10 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
 TEST(PointIndex, filterThatDropsAll) {
   const Points points = in_a_box(500, 1.0F, 4);
   PointIndex index;
+  const std::vector<CloudPoint> list = points.list();
   PointIndexBuilder().build(
-      {1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
-      points.size(), [](const PointTile&, const PaddedBox&) { return 0xFFFFU; }, &index);
+      {1.0, 2.0, 3.0}, list.data(), list.size(),
+      [](const PointTile&, const PaddedBox&) { return 0xFFFFU; }, &index);
   EXPECT_TRUE(index.empty());
   EXPECT_EQ(index.root(), -1);
   EXPECT_TRUE(index.nodes().empty());
