@@ -115,7 +115,8 @@ bool read_arguments(int argc, char** argv, Options* options, std::string* scene)
 }
 
 int run(const Options& options) {
-  const std::string document = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/packing.md";
+  const std::string folder = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/";
+  const std::string document = folder + "packing.md";
   int status = 0;
   for (const Part& part : kParts) {
     const auto& wanted = options.tables;
@@ -130,6 +131,7 @@ int run(const Options& options) {
     table.print();
     if (options.update_doc && !table.write(document)) status = 1;
   }
+  if (options.update_doc) plot_growth(document, folder + "packing_growth.svg");
   return status;
 }
 

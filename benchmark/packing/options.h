@@ -45,6 +45,9 @@ bool measure_hierarchy(const Options& options, Table* table);
 /// Runs some queries between callgrind's marks: `packing --count`, under valgrind.
 void count_instructions(const Options& options, const std::string& scene);
 
+/// Draws the document's table of growth into an SVG file.
+void plot_growth(const std::string& document, const std::string& path);
+
 Table time_table();
 Table gaps_table();
 Table certificate_table();

@@ -20,6 +20,10 @@ constexpr double kMaxOpening = 0.1;
 // Less volume than this share of area^1.5 is a sheet's: neither side is outside.
 constexpr double kMinVolume = 1e-9;
 
+// Pairs of shells that are looked at: about a second. Meshes of many thousand shells of which many
+// are inside out are left as they are.
+constexpr std::size_t kMaxPairs = 200000000;
+
 using Triangles = std::vector<std::size_t>;
 
 bool is_inside_out(const TriangleMesh& mesh, const Triangles& triangles) {
@@ -115,7 +119,7 @@ void turn_outward(TriangleMesh* mesh) {
   for (std::size_t s = 0; s < shells.size(); ++s) {
     if (is_inside_out(*mesh, shells[s])) turned.push_back(s);
   }
-  if (turned.empty()) return;
+  if (turned.empty() || turned.size() > kMaxPairs / shells.size()) return;
   Nesting nesting(*mesh, shells);
   std::vector<bool> turns(shells.size(), false);
   for (const std::size_t s : turned) {

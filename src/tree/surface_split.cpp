@@ -19,7 +19,10 @@ double area(const Eigen::AlignedBox3d& box) {
   return 2.0 * (s.x() * s.y() + s.y() * s.z() + s.z() * s.x());
 }
 
-double leaves(std::uint32_t balls) { return static_cast<double>((balls + kWidth - 1) / kWidth); }
+double leaves(std::uint32_t balls) {
+  const std::uint32_t count = (balls + kWidth - 1) / kWidth;
+  return static_cast<double>(count);
+}
 
 void sort_along(int axis, const BallRange& range, BallOrder* order) {
   const auto begin = order->indices.begin();
