@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -29,7 +28,7 @@ std::vector<std::uint32_t> place_ids(const std::vector<Eigen::Vector3d>& vertice
 
 }  // namespace
 
-std::size_t count_boundary_edges(const TriangleMesh& mesh) {
+std::vector<OpenEdge> open_edges(const TriangleMesh& mesh) {
   const std::vector<std::uint32_t> id = place_ids(mesh.vertices);
   // An edge, and whether it is passed forward (1) or backward (-1).
   std::vector<std::pair<std::uint64_t, int>> edges;
@@ -41,17 +40,26 @@ std::size_t count_boundary_edges(const TriangleMesh& mesh) {
     }
   }
   std::sort(edges.begin(), edges.end());
-  std::size_t open = 0;
+  std::vector<OpenEdge> open;
   for (std::size_t first = 0; first < edges.size();) {
     std::size_t last = first;
     int balance = 0;
     while (last < edges.size() && edges[last].first == edges[first].first) {
       balance += edges[last++].second;
     }
-    open += static_cast<std::size_t>(std::abs(balance));
+    const auto low = static_cast<std::uint32_t>(edges[first].first >> 32U);
+    const auto high = static_cast<std::uint32_t>(edges[first].first);
+    if (balance > 0) open.push_back({low, high, balance});
+    if (balance < 0) open.push_back({high, low, -balance});
     first = last;
   }
   return open;
+}
+
+std::size_t count_boundary_edges(const TriangleMesh& mesh) {
+  std::size_t count = 0;
+  for (const OpenEdge& edge : open_edges(mesh)) count += static_cast<std::size_t>(edge.count);
+  return count;
 }
 
 bool is_closed_mesh(const TriangleMesh& mesh) { return count_boundary_edges(mesh) == 0; }

@@ -68,11 +68,11 @@ MedialBallFinder::InnerBall climb(const MedialBallFinder& finder, const Eigen::V
       step *= 0.5;
       continue;
     }
-    // A step shorter than the clearance crosses no triangle.
+    // A step shorter than the clearance crosses no triangle, and leaves through no hole.
     const Eigen::Vector3d next = ball.center + step / slope * direction;
     obstacle = finder.nearest(next);
     contacts.add(obstacle.contact);
-    if (obstacle.distance > (1.0 + kLeastRise) * ball.radius && finder.stays_inside(next)) {
+    if (obstacle.distance > (1.0 + kLeastRise) * ball.radius) {
       ball = {next, obstacle.distance};
       step = std::min(1.5 * step, 0.9 * ball.radius);
     } else {

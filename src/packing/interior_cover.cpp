@@ -10,7 +10,16 @@
 namespace ist {
 namespace {
 
-enum class Cell { kOutside, kInside, kBoundary };
+// Where a hole leaves no room for inner balls, outer ones have this share of the way to the mesh,
+// and of the gap that is wanted.
+constexpr double kBehindHole = 0.5;
+
+// A cell by a hole that may have an inside is taken to have one when it is as small as this share
+// of the gap that is wanted.
+constexpr double kUnclearSize = 0.25;
+constexpr double kWindingError = 0.01;
+
+enum class Cell { kOutside, kInside, kAtSurface, kUnclear };
 
 class InteriorCover {
  public:
@@ -72,24 +81,32 @@ class InteriorCover {
     const double radius = half.norm();
     const Cell kind = classify(center, radius);
     if (kind == Cell::kOutside) return;
-    if (kind == Cell::kBoundary && 2.0 * radius <= target_) return;
-    if (kind == Cell::kInside && fill(center, radius, match)) return;
+    if (kind == Cell::kAtSurface && 2.0 * radius <= target_) return;
+    const bool is_wanted =
+        kind == Cell::kInside || (kind == Cell::kUnclear && radius <= kUnclearSize * target_);
+    if (is_wanted && fill(center, radius, kind, match)) return;
     for (const Eigen::Vector3d& corner : corners) {
       visit(0.5 * (center + corner), 0.5 * half, match.ball);
     }
   }
 
   // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
-  bool fill(const Eigen::Vector3d& center, double radius, const BallSearch::Match& match) {
+  bool fill(const Eigen::Vector3d& center, double radius, Cell kind,
+            const BallSearch::Match& match) {
     const double uncovered = search_.best(&center, 1, match.ball).cost;
     if (uncovered <= 0.5 * target_ && 2.0 * radius > 0.5 * target_) return false;
     if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
       return true;
     }
-    const MedialBallFinder::InnerBall ball = finder_.around(center, 0.1 * target_);
-    packing_.balls.push_back({ball.center, ball.radius, ball.radius});
-    search_.add(ball.center, ball.radius);
+    const MedialBallFinder::InnerBall ball =
+        kind == Cell::kInside
+            ? finder_.around(center, 0.1 * target_)
+            : MedialBallFinder::InnerBall{center, -std::sqrt(bvh_.closest(center).distance_sq)};
+    const double cover_radius =
+        ball.radius < 0.0 ? kBehindHole * std::max(-ball.radius, target_) : ball.radius;
+    packing_.balls.push_back({ball.center, ball.radius, cover_radius});
+    search_.add(ball.center, cover_radius);
     balls_.add(ball.center, ball.radius);
     return false;
   }
@@ -99,13 +116,15 @@ class InteriorCover {
   // bounds its rise from the centre to the cell's corners.
   Cell classify(const Eigen::Vector3d& center, double radius) const {
     const double distance = std::sqrt(bvh_.closest(center).distance_sq);
-    if (distance <= radius) return Cell::kBoundary;
+    if (distance <= radius) return Cell::kAtSurface;
     if (finder_.is_closed()) return bvh_.is_inside(center) ? Cell::kInside : Cell::kOutside;
     const double q = radius / distance;
     const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
-    const double w = bvh_.quick_winding_number(center) + TriangleBvh::kQuickWindingError;
-    if (std::max(w, 0.0) * rise < 0.5) return Cell::kOutside;
-    return w > 0.5 ? Cell::kInside : Cell::kBoundary;
+    const double quick = bvh_.quick_winding_number(center);
+    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) return Cell::kOutside;
+    const double w = bvh_.winding_number(center);
+    if (std::max(w + kWindingError, 0.0) * rise < 0.5) return Cell::kOutside;
+    return w > 0.5 ? Cell::kInside : Cell::kUnclear;
   }
 
   const TriangleBvh& bvh_;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "geometry/boundary_edges.h"
+#include "hole_guard.h"
 #include "interior_cover.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/tessellation.h"
@@ -19,8 +19,13 @@ namespace {
 // The share of the wanted error that an inscribed prism may take.
 constexpr double kTessellationShare = 0.1;
 
-// Smaller holes than this share of the wanted error are left as they are.
+// Room for a ball smaller than this share of the wanted error is left as it is.
 constexpr double kHoleShare = 0.5;
+
+// How far beyond what they must, inner balls stay away from holes in the mesh, as a share of the
+// wanted error, and at least of the mesh's size.
+constexpr double kGuardShare = 0.1;
+constexpr double kLeastGuard = 1e-3;
 
 // About how the time goes.
 constexpr double kSurfaceShare = 0.6;
@@ -80,7 +85,10 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
   const TriangleBvh bvh(mesh);
   BallSearch balls;
   const bool may_overlap = config.order == PackingOrder::kMedial;
-  const MedialBallFinder finder(bvh, is_closed_mesh(mesh), may_overlap ? nullptr : &balls);
+  const double tolerance =
+      std::max(kGuardShare * config.max_error, kLeastGuard * bvh.bounds().sizes().norm());
+  HoleGuard guard(mesh, bvh, tolerance);
+  const MedialBallFinder finder(bvh, &guard, may_overlap ? nullptr : &balls);
   SurfaceCover cover(mesh, finder, &balls);
   std::optional<VolumeFiller> holes;
   if (!may_overlap) holes.emplace(bvh, finder, balls, kHoleShare * config.max_error);

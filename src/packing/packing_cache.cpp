@@ -151,7 +151,7 @@ bool is_sound(const PackingCertificate& certificate) {
 }
 
 bool is_sound(const Ball& ball) {
-  return ball.center.allFinite() && is_length(ball.radius) && std::isfinite(ball.cover_radius) &&
+  return ball.center.allFinite() && std::isfinite(ball.radius) && is_length(ball.cover_radius) &&
          ball.cover_radius >= ball.radius;
 }
 

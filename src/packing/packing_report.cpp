@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "ball_search.h"
 
@@ -11,7 +12,8 @@ namespace {
 
 constexpr int kVolumeSamples = 100000;
 constexpr int kDirections = 100;
-constexpr int kBisections = 30;
+constexpr int kMarchSteps = 12;
+constexpr double kTouch = 1e-9;  // [m]
 constexpr double kGoldenAngle = 2.39996322972865332;
 
 // Evenly spread in the unit cube (Roberts' R3 sequence).
@@ -28,15 +30,20 @@ Eigen::Vector3d direction(int i) {
   return {radius * std::cos(kGoldenAngle * i), radius * std::sin(kGoldenAngle * i), z};
 }
 
-// How far outside the end of this radius of the ball is, along it.
-double bulge(const Solid& solid, const Ball& ball, const Eigen::Vector3d& radius) {
-  if (solid.is_inside(ball.center + radius)) return 0.0;
-  double inside = 0.0, outside = 1.0;
-  for (int i = 0; i < kBisections; ++i) {
-    const double middle = 0.5 * (inside + outside);
-    (solid.is_inside(ball.center + middle * radius) ? inside : outside) = middle;
+// How much nearer the ball is than the mesh to the first point outside that is met along a ray.
+double bulge(const Solid& solid, const Ball& ball, const Eigen::Vector3d& ray) {
+  double way = ball.radius;
+  for (int i = 0; i < kMarchSteps; ++i) {
+    const Eigen::Vector3d p = ball.center + way * ray;
+    const double distance =
+        std::abs(solid.distance_outside(p, std::numeric_limits<double>::infinity()).distance);
+    const double nearer = ball.radius + distance - way;
+    // Along a ray this does not grow.
+    if (nearer <= kTouch) return 0.0;
+    if (!solid.is_inside(p)) return nearer;
+    way += std::min(nearer, 0.98 * distance);  // short of the mesh
   }
-  return (1.0 - inside) * ball.radius;
+  return 0.0;
 }
 
 double protrusion(const Solid& solid, const Ball& ball) {
@@ -44,7 +51,7 @@ double protrusion(const Solid& solid, const Ball& ball) {
   double farthest = std::max(0.0, ball.radius - depth);
   if (!solid.has_holes()) return farthest;
   for (int i = 0; i < kDirections; ++i) {
-    farthest = std::max(farthest, bulge(solid, ball, ball.radius * direction(i)));
+    farthest = std::max(farthest, bulge(solid, ball, direction(i)));
   }
   return farthest;
 }

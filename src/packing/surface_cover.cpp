@@ -16,6 +16,8 @@ constexpr double kSlacks[] = {0.6, 0.33, 0.15};
 // As much of the gap a disjoint ball may leave, if it is the largest of its neighbourhood.
 constexpr double kLooseSlack = 0.9;
 constexpr int kProgressInterval = 256;
+// Searches for a ball that no hole speaks against.
+constexpr int kMaxTries = 8;
 
 // A patch whose gap is known to be this share of its bound gets a ball; else it is split.
 constexpr double kTight = 0.8;
@@ -47,6 +49,17 @@ bool SurfaceCover::fill_hole(double at_least, VolumeFiller* holes) {
   return ball.has_value();
 }
 
+// What a search finds, repeated where a hole speaks against it; at last the surface point s itself.
+template <class Search>
+MedialBallFinder::InnerBall SurfaceCover::admitted(const Eigen::Vector3d& s,
+                                                   const Search& search) const {
+  for (int i = 0; i < kMaxTries; ++i) {
+    const MedialBallFinder::InnerBall ball = search();
+    if (finder_.is_closed() || ball.radius <= 0.0 || finder_.admits(ball)) return ball;
+  }
+  return {s, 0.0};
+}
+
 // The first ball is as large as it gets, or touches the largest triangle.
 void SurfaceCover::seed(VolumeFiller* holes) {
   if (fill_hole(0.0, holes)) return;
@@ -63,7 +76,8 @@ void SurfaceCover::seed(VolumeFiller* holes) {
   }
   const Eigen::Vector3d middle =
       (mesh_.corner(largest, 0) + mesh_.corner(largest, 1) + mesh_.corner(largest, 2)) / 3.0;
-  add_ball(finder_.at_surface(middle, normal(largest), 1e3 * smallest_patch_));
+  const double slack = 1e3 * smallest_patch_;
+  add_ball(admitted(middle, [&] { return finder_.at_surface(middle, normal(largest), slack); }));
 }
 
 void SurfaceCover::cover_triangles() {
@@ -166,6 +180,11 @@ void SurfaceCover::split_or_fill(const Patch& patch, double target) {
 
 MedialBallFinder::InnerBall SurfaceCover::ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
                                                   double gap) const {
+  return admitted(s, [&] { return candidate(s, triangle, gap); });
+}
+
+MedialBallFinder::InnerBall SurfaceCover::candidate(const Eigen::Vector3d& s,
+                                                    std::uint32_t triangle, double gap) const {
   const auto left = [&s](const MedialBallFinder::InnerBall& ball) {
     return (ball.center - s).norm() - ball.radius;
   };
@@ -183,7 +202,7 @@ MedialBallFinder::InnerBall SurfaceCover::ball_at(const Eigen::Vector3d& s, std:
     best = ball;
   }
   if (!finder_.is_disjoint() || best.radius <= 0.0) return best;
-  const MedialBallFinder::InnerBall top = finder_.without_bulge(climb(finder_, best.center));
+  const MedialBallFinder::InnerBall top = climb(finder_, best.center);
   return left(top) <= kLooseSlack * gap ? top : best;
 }
 

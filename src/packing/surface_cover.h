@@ -57,6 +57,10 @@ class SurfaceCover {
   void split(const Patch& patch);
   MedialBallFinder::InnerBall ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
                                       double gap) const;
+  template <class Search>
+  MedialBallFinder::InnerBall admitted(const Eigen::Vector3d& s, const Search& search) const;
+  MedialBallFinder::InnerBall candidate(const Eigen::Vector3d& s, std::uint32_t triangle,
+                                        double gap) const;
   Eigen::Vector3d normal(std::uint32_t triangle) const;
 
   const TriangleMesh& mesh_;

@@ -12,11 +12,12 @@ namespace {
 constexpr double kEnough = 0.9;
 // A prototype starts where the cell is small against the clearance: a finer start climbs no higher.
 constexpr double kClimbAt = 0.5;
-// In an open mesh, what is less inside than this has no inside nearby.
-constexpr double kHardlyInside = 0.2;
-constexpr double kFinestSearch = 0.25;
 // Steps of a search between two questions whether to go on.
-constexpr std::uint32_t kStopInterval = 256;
+constexpr std::uint32_t kStopInterval = 64;
+// Refusals by holes, of one prototype and in all: a mesh that is nothing but holes has no more
+// room.
+constexpr int kMaxRefusals = 2;
+constexpr int kMaxRefusalsInAll = 500;
 
 }  // namespace
 
@@ -38,16 +39,11 @@ void VolumeFiller::add_cell(const Eigen::Vector3d& center, double half, const Ce
   const double to_surface = std::sqrt(bvh_.closest(center).distance_sq);
   // Within the ball about the parent's centre that no triangle enters, the side is the same.
   const bool same_side = parent != nullptr && finder_.is_closed() &&
-                         std::abs(parent->surface) > (center - parent->center).norm();
-  const bool inside = same_side ? parent->surface > 0.0 : bvh_.is_inside(center);
-  // In an open mesh the inside may begin between triangles, at once with a large clearance; it is
-  // looked for down to a part of that.
-  const bool may_begin = !finder_.is_closed() && radius > kFinestSearch * to_surface &&
-                         bvh_.quick_winding_number(center) > kHardlyInside;
-  if (!inside && !may_begin && to_surface > radius) return;
-  const double signed_distance = inside ? to_surface : -to_surface;
-  Cell cell{center, half, signed_distance, signed_distance, 0.0, 0, false};
-  cell.bound = radius + (may_begin ? to_surface : signed_distance);
+                         std::abs(parent->room) > (center - parent->center).norm();
+  const bool inside = same_side ? parent->room > 0.0 : bvh_.is_inside(center);
+  // Balls keep as far away from a point outside as the mesh, on the other side of a hole too.
+  const double room = inside ? finder_.holes().nearest(center, to_surface).distance : -to_surface;
+  Cell cell{center, half, room, room, room + radius, 0, false};
   update(&cell);
   if (cell.bound < min_radius_) return;
   cells_.push_back(cell);
@@ -66,11 +62,11 @@ bool VolumeFiller::update(Cell* cell) const {
   return true;
 }
 
-void VolumeFiller::add_prototype(const Eigen::Vector3d& start) {
-  const MedialBallFinder::InnerBall ball = finder_.without_bulge(climb(finder_, start));
+void VolumeFiller::add_prototype(const Eigen::Vector3d& start, int refusals) {
+  const MedialBallFinder::InnerBall ball = climb(finder_, start);
   // A little below min_radius too: what is left of a cell must be decided before its size is 0.
   if (ball.radius < kEnough * min_radius_ || ball.radius <= 0.0) return;
-  prototypes_.push_back({ball, count()});
+  prototypes_.push_back({ball, count(), refusals});
   std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
 }
 
@@ -87,7 +83,7 @@ void VolumeFiller::revise_prototypes() {
       prototypes_.push_back(prototype);
       std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
     } else if (clear > 0.0) {
-      add_prototype(prototype.ball.center);
+      add_prototype(prototype.ball.center, prototype.refusals);
     }
   }
 }
@@ -105,9 +101,16 @@ std::optional<MedialBallFinder::InnerBall> VolumeFiller::next(double at_least) {
     if (cells_.empty() || cells_.front().bound <= std::max(found / kEnough, at_least)) {
       if (found <= 0.0 || found < kEnough * at_least) return std::nullopt;
       std::pop_heap(prototypes_.begin(), prototypes_.end(), Smaller());
-      const MedialBallFinder::InnerBall ball = prototypes_.back().ball;
+      const Prototype prototype = prototypes_.back();
       prototypes_.pop_back();
-      return ball;
+      const MedialBallFinder::InnerBall& ball = prototype.ball;
+      if (finder_.is_closed() || finder_.admits(ball)) return ball;
+      stopped_ = ++refusals_ >= kMaxRefusalsInAll;
+      // It climbs anew from where it is, away from the hole, but not without end.
+      if (prototype.refusals < kMaxRefusals && finder_.nearest(ball.center).distance > 0.0) {
+        add_prototype(ball.center, prototype.refusals + 1);
+      }
+      continue;
     }
     std::pop_heap(cells_.begin(), cells_.end(), BoundLess());
     Cell cell = cells_.back();
@@ -117,10 +120,7 @@ std::optional<MedialBallFinder::InnerBall> VolumeFiller::next(double at_least) {
       cell.has_climbed = true;
       add_prototype(cell.center);
     } else if (!is_stale) {
-      // By a hole the largest ball without bulge is smaller than the clearance; a finer start would
-      // not change that.
-      const bool is_exhausted = !finder_.is_closed() && cell.half <= kFinestSearch * cell.clearance;
-      for (int corner = 0; corner < 8 && !is_exhausted; ++corner) {
+      for (int corner = 0; corner < 8; ++corner) {
         const Eigen::Vector3d sign((corner & 1) - 0.5, ((corner >> 1) & 1) - 0.5,
                                    ((corner >> 2) & 1) - 0.5);
         add_cell(cell.center + cell.half * sign, 0.5 * cell.half, &cell);

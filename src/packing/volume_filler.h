@@ -26,8 +26,7 @@ class VolumeFiller {
   VolumeFiller(const TriangleBvh& bvh, const MedialBallFinder& finder, const BallSearch& balls,
                double min_radius);
 
-  /// Ends the search when `progress` returns false, which is asked every now and then: on a mesh
-  /// with holes one search can take minutes.
+  /// Ends the search when `progress` returns false, which is asked every now and then.
   void stop_with(PackingProgress progress) { progress_ = std::move(progress); }
 
   /// The next ball, which must be added to `balls`; nothing when none of radius `at_least` [m]
@@ -38,8 +37,8 @@ class VolumeFiller {
   struct Cell {
     Eigen::Vector3d center;
     double half;         ///< [m] of an edge
-    double surface;      ///< [m] the centre's distance to it, negative outside
-    double clearance;    ///< [m] at the centre: to surface and balls
+    double room;         ///< [m] from the centre to the mesh and to holes, negative outside
+    double clearance;    ///< [m] at the centre: the same, and to balls
     double bound;        ///< [m] no ball about a point of the cell is larger
     std::uint32_t seen;  ///< balls that clearance and bound know of
     bool has_climbed;
@@ -47,6 +46,7 @@ class VolumeFiller {
   struct Prototype {
     MedialBallFinder::InnerBall ball;
     std::uint32_t seen;
+    int refusals;  ///< how often a hole spoke against it
   };
   struct BoundLess {
     bool operator()(const Cell& a, const Cell& b) const { return a.bound < b.bound; }
@@ -58,7 +58,7 @@ class VolumeFiller {
   };
 
   void add_cell(const Eigen::Vector3d& center, double half, const Cell* parent);
-  void add_prototype(const Eigen::Vector3d& start);
+  void add_prototype(const Eigen::Vector3d& start, int refusals = 0);
   void revise_prototypes();
   bool is_stopped();
   bool update(Cell* cell) const;
@@ -72,6 +72,7 @@ class VolumeFiller {
   std::vector<Prototype> prototypes_;  // heap
   PackingProgress progress_;
   std::uint32_t steps_ = 0;
+  int refusals_ = 0;
   bool stopped_ = false;
 };
 

@@ -162,7 +162,7 @@ TEST_F(PackingCacheTest, refusesNumbersThatAreNoPacking) {
   std::vector<Packing> bad(8, sample_packing());
   bad[0].balls[7].center.y() = nan;
   bad[1].balls[7].radius = inf;
-  bad[2].balls[7].radius = -0.1;
+  bad[2].balls[7].cover_radius = -0.1;
   bad[3].balls[7].cover_radius = 0.0;  // below the radius
   bad[4].certificate.max_gap = nan;
   bad[5].certificate.surface_area = -1.0;

@@ -31,8 +31,11 @@ struct PackingConfig {
 /// `cover_radius` about the same centre. The outer balls of a packing cover the link's surface.
 struct Ball {
   Eigen::Vector3d center;  ///< [m] in the link's frame
-  double radius;           ///< [m] >= 0; 0 where no inner ball reaches the surface (sheets, flaps)
-  double cover_radius;     ///< [m] >= radius; the difference is this ball's gap
+  /// [m] of the inner ball. 0: a point of the surface that no inner ball reaches (sheets, flaps,
+  /// some rims of holes). Negative: there is none, the outer ball covers some of the inside by a
+  /// hole, and the surface is that far from the centre. Neither has a volume.
+  double radius;
+  double cover_radius;  ///< [m] >= 0, >= radius; the difference is this ball's gap
 };
 
 /// What is known for certain about a packing.
@@ -50,7 +53,11 @@ struct PackingCertificate {
 /// For every point p outside, with d_in(p) = min(|p - c| - radius) and d_out(p) likewise with
 /// cover_radius: d_out(p) <= distance(p, surface). A point with d_out(p) > interior_gap is outside
 /// for certain.
-/// d_in(p) >= distance(p, surface) where the mesh has no holes.
+/// d_in(p) >= distance(p, surface). Outside is where the mesh's generalized winding number is at
+/// most 0.5, and the surface is its triangles, nothing in between: before a hole, and in it up to
+/// where the number is 0.5, a point is as far from the surface as from the hole's rim, and no inner
+/// ball comes nearer. Proven for meshes without holes; with holes it is looked for about each ball
+/// that may be near one, in many directions, and measured (PackingReport::protrusion).
 struct Packing {
   std::vector<Ball> balls;  ///< in the order of insertion: every prefix is a coarser packing
   PackingCertificate certificate;

@@ -13,8 +13,8 @@ struct PackingReport {
   double filled_volume =
       0.0;               ///< [m^3] of the union of the inner balls; balls that overlap count once
   double overlap = 0.0;  ///< [m] deepest that two inner balls reach into each other
-  /// [m] farthest that an inner ball bulges out of the solid (through a hole in its mesh), along
-  /// its radii.
+  /// [m] how much nearer an inner ball comes to a point outside than the solid's surface does:
+  /// through a hole in its mesh, along its radii.
   double protrusion = 0.0;
 };
 

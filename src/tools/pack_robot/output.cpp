@@ -83,7 +83,7 @@ std::string ply(const Input& input, const RobotModel& model) {
     for (const Ball& ball : link.packing.balls) {
       const Eigen::Vector3d c =
           pose == input.X_RL.end() ? ball.center : Eigen::Vector3d(pose->second * ball.center);
-      vertices << c.x() << ' ' << c.y() << ' ' << c.z() << ' ' << ball.radius << ' '
+      vertices << c.x() << ' ' << c.y() << ' ' << c.z() << ' ' << std::max(ball.radius, 0.0) << ' '
                << ball.cover_radius << ' ' << l << '\n';
       ++count;
     }

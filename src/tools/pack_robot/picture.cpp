@@ -113,7 +113,7 @@ std::vector<PlacedBall> placed(const Input& input, const RobotModel& model) {
     for (const Ball& ball : model.links[l].packing.balls) {
       const Eigen::Vector3d c =
           pose == input.X_RL.end() ? ball.center : Eigen::Vector3d(pose->second * ball.center);
-      balls.push_back({R * c, ball.radius, l});
+      balls.push_back({R * c, std::max(ball.radius, 0.0), l});
     }
   }
   return balls;

@@ -1,0 +1,93 @@
+#include "geometry/hole_caps.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <queue>
+#include <unordered_map>
+
+namespace ist {
+namespace {
+
+using Loop = std::vector<std::uint32_t>;  // vertices in turn; an edge leads from each to the next
+
+// Walks along open edges; whenever a vertex comes up again, what lies between is a loop.
+std::vector<Loop> loops_of(const std::vector<OpenEdge>& open) {
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> next;
+  for (const OpenEdge& edge : open) {
+    for (int i = 0; i < edge.count; ++i) next[edge.from].push_back(edge.to);
+  }
+  std::vector<Loop> loops;
+  std::unordered_map<std::uint32_t, std::size_t> place;  // in the path
+  for (const OpenEdge& edge : open) {
+    Loop path = {edge.from};
+    place = {{edge.from, 0}};
+    for (auto* ways = &next[edge.from]; !ways->empty(); ways = &next[path.back()]) {
+      const std::uint32_t vertex = ways->back();
+      ways->pop_back();
+      const auto known = place.find(vertex);
+      if (known == place.end()) {
+        place[vertex] = path.size();
+        path.push_back(vertex);
+        continue;
+      }
+      const auto first = path.begin() + static_cast<std::ptrdiff_t>(known->second);
+      loops.emplace_back(first, path.end());
+      for (auto v = first + 1; v != path.end(); ++v) place.erase(*v);
+      path.erase(first + 1, path.end());
+    }
+  }
+  return loops;
+}
+
+struct Diagonal {
+  double length_sq;
+  std::uint32_t cut_off;  // place in the loop
+  std::uint32_t before, after;
+
+  bool operator<(const Diagonal& other) const {
+    return length_sq != other.length_sq ? length_sq > other.length_sq : cut_off > other.cut_off;
+  }
+};
+
+void close(const Loop& loop, TriangleMesh* caps) {
+  const auto n = static_cast<std::uint32_t>(loop.size());
+  std::vector<std::uint32_t> before(n), after(n);
+  std::priority_queue<Diagonal> shortest;
+  const auto push = [&](std::uint32_t i) {
+    const Eigen::Vector3d& a = caps->vertices[loop[before[i]]];
+    const Eigen::Vector3d& b = caps->vertices[loop[after[i]]];
+    shortest.push({(a - b).squaredNorm(), i, before[i], after[i]});
+  };
+  for (std::uint32_t i = 0; i < n; ++i) {
+    before[i] = (i + n - 1) % n;
+    after[i] = (i + 1) % n;
+  }
+  for (std::uint32_t i = 0; i < n; ++i) push(i);
+  constexpr auto kGone = static_cast<std::uint32_t>(-1);
+  for (std::uint32_t left = n; left >= 3;) {
+    const Diagonal cut = shortest.top();
+    shortest.pop();
+    const std::uint32_t i = cut.cut_off;
+    if (before[i] != cut.before || after[i] != cut.after) continue;  // has changed since
+    // Against the loop's direction.
+    caps->triangles.push_back({loop[cut.after], loop[i], loop[cut.before]});
+    after[cut.before] = cut.after;
+    before[cut.after] = cut.before;
+    before[i] = after[i] = kGone;
+    --left;
+    push(cut.before);
+    push(cut.after);
+  }
+}
+
+}  // namespace
+
+TriangleMesh hole_caps(const TriangleMesh& mesh, const std::vector<OpenEdge>& open) {
+  TriangleMesh caps;
+  caps.vertices = mesh.vertices;
+  for (const Loop& loop : loops_of(open)) close(loop, &caps);
+  return caps;
+}
+
+}  // namespace ist
