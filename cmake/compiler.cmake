@@ -2,7 +2,6 @@
 
 set(CMAKE_CXX_STANDARD 17)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
-# ISO mode, so that GCC does not contract a*b+c behind our back: results must not depend on it.
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
@@ -13,6 +12,9 @@ endif()
 
 # -ffast-math is out: NaN and infinity carry meaning here. -march=native is out: Highway picks the
 # instruction set at run time, and Eigen types in the interface would change their alignment.
+# a*b+c is one operation where the code says so (MulAdd), nowhere else: results must not depend on what
+# the compiler makes of it. GCC contracts in C++'s ISO mode, too.
+add_compile_options(-ffp-contract=off)
 add_compile_options(-Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Wvla)
 if(IST_PROXIMITY_WERROR)
   add_compile_options(-Werror)
