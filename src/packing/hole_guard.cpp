@@ -12,7 +12,7 @@ namespace ist {
 namespace {
 
 // How much larger than needed an obstacle is, as a share of what is needed: exits between those
-// that were found have theirs. At least half the tolerance, at most some of it.
+// that were found have theirs. At least half the tolerance, at most a few times it.
 constexpr double kSlackShare = 0.15;
 constexpr double kMaxSlack = 3.0;
 // Caps are divided down to this share of their way to the mesh, and so many tolerances.

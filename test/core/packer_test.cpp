@@ -140,6 +140,63 @@ TEST(PackMesh, InnerBallsKeepAwayFromHoles) {
   }
 }
 
+// Triangles of any size and place: a soup, all edges open; the same twice, also shifted a little in
+// its own planes; a closed ball through it; far from the origin.
+std::vector<NamedMesh> random_meshes(test::Rng* rng) {
+  TriangleMesh soup;
+  for (std::uint32_t t = 0; t < 40; ++t) {
+    const Eigen::Vector3d place = test::random_vector(rng, 0.1);
+    const double size = std::pow(10.0, test::uniform(rng, -4.0, -1.0));
+    for (int k = 0; k < 3; ++k) soup.vertices.push_back(place + test::random_vector(rng, size));
+    soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  TriangleMesh slid = soup;
+  for (std::size_t t = 0; t < slid.triangles.size(); ++t) {
+    const Eigen::Vector3d by = 0.3 * (soup.corner(t, 1) - soup.corner(t, 0));
+    for (const std::uint32_t v : slid.triangles[t]) slid.vertices[v] += by;
+  }
+  const TriangleMesh with_ball = test::joined(soup, test::icosphere(0.06, 2));
+  return {{"soup", soup},
+          {"soup and the same again", test::joined(soup, soup)},
+          {"soup with coplanar neighbours", test::joined(soup, slid)},
+          {"ball in a soup", with_ball},
+          {"far away", shifted(with_ball, {3.0, -20.0, 1.0})}};
+}
+
+TEST(PackMesh, CertificateHoldsOnRandomMeshes) {
+  test::Rng rng(77);
+  for (const auto& [name, mesh] : random_meshes(&rng)) {
+    for (const PackingOrder order : {PackingOrder::kMedial, PackingOrder::kDisjoint}) {
+      SCOPED_TRACE(name + ", order " + std::to_string(static_cast<int>(order)));
+      PackingConfig config;
+      config.max_error = 0.01;
+      config.order = order;
+      const Packing packing = pack_mesh(mesh, config);
+      EXPECT_TRUE(packing.certificate.reached);
+      double excess = 0.0;
+      expect_certificate_holds(mesh, packing, 100, &excess);
+      EXPECT_LE(excess, packing.certificate.max_gap + 1e-5);
+    }
+  }
+}
+
+// Where every seventh face is inside out, room for a ball that no hole speaks against was looked
+// for without end.
+TEST(PackMesh, DisjointPackingsOfOpenMeshesEnd) {
+  TriangleMesh mesh = test::icosphere(0.1, 2);
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 7) {
+    std::swap(mesh.triangles[t][0], mesh.triangles[t][1]);
+  }
+  PackingConfig config;
+  config.max_error = 0.01;
+  config.order = PackingOrder::kDisjoint;
+  EXPECT_TRUE(pack_mesh(mesh, config).certificate.reached);
+  int asked = 0;
+  const Packing stopped = pack_mesh(mesh, config, [&asked](double) { return ++asked < 3; });
+  EXPECT_FALSE(stopped.certificate.reached);
+  EXPECT_LE(asked, 10) << "what is left has to stop as well";
+}
+
 constexpr PackingOrder kOrders[] = {PackingOrder::kMedial, PackingOrder::kDisjoint,
                                     PackingOrder::kVolume};
 
