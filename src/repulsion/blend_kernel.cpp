@@ -68,37 +68,17 @@ HWY_INLINE void Pose(const PosedBalls& balls, const BallGroup& group, Posed* pos
   posed->reach = group.reach;
 }
 
-// A tile's points, gathered by fours.
-struct Patches {
-  alignas(64) float x[kWidth], y[kWidth], z[kWidth], weight[kWidth];
-  int count = 0;
-
-  void add(float px, float py, float pz, float w) {
-    x[count] = px;
-    y[count] = py;
-    z[count] = pz;
-    weight[count++] = w;
-  }
-};
-
 HWY_INLINE V Gap(V low, V high, V value) {
   const Tag d;
   return hn::Max(hn::Max(hn::Sub(low, value), hn::Sub(value, high)), hn::Zero(d));
 }
 
 // From a point, or from the nearest point of a box, to the centres of balls k, k + 1, ...
-template <class Points>
-HWY_INLINE Offset ToPoint(const Points& points, int i, const Posed& balls, std::size_t k) {
+HWY_INLINE Offset ToBalls(const PointTile& tile, int point, const Posed& balls, std::size_t k) {
   const Tag d;
-  return {hn::Sub(hn::Load(d, balls.x + k), hn::Set(d, points.x[i])),
-          hn::Sub(hn::Load(d, balls.y + k), hn::Set(d, points.y[i])),
-          hn::Sub(hn::Load(d, balls.z + k), hn::Set(d, points.z[i]))};
-}
-HWY_INLINE Offset ToBalls(const PointTile& tile, int i, const Posed& balls, std::size_t k) {
-  return ToPoint(tile, i, balls, k);
-}
-HWY_INLINE Offset ToBalls(const Patches& patches, int i, const Posed& balls, std::size_t k) {
-  return ToPoint(patches, i, balls, k);
+  return {hn::Sub(hn::Load(d, balls.x + k), hn::Set(d, tile.x[point])),
+          hn::Sub(hn::Load(d, balls.y + k), hn::Set(d, tile.y[point])),
+          hn::Sub(hn::Load(d, balls.z + k), hn::Set(d, tile.z[point]))};
 }
 
 HWY_INLINE V Beyond(float low, float high, V v) {
@@ -218,7 +198,7 @@ HWY_INLINE float NearestPair(const Index& index, const PosedBalls& balls, float 
   return limit;
 }
 
-// How much of its cell a surface through each point covers; 0 for unused slots.
+// How much of its cell a surface through each point covers.
 HWY_INLINE void CellWeights(const PointTile& tile, const CellGrid& grid, float* weights) {
   const Tag d;
   const V half = hn::Set(d, 0.5F), scale = hn::Set(d, grid.per_meter);
@@ -234,58 +214,7 @@ HWY_INLINE void CellWeights(const PointTile& tile, const CellGrid& grid, float* 
     const V section = hn::Max(hn::Sub(hn::Set(d, 1.0F), part), hn::Zero(d));
     const V weight = hn::MulAdd(hn::Mul(section, section), hn::Set(d, 1.0F - kLeastCellWeight),
                                 hn::Set(d, kLeastCellWeight));
-    const auto used =
-        hn::Lt(hn::Iota(d, static_cast<float>(k)), hn::Set(d, static_cast<float>(tile.count)));
-    hn::Store(hn::IfThenElseZero(used, weight), d, weights + k);
-  }
-}
-
-// Four neighbours that lie within `radius` of their mean are one patch there.
-HWY_INLINE void Gather(const PointTile& tile, const CellGrid& grid, float radius,
-                       Patches* patches) {
-  // Lane q holds every fourth point from 4 q on in four vectors, so that sums stay within lanes.
-  const hn::CappedTag<float, kWidth / 4> d;
-  using Quads = hn::Vec<decltype(d)>;
-  alignas(64) float weights[kWidth];
-  CellWeights(tile, grid, weights);
-  struct {
-    alignas(16) float x[kWidth / 4], y[kWidth / 4], z[kWidth / 4];
-    alignas(16) float weight[kWidth / 4], spread_sq[kWidth / 4];
-  } mean;
-  for (std::size_t q = 0; q < kWidth / 4; q += hn::Lanes(d)) {
-    Quads w[4], spread[4];
-    hn::LoadInterleaved4(d, weights + 4 * q, w[0], w[1], w[2], w[3]);
-    const Quads all = hn::Add(hn::Add(w[0], w[1]), hn::Add(w[2], w[3]));
-    const Quads per_weight = hn::Div(hn::Set(d, 1.0F), hn::Max(all, hn::Set(d, kLeastCellWeight)));
-    for (Quads& value : spread) value = hn::Zero(d);
-    const auto average = [&](const float* v, float* into) {
-      Quads of[4];
-      hn::LoadInterleaved4(d, v + 4 * q, of[0], of[1], of[2], of[3]);
-      const Quads sum = hn::MulAdd(w[0], of[0], hn::Mul(w[1], of[1]));
-      const Quads middle =
-          hn::Mul(hn::Add(sum, hn::MulAdd(w[2], of[2], hn::Mul(w[3], of[3]))), per_weight);
-      hn::Store(middle, d, into + q);
-      for (int i = 0; i < 4; ++i) {
-        const Quads off = hn::IfThenElseZero(hn::Gt(w[i], hn::Zero(d)), hn::Sub(of[i], middle));
-        spread[i] = hn::MulAdd(off, off, spread[i]);
-      }
-    };
-    average(tile.x, mean.x);
-    average(tile.y, mean.y);
-    average(tile.z, mean.z);
-    hn::Store(all, d, mean.weight + q);
-    hn::Store(hn::Max(hn::Max(spread[0], spread[1]), hn::Max(spread[2], spread[3])), d,
-              mean.spread_sq + q);
-  }
-  for (int first = 0; first < tile.count; first += 4) {
-    const int q = first / 4;
-    if (mean.spread_sq[q] <= radius * radius) {
-      patches->add(mean.x[q], mean.y[q], mean.z[q], mean.weight[q]);
-      continue;
-    }
-    for (int i = first; i < std::min(first + 4, tile.count); ++i) {
-      patches->add(tile.x[i], tile.y[i], tile.z[i], weights[i]);
-    }
+    hn::Store(weight, d, weights + k);
   }
 }
 
@@ -295,12 +224,10 @@ struct BallSums {
   alignas(64) float weight[kWidth] = {}, undirected[kWidth] = {};
 };
 
-HWY_INLINE float Weight(const Patches& patches, int i) { return patches.weight[i]; }
-HWY_INLINE float Weight(const BoxTile&, int) { return 1.0F; }
-
-template <class Items>
-HWY_INLINE void AddItems(const Items& items, const Posed& balls, float nearest, float per_smoothing,
-                         BallSums* sums) {
+// weights: by point, or box.
+template <class Tile>
+HWY_INLINE void AddTile(const Tile& tile, const float* weights, const Posed& balls, float nearest,
+                        float per_smoothing, BallSums* sums) {
   const Tag d;
   // Shorter than this a direction is noise; the weight moves over to the fallback smoothly.
   constexpr float kTiny = 1e-6F;  // [m]
@@ -312,13 +239,13 @@ HWY_INLINE void AddItems(const Items& items, const Posed& balls, float nearest, 
     // 1 - (d - nearest) / smoothing = start - length / smoothing.
     const V start =
         hn::MulAdd(hn::Add(hn::Load(d, balls.radius + k), hn::Set(d, nearest)), falls, one);
-    for (int i = 0; i < items.count; ++i) {
-      const Offset o = ToBalls(items, i, balls, k);
+    for (int i = 0; i < tile.count; ++i) {
+      const Offset o = ToBalls(tile, i, balls, k);
       const V raw = SquaredNorm(o), squared = hn::Max(raw, tiny_sq);
       const V inverse = InverseRoot(squared);
       const V length = hn::Mul(squared, inverse);
       const V root = hn::Max(hn::NegMulAdd(length, falls, start), hn::Zero(d));
-      const V w = hn::Mul(hn::Mul(root, root), hn::Set(d, Weight(items, i)));
+      const V w = hn::Mul(hn::Mul(root, root), hn::Set(d, weights[i]));
       const V directed = hn::Mul(w, inverse);
       x = hn::MulAdd(directed, o.x, x);
       y = hn::MulAdd(directed, o.y, y);
@@ -366,19 +293,13 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedBalls& balls, cons
   Pose(balls, &link);
   std::array<BallSums, kMostGroups> sums;
   const float limit = band.nearest + band.smoothing;
+  alignas(64) float weights[kWidth];
+  std::fill_n(weights, kWidth, 1.0F);
   VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
-    const auto add = [&](const auto& items) {
-      for (; groups != 0; groups &= groups - 1) {
-        const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
-        AddItems(items, link.groups[g], band.nearest, 1.0F / band.smoothing, &sums[g]);
-      }
-    };
-    if constexpr (std::is_same_v<Index, PointIndex>) {
-      Patches patches;
-      Gather(tile, band.grid, kPatchPerSmoothing * band.smoothing, &patches);
-      add(patches);
-    } else {
-      add(tile);
+    if constexpr (std::is_same_v<Index, PointIndex>) CellWeights(tile, band.grid, weights);
+    for (; groups != 0; groups &= groups - 1) {
+      const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
+      AddTile(tile, weights, link.groups[g], band.nearest, 1.0F / band.smoothing, &sums[g]);
     }
   });
   PairSums total;

@@ -59,11 +59,6 @@ struct Band {
 constexpr float kLeastCellWeight = 0.01F;
 constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
 
-/// Four neighbouring points of a tile that lie within this part of the smoothing of their mean
-/// count as one there, with their weight. It depends on the cloud alone, so nothing jumps while the
-/// robot moves, and the nearest point's patch keeps a weight.
-constexpr float kPatchPerSmoothing = 0.25F;
-
 /// Over all pairs nearer than nearest + smoothing, w = (1 - (d - nearest) / smoothing)^2 times the
 /// points' weight.
 PairSums blend_pairs(const PointIndex& index, const PosedBalls& balls, const Band& band);

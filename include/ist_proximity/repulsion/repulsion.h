@@ -50,8 +50,7 @@ struct alignas(64) BallGroup {
 /// over all pairs: the nearest pair alone would jump when two obstacles are equally near. a is how
 /// much of its cell a surface through the thinned point covers, about (1 - rho^2)^2 with rho = 0 in
 /// the cell's middle and 1 in a corner: cells that a surface hardly cuts, which more points would
-/// find and fewer would not, count little. Up to four neighbours within smoothing / 4 of their mean
-/// are taken together there. Both depend on the cloud alone, not on where the link is. The
+/// find and fewer would not, count little. It depends on the cloud alone. The
 /// vector is gain * s * u with s = 1 - distance / influence_distance, not below 0 and not above 1:
 /// its length is 0 at and beyond the influence distance and never more than the gain. In contact it
 /// stays at the gain (how deep is for the penetration wrench to say), and in a symmetric squeeze
