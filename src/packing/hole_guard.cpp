@@ -246,7 +246,7 @@ std::optional<Eigen::Vector3d> HoleGuard::exit_about(const Eigen::Vector3d& cent
       const double angle = 2.0 * M_PI * i / kTurns;
       const Eigen::Vector3d turned =
           (ray + turn * (std::cos(angle) * u + std::sin(angle) * v)).normalized();
-      if (const auto exit = exit_along(center, radius, turned, &margin)) return exit;
+      if (auto exit = exit_along(center, radius, turned, &margin)) return exit;
       if (margin < best_margin) best = turned;
       best_margin = std::min(best_margin, margin);
     }
