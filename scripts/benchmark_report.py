@@ -170,24 +170,14 @@ def ratios(rows):
     return table(["what", "out of contact", "all", "goal"], lines)
 
 
-class Plot:
-    """Speed against error, both axes logarithmic."""
-
-    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 30, 40, 60
-    COLOURS = {"ours": "#c0392b", "exact": "#2c3e50", "spheres": "#2980b9", "grid": "#8e44ad"}
-    FLOOR_MM = 0.01  # exact to float: drawn here
+class Drawing:
+    """Parts of an SVG, with a logarithmic axis of times upwards. What derives from it has the sizes
+    and `y`, the range of the times' decimal logarithms."""
 
     def __init__(self, rows, title):
-        self.rows = [r for r in rows if r["kind"] != "floor"]
+        self.rows = rows
         self.title = title
-        times = [r["free_query_us"] for r in self.rows]
-        self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
-        self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels
         self.parts = []
-
-    def px(self, mm):
-        share = (math.log10(max(mm, self.FLOOR_MM)) - self.x[0]) / (self.x[1] - self.x[0])
-        return self.LEFT + share * (self.WIDTH - self.LEFT - self.RIGHT)
 
     def py(self, us):
         share = (math.log10(us) - self.y[0]) / (self.y[1] - self.y[0])
@@ -196,6 +186,30 @@ class Plot:
     def text(self, x, y, words, anchor="middle", colour="#333", extra=""):
         self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"'
                           f'{extra}>{escape(words)}</text>')
+
+    def whole(self):
+        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
+                'font-family="sans-serif" font-size="12">\n'
+                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
+                "\n</svg>\n")
+
+
+class Plot(Drawing):
+    """Speed against error, both axes logarithmic."""
+
+    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 860, 520, 80, 30, 40, 60
+    COLOURS = {"ours": "#c0392b", "exact": "#2c3e50", "spheres": "#2980b9", "grid": "#8e44ad"}
+    FLOOR_MM = 0.01  # exact to float: drawn here
+
+    def __init__(self, rows, title):
+        super().__init__([r for r in rows if r["kind"] != "floor"], title)
+        times = [r["free_query_us"] for r in self.rows]
+        self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
+        self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels
+
+    def px(self, mm):
+        share = (math.log10(max(mm, self.FLOOR_MM)) - self.x[0]) / (self.x[1] - self.x[0])
+        return self.LEFT + share * (self.WIDTH - self.LEFT - self.RIGHT)
 
     def line(self, x1, y1, x2, y2, colour):
         self.parts.append(f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" '
@@ -257,13 +271,10 @@ class Plot:
         self.axes()
         self.front()
         self.peers()
-        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
-                'font-family="sans-serif" font-size="12">\n'
-                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
-                "\n</svg>\n")
+        return self.whole()
 
 
-class GrowthPlot:
+class GrowthPlot(Drawing):
     """Median and 99th percentile of a query against what grows: four panels, axes logarithmic."""
 
     WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM, GAP = 860, 330, 70, 20, 60, 50, 22
@@ -272,19 +283,9 @@ class GrowthPlot:
     COLOURS = {0.0: ("exact", "#c0392b"), 1.0: ("to 1 mm", "#2980b9")}  # by tolerance [mm]
 
     def __init__(self, rows, title):
-        self.rows = rows
-        self.title = title
+        super().__init__(rows, title)
         times = [r[key] for r in rows for key in ("query_us", "query_p99_us")]
         self.y = (math.log10(min(times)) - 0.1, math.log10(max(times)) + 0.1)
-        self.parts = []
-
-    def py(self, us):
-        share = (math.log10(us) - self.y[0]) / (self.y[1] - self.y[0])
-        return self.HEIGHT - self.BOTTOM - share * (self.HEIGHT - self.TOP - self.BOTTOM)
-
-    def text(self, x, y, words, anchor="middle", colour="#333", extra=""):
-        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"'
-                          f'{extra}>{escape(words)}</text>')
 
     def line(self, points, colour, extra=""):
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
@@ -327,10 +328,7 @@ class GrowthPlot:
         for number, (words, colour) in enumerate(self.COLOURS.values()):
             self.text(self.LEFT + 270 * number, 44, f"{words}: median (99th percentile dashed)",
                       "start", colour)
-        return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" '
-                'font-family="sans-serif" font-size="12">\n'
-                '<rect width="100%" height="100%" fill="white"/>\n' + "\n".join(self.parts) +
-                "\n</svg>\n")
+        return self.whole()
 
 
 def fill(path, parts):
