@@ -33,6 +33,9 @@ namespace {
 
 using ist_proximity::ProximityArray;
 
+// [s] After the first answer the model is still at work: contact volumes are packed beside it.
+constexpr double kSettling = 20.0;
+
 struct Options {
   std::string urdf = IST_PROXIMITY_SOURCE_DIR "/demo/demo_arm.urdf";
   std::string geometry = "collision";
@@ -202,7 +205,7 @@ bool run(const Options& options) {
       });
 
   while (ros::ok() && !ears.is_ok()) wait(0.1);
-  wait(2.0);
+  wait(kSettling);
   watches.count(true);
   auto before = thread_times();
   wait(options.seconds);
