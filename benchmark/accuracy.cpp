@@ -1,13 +1,19 @@
 // Error of the published distances against exact truth, as a Markdown table.
 //
-// Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: accuracy [max_error_mm ...]
+// Needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
+// Usage: accuracy [--update-doc README.md] [max_error_mm ...]
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <string>
 #include <vector>
 
+#include "document.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "truth_scenes.h"
 
@@ -63,12 +69,40 @@ void measure(const std::shared_ptr<const ist::RobotModel>& model, const ist::Que
   }
 }
 
+std::string readme_row(double max_error, double tolerance, const Tally& tally) {
+  const auto below = [&](double q) { return 1e3 * quantile(tally.error, q); };
+  std::array<char, 160> text{};
+  const int begin =
+      std::snprintf(text.data(), text.size(), "| %.0f mm | %.0f%s | %zu | %d | ", 1e3 * max_error,
+                    1e3 * tolerance, tolerance > 0.0 ? " mm" : "", tally.error.size(),
+                    tally.violations);
+  const auto at = static_cast<std::size_t>(begin);
+  if (below(1.0) < 1e-4) {
+    std::snprintf(&text[at], text.size() - at, "below 0.0001 mm | below %.3f mm |\n",
+                  std::ceil(1e6 * mean(tally.width)) * 1e-3);
+  } else {
+    std::snprintf(&text[at], text.size() - at, "%.3f / %.3f / %.3f mm | %.2f mm |\n",
+                  1e3 * mean(tally.error), below(0.99), below(1.0), 1e3 * mean(tally.width));
+  }
+  return text.data();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const std::filesystem::path data = ist::benchmark::data_or_exit();
   std::vector<double> max_errors;
-  for (int i = 1; i < argc; ++i) max_errors.push_back(1e-3 * std::atof(argv[i]));
+  std::string document;
+  std::string table =
+      "| `max_error` | tolerance | cases without contact | violations | error mean / p99 / max | "
+      "interval, mean |\n| --- | --- | --- | --- | --- | --- |\n";
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--update-doc") == 0 && i + 1 < argc) {
+      document = argv[++i];
+    } else {
+      max_errors.push_back(1e-3 * std::atof(argv[i]));
+    }
+  }
   if (max_errors.empty()) max_errors = {0.005, 0.002};
   const auto scenes = ist::benchmark::truth_scenes(data);
   std::printf("| max_error | balls | packing | tolerance | cases | violations | wrong state | "
@@ -96,7 +130,8 @@ int main(int argc, char** argv) {
                   1e3 * mean(tally.width), quantile(tally.free_us, 0.5),
                   quantile(tally.free_us, 0.99), quantile(tally.contact_us, 0.5),
                   quantile(tally.contact_us, 0.99));
+      table += readme_row(max_error, tolerance, tally);
     }
   }
-  return 0;
+  return document.empty() || ist::benchmark::write_table(document, "accuracy", table) ? 0 : 1;
 }
