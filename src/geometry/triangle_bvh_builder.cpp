@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "geometry/float_rounding.h"
+
 namespace ist {
 namespace {
 
@@ -14,11 +16,6 @@ Eigen::Vector3d centroid(const TriangleBvh::Triangle& t) { return (t.a + t.b + t
 
 Eigen::Vector3d area_normal(const TriangleBvh::Triangle& t) {
   return 0.5 * (t.b - t.a).cross(t.c - t.a);
-}
-
-float round_up(double value) {
-  const auto nearest = static_cast<float>(value);
-  return nearest >= value ? nearest : std::nextafter(nearest, std::numeric_limits<float>::max());
 }
 
 }  // namespace

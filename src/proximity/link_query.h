@@ -68,6 +68,9 @@ class LinkQuery {
     Part part = Part::kPoints;
   };
 
+  /// [m] More than double loses where distances are compared.
+  static constexpr double kRounding = 1e-12;
+
   static std::uint64_t generation(const CloudSnapshot& cloud, Part part);
   bool enter(const CloudSnapshot& cloud, std::int32_t index, Part part);
   Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
@@ -82,14 +85,27 @@ class LinkQuery {
   void set_planes(Traversal* traversal) const;
   static void on_aim(void* context);
   static void on_nearer(void* context);
-  void keep_promise();
-  void evaluate_waiting();
-  void rule_out_waiting();
-  void drop_far_waiting();
   void descend(Traversal* traversal);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
   void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
+
+  // Of points that wait, in link_waiting.cpp.
+  /// What became of a point in this descent.
+  struct Visit {
+    std::uint32_t epoch = 0, key = 0;
+    std::int32_t waiting = -1;  ///< index in `waiting_`; -1: it is done with
+  };
+  Visit& visit_of(std::uint32_t key) { return visited_[(key * 2654435761U) >> 23U]; }
+  bool is_visited(const Visit& visit, std::uint32_t key) const {
+    return visit.epoch == epoch_ && visit.key == key;
+  }
+  bool first_visit(std::int32_t tile, int lane);
+  static void on_candidate(void* context, std::int32_t tile, int lane, float bound);
+  void keep_promise();
+  void evaluate_waiting();
+  void drop_far_waiting();
+  void rule_out_waiting();
 
   // Of boxes, in link_boxes.cpp.
   double depth_threshold() const;
@@ -110,17 +126,6 @@ class LinkQuery {
   double wanted_below(double distance) const;
   /// [m] bounds from here on cannot change the answer by more than the tolerance.
   double threshold() const;
-  /// What became of a point in this descent.
-  struct Visit {
-    std::uint32_t epoch = 0, key = 0;
-    std::int32_t waiting = -1;  ///< index in `waiting_`; -1: it is done with
-  };
-  Visit& visit_of(std::uint32_t key) { return visited_[(key * 2654435761U) >> 23U]; }
-  bool is_visited(const Visit& visit, std::uint32_t key) const {
-    return visit.epoch == epoch_ && visit.key == key;
-  }
-  bool first_visit(std::int32_t tile, int lane);
-  static void on_candidate(void* context, std::int32_t tile, int lane, float bound);
   static bool on_expired(void* context);
 
   const LinkModel* link_;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include "geometry/float_rounding.h"
 #include "tree/partition.h"
 
 namespace ist {
@@ -15,13 +16,6 @@ namespace {
 // Slots without a child: at the origin, with a radius that makes them farther than anything.
 constexpr float kNoRadius = -1e30F;
 constexpr int kEnclosingSteps = 48;
-
-float round_up(double value) {
-  const auto nearest = static_cast<float>(value);
-  return nearest >= value ? nearest : std::nextafter(nearest, std::numeric_limits<float>::max());
-}
-
-float round_down(double value) { return -round_up(-value); }
 
 // Not to be inlined: where it meets the way back to double, GCC 12 (-O2) vectorizes the pair into
 // nothing, and the rounding is not there any more.
