@@ -17,6 +17,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "peers/scene.h"
 #include "support.h"
+#include "support/whole_cloud.h"
 
 namespace {
 
@@ -39,12 +40,8 @@ ist::QueryConfig query_config(double tolerance) {
 }
 
 ist::CloudSnapshot ingested(const Frame& frame) {
-  ist::IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;
   ist::CloudSnapshot snapshot;
-  ist::Ingest(config).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
+  ist::Ingest(ist::test::whole_cloud()).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
   return snapshot;
 }
 

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <limits>
 #include <numeric>
 #include <random>
 #include <string>
@@ -17,6 +16,7 @@
 #include "peers/scene.h"
 #include "support.h"
 #include "support/data_dir.h"
+#include "support/whole_cloud.h"
 
 namespace {
 
@@ -51,12 +51,7 @@ double copy_us(const Frame& frame, int repetitions) {
 }
 
 double ingest_us(const Frame& frame, bool thin, int repetitions) {
-  ist::IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;
-  config.thin = thin;
-  ist::Ingest ingest(config);
+  ist::Ingest ingest(ist::test::whole_cloud(thin));
   ist::CloudSnapshot snapshot;
   ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
   std::vector<double> us;

@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <limits>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,6 +21,7 @@
 #include "peers/scene.h"
 #include "support.h"
 #include "support/data_dir.h"
+#include "support/whole_cloud.h"
 
 namespace {
 
@@ -40,15 +40,6 @@ using Poses = std::vector<Eigen::Isometry3d>;
 constexpr double kMaxError = 0.002;  // [m] packing
 constexpr std::size_t kCounted = 100;
 
-ist::IngestConfig everything() {
-  ist::IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;
-  config.thin = false;
-  return config;
-}
-
 QueryConfig query_config(double tolerance, double relative = 0.0) {
   QueryConfig config;
   config.max_distance = 10.0;
@@ -66,7 +57,7 @@ struct Bench {
     clouds.resize(set.scenes.size());
     for (std::size_t s = 0; s < clouds.size(); ++s) {
       const ist::benchmark::Frame& frame = set.scenes[s].frame;
-      ist::Ingest(everything()).run(frame.raw(), frame.X_FS, {}, 0.0, &clouds[s]);
+      ist::Ingest(ist::test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &clouds[s]);
     }
     find_free();
   }
@@ -176,7 +167,7 @@ double batch_us(const Bench& bench, int threads) {
 // Two sensors' images, each with an Ingest of its own.
 double ingest_us(const Bench& bench, bool side_by_side) {
   const ist::benchmark::Frame& frame = bench.set.scenes[0].frame;
-  ist::Ingest ingests[2] = {ist::Ingest(everything()), ist::Ingest(everything())};
+  ist::Ingest ingests[2] = {ist::Ingest(ist::test::whole_cloud(false)), ist::Ingest(ist::test::whole_cloud(false))};
   CloudSnapshot snapshots[2];
   constexpr int kImages = 20;
   const auto work = [&](int i) {
@@ -252,7 +243,7 @@ void count(const std::string& cache, const std::string& what) {
   const DataSet set =
       data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
   const ist::benchmark::Frame& frame = set.scenes[0].frame;
-  ist::Ingest ingest(everything());
+  ist::Ingest ingest(ist::test::whole_cloud(false));
   CloudSnapshot cloud;
   for (std::size_t k = 0; k < (what == "ingest" ? kCounted / 10 : 1); ++k) {
     ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &cloud);

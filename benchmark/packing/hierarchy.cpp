@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <limits>
 #include <memory>
 #include <random>
 #include <sstream>
@@ -25,6 +24,7 @@
 #include "support.h"
 #include "support/demo_arm.h"
 #include "support/temp_dir.h"
+#include "support/whole_cloud.h"
 
 namespace ist::benchmark {
 namespace {
@@ -62,13 +62,8 @@ QueryConfig query_config() {
 }
 
 CloudSnapshot ingested(const Frame& frame) {
-  IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;
-  config.thin = false;
   CloudSnapshot snapshot;
-  Ingest(config).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
+  Ingest(test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
   return snapshot;
 }
 

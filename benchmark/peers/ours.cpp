@@ -1,8 +1,8 @@
-#include <limits>
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "peers/method.h"
+#include "support/whole_cloud.h"
 
 namespace ist::benchmark {
 namespace {
@@ -11,19 +11,10 @@ namespace {
 constexpr double kMaxErrors[] = {0.01, 0.005, 0.002};        // [m]
 constexpr double kTolerances[] = {0.0, 0.001, 0.005, 0.02};  // [m]
 
-IngestConfig everything() {
-  IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;  // the truth is of all points
-  config.thin = false;         // no distance needs it
-  return config;
-}
-
 class Ours : public Method {
  public:
   Ours(const std::shared_ptr<const RobotModel>& model, double max_error_, double tolerance_)
-      : ingest_(everything()),
+      : ingest_(test::whole_cloud(false)),
         query_(model, config(tolerance_)),
         known_(model->links.size(), true) {
     name = "ist_proximity";

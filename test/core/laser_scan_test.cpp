@@ -8,6 +8,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "support/scene.h"
+#include "support/whole_cloud.h"
 
 namespace ist {
 namespace {
@@ -26,21 +27,13 @@ LaserScan scan_of(const std::vector<float>& ranges) {
   return scan;
 }
 
-IngestConfig unlimited() {
-  IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;
-  return config;
-}
-
 CloudSnapshot ingested(const LaserScan& scan, double min_range, double max_range,
                        const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity(),
                        const Eigen::Isometry3d& X_FS_end = Eigen::Isometry3d::Identity()) {
   ScanPoints points;
   to_points(scan, min_range, max_range, X_FS.inverse() * X_FS_end, &points);
   CloudSnapshot snapshot;
-  Ingest(unlimited()).run(points.raw(), X_FS, {}, 0.0, &snapshot);
+  Ingest(test::whole_cloud()).run(points.raw(), X_FS, {}, 0.0, &snapshot);
   return snapshot;
 }
 
@@ -142,7 +135,7 @@ TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
     robot.X_FL[0].translation() << x, y, 0.0;
     return robot;
   };
-  IngestConfig config = unlimited();
+  IngestConfig config = test::whole_cloud();
   config.self_filter = true;
   Ingest ingest(config);
   CloudSnapshot first, both;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -13,6 +12,7 @@
 #include "ist_proximity/proximity/contact_volume.h"
 #include "support/random_links.h"
 #include "support/scene.h"
+#include "support/whole_cloud.h"
 
 /// Contact volumes by brute force in double: all balls of the link against all of the obstacle.
 namespace ist::test {
@@ -160,10 +160,7 @@ inline CloudSnapshot thinned(const std::vector<Eigen::Vector3d>& points, double 
   raw.y = sizeof(double);
   raw.z = 2 * sizeof(double);
   raw.is_double = true;
-  IngestConfig config;
-  config.min_range = 0.0;
-  config.max_range = std::numeric_limits<double>::infinity();
-  config.self_filter = false;
+  IngestConfig config = whole_cloud();
   config.thinning = thinning;
   CloudSnapshot snapshot;
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
