@@ -63,15 +63,12 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
   kinematics_ = std::move(kinematics);
   index_.clear();
   moved_by_.clear();
-  positions_.clear();
   forget();
   facts_.messages = facts_.used = facts_.dropped = facts_.skipped = 0;
   facts_.problem.clear();
   if (!kinematics_) return;
   const std::size_t count = kinematics_->joints().size();
   moved_by_.resize(count);
-  positions_.resize(count);
-  taken_ = positions_;
   for (std::size_t j = 0; j < count; ++j) {
     const Kinematics::Joint& joint = kinematics_->joints()[j];
     index_[joint.name] = j;
@@ -84,13 +81,7 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
 }
 
 void JointStateListener::newest(const Kinematics& kinematics, std::vector<Position>* positions) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  notice_clock_jump();
-  if (&kinematics == kinematics_.get()) {
-    *positions = positions_;
-  } else {
-    positions->clear();
-  }
+  copy(positions_, kinematics, positions);
 }
 
 void JointStateListener::take_next() {
@@ -102,17 +93,26 @@ void JointStateListener::take_next() {
   }
   taken_.swap(waiting_.front());
   waiting_.pop_front();
-  waiting_count_ = waiting_.size();
 }
 
 void JointStateListener::taken(const Kinematics& kinematics, std::vector<Position>* positions) {
+  copy(taken_, kinematics, positions);
+}
+
+void JointStateListener::copy(const std::vector<Position>& from, const Kinematics& kinematics,
+                              std::vector<Position>* positions) {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
   if (&kinematics == kinematics_.get()) {
-    *positions = taken_;
+    *positions = from;
   } else {
     positions->clear();
   }
+}
+
+bool JointStateListener::is_waiting() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return !waiting_.empty();
 }
 
 JointStateFacts JointStateListener::facts() {
@@ -131,10 +131,9 @@ void JointStateListener::notice_clock_jump() {
 
 /// With mutex_ held, as enqueue().
 void JointStateListener::forget() {
-  positions_.assign(positions_.size(), Position());
+  positions_.assign(kinematics_ ? kinematics_->joints().size() : 0, Position());
   taken_ = positions_;
   waiting_.clear();
-  waiting_count_ = 0;
 }
 
 void JointStateListener::enqueue() {
@@ -143,7 +142,6 @@ void JointStateListener::enqueue() {
     waiting_.clear();
   }
   waiting_.push_back(positions_);
-  waiting_count_ = waiting_.size();
 }
 
 /// Not in facts(): roscpp's answer can wait for the master.

@@ -43,8 +43,8 @@ struct JointStateFacts {
 /// interpolated, with all that tf knows besides: cameras on links, the frame the robot stands in.
 ///
 /// Every message that told something new waits for its turn, take_next(), so that what follows the
-/// robot answers each of them, also after a moment without a processor. Who is ten messages late
-/// has lost the robot: they are skipped, all but the newest.
+/// robot answers each of them, also after a moment without a processor. When ten wait, the robot
+/// has gone on too far: they are skipped for the next one.
 ///
 /// When the ROS clock jumps back, all positions are forgotten. Thread safe.
 class JointStateListener {
@@ -68,7 +68,7 @@ class JointStateListener {
   void newest(const Kinematics& kinematics, std::vector<Position>* positions);
 
   /// Whether a message waits for its turn.
-  bool is_waiting() const { return waiting_count_ > 0; }
+  bool is_waiting();
   /// To the oldest message that waits; to the newest positions when none does.
   void take_next();
   /// As newest(), just after the message that take_next() has come to. What came before it counts,
@@ -86,6 +86,8 @@ class JointStateListener {
   void notice_clock_jump();
   void forget();
   void enqueue();
+  void copy(const std::vector<Position>& from, const Kinematics& kinematics,
+            std::vector<Position>* positions);
   void count_publishers();
   void drop(const std::string& problem, std::size_t count);
 
@@ -101,7 +103,6 @@ class JointStateListener {
   std::vector<Position> positions_;                     ///< by joint
   std::vector<Position> taken_;                         ///< the same, at the turn of a message
   std::deque<std::vector<Position>> waiting_;           ///< the same, after each that waits
-  std::atomic<std::size_t> waiting_count_{0};
   JointStateFacts facts_;
   std::chrono::steady_clock::time_point problem_time_;
   ros::Time last_now_;
