@@ -32,7 +32,8 @@ double seconds_since(Clock::time_point start) {
 
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
-  const auto at = std::min(values.size() - 1, static_cast<std::size_t>(q * static_cast<double>(values.size())));
+  const auto at =
+      std::min(values.size() - 1, static_cast<std::size_t>(q * static_cast<double>(values.size())));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
   return values[at];
 }
@@ -62,7 +63,8 @@ void measure(const std::shared_ptr<const ist::RobotModel>& model, const ist::Que
       const double exact = truth.links[i].distance;
       tally->error.push_back(results[i].distance - exact);
       tally->width.push_back(results[i].distance - results[i].lower_bound);
-      const bool holds = results[i].lower_bound <= exact + 1e-6 && exact <= results[i].distance + 1e-6;
+      const bool holds =
+          results[i].lower_bound <= exact + 1e-6 && exact <= results[i].distance + 1e-6;
       tally->violations += holds ? 0 : 1;
     }
     (any_contact ? tally->contact_us : tally->free_us).push_back(us);
@@ -72,10 +74,9 @@ void measure(const std::shared_ptr<const ist::RobotModel>& model, const ist::Que
 std::string readme_row(double max_error, double tolerance, const Tally& tally) {
   const auto below = [&](double q) { return 1e3 * quantile(tally.error, q); };
   std::array<char, 160> text{};
-  const int begin =
-      std::snprintf(text.data(), text.size(), "| %.0f mm | %.0f%s | %zu | %d | ", 1e3 * max_error,
-                    1e3 * tolerance, tolerance > 0.0 ? " mm" : "", tally.error.size(),
-                    tally.violations);
+  const int begin = std::snprintf(text.data(), text.size(), "| %.0f mm | %.0f%s | %zu | %d | ",
+                                  1e3 * max_error, 1e3 * tolerance, tolerance > 0.0 ? " mm" : "",
+                                  tally.error.size(), tally.violations);
   const auto at = static_cast<std::size_t>(begin);
   if (below(1.0) < 1e-4) {
     std::snprintf(&text[at], text.size() - at, "below 0.0001 mm | below %.3f mm |\n",
@@ -105,9 +106,10 @@ int main(int argc, char** argv) {
   }
   if (max_errors.empty()) max_errors = {0.005, 0.002};
   const auto scenes = ist::benchmark::truth_scenes(data);
-  std::printf("| max_error | balls | packing | tolerance | cases | violations | wrong state | "
-              "error mean / p99 / max | width mean | query free median / p99 | in contact |\n"
-              "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  std::printf(
+      "| max_error | balls | packing | tolerance | cases | violations | wrong state | "
+      "error mean / p99 / max | width mean | query free median / p99 | in contact |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const double max_error : max_errors) {
     const Clock::time_point start = Clock::now();
     const auto model = ist::test::panda_model(data, max_error);
@@ -122,14 +124,14 @@ int main(int argc, char** argv) {
       for (const auto& scene : scenes) {
         measure(model, config, *scene.cloud, scene.cases, &tally);
       }
-      std::printf("| %.0f mm | %zu | %.1f s | %.0f mm | %zu | %d | %d | %.4f / %.4f / %.4f mm | "
-                  "%.3f mm | %.0f / %.0f us | %.0f / %.0f us |\n",
-                  1e3 * max_error, balls, packing, 1e3 * tolerance, tally.error.size(),
-                  tally.violations, tally.wrong_state, 1e3 * mean(tally.error),
-                  1e3 * quantile(tally.error, 0.99), 1e3 * quantile(tally.error, 1.0),
-                  1e3 * mean(tally.width), quantile(tally.free_us, 0.5),
-                  quantile(tally.free_us, 0.99), quantile(tally.contact_us, 0.5),
-                  quantile(tally.contact_us, 0.99));
+      std::printf(
+          "| %.0f mm | %zu | %.1f s | %.0f mm | %zu | %d | %d | %.4f / %.4f / %.4f mm | "
+          "%.3f mm | %.0f / %.0f us | %.0f / %.0f us |\n",
+          1e3 * max_error, balls, packing, 1e3 * tolerance, tally.error.size(), tally.violations,
+          tally.wrong_state, 1e3 * mean(tally.error), 1e3 * quantile(tally.error, 0.99),
+          1e3 * quantile(tally.error, 1.0), 1e3 * mean(tally.width), quantile(tally.free_us, 0.5),
+          quantile(tally.free_us, 0.99), quantile(tally.contact_us, 0.5),
+          quantile(tally.contact_us, 0.99));
       table += readme_row(max_error, tolerance, tally);
     }
   }

@@ -25,8 +25,8 @@ void box_distances_sq(const Points& points, const Eigen::Isometry3d& X_LF,
 /// Index of the point nearest to `center`.
 std::size_t nearest_of_all(const Points& points, const Eigen::Vector3f& center);
 
-/// Spheres that stand for the links, one after the other; each is only asked for what is nearer than
-/// the link's spheres before it.
+/// Spheres that stand for the links, one after the other; each is only asked for what is nearer
+/// than the link's spheres before it.
 class BySpheres : public Method {
  public:
   explicit BySpheres(const SphereSet& set) : set_(set) { spheres = set.size(); }

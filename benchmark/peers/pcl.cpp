@@ -10,7 +10,8 @@
 
 #include "peers/flat.h"
 
-// PCL's k-d tree (FLANN's) and its octree over all points, asked for what is nearest to each sphere.
+// PCL's k-d tree (FLANN's) and its octree over all points, asked for what is nearest to each
+// sphere.
 namespace ist::benchmark {
 namespace {
 

@@ -11,13 +11,13 @@
 namespace ist::benchmark {
 namespace {
 
-constexpr float kCell = 0.0075F;   // [m]
-constexpr float kMargin = 0.1F;    // [m] about the link's box; beyond, the box's side is asked for
+constexpr float kCell = 0.0075F;  // [m]
+constexpr float kMargin = 0.1F;   // [m] about the link's box; beyond, the box's side is asked for
 
 struct Grid {
   Eigen::Vector3f low;
-  Eigen::Vector3i size;          // nodes
-  std::vector<float> distance;   // [m] unsigned, by node, x fastest
+  Eigen::Vector3i size;         // nodes
+  std::vector<float> distance;  // [m] unsigned, by node, x fastest
 
   explicit Grid(const TriangleMesh& mesh) {
     const TriangleBvh bvh(mesh);
@@ -28,7 +28,8 @@ struct Grid {
     for (int z = 0; z < size.z(); ++z) {
       for (int y = 0; y < size.y(); ++y) {
         for (int x = 0; x < size.x(); ++x) {
-          const Eigen::Vector3f p = low + kCell * Eigen::Vector3f(Eigen::Vector3i(x, y, z).cast<float>());
+          const Eigen::Vector3f p =
+              low + kCell * Eigen::Vector3f(Eigen::Vector3i(x, y, z).cast<float>());
           distance.push_back(
               static_cast<float>(std::sqrt(bvh.closest(p.cast<double>()).distance_sq)));
         }

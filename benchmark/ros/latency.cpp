@@ -7,10 +7,10 @@
 // message is copied. With --tcp, the node and a node that only receives are processes of their own.
 // Prints rows of tables in Markdown; with --update-doc FILE they are put there too.
 
-#include <CLI/CLI.hpp>
 #include <ros/ros.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <filesystem>
@@ -184,8 +184,8 @@ bool run(const Options& options) {
   std::unique_ptr<Relay> relay;
   std::unique_ptr<Process> node, receiver;
   if (options.tcp) {
-    node = std::make_unique<Process>(std::vector<std::string>{
-        IST_PROXIMITY_NODE, "__name:=latency_node"});
+    node = std::make_unique<Process>(
+        std::vector<std::string>{IST_PROXIMITY_NODE, "__name:=latency_node"});
     receiver = std::make_unique<Process>(std::vector<std::string>{
         std::filesystem::read_symlink("/proc/self/exe"), "--receive", "__name:=latency_receiver"});
   } else {

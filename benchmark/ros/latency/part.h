@@ -33,7 +33,8 @@ class Relay {
     relayed_ = states_.nh().advertise<sensor_msgs::JointState>("relayed", 100);
     seen_ = clouds_.nh().advertise<std_msgs::Header>("seen", 100);
     on_state_ = states_.nh().subscribe<sensor_msgs::JointState>(
-        "joint_states", 100, [this](const sensor_msgs::JointStateConstPtr& m) { relayed_.publish(m); },
+        "joint_states", 100,
+        [this](const sensor_msgs::JointStateConstPtr& m) { relayed_.publish(m); },
         ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
     on_cloud_ = clouds_.nh().subscribe<sensor_msgs::PointCloud2>(
         "cloud", 2, [this, copies_clouds](const sensor_msgs::PointCloud2ConstPtr& m) {
