@@ -1,6 +1,6 @@
 // What the ways to ask cost, as Markdown tables: every link, the robot's minimum, one link; one
-// thread and two; each instruction set. On a motion at 1 kHz among the test data's depth images where
-// they are (IST_PROXIMITY_DATA, or ../shared/data), else in the synthetic scene.
+// thread and two; each instruction set. On a motion at 1 kHz among the test data's depth images
+// where they are (IST_PROXIMITY_DATA, or ../shared/data), else in the synthetic scene.
 //
 // Usage: modes CACHE_FOLDER, for the tables; modes CACHE_FOLDER exact|1mm|minimum|ingest, for that
 // alone, a hundred times, for a profiler to count. scripts/benchmark calls both.
@@ -49,14 +49,20 @@ QueryConfig query_config(double tolerance, double relative = 0.0) {
 }
 
 struct Bench {
-  explicit Bench(const std::string& cache) {
+  // @param turn  of everything in the fixed frame
+  explicit Bench(const std::string& cache,
+                 const Eigen::Isometry3d& turn = Eigen::Isometry3d::Identity()) {
     const auto data = ist::test::data_dir();
     set = data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
     model = set.robot.pack(kMaxError);
     known.assign(model->links.size(), true);
+    for (Poses& X_FL : set.motion) {
+      for (Eigen::Isometry3d& X : X_FL) X = turn * X;
+    }
     clouds.resize(set.scenes.size());
     for (std::size_t s = 0; s < clouds.size(); ++s) {
-      const ist::benchmark::Frame& frame = set.scenes[s].frame;
+      ist::benchmark::Frame& frame = set.scenes[s].frame;
+      frame.X_FS = turn * frame.X_FS;
       ist::Ingest(ist::test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &clouds[s]);
     }
     find_free();
@@ -70,9 +76,9 @@ struct Bench {
     for (std::size_t s = 0; s < clouds.size(); ++s) {
       for (const Poses& X_FL : set.motion) {
         query.run(X_FL, known, {&clouds[s]}, &results);
-        const bool contact =
-            std::any_of(results.begin(), results.end(),
-                        [](const auto& link) { return link.state == LinkState::kContact; });
+        const bool contact = std::any_of(results.begin(), results.end(), [](const auto& link) {
+          return link.state == LinkState::kContact;
+        });
         if (!contact) free[s].push_back(&X_FL);
       }
     }
@@ -125,7 +131,7 @@ struct Bench {
   std::vector<std::vector<const Poses*>> free;  // by cloud
 };
 
-void print_modes(const Bench& bench) {
+void print_modes(const Bench& bench, const Bench& turned) {
   const auto all = [&](double tolerance, double relative = 0.0) {
     return bench.time([&] { return bench.every_link(query_config(tolerance, relative)); });
   };
@@ -146,6 +152,11 @@ void print_modes(const Bench& bench) {
   print("the robot's minimum, to 1 mm", minimum(0.001), coarse);
   print("the last link alone, to 1 mm",
         bench.time([&] { return bench.last_link(query_config(0.001)); }), coarse);
+  const auto all_turned = [&](double tolerance) {
+    return turned.time([&] { return turned.every_link(query_config(tolerance)); });
+  };
+  print("all links, exact; fixed frame turned", all_turned(0.0), exact);
+  print("all links, to 1 mm; fixed frame turned", all_turned(0.001), coarse);
 }
 
 double batch_us(const Bench& bench, int threads) {
@@ -167,7 +178,8 @@ double batch_us(const Bench& bench, int threads) {
 // Two sensors' images, each with an Ingest of its own.
 double ingest_us(const Bench& bench, bool side_by_side) {
   const ist::benchmark::Frame& frame = bench.set.scenes[0].frame;
-  ist::Ingest ingests[2] = {ist::Ingest(ist::test::whole_cloud(false)), ist::Ingest(ist::test::whole_cloud(false))};
+  ist::Ingest ingests[2] = {ist::Ingest(ist::test::whole_cloud(false)),
+                            ist::Ingest(ist::test::whole_cloud(false))};
   CloudSnapshot snapshots[2];
   constexpr int kImages = 20;
   const auto work = [&](int i) {
@@ -275,7 +287,9 @@ int main(int argc, char** argv) {
     return 0;
   }
   const Bench bench(argv[1]);
-  print_modes(bench);
+  // A fixed frame that no surface lies along.
+  const Eigen::AngleAxisd turn(0.5, Eigen::Vector3d(1.0, 2.0, 3.0).normalized());
+  print_modes(bench, Bench(argv[1], Eigen::Isometry3d(turn)));
   print_threads(bench);
   print_instruction_sets(bench);
   return 0;

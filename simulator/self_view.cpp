@@ -58,7 +58,7 @@ std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, doub
   std::uint64_t count = 0;
   for (const PointTile& tile : index.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      const Eigen::Vector3d p = index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]);
+      const Eigen::Vector3d p = index.X_FO() * tile.point(k);
       const bool is_ball = ball != nullptr &&
                            (p - ball->pose(stamp).translation()).norm() < kBallRadius + 6.0 * noise;
       count += is_ball ? 0 : 1;

@@ -48,7 +48,7 @@ Matrix3X thinned_points(const CloudSnapshot& cloud) {
   Eigen::Index n = 0;
   for (const PointTile& tile : cloud.coarse.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      points.col(n++) = cloud.coarse.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]);
+      points.col(n++) = cloud.coarse.X_FO() * tile.point(static_cast<int>(k));
     }
   }
   return points;

@@ -8,82 +8,10 @@
 #include <type_traits>
 
 #include "cloud/crop_kernel.h"
+#include "cloud/point_reader.h"
 
 namespace ist {
 namespace {
-
-constexpr double kFarFromSensor = 1000.0;  // [m]
-constexpr std::size_t kSamples = 1024;     // points that the middle of a cloud is made of
-
-template <typename Bits>
-Bits swapped(Bits bits) {
-  Bits result = 0;
-  for (std::size_t byte = 0; byte < sizeof(Bits); ++byte) {
-    result = static_cast<Bits>(result << 8 | (bits & 0xFFU));
-    bits >>= 8;
-  }
-  return result;
-}
-
-// Coordinates in a message are not aligned to anything.
-template <typename Scalar, bool kSwap>
-Scalar read(const std::uint8_t* bytes) {
-  std::conditional_t<sizeof(Scalar) == 4, std::uint32_t, std::uint64_t> bits;
-  static_assert(sizeof bits == sizeof(Scalar), "float or double");
-  std::memcpy(&bits, bytes, sizeof bits);
-  if (kSwap) bits = swapped(bits);
-  Scalar value;
-  std::memcpy(&value, &bits, sizeof value);
-  return value;
-}
-
-const std::uint8_t* bytes_of(const RawCloud& cloud, std::size_t row, std::size_t column) {
-  return cloud.data + row * cloud.row_step + column * cloud.point_step;
-}
-
-template <typename Scalar, bool kSwap>
-Eigen::Vector3d read_point(const RawCloud& cloud, const std::uint8_t* bytes) {
-  return {static_cast<double>(read<Scalar, kSwap>(bytes + cloud.x)),
-          static_cast<double>(read<Scalar, kSwap>(bytes + cloud.y)),
-          static_cast<double>(read<Scalar, kSwap>(bytes + cloud.z))};
-}
-
-Eigen::Vector3d point_at(const RawCloud& cloud, std::size_t i) {
-  const std::uint8_t* bytes = bytes_of(cloud, i / cloud.width, i % cloud.width);
-  if (cloud.is_double) {
-    return cloud.swap_bytes ? read_point<double, true>(cloud, bytes)
-                            : read_point<double, false>(cloud, bytes);
-  }
-  return cloud.swap_bytes ? read_point<float, true>(cloud, bytes)
-                          : read_point<float, false>(cloud, bytes);
-}
-
-// Where a cloud is that does not lie about its sensor: the median, axis by axis, of some of its
-// points. In the sensor frame [m]; zero where the cloud is about its sensor.
-Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max_range_sq) {
-  std::array<std::array<double, kSamples>, 3> samples;
-  std::size_t count = 0;
-  const std::size_t n = cloud.size();
-  const std::size_t stride = (n + kSamples - 1) / kSamples;
-  for (std::size_t i = 0; i < n; i += stride) {
-    const Eigen::Vector3d p = point_at(cloud, i);
-    const double range_sq = p.squaredNorm();
-    if (!(range_sq >= min_range_sq && range_sq <= max_range_sq)) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      samples[axis][count] = p[static_cast<Eigen::Index>(axis)];
-    }
-    ++count;
-  }
-  if (count == 0) return Eigen::Vector3d::Zero();
-  Eigen::Vector3d median;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto begin = samples[axis].begin();
-    const auto half = static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(begin, begin + half, begin + static_cast<std::ptrdiff_t>(count));
-    median[static_cast<Eigen::Index>(axis)] = samples[axis][count / 2];
-  }
-  return median.norm() > kFarFromSensor ? median : Eigen::Vector3d::Zero();
-}
 
 CropRange range_of(const CropPose& pose) {
   CropRange range;
@@ -95,6 +23,8 @@ CropRange range_of(const CropPose& pose) {
   }
   range.min_range_sq = pose.min_range_sq;
   range.max_range_sq = pose.max_range_sq;
+  for (int axis = 0; axis < 3; ++axis) range.center[axis] = pose.horizon_center[axis];
+  range.horizon_sq = pose.horizon_sq;
   return range;
 }
 
@@ -170,6 +100,7 @@ std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropPose&
   const std::size_t never_received = used - window.rows * window.columns;
   counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number - never_received);
   if (tally.endless > 0) counts->infinite += count_infinite(block, used);
+  counts->beyond_horizon += static_cast<std::uint32_t>(tally.beyond);
   return tally.kept;
 }
 
@@ -191,6 +122,7 @@ std::ptrdiff_t crop_quads(const std::uint8_t* bytes, std::size_t stride, std::si
                                     stride / sizeof(float), rows, block);
   if (tally.endless > 0) return -1;  // rare; they have to be looked at
   counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
+  counts->beyond_horizon += static_cast<std::uint32_t>(tally.beyond);
   return static_cast<std::ptrdiff_t>(tally.kept);
 }
 
@@ -220,20 +152,6 @@ std::size_t append(const CropBlock& block, std::size_t count, std::uint32_t firs
 }
 
 }  // namespace
-
-CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
-                   double max_range) {
-  const double largest = std::min(max_range, kLargestRange);
-  CropPose pose;
-  pose.min_range_sq = min_range * min_range;
-  pose.max_range_sq = largest * largest;
-  Eigen::Vector3d near_S = Eigen::Vector3d::Zero();
-  if (max_range > kFarFromSensor) near_S = middle_of(cloud, pose.min_range_sq, pose.max_range_sq);
-  pose.origin = (X_FS * near_S).array().round();
-  pose.X_OS = X_FS;
-  pose.X_OS.translation() -= pose.origin;
-  return pose;
-}
 
 std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
                         std::size_t count, const CropPose& pose, CropBlock* block,

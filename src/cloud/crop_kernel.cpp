@@ -25,6 +25,7 @@ HWY_INLINE hn::Vec<DoubleTag> LoadAsDouble(DoubleTag d, const float* from) {
 }
 
 // What is asked of every point, and where it goes, in registers.
+template <bool kHorizon>
 class Cropper {
  public:
   Cropper(const CropRange& range, CropBlock* block) : range_(range), block_(*block) {}
@@ -36,8 +37,13 @@ class Cropper {
     const FloatTag f;
     const auto sq = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
     // False for NaN, and for what overflows.
-    const auto keep = hn::And(hn::Ge(sq, hn::Set(d, range_.min_range_sq)),
-                              hn::Le(sq, hn::Set(d, range_.max_range_sq)));
+    auto keep = hn::And(hn::Ge(sq, hn::Set(d, range_.min_range_sq)),
+                        hn::Le(sq, hn::Set(d, range_.max_range_sq)));
+    if constexpr (kHorizon) {
+      const std::size_t in_range = hn::CountTrue(d, keep);
+      keep = hn::And(keep, IsNear(x, y, z));
+      tally.beyond += in_range - hn::CountTrue(d, keep);
+    }
     const auto nan = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
     const std::size_t kept = hn::CountTrue(d, keep);
     auto to_x = nan;
@@ -58,6 +64,16 @@ class Cropper {
 
  private:
   template <class V>
+  HWY_INLINE auto IsNear(V x, V y, V z) const {
+    const DoubleTag d;
+    const auto dx = hn::Sub(x, hn::Set(d, range_.center[0])),
+               dy = hn::Sub(y, hn::Set(d, range_.center[1])),
+               dz = hn::Sub(z, hn::Set(d, range_.center[2]));
+    const auto sq = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
+    return hn::Le(sq, hn::Set(d, range_.horizon_sq));
+  }
+
+  template <class V>
   HWY_INLINE V Moved(int row, V x, V y, V z) const {
     const DoubleTag d;
     const double* r = range_.R + 3 * row;
@@ -70,11 +86,15 @@ class Cropper {
   CropBlock& block_;
 };
 
-template <typename Scalar>
+bool HasHorizon(const CropRange& range) {
+  return range.horizon_sq < std::numeric_limits<double>::infinity();
+}
+
+template <bool kHorizon, typename Scalar>
 HWY_INLINE CropTally Crop(const CropRange& range, const Scalar* x_S, const Scalar* y_S,
                           const Scalar* z_S, std::size_t count, CropBlock* block) {
   const DoubleTag d;
-  Cropper cropper(range, block);
+  Cropper<kHorizon> cropper(range, block);
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
     cropper.Take(LoadAsDouble(d, x_S + k), LoadAsDouble(d, y_S + k), LoadAsDouble(d, z_S + k), k);
   }
@@ -85,19 +105,22 @@ HWY_INLINE CropTally Crop(const CropRange& range, const Scalar* x_S, const Scala
 
 CropTally CropFloats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
                      std::size_t count, CropBlock* block) {
-  return Crop(range, x_S, y_S, z_S, count, block);
+  return HasHorizon(range) ? Crop<true>(range, x_S, y_S, z_S, count, block)
+                           : Crop<false>(range, x_S, y_S, z_S, count, block);
 }
 
 CropTally CropDoubles(const CropRange& range, const double* x_S, const double* y_S,
                       const double* z_S, std::size_t count, CropBlock* block) {
-  return Crop(range, x_S, y_S, z_S, count, block);
+  return HasHorizon(range) ? Crop<true>(range, x_S, y_S, z_S, count, block)
+                           : Crop<false>(range, x_S, y_S, z_S, count, block);
 }
 
-CropTally CropRows(const CropRange& range, const float* points, std::size_t stride,
-                   std::size_t rows, CropBlock* block) {
+template <bool kHorizon>
+HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std::size_t stride,
+                               std::size_t rows, CropBlock* block) {
   const DoubleTag d;
   const FloatTag f;
-  Cropper cropper(range, block);
+  Cropper<kHorizon> cropper(range, block);
   for (std::size_t row = 0; row < rows; ++row, points += stride) {
     // The next sixteen points of the row are what is asked for next.
     for (std::size_t line = 4; line < 8; ++line) hwy::Prefetch(points + 16 * line);
@@ -108,6 +131,12 @@ CropTally CropRows(const CropRange& range, const float* points, std::size_t stri
     }
   }
   return cropper.tally;
+}
+
+CropTally CropRows(const CropRange& range, const float* points, std::size_t stride,
+                   std::size_t rows, CropBlock* block) {
+  return HasHorizon(range) ? CropQuads<true>(range, points, stride, rows, block)
+                           : CropQuads<false>(range, points, stride, rows, block);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -11,11 +11,14 @@ struct CropRange {
   double R[9];                        ///< rotation of X_OS, row-major
   double t[3];                        ///< [m] its translation
   double min_range_sq, max_range_sq;  ///< [m^2]
+  double center[3];                   ///< [m] of the horizon, in the sensor frame
+  double horizon_sq;                  ///< [m^2] may be inf
 };
 
 /// What became of a block.
 struct CropTally {
   std::size_t kept = 0;
+  std::size_t beyond = 0;        ///< in range, but beyond the horizon
   std::size_t not_a_number = 0;  ///< a coordinate is NaN
   std::size_t endless = 0;       ///< the squared range is infinite
 };

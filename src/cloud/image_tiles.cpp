@@ -247,7 +247,7 @@ bool is_image(const RawCloud& cloud, const CropPose& pose) {
 
 std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
                         PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {
-  builder->start(pose.origin, index);
+  builder->start(pose.X_FO, index);
   const std::size_t kept = ImageReader(cloud, pose, on_robot, builder, counts).run();
   builder->finish();
   return kept;

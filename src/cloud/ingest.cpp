@@ -8,6 +8,7 @@
 #include "cloud/crop.h"
 #include "cloud/image_tiles.h"
 #include "cloud/point_index_builder.h"
+#include "cloud/scene_axes.h"
 #include "cloud/self_filter.h"
 #include "cloud/thinning.h"
 
@@ -35,6 +36,7 @@ void check(const IngestConfig& config) {
 
 struct Ingest::Impl {
   IngestConfig config;
+  Horizon horizon;
   std::vector<CloudPoint> points;
   PointIndexBuilder builder;
   SelfFilter self_filter;
@@ -52,6 +54,14 @@ Ingest& Ingest::operator=(Ingest&&) noexcept = default;
 
 const IngestConfig& Ingest::config() const { return impl_->config; }
 
+void Ingest::set_horizon(const Horizon& horizon) {
+  if (!horizon.center_F.allFinite() || !(horizon.radius >= 0.0)) {
+    throw std::invalid_argument(
+        "the horizon's centre is not finite, or its radius no number >= 0.");
+  }
+  impl_->horizon = horizon;
+}
+
 void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
                  double stamp, CloudSnapshot* snapshot, const std::vector<PosedRobot>& also) {
   const auto start = std::chrono::steady_clock::now();
@@ -59,34 +69,39 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
   }
   const IngestConfig& config = impl_->config;
-  const CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
+  CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
+
+  limit(impl_->horizon, X_FS, &pose);
+  const bool image = is_image(cloud, pose);
+  turn(scene_axes(cloud, X_FS.linear(), image), &pose);
 
   const SelfFilter* on_robot = nullptr;
   if (config.self_filter && robot.model != nullptr) {
-    impl_->self_filter.pose(robot, pose.origin, config.self_filter_padding);
-    for (const PosedRobot& later : also) impl_->self_filter.add(later, pose.origin);
+    impl_->self_filter.pose(robot, pose.X_FO, config.self_filter_padding);
+    for (const PosedRobot& later : also) impl_->self_filter.add(later, pose.X_FO);
     on_robot = &impl_->self_filter;
   }
   IngestCounts counts;
   std::size_t kept = 0;
-  if (is_image(cloud, pose)) {
+  if (image) {
     kept = index_image(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
   } else {
     kept = crop(cloud, pose, &impl_->points, &counts);
-    impl_->builder.build(pose.origin, impl_->points.data(), kept,
+    impl_->builder.build(pose.X_FO, impl_->points.data(), kept,
                          on_robot == nullptr ? PointFilter() : on_robot->as_filter(),
                          &snapshot->index);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
-  counts.out_of_range =
-      counts.received - counts.not_a_number - counts.infinite - static_cast<std::uint32_t>(kept);
+  counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -
+                        counts.beyond_horizon - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
   snapshot->thinning = config.thinning;
+  snapshot->horizon = impl_->horizon;
   if (config.thin) {
     impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
   } else {
-    impl_->builder.start(pose.origin, &snapshot->coarse);
+    impl_->builder.start(pose.X_FO, &snapshot->coarse);
     impl_->builder.finish();
   }
 

@@ -8,7 +8,8 @@ void PointIndex::build(const Eigen::Vector3d& origin, const float* x, const floa
                        const float* z, const std::uint32_t* id, std::size_t n) {
   std::vector<CloudPoint> points(n);
   for (std::size_t i = 0; i < n; ++i) points[i] = {x[i], y[i], z[i], id[i]};
-  PointIndexBuilder().build(origin, points.data(), n, {}, this);
+  PointIndexBuilder().build(Eigen::Isometry3d(Eigen::Translation3d(origin)), points.data(), n, {},
+                            this);
 }
 
 }  // namespace ist

@@ -112,11 +112,11 @@ bool make_a_node(const HierarchyChild* tiles, std::size_t count) {
 
 }  // namespace
 
-void PointIndexBuilder::start(const Eigen::Vector3d& origin, PointIndex* index) {
+void PointIndexBuilder::start(const Eigen::Isometry3d& X_FO, PointIndex* index) {
   index_ = index;
   used_ = 0;
   index->generation_ = next_generation();
-  index->origin_ = origin;
+  index->X_FO_ = X_FO;
   index->size_ = 0;
   index->nodes_.clear();
   loose_.clear();
@@ -213,10 +213,10 @@ void PointIndexBuilder::end_cell() {
   loose_.clear();
 }
 
-void PointIndexBuilder::build(const Eigen::Vector3d& origin, const CloudPoint* points,
+void PointIndexBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* points,
                               std::size_t n, const PointFilter& drop, PointIndex* index) {
   const CloudPoint* sorted = morton_.sort(points, n);
-  start(origin, index);
+  start(X_FO, index);
   std::size_t begin = 0;
   for (const std::size_t end : morton_.cell_ends()) {
     add_runs(sorted + begin, end - begin, drop);
@@ -226,9 +226,9 @@ void PointIndexBuilder::build(const Eigen::Vector3d& origin, const CloudPoint* p
   finish();
 }
 
-void PointIndexBuilder::build_in_order(const Eigen::Vector3d& origin,
+void PointIndexBuilder::build_in_order(const Eigen::Isometry3d& X_FO,
                                        const std::vector<CloudPoint>& points, PointIndex* index) {
-  start(origin, index);
+  start(X_FO, index);
   add_runs(points.data(), points.size(), {});
   finish();
 }

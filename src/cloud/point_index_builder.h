@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -25,20 +26,21 @@ using PointFilter = std::function<std::uint32_t(const PointTile& tile, const Pad
 /// alone makes boxes that overlap, and doubles what a query visits.
 class PointIndexBuilder {
  public:
-  /// As PointIndex::build.
+  /// As PointIndex::build, in any frame.
+  /// @param X_FO    frame of the points -> fixed frame, rigid
   /// @param drop    may be empty. Called once for each tile-to-be, before boxes are made: to filter
   ///                a tile at a time is much cheaper than a point at a time.
   /// @param index   overwritten, its buffers reused
-  void build(const Eigen::Vector3d& origin, const CloudPoint* points, std::size_t n,
+  void build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,
              const PointFilter& drop, PointIndex* index);
 
   /// The same for points of which neighbours in the list are mostly neighbours in space.
-  void build_in_order(const Eigen::Vector3d& origin, const std::vector<CloudPoint>& points,
+  void build_in_order(const Eigen::Isometry3d& X_FO, const std::vector<CloudPoint>& points,
                       PointIndex* index);
 
   /// The same tile by tile, for who knows which points are neighbours: start(), then room() and
   /// keep() for each tile, then finish(). Before finish(), the index is not to be read.
-  void start(const Eigen::Vector3d& origin, PointIndex* index);
+  void start(const Eigen::Isometry3d& X_FO, PointIndex* index);
   /// The next tiles, to be filled: points, ids and count.
   PointTile* room(std::size_t count);
   /// Keeps the first tile of room().

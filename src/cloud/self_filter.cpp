@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "geometry/relative_pose.h"
+
 namespace ist {
 namespace {
 
@@ -16,13 +18,13 @@ std::uint32_t all_of(const PointTile& tile) {
 
 }  // namespace
 
-void SelfFilter::pose(const PosedRobot& robot, const Eigen::Vector3d& origin, double padding) {
+void SelfFilter::pose(const PosedRobot& robot, const Eigen::Isometry3d& X_FO, double padding) {
   padding_ = padding;
   links_.clear();
-  add(robot, origin);
+  add(robot, X_FO);
 }
 
-void SelfFilter::add(const PosedRobot& robot, const Eigen::Vector3d& origin) {
+void SelfFilter::add(const PosedRobot& robot, const Eigen::Isometry3d& X_FO) {
   if (robot.model == nullptr) return;
   const std::size_t count =
       std::min({robot.model->links.size(), robot.known.size(), robot.X_FL.size()});
@@ -30,8 +32,7 @@ void SelfFilter::add(const PosedRobot& robot, const Eigen::Vector3d& origin) {
     const LinkModel& model = robot.model->links[i];
     if (!robot.known[i] || !model.usable() || model.tree.empty()) continue;
     const InnerSphereTree& tree = model.tree;
-    Eigen::Isometry3d X_OL = robot.X_FL[i];
-    X_OL.translation() -= origin;
+    const Eigen::Isometry3d X_OL = relative_pose(X_FO, robot.X_FL[i]);
     const double clear_beyond = std::max(padding_, tree.interior_gap());
     const double size = tree.center().norm() + tree.radius() + clear_beyond;
     PosedLink link;

@@ -20,11 +20,11 @@ namespace ist {
 class SelfFilter {
  public:
   /// @param robot    links without a known pose, without geometry or with an error claim no point
-  /// @param origin   [m] of the points, in the fixed frame
+  /// @param X_FO     frame of the points -> fixed frame
   /// @param padding  [m] >= 0
-  void pose(const PosedRobot& robot, const Eigen::Vector3d& origin, double padding);
+  void pose(const PosedRobot& robot, const Eigen::Isometry3d& X_FO, double padding);
   /// The robot at one more instant, beside those before.
-  void add(const PosedRobot& robot, const Eigen::Vector3d& origin);
+  void add(const PosedRobot& robot, const Eigen::Isometry3d& X_FO);
 
   /// False: none of the points in this box is the robot's.
   bool may_drop(const PaddedBox& box) const;
@@ -43,7 +43,7 @@ class SelfFilter {
 
   struct PosedLink {
     const LinkModel* model;
-    Eigen::Isometry3d X_LO;    ///< origin's frame (fixed frame's axes) -> link frame
+    Eigen::Isometry3d X_LO;    ///< frame of the points -> link frame
     Eigen::Vector3f center_O;  ///< [m] of the link's bounding sphere
     float reach;               ///< [m] bounding sphere and padding
     float slack;               ///< [m] more than what float rounds off

@@ -21,9 +21,17 @@ float offset_in_cell(double origin, double edge) {
 // Cells are larger where their numbers would not fit: across more than two billion of them.
 double fitting(double cell, const PointIndex& all) {
   if (all.empty()) return cell;
-  const float reach =
-      std::max(all.bounds().min().cwiseAbs().maxCoeff(), all.bounds().max().cwiseAbs().maxCoeff());
+  const float reach = all.bounds().min().cwiseAbs().cwiseMax(all.bounds().max().cwiseAbs()).norm();
   return std::max(cell, static_cast<double>(reach) / kMostCells);
+}
+
+CellGrid make_grid(const Eigen::Matrix3d& R_FO, const Eigen::Vector3d& origin, double edge) {
+  CellGrid grid;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) grid.turn[3 * i + k] = static_cast<float>(R_FO(i, k) / edge);
+    grid.offset[i] = offset_in_cell(origin[i], edge);
+  }
+  return grid;
 }
 
 }  // namespace
@@ -41,10 +49,9 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
   table_.assign(table_size, 0U);
   entries_.clear();
   recent_.fill(0);
-  const Eigen::Vector3d& origin = all.origin();
-  const double edge = fitting(cell_size, all);
-  CellGrid grid{static_cast<float>(1.0 / edge), {}};
-  for (int i = 0; i < 3; ++i) grid.offset[i] = offset_in_cell(origin[i], edge);
+  const Eigen::Matrix3d& R_FO = all.X_FO().linear();
+  const Eigen::Vector3d& origin = all.X_FO().translation();
+  const CellGrid grid = make_grid(R_FO, origin, fitting(cell_size, all));
   TileCells cells;
   for (const PointTile& tile : all.tiles()) {
     const std::size_t count = find_cells(grid, tile, &cells);
@@ -58,9 +65,13 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
   }
 
   points_.clear();
-  for (const Entry& entry : entries_) points_.push_back({entry.x, entry.y, entry.z, entry.id});
+  for (const Entry& entry : entries_) {
+    const Eigen::Vector3f p =
+        (R_FO * Eigen::Vector3f(entry.x, entry.y, entry.z).cast<double>()).cast<float>();
+    points_.push_back({p.x(), p.y(), p.z(), entry.id});
+  }
   // Neighbours among the tiles have given neighbours.
-  builder->build_in_order(origin, points_, thin);
+  builder->build_in_order(Eigen::Isometry3d(Eigen::Translation3d(origin)), points_, thin);
 }
 
 // The usual case, on its own for speed: a cell seen a moment ago has a better point already.

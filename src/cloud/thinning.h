@@ -17,7 +17,7 @@ class Thinning {
  public:
   /// @param all   what to thin
   /// @param cell_size  [m] > 0, edge of a cell
-  /// @param thin  overwritten, with the same origin and ids
+  /// @param thin  overwritten, with the same origin and ids, along the fixed frame's axes
   void run(const PointIndex& all, double cell_size, PointIndexBuilder* builder, PointIndex* thin);
 
  private:
@@ -37,7 +37,7 @@ class Thinning {
   struct Entry {
     Cell cell;
     float off_centre;  ///< squared distance to the cell's centre, in cells
-    float x, y, z;     ///< [m] from the origin
+    float x, y, z;     ///< [m] in the frame of the index
     std::uint32_t id;
 
     bool better_than(const Entry& other) const;

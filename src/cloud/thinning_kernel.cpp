@@ -24,11 +24,18 @@ HWY_INLINE std::uint32_t MaskBits(const M& mask) {
   return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8;
 }
 
-HWY_INLINE hn::Vec<CellTag> Divide(const CellGrid& grid, int axis, const float* v, float* cell) {
+HWY_INLINE hn::Vec<CellTag> Divide(const CellGrid& grid, int axis, const PointTile& tile,
+                                   std::size_t first, float* cell) {
   const CellTag d;
-  const auto cells =
-      hn::Add(hn::Mul(hn::Load(d, v), hn::Set(d, grid.scale)), hn::Set(d, grid.offset[axis]));
-  const auto bounded = hn::Min(cells, hn::Set(d, kUnusedCell));
+  const float* turn = grid.turn + 3 * axis;
+  const auto x = hn::Load(d, tile.x + first), y = hn::Load(d, tile.y + first),
+             z = hn::Load(d, tile.z + first);
+  const auto turned =
+      hn::Add(hn::Add(hn::Mul(x, hn::Set(d, turn[0])), hn::Mul(y, hn::Set(d, turn[1]))),
+              hn::Mul(z, hn::Set(d, turn[2])));
+  const auto cells = hn::Add(turned, hn::Set(d, grid.offset[axis]));
+  const auto unused = hn::Eq(x, hn::Set(d, kFarAway));
+  const auto bounded = hn::IfThenElse(unused, hn::Set(d, kUnusedCell), cells);
   const auto floor = hn::Floor(bounded);
   hn::Store(floor, d, cell);
   const auto off = hn::Sub(hn::Sub(bounded, floor), hn::Set(d, 0.5F));
@@ -64,9 +71,9 @@ HWY_INLINE Cell CellOf(const TileCells& cells, std::size_t k) {
 std::size_t FindCells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
   const CellTag d;
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
-    const auto x = Divide(grid, 0, tile.x + i, cells->x + i);
-    const auto y = Divide(grid, 1, tile.y + i, cells->y + i);
-    const auto z = Divide(grid, 2, tile.z + i, cells->z + i);
+    const auto x = Divide(grid, 0, tile, i, cells->x + i);
+    const auto y = Divide(grid, 1, tile, i, cells->y + i);
+    const auto z = Divide(grid, 2, tile, i, cells->z + i);
     hn::Store(hn::Add(hn::Add(x, y), z), d, cells->off_centre + i);
   }
   std::size_t count = 0;

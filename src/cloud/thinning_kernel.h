@@ -7,11 +7,11 @@
 
 namespace ist {
 
-/// A cubic grid along the fixed frame's axes, as seen from an origin that lies anywhere in it.
+/// A cubic grid along the fixed frame's axes, as seen from a frame O that lies anywhere in it.
 /// Float is enough: cells come out no less exact than the coordinates are.
 struct CellGrid {
-  float scale;      ///< [1/m]
-  float offset[3];  ///< of the origin, in cells
+  float turn[9];    ///< [1/m] rotation from O to the grid's axes over a cell's edge, row-major
+  float offset[3];  ///< of O's origin, in cells
 };
 
 /// The cells that a tile's points are in.

@@ -44,15 +44,14 @@ class LinkContact {
 
   void points(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF,
               const std::vector<const CloudSnapshot*>& clouds) {
-    const Eigen::Isometry3d X_LO = X_LF * Eigen::Translation3d(cloud.coarse.origin());
+    const Eigen::Isometry3d &X_FO = cloud.coarse.X_FO(), X_LO = X_LF * X_FO;
     const double radius = point_ball_radius(cloud);
     visit_tiles(
         cloud.coarse, [&](const Around& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const PointTile& tile) {
           for (int k = 0; k < tile.count; ++k) {
-            const Eigen::Vector3d p_O(tile.x[k], tile.y[k], tile.z[k]);
-            add(X_LO * p_O, radius,
-                [&] { return kept_share(p_O + cloud.coarse.origin(), radius, clouds); });
+            const Eigen::Vector3d p_O = tile.point(k);
+            add(X_LO * p_O, radius, [&] { return kept_share(X_FO * p_O, radius, clouds); });
           }
         });
   }

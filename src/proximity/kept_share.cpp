@@ -50,7 +50,8 @@ double kept_share(const Eigen::Vector3d& p_F, double radius,
     if (index.empty()) continue;
     const auto R = static_cast<float>(point_ball_radius(*cloud));
     const float reach = (R + r) * (R + r);
-    const Eigen::Vector3f p = (p_F - index.origin()).cast<float>();
+    const Eigen::Vector3f p =
+        (index.X_FO().linear().transpose() * (p_F - index.X_FO().translation())).cast<float>();
     std::array<std::int32_t, kStackSize> stack;
     std::size_t top = 0;
     stack[top++] = index.root();

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "geometry/float_rounding.h"
+#include "geometry/relative_pose.h"
 
 namespace ist {
 namespace {
@@ -71,6 +72,13 @@ void LinkQuery::start_cold(const Eigen::Isometry3d& X_FL, const QueryConfig& con
   // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
   dropped_ = -link_->tree.radius();
   rounding_ = reach_ = 0.0;
+  horizon_ = kInfinity;
+}
+
+// How near to the link what lies beyond a horizon may be.
+double LinkQuery::to_horizon(const Horizon& horizon) const {
+  const double from_center = (X_FL_ * link_->tree.center() - horizon.center_F).norm();
+  return std::max(horizon.radius - from_center, 0.0) - link_->tree.radius();
 }
 
 bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part) {
@@ -80,12 +88,10 @@ bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part)
   cloud_ = index;
   if (boxes_ != nullptr) {
     X_FO_ = cloud.X_FM * Eigen::Translation3d(boxes_->origin());
-    X_OL_ = X_FO_.inverse() * X_FL_;
   } else {
-    X_FO_ = Eigen::Translation3d(index_->origin());
-    X_OL_ = X_FL_;
-    X_OL_.translation() -= index_->origin();
+    X_FO_ = index_->X_FO();
   }
+  X_OL_ = relative_pose(X_FO_, X_FL_);
   X_LO_ = X_OL_.inverse();
   const double reach = X_OL_.translation().cwiseAbs().maxCoeff() + link_->tree.center().norm() +
                        link_->tree.radius();
@@ -95,8 +101,7 @@ bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part)
 }
 
 Eigen::Vector3d LinkQuery::point_O(std::int32_t tile, int lane) const {
-  const PointTile& points = index_->tiles()[static_cast<std::size_t>(tile)];
-  return {points.x[lane], points.y[lane], points.z[lane]};
+  return index_->tiles()[static_cast<std::size_t>(tile)].point(lane);
 }
 
 double LinkQuery::wanted_below(double distance) const {
@@ -212,6 +217,13 @@ bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline
   // With holes, cells bound little: see Solid::distance_floor.
   cells_left_ = link_->solid.is_closed() ? kMaxCells : kMaxCells / 8;
   bool stopped = false;
+  for (const CloudSnapshot* cloud : clouds) {
+    horizon_ = std::min(horizon_, to_horizon(cloud->horizon));
+  }
+  if (!sees_all()) {
+    drop(horizon_);
+    ++statistics->past_horizon;
+  }
   for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
     for (const Part part : {Part::kPoints, Part::kBoxes}) {
       if (stopped || !enter(*clouds[i], static_cast<std::int32_t>(i), part)) continue;
@@ -314,7 +326,7 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   statistics_ = nullptr;
   last_generation_ = 0;
   if (nearest_.exact.distance > range()) {
-    if (!complete_) return;  // UNKNOWN: nothing was measured, and not all was seen
+    if (!complete_ || !sees_all()) return;  // UNKNOWN: nothing measured, and not all was seen
     result->state = LinkState::kClear;
     result->distance = kInfinity;
     result->lower_bound = config_.max_distance;

@@ -45,6 +45,8 @@ class LinkQuery {
   double distance() const { return nearest_.exact.distance; }
   /// [m] Proven: the link's distance is not below it. Inf where nothing is in range.
   double proven() const;
+  /// After refine(): whether the clouds end nowhere that this link would have to know.
+  bool sees_all() const { return horizon_ >= config_.max_distance + config_.margin; }
 
   /// The descent. False: the deadline passed first; what is known by then still holds.
   bool refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
@@ -121,6 +123,7 @@ class LinkQuery {
   void find_overlap_in_tile(std::int32_t tile);
   void find_depth_in_box(const BoxCell& whole, std::int32_t tile, int lane);
   BoxCell make_cell(const Eigen::AlignedBox3d& box, std::int32_t tile, int lane);
+  double to_horizon(const Horizon& horizon) const;
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
   double wanted_below(double distance) const;
@@ -136,6 +139,7 @@ class LinkQuery {
   double rounding_ = 0.0;  ///< [m] largest error of a float bound
   double others_ = 0.0;    ///< [m] distance of other links, that this one need not be beyond
   double reach_ = 0.0;     ///< [m] largest coordinate of the link in the index's frame
+  double horizon_ = 0.0;   ///< [m] no point that the clouds left out is nearer
   bool complete_ = false;
 
   // The index at work: its frame O has the fixed frame's axes for points, the map's for boxes.

@@ -85,7 +85,7 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double nearest = kInfinity, proven = kInfinity;
   std::size_t best = count;
-  bool complete = true;
+  bool complete = true, sees_all = true;
   // Begins with the link that was nearest last time: its bound rules most of the others out.
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
@@ -101,6 +101,7 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
       link.start_cold(X_FL[i], impl_->config, nearest);
     }
     complete = impl_->refine(i, clouds, &deadline) && complete;
+    sees_all = sees_all && link.sees_all();
     proven = std::min(proven, link.proven());
     if (best == count || link.distance() < nearest) {
       best = i;
@@ -114,7 +115,7 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
     result->link = static_cast<std::int32_t>(best);
     answer.lower_bound = std::min(answer.lower_bound, proven);
     impl_->last_nearest = best;
-  } else if (!complete) {
+  } else if (!complete || !sees_all) {
     answer.reset();
   }
   return complete;

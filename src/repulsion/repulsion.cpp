@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/relative_pose.h"
 #include "repulsion/blend_kernel.h"
 
 namespace ist {
@@ -33,14 +34,13 @@ void for_each_index(const std::vector<const CloudSnapshot*>& clouds,
   for (const CloudSnapshot* cloud : clouds) {
     if (cloud == nullptr) continue;
     if (!cloud->coarse.empty()) {
-      Eigen::Isometry3d X_OL = X_FL;
-      X_OL.translation() -= cloud->coarse.origin();
-      visit(cloud->coarse, posed(X_OL), Eigen::Matrix3d::Identity(),
-            CellGrid(cloud->coarse.origin(), cloud->thinning));
+      const Eigen::Isometry3d& X_FO = cloud->coarse.X_FO();
+      visit(cloud->coarse, posed(relative_pose(X_FO, X_FL)), X_FO.linear(),
+            CellGrid(X_FO.translation(), cloud->thinning));
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     const Eigen::Isometry3d X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
-    visit(*cloud->boxes, posed(X_FO.inverse() * X_FL), X_FO.linear(), no_grid);
+    visit(*cloud->boxes, posed(relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
   }
 }
 

@@ -42,14 +42,12 @@ sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros:
   message->data.resize(message->row_step);
 
   std::uint8_t* out = message->data.data();
-  const Eigen::Vector3d& origin = snapshot.index.origin();
+  const Eigen::Isometry3d& X_FO = snapshot.index.X_FO();
   for (const PointTile& tile : snapshot.index.tiles()) {
     for (int i = 0; i < tile.count; ++i) {
-      const float p[3] = {static_cast<float>(origin.x() + tile.x[i]),
-                          static_cast<float>(origin.y() + tile.y[i]),
-                          static_cast<float>(origin.z() + tile.z[i])};
-      std::memcpy(out, p, sizeof p);
-      out += sizeof p;
+      const Eigen::Vector3f p_F = (X_FO * tile.point(i)).cast<float>();
+      std::memcpy(out, p_F.data(), 3 * sizeof(float));
+      out += 3 * sizeof(float);
     }
   }
   return message;

@@ -50,11 +50,12 @@ CloudSource::~CloudSource() {
   subscriber_.shutdown();
 }
 
-void CloudSource::set_model(std::shared_ptr<const RobotModel> model,
-                            const std::string& fixed_frame) {
+void CloudSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
+                            const Horizon& horizon) {
   const std::lock_guard<std::mutex> lock(mutex_);
   shared_target_.model = std::move(model);
   shared_target_.fixed_frame = fixed_frame;
+  shared_target_.horizon = horizon;
 }
 
 const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel>& model,
@@ -365,6 +366,9 @@ std::string CloudSource::ingest(const Measurement& waiting) {
   if (!problem.empty()) return problem;
   const std::shared_ptr<SourceSnapshot>& shared = writable();
   SourceSnapshot& snapshot = *shared;
+  // Who looks at the cloud wants to see it whole.
+  const bool show = !is_map_ && filtered_.getNumSubscribers() > 0;
+  ingest_.set_horizon(show ? Horizon() : target_.horizon);
   try {
     waiting.ingest(placement, &ingest_, &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a monstrous cloud
@@ -384,7 +388,6 @@ std::string CloudSource::ingest(const Measurement& waiting) {
   }
   snapshot.generation = target_.generation;
   in_use_ = stamp;
-  const bool show = !is_map_ && filtered_.getNumSubscribers() > 0;
   if (show) filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -51,8 +51,8 @@ std::string doubt_of_self_filter(const SourceFacts& source) {
   constexpr double kNearlyAll = 0.95;
   const IngestCounts& counts = source.counts;
   if (!source.has_snapshot || std::isnan(source.blind_skin)) return "";
-  const std::size_t in_range =
-      counts.received - counts.not_a_number - counts.noise - counts.infinite - counts.out_of_range;
+  const std::size_t in_range = counts.received - counts.not_a_number - counts.noise -
+                               counts.infinite - counts.out_of_range - counts.beyond_horizon;
   if (in_range == 0) return "";
   const double share = static_cast<double>(counts.on_robot) / static_cast<double>(in_range);
   if (share >= kNearlyAll) {
@@ -151,6 +151,7 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceFacts& s
     add("points used", source.counts.used, &status);
     add("points on the robot", source.counts.on_robot, &status);
     add("points out of range", source.counts.out_of_range, &status);
+    add("points out of reach", source.counts.beyond_horizon, &status);
     if (source.counts.noise > 0) add("points taken for noise", source.counts.noise, &status);
     add("points NaN", source.counts.not_a_number, &status);
     add("points infinite", source.counts.infinite, &status);

@@ -71,7 +71,7 @@ ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict&
   message.stamp = source.stamp;
   if (!source.is_file) message.age = seconds_between(message.stamp, stamp);
   message.points_received = source.counts.received;
-  message.points_used = source.counts.used;
+  message.points_used = source.counts.used + source.counts.beyond_horizon;
   message.points_on_robot = source.counts.on_robot;
   return message;
 }

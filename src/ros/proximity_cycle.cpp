@@ -102,6 +102,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && poses_.known[i];
   situation_.deadline_passed =
       !query_.run(poses_.X_FL, known, clouds_, &results_) && !clouds_.empty();
+  situation_.past_horizon = query_.statistics().past_horizon > 0;
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;

@@ -146,6 +146,7 @@ void ProximityServer::run_cycle() {
   const auto message = boost::make_shared<ProximityArray>();
   const std::string transform_problem = listener_.problem();
   const LiveConfig live = live_config();
+  if (live.query.margin != margin_) aim_sources(live.query);
   {
     const std::lock_guard<std::mutex> lock(shared_mutex_);
     report_.transform_problem = transform_problem;
@@ -201,8 +202,20 @@ void ProximityServer::take_model() {
   query_service_->set_model(model_);
   if (self_proximity_) self_proximity_->set_model(model_);
   publish_spheres();
+  aim_sources(live_.get().query);
+}
+
+void ProximityServer::aim_sources(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
-  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame);
+  margin_ = query.margin;
+  Horizon horizon;
+  // tf may know better than the URDF where links are.
+  const bool computes_poses = config_.pose_source == PoseSourceKind::kJointStates;
+  if (computes_poses && model_->robot && model_->kinematics) {
+    horizon = horizon_of(*model_->robot, *model_->kinematics, fixed_frame,
+                         query.max_distance + query.margin);
+  }
+  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, horizon);
 }
 
 void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& message) {

@@ -142,6 +142,13 @@ Verdict judge(const Situation& situation, double now) {
         "~query/deadline passed before every link met ~query/tolerance: bounds hold but are wider; "
         "raise either, or ~packing/max_error");
   }
+  if (situation.past_horizon) {
+    add(ProximityArray::DEGRADED,
+        "a link is farther out than the limits of prismatic joints allow, and looks where points "
+        "were "
+        "dropped as out of reach: what it would have to know from there is not known; state these "
+        "limits in the URDF as they are");
+  }
   if (found.empty()) return {ProximityArray::OK, ""};
 
   Verdict verdict{found[0].status, ""};

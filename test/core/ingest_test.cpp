@@ -97,7 +97,8 @@ CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
   Ingest(config).run(message.raw, X_FS, robot, 12.5, &snapshot);
   const IngestCounts& n = snapshot.counts;
   EXPECT_EQ(n.received, points.size());
-  EXPECT_EQ(n.received, n.not_a_number + n.infinite + n.out_of_range + n.on_robot + n.used);
+  EXPECT_EQ(n.received,
+            n.not_a_number + n.infinite + n.out_of_range + n.beyond_horizon + n.on_robot + n.used);
   EXPECT_EQ(n.used, snapshot.index.size());
   return snapshot;
 }
@@ -107,8 +108,7 @@ std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
   std::map<std::uint32_t, Eigen::Vector3d> points;
   for (const PointTile& tile : index.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      const Eigen::Vector3d p = Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]).cast<double>();
-      EXPECT_TRUE(points.emplace(tile.id[k], index.origin() + p).second) << "id twice";
+      EXPECT_TRUE(points.emplace(tile.id[k], index.X_FO() * tile.point(k)).second) << "id twice";
     }
   }
   return points;
@@ -336,6 +336,16 @@ void for_each_instruction_set(const Test& test) {
   choose(0);
 }
 
+// Frames differ, and what float rounds with them.
+void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
+                 const std::map<std::uint32_t, Eigen::Vector3d>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [id, p] : a) {
+    ASSERT_EQ(b.count(id), 1U) << id;
+    ASSERT_LT((b.at(id) - p).norm(), 1e-6) << id;
+  }
+}
+
 // What a depth camera sees: a wall and a board before it, and nothing at some pixels.
 Points depth_image(std::size_t width, std::size_t height) {
   std::mt19937 random(8);
@@ -369,7 +379,7 @@ void check_images(const Format& format) {
     EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
     EXPECT_EQ(a.counts.infinite, b.counts.infinite);
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
-    EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
+    expect_same(points_by_id(a.index), points_by_id(b.index));
     // Tiles do not span the edge of the board, 0.6 m deep.
     for (const PointTile& tile : b.index.tiles()) {
       Eigen::AlignedBox3f box;
@@ -442,7 +452,7 @@ TEST(Ingest, farPointsWithASensorFrameThatBringsThemBack) {
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   X_FS.translation() << -691000.0, -5334000.0, -520.0;
   const CloudSnapshot snapshot = ingest(points, without_limits(), float64(), X_FS);
-  EXPECT_LT(snapshot.index.origin().norm(), 10.0);
+  EXPECT_LT(snapshot.index.X_FO().translation().norm(), 10.0);
   expect_transformed(points, X_FS, snapshot.index, 1e-6);
 }
 
@@ -451,13 +461,56 @@ TEST(Ingest, farOutliersDoNotMoveTheOrigin) {
   Points points = random_points(500, 2.0, 6);
   for (int i = 0; i < 50; ++i) points.emplace_back(1e8, -1e8, 1e8);
   const CloudSnapshot snapshot = ingest(points, without_limits(), float64());
-  EXPECT_EQ(snapshot.index.origin(), Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(snapshot.index.X_FO().translation(), Eigen::Vector3d(0, 0, 0));
 }
 
 TEST(Ingest, originIsOnWholeMetres) {
   const CloudSnapshot snapshot = ingest(random_points(50, 1.0, 7), {}, {}, pose(1.4, -2.6, 0.2));
-  EXPECT_EQ(snapshot.index.origin(), Eigen::Vector3d(1, -3, 0));
-  EXPECT_EQ(snapshot.coarse.origin(), snapshot.index.origin());
+  EXPECT_EQ(snapshot.index.X_FO().translation(), Eigen::Vector3d(1, -3, 0));
+  EXPECT_EQ(snapshot.coarse.X_FO().translation(), snapshot.index.X_FO().translation());
+}
+
+// Every way that points are read: float or double, image or list, four floats or not.
+TEST(Ingest, whatIsBeyondTheHorizonIsLeftOut) {
+  const Points points = depth_image(160, 120);
+  const Eigen::Isometry3d X_FS = pose(0.5, 0.2, 1.0);
+  Horizon horizon;
+  horizon.center_F << 0.3, -0.4, 0.9;
+  horizon.radius = 1.5;
+  Format image, four_floats;
+  image.width = four_floats.width = 160;
+  four_floats.point_step = 16;
+  four_floats.misaligned = 0;
+  for (const Format& format : {Format(), image, four_floats, float64()}) {
+    const Message message(points, format);
+    Ingest ingest(without_limits());
+    CloudSnapshot all, cut;
+    ingest.run(message.raw, X_FS, {}, 0.0, &all);
+    ingest.set_horizon(horizon);
+    ingest.run(message.raw, X_FS, {}, 0.0, &cut);
+    EXPECT_EQ(all.horizon.radius, kInf);
+    EXPECT_EQ(cut.horizon.radius, 1.5);
+    const auto kept = points_by_id(cut.index);
+    std::size_t expected = 0;
+    for (const auto& [id, p] : points_by_id(all.index)) {
+      const double from_center = (p - horizon.center_F).norm();
+      ASSERT_GT(std::abs(from_center - 1.5), 1e-9) << "nobody knows";
+      ASSERT_EQ(kept.count(id), from_center < 1.5 ? 1U : 0U) << from_center;
+      expected += from_center < 1.5;
+    }
+    EXPECT_GT(expected, 1000U);
+    EXPECT_EQ(cut.counts.used, expected);
+    EXPECT_EQ(cut.counts.beyond_horizon, all.counts.used - expected);
+    EXPECT_EQ(cut.counts.out_of_range, 0U);
+  }
+}
+
+TEST(Ingest, aHorizonThatIsNoBallIsRefused) {
+  Ingest ingest{IngestConfig()};
+  for (const double radius : {kNan, -1.0}) {
+    EXPECT_THROW(ingest.set_horizon({Eigen::Vector3d::Zero(), radius}), std::invalid_argument);
+  }
+  EXPECT_THROW(ingest.set_horizon({Eigen::Vector3d(0, kInf, 0), 1.0}), std::invalid_argument);
 }
 
 TEST(Ingest, badConfigurationIsNamed) {

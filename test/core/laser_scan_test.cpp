@@ -41,8 +41,7 @@ std::vector<Eigen::Vector3d> by_beam(const CloudSnapshot& snapshot, std::size_t 
   std::vector<Eigen::Vector3d> points(count, Eigen::Vector3d::Constant(NAN));
   for (const PointTile& tile : snapshot.index.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      points[tile.id[k]] =
-          snapshot.index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]);
+      points[tile.id[k]] = snapshot.index.X_FO() * tile.point(static_cast<int>(k));
     }
   }
   return points;

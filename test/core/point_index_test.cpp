@@ -31,6 +31,8 @@ struct Points {
   }
 };
 
+const Eigen::Isometry3d kFrame(Eigen::Translation3d(1.0, 2.0, 3.0));
+
 PointIndex build(const Points& points) {
   PointIndex index;
   index.build({1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
@@ -79,7 +81,7 @@ class Checker {
   void run() {
     ASSERT_EQ(index_.size(), points_.size());
     ASSERT_EQ(index_.empty(), points_.size() == 0);
-    ASSERT_EQ(index_.origin(), Eigen::Vector3d(1.0, 2.0, 3.0));
+    ASSERT_EQ(index_.X_FO().matrix(), kFrame.matrix());
     if (index_.empty()) {
       EXPECT_TRUE(index_.nodes().empty());
       EXPECT_EQ(index_.root(), -1);
@@ -298,7 +300,7 @@ TEST(PointIndex, dependsOnNothingButItsArguments) {
   PointIndex index;
   for (const Points* points : {&small, &large, &small, &small}) {
     const std::vector<CloudPoint> list = points->list();
-    builder.build({1.0, 2.0, 3.0}, list.data(), list.size(), {}, &index);
+    builder.build(kFrame, list.data(), list.size(), {}, &index);
   }
   EXPECT_TRUE(same(index, expected));
 }
@@ -309,7 +311,7 @@ TEST(PointIndex, buffersAreReused) {
   PointIndex index;
   const auto run = [&](const Points& points) {
     const std::vector<CloudPoint> list = points.list();
-    builder.build({1.0, 2.0, 3.0}, list.data(), list.size(), {}, &index);
+    builder.build(kFrame, list.data(), list.size(), {}, &index);
   };
   run(large);
   const auto* tiles = index.tiles().data();
@@ -328,7 +330,7 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
   std::size_t asked = 0;
   const std::vector<CloudPoint> list = points.list();
   PointIndexBuilder().build(
-      {1.0, 2.0, 3.0}, list.data(), list.size(),
+      kFrame, list.data(), list.size(),
       [&](const PointTile& tile, const PaddedBox& box) {
         asked += static_cast<std::size_t>(tile.count);
         Eigen::AlignedBox3f exact;
@@ -366,8 +368,8 @@ TEST(PointIndex, filterThatDropsAll) {
   PointIndex index;
   const std::vector<CloudPoint> list = points.list();
   PointIndexBuilder().build(
-      {1.0, 2.0, 3.0}, list.data(), list.size(),
-      [](const PointTile&, const PaddedBox&) { return 0xFFFFU; }, &index);
+      kFrame, list.data(), list.size(), [](const PointTile&, const PaddedBox&) { return 0xFFFFU; },
+      &index);
   EXPECT_TRUE(index.empty());
   EXPECT_EQ(index.root(), -1);
   EXPECT_TRUE(index.nodes().empty());

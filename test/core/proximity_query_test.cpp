@@ -54,8 +54,7 @@ std::vector<Eigen::Vector3d> stored_points(const CloudSnapshot& snapshot,
   std::vector<Eigen::Vector3d> points;
   for (const PointTile& tile : snapshot.index.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      points.push_back(
-          X_LF * (snapshot.index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k])));
+      points.push_back(X_LF * (snapshot.index.X_FO() * tile.point(k)));
     }
   }
   return points;

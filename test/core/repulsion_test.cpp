@@ -74,7 +74,7 @@ std::vector<Weighted> weighted_points(const CloudSnapshot& cloud) {
   std::vector<Weighted> all;
   for (const PointTile& tile : cloud.coarse.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      const Vector3d p = cloud.coarse.origin() + Vector3d(tile.x[k], tile.y[k], tile.z[k]);
+      const Vector3d p = cloud.coarse.X_FO() * tile.point(static_cast<int>(k));
       const Vector3d cells = p / cloud.thinning;
       const Vector3d off = cells - cells.array().floor().matrix() - Vector3d::Constant(0.5);
       const double section = 1.0 - off.squaredNorm() / 0.75;

@@ -10,7 +10,7 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2
 
 DEMO = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "demo")
 sys.path.insert(0, DEMO)
@@ -171,6 +171,42 @@ class JointStatesTest(unittest.TestCase):
         values = {v.key: v.value for v in pose.values}
         self.assertEqual(values["topic"], self.namespace + "/joint_states")
         self.assertGreater(int(values["joint states used"]), 100)
+
+    def test_out_of_reach(self):
+        """What no link gets near is dropped, and missed by a joint that leaves its limits."""
+        node = self.start(max_distance=0.3, max_range=9.0, self_filter=False)
+        seen = np.array([[0.6, 0.6, 0.6], [4.0, 0.0, 0.5]])  # in base, which the box gets 2.8 m from
+
+        def stand(slide):
+            self.still = {"turn": 0.0, "slide": slide}
+            X = arm_poses(**self.still)
+            self.world.points = pt.apply(pt.inverse(X["camera"]), seen)
+
+        def dropped():
+            values = node.diagnostics["input cloud"].values if node.diagnostics else []
+            return {v.key: v.value for v in values}.get("points out of reach")
+
+        stand(0.5)
+        self.world.repeat(50, lambda: self.send("turn", "slide"))
+        self.world.start_clouds()
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertEqual(message.sources[0].points_used, 2)
+        node.wait_until(lambda: dropped() == "1", "a point out of reach")
+        self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
+
+        stand(3.4)  # at the far point, but for 0.6 m
+        message = node.wait_for_status(ProximityArray.DEGRADED, "farther out than the limits")
+        node.wait_for(lambda m: pt.all_unknown(m), "nothing known")
+
+        # Who looks at the cloud sees it whole, and so do the links.
+        clouds = []
+        node.subscribe("filtered_cloud", PointCloud2, clouds.append)
+        message = node.wait_for_status(ProximityArray.OK)
+        node.wait_until(lambda: clouds and clouds[-1].width == 2, "both points")
+        self.assertTrue(all(s == LinkProximity.CLEAR for s in pt.states(message)), message)
+        stand(3.7)
+        message = node.wait_for(lambda m: pt.link(m, "ball_link").state == LinkProximity.NEAR, "near")
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
 
     def test_moving(self):
         """Poses belong to the stamp; clouds of a camera on a link, late, with the robot in view;

@@ -81,7 +81,7 @@ inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
   std::vector<Eigen::Vector3d> points;
   for (const PointTile& tile : cloud.coarse.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      points.push_back(cloud.coarse.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]));
+      points.push_back(cloud.coarse.X_FO() * tile.point(static_cast<int>(k)));
     }
   }
   return points;

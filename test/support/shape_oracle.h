@@ -59,7 +59,7 @@ inline std::vector<Eigen::Vector3d> stored_points(const PointIndex& index) {
   points.reserve(index.size());
   for (const PointTile& tile : index.tiles()) {
     for (int k = 0; k < tile.count; ++k) {
-      points.push_back(index.origin() + Eigen::Vector3d(tile.x[k], tile.y[k], tile.z[k]));
+      points.push_back(index.X_FO() * tile.point(static_cast<int>(k)));
     }
   }
   return points;

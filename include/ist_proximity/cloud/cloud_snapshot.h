@@ -6,19 +6,21 @@
 #include <string>
 
 #include "ist_proximity/cloud/box_index.h"
+#include "ist_proximity/cloud/horizon.h"
 #include "ist_proximity/cloud/point_index.h"
 
 namespace ist {
 
 /// What became of the points of one cloud.
 struct IngestCounts {
-  std::uint32_t received = 0;      ///< points in the message
-  std::uint32_t not_a_number = 0;  ///< dropped: a coordinate is NaN
-  std::uint32_t infinite = 0;      ///< dropped: a coordinate is infinite, and none is NaN
-  std::uint32_t out_of_range = 0;  ///< dropped: nearer than min_range or beyond max_range
-  std::uint32_t noise = 0;         ///< dropped by a noise filter that ran before
-  std::uint32_t on_robot = 0;      ///< dropped by the self-filter
-  std::uint32_t used = 0;          ///< what queries see
+  std::uint32_t received = 0;        ///< points in the message
+  std::uint32_t not_a_number = 0;    ///< dropped: a coordinate is NaN
+  std::uint32_t infinite = 0;        ///< dropped: a coordinate is infinite, and none is NaN
+  std::uint32_t out_of_range = 0;    ///< dropped: nearer than min_range or beyond max_range
+  std::uint32_t beyond_horizon = 0;  ///< dropped: in range, but no link gets near
+  std::uint32_t noise = 0;           ///< dropped by a noise filter that ran before
+  std::uint32_t on_robot = 0;        ///< dropped by the self-filter
+  std::uint32_t used = 0;            ///< what queries see
 
   /// Every point of a cloud that holds some is NaN (or noise): the sensor saw nothing at all.
   bool saw_nothing() const { return received > 0 && not_a_number + noise == received; }
@@ -30,6 +32,7 @@ struct CloudSnapshot {
   PointIndex index;        ///< all points used
   PointIndex coarse;       ///< the same, thinned to one point per cell; empty where not asked for
   double thinning = 0.01;  ///< [m] edge of such a cell
+  Horizon horizon;         ///< where the points end
   std::shared_ptr<const BoxIndex> boxes;                   ///< of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
   IngestCounts counts;

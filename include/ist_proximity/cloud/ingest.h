@@ -39,10 +39,14 @@ class Ingest {
   Ingest(Ingest&&) noexcept;
   Ingest& operator=(Ingest&&) noexcept;
 
-  /// Drops what is not finite or out of range, moves the rest to the fixed frame in double,
-  /// removes the robot's own points and builds the index. Its origin, on whole metres, is where the
-  /// sensor is, or in the middle of a cloud that is far from its sensor's frame (map coordinates):
-  /// it is subtracted before double becomes float.
+  /// Where to end from the next cloud on; nowhere at first.
+  /// @throws std::invalid_argument when it is not a ball; the last one stays then
+  void set_horizon(const Horizon& horizon);
+
+  /// Drops what is not finite, out of range or beyond the horizon, moves the rest to the fixed
+  /// frame in double, removes the robot's own points and builds the index. Its origin, on whole
+  /// metres, is where the sensor is, or in the middle of a cloud that is far from its sensor's
+  /// frame (map coordinates): it is subtracted before double becomes float.
   ///
   /// A point is the robot's when its exact distance to a link is at most the padding, or when it is
   /// inside. Links whose pose is unknown claim no point.

@@ -10,12 +10,14 @@ namespace ist {
 
 constexpr int kPointWidth = 16;
 
-/// Points side by side for SIMD, in metres from the index's origin. Unused slots hold a point so
+/// Points side by side for SIMD, in the index's frame [m]. Unused slots hold a point so
 /// far away that no bound is touched by it (but whose square is still finite).
 struct alignas(64) PointTile {
   float x[kPointWidth], y[kPointWidth], z[kPointWidth];
   std::uint32_t id[kPointWidth];  ///< index of the point in the message it came from
   std::int32_t count;             ///< used slots, at the front
+
+  Eigen::Vector3d point(int k) const { return {x[k], y[k], z[k]}; }
 };
 
 /// Boxes of up to sixteen children side by side.
@@ -29,10 +31,13 @@ struct alignas(64) BoxNode {
 constexpr float kFarAway = 1e15F;  ///< [m] coordinates of unused slots
 
 /// An immutable hierarchy of boxes over points: tiles of up to 16 neighbours, 16-wide boxes above.
-/// Coordinates are relative to `origin` so that float loses nothing far from zero. Thread safe.
+/// Coordinates are in a frame O of its own: its origin is near the points, so that float loses
+/// nothing far from zero, and its axes lie along the scene's surfaces where ingest has found such,
+/// so that boxes are thin; else along the fixed frame's. Thread safe.
 class PointIndex {
  public:
-  /// Builds over points given relative to `origin` (fixed frame, double) in structure-of-arrays.
+  /// Builds over points given relative to `origin` (fixed frame, double) along the fixed frame's
+  /// axes, in structure-of-arrays.
   /// The result depends on nothing but the arguments. For a stream of clouds use
   /// PointIndexBuilder, which keeps its working memory; this allocates.
   /// @param x,y,z  n coordinates [m] each, finite, below kFarAway
@@ -42,18 +47,18 @@ class PointIndex {
 
   bool empty() const { return tiles_.empty(); }
   std::size_t size() const { return size_; }                    ///< points
-  const Eigen::Vector3d& origin() const { return origin_; }     ///< [m] in the fixed frame
+  const Eigen::Isometry3d& X_FO() const { return X_FO_; }       ///< index's -> fixed frame
   const std::vector<BoxNode>& nodes() const { return nodes_; }  ///< the root is nodes()[root()]
   std::int32_t root() const { return root_; }                   ///< -1 when empty
   const std::vector<PointTile>& tiles() const { return tiles_; }
-  Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< relative to the origin
+  Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
   /// Another number after every build() of any index: tells whether an answer belongs to it.
   std::uint64_t generation() const { return generation_; }
 
  private:
   friend class PointIndexBuilder;
 
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  Eigen::Isometry3d X_FO_ = Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3f bounds_;
   std::vector<BoxNode> nodes_;  ///< level by level, the root last
   std::vector<PointTile> tiles_;

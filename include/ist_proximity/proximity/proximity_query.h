@@ -57,6 +57,7 @@ struct QueryStatistics {
   std::uint64_t node_pairs = 0;         ///< pairs of tree node and box expanded
   std::uint64_t leaf_pairs = 0;         ///< ball leaf against point tile
   std::uint64_t exact_evaluations = 0;  ///< point against the link's exact geometry
+  std::uint64_t past_horizon = 0;       ///< links that would see beyond a cloud's horizon
 };
 
 /// Distances from the links of a robot to point clouds.

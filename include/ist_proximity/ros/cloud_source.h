@@ -61,8 +61,10 @@ class CloudSource {
   CloudSource(const CloudSource&) = delete;
   CloudSource& operator=(const CloudSource&) = delete;
 
-  /// What clouds are transformed to and filtered with; null: they cannot be used. Thread safe.
-  void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame);
+  /// What clouds are transformed to, filtered with and cut at; null: they cannot be used. Thread
+  /// safe.
+  void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
+                 const Horizon& horizon);
 
   /// The newest snapshot made with `model` since the clock's last jump; null: none. Valid until
   /// the next call. One thread only; never waits. Before facts(), which tells why there is none.
@@ -85,6 +87,7 @@ class CloudSource {
   struct Target {
     std::shared_ptr<const RobotModel> model;
     std::string fixed_frame;
+    Horizon horizon;
     std::uint64_t generation = 1;
   };
 

@@ -60,6 +60,7 @@ class ProximityServer {
   void run_cycle();
   void notice_clock_jump(const ros::Time& now);
   void take_model();
+  void aim_sources(const QueryConfig& query);
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void publish_joint_repulsion(const ist_proximity::ProximityArray& proximity);
   void publish_spheres();
@@ -91,6 +92,7 @@ class ProximityServer {
   std::shared_ptr<const ModelState> model_;
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
   ProximityMarkers marker_drawer_;
+  double margin_ = 0.0;  ///< ~query/margin that the sources were aimed with
   visualization_msgs::MarkerArray shown_spheres_;
   Clock::time_point spheres_again_ = Clock::time_point::max();  ///< when to latch them anew
   std::chrono::seconds spheres_delay_{0};

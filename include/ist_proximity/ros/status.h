@@ -64,7 +64,8 @@ struct Situation {
   std::vector<Verdict> verdicts;           ///< of `sources`, one each
   std::vector<std::string> pose_problems;  ///< one sentence each
   bool deadline_passed = false;
-  bool clock_runs = true;  ///< false: simulated time, and no /clock yet
+  bool past_horizon = false;  ///< a link is farther out than it can be
+  bool clock_runs = true;     ///< false: simulated time, and no /clock yet
 };
 
 /// Whether the query may look at clouds: every required source is usable, and at least one is. A

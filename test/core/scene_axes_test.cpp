@@ -1,0 +1,162 @@
+// The axes of an index lie along the scene's surfaces, and say nothing of what is measured.
+
+#include "cloud/scene_axes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "support/scene.h"
+#include "support/whole_cloud.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kWidth = 160, kHeight = 120;
+
+// A depth image as its bytes: x, y, z as floats.
+struct Image {
+  std::vector<float> xyz;
+  double share[3] = {};  // of the pixels that see a wall across this axis of the room
+
+  RawCloud raw(bool as_list) const {
+    RawCloud cloud;
+    cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
+    cloud.width = as_list ? xyz.size() / 3 : kWidth;
+    cloud.height = as_list ? 1 : kHeight;
+    cloud.point_step = 3 * sizeof(float);
+    cloud.row_step = cloud.width * cloud.point_step;
+    cloud.y = sizeof(float);
+    cloud.z = 2 * sizeof(float);
+    return cloud;
+  }
+};
+
+// A camera's view into the corner of a room: the nearest of three planes across each other, at each
+// pixel, with some noise along the ray.
+// @param R_SR  the room's axes in the sensor frame
+Image corner(const Eigen::Matrix3d& R_SR, double noise, test::Rng* rng) {
+  std::normal_distribution<double> normal(0.0, 1.0);
+  Image image;
+  for (std::size_t v = 0; v < kHeight; ++v) {
+    for (std::size_t u = 0; u < kWidth; ++u) {
+      const Eigen::Vector3d ray(static_cast<double>(u) / 100.0 - 0.8,
+                                static_cast<double>(v) / 100.0 - 0.6, 1.0);
+      double depth = std::numeric_limits<double>::infinity();
+      int nearest = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double here = (1.0 + 0.3 * axis) / std::abs(R_SR.col(axis).dot(ray));
+        if (here < depth) nearest = axis;
+        depth = std::min(depth, here);
+      }
+      image.share[nearest] += 1.0 / static_cast<double>(kWidth * kHeight);
+      const Eigen::Vector3d p = (depth + noise * normal(*rng)) * ray;
+      for (int axis = 0; axis < 3; ++axis) image.xyz.push_back(static_cast<float>(p[axis]));
+    }
+  }
+  return image;
+}
+
+// The angle [rad] to the nearest axis.
+double to_nearest(const Eigen::Matrix3d& axes, const Eigen::Vector3d& normal) {
+  return std::acos(std::min((axes.transpose() * normal).cwiseAbs().maxCoeff(), 1.0));
+}
+
+TEST(SceneAxes, LieAlongWalls) {
+  test::Rng rng(3);
+  for (int k = 0; k < test::scaled(40); ++k) {
+    const Eigen::Matrix3d R_SR = test::random_pose(&rng, 0.0).linear();
+    const Eigen::Matrix3d R_FS = test::random_pose(&rng, 0.0).linear();
+    const double noise = k % 2 == 0 ? 0.0 : 0.002;
+    const Image image = corner(R_SR, noise, &rng);
+    for (const bool as_list : {false, true}) {
+      const Eigen::Matrix3d R_FO = scene_axes(image.raw(as_list), R_FS, !as_list);
+      EXPECT_LT((R_FO.transpose() * R_FO - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+      EXPECT_NEAR(R_FO.determinant(), 1.0, 1e-12);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (image.share[axis] < 0.25) continue;
+        EXPECT_LT(to_nearest(R_FO, R_FS * R_SR.col(axis)), 0.05) << k << ", list: " << as_list;
+      }
+      // Named after the fixed frame's axes that they are nearest to: never turned by half a turn.
+      EXPECT_GT(R_FO.diagonal().maxCoeff(), 0.5);
+    }
+  }
+}
+
+TEST(SceneAxes, AreTheFixedFramesWhereNothingIsFlat) {
+  test::Rng rng(4);
+  Image nothing, noise, few;
+  for (std::size_t i = 0; i < 3 * kWidth * kHeight; ++i) {
+    nothing.xyz.push_back(std::numeric_limits<float>::quiet_NaN());
+    noise.xyz.push_back(static_cast<float>(test::uniform(&rng, -1.0, 1.0)));
+  }
+  noise.xyz[7] = std::numeric_limits<float>::infinity();
+  few.xyz.assign(30, 1.0F);
+  const Eigen::Matrix3d R_FS = test::random_pose(&rng, 0.0).linear();
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
+  for (const bool as_list : {false, true}) {
+    EXPECT_EQ(scene_axes(nothing.raw(as_list), R_FS, !as_list), none);
+    EXPECT_EQ(scene_axes(noise.raw(as_list), R_FS, !as_list), none);
+  }
+  EXPECT_EQ(scene_axes(few.raw(true), R_FS, false), none);
+  EXPECT_EQ(scene_axes(Image().raw(true), R_FS, false), none);
+}
+
+// The thinned cloud's cells are the fixed frame's, whatever the index's axes are: it is the same
+// from cloud to cloud.
+TEST(SceneAxes, DoNotTurnTheThinnedCloud) {
+  test::Rng rng(6);
+  const Eigen::Matrix3d R_SR = test::random_pose(&rng, 0.0).linear();
+  const Image image = corner(R_SR, 0.001, &rng);
+  const Eigen::Isometry3d X_FS = test::random_pose(&rng, 1.0);
+  CloudSnapshot snapshot;
+  Ingest(test::whole_cloud(true)).run(image.raw(false), X_FS, {}, 0.0, &snapshot);
+  EXPECT_GT((snapshot.index.X_FO().linear() - Eigen::Matrix3d::Identity()).norm(), 0.1);
+  EXPECT_EQ(snapshot.coarse.X_FO().linear(), Eigen::Matrix3d::Identity());
+  // One of a cell's points, and the nearest to its centre but for rounding.
+  const double cell = snapshot.thinning;
+  const auto cell_of = [&](const Eigen::Vector3d& p) {
+    return Eigen::Vector3d((p / cell).array().floor());
+  };
+  const auto off_centre = [&](const Eigen::Vector3d& p) {
+    return (p / cell - cell_of(p) - Eigen::Vector3d::Constant(0.5)).norm();
+  };
+  std::vector<std::pair<Eigen::Vector3d, double>> kept;
+  for (const PointTile& tile : snapshot.coarse.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      const Eigen::Vector3d p = snapshot.coarse.X_FO() * tile.point(k);
+      kept.emplace_back(cell_of(p), off_centre(p));
+    }
+  }
+  const auto before = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  std::sort(kept.begin(), kept.end(),
+            [&](const auto& a, const auto& b) { return before(a.first, b.first); });
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    ASSERT_TRUE(before(kept[i - 1].first, kept[i].first)) << "two in a cell";
+  }
+  std::size_t elsewhere = 0;
+  for (const PointTile& tile : snapshot.index.tiles()) {
+    for (int k = 0; k < tile.count; ++k) {
+      const Eigen::Vector3d p = snapshot.index.X_FO() * tile.point(k);
+      const auto at = std::lower_bound(
+          kept.begin(), kept.end(), cell_of(p),
+          [&](const auto& a, const Eigen::Vector3d& c) { return before(a.first, c); });
+      if (at == kept.end() || at->first != cell_of(p)) {
+        ++elsewhere;  // on the edge of two cells
+        continue;
+      }
+      ASSERT_LE(at->second, off_centre(p) + 1e-3);
+    }
+  }
+  EXPECT_LT(elsewhere, snapshot.index.size() / 1000);
+}
+
+}  // namespace
+}  // namespace ist
