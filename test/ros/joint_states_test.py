@@ -174,8 +174,8 @@ class JointStatesTest(unittest.TestCase):
 
     def test_out_of_reach(self):
         """What no link gets near is dropped, and missed by a joint that leaves its limits."""
-        node = self.start(max_distance=0.3, max_range=9.0, self_filter=False)
-        seen = np.array([[0.6, 0.6, 0.6], [4.0, 0.0, 0.5]])  # in base, which the box gets 2.8 m from
+        node = self.start(max_range=9.0, self_filter=False)
+        seen = np.array([[0.6, 0.6, 0.6], [4.9, 0.0, 0.5]])  # in base, from which the box gets 2.8 m
 
         def stand(slide):
             self.still = {"turn": 0.0, "slide": slide}
@@ -194,7 +194,7 @@ class JointStatesTest(unittest.TestCase):
         node.wait_until(lambda: dropped() == "1", "a point out of reach")
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
 
-        stand(3.4)  # at the far point, but for 0.6 m
+        stand(3.4)  # at the far point, but for 1.4 m
         message = node.wait_for_status(ProximityArray.DEGRADED, "farther out than the limits")
         node.wait_for(lambda m: pt.all_unknown(m), "nothing known")
 
@@ -204,9 +204,9 @@ class JointStatesTest(unittest.TestCase):
         message = node.wait_for_status(ProximityArray.OK)
         node.wait_until(lambda: clouds and clouds[-1].width == 2, "both points")
         self.assertTrue(all(s == LinkProximity.CLEAR for s in pt.states(message)), message)
-        stand(3.7)
+        stand(4.4)
         message = node.wait_for(lambda m: pt.link(m, "ball_link").state == LinkProximity.NEAR, "near")
-        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.4, 5)
 
     def test_moving(self):
         """Poses belong to the stamp; clouds of a camera on a link, late, with the robot in view;
