@@ -68,7 +68,7 @@ struct Traversal {
 constexpr float kNowhere = -1e15F;  ///< [m] how far nothing reaches
 
 /// How far the parts of a link reach along a direction: for each child of each node the largest
-/// n . x of its outer balls, or `most` if that is less.
+/// n . x of its outer balls, or `most` if that is less; at least that of their centres.
 /// @param n        unit vector in the link's frame
 /// @param most     [m] how far the link's geometry itself reaches
 /// @param support  [m] kSphereWidth for each node, overwritten where there is a child; elsewhere
