@@ -198,6 +198,7 @@ void LinkQuery::find_first(Traversal* traversal) {
   Traversal inner = *traversal;
   inner.expired = nullptr;
   inner.aim_after = kNever;
+  inner.front = nullptr;
   descend_inner(&inner);
   if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false);
   if (inner.inner_distance < 0.0F && boxes_ != nullptr) {
@@ -300,6 +301,13 @@ void LinkQuery::descend(Traversal* traversal) {
   waiting_count_ = 0;
 }
 
+// From where the last descent of this index ended, if that can be.
+void LinkQuery::go_on(Traversal* traversal) {
+  const std::uint64_t index = boxes_ != nullptr ? boxes_->generation() : index_->generation();
+  traversal->front = fronts_.of(index);
+  if (traversal->front != nullptr) traversal->front->go_to(index, X_OL_, extent_);
+}
+
 // The index at work. True: the deadline passed.
 bool LinkQuery::search(Deadline* deadline) {
   Traversal traversal = make_traversal();
@@ -309,6 +317,7 @@ bool LinkQuery::search(Deadline* deadline) {
   } else {
     traversal.nearer = &LinkQuery::on_nearer;
   }
+  go_on(&traversal);
   is_broken_ = false;
   const double dropped_before = dropped_;
   descend(&traversal);
@@ -317,6 +326,7 @@ bool LinkQuery::search(Deadline* deadline) {
     again.node_pairs = traversal.node_pairs;
     again.leaf_pairs = traversal.leaf_pairs;
     again.may_be_inside = traversal.may_be_inside;
+    go_on(&again);
     traversal = again;
     dropped_ = dropped_before;
     ++epoch_;

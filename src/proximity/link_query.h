@@ -11,6 +11,7 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/carried_bound.h"
+#include "proximity/front.h"
 #include "proximity/traversal.h"
 
 namespace ist {
@@ -31,7 +32,10 @@ class Deadline {
 class LinkQuery {
  public:
   explicit LinkQuery(const LinkModel& link)
-      : link_(&link), carried_(link), support_(link.tree.nodes().size() * kSphereWidth, kNowhere) {}
+      : link_(&link),
+        carried_(link),
+        extent_(link),
+        support_(link.tree.nodes().size() * kSphereWidth, kNowhere) {}
 
   /// Sets the pose and evaluates the last answer's point at it, if that point is still there.
   /// @param seen  by SeenClouds: whether bounds of other poses hold
@@ -59,6 +63,7 @@ class LinkQuery {
   void forget() {
     last_generation_ = 0;
     carried_.forget();
+    fronts_.forget();
   }
 
  private:
@@ -89,6 +94,7 @@ class LinkQuery {
             std::int32_t tile, int lane);
   bool search(Deadline* deadline);
   Traversal make_traversal();
+  void go_on(Traversal* traversal);
   bool needs_aim() const;
   void aim_later(Traversal* traversal) const;
   void set_planes(Traversal* traversal) const;
@@ -148,6 +154,8 @@ class LinkQuery {
   bool complete_ = false;
 
   CarriedBound carried_;
+  LinkExtent extent_;
+  Fronts fronts_;
   std::uint64_t seen_ = 0;     ///< clouds, by SeenClouds
   double beyond_ = 0.0;        ///< [m] smallest bound of a point, by the balls alone
   double proven_reach_ = 0.0;  ///< [m] `reach_` where the carried bound was proven

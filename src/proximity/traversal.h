@@ -6,6 +6,7 @@
 #include "ist_proximity/cloud/box_index.h"
 #include "ist_proximity/cloud/point_index.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
+#include "proximity/front.h"
 
 namespace ist {
 
@@ -52,6 +53,10 @@ struct Traversal {
   /// Called every few pairs; true ends the descent.
   bool (*expired)(void* context) = nullptr;
   void* context = nullptr;
+
+  /// Where descents have ended before, told of the pose; this one goes on from there, and its end
+  /// is kept (exact descent only; null: nowhere).
+  Front* front = nullptr;
 
   // What came of it.
   float dropped = std::numeric_limits<float>::infinity();  ///< [m] smallest bound of a dropped pair
