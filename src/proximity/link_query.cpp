@@ -21,6 +21,8 @@ constexpr double kPointError = 1.1e-7;
 // Directions this close [rad] serve as one: at 5 cm aside that makes 0.5 mm.
 constexpr double kSameAim = 0.01;
 constexpr std::uint64_t kPairsBeforeAim = 8;
+// So many steps ahead are proven, of a link that need only be known not to be nearest.
+constexpr double kStepsAhead = 8.0;
 // Planes may be this much [m] too far.
 constexpr double kSupportSlack = 1e-5;
 
@@ -44,8 +46,9 @@ std::uint64_t LinkQuery::generation(const CloudSnapshot& cloud, Part part) {
 }
 
 void LinkQuery::start(const Eigen::Isometry3d& X_FL,
-                      const std::vector<const CloudSnapshot*>& clouds, const QueryConfig& config) {
-  start_cold(X_FL, config, kInfinity);
+                      const std::vector<const CloudSnapshot*>& clouds, std::uint64_t seen,
+                      const QueryConfig& config) {
+  start_cold(X_FL, seen, config, kInfinity);
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     for (const Part part : {Part::kPoints, Part::kBoxes}) {
       if (last_generation_ == 0 || generation(*clouds[i], part) != last_generation_) continue;
@@ -59,9 +62,10 @@ void LinkQuery::start(const Eigen::Isometry3d& X_FL,
   }
 }
 
-void LinkQuery::start_cold(const Eigen::Isometry3d& X_FL, const QueryConfig& config,
-                           double nearest) {
+void LinkQuery::start_cold(const Eigen::Isometry3d& X_FL, std::uint64_t seen,
+                           const QueryConfig& config, double nearest) {
   X_FL_ = X_FL;
+  seen_ = seen;
   config_ = config;
   others_ = nearest;
   nearest_ = Nearest{};
@@ -199,6 +203,7 @@ void LinkQuery::find_first(Traversal* traversal) {
   Traversal inner = *traversal;
   inner.expired = nullptr;
   inner.aim_after = kNever;
+  inner.front = nullptr;
   descend_inner(&inner);
   if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false);
   if (inner.inner_distance < 0.0F && boxes_ != nullptr) {
@@ -210,16 +215,19 @@ void LinkQuery::find_first(Traversal* traversal) {
 
 bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
                        QueryStatistics* statistics) {
-  if (deadline->passed()) return false;
-  deadline_ = deadline;
-  statistics_ = statistics;
-  dropped_ = kInfinity;
-  // With holes, cells bound little: see Solid::distance_floor.
-  cells_left_ = link_->solid.is_closed() ? kMaxCells : kMaxCells / 8;
-  bool stopped = false;
+  horizon_ = kInfinity;
   for (const CloudSnapshot* cloud : clouds) {
     horizon_ = std::min(horizon_, to_horizon(cloud->horizon));
   }
+  if (sees_all() && is_settled()) return true;
+  if (deadline->passed()) return false;
+  deadline_ = deadline;
+  statistics_ = statistics;
+  dropped_ = beyond_ = kInfinity;
+  look_ahead();
+  // With holes, cells bound little: see Solid::distance_floor.
+  cells_left_ = link_->solid.is_closed() ? kMaxCells : kMaxCells / 8;
+  bool stopped = false;
   if (!sees_all()) {
     drop(horizon_);
     ++statistics->past_horizon;
@@ -233,7 +241,34 @@ bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline
   }
   if (stopped) drop(-link_->tree.radius());  // clouds that were not reached
   complete_ = !stopped;
+  if (complete_) keep_bound();
   return complete_;
+}
+
+// Whether what was proven at another pose is enough at this one.
+bool LinkQuery::is_settled() {
+  const double carried = carried_.at(seen_, X_FL_);
+  if (!(carried >= threshold() - kRounding) || !(nearest_.exact.distance > 0.0)) return false;
+  dropped_ = carried;
+  reach_ = std::max(reach_, proven_reach_ + carried_.motion(seen_, X_FL_));
+  complete_ = true;
+  return true;
+}
+
+// What need only be known to be farther than another link: a little more, proven now, spares the
+// queries to come as many steps as long as the last ones.
+void LinkQuery::look_ahead() {
+  if (others_ == kInfinity) return;
+  const double ahead = kStepsAhead * carried_.motion(seen_, X_FL_);
+  if (ahead < others_) others_ += ahead;
+}
+
+void LinkQuery::keep_bound() {
+  double bound = std::min(nearest_.exact.distance, dropped_);
+  // Float loses more, the farther.
+  if (bound > range()) bound -= kFloatError * (bound - range());
+  proven_reach_ = reach_;
+  carried_.prove(seen_, X_FL_, bound, std::min(beyond_, dropped_));
 }
 
 Traversal LinkQuery::make_traversal() {
@@ -279,6 +314,13 @@ void LinkQuery::descend(Traversal* traversal) {
   waiting_count_ = 0;
 }
 
+// From where the last descent of this index ended, if that can be.
+void LinkQuery::go_on(Traversal* traversal) {
+  const std::uint64_t index = boxes_ != nullptr ? boxes_->generation() : index_->generation();
+  traversal->front = fronts_.of(index);
+  if (traversal->front != nullptr) traversal->front->go_to(index, X_OL_, extent_);
+}
+
 // The index at work. True: the deadline passed.
 bool LinkQuery::search(Deadline* deadline) {
   Traversal traversal = make_traversal();
@@ -288,6 +330,7 @@ bool LinkQuery::search(Deadline* deadline) {
   } else {
     traversal.nearer = &LinkQuery::on_nearer;
   }
+  go_on(&traversal);
   is_broken_ = false;
   const double dropped_before = dropped_;
   descend(&traversal);
@@ -296,6 +339,7 @@ bool LinkQuery::search(Deadline* deadline) {
     again.node_pairs = traversal.node_pairs;
     again.leaf_pairs = traversal.leaf_pairs;
     again.may_be_inside = traversal.may_be_inside;
+    go_on(&again);
     traversal = again;
     dropped_ = dropped_before;
     ++epoch_;
@@ -306,6 +350,7 @@ bool LinkQuery::search(Deadline* deadline) {
   statistics_->leaf_pairs += traversal.leaf_pairs;
   drop(static_cast<double>(traversal.dropped) - rounding_);
   bool stopped = traversal.stopped;
+  if (traversal.may_be_inside) beyond_ = -kInfinity;
   if (traversal.may_be_inside && !stopped) {
     boxes_ != nullptr ? find_overlap(deadline) : find_depth(deadline);
   }

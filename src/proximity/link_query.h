@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_query.h"
+#include "proximity/carried_bound.h"
+#include "proximity/front.h"
 #include "proximity/traversal.h"
 
 namespace ist {
@@ -30,16 +32,21 @@ class Deadline {
 class LinkQuery {
  public:
   explicit LinkQuery(const LinkModel& link)
-      : link_(&link), support_(link.tree.nodes().size() * kSphereWidth, kNowhere) {}
+      : link_(&link),
+        carried_(link),
+        extent_(link),
+        support_(link.tree.nodes().size() * kSphereWidth, kNowhere) {}
 
   /// Sets the pose and evaluates the last answer's point at it, if that point is still there.
+  /// @param seen  by SeenClouds: whether bounds of other poses hold
   void start(const Eigen::Isometry3d& X_FL, const std::vector<const CloudSnapshot*>& clouds,
-             const QueryConfig& config);
+             std::uint64_t seen, const QueryConfig& config);
 
   /// As start(), without the last answer's point: for a link that need only be known where it is
   /// nearer than another.
   /// @param nearest  [m] that another link is known to be at
-  void start_cold(const Eigen::Isometry3d& X_FL, const QueryConfig& config, double nearest);
+  void start_cold(const Eigen::Isometry3d& X_FL, std::uint64_t seen, const QueryConfig& config,
+                  double nearest);
 
   /// [m] of the nearest point found; inf: none.
   double distance() const { return nearest_.exact.distance; }
@@ -55,7 +62,11 @@ class LinkQuery {
   /// The answer as it stands after start() or refine().
   void answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result);
 
-  void forget() { last_generation_ = 0; }
+  void forget() {
+    last_generation_ = 0;
+    carried_.forget();
+    fronts_.forget();
+  }
 
  private:
   /// Which of a snapshot's indices is at work.
@@ -73,6 +84,9 @@ class LinkQuery {
   /// [m] More than double loses where distances are compared.
   static constexpr double kRounding = 1e-12;
 
+  bool is_settled();
+  void look_ahead();
+  void keep_bound();
   static std::uint64_t generation(const CloudSnapshot& cloud, Part part);
   bool enter(const CloudSnapshot& cloud, std::int32_t index, Part part);
   Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
@@ -82,6 +96,7 @@ class LinkQuery {
             std::int32_t tile, int lane);
   bool search(Deadline* deadline);
   Traversal make_traversal();
+  void go_on(Traversal* traversal);
   bool needs_aim() const;
   void aim_later(Traversal* traversal) const;
   void set_planes(Traversal* traversal) const;
@@ -142,7 +157,14 @@ class LinkQuery {
   double horizon_ = 0.0;   ///< [m] no point that the clouds left out is nearer
   bool complete_ = false;
 
-  // The index at work: its frame O has the fixed frame's axes for points, the map's for boxes.
+  CarriedBound carried_;
+  LinkExtent extent_;
+  Fronts fronts_;
+  std::uint64_t seen_ = 0;     ///< clouds, by SeenClouds
+  double beyond_ = 0.0;        ///< [m] smallest bound of a point, by the balls alone
+  double proven_reach_ = 0.0;  ///< [m] `reach_` where the carried bound was proven
+
+  // The index at work, in a frame O of its own.
   const PointIndex* index_ = nullptr;
   const BoxIndex* boxes_ = nullptr;
   std::int32_t cloud_ = -1;

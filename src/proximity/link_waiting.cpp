@@ -31,6 +31,7 @@ bool LinkQuery::first_visit(std::int32_t tile, int lane) {
 
 void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float bound) {
   auto* self = static_cast<LinkQuery*>(context);
+  self->beyond_ = std::min(self->beyond_, static_cast<double>(bound) - self->rounding_);
   if (self->boxes_ != nullptr) {
     if (self->first_visit(tile, lane)) self->consider(tile, lane, true);
     return;

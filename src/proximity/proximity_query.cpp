@@ -35,6 +35,7 @@ struct ProximityQuery::Impl {
   }
 
   std::vector<LinkQuery> links;
+  SeenClouds seen;
   std::size_t last_nearest = 0;  // link
   QueryStatistics statistics;
 };
@@ -53,10 +54,11 @@ bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
   results->resize(count);
   impl_->statistics = {};
   Deadline deadline(impl_->config.deadline);
+  const std::uint64_t seen = impl_->seen.note(clouds);
   // All warm starts before the first descent: should the deadline pass, every link has an answer.
   for (std::size_t i = 0; i < count; ++i) {
     if (impl_->can_query(i, known, !clouds.empty())) {
-      impl_->links[i].start(X_FL[i], clouds, impl_->config);
+      impl_->links[i].start(X_FL[i], clouds, seen, impl_->config);
     }
   }
   bool complete = true;
@@ -82,6 +84,7 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
   *result = RobotProximity();
   result->all_known = true;
   Deadline deadline(impl_->config.deadline);
+  const std::uint64_t seen = impl_->seen.note(clouds);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double nearest = kInfinity, proven = kInfinity;
   std::size_t best = count;
@@ -96,9 +99,9 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
     }
     LinkQuery& link = impl_->links[i];
     if (best == count) {
-      link.start(X_FL[i], clouds, impl_->config);
+      link.start(X_FL[i], clouds, seen, impl_->config);
     } else {
-      link.start_cold(X_FL[i], impl_->config, nearest);
+      link.start_cold(X_FL[i], seen, impl_->config, nearest);
     }
     complete = impl_->refine(i, clouds, &deadline) && complete;
     sees_all = sees_all && link.sees_all();
@@ -133,7 +136,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL,
     return true;
   }
   Deadline deadline(impl_->config.deadline);
-  impl_->links[link].start(X_FL, clouds, impl_->config);
+  impl_->links[link].start(X_FL, clouds, impl_->seen.note(clouds), impl_->config);
   const bool complete = impl_->refine(link, clouds, &deadline);
   impl_->links[link].answer(clouds, result);
   return complete;

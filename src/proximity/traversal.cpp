@@ -7,8 +7,11 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
+
+#include "proximity/cut_balls-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
@@ -20,6 +23,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 struct Pair {
   float bound;
   std::int32_t slot;         // of the sphere in `support`
+  std::int32_t box_slot;     // as the front counts them
+  std::int32_t parent;       // in the front: kPointWidth * pair + child; or one of those below
   std::int32_t sphere, box;  // child indices: >= 0 node, < 0 leaf or tile
   float x, y, z, radius;     // the sphere, posed
   float min[3], max[3];
@@ -28,80 +33,35 @@ struct Pair {
 constexpr std::size_t kStackSize = 1024;  // 7 siblings a level of spheres, 15 of boxes, and room
 constexpr std::uint64_t kExpiryInterval = 16;
 
-using SphereTag = hn::CappedTag<float, static_cast<std::size_t>(kSphereWidth)>;
-using PointTag = hn::CappedTag<float, static_cast<std::size_t>(kPointWidth)>;
-
-template <class D>
-HWY_INLINE hn::Vec<D> Gap(D d, hn::Vec<D> low, hn::Vec<D> high, hn::Vec<D> value) {
-  return hn::Max(hn::Max(hn::Sub(low, value), hn::Sub(value, high)), hn::Zero(d));
-}
-
-template <class V>
-HWY_INLINE V Norm(V x, V y, V z) {
-  return hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))));
-}
-
-// The circle in which a plane `height` above a ball's centre cuts it: its radius, at least.
-template <class D>
-HWY_INLINE hn::Vec<D> RimRadius(D d, hn::Vec<D> radius, hn::Vec<D> height, float rounding) {
-  const auto slack = hn::Set(d, rounding);
-  const auto least = hn::Max(hn::Sub(hn::Abs(height), slack), hn::Zero(d));
-  const auto squared = hn::NegMulAdd(least, least, hn::Mul(radius, radius));
-  return hn::Add(hn::Sqrt(hn::Max(squared, hn::Zero(d))), slack);
-}
-
-// How far what is `ahead` of the plane, and `aside` of the ball's axis across it, is from what the
-// plane leaves of the ball: from the rim, where the ball's nearest point is cut off. Otherwise only
-// the plane tells.
-template <class D>
-HWY_INLINE hn::Vec<D> CutDistance(D d, hn::Vec<D> ahead, hn::Vec<D> aside, hn::Vec<D> radius,
-                                  hn::Vec<D> height, hn::Vec<D> rim) {
-  const auto zero = hn::Zero(d);
-  const auto over_center = hn::Add(ahead, height);
-  const auto over_sq = hn::Mul(over_center, over_center);
-  const auto lowest = hn::Min(ahead, over_center);
-  const auto is_cut =
-      hn::And(hn::Gt(lowest, zero),
-              hn::Gt(hn::Mul(hn::Mul(radius, radius), over_sq),
-                     hn::Mul(hn::Mul(height, hn::Abs(height)), hn::MulAdd(aside, aside, over_sq))));
-  const auto beyond = hn::Max(hn::Sub(aside, rim), zero);
-  const auto to_rim = hn::Sqrt(hn::MulAdd(ahead, ahead, hn::Mul(beyond, beyond)));
-  return hn::IfThenElse(is_cut, to_rim, ahead);
-}
-
-struct Posed {
-  alignas(64) float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];
-};
-
-// Eight centres from the link's frame into the index's.
-HWY_INLINE void Pose(const Traversal& t, const float* x, const float* y, const float* z,
-                     Posed* posed) {
-  const SphereTag d;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
-    const auto vx = hn::Load(d, x + k), vy = hn::Load(d, y + k), vz = hn::Load(d, z + k);
-    float* out[3] = {posed->x, posed->y, posed->z};
-    for (int row = 0; row < 3; ++row) {
-      const float* r = t.R_OL + 3 * row;
-      const auto sum =
-          hn::MulAdd(hn::Set(d, r[0]), vx,
-                     hn::MulAdd(hn::Set(d, r[1]), vy,
-                                hn::MulAdd(hn::Set(d, r[2]), vz, hn::Set(d, t.p_OL[row]))));
-      hn::Store(sum, d, out[row] + k);
-    }
-  }
-}
+// A pair's parent, where there is none: the root's, or what no front keeps; the pair itself is in
+// the front (from here down) and opened again.
+constexpr std::int32_t kNoParent = -1, kReopened = -2;
 
 template <bool kExact, bool kBoxes>
 class Descent {
  public:
-  explicit Descent(Traversal* traversal) : t_(*traversal) {}
+  explicit Descent(Traversal* traversal)
+      : t_(*traversal), planes_(*traversal), front_(kExact ? traversal->front : nullptr) {
+    if (front_ != nullptr) gain_ = front_->way() - t_.rounding;
+  }
 
   void Run() {
-    PushRoot();
+    if (front_ == nullptr || front_->empty()) {
+      PushRoot();
+      Empty();
+    } else {
+      GoOn();
+    }
+    if (front_ != nullptr) front_->close(!is_cut_short_ && !is_full_);
+  }
+
+ private:
+  // Until nothing is left that matters.
+  void Empty() {
     while (top_ > 0) {
       const Pair pair = stack_[--top_];
       if (!(pair.bound < Limit())) {
-        Drop(pair.bound);
+        Leave(pair);
         continue;
       }
       if (t_.node_pairs >= t_.aim_after) {
@@ -111,11 +71,12 @@ class Descent {
       if (kExact && t_.may_be_inside && t_.threshold <= t_.interior) {
         // What is left is outside and too far, or is the depth query's.
         Drop(t_.interior);
+        is_cut_short_ = true;
         return;
       }
       if (++t_.node_pairs % kExpiryInterval == 0 && t_.expired != nullptr &&
           t_.expired(t_.context)) {
-        t_.stopped = true;
+        t_.stopped = is_cut_short_ = true;
         Drop(pair.bound);
         while (top_ > 0) Drop(stack_[--top_].bound);
         return;
@@ -130,12 +91,118 @@ class Descent {
     }
   }
 
- private:
+  // From where the last descent ended: the pairs of which the most promising is left first.
+  void GoOn() {
+    std::array<std::int32_t, Front::kMost> pairs;
+    const std::size_t count = FindOpen(pairs.data());
+    const float* left = front_->left();
+    std::sort(pairs.begin(), pairs.begin() + static_cast<std::ptrdiff_t>(count),
+              [left](std::int32_t a, std::int32_t b) { return left[a] < left[b]; });
+    for (std::size_t i = 0; i < count; ++i) {
+      const float bound = left[pairs[i]] - gain_;
+      if (t_.stopped || !(bound < Limit())) {
+        Drop(bound);
+        continue;
+      }
+      Reopen(pairs[i], bound);
+      Empty();
+      if (is_cut_short_ && !t_.stopped) return;
+    }
+  }
+
+  // Of the others the least bound is told.
+  std::size_t FindOpen(std::int32_t* pairs) {
+    const PointTag d;
+    const auto limit = hn::Set(d, std::min(Limit() + gain_, kFarAway));
+    auto dropped = hn::Set(d, kFarAway);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < front_->size(); i += hn::Lanes(d)) {
+      const auto left = hn::LoadU(d, front_->left() + i);
+      const auto is_open = hn::Lt(left, limit);
+      dropped = hn::Min(dropped, hn::IfThenElse(is_open, dropped, left));
+      for (std::uint32_t bits = Bits(d, is_open); bits != 0; bits &= bits - 1) {
+        pairs[count++] = static_cast<std::int32_t>(i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+      }
+    }
+    Drop(hn::GetLane(hn::MinOfLanes(d, dropped)) - gain_);
+    return count;
+  }
+
+  // Its bound is only that of what was left of it; it is expanded in any case.
+  void Reopen(std::int32_t index, float bound) {
+    const Front::Pair& kept = front_->pair(index);
+    Pair pair = Root();
+    pair.parent = kReopened - index;
+    pair.bound = bound;
+    if (kept.sphere != Front::kRoot) {
+      const SphereNode& node = t_.sphere_nodes[kept.sphere / kSphereWidth];
+      const int k = kept.sphere % kSphereWidth;
+      const float* r = t_.R_OL;
+      pair.slot = kept.sphere;
+      pair.sphere = node.child[k];
+      pair.x = r[0] * node.x[k] + r[1] * node.y[k] + r[2] * node.z[k] + t_.p_OL[0];
+      pair.y = r[3] * node.x[k] + r[4] * node.y[k] + r[5] * node.z[k] + t_.p_OL[1];
+      pair.z = r[6] * node.x[k] + r[7] * node.y[k] + r[8] * node.z[k] + t_.p_OL[2];
+      pair.radius = node.radius[k];
+    }
+    if (kept.box != Front::kRoot) SetBox(kept.box, &pair);
+    stack_[top_++] = pair;
+  }
+
+  HWY_INLINE void SetBox(std::int32_t slot, Pair* pair) const {
+    const BoxNode& node = t_.box_nodes[slot / kPointWidth];
+    const int k = slot % kPointWidth;
+    pair->box_slot = slot;
+    pair->box = node.child[k];
+    pair->min[0] = node.min_x[k];
+    pair->min[1] = node.min_y[k];
+    pair->min[2] = node.min_z[k];
+    pair->max[0] = node.max_x[k];
+    pair->max[1] = node.max_y[k];
+    pair->max[2] = node.max_z[k];
+  }
+
   float Limit() const {
     return kExact ? std::max(t_.threshold, t_.interior) : std::min(t_.threshold, t_.inner_distance);
   }
 
   void Drop(float bound) { t_.dropped = std::min(t_.dropped, bound); }
+
+  // A pair that was not expanded after all.
+  void Leave(const Pair& pair) {
+    Drop(pair.bound);
+    if (pair.parent >= 0) front_->leave(pair.parent / kPointWidth, pair.bound + gain_);
+  }
+
+  // The pair that is expanded now gets its place in the front.
+  std::int32_t Enter(const Pair& pair) {
+    if (front_ == nullptr) return Front::kFull;
+    if (pair.parent <= kReopened) {
+      front_->open(kReopened - pair.parent);
+      return kReopened - pair.parent;
+    }
+    const std::int32_t index = front_->add(pair.slot, pair.box_slot);
+    is_full_ = is_full_ || index == Front::kFull;
+    if (index >= 0 && pair.parent >= 0) {
+      front_->mark_expanded(pair.parent / kPointWidth, pair.parent % kPointWidth);
+    }
+    return index;
+  }
+
+  // Children that are in the front have their own place there.
+  std::uint32_t Expanded(std::int32_t index) const {
+    return index < 0 ? 0U : front_->pair(index).expanded;
+  }
+
+  static std::int32_t ParentOf(std::int32_t index, int child) {
+    return index < 0 ? kNoParent : kPointWidth * index + child;
+  }
+
+  // What was dropped of a pair.
+  void Drop(std::int32_t index, float bound) {
+    Drop(bound);
+    if (index >= 0) front_->leave(index, bound + gain_);
+  }
 
   static bool BoxIsLarger(const Pair& pair) {
     float size_sq = 0.0F;
@@ -146,24 +213,37 @@ class Descent {
   }
 
   // The root pair's volumes are never compared: it is expanded on the sphere's side first.
-  void PushRoot() {
+  Pair Root() const {
     Pair root{};
     root.bound = -std::numeric_limits<float>::infinity();
+    root.slot = root.box_slot = Front::kRoot;
+    root.parent = kNoParent;
     root.radius = std::numeric_limits<float>::infinity();
     root.box = t_.box_root;
     for (int i = 0; i < 3; ++i) {
       root.min[i] = -kFarAway;
       root.max[i] = kFarAway;
     }
-    stack_[top_++] = root;
+    return root;
   }
+  void PushRoot() { stack_[top_++] = Root(); }
 
-  // Keeps the children from `begin` up sorted, the nearest on top.
-  HWY_INLINE void Insert(std::size_t begin, const Pair& pair) {
-    assert(top_ < kStackSize);
-    std::size_t at = top_++;
-    for (; at > begin && stack_[at - 1].bound < pair.bound; --at) stack_[at] = stack_[at - 1];
-    stack_[at] = pair;
+  // The children in `near`, the farthest first: so the nearest comes to lie on top.
+  struct Order {
+    int count = 0;
+    std::array<int, kPointWidth> child;
+  };
+  static HWY_INLINE Order Sorted(std::uint32_t near, const float* bound) {
+    Order order;
+    for (; near != 0; near &= near - 1) {
+      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
+      int at = order.count++;
+      for (; at > 0 && bound[order.child[static_cast<std::size_t>(at - 1)]] < bound[k]; --at) {
+        order.child[static_cast<std::size_t>(at)] = order.child[static_cast<std::size_t>(at - 1)];
+      }
+      order.child[static_cast<std::size_t>(at)] = k;
+    }
+    return order;
   }
 
   // Bit k for a bound below the limit; the least of the others is kept, of unused slots too, which
@@ -172,17 +252,34 @@ class Descent {
   static HWY_INLINE std::uint32_t Below(D d, V bound, float limit, V* dropped) {
     const auto below = hn::Lt(bound, hn::Set(d, limit));
     *dropped = hn::Min(*dropped, hn::IfThenElse(below, *dropped, bound));
+    return Bits(d, below);
+  }
+  template <class D>
+  static HWY_INLINE std::uint32_t Bits(D d, hn::Mask<D> mask) {
     std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, below, bits);
+    hn::StoreMaskBits(d, mask, bits);
     return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
   }
 
+  // Far away for the children whose bits are set.
+  template <class D>
+  static HWY_INLINE hn::Vec<D> Unless(D d, hn::Vec<D> bound, std::uint32_t bits) {
+    if (bits == 0) return bound;
+    alignas(64) float away[kPointWidth];
+    for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
+      away[k] = ((bits >> k) & 1U) != 0 ? kFarAway : -kFarAway;
+    }
+    return hn::Max(bound, hn::Load(d, away));
+  }
+
   void ExpandSphere(const Pair& pair) {
+    const std::int32_t index = Enter(pair);
+    const std::uint32_t expanded = Expanded(index);
     const SphereNode& node = t_.sphere_nodes[pair.sphere];
     const SphereTag d;
     Posed posed;
     Pose(t_, node.x, node.y, node.z, &posed);
-    const auto ahead = hn::Set(d, Ahead(pair));
+    const auto ahead = hn::Set(d, planes_.Ahead(pair.min, pair.max));
     const Middle box = MiddleOf(pair);
     const float* support = t_.support + pair.sphere * kSphereWidth;
     const float limit = Limit();
@@ -200,42 +297,47 @@ class Descent {
                  z = hn::Load(d, posed.z + k), radius = hn::Load(d, node.radius + k);
       const auto reach = hn::LoadU(d, support + k);
       const auto apart = hn::Sub(Norm(dx, dy, dz), radius);
-      const auto height = hn::Sub(hn::Add(hn::Set(d, t_.offset), reach), Along(d, x, y, z));
+      const auto height = hn::Sub(hn::Add(hn::Set(d, t_.offset), reach), planes_.Along(d, x, y, z));
       const auto aside =
-          hn::Sub(Aside(d, hn::Sub(hn::Set(d, box.x), x), hn::Sub(hn::Set(d, box.y), y),
-                        hn::Sub(hn::Set(d, box.z), z)),
+          hn::Sub(planes_.Aside(d, hn::Sub(hn::Set(d, box.x), x), hn::Sub(hn::Set(d, box.y), y),
+                                hn::Sub(hn::Set(d, box.z), z)),
                   hn::Set(d, box.radius));
       const auto least =
           hn::Max(apart, CutDistance(d, hn::Sub(ahead, reach), hn::Max(aside, hn::Zero(d)), radius,
                                      height, RimRadius(d, radius, height, t_.rounding)));
-      near |= Below(d, least, limit, &dropped) << k;
+      near |= Below(d, Unless(d, least, expanded >> k), limit, &dropped) << k;
       hn::Store(least, d, bound + k);
     }
-    near &= (1U << static_cast<std::uint32_t>(node.count)) - 1U;
-    Drop(hn::GetLane(hn::MinOfLanes(d, dropped)));
-    Pair child = pair;
-    const std::size_t begin = top_;
-    for (; near != 0; near &= near - 1) {
-      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
+    near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
+    Drop(index, hn::GetLane(hn::MinOfLanes(d, dropped)));
+    const Order order = Sorted(near, bound);
+    assert(top_ + static_cast<std::size_t>(order.count) <= kStackSize);
+    for (int i = 0; i < order.count; ++i) {
+      const int k = order.child[static_cast<std::size_t>(i)];
+      Pair& child = stack_[top_++];
+      child = pair;
       child.bound = bound[k];
       child.slot = pair.sphere * kSphereWidth + k;
+      child.parent = ParentOf(index, k);
       child.sphere = node.child[k];
       child.x = posed.x[k];
       child.y = posed.y[k];
       child.z = posed.z[k];
       child.radius = node.radius[k];
-      Insert(begin, child);
     }
   }
 
   void ExpandBox(const Pair& pair) {
+    const std::int32_t index = Enter(pair);
+    const std::uint32_t expanded = Expanded(index);
     const BoxNode& node = t_.box_nodes[pair.box];
     const PointTag d;
     const float offset = t_.offset + t_.support[pair.slot];
     const float center[3] = {pair.x, pair.y, pair.z};
     const auto radius = hn::Set(d, pair.radius);
-    const auto height = hn::Sub(
-        hn::Set(d, offset), Along(d, hn::Set(d, pair.x), hn::Set(d, pair.y), hn::Set(d, pair.z)));
+    const auto height =
+        hn::Sub(hn::Set(d, offset),
+                planes_.Along(d, hn::Set(d, pair.x), hn::Set(d, pair.y), hn::Set(d, pair.z)));
     const auto rim = RimRadius(d, radius, height, t_.rounding);
     const float limit = Limit();
     std::uint32_t near = 0;
@@ -249,26 +351,23 @@ class Descent {
       const auto dz =
           Gap(d, hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, pair.z));
       const auto apart = hn::Sub(Norm(dx, dy, dz), radius);
-      const auto least = hn::Max(apart, CutDistance(d, Ahead(node, k, offset),
-                                                    Aside(node, k, center), radius, height, rim));
-      near |= Below(d, least, limit, &dropped) << k;
+      const auto least =
+          hn::Max(apart, CutDistance(d, planes_.Ahead(node, k, offset),
+                                     planes_.Aside(node, k, center), radius, height, rim));
+      near |= Below(d, Unless(d, least, expanded >> k), limit, &dropped) << k;
       hn::Store(least, d, bound + k);
     }
-    near &= (1U << static_cast<std::uint32_t>(node.count)) - 1U;
-    Drop(hn::GetLane(hn::MinOfLanes(d, dropped)));
-    Pair child = pair;
-    const std::size_t begin = top_;
-    for (; near != 0; near &= near - 1) {
-      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
+    near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
+    Drop(index, hn::GetLane(hn::MinOfLanes(d, dropped)));
+    const Order order = Sorted(near, bound);
+    assert(top_ + static_cast<std::size_t>(order.count) <= kStackSize);
+    for (int i = 0; i < order.count; ++i) {
+      const int k = order.child[static_cast<std::size_t>(i)];
+      Pair& child = stack_[top_++];
+      child = pair;
       child.bound = bound[k];
-      child.box = node.child[k];
-      child.min[0] = node.min_x[k];
-      child.min[1] = node.min_y[k];
-      child.min[2] = node.min_z[k];
-      child.max[0] = node.max_x[k];
-      child.max[1] = node.max_y[k];
-      child.max[2] = node.max_z[k];
-      Insert(begin, child);
+      child.parent = ParentOf(index, k);
+      SetBox(pair.box * kPointWidth + k, &child);
     }
   }
 
@@ -284,91 +383,6 @@ class Descent {
             0.5F * (pair.min[2] + pair.max[2]), 0.5F * std::sqrt(size_sq)};
   }
 
-  // Of a box before the plane through the link's origin.
-  HWY_INLINE float Ahead(const Pair& pair) const {
-    float ahead = -t_.offset;
-    for (int i = 0; i < 3; ++i) {
-      ahead += t_.normal[i] * (t_.normal[i] > 0.0F ? pair.min[i] : pair.max[i]);
-    }
-    return ahead;
-  }
-  // Of sixteen points, or boxes, before the plane at `offset`.
-  HWY_INLINE hn::Vec<PointTag> Ahead(const float* x, const float* y, const float* z,
-                                     float offset) const {
-    const PointTag d;
-    return hn::MulAdd(
-        hn::Set(d, t_.normal[0]), hn::Load(d, x),
-        hn::MulAdd(hn::Set(d, t_.normal[1]), hn::Load(d, y),
-                   hn::MulAdd(hn::Set(d, t_.normal[2]), hn::Load(d, z), hn::Set(d, -offset))));
-  }
-  HWY_INLINE hn::Vec<PointTag> Ahead(const PointTile& tile, std::size_t k, float offset) const {
-    return Ahead(tile.x + k, tile.y + k, tile.z + k, offset);
-  }
-  template <class Boxes>
-  HWY_INLINE hn::Vec<PointTag> Ahead(const Boxes& boxes, std::size_t k, float offset) const {
-    return Ahead((t_.normal[0] > 0.0F ? boxes.min_x : boxes.max_x) + k,
-                 (t_.normal[1] > 0.0F ? boxes.min_y : boxes.max_y) + k,
-                 (t_.normal[2] > 0.0F ? boxes.min_z : boxes.max_z) + k, offset);
-  }
-
-  template <class D>
-  HWY_INLINE hn::Vec<D> Along(D d, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) const {
-    return hn::MulAdd(
-        hn::Set(d, t_.normal[0]), x,
-        hn::MulAdd(hn::Set(d, t_.normal[1]), y, hn::Mul(hn::Set(d, t_.normal[2]), z)));
-  }
-
-  // Length of what is left of vectors across the normal.
-  template <class D>
-  HWY_INLINE hn::Vec<D> Aside(D d, hn::Vec<D> x, hn::Vec<D> y, hn::Vec<D> z) const {
-    const auto along = Along(d, x, y, z);
-    return Norm(hn::NegMulAdd(hn::Set(d, t_.normal[0]), along, x),
-                hn::NegMulAdd(hn::Set(d, t_.normal[1]), along, y),
-                hn::NegMulAdd(hn::Set(d, t_.normal[2]), along, z));
-  }
-  // How far sixteen boxes, or points, are aside of the pair's ball, at least.
-  HWY_INLINE hn::Vec<PointTag> Aside(const PointTile& tile, std::size_t k,
-                                     const float* center) const {
-    const PointTag d;
-    return Aside(d, hn::Sub(hn::Load(d, tile.x + k), hn::Set(d, center[0])),
-                 hn::Sub(hn::Load(d, tile.y + k), hn::Set(d, center[1])),
-                 hn::Sub(hn::Load(d, tile.z + k), hn::Set(d, center[2])));
-  }
-  template <class Boxes>
-  HWY_INLINE hn::Vec<PointTag> Aside(const Boxes& boxes, std::size_t k, const float* center) const {
-    const PointTag d;
-    const auto half = hn::Set(d, 0.5F);
-    const auto middle = [&](const float* min, const float* max, float c) {
-      return hn::Sub(hn::Mul(half, hn::Add(hn::Load(d, min + k), hn::Load(d, max + k))),
-                     hn::Set(d, c));
-    };
-    const auto extent = [&](const float* min, const float* max) {
-      return hn::Mul(half, hn::Sub(hn::Load(d, max + k), hn::Load(d, min + k)));
-    };
-    const auto aside = Aside(d, middle(boxes.min_x, boxes.max_x, center[0]),
-                             middle(boxes.min_y, boxes.max_y, center[1]),
-                             middle(boxes.min_z, boxes.max_z, center[2]));
-    const auto around = Norm(extent(boxes.min_x, boxes.max_x), extent(boxes.min_y, boxes.max_y),
-                             extent(boxes.min_z, boxes.max_z));
-    return hn::Max(hn::Sub(aside, around), hn::Zero(d));
-  }
-
-  // From sixteen points, or boxes, to a place.
-  HWY_INLINE hn::Vec<PointTag> Distance(const PointTile& tile, std::size_t k, float x, float y,
-                                        float z) const {
-    const PointTag d;
-    return Norm(hn::Sub(hn::Load(d, tile.x + k), hn::Set(d, x)),
-                hn::Sub(hn::Load(d, tile.y + k), hn::Set(d, y)),
-                hn::Sub(hn::Load(d, tile.z + k), hn::Set(d, z)));
-  }
-  HWY_INLINE hn::Vec<PointTag> Distance(const BoxTile& tile, std::size_t k, float x, float y,
-                                        float z) const {
-    const PointTag d;
-    return Norm(Gap(d, hn::Load(d, tile.min_x + k), hn::Load(d, tile.max_x + k), hn::Set(d, x)),
-                Gap(d, hn::Load(d, tile.min_y + k), hn::Load(d, tile.max_y + k), hn::Set(d, y)),
-                Gap(d, hn::Load(d, tile.min_z + k), hn::Load(d, tile.max_z + k), hn::Set(d, z)));
-  }
-
   HWY_INLINE void Leaves(const Pair& pair) {
     if constexpr (kBoxes) {
       Leaves(pair, t_.box_tiles[~pair.box]);
@@ -381,6 +395,7 @@ class Descent {
   template <class Tile>
   HWY_INLINE void Leaves(const Pair& pair, const Tile& tile) {
     ++t_.leaf_pairs;
+    const std::int32_t index = Enter(pair);
     const SphereLeaf& leaf = t_.sphere_leaves[~pair.sphere];
     const std::int32_t tile_index = ~pair.box;
     Posed posed;
@@ -392,7 +407,7 @@ class Descent {
     bool is_near = false;
     const auto limit = hn::Set(d, Limit());
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
-      const auto ahead = Ahead(tile, k, offset);
+      const auto ahead = planes_.Ahead(tile, k, offset);
       auto nearest = hn::Set(d, kFarAway);
       for (int b = 0; b < leaf.count; ++b) {
         const auto to_center = Distance(tile, k, posed.x[b], posed.y[b], posed.z[b]);
@@ -404,7 +419,18 @@ class Descent {
     }
     if (!kExact) return Nearest(pair, distance);
     if (is_near) LookCloser(pair, leaf, posed, tile, offset, distance);
-    Candidates(tile_index, tile.count, distance);
+    auto least = hn::Load(d, distance);
+    for (std::size_t k = hn::Lanes(d); k < static_cast<std::size_t>(kPointWidth);
+         k += hn::Lanes(d)) {
+      least = hn::Min(least, hn::Load(d, distance + k));
+    }
+    const float left = hn::GetLane(hn::MinOfLanes(d, least));
+    if (index >= 0) front_->leave(index, left + gain_);
+    if (is_near) {
+      Candidates(tile_index, tile.count, distance);
+    } else {
+      Drop(left);
+    }
   }
 
   // Unused lanes are far away.
@@ -426,22 +452,23 @@ class Descent {
     const SphereTag balls;
     alignas(64) float height[kSphereWidth], rim[kSphereWidth], inner[kPointWidth];
     for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(balls)) {
-      const auto over = hn::Sub(hn::Set(balls, offset),
-                                Along(balls, hn::Load(balls, posed.x + b),
-                                      hn::Load(balls, posed.y + b), hn::Load(balls, posed.z + b)));
+      const auto over =
+          hn::Sub(hn::Set(balls, offset),
+                  planes_.Along(balls, hn::Load(balls, posed.x + b), hn::Load(balls, posed.y + b),
+                                hn::Load(balls, posed.z + b)));
       hn::Store(over, balls, height + b);
       hn::Store(RimRadius(balls, hn::Load(balls, leaf.outer + b), over, t_.rounding), balls,
                 rim + b);
     }
     bool is_nearer = false;
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
-      const auto ahead = Ahead(tile, k, offset);
+      const auto ahead = planes_.Ahead(tile, k, offset);
       auto nearest = hn::Set(d, kFarAway), nearest_inner = nearest;
       for (int b = 0; b < leaf.count; ++b) {
         const float center[3] = {posed.x[b], posed.y[b], posed.z[b]};
         const auto radius = hn::Set(d, leaf.outer[b]);
         const auto to_center = Distance(tile, k, center[0], center[1], center[2]);
-        const auto cut = CutDistance(d, ahead, Aside(tile, k, center), radius,
+        const auto cut = CutDistance(d, ahead, planes_.Aside(tile, k, center), radius,
                                      hn::Set(d, height[b]), hn::Set(d, rim[b]));
         nearest = hn::Min(nearest, hn::Max(hn::Sub(to_center, radius), cut));
         nearest_inner = hn::Min(nearest_inner, hn::Sub(to_center, hn::Set(d, leaf.inner[b])));
@@ -477,37 +504,13 @@ class Descent {
   }
 
   Traversal& t_;
+  const Planes planes_;
+  Front* front_;
+  float gain_ = 0.0F;  // from a bound found now to one that the front keeps
+  bool is_full_ = false, is_cut_short_ = false;
   std::size_t top_ = 0;
   Pair stack_[kStackSize];
 };
-
-// Nodes follow their parents. Unused slots reach nowhere: balls by their radius, children by what
-// `support` is filled with.
-void FindSupport(const InnerSphereTree& tree, const float* n, float most, float* support) {
-  const SphereTag d;
-  const auto nx = hn::Set(d, n[0]), ny = hn::Set(d, n[1]), nz = hn::Set(d, n[2]);
-  for (std::size_t i = tree.nodes().size(); i-- > 0;) {
-    const SphereNode& node = tree.nodes()[i];
-    float* here = support + i * static_cast<std::size_t>(kSphereWidth);
-    for (int k = 0; k < node.count; ++k) {
-      const std::int32_t child = node.child[k];
-      auto farthest = hn::Set(d, -kFarAway);
-      for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(d)) {
-        if (child >= 0) {
-          farthest = hn::Max(farthest, hn::LoadU(d, support + child * kSphereWidth + b));
-          continue;
-        }
-        const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
-        const auto along = hn::MulAdd(
-            nx, hn::Load(d, leaf.x + b),
-            hn::MulAdd(ny, hn::Load(d, leaf.y + b),
-                       hn::MulAdd(nz, hn::Load(d, leaf.z + b), hn::Load(d, leaf.outer + b))));
-        farthest = hn::Max(farthest, along);
-      }
-      here[k] = std::min(hn::GetLane(hn::MaxOfLanes(d, farthest)), most);
-    }
-  }
-}
 
 void DescendInner(Traversal* traversal) { Descent<false, false>(traversal).Run(); }
 void DescendExact(Traversal* traversal) { Descent<true, false>(traversal).Run(); }
@@ -521,15 +524,10 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(FindSupport);
 HWY_EXPORT(DescendInner);
 HWY_EXPORT(DescendExact);
 HWY_EXPORT(DescendInnerBoxes);
 HWY_EXPORT(DescendExactBoxes);
-
-void find_support(const InnerSphereTree& tree, const float n[3], float most, float* support) {
-  HWY_DYNAMIC_DISPATCH(FindSupport)(tree, n, most, support);
-}
 
 void descend_inner(Traversal* traversal) {
   if (traversal->box_tiles != nullptr) {

@@ -6,6 +6,7 @@
 #include "ist_proximity/cloud/box_index.h"
 #include "ist_proximity/cloud/point_index.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
+#include "proximity/front.h"
 
 namespace ist {
 
@@ -53,6 +54,10 @@ struct Traversal {
   bool (*expired)(void* context) = nullptr;
   void* context = nullptr;
 
+  /// Where descents have ended before, told of the pose; this one goes on from there, and its end
+  /// is kept (exact descent only; null: nowhere).
+  Front* front = nullptr;
+
   // What came of it.
   float dropped = std::numeric_limits<float>::infinity();  ///< [m] smallest bound of a dropped pair
   bool may_be_inside = false;  ///< some point's bound is at most `interior`
@@ -68,7 +73,7 @@ struct Traversal {
 constexpr float kNowhere = -1e15F;  ///< [m] how far nothing reaches
 
 /// How far the parts of a link reach along a direction: for each child of each node the largest
-/// n . x of its outer balls, or `most` if that is less.
+/// n . x of its outer balls, or `most` if that is less; at least that of their centres.
 /// @param n        unit vector in the link's frame
 /// @param most     [m] how far the link's geometry itself reaches
 /// @param support  [m] kSphereWidth for each node, overwritten where there is a child; elsewhere

@@ -1,0 +1,349 @@
+// Bounds proven at one pose that hold at others: what they are made of, and queries that use them,
+// on long motions against brute force.
+
+#include "proximity/carried_bound.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/box_oracle.h"
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+using Points = std::vector<Eigen::Vector3d>;
+using Poses = std::vector<Eigen::Isometry3d>;
+
+const std::vector<Shape>& shapes() {
+  static const std::vector<Shape> kShapes = {
+      Box{{0.2, 0.1, 0.3}}, Cylinder{0.05, 0.25}, test::l_shape(0.2, 0.05),
+      test::torus(0.1, 0.03, 12, 6), test::open_box({0.15, 0.1, 0.2})};
+  return kShapes;
+}
+
+const test::Trial& links() {
+  static const test::Trial trial(shapes(), 0.005);
+  return trial;
+}
+
+Points random_points(test::Rng* rng, int count, double size) {
+  Points points;
+  for (int i = 0; i < count; ++i) points.push_back(test::random_vector(rng, size));
+  return points;
+}
+
+// Turned about a place by an angle, and moved.
+Eigen::Isometry3d turned(const Eigen::Isometry3d& X, const Eigen::Vector3d& center, double angle,
+                         const Eigen::Vector3d& axis, const Eigen::Vector3d& way) {
+  Eigen::Isometry3d result = Eigen::Translation3d(center + way) * Eigen::AngleAxisd(angle, axis) *
+                             Eigen::Translation3d(-center) * X;
+  result.linear() = Eigen::Quaterniond(result.linear()).normalized().toRotationMatrix();
+  return result;
+}
+
+TEST(LinkExtent, NoPointOfTheLinkGoesFarther) {
+  test::Rng rng(61);
+  for (std::size_t i = 2; i < shapes().size(); ++i) {
+    const LinkExtent extent(links().model().links[i]);
+    const auto& mesh = std::get<TriangleMesh>(shapes()[i]);
+    for (int k = 0; k < 300; ++k) {
+      const Eigen::Isometry3d A = test::random_pose(&rng, 3.0);
+      const double size = std::pow(10.0, test::uniform(&rng, -9, 1));
+      const Eigen::Isometry3d B =
+          turned(A, test::random_vector(&rng, 5.0), test::uniform(&rng, -size, size),
+                 test::random_vector(&rng, 1.0).normalized(), test::random_vector(&rng, size));
+      const double motion = extent.motion(A, B);
+      double farthest = 0.0;
+      for (const Eigen::Vector3d& v : mesh.vertices) {
+        farthest = std::max(farthest, (A * v - B * v).norm());
+      }
+      ASSERT_GE(motion, farthest);
+      // No farther than the ends of the box, which the link does not fill.
+      ASSERT_LE(motion, 4.0 * farthest + 1e-9);
+    }
+    const Eigen::Isometry3d still = test::random_pose(&rng, 3.0);
+    EXPECT_EQ(extent.motion(still, still), 0.0);
+  }
+}
+
+TEST(LinkExtent, PosesThatAreNone) {
+  const LinkExtent extent(links().model().links[0]);
+  const Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  for (const double odd : {kNaN, kInfinity, -kInfinity, 1e300}) {
+    for (int entry = 0; entry < 12; ++entry) {
+      Eigen::Isometry3d bad = X;
+      bad.matrix()(entry % 3, entry / 3) = odd;
+      EXPECT_FALSE(extent.motion(X, bad) < 1e100) << odd;
+      EXPECT_FALSE(extent.motion(bad, X) < 1e100) << odd;
+    }
+  }
+}
+
+TEST(CarriedBound, HoldsAmongTheSameCloudsOnly) {
+  const LinkModel& link = links().model().links[0];
+  CarriedBound carried(link);
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  EXPECT_EQ(carried.at(1, X), -kInfinity);
+  carried.prove(1, X, 0.3, 0.0);
+  EXPECT_EQ(carried.at(1, X), 0.3);
+  X.translation().x() = 0.1;
+  EXPECT_NEAR(carried.at(1, X), 0.2, 1e-12);
+  EXPECT_LE(carried.at(1, X), 0.2);
+  EXPECT_EQ(carried.at(2, X), -kInfinity);
+  EXPECT_EQ(carried.at(0, X), -kInfinity);
+  X.translation().x() = 0.31;
+  EXPECT_EQ(carried.at(1, X), -kInfinity) << "may be in contact";
+  X.translation().x() = kNaN;
+  EXPECT_EQ(carried.at(1, X), -kInfinity);
+  carried.prove(1, X, 0.3, 0.0);  // at a pose that is none
+  EXPECT_EQ(carried.at(1, X), -kInfinity);
+  EXPECT_EQ(carried.at(1, Eigen::Isometry3d::Identity()), -kInfinity);
+  carried.prove(0, Eigen::Isometry3d::Identity(), 0.3, 0.0);
+  EXPECT_EQ(carried.at(0, Eigen::Isometry3d::Identity()), -kInfinity);
+  carried.prove(1, Eigen::Isometry3d::Identity(), -0.1, 0.0);
+  EXPECT_EQ(carried.at(1, Eigen::Isometry3d::Identity()), -kInfinity) << "in contact";
+}
+
+TEST(CarriedBound, WithHolesOnlyFarFromTheBalls) {
+  const LinkModel& link = links().model().links[4];
+  ASSERT_TRUE(link.solid.has_holes());
+  const double gap = link.tree.interior_gap();
+  CarriedBound carried(link);
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  carried.prove(1, X, 0.3, gap + 0.02);
+  EXPECT_EQ(carried.at(1, X), 0.3);
+  X.translation().z() = 0.019;
+  EXPECT_GT(carried.at(1, X), 0.28);
+  X.translation().z() = 0.021;
+  EXPECT_EQ(carried.at(1, X), -kInfinity);
+  carried.prove(1, X, 0.3, gap);
+  EXPECT_EQ(carried.at(1, X), -kInfinity);
+}
+
+TEST(SeenClouds, KnowsThemAgain) {
+  CloudSnapshot a = test::make_snapshot({{0, 0, 1}});
+  const CloudSnapshot b = test::make_snapshot({{0, 0, 1}}), nothing = test::make_snapshot({});
+  CloudSnapshot map = test::make_map({{Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 1, 2)}});
+  SeenClouds seen;
+  std::uint64_t last = seen.note({&a});
+  EXPECT_NE(last, 0U);
+  const auto changes = [&](const std::vector<const CloudSnapshot*>& clouds) {
+    const std::uint64_t before = last;
+    last = seen.note(clouds);
+    EXPECT_EQ(seen.note(clouds), last);
+    return last != before;
+  };
+  EXPECT_FALSE(changes({&a}));
+  EXPECT_TRUE(changes({&b})) << "equal points, another cloud";
+  EXPECT_TRUE(changes({&a, &b}));
+  EXPECT_TRUE(changes({&b, &a}));
+  EXPECT_TRUE(changes({&b}));
+  EXPECT_TRUE(changes({}));
+  EXPECT_TRUE(changes({&nothing}));
+  EXPECT_TRUE(changes({&a, &map}));
+  map.X_FM.translation().x() += 1e-9;
+  EXPECT_TRUE(changes({&a, &map})) << "the map has moved";
+  a = test::make_snapshot({{0, 0, 1}});
+  EXPECT_TRUE(changes({&a, &map})) << "in the same place";
+  EXPECT_EQ(seen.note(std::vector<const CloudSnapshot*>(100, &a)), 0U);
+  EXPECT_NE(seen.note({&a, &map}), last);
+}
+
+// A motion of all links, and what they move among.
+struct Motion {
+  explicit Motion(std::uint64_t seed) : rng(seed), X_FL(shapes().size()) {
+    jump();
+    change_cloud();
+  }
+
+  void jump() {
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.4);
+  }
+
+  void change_cloud() {
+    points = random_points(&rng, 30, 0.6);
+    cloud = test::make_snapshot(points);
+  }
+
+  // Links stand still, creep, turn about far places; seldom, all is new.
+  void step() {
+    const double kind = test::uniform(&rng, 0.0, 1.0);
+    if (kind < 0.01) return jump();
+    if (kind < 0.03) return change_cloud();
+    if (kind < 0.06) speed = std::pow(10.0, test::uniform(&rng, -6, -2));
+    if (kind < 0.09) {
+      center = test::random_vector(&rng, kind < 0.075 ? 10.0 : 0.3);
+      axis = test::random_vector(&rng, 1.0).normalized();
+      way = test::random_vector(&rng, 1.0);
+    }
+    if (kind > 0.9) return;
+    const double angle = speed / (0.3 + center.norm());
+    for (std::size_t i = 1; i < X_FL.size(); ++i) {  // the first one only jumps
+      X_FL[i] = turned(X_FL[i], center, angle, axis, i % 2 * speed * way);
+    }
+  }
+
+  test::Rng rng;
+  Poses X_FL;
+  Points points;
+  CloudSnapshot cloud;
+  double speed = 1e-3;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero(), axis = Eigen::Vector3d::UnitZ(),
+                  way = Eigen::Vector3d::UnitX();
+};
+
+void expect_minimum(const RobotProximity& robot, const std::vector<test::Truth>& truth,
+                    const Motion& motion, const QueryConfig& config) {
+  test::Truth least{kInfinity, kInfinity};
+  for (const test::Truth& one : truth) {
+    least = {std::min(least.measured, one.measured), std::min(least.stored, one.stored)};
+  }
+  const auto i = static_cast<std::size_t>(std::max(robot.link, 0));
+  test::expect_truth(robot.nearest, least, config, motion.X_FL[i]);
+}
+
+class CarriedQueries : public ::testing::TestWithParam<double> {};
+
+// All ways to ask in turn, of one object.
+TEST_P(CarriedQueries, LongMotions) {
+  Motion motion(static_cast<std::uint64_t>(62 + 1e4 * GetParam()));
+  QueryConfig config;
+  config.tolerance = GetParam();
+  config.max_distance = 0.5;
+  ProximityQuery query(links().shared_model(), config);
+  const std::size_t count = motion.X_FL.size();
+  const std::vector<bool> known(count, true);
+  std::vector<LinkProximity> results;
+  RobotProximity robot;
+  int settled = 0, contact = 0, steps = test::scaled(1200);
+  for (int step = 0; step < steps && !::testing::Test::HasFailure(); ++step) {
+    SCOPED_TRACE("step " + std::to_string(step));
+    motion.step();
+    std::vector<test::Truth> truth;
+    for (std::size_t i = 0; i < count; ++i) {
+      truth.push_back(test::truth_of(links().link(i), motion.X_FL[i], motion.points, motion.cloud));
+    }
+    const int way = static_cast<int>(test::uniform(&motion.rng, 0.0, 4.0));
+    if (way == 0) {
+      ASSERT_TRUE(query.run(motion.X_FL, known, {&motion.cloud}, &results));
+      for (std::size_t i = 0; i < count; ++i) {
+        test::expect_truth(results[i], truth[i], config, motion.X_FL[i]);
+        contact += results[i].state == LinkState::kContact ? 1 : 0;
+      }
+    } else if (way == 1) {
+      const std::size_t i = motion.rng() % count;
+      results.resize(1);
+      ASSERT_TRUE(query.run_link(i, motion.X_FL[i], {&motion.cloud}, &results[0]));
+      test::expect_truth(results[0], truth[i], config, motion.X_FL[i]);
+    } else {
+      ASSERT_TRUE(query.run_minimum(motion.X_FL, known, {&motion.cloud}, &robot));
+      expect_minimum(robot, truth, motion, config);
+    }
+    settled += query.statistics().node_pairs == 0 ? 1 : 0;
+  }
+  EXPECT_GT(settled, steps / 50) << "nothing was carried";
+  EXPECT_GT(contact, steps / 50);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, CarriedQueries, ::testing::Values(0.0, 0.001, 0.02));
+
+// Cut off anywhere, bounds hold, then and later.
+TEST(CarriedQueries, Deadlines) {
+  Motion motion(63);
+  QueryConfig config;
+  ProximityQuery query(links().shared_model(), config);
+  const std::size_t count = motion.X_FL.size();
+  const std::vector<bool> known(count, true);
+  std::vector<LinkProximity> results;
+  RobotProximity robot;
+  int stopped = 0;
+  for (int step = 0; step < test::scaled(900); ++step) {
+    motion.step();
+    config.deadline =
+        step % 3 == 0 ? 0.0 : 1e-6 * std::pow(10.0, test::uniform(&motion.rng, -1.0, 2.5));
+    query.set_config(config);
+    const bool all = step % 2 == 0;
+    const bool complete = all ? query.run(motion.X_FL, known, {&motion.cloud}, &results)
+                              : query.run_minimum(motion.X_FL, known, {&motion.cloud}, &robot);
+    stopped += complete ? 0 : 1;
+    double least = kInfinity;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double truth =
+          test::truth_of(links().link(i), motion.X_FL[i], motion.points, motion.cloud).measured;
+      least = std::min(least, truth);
+      if (!all) continue;
+      ASSERT_LE(results[i].lower_bound, truth + 2e-8) << "step " << step;
+      if (complete) ASSERT_LE(results[i].distance, truth + config.tolerance + 1e-6);
+    }
+    if (all) continue;
+    ASSERT_LE(robot.nearest.lower_bound, least + 2e-8) << "step " << step;
+    if (complete) ASSERT_LE(robot.nearest.distance, least + config.tolerance + 1e-6);
+  }
+  EXPECT_GT(stopped, 0);
+}
+
+// Through the opening, where a point's distance jumps from one side of nothing to the other, while
+// another point, or another link, is what was nearest.
+TEST(CarriedQueries, ThroughAHole) {
+  const TriangleMesh open = test::open_box({0.15, 0.1, 0.2});
+  const auto model = test::make_model({Box{{0.02, 0.02, 0.02}}, open}, 0.005);
+  const std::vector<bool> known(2, true);
+  const Points points = {{0, 0, 0}, {0.095, 0, 0}};
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  for (const double tolerance : {0.0, 0.001, 0.05}) {
+    QueryConfig config;
+    config.tolerance = tolerance;
+    ProximityQuery query(model, config), minimum(model, config);
+    std::vector<LinkProximity> results;
+    RobotProximity robot;
+    Poses X_FL(2, Eigen::Isometry3d::Identity());
+    X_FL[0].translation().x() = 0.12;  // 1.5 cm from the point on the right
+    int contacts = 0;
+    for (double way = -0.25; way < 0.25; way += 0.0007) {
+      X_FL[1].translation().z() = way;
+      const double truth = test::oracle_minimum(
+          open, {X_FL[1].inverse() * points[0], X_FL[1].inverse() * points[1]});
+      query.run(X_FL, known, {&cloud}, &results);
+      ASSERT_LE(results[1].lower_bound, truth + 1e-6) << way;
+      ASSERT_LE(results[1].distance, truth + tolerance + 1e-6) << way;
+      minimum.run_minimum(X_FL, known, {&cloud}, &robot);
+      ASSERT_LE(robot.nearest.lower_bound, truth + 1e-6) << way;
+      ASSERT_LE(robot.nearest.distance, truth + tolerance + 1e-6) << way;
+      contacts += truth < 0.0 ? 1 : 0;
+    }
+    EXPECT_GT(contacts, 100);
+  }
+}
+
+// A map that moves under links that stand still.
+TEST(CarriedQueries, MapsMove) {
+  test::Rng rng(64);
+  CloudSnapshot map = test::make_map({{Eigen::Vector3d(0.5, -1, -1), Eigen::Vector3d(1, 1, 1)}});
+  const auto model = test::make_model({Sphere{0.1}, Box{{0.2, 0.2, 0.2}}}, 0.005);
+  ProximityQuery query(model, {});
+  const Poses X_FL(2, Eigen::Isometry3d::Identity());
+  const std::vector<bool> known(2, true);
+  std::vector<LinkProximity> results;
+  for (int step = 0; step < 200; ++step) {
+    const double to_map =
+        step % 2 == 0 ? test::uniform(&rng, 0.11, 0.9) : 0.5 + map.X_FM.translation().x();
+    map.X_FM.translation().x() = to_map - 0.5;
+    ASSERT_TRUE(query.run(X_FL, known, {&map}, &results));
+    for (const LinkProximity& link : results) {
+      ASSERT_LE(link.lower_bound, to_map - 0.1 + 1e-6);
+      ASSERT_NEAR(link.distance, to_map - 0.1, 0.001 + 1e-6);
+    }
+    if (step % 2 == 1) EXPECT_EQ(query.statistics().node_pairs, 0U) << "nothing has moved";
+  }
+}
+
+}  // namespace
+}  // namespace ist

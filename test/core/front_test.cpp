@@ -1,0 +1,199 @@
+// Descents that go on from where the last one ended, against descents from the root.
+
+#include "proximity/front.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <vector>
+
+#include "support/box_oracle.h"
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;
+
+const std::vector<Shape>& shapes() {
+  static const std::vector<Shape> kShapes = {
+      Box{{0.2, 0.1, 0.3}}, Cylinder{0.05, 0.25}, test::l_shape(0.2, 0.05),
+      test::torus(0.1, 0.03, 24, 12), test::open_box({0.15, 0.1, 0.2})};
+  return kShapes;
+}
+
+Eigen::Isometry3d at(double x) { return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0)); }
+
+TEST(Front, WaysAddUpUntilItIsClosedOrTooLong) {
+  const auto model = test::make_model({shapes()[0]}, 0.01);
+  const LinkExtent extent(model->links[0]);
+  Front front;
+  front.go_to(7, at(0.0), extent);
+  EXPECT_TRUE(front.empty());
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(front.add(i, 0), i);
+  front.leave(3, 0.5F);
+  front.leave(3, 0.6F);
+  front.close(true);
+  front.go_to(7, at(0.02), extent);
+  front.go_to(7, at(0.0), extent);
+  EXPECT_GE(front.way(), 0.04F);
+  EXPECT_NEAR(front.way(), 0.04F, 1e-6);
+  EXPECT_EQ(front.size(), 10U);
+  EXPECT_EQ(front.left()[3], 0.5F);
+  EXPECT_EQ(front.left()[4], kFarAway);
+  front.go_to(7, at(0.2), extent);
+  EXPECT_TRUE(front.empty()) << "gone too far";
+  EXPECT_EQ(front.way(), 0.0F);
+  EXPECT_EQ(front.left()[3], kFarAway);
+  front.add(0, 0);
+  front.close(true);
+  front.go_to(8, at(0.2), extent);
+  EXPECT_TRUE(front.empty()) << "another index";
+  front.add(0, 0);
+  front.close(false);
+  front.go_to(8, at(0.2), extent);
+  EXPECT_TRUE(front.empty()) << "cut short";
+  front.add(0, 0);
+  front.close(true);
+  front.go_to(8, at(std::numeric_limits<double>::quiet_NaN()), extent);
+  EXPECT_TRUE(front.empty()) << "no pose";
+  front.add(0, 0);
+  front.close(true);
+  front.go_to(8, at(0.2), extent);
+  EXPECT_TRUE(front.empty()) << "from no pose";
+}
+
+TEST(Front, IsMadeAnewWhenItHasGrown) {
+  const auto model = test::make_model({shapes()[0]}, 0.01);
+  const LinkExtent extent(model->links[0]);
+  Front front;
+  front.go_to(7, at(0.0), extent);
+  front.add(0, 0);
+  front.close(true);
+  std::size_t size = 1;
+  for (; !front.empty() && size < 2 * Front::kMost; ++size) {
+    front.add(0, 0);
+    front.close(true);
+    front.go_to(7, at(0.0), extent);
+  }
+  EXPECT_LT(size, Front::kMost);
+  while (front.add(0, 0) != Front::kFull) {
+  }
+  EXPECT_EQ(front.size(), Front::kMost);
+}
+
+TEST(Fronts, KeepThoseAskedForLately) {
+  const auto model = test::make_model({shapes()[0]}, 0.01);
+  const LinkExtent extent(model->links[0]);
+  Fronts fronts;
+  const auto ask = [&](std::uint64_t index) {
+    Front* front = fronts.of(index);
+    if (front == nullptr) return false;
+    const bool known = front->index() == index;
+    front->go_to(index, at(0.0), extent);
+    front->add(0, 0);
+    front->close(true);
+    return known;
+  };
+  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(ask(index));
+  for (const std::uint64_t index : {1, 3, 2, 4}) EXPECT_TRUE(ask(index));
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_EQ(fronts.of(5), nullptr);
+    for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(ask(index));
+  }
+  for (int i = 0; i < 20; ++i) {
+    for (const std::uint64_t index : {2, 3, 4}) EXPECT_TRUE(ask(index));
+  }
+  EXPECT_FALSE(ask(5)) << "in the place of 1, which is no more";
+  for (const std::uint64_t index : {2, 3, 4, 5}) EXPECT_TRUE(ask(index)) << index;
+  EXPECT_FALSE(ask(1));
+  fronts.forget();
+  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(ask(index));
+  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(ask(index));
+}
+
+CloudSnapshot random_cloud(test::Rng* rng, int count) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < count; ++i) {
+    Eigen::Vector3d p = test::random_vector(rng, 0.7);
+    if (i % 2 == 0) p.z() = -0.5 + 1e-3 * p.x();
+    points.push_back(p);
+  }
+  return test::make_snapshot(points);
+}
+
+CloudSnapshot random_map(test::Rng* rng, int count) {
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d p = test::random_vector(rng, 0.7);
+    boxes.emplace_back(p, p + Eigen::Vector3d::Constant(0.02));
+  }
+  return test::make_map(boxes, test::random_pose(rng, 0.1));
+}
+
+// Among one cloud, or more clouds and maps than there are fronts; of which one moves.
+class FrontQueries : public ::testing::TestWithParam<std::tuple<int, double>> {};
+
+TEST_P(FrontQueries, AnswerAsFromTheRoot) {
+  const auto [sources, tolerance] = GetParam();
+  test::Rng rng(81);
+  static const auto model = test::make_model(shapes(), 0.003);
+  const std::vector<bool> known(model->links.size(), true);
+  QueryConfig config, exact;
+  config.tolerance = tolerance;
+  exact.tolerance = 0.0;
+  ProximityQuery query(model, config);
+  std::vector<CloudSnapshot> snapshots;
+  for (int i = 0; i < sources; ++i) {
+    snapshots.push_back(i % 2 == 0 ? random_cloud(&rng, 1500) : random_map(&rng, 200));
+  }
+  std::vector<const CloudSnapshot*> clouds;
+  for (const CloudSnapshot& snapshot : snapshots) clouds.push_back(&snapshot);
+  Poses X_FL(model->links.size());
+  for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.4);
+  std::vector<LinkProximity> results, exact_results, ignored;
+  std::uint64_t pairs = 0, root_pairs = 0;
+  const int steps = test::scaled(100);
+  for (int step = 0; step < steps; ++step) {
+    const double size = step % 25 == 24 ? 0.1 : 5e-4;
+    for (Eigen::Isometry3d& X : X_FL) {
+      X.translation() += test::random_vector(&rng, size);
+      X.rotate(Eigen::AngleAxisd(size, test::random_vector(&rng, 1.0).normalized()));
+      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+    }
+    for (CloudSnapshot& snapshot : snapshots) {
+      snapshot.X_FM.translation() += test::random_vector(&rng, 1e-4);
+    }
+    if (step % 47 == 0) snapshots[0] = random_cloud(&rng, 1500);
+    ASSERT_TRUE(query.run(X_FL, known, clouds, &results));
+    pairs += query.statistics().node_pairs;
+    ASSERT_TRUE(ProximityQuery(model, exact).run(X_FL, known, clouds, &exact_results));
+    ProximityQuery cold(model, config);
+    cold.run(X_FL, known, clouds, &ignored);
+    root_pairs += cold.statistics().node_pairs;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      SCOPED_TRACE("step " + std::to_string(step) + ", link " + std::to_string(i));
+      ASSERT_EQ(results[i].state, exact_results[i].state);
+      if (results[i].state == LinkState::kClear) continue;
+      // How deep boxes are is found within a resolution, from either start.
+      const double slack = results[i].state == LinkState::kContact && sources > 1 ? 0.01 : 1e-12;
+      ASSERT_LE(results[i].lower_bound, exact_results[i].distance + 1e-12);
+      ASSERT_GE(results[i].distance, exact_results[i].lower_bound - 1e-12);
+      ASSERT_LE(results[i].distance, exact_results[i].distance + tolerance + slack);
+      if (results[i].state == LinkState::kContact) continue;
+      ASSERT_LE(results[i].distance - results[i].lower_bound, tolerance + 3e-6);
+    }
+  }
+  EXPECT_LT(pairs, 3 * root_pairs / 4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sources, FrontQueries,
+                         ::testing::Combine(::testing::Values(1, 3, 6),
+                                            ::testing::Values(0.0, 0.001)));
+
+}  // namespace
+}  // namespace ist
