@@ -148,7 +148,8 @@ Normals sample_list(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> axes;
     axes.computeDirect(points * points.transpose());
     const Eigen::Vector3f& spread_sq = axes.eigenvalues();
-    if (spread_sq[0] <= kFlat * kFlat * spread_sq[1] && spread_sq[1] > 0.0F) {
+    const bool is_plane = spread_sq[1] > kFlat * kFlat * spread_sq[2];  // not a line
+    if (is_plane && spread_sq[0] <= kFlat * kFlat * spread_sq[1]) {
       normals.add(axes.eigenvectors().col(0));
     }
   }

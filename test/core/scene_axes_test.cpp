@@ -104,6 +104,11 @@ TEST(SceneAxes, AreTheFixedFramesWhereNothingIsFlat) {
     EXPECT_EQ(scene_axes(noise.raw(as_list), R_FS, !as_list), none);
   }
   EXPECT_EQ(scene_axes(few.raw(true), R_FS, false), none);
+  Image line;  // what a planar scanner sees of a wall
+  for (int i = 0; i < 1000; ++i) {
+    line.xyz.insert(line.xyz.end(), {1.0F, 0.002F * static_cast<float>(i), 0.0F});
+  }
+  EXPECT_EQ(scene_axes(line.raw(true), R_FS, false), none);
   EXPECT_EQ(scene_axes(Image().raw(true), R_FS, false), none);
 }
 
