@@ -28,6 +28,13 @@ struct alignas(64) PatchTiles {
   /// far apart pixels are on its surfaces. Without meaning where not all pixels are kept.
   std::uint32_t suspicious;
 
+  /// All pixels are kept, and no tile may span an edge.
+  bool is_plain() const {
+    std::uint32_t all = 0xFFFFU;
+    for (const std::uint32_t row : kept) all &= row;
+    return all == 0xFFFFU && suspicious == 0;
+  }
+
   /// Bit 4 r + c: the pixel in row r and column c of the tile.
   std::uint32_t kept_of(std::size_t slot) const {
     const std::uint32_t* rows = kept + tile_row(slot);

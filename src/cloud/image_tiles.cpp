@@ -86,6 +86,7 @@ class ImageReader {
     const auto id = static_cast<std::uint32_t>(first);
     const auto width = static_cast<std::uint32_t>(cloud_.width);
     find_tiles(block_, &tiles_);
+    if (tiles_.is_plain() && keep_plain(id, width)) return;
     const Choice choice = choose();
     PointTile* room = builder_.room(kPointWidth);
     write_tiles(block_, tiles_, choice.as_they_are, id, width, room);
@@ -102,6 +103,19 @@ class ImageReader {
       keep_parts(tile, box_in(tiles_.boxes, static_cast<int>(slot)));
     }
     builder_.end_neighbours();
+  }
+
+  // What most patches are, where a camera sees well: in a few steps what the rest does tile by
+  // tile.
+  bool keep_plain(std::uint32_t id, std::uint32_t width) {
+    tiles_.boxes.count = kPointWidth;
+    const PaddedBox around = box_around(tiles_.boxes);
+    const float sum = LaneMap(tiles_.diagonal_sq).sqrt().sum();
+    if (!lie_close_together(around.diagonal(), sum, kPointWidth)) return false;
+    if (on_robot_ != nullptr && on_robot_->may_drop(around)) return false;
+    write_tiles(block_, tiles_, 0xFFFFU, id, width, builder_.room(kPointWidth));
+    builder_.keep_node(tiles_.boxes);
+    return true;
   }
 
   // Slots of the tiles that stay as they are, and of those that may have a gap.

@@ -96,10 +96,7 @@ void put_unused_far_away(PointTile* tile) {
 }
 
 // Whether tiles that are neighbours shall be a node: most of it is used, and they lie side by side.
-// Four by four squares are four times as long as one of them; where they are much longer, there is
-// a leap between them.
 bool make_a_node(const HierarchyChild* tiles, std::size_t count) {
-  constexpr float kLongest = 6.0F;
   if (count < kWidth / 2 || count > kWidth) return false;
   PaddedBox around = tiles[0].box;
   float sum = 0.0F;
@@ -107,7 +104,7 @@ bool make_a_node(const HierarchyChild* tiles, std::size_t count) {
     around.extend(tiles[i].box);
     sum += tiles[i].box.diagonal();
   }
-  return around.diagonal() <= kLongest * sum / static_cast<float>(count);
+  return lie_close_together(around.diagonal(), sum, count);
 }
 
 }  // namespace
@@ -157,6 +154,14 @@ void PointIndexBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) 
     child.child = ~static_cast<std::int32_t>(used_);
     ++used_;
   }
+}
+
+void PointIndexBuilder::keep_node(const BoxNode& boxes) {
+  index_->nodes_.push_back(boxes);
+  BoxNode& node = index_->nodes_.back();
+  node.count = kPointWidth;
+  for (std::int32_t& child : node.child) child = ~static_cast<std::int32_t>(used_++);
+  index_->size_ += static_cast<std::size_t>(kPointWidth) * static_cast<std::size_t>(kPointWidth);
 }
 
 void PointIndexBuilder::end_neighbours() {

@@ -50,6 +50,10 @@ class PointIndexBuilder {
   /// @param boxes  of exactly the points of each tile, in order; others between them
   /// @param which  bit k: slot k of `boxes` is a tile's
   void keep_written(const BoxNode& boxes, std::uint32_t which);
+  /// Keeps the first sixteen tiles of room(), all full, as a node of their own. For neighbours that
+  /// lie close together.
+  /// @param boxes  of exactly the points of each tile, in order
+  void keep_node(const BoxNode& boxes);
   /// The tiles kept since the last call are neighbours: they become a node of their own if they
   /// fill it and lie close together, else they are grouped with others at the end.
   void end_neighbours();

@@ -36,4 +36,13 @@ inline bool is_worth_a_cut(const PaddedBox& front, const PaddedBox& back, const 
   return front.diagonal() + back.diagonal() < kCutBelow * whole.diagonal();
 }
 
+/// Whether neighbouring tiles lie side by side. Four by four squares are four times as long as one
+/// of them; where they are much longer, there is a leap between them.
+/// @param around  [m] diagonal of the box of all
+/// @param sum     [m] of their diagonals
+inline bool lie_close_together(float around, float sum, std::size_t count) {
+  constexpr float kLongest = 6.0F;
+  return around * static_cast<float>(count) <= kLongest * sum;
+}
+
 }  // namespace ist
