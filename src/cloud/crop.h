@@ -41,7 +41,7 @@ std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t colum
 /// @param points  in O; the id is the number of the point in the message. Grows to more than are
 ///                kept, and never shrinks
 /// @returns how many are kept
-std::size_t crop(const RawCloud& cloud, const CropPose& pose, std::vector<CloudPoint>* points,
+std::size_t crop(const RawCloud& raw, const CropPose& pose, std::vector<CloudPoint>* points,
                  IngestCounts* counts);
 
 }  // namespace ist
