@@ -80,8 +80,9 @@ class Front {
 /// The fronts of one link: one for each of so many indices.
 class Fronts {
  public:
-  /// That of an index; if there is none, the one that has not been asked for longest. Null: all have
-  /// been lately, and where more indices are at work than these, it is best that some keep theirs.
+  /// That of an index; if there is none, the one that has not been asked for longest. Null: all
+  /// have been lately, and where more indices are at work than these, it is best that some keep
+  /// theirs.
   Front* of(std::uint64_t index);
   void forget();
 
