@@ -82,8 +82,8 @@ LinkQuery::BoxDepth LinkQuery::box_depth(const Eigen::Vector3d& center, double r
   const std::uint64_t index = index_->generation();
   const KnownDistances::Known known = known_.at(index, kKind, id, center);
   const double limit = threshold() + radius;
-  const bool is_open = known.floor > -kInfinity && known.floor + known.way < limit &&
-                       known.way < kSmallWay * radius;
+  const bool is_open =
+      known.floor > -kInfinity && known.floor + known.way < limit && known.way < kSmallWay * radius;
   if (known.floor >= limit || is_open) return {true, known.floor, known.guess};
   // Farther boxes hold no point inside; what they hold outside the descent has seen.
   if (link_->tree.is_beyond(center, interior_reach() + radius)) return {};
