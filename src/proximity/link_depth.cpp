@@ -13,6 +13,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// What was found about a box's middle is as good as new after such a share of its radius.
+constexpr double kSmallWay = 0.25;
+
 struct Entry {
   double bound;            ///< [m] no point below has a smaller signed distance
   Eigen::Vector3d center;  ///< of the box, link frame
@@ -28,7 +31,6 @@ struct Entry {
 // value at a box's middle bounds all of the box: branch and bound over the boxes that may hold
 // points inside. Most are done with as soon as any triangle is found too near for them to matter.
 void LinkQuery::find_depth(Deadline* deadline) {
-  const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
   std::array<Entry, 512> stack;  // 16 children on each of at most 8 levels, and room
   std::size_t top = 0;
   stack[top++] = {-kInfinity, Eigen::Vector3d::Zero(), -kInfinity, -kInfinity, index_->root()};
@@ -56,27 +58,46 @@ void LinkQuery::find_depth(Deadline* deadline) {
         drop(inherited);
         continue;
       }
-      // Farther boxes hold no point inside; what they hold outside the descent has seen.
-      const double near = interior + ball.radius;
-      if (link_->tree.is_beyond(center, near)) continue;
-      ++statistics_->exact_evaluations;
-      const PointDepth depth = link_->solid.depth(center, -threshold() - ball.radius);
+      const auto id =
+          static_cast<std::uint32_t>(entry.child) * kPointWidth + static_cast<std::uint32_t>(k);
+      const BoxDepth depth = box_depth(center, ball.radius, id);
+      if (!depth.matters) continue;
       const double bound = depth.floor - ball.radius;
-      const double guess = std::min(depth.exact.distance, std::abs(depth.floor)) - ball.radius;
       if (bound >= threshold()) {
         drop(bound);
         continue;
       }
       std::size_t at = top++;
-      for (; at > begin && stack[at - 1].guess < guess; --at) stack[at] = stack[at - 1];
-      stack[at] = {bound, center, depth.floor, guess, node.child[k]};
+      for (; at > begin && stack[at - 1].guess < depth.guess; --at) stack[at] = stack[at - 1];
+      stack[at] = {bound, center, depth.floor, depth.guess, node.child[k]};
     }
   }
 }
 
+// What was found about the box lately is enough where it rules the box out, or could not rule it
+// out if it were found anew.
+LinkQuery::BoxDepth LinkQuery::box_depth(const Eigen::Vector3d& center, double radius,
+                                         std::uint32_t id) {
+  constexpr auto kKind = KnownDistances::Kind::kBoxMiddle;
+  const std::uint64_t index = index_->generation();
+  const KnownDistances::Known known = known_.at(index, kKind, id, center);
+  const double limit = threshold() + radius;
+  const bool is_open =
+      known.floor > -kInfinity && known.floor + known.way < limit && known.way < kSmallWay * radius;
+  if (known.floor >= limit || is_open) return {true, known.floor, known.guess};
+  // Farther boxes hold no point inside; what they hold outside the descent has seen.
+  if (link_->tree.is_beyond(center, interior_reach() + radius)) return {};
+  ++statistics_->exact_evaluations;
+  const PointDepth depth = link_->solid.depth(center, -limit);
+  const double guess = std::min(depth.exact.distance, std::abs(depth.floor)) - radius;
+  known_.keep(index, kKind, id, center, depth.floor, guess);
+  return {true, depth.floor, guess};
+}
+
 // Each point that is evaluated bounds its neighbours too, so few of the sixteen have to be.
 void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor) {
-  const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
+  const double interior = interior_reach();
+  const std::uint64_t index = index_->generation();
   const int count = index_->tiles()[static_cast<std::size_t>(tile)].count;
   std::array<Eigen::Vector3d, kPointWidth> p_L;
   std::array<double, kPointWidth> bound;
@@ -84,7 +105,9 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& cen
   for (int k = 0; k < count; ++k) {
     const auto i = static_cast<std::size_t>(k);
     p_L[i] = X_LO_ * point_O(tile, k);
-    bound[i] = floor - (p_L[i] - center).norm();
+    const double known =
+        known_.at(index, KnownDistances::Kind::kPoint, key_of(tile, k), p_L[i]).floor;
+    bound[i] = std::max(floor - (p_L[i] - center).norm(), known);
     open[i] = true;
   }
   for (int round = 0; round < count; ++round) {
@@ -102,6 +125,7 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& cen
     if (link_->tree.is_beyond(p_L[i], interior)) continue;
     ++statistics_->exact_evaluations;
     const PointDepth depth = link_->solid.depth(p_L[i], -threshold());
+    known_.keep(index, KnownDistances::Kind::kPoint, key_of(tile, next), p_L[i], depth.floor);
     if (depth.exact.distance < kInfinity) {
       take(depth.exact, p_L[i], point_O(tile, next), tile, next);
     } else {

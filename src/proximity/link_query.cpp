@@ -122,16 +122,23 @@ double LinkQuery::threshold() const {
 void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside, double below) {
   if (boxes_ != nullptr) return consider_box(tile, lane, is_outside);
   const Eigen::Vector3d p_O = point_O(tile, lane), p_L = X_LO_ * p_O;
-  if (statistics_ != nullptr) ++statistics_->exact_evaluations;
-  if (!is_outside) {
-    const double interior = link_->tree.interior_gap();
-    is_outside = link_->tree.is_beyond(p_L, interior);
+  const std::uint64_t index = index_->generation();
+  const std::uint32_t key = key_of(tile, lane);
+  if (is_outside) {
+    const double known = known_.at(index, KnownDistances::Kind::kOutside, key, p_L).floor;
+    if (known >= threshold()) return drop(known);
+  } else {
+    is_outside = link_->tree.is_beyond(p_L, link_->tree.interior_gap());
   }
+  if (statistics_ != nullptr) ++statistics_->exact_evaluations;
   const double limit = std::min({nearest_.exact.distance, others_, range() + rounding_, below});
   const Eigen::Vector3d& toward =
       nearest_.exact.distance == kInfinity ? aim_L_ : nearest_.exact.normal;
   const SignedDistance exact = is_outside ? link_->solid.distance_outside(p_L, limit, toward)
                                           : link_->solid.signed_distance(p_L);
+  if (is_outside) {
+    known_.keep(index, KnownDistances::Kind::kOutside, key, p_L, std::min(exact.distance, limit));
+  }
   take(exact, p_L, p_O, tile, lane);
 }
 

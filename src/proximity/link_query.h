@@ -12,6 +12,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/carried_bound.h"
 #include "proximity/front.h"
+#include "proximity/known_distances.h"
 #include "proximity/traversal.h"
 
 namespace ist {
@@ -88,6 +89,9 @@ class LinkQuery {
   void look_ahead();
   void keep_bound();
   static std::uint64_t generation(const CloudSnapshot& cloud, Part part);
+  static std::uint32_t key_of(std::int32_t tile, int lane) {
+    return static_cast<std::uint32_t>(tile) * kPointWidth + static_cast<std::uint32_t>(lane);
+  }
   bool enter(const CloudSnapshot& cloud, std::int32_t index, Part part);
   Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
   void consider(std::int32_t tile, int lane, bool is_outside,
@@ -105,6 +109,13 @@ class LinkQuery {
   void descend(Traversal* traversal);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
+  struct BoxDepth {
+    bool matters = false;             ///< some of it may be inside
+    double floor = 0.0, guess = 0.0;  ///< [m] of its middle, see Entry
+  };
+  BoxDepth box_depth(const Eigen::Vector3d& center, double radius, std::uint32_t id);
+  /// [m] What is farther from the balls is outside.
+  double interior_reach() const { return link_->tree.interior_gap() + 3.0 * rounding_; }
   void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
 
   // Of points that wait, in link_waiting.cpp.
@@ -160,6 +171,7 @@ class LinkQuery {
   CarriedBound carried_;
   LinkExtent extent_;
   Fronts fronts_;
+  KnownDistances known_;
   std::uint64_t seen_ = 0;     ///< clouds, by SeenClouds
   double beyond_ = 0.0;        ///< [m] smallest bound of a point, by the balls alone
   double proven_reach_ = 0.0;  ///< [m] `reach_` where the carried bound was proven

@@ -15,10 +15,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // So many points that may be nearest are worth a look at where the link ends.
 constexpr std::size_t kManyWaiting = 16;
 
-std::uint32_t key_of(std::int32_t tile, int lane) {
-  return static_cast<std::uint32_t>(tile) * kPointWidth + static_cast<std::uint32_t>(lane);
-}
-
 }  // namespace
 
 bool LinkQuery::first_visit(std::int32_t tile, int lane) {

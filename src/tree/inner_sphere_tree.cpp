@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "geometry/float_rounding.h"
+#include "tree/beyond_kernel.h"
 #include "tree/partition.h"
 
 namespace ist {
@@ -223,44 +224,8 @@ bool InnerSphereTree::is_beyond(const Eigen::Vector3d& p_L, double distance) con
   const Eigen::Vector3f p = p_L.cast<float>();
   // As in outer_distance.
   const double rounding = 1e-6 * (p_L.cwiseAbs().maxCoeff() + radius_ + center_.norm());
-  const auto margin = static_cast<float>(distance + rounding);
-  struct Entry {
-    std::int32_t child;
-    float power;  // [m^2] of its sphere
-  };
-  std::array<Entry, 512> stack;
-  std::size_t top = 0;
-  stack[top++] = {0, 0.0F};
-  std::array<float, kSphereWidth> power{};  // above 0: farther than `distance`
-  const auto powers = [&p, &power, margin](const float* x, const float* y, const float* z,
-                                           const float* radius) {
-    for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
-      const float dx = x[k] - p.x(), dy = y[k] - p.y(), dz = z[k] - p.z();
-      const float reach = std::max(radius[k] + margin, -1.0F);
-      power[k] = dx * dx + dy * dy + dz * dz - reach * std::abs(reach);
-    }
-  };
-  while (top > 0) {
-    const Entry entry = stack[--top];
-    if (entry.child < 0) {
-      const SphereLeaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
-      powers(leaf.x, leaf.y, leaf.z, leaf.outer);
-      for (const float value : power) {
-        if (value <= 0.0F) return false;
-      }
-      continue;
-    }
-    const SphereNode& node = nodes_[static_cast<std::size_t>(entry.child)];
-    powers(node.x, node.y, node.z, node.radius);
-    const std::size_t begin = top;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(node.count); ++k) {
-      if (power[k] > 0.0F) continue;
-      std::size_t at = top++;  // the deepest entered on top
-      for (; at > begin && stack[at - 1].power < power[k]; --at) stack[at] = stack[at - 1];
-      stack[at] = {node.child[k], power[k]};
-    }
-  }
-  return true;
+  return is_beyond_balls(nodes_.data(), leaves_.data(), p.data(),
+                         static_cast<float>(distance + rounding));
 }
 
 }  // namespace ist

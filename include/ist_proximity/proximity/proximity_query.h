@@ -68,7 +68,9 @@ struct QueryStatistics {
 /// query of their own (branch and bound on the exact signed distance).
 ///
 /// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
-/// starts the next query's bound (warm start) and never changes the result.
+/// starts the next query's bound (warm start), and what was proven at one pose is used at the next
+/// ones, less how far the link has gone, while the snapshots are the same. Neither changes what an
+/// answer promises; poses may jump.
 class ProximityQuery {
  public:
   ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config);

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "ist_proximity/tree/inner_sphere_tree.h"
+
+namespace ist {
+
+/// Whether a point is farther from all outer balls than a margin [m].
+/// @param nodes   nodes[0] is the root
+/// @param p_L     [m] link frame
+bool is_beyond_balls(const SphereNode* nodes, const SphereLeaf* leaves, const float p_L[3],
+                     float margin);
+
+}  // namespace ist
