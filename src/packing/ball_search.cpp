@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace ist {
@@ -145,10 +144,10 @@ void BallSearch::insert(std::uint32_t ball) {
 }
 
 BallSearch::Match BallSearch::best(const Eigen::Vector3d* corners, int corner_count,
-                                   std::uint32_t hint, std::size_t seen) const {
+                                   std::uint32_t hint, std::size_t seen, double enough) const {
   const Corners patch(corners, corner_count);
   Match match{hint, std::sqrt(patch.farthest_sq(balls_[hint].center)) - balls_[hint].weight};
-  if (nodes_[0].newest < seen) return match;
+  if (match.cost <= enough || nodes_[0].newest < seen) return match;
   // Of a ball below a node: from its centre to the farthest corner, less its radius.
   const auto bound = [&](const Node& node) {
     return std::sqrt(box_distance_sq(node.box, patch.middle) + patch.spread_sq) - node.max_weight;
@@ -172,6 +171,7 @@ BallSearch::Match BallSearch::best(const Eigen::Vector3d* corners, int corner_co
       const double cost = std::sqrt(patch.farthest_sq(item.center)) - item.weight;
       if (cost < match.cost || (cost == match.cost && ball < match.ball)) match = {ball, cost};
     }
+    if (match.cost <= enough) break;
     if (node.count > 0) continue;
     Entry near{node.below[0], bound(nodes_[node.below[0]])};
     Entry far{node.below[1], bound(nodes_[node.below[1]])};

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace ist {
@@ -26,8 +27,9 @@ class BallSearch {
 
   /// The ball of least cost among those added after the first `seen`, and `hint` (any ball's
   /// index); ties go to the lowest index. Needs at least one ball.
+  /// @param enough  [m] the first ball found whose cost is no more than this will do
   Match best(const Eigen::Vector3d* corners, int corner_count, std::uint32_t hint,
-             std::size_t seen = 0) const;
+             std::size_t seen = 0, double enough = -std::numeric_limits<double>::infinity()) const;
 
   std::size_t size() const { return balls_.size(); }
   const Eigen::Vector3d& center(std::uint32_t ball) const { return balls_[ball].center; }

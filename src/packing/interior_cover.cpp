@@ -106,7 +106,7 @@ class InteriorCover {
                                             (k & 2) != 0U ? half.y() : -half.y(),
                                             (k & 4) != 0U ? half.z() : -half.z());
     }
-    const BallSearch::Match match = search_.best(corners.data(), 8, hint);
+    const BallSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
     if (match.cost <= target_) return;
     const double radius = half.norm();
     const double to_surface = std::sqrt(bvh_.closest(center).distance_sq);
@@ -139,13 +139,14 @@ class InteriorCover {
     if (bvh_.is_inside(center + 0.5 * (highest + reach) * n)) return false;
     std::array<Eigen::Vector3d, kMaxCorners> corners;
     const int count = cut(center, half, n, highest - target_, &corners);
-    return count == 0 || search_.best(corners.data(), count, match.ball).cost <= target_;
+    return count == 0 ||
+           search_.best(corners.data(), count, match.ball, 0, target_).cost <= target_;
   }
 
   // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
   bool fill(const Eigen::Vector3d& center, double radius, Cell kind,
             const BallSearch::Match& match) {
-    const double uncovered = search_.best(&center, 1, match.ball).cost;
+    const double uncovered = search_.best(&center, 1, match.ball, 0, 0.5 * target_).cost;
     if (uncovered <= 0.5 * target_ && 2.0 * radius > 0.5 * target_) return false;
     if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);

@@ -67,6 +67,11 @@ TEST(BallSearch, FindsTheBestWhileBallsAreAdded) {
         ASSERT_LE(of_new, cost_of(balls[i], corners.data(), count) + 1e-12);
       }
       ASSERT_LE(of_new, cost_of(balls[hint], corners.data(), count) + 1e-12);
+      // One that is good enough will do, where there is one.
+      const double enough = match.cost + test::uniform(&rng, -0.1, 0.2);
+      const BallSearch::Match any = search.best(corners.data(), count, hint, 0, enough);
+      ASSERT_NEAR(any.cost, cost_of(balls[any.ball], corners.data(), count), 1e-12);
+      ASSERT_LE(any.cost, std::max(enough, match.cost));
     }
   }
 }
