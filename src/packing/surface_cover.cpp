@@ -81,8 +81,9 @@ void SurfaceCover::seed(VolumeFiller* holes) {
 }
 
 void SurfaceCover::cover_triangles() {
-  patches_.reserve(mesh_.triangles.size());
-  heap_.reserve(mesh_.triangles.size());
+  // Room that is not used costs no memory; to move patches for more room does.
+  patches_.reserve(2 * mesh_.triangles.size());
+  heap_.reserve(2 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
     Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 0, t};
     const BallSearch::Match match = search_.best(patch.corner, 3, 0);
