@@ -109,12 +109,14 @@ class InteriorCover {
     const BallSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
     if (match.cost <= target_) return;
     const double radius = half.norm();
-    const double to_surface = std::sqrt(bvh_.closest(center).distance_sq);
+    const ClosestPoint surface = bvh_.closest(center);
+    const double to_surface = std::sqrt(surface.distance_sq);
     const Cell kind = classify(center, radius, to_surface);
     if (kind == Cell::kOutside) return;
     // The surface is covered, and its inside to a depth of target_.
     if (to_surface + radius <= target_) return;
-    if (to_surface < radius + target_ && is_covered_below(center, half, match)) return;
+    if (to_surface < radius + target_ && is_covered_below(center, half, surface.point, match))
+      return;
     const bool is_wanted =
         kind == Cell::kInside || (kind == Cell::kUnclear && radius <= kUnclearSize * target_);
     if (is_wanted && fill(center, radius, kind, match)) return;
@@ -123,16 +125,27 @@ class InteriorCover {
     }
   }
 
+  // Whether a ball covers what of the cell is deeper than target_: cut off across the way to the
+  // nearest surface point q, or from the ball.
+  bool is_covered_below(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
+                        const Eigen::Vector3d& q, const BallSearch::Match& match) const {
+    if (!finder_.is_closed()) return false;
+    const Eigen::Vector3d from_ball = center - search_.center(match.ball), from_q = center - q;
+    const double side = from_q.dot(from_ball) > 0.0 ? 1.0 : -1.0;
+    return is_covered_along(side * from_q, center, half, match) ||
+           is_covered_along(from_ball, center, half, match);
+  }
+
   // Whether a ball covers what of the cell is deeper than target_, as far as one plane can tell.
   //
   // Beyond everything that the surface reaches along n, within target_ of the cell, all is outside
   // if one point is: it is convex, and no triangle crosses it. Points of the cell that come there
   // by a way of target_ are outside, or cross the surface on it.
-  bool is_covered_below(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
-                        const BallSearch::Match& match) const {
+  bool is_covered_along(const Eigen::Vector3d& way, const Eigen::Vector3d& center,
+                        const Eigen::Vector3d& half, const BallSearch::Match& match) const {
     const double reach = half.norm() + target_;
-    if (!finder_.is_closed()) return false;
-    const Eigen::Vector3d n = (center - search_.center(match.ball)).stableNormalized();
+    const Eigen::Vector3d n = way.stableNormalized();
+    if (!(n.squaredNorm() > 0.5)) return false;  // no way at all
     const double width = n.cwiseAbs().dot(half), limit = (1.0 - kLeastCut) * width + target_;
     const double highest = bvh_.support_within(center, reach, n, limit);
     if (!(highest <= limit) || highest < -reach) return false;
