@@ -24,7 +24,7 @@ struct Series {
   double name_y;  // below the first point
 };
 constexpr Series kSeries[] = {{"time [s]", "#1f6fb4", 2, 20.0},
-                              {"memory [MB]", "#c4572b", 4, -12.0}};
+                              {"memory [MB]", "#c4572b", 4, -24.0}};
 
 // One panel: log-log, rows whose `fixed` cell is `value`, by the other of the first two cells.
 class Panel {
