@@ -54,7 +54,7 @@ template <class Search>
 MedialBallFinder::InnerBall SurfaceCover::admitted(const Eigen::Vector3d& s,
                                                    const Search& search) const {
   for (int i = 0; i < kMaxTries; ++i) {
-    const MedialBallFinder::InnerBall ball = search();
+    MedialBallFinder::InnerBall ball = search();
     if (finder_.is_closed() || ball.radius <= 0.0 || finder_.admits(ball)) return ball;
   }
   return {s, 0.0};
@@ -101,8 +101,8 @@ void SurfaceCover::add_ball(const MedialBallFinder::InnerBall& ball) {
   search_.add(ball.center, ball.radius);
 }
 
-void SurfaceCover::push(std::uint32_t patch) {
-  heap_.push_back({patches_[patch].bound, patch});
+void SurfaceCover::push(std::uint32_t index) {
+  heap_.push_back({patches_[index].bound, index});
   std::push_heap(heap_.begin(), heap_.end(), Looser());
 }
 
@@ -140,13 +140,12 @@ void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* holes,
       if (!progress(std::min(1.0, config.max_error / worst))) return;
     }
     if (balls_.size() >= static_cast<std::size_t>(config.max_spheres)) return;
-    const std::uint32_t patch = pop();
-    if (tighten(&patches_[patch])) {
-      push(patch);
-    } else if (fill_hole(hole_share * patches_[patch].bound, holes)) {
-      push(patch);
+    const std::uint32_t index = pop();
+    Patch& patch = patches_[index];
+    if (tighten(&patch) || fill_hole(hole_share * patch.bound, holes)) {
+      push(index);
     } else {
-      split_or_fill(patch, config.max_error);
+      split_or_fill(index, config.max_error);
     }
   }
 }

@@ -56,10 +56,10 @@ class SurfaceCover {
   double gap_at_points(const Patch& patch, Eigen::Vector3d* worst_point) const;
   static double longest_edge(const Patch& patch);
   std::uint32_t pop();
-  void push(std::uint32_t patch);
+  void push(std::uint32_t index);
   bool tighten(Patch* patch) const;
-  void split_or_fill(std::uint32_t patch, double target);
-  void split(std::uint32_t patch);
+  void split_or_fill(std::uint32_t index, double target);
+  void split(std::uint32_t index);
   MedialBallFinder::InnerBall ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
                                       double gap) const;
   template <class Search>
