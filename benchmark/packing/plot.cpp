@@ -15,16 +15,16 @@ namespace ist::benchmark {
 namespace {
 
 constexpr double kWidth = 360.0, kHeight = 260.0, kLeft = 50.0, kTop = 30.0;  // of a panel's axes
-constexpr double kPanel = 430.0;
+constexpr double kPanel = 440.0;
 
 struct Series {
   const char* name;
   const char* colour;
   std::size_t column;
-  double name_y;  // below the last point
+  double name_y;  // below the first point
 };
-constexpr Series kSeries[] = {{"time [s]", "#1f6fb4", 2, -10.0},
-                              {"memory [MB]", "#c4572b", 4, 20.0}};
+constexpr Series kSeries[] = {{"time [s]", "#1f6fb4", 2, 20.0},
+                              {"memory [MB]", "#c4572b", 4, -24.0}};
 
 // One panel: log-log, rows whose `fixed` cell is `value`, by the other of the first two cells.
 class Panel {
@@ -63,7 +63,7 @@ class Panel {
              << "\" r=\"3.5\" fill=\"" << series.colour << "\"/>\n";
       }
       line(points, series.colour, 2, svg);
-      text(points.back().first - 30, points.back().second + series.name_y, series.name,
+      text(points.front().first + 40, points.front().second + series.name_y, series.name,
            series.colour, svg);
     }
   }

@@ -275,7 +275,8 @@ HoleGuard::Obstacle HoleGuard::nearest(const Eigen::Vector3d& x, double at_most)
 }
 
 bool HoleGuard::is_open(const Eigen::Vector3d& p) const {
-  if (bvh_.quick_winding_number(p) > kOpen + TriangleBvh::kQuickWindingError) return false;
+  const double quick = bvh_.quick_winding_number(p);
+  if (std::abs(quick - kOpen) > TriangleBvh::kQuickWindingError) return quick < kOpen;
   return bvh_.winding_number(p) < kOpen;
 }
 

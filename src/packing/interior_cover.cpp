@@ -19,7 +19,37 @@ constexpr double kBehindHole = 0.5;
 constexpr double kUnclearSize = 0.25;
 constexpr double kWindingError = 0.01;
 
+// A cell is cut where that takes away at least this share of its half width.
+constexpr double kLeastCut = 0.2;
+
 enum class Cell { kOutside, kInside, kAtSurface, kUnclear };
+
+// The corners of the part of a box where n.(x - center) <= end: its own, and where the plane cuts
+// its edges. The plane meets at most six edges, and leaves one corner out at least.
+constexpr std::size_t kMaxCorners = 13;
+int cut(const Eigen::Vector3d& center, const Eigen::Vector3d& half, const Eigen::Vector3d& n,
+        double end, std::array<Eigen::Vector3d, kMaxCorners>* corners) {
+  std::array<Eigen::Vector3d, 8> box;
+  std::array<double, 8> beyond;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < 8; ++k) {
+    const Eigen::Vector3d arm((k & 1) != 0U ? half.x() : -half.x(),
+                              (k & 2) != 0U ? half.y() : -half.y(),
+                              (k & 4) != 0U ? half.z() : -half.z());
+    box[k] = center + arm;
+    beyond[k] = n.dot(arm) - end;
+    if (beyond[k] <= 0.0) (*corners)[count++] = box[k];
+  }
+  for (std::size_t k = 0; k < 8; ++k) {
+    for (const std::size_t step : {1U, 2U, 4U}) {
+      const std::size_t other = k | step;
+      if (other == k || (beyond[k] <= 0.0) == (beyond[other] <= 0.0)) continue;
+      const double share = beyond[k] / (beyond[k] - beyond[other]);
+      (*corners)[count++] = box[k] + share * (box[other] - box[k]);
+    }
+  }
+  return static_cast<int>(count);
+}
 
 class InteriorCover {
  public:
@@ -76,12 +106,17 @@ class InteriorCover {
                                             (k & 2) != 0U ? half.y() : -half.y(),
                                             (k & 4) != 0U ? half.z() : -half.z());
     }
-    const BallSearch::Match match = search_.best(corners.data(), 8, hint);
+    const BallSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
     if (match.cost <= target_) return;
     const double radius = half.norm();
-    const Cell kind = classify(center, radius);
+    const ClosestPoint surface = bvh_.closest(center);
+    const double to_surface = std::sqrt(surface.distance_sq);
+    const Cell kind = classify(center, radius, to_surface);
     if (kind == Cell::kOutside) return;
-    if (kind == Cell::kAtSurface && 2.0 * radius <= target_) return;
+    // The surface is covered, and its inside to a depth of target_.
+    if (to_surface + radius <= target_) return;
+    if (to_surface < radius + target_ && is_covered_below(center, half, surface.point, match))
+      return;
     const bool is_wanted =
         kind == Cell::kInside || (kind == Cell::kUnclear && radius <= kUnclearSize * target_);
     if (is_wanted && fill(center, radius, kind, match)) return;
@@ -90,10 +125,41 @@ class InteriorCover {
     }
   }
 
+  // Whether a ball covers what of the cell is deeper than target_: cut off across the way to the
+  // nearest surface point q, or from the ball.
+  bool is_covered_below(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
+                        const Eigen::Vector3d& q, const BallSearch::Match& match) const {
+    if (!finder_.is_closed()) return false;
+    const Eigen::Vector3d from_ball = center - search_.center(match.ball), from_q = center - q;
+    const double side = from_q.dot(from_ball) > 0.0 ? 1.0 : -1.0;
+    return is_covered_along(side * from_q, center, half, match) ||
+           is_covered_along(from_ball, center, half, match);
+  }
+
+  // Whether a ball covers what of the cell is deeper than target_, as far as one plane can tell.
+  //
+  // Beyond everything that the surface reaches along n, within target_ of the cell, all is outside
+  // if one point is: it is convex, and no triangle crosses it. Points of the cell that come there
+  // by a way of target_ are outside, or cross the surface on it.
+  bool is_covered_along(const Eigen::Vector3d& way, const Eigen::Vector3d& center,
+                        const Eigen::Vector3d& half, const BallSearch::Match& match) const {
+    const double reach = half.norm() + target_;
+    const Eigen::Vector3d n = way.stableNormalized();
+    if (!(n.squaredNorm() > 0.5)) return false;  // no way at all
+    const double width = n.cwiseAbs().dot(half), limit = (1.0 - kLeastCut) * width + target_;
+    const double highest = bvh_.support_within(center, reach, n, limit);
+    if (!(highest <= limit) || highest < -reach) return false;
+    if (bvh_.is_inside(center + 0.5 * (highest + reach) * n)) return false;
+    std::array<Eigen::Vector3d, kMaxCorners> corners;
+    const int count = cut(center, half, n, highest - target_, &corners);
+    return count == 0 ||
+           search_.best(corners.data(), count, match.ball, 0, target_).cost <= target_;
+  }
+
   // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
   bool fill(const Eigen::Vector3d& center, double radius, Cell kind,
             const BallSearch::Match& match) {
-    const double uncovered = search_.best(&center, 1, match.ball).cost;
+    const double uncovered = search_.best(&center, 1, match.ball, 0, 0.5 * target_).cost;
     if (uncovered <= 0.5 * target_ && 2.0 * radius > 0.5 * target_) return false;
     if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
@@ -114,8 +180,7 @@ class InteriorCover {
   // A cell that no triangle touches is inside or outside as its centre is. In an open mesh the
   // winding number changes smoothly instead: Harnack's inequality for positive harmonic functions
   // bounds its rise from the centre to the cell's corners.
-  Cell classify(const Eigen::Vector3d& center, double radius) const {
-    const double distance = std::sqrt(bvh_.closest(center).distance_sq);
+  Cell classify(const Eigen::Vector3d& center, double radius, double distance) const {
     if (distance <= radius) return Cell::kAtSurface;
     if (finder_.is_closed()) return bvh_.is_inside(center) ? Cell::kInside : Cell::kOutside;
     const double q = radius / distance;

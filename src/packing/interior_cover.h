@@ -9,9 +9,10 @@ namespace ist {
 /// Extends the cover to the interior: afterwards no point inside the mesh is farther than
 /// `interior_gap` from the outer balls, so that a point farther away is outside for certain.
 ///
-/// An octree over the mesh's box. A cell that the surface crosses is done once its diagonal is at
-/// most the gap wanted (its interior points are that near to the surface, which is covered); an
-/// empty cell is outside, or near enough to an outer ball, or gets a ball of its own.
+/// An octree over the mesh's box. A cell that the surface crosses is done once its interior points
+/// are within the gap wanted of the surface, which is covered: for the size of the cell, or, in
+/// closed meshes, after the part below that depth was cut off and found near enough to an outer
+/// ball. An empty cell is outside, or near enough to an outer ball, or gets a ball of its own.
 /// @param balls    inner balls, weighted by inner radius; those added are added here too
 /// @param packing  certified by SurfaceCover; balls are added, `interior_gap` is set to max_error,
 ///                 or max_gap where that is larger (or more still: where max_spheres leaves

@@ -54,7 +54,7 @@ template <class Search>
 MedialBallFinder::InnerBall SurfaceCover::admitted(const Eigen::Vector3d& s,
                                                    const Search& search) const {
   for (int i = 0; i < kMaxTries; ++i) {
-    const MedialBallFinder::InnerBall ball = search();
+    MedialBallFinder::InnerBall ball = search();
     if (finder_.is_closed() || ball.radius <= 0.0 || finder_.admits(ball)) return ball;
   }
   return {s, 0.0};
@@ -81,6 +81,8 @@ void SurfaceCover::seed(VolumeFiller* holes) {
 }
 
 void SurfaceCover::cover_triangles() {
+  // Room that is not used costs no memory; to move patches for more room does.
+  patches_.reserve(2 * mesh_.triangles.size());
   heap_.reserve(2 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
     Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 0, t};
@@ -88,7 +90,8 @@ void SurfaceCover::cover_triangles() {
     patch.bound = match.cost;
     patch.ball = match.ball;
     patch.seen = static_cast<std::uint32_t>(balls_.size());
-    heap_.push_back(patch);
+    patches_.push_back(patch);
+    heap_.push_back({patch.bound, t});
   }
   std::make_heap(heap_.begin(), heap_.end(), Looser());
 }
@@ -98,9 +101,17 @@ void SurfaceCover::add_ball(const MedialBallFinder::InnerBall& ball) {
   search_.add(ball.center, ball.radius);
 }
 
-void SurfaceCover::push(const Patch& patch) {
-  heap_.push_back(patch);
+void SurfaceCover::push(std::uint32_t index) {
+  heap_.push_back({patches_[index].bound, index});
   std::push_heap(heap_.begin(), heap_.end(), Looser());
+}
+
+// The patch with the largest bound.
+std::uint32_t SurfaceCover::pop() {
+  std::pop_heap(heap_.begin(), heap_.end(), Looser());
+  const std::uint32_t patch = heap_.back().patch;
+  heap_.pop_back();
+  return patch;
 }
 
 // Balls added since the bound was computed may cover the patch better.
@@ -129,15 +140,12 @@ void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* holes,
       if (!progress(std::min(1.0, config.max_error / worst))) return;
     }
     if (balls_.size() >= static_cast<std::size_t>(config.max_spheres)) return;
-    std::pop_heap(heap_.begin(), heap_.end(), Looser());
-    Patch patch = heap_.back();
-    heap_.pop_back();
-    if (tighten(&patch)) {
-      push(patch);
-    } else if (fill_hole(hole_share * patch.bound, holes)) {
-      push(patch);
+    const std::uint32_t index = pop();
+    Patch& patch = patches_[index];
+    if (tighten(&patch) || fill_hole(hole_share * patch.bound, holes)) {
+      push(index);
     } else {
-      split_or_fill(patch, config.max_error);
+      split_or_fill(index, config.max_error);
     }
   }
 }
@@ -150,7 +158,7 @@ double SurfaceCover::gap_at_points(const Patch& patch, Eigen::Vector3d* worst_po
   for (const Eigen::Vector3d& corner : patch.corner) {
     // A little inside the patch: a corner belongs to faces of other normals too.
     const Eigen::Vector3d point = 0.98 * corner + 0.02 * middle;
-    const double gap = search_.best(&point, 1, patch.ball).cost;
+    const double gap = search_.best(&point, 1, patch.ball, 0, worst_gap).cost;
     if (gap > worst_gap) {
       worst_gap = gap;
       *worst_point = point;
@@ -165,17 +173,18 @@ double SurfaceCover::longest_edge(const Patch& patch) {
                    (patch.corner[2] - patch.corner[0]).norm()});
 }
 
-void SurfaceCover::split_or_fill(const Patch& patch, double target) {
+void SurfaceCover::split_or_fill(std::uint32_t index, double target) {
+  const Patch& patch = patches_[index];
   Eigen::Vector3d worst_point;
   const double worst_gap = gap_at_points(patch, &worst_point);
   if (worst_gap < std::max(kTight * patch.bound, 0.98 * target) &&
       longest_edge(patch) > smallest_patch_) {
-    split(patch);
+    split(index);
     return;
   }
   const double gap = std::max(std::min(worst_gap, patch.bound), 0.5 * target);
   add_ball(ball_at(worst_point, patch.triangle, gap));
-  push(patch);
+  push(index);
 }
 
 MedialBallFinder::InnerBall SurfaceCover::ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
@@ -209,25 +218,25 @@ MedialBallFinder::InnerBall SurfaceCover::candidate(const Eigen::Vector3d& s,
 void SurfaceCover::sharpen() {
   double known = 0.0;  // [m] a gap that is there
   for (std::size_t i = 0; i < kMaxSharpenings; ++i) {
-    std::pop_heap(heap_.begin(), heap_.end(), Looser());
-    Patch patch = heap_.back();
-    heap_.pop_back();
+    const std::uint32_t index = pop();
+    Patch& patch = patches_[index];
     if (tighten(&patch)) {
-      push(patch);
+      push(index);
       continue;
     }
     Eigen::Vector3d worst_point;
     known = std::max(known, gap_at_points(patch, &worst_point));
     if (kSharp * patch.bound <= known || longest_edge(patch) <= smallest_patch_) {
-      push(patch);
+      push(index);
       return;
     }
-    split(patch);
+    split(index);
   }
 }
 
 // Halves the longest edge: two patches of the same triangle, covering it without overlap.
-void SurfaceCover::split(const Patch& patch) {
+void SurfaceCover::split(std::uint32_t index) {
+  const Patch patch = patches_[index];
   int longest = 0;
   double length_sq = -1.0;
   for (int k = 0; k < 3; ++k) {
@@ -239,12 +248,14 @@ void SurfaceCover::split(const Patch& patch) {
   }
   const int a = longest, b = (longest + 1) % 3;
   const Eigen::Vector3d middle = 0.5 * (patch.corner[a] + patch.corner[b]);
-  for (const int replaced : {a, b}) {
-    Patch half = patch;
-    half.corner[replaced] = middle;
-    half.seen = 0;  // another ball may suit the smaller patch
+  const auto added = static_cast<std::uint32_t>(patches_.size());
+  patches_.push_back(patch);
+  patches_[index].corner[a] = middle;
+  patches_[added].corner[b] = middle;
+  for (const std::uint32_t half : {index, added}) {
+    patches_[half].seen = 0;  // another ball may suit the smaller patch
     // The parent's bound holds for its parts too, whatever the search says.
-    tighten(&half);
+    tighten(&patches_[half]);
     push(half);
   }
 }
@@ -257,7 +268,7 @@ void SurfaceCover::certify(Packing* packing) {
   }
   PackingCertificate& certificate = packing->certificate;
   double weighted = 0.0;
-  for (Patch& patch : heap_) {
+  for (Patch& patch : patches_) {
     tighten(&patch);
     Ball& ball = packing->balls[patch.ball];
     const double gap = std::max(0.0, patch.bound);

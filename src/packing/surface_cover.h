@@ -41,8 +41,12 @@ class SurfaceCover {
     std::uint32_t seen;  ///< balls there were when it was last searched
     std::uint32_t triangle;
   };
+  struct Entry {
+    double bound;  ///< [m] of the patch
+    std::uint32_t patch;
+  };
   struct Looser {
-    bool operator()(const Patch& a, const Patch& b) const { return a.bound < b.bound; }
+    bool operator()(const Entry& a, const Entry& b) const { return a.bound < b.bound; }
   };
 
   void seed(VolumeFiller* holes);
@@ -51,10 +55,11 @@ class SurfaceCover {
   void add_ball(const MedialBallFinder::InnerBall& ball);
   double gap_at_points(const Patch& patch, Eigen::Vector3d* worst_point) const;
   static double longest_edge(const Patch& patch);
-  void push(const Patch& patch);
+  std::uint32_t pop();
+  void push(std::uint32_t index);
   bool tighten(Patch* patch) const;
-  void split_or_fill(const Patch& patch, double target);
-  void split(const Patch& patch);
+  void split_or_fill(std::uint32_t index, double target);
+  void split(std::uint32_t index);
   MedialBallFinder::InnerBall ball_at(const Eigen::Vector3d& s, std::uint32_t triangle,
                                       double gap) const;
   template <class Search>
@@ -65,7 +70,8 @@ class SurfaceCover {
 
   const TriangleMesh& mesh_;
   const MedialBallFinder& finder_;
-  std::vector<Patch> heap_;
+  std::vector<Patch> patches_;
+  std::vector<Entry> heap_;  // of all patches but one that is worked on
   std::vector<MedialBallFinder::InnerBall> balls_;
   BallSearch& search_;
   double smallest_patch_;  ///< [m] edges below it are not split: rounding would decide

@@ -99,6 +99,33 @@ TEST(PackMesh, CertificateHoldsOnAnyMesh) {
   }
 }
 
+// Below the surface most of all: to a depth of a few gaps.
+TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
+  test::Rng rng(9);
+  for (const auto& [name, mesh] : hostile_meshes()) {
+    SCOPED_TRACE(name);
+    const TriangleBvh bvh(mesh);
+    const double size = bvh.bounds().sizes().norm();
+    PackingConfig config;
+    config.max_error = 0.002 * size;
+    config.max_spheres = 200;
+    const Packing packing = pack_mesh(mesh, config);
+    const double gap = packing.certificate.interior_gap;
+    for (int i = 0; i < 3000; ++i) {
+      const auto t = static_cast<std::size_t>(i) % mesh.triangles.size();
+      const double u = test::uniform(&rng, 0, 1), v = test::uniform(&rng, 0, 1 - u);
+      const Eigen::Vector3d p = mesh.corner(t, 0) * (1 - u - v) + mesh.corner(t, 1) * u +
+                                mesh.corner(t, 2) * v + test::random_vector(&rng, 4.0 * gap);
+      if (!bvh.is_inside(p)) continue;
+      double outer = size;
+      for (const Ball& ball : packing.balls) {
+        outer = std::min(outer, (p - ball.center).norm() - ball.cover_radius);
+      }
+      ASSERT_LE(outer, gap + 1e-9 * size) << p.transpose();
+    }
+  }
+}
+
 TEST(PackMesh, InnerBallsOfClosedMeshesStayInside) {
   for (const TriangleMesh& mesh :
        {test::box({0.1, 0.2, 0.3}), test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 32, 16)}) {

@@ -103,6 +103,34 @@ TEST(TriangleBvh, SupportEqualsBruteForce) {
   EXPECT_EQ(TriangleBvh().support({1, 0, 0}), -std::numeric_limits<double>::infinity());
 }
 
+TEST(TriangleBvh, SupportWithinABallIsNoLessThanAnyPointThere) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  test::Rng rng(8);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector3d center = test::random_vector(&rng, 0.2);
+      const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
+      const double radius = test::uniform(&rng, 0.005, 0.2);
+      const double reach = bvh.support_within(center, radius, n, kInfinity);
+      double sampled = -kInfinity;
+      for (int sample = 0; sample < 4000; ++sample) {
+        const auto t = static_cast<std::size_t>(sample) % mesh.triangles.size();
+        const double u = test::uniform(&rng, 0, 1), v = test::uniform(&rng, 0, 1 - u);
+        const Eigen::Vector3d x = mesh.corner(t, 0) * (1 - u - v) + mesh.corner(t, 1) * u +
+                                  mesh.corner(t, 2) * v - center;
+        if (x.norm() <= radius) sampled = std::max(sampled, n.dot(x));
+      }
+      ASSERT_GE(reach, sampled - 1e-12);
+      ASSERT_LE(reach, radius + 1e-12);
+      ASSERT_EQ(bvh.support_within(center, radius, n, reach - 1e-6),
+                reach == -kInfinity ? -kInfinity : kInfinity);
+      ASSERT_EQ(bvh.support_within(center, radius, n, reach), reach);
+    }
+  }
+  EXPECT_EQ(TriangleBvh().support_within({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
+}
+
 TEST(TriangleBvh, EndsAreNoWiderThanTold) {
   test::Rng rng(6);
   for (const TriangleMesh& mesh : meshes()) {

@@ -58,6 +58,14 @@ class TriangleBvh {
   double support(const Eigen::Vector3d& n_M, double slack = 0.0,
                  double reached = -std::numeric_limits<double>::infinity()) const;
 
+  /// [m] How far beyond a ball's centre the surface within the ball reaches along a direction, at
+  /// most: no point of it that is in the ball has a larger n.(x - center). -inf where there is
+  /// none; inf where that is more than `limit` [m]. Large triangles count as discs that end at the
+  /// ball.
+  /// @param n_M  unit
+  double support_within(const Eigen::Vector3d& center_M, double radius, const Eigen::Vector3d& n_M,
+                        double limit) const;
+
   /// How wide the surface is near its end along a direction: for each depth, how far from a line
   /// along the direction any of its points is that is no deeper below `highest`.
   /// @param n_M      unit
