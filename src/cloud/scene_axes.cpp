@@ -171,6 +171,14 @@ Eigen::Matrix3d axes_of(const Eigen::Vector3d& first, const Eigen::Vector3d& sec
   return R;
 }
 
+// The axis of a frame that is most nearly across a direction. In an image's own frame: squares of
+// pixels lie along it.
+Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Matrix3d& axes) {
+  Eigen::Index least;
+  (axes.transpose() * n).cwiseAbs().minCoeff(&least);
+  return axes.col(least);
+}
+
 }  // namespace
 
 Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_image) {
@@ -179,12 +187,8 @@ Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, b
   const Eigen::Vector3f first = normals.most_common(Eigen::Vector3f::Zero(), enough);
   if (first.isZero()) return Eigen::Matrix3d::Identity();
   const Eigen::Vector3d n = first.cast<double>().normalized();
-  Eigen::Vector3d other = normals.most_common(first, enough / 2).cast<double>();
-  if (other.isZero()) {
-    Eigen::Index least;
-    n.cwiseAbs().minCoeff(&least);
-    other = Eigen::Vector3d::Unit(least);
-  }
+  Eigen::Vector3d other = normals.most_common(first, enough).cast<double>();
+  if (other.isZero()) other = across(n, is_image ? R_FS : Eigen::Matrix3d::Identity());
   return axes_of(n, (other - other.dot(n) * n).normalized());
 }
 
