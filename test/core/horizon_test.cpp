@@ -139,7 +139,7 @@ TEST(Horizon, WhatIsBeyondIsNotKnown) {
   ProximityQuery query(model, config);
   const std::vector<bool> known(meshes.size(), true);
   int clear = 0, measured = 0, unknown = 0, cut = 0;
-  for (int scene = 0; scene < test::scaled(40); ++scene) {
+  for (int scene = 0; scene < (test::kSanitized ? 20 : 40); ++scene) {
     std::vector<Eigen::Vector3d> points, kept;
     Horizon horizon;
     horizon.center_F = test::random_vector(&rng, 0.2);
