@@ -1,5 +1,6 @@
 // How time and memory grow with the triangles of a mesh and the balls of a packing.
 
+#include <malloc.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -72,6 +73,7 @@ Result pack_alone(const TriangleMesh& mesh, int balls) {
   int ends[2];
   Result result;
   if (pipe(ends) != 0) return result;
+  malloc_trim(0);  // what was freed before would be taken first, and not count
   const pid_t child = fork();
   if (child == 0) {
     result = pack(mesh, balls);

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <limits>
 
-#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/horizon.h"
 #include "ist_proximity/cloud/raw_cloud.h"
 
 namespace ist {

@@ -7,8 +7,7 @@
 namespace ist {
 
 /// Axes that most of a cloud's surfaces lie along. A box about a slanted surface is thick, and
-/// queries pay for that: two to three times as much where a table is seen from a camera's own frame
-/// as where its normal is an axis.
+/// queries pay for that.
 ///
 /// Looks at normals here and there: the direction that most of them share, and then the one across
 /// it that most of the others do, as in rooms and on tables; a matter of speed.

@@ -4,13 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/float_rounding.h"
+
 namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// What double loses in a way, in units of the numbers involved: a dozen roundings of 2^-53.
-constexpr double kLost = 4e-15;
 
 Eigen::AlignedBox3d box_of(const LinkModel& link) {
   Eigen::AlignedBox3d box;
@@ -72,7 +71,7 @@ double LinkExtent::motion(const Eigen::Isometry3d& X_FA, const Eigen::Isometry3d
   }
   if (!(middle.squaredNorm() < kInfinity)) return std::numeric_limits<double>::quiet_NaN();
   const double size = X_FA.translation().norm() + X_FB.translation().norm() + size_;
-  return farthest_sq > 0.0 ? std::sqrt(farthest_sq) + kLost * size : 0.0;
+  return farthest_sq > 0.0 ? std::sqrt(farthest_sq) + kLostInLength * size : 0.0;
 }
 
 CarriedBound::CarriedBound(const LinkModel& link)

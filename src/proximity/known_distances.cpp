@@ -2,13 +2,9 @@
 
 #include <cmath>
 
+#include "geometry/float_rounding.h"
+
 namespace ist {
-namespace {
-
-// What double loses in a place and a way, in units of the numbers involved.
-constexpr double kLost = 4e-15;
-
-}  // namespace
 
 KnownDistances::Known KnownDistances::at(std::uint64_t index, Kind kind, std::uint32_t id,
                                          const Eigen::Vector3d& p_L) const {
@@ -16,7 +12,7 @@ KnownDistances::Known KnownDistances::at(std::uint64_t index, Kind kind, std::ui
   const Place& place = places_[slot(kind, id)];
   if (place.index != index || place.id != id || place.kind != kind) return known;
   const double gone = (p_L - place.p_L).norm();
-  const double way = gone == 0.0 ? 0.0 : gone + kLost * (p_L.norm() + place.p_L.norm());
+  const double way = gone == 0.0 ? 0.0 : gone + kLostInLength * (p_L.norm() + place.p_L.norm());
   // Written so that NaN is unknown.
   if (!(way < std::numeric_limits<double>::infinity())) return known;
   known.floor = place.floor - way;

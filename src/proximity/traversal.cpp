@@ -246,6 +246,22 @@ class Descent {
     return order;
   }
 
+  // The children in `near`, the nearest on top. `divide` fills in what each is a part of.
+  template <class Divide>
+  HWY_INLINE void PushChildren(const Pair& pair, std::int32_t index, std::uint32_t near,
+                               const float* bound, const Divide& divide) {
+    const Order order = Sorted(near, bound);
+    assert(top_ + static_cast<std::size_t>(order.count) <= kStackSize);
+    for (int i = 0; i < order.count; ++i) {
+      const int k = order.child[static_cast<std::size_t>(i)];
+      Pair& child = stack_[top_++];
+      child = pair;
+      child.bound = bound[k];
+      child.parent = ParentOf(index, k);
+      divide(k, &child);
+    }
+  }
+
   // Bit k for a bound below the limit; the least of the others is kept, of unused slots too, which
   // are far away.
   template <class D, class V>
@@ -310,21 +326,14 @@ class Descent {
     }
     near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
     Drop(index, hn::GetLane(hn::MinOfLanes(d, dropped)));
-    const Order order = Sorted(near, bound);
-    assert(top_ + static_cast<std::size_t>(order.count) <= kStackSize);
-    for (int i = 0; i < order.count; ++i) {
-      const int k = order.child[static_cast<std::size_t>(i)];
-      Pair& child = stack_[top_++];
-      child = pair;
-      child.bound = bound[k];
-      child.slot = pair.sphere * kSphereWidth + k;
-      child.parent = ParentOf(index, k);
-      child.sphere = node.child[k];
-      child.x = posed.x[k];
-      child.y = posed.y[k];
-      child.z = posed.z[k];
-      child.radius = node.radius[k];
-    }
+    PushChildren(pair, index, near, bound, [&](int k, Pair* child) {
+      child->slot = pair.sphere * kSphereWidth + k;
+      child->sphere = node.child[k];
+      child->x = posed.x[k];
+      child->y = posed.y[k];
+      child->z = posed.z[k];
+      child->radius = node.radius[k];
+    });
   }
 
   void ExpandBox(const Pair& pair) {
@@ -359,16 +368,8 @@ class Descent {
     }
     near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
     Drop(index, hn::GetLane(hn::MinOfLanes(d, dropped)));
-    const Order order = Sorted(near, bound);
-    assert(top_ + static_cast<std::size_t>(order.count) <= kStackSize);
-    for (int i = 0; i < order.count; ++i) {
-      const int k = order.child[static_cast<std::size_t>(i)];
-      Pair& child = stack_[top_++];
-      child = pair;
-      child.bound = bound[k];
-      child.parent = ParentOf(index, k);
-      SetBox(pair.box * kPointWidth + k, &child);
-    }
+    PushChildren(pair, index, near, bound,
+                 [&](int k, Pair* child) { SetBox(pair.box * kPointWidth + k, child); });
   }
 
   struct Middle {

@@ -22,6 +22,13 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-6;  // [m]
 
+// A ball for each of the links l0, l1 ...
+std::shared_ptr<RobotModel> balls(std::size_t count, double radius) {
+  const auto model = test::make_model(std::vector<Shape>(count, Sphere{radius}), 0.01);
+  for (std::size_t i = 0; i < count; ++i) model->links[i].name = "l" + std::to_string(i);
+  return model;
+}
+
 // A ball for each of a random robot's links.
 struct Arm {
   Arm(test::Rng* rng, int max_joints) : description(test::random_robot(rng, max_joints)) {
@@ -29,11 +36,7 @@ struct Arm {
       joint.lower = test::uniform(rng, -1.0, 0.0);
       joint.upper = test::uniform(rng, 0.0, 1.0);
     }
-    std::vector<Shape> shapes(description.joints.size() + 1, Sphere{0.05});
-    model = test::make_model(shapes, 0.01);
-    for (std::size_t i = 0; i < model->links.size(); ++i) {
-      model->links[i].name = "l" + std::to_string(i);
-    }
+    model = balls(description.joints.size() + 1, 0.05);
   }
 
   RobotDescription description;
@@ -71,25 +74,25 @@ TEST(Reach, NoLinkGetsFarther) {
   }
 }
 
+JointDescription joint(JointType type, const std::string& parent, const std::string& child,
+                       const Eigen::Vector3d& p_PJ) {
+  JointDescription result;
+  result.name = "to_" + child;
+  result.type = type;
+  result.parent_link = parent;
+  result.child_link = child;
+  result.X_PJ.translation() = p_PJ;
+  return result;
+}
+
 TEST(Reach, OfAnArmThatIsStretched) {
   RobotDescription arm;
   arm.root_link = "l0";
-  JointDescription turn, slide;
-  turn.name = "turn";
-  turn.type = JointType::kRevolute;
-  turn.parent_link = "l0";
-  turn.child_link = "l1";
-  turn.X_PJ.translation() << 0.0, 0.0, 0.3;
-  slide.name = "slide";
-  slide.type = JointType::kPrismatic;
-  slide.parent_link = "l1";
-  slide.child_link = "l2";
-  slide.X_PJ.translation() << 0.5, 0.0, 0.0;
-  slide.lower = -0.4;
-  slide.upper = 0.2;
-  arm.joints = {turn, slide};
-  const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}, Sphere{0.1}}, 0.01);
-  for (std::size_t i = 0; i < 3; ++i) model->links[i].name = "l" + std::to_string(i);
+  arm.joints = {joint(JointType::kRevolute, "l0", "l1", {0.0, 0.0, 0.3}),
+                joint(JointType::kPrismatic, "l1", "l2", {0.5, 0.0, 0.0})};
+  arm.joints[1].lower = -0.4;
+  arm.joints[1].upper = 0.2;
+  const auto model = balls(3, 0.1);
   EXPECT_NEAR(reach(*model, Kinematics(arm)), 0.3 + 0.5 + 0.4 + 0.1, 0.02);
   arm.joints[1].upper = kInfinity;
   EXPECT_EQ(reach(*model, Kinematics(arm)), kInfinity);
@@ -102,19 +105,9 @@ TEST(Reach, OfAnArmThatIsStretched) {
 TEST(Horizon, OnlyInFramesThatStandStill) {
   RobotDescription robot;
   robot.root_link = "world";
-  JointDescription base, shoulder;
-  base.name = "base";
-  base.parent_link = "world";
-  base.child_link = "l0";
-  base.X_PJ.translation() << 1.0, 2.0, 3.0;
-  shoulder.name = "shoulder";
-  shoulder.type = JointType::kRevolute;
-  shoulder.parent_link = "l0";
-  shoulder.child_link = "l1";
-  robot.joints = {base, shoulder};
-  const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}}, 0.01);
-  model->links[0].name = "l0";
-  model->links[1].name = "l1";
+  robot.joints = {joint(JointType::kFixed, "world", "l0", {1.0, 2.0, 3.0}),
+                  joint(JointType::kRevolute, "l0", "l1", Eigen::Vector3d::Zero())};
+  const auto model = balls(2, 0.1);
   const Kinematics kinematics(robot);
   const double far = reach(*model, kinematics);
   for (const char* frame : {"l1", "map", ""}) {
