@@ -9,6 +9,8 @@ namespace ist::benchmark {
 
 RawCloud Frame::raw() const {
   RawCloud cloud;
+  // The frame stays as it is while its snapshots are asked.
+  cloud.owner = std::shared_ptr<const void>(std::shared_ptr<void>(), data.data());
   cloud.data = reinterpret_cast<const std::uint8_t*>(data.data());
   cloud.width = width;
   cloud.height = height;

@@ -6,6 +6,7 @@
 #include "ist_proximity/proximity/contact_volume.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "repulsion/measure.h"
+#include "support/tiles.h"
 
 namespace ist::benchmark {
 namespace {
@@ -46,7 +47,7 @@ Matrix3X surface_samples(const LinkGeometry& geometry, int count, std::mt19937_6
 Matrix3X thinned_points(const CloudSnapshot& cloud) {
   Matrix3X points(3, static_cast<Eigen::Index>(cloud.coarse.size()));
   Eigen::Index n = 0;
-  for (const PointTile& tile : cloud.coarse.tiles()) {
+  for (const PointTile& tile : test::tiles_of(cloud.coarse)) {
     for (int k = 0; k < tile.count; ++k) {
       points.col(n++) = cloud.coarse.X_FO() * tile.point(static_cast<int>(k));
     }

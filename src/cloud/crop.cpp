@@ -74,7 +74,7 @@ std::uint32_t count_infinite(const SensorBlock<Scalar>& block, std::size_t count
   return infinite;
 }
 
-// A rectangle of a cloud. Where there are more rows than one, each takes kPatchSide slots.
+// A rectangle of a cloud. Where there are more rows than one, each takes kTileSide slots.
 struct Window {
   const std::uint8_t* bytes;
   std::size_t rows, columns;
@@ -84,11 +84,11 @@ template <typename Scalar, bool kSwap>
 std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropPose& pose,
                     CropBlock* out, IngestCounts* counts) {
   SensorBlock<Scalar> block;
-  const std::size_t used = (window.rows - 1) * kPatchSide + window.columns;
+  const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
   for (std::size_t row = 0; row < window.rows; ++row) {
-    const std::size_t slot = row * kPatchSide;
+    const std::size_t slot = row * kTileSide;
     load<Scalar, kSwap>(cloud, window.bytes + row * cloud.row_step, window.columns, slot, &block);
-    if (row + 1 < window.rows) fill(slot + window.columns, slot + kPatchSide, &block);
+    if (row + 1 < window.rows) fill(slot + window.columns, slot + kTileSide, &block);
   }
   fill(used, (used + 7) / 8 * 8, &block);
   CropTally tally;
@@ -113,18 +113,16 @@ std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropP
   return crop(cloud, window, pose, block, counts);
 }
 
-// Whole rows of sixteen points of four floats.
-// @param stride  [bytes] from row to row
+// What became of points of four floats.
 // @returns how many are kept; a negative number: to be done the other way
-std::ptrdiff_t crop_quads(const std::uint8_t* bytes, std::size_t stride, std::size_t rows,
-                          const CropPose& pose, CropBlock* block, IngestCounts* counts) {
-  const CropTally tally = crop_rows(range_of(pose), reinterpret_cast<const float*>(bytes),
-                                    stride / sizeof(float), rows, block);
+std::ptrdiff_t take(const CropTally& tally, IngestCounts* counts) {
   if (tally.endless > 0) return -1;  // rare; they have to be looked at
   counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
   counts->beyond_horizon += static_cast<std::uint32_t>(tally.beyond);
   return static_cast<std::ptrdiff_t>(tally.kept);
 }
+
+const float* floats(const std::uint8_t* bytes) { return reinterpret_cast<const float*>(bytes); }
 
 // One row of points where the rows follow each other without gaps, and a column is a row as well:
 // blocks are to be full.
@@ -157,28 +155,29 @@ std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t colu
                         std::size_t count, const CropPose& pose, CropBlock* block,
                         IngestCounts* counts) {
   const std::uint8_t* bytes = bytes_of(cloud, row, column);
-  if (is_four_floats(cloud) && count % kPatchSide == 0) {
-    const std::ptrdiff_t kept =
-        crop_quads(bytes, kPatchSide * cloud.point_step, count / kPatchSide, pose, block, counts);
+  if (is_four_floats(cloud) && count % kCropRow == 0) {
+    const CropTally tally = crop_rows(range_of(pose), floats(bytes), count / kCropRow, block);
+    const std::ptrdiff_t kept = take(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }
   return crop_window(cloud, {bytes, 1, count}, pose, block, counts);
 }
 
-std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t column,
-                       const CropPose& pose, CropBlock* block, IngestCounts* counts) {
-  const Window window = {bytes_of(cloud, row, column), std::min(kPatchSide, cloud.height - row),
-                         std::min(kPatchSide, cloud.width - column)};
-  std::ptrdiff_t kept = -1;
-  if (is_four_floats(cloud) && window.columns == kPatchSide) {
-    kept = crop_quads(window.bytes, cloud.row_step, window.rows, pose, block, counts);
+std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
+                      const CropPose& pose, CropBlock* block, IngestCounts* counts) {
+  constexpr std::size_t kSlots = kTileSide * kTileSide;
+  const Window window = {bytes_of(cloud, row, column), std::min(kTileSide, cloud.height - row),
+                         std::min(kTileSide, cloud.width - column)};
+  if (is_four_floats(cloud) && window.rows == kTileSide && window.columns == kTileSide) {
+    const CropTally tally =
+        crop_square(range_of(pose), floats(window.bytes), cloud.row_step / sizeof(float), block);
+    const std::ptrdiff_t kept = take(tally, counts);
+    if (kept >= 0) return static_cast<std::size_t>(kept);
   }
-  if (kept < 0) {
-    kept = static_cast<std::ptrdiff_t>(crop_window(cloud, window, pose, block, counts));
-  }
-  const std::size_t used = (window.rows - 1) * kPatchSide + window.columns;
-  std::fill(block->x + used, block->x + kCropBlock, std::numeric_limits<float>::quiet_NaN());
-  return static_cast<std::size_t>(kept);
+  const std::size_t kept = crop_window(cloud, window, pose, block, counts);
+  const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
+  std::fill(block->x + used, block->x + kSlots, std::numeric_limits<float>::quiet_NaN());
+  return kept;
 }
 
 std::size_t crop(const RawCloud& raw, const CropPose& pose, std::vector<CloudPoint>* points,

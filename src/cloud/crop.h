@@ -28,13 +28,13 @@ std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t colu
                         std::size_t count, const CropPose& pose, CropBlock* block,
                         IngestCounts* counts);
 
-constexpr std::size_t kPatchSide = 16;  ///< pixels; a patch is a block
+constexpr std::size_t kTileSide = 4;  ///< pixels; a tile of an image is a square of them
 
-/// The same for a square of an image: the pixel in row r and column c of it goes to slot
-/// 16 r + c. Pixels beyond the image's edges are dropped, and count for nothing.
+/// The same for a square of an image: the pixel in row r and column c of it goes to slot 4 r + c.
+/// Pixels beyond the image's edges are dropped, and count for nothing.
 /// @param row, column  of the first pixel
-std::size_t crop_patch(const RawCloud& cloud, std::size_t row, std::size_t column,
-                       const CropPose& pose, CropBlock* block, IngestCounts* counts);
+std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
+                      const CropPose& pose, CropBlock* block, IngestCounts* counts);
 
 /// Reads a message's bytes once: drops what is not finite or not in range, and counts
 /// `not_a_number` and `infinite`.

@@ -3,7 +3,6 @@
 #define HWY_TARGET_INCLUDE "cloud/crop_kernel.cpp"
 #include "cloud/crop_kernel.h"
 
-#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -116,27 +115,40 @@ CropTally CropDoubles(const CropRange& range, const double* x_S, const double* y
 }
 
 template <bool kHorizon>
-HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std::size_t stride,
-                               std::size_t rows, CropBlock* block) {
+HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std::size_t count,
+                               CropBlock* block) {
   const DoubleTag d;
   const FloatTag f;
   Cropper<kHorizon> cropper(range, block);
-  for (std::size_t row = 0; row < rows; ++row, points += stride) {
-    // The next sixteen points of the row are what is asked for next.
-    for (std::size_t line = 4; line < 8; ++line) hwy::Prefetch(points + 16 * line);
-    for (std::size_t k = 0; k < 16; k += hn::Lanes(f)) {
-      hn::Vec<FloatTag> x, y, z, unused;
-      hn::LoadInterleaved4(f, points + 4 * k, x, y, z, unused);
-      cropper.Take(hn::PromoteTo(d, x), hn::PromoteTo(d, y), hn::PromoteTo(d, z), 16 * row + k);
-    }
+  for (std::size_t k = 0; k < count; k += hn::Lanes(f)) {
+    hn::Vec<FloatTag> x, y, z, unused;
+    hn::LoadInterleaved4(f, points + 4 * k, x, y, z, unused);
+    cropper.Take(hn::PromoteTo(d, x), hn::PromoteTo(d, y), hn::PromoteTo(d, z), k);
   }
   return cropper.tally;
 }
 
-CropTally CropRows(const CropRange& range, const float* points, std::size_t stride,
-                   std::size_t rows, CropBlock* block) {
-  return HasHorizon(range) ? CropQuads<true>(range, points, stride, rows, block)
-                           : CropQuads<false>(range, points, stride, rows, block);
+CropTally CropRows(const CropRange& range, const float* points, std::size_t rows,
+                   CropBlock* block) {
+  const std::size_t count = rows * kCropRow;
+  return HasHorizon(range) ? CropQuads<true>(range, points, count, block)
+                           : CropQuads<false>(range, points, count, block);
+}
+
+CropTally CropSquare(const CropRange& range, const float* points, std::size_t stride,
+                     CropBlock* block) {
+  const hn::CappedTag<float, kTileSide> d;
+  alignas(64) float x[kTileSide * kTileSide], y[kTileSide * kTileSide], z[kTileSide * kTileSide];
+  for (std::size_t row = 0; row < kTileSide; ++row, points += stride) {
+    for (std::size_t k = 0; k < kTileSide; k += hn::Lanes(d)) {
+      hn::Vec<decltype(d)> vx, vy, vz, unused;
+      hn::LoadInterleaved4(d, points + 4 * k, vx, vy, vz, unused);
+      hn::Store(vx, d, x + kTileSide * row + k);
+      hn::Store(vy, d, y + kTileSide * row + k);
+      hn::Store(vz, d, z + kTileSide * row + k);
+    }
+  }
+  return CropFloats(range, x, y, z, kTileSide * kTileSide, block);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -149,6 +161,7 @@ namespace ist {
 HWY_EXPORT(CropFloats);
 HWY_EXPORT(CropDoubles);
 HWY_EXPORT(CropRows);
+HWY_EXPORT(CropSquare);
 
 CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
                       std::size_t count, CropBlock* block) {
@@ -160,9 +173,14 @@ CropTally crop_doubles(const CropRange& range, const double* x_S, const double* 
   return HWY_DYNAMIC_DISPATCH(CropDoubles)(range, x_S, y_S, z_S, count, block);
 }
 
-CropTally crop_rows(const CropRange& range, const float* points, std::size_t stride,
-                    std::size_t rows, CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropRows)(range, points, stride, rows, block);
+CropTally crop_rows(const CropRange& range, const float* points, std::size_t rows,
+                    CropBlock* block) {
+  return HWY_DYNAMIC_DISPATCH(CropRows)(range, points, rows, block);
+}
+
+CropTally crop_square(const CropRange& range, const float* points, std::size_t stride,
+                      CropBlock* block) {
+  return HWY_DYNAMIC_DISPATCH(CropSquare)(range, points, stride, block);
 }
 
 }  // namespace ist

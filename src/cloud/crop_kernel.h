@@ -32,11 +32,18 @@ CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S
 CropTally crop_doubles(const CropRange& range, const double* x_S, const double* y_S,
                        const double* z_S, std::size_t count, CropBlock* block);
 
-/// The same for rows of sixteen points of four floats each (x, y, z and padding).
-/// @param points  of the first row, aligned as floats are
+/// Points that crop_rows() takes at a time.
+constexpr std::size_t kCropRow = 16;
+
+/// The same for points of four floats each (x, y, z and padding), one after the other.
+/// @param points  aligned as floats are
+/// @param rows    of kCropRow points; at most kCropBlock in all
+CropTally crop_rows(const CropRange& range, const float* points, std::size_t rows,
+                    CropBlock* block);
+
+/// The same for a square of kTileSide x kTileSide points.
 /// @param stride  [floats] from row to row
-/// @param rows    at most kCropBlock / 16
-CropTally crop_rows(const CropRange& range, const float* points, std::size_t stride,
-                    std::size_t rows, CropBlock* block);
+CropTally crop_square(const CropRange& range, const float* points, std::size_t stride,
+                      CropBlock* block);
 
 }  // namespace ist

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "cloud/image_kernel.h"
+#include "cloud/point_reader.h"
 #include "cloud/tile_box.h"
+#include "cloud/tile_reader.h"
 
 namespace ist {
 namespace {
@@ -60,106 +63,250 @@ void copy_points(const PointTile& from, std::uint32_t points, PointTile* to) {
   }
 }
 
+// Whether pixels can be read in blocks of four floats, the coordinates first, where they are.
+bool holds_floats(const RawCloud& cloud) {
+  const auto is_aligned = [](std::size_t bytes) { return bytes % sizeof(float) == 0; };
+  return !cloud.is_double && !cloud.swap_bytes && cloud.y == cloud.x + sizeof(float) &&
+         cloud.z == cloud.x + 2 * sizeof(float) &&
+         cloud.x + 4 * sizeof(float) <= cloud.point_step && is_aligned(cloud.point_step) &&
+         is_aligned(cloud.row_step) &&
+         is_aligned(reinterpret_cast<std::uintptr_t>(cloud.data) + cloud.x);
+}
+
+// How a box lies to the horizon, as far as float tells.
+enum class Side { kWithin, kBeyond, kAcross };
+
+// Where an image is cut.
+class Cut {
+ public:
+  explicit Cut(const CropPose& pose)
+      : center_O_(pose.X_OS * pose.horizon_center), radius_sq_(pose.horizon_sq) {}
+
+  Side side_of(const Patch& patch) const {
+    if (radius_sq_ == std::numeric_limits<double>::infinity()) return Side::kWithin;
+    double nearest_sq = 0.0, farthest_sq = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double below = static_cast<double>(patch.min[i]) - center_O_[i],
+                   above = static_cast<double>(patch.max[i]) - center_O_[i];
+      const double farthest = std::max(-below, above), nearest = std::max({below, -above, 0.0});
+      farthest_sq += farthest * farthest;
+      nearest_sq += nearest * nearest;
+    }
+    constexpr double kSlack = 1e-6;  // far more than double loses
+    if (farthest_sq * (1.0 + kSlack) <= radius_sq_) return Side::kWithin;
+    return nearest_sq * (1.0 - kSlack) > radius_sq_ ? Side::kBeyond : Side::kAcross;
+  }
+
+ private:
+  Eigen::Vector3d center_O_;
+  double radius_sq_;
+};
+
 class ImageReader {
  public:
   ImageReader(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
               PointIndexBuilder* builder, IngestCounts* counts)
-      : cloud_(cloud), pose_(pose), on_robot_(on_robot), builder_(*builder), counts_(*counts) {
+      : cloud_(cloud),
+        pose_(pose),
+        patch_pose_(pose),
+        anywhere_(patch_pose_.without_limits()),
+        cut_(pose),
+        holds_floats_(holds_floats(cloud)),
+        on_robot_(on_robot),
+        builder_(*builder),
+        counts_(*counts) {
     if (on_robot != nullptr) drop_ = on_robot->as_filter();
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      offset_[slot] = static_cast<std::uint32_t>(tile_row(slot) * cloud.width + tile_column(slot));
+    }
   }
 
   std::size_t run() {
-    for (std::size_t row = 0; row < cloud_.height; row += kPatchSide) {
-      for (std::size_t column = 0; column < cloud_.width; column += kPatchSide) {
-        const std::size_t kept = crop_patch(cloud_, row, column, pose_, &block_, &counts_);
-        if (kept == 0) continue;
-        kept_ += kept;
-        patch(row * cloud_.width + column);
-      }
+    for (row_ = 0; row_ < cloud_.height; row_ += kPatchSide) {
+      for (column_ = 0; column_ < cloud_.width; column_ += kPatchSide) read_patch();
     }
     return kept_;
   }
 
  private:
-  // @param first  pixel
-  void patch(std::size_t first) {
-    const auto id = static_cast<std::uint32_t>(first);
-    const auto width = static_cast<std::uint32_t>(cloud_.width);
-    find_tiles(block_, &tiles_);
-    if (tiles_.is_plain() && keep_plain(id, width)) return;
-    const Choice choice = choose();
-    PointTile* room = builder_.room(kPointWidth);
-    write_tiles(block_, tiles_, choice.as_they_are, id, width, room);
-    tiles_.boxes.count = kPointWidth;
-    if (on_robot_ != nullptr && on_robot_->may_drop(box_around(tiles_.boxes))) {
-      keep_one_by_one(choice.as_they_are);
+  static constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
+  static constexpr std::uint32_t kWhole = 0xFFFFU;  // a tile of which all pixels are kept
+
+  void read_patch() {
+    PatchState state = survey_patch(patch_pose_, pixels(), &patch_);
+    if (state == PatchState::kNone) {
+      counts_.not_a_number += static_cast<std::uint32_t>(received());
+      return;
+    }
+    if (state != PatchState::kUnclear) {
+      const Side side = cut_.side_of(patch_);
+      if (side == Side::kAcross) state = PatchState::kUnclear;
+      if (side == Side::kBeyond) return leave_out(state);
+    }
+    if (state == PatchState::kAll) {
+      std::fill_n(patch_.kept, kSlots, kWhole);
+      kept_ += kPatchSide * kPatchSide;
+    } else if (state == PatchState::kUnclear) {
+      look_closely();
     } else {
-      builder_.keep_written(tiles_.boxes, choice.as_they_are);
+      note_kept();
     }
-    for (std::size_t slot = 0; slot < kPatchTiles * kPatchTiles; ++slot) {
-      if ((choice.to_be_parted >> slot & 1U) == 0) continue;
-      PointTile tile;
-      write_tiles(block_, tiles_, 1U << slot, id, width, &tile);
-      keep_parts(tile, box_in(tiles_.boxes, static_cast<int>(slot)));
+    const std::uint32_t gaps = find_gaps();
+    if (state != PatchState::kAll || gaps != 0 || !keep_plain()) keep_tiles(gaps);
+  }
+
+  std::size_t rows() const { return std::min(kPatchSide, cloud_.height - row_); }
+  std::size_t columns() const { return std::min(kPatchSide, cloud_.width - column_); }
+  std::size_t received() const { return rows() * columns(); }
+  std::uint32_t first_pixel(std::size_t slot) const {
+    return static_cast<std::uint32_t>(row_ * cloud_.width + column_) + offset_[slot];
+  }
+
+  // Where they are in the message, if possible.
+  PatchPixels pixels() {
+    if (!holds_floats_ || received() < kPatchSide * kPatchSide) return copied();
+    const std::uint8_t* first = bytes_of(cloud_, row_, column_) + cloud_.x;
+    return {reinterpret_cast<const float*>(first), cloud_.point_step / sizeof(float),
+            cloud_.row_step / sizeof(float)};
+  }
+
+  // As floats; NaN beyond the image's edges.
+  PatchPixels copied() {
+    std::fill_n(copy_, 4 * kPatchSide * kPatchSide, std::numeric_limits<float>::quiet_NaN());
+    for (std::size_t row = 0; row < rows(); ++row) {
+      for (std::size_t column = 0; column < columns(); ++column) {
+        const Eigen::Vector3d p = point_at(cloud_, row_ + row, column_ + column);
+        float* to = copied_pixel(row, column);
+        for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(p[i]);
+      }
     }
-    builder_.end_neighbours();
+    return {copy_, 4, 4 * kPatchSide};
+  }
+  float* copied_pixel(std::size_t row, std::size_t column) {
+    return copy_ + 4 * (kPatchSide * row + column);
+  }
+
+  // Beyond the horizon.
+  void leave_out(PatchState state) {
+    std::size_t kept = kPatchSide * kPatchSide;
+    if (state != PatchState::kAll) {
+      const std::size_t kept_before = kept_;
+      note_kept();
+      kept = kept_ - kept_before;
+      kept_ = kept_before;
+    }
+    counts_.beyond_horizon += static_cast<std::uint32_t>(kept);
+  }
+
+  // Of a patch of which some pixels are kept.
+  void note_kept() {
+    counts_.not_a_number +=
+        patch_.not_a_number - static_cast<std::uint32_t>(kPatchSide * kPatchSide - received());
+    for (const std::uint32_t kept : patch_.kept) kept_ += std::bitset<kSlots>(kept).count();
+  }
+
+  // Pixel by pixel in double, which decides.
+  void look_closely() {
+    CropBlock block;
+    copied();
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::size_t row = tile_row(slot), column = tile_column(slot);
+      if (row >= rows() || column >= columns()) continue;
+      kept_ += crop_tile(cloud_, row_ + row, column_ + column, pose_, &block, &counts_);
+      for (std::size_t k = 0; k < kSlots; ++k) {
+        if (block.x[k] == block.x[k]) continue;
+        copied_pixel(row + k / kTileSide, column + k % kTileSide)[0] =
+            std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+    if (survey_patch(anywhere_, {copy_, 4, 4 * kPatchSide}, &patch_) == PatchState::kAll) {
+      std::fill_n(patch_.kept, kSlots, kWhole);
+    }
   }
 
   // What most patches are, where a camera sees well: in a few steps what the rest does tile by
   // tile.
-  bool keep_plain(std::uint32_t id, std::uint32_t width) {
-    tiles_.boxes.count = kPointWidth;
-    const PaddedBox around = box_around(tiles_.boxes);
-    const float sum = LaneMap(tiles_.diagonal_sq).sqrt().sum();
-    if (!lie_close_together(around.diagonal(), sum, kPointWidth)) return false;
+  bool keep_plain() {
+    const PaddedBox around = box_around_patch();
+    if (!lie_close_together(around.diagonal(), patch_.diagonals, kPointWidth)) return false;
     if (on_robot_ != nullptr && on_robot_->may_drop(around)) return false;
-    write_tiles(block_, tiles_, 0xFFFFU, id, width, builder_.room(kPointWidth));
-    builder_.keep_node(tiles_.boxes);
+    std::array<std::uint32_t, kSlots> first;
+    for (std::size_t slot = 0; slot < kSlots; ++slot) first[slot] = first_pixel(slot);
+    builder_.keep_unread_node(patch_.boxes, first.data());
     return true;
   }
 
-  // Slots of the tiles that stay as they are, and of those that may have a gap.
-  struct Choice {
-    std::uint32_t as_they_are = 0, to_be_parted = 0;
-  };
+  PaddedBox box_around_patch() const {
+    return {{patch_.min[0], patch_.min[1], patch_.min[2], 0.0F},
+            {patch_.max[0], patch_.max[1], patch_.max[2], 0.0F}};
+  }
 
-  // Full tiles that are as long as their pixels are apart are good; others are when they are no
-  // longer than those.
-  Choice choose() const {
-    Choice choice;
+  // @param gaps  slots of the tiles that may have one
+  void keep_tiles(std::uint32_t gaps) {
+    if (std::all_of(patch_.kept, patch_.kept + kSlots, [](std::uint32_t k) { return k == 0; })) {
+      return;
+    }
+    const bool is_near_robot = on_robot_ != nullptr && on_robot_->may_drop(box_around_patch());
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::uint32_t kept = patch_.kept[slot];
+      if (kept == 0) continue;
+      const PaddedBox box = box_in(patch_.boxes, static_cast<int>(slot));
+      const bool may_have_gap = (gaps >> slot & 1U) != 0;
+      const bool may_be_robot = is_near_robot && on_robot_->may_drop(box);
+      if (kept == kWhole && !may_have_gap && !may_be_robot) {
+        builder_.keep_unread(box, first_pixel(slot));
+        continue;
+      }
+      if (may_have_gap) {
+        PointTile tile;
+        read_kept(slot, &tile);
+        keep_parts(tile, box);
+      } else {
+        read_kept(slot, builder_.room(1));
+        builder_.keep(box, drop_);
+      }
+    }
+    builder_.end_neighbours();
+  }
+
+  void read_kept(std::size_t slot, PointTile* tile) const {
+    if (patch_.kept[slot] == kWhole) {
+      return read_tile(cloud_, pose_.X_OS, first_pixel(slot), tile);
+    }
+    CropBlock block;
+    IngestCounts counted_before;
+    crop_tile(cloud_, row_ + tile_row(slot), column_ + tile_column(slot), pose_, &block,
+              &counted_before);
+    copy_kept(block, cloud_.width, first_pixel(slot), tile);
+  }
+
+  // Slots of the tiles that may have a gap. Full tiles that are as long as their pixels are apart
+  // have none; nor do others that are not much longer than those.
+  std::uint32_t find_gaps() const {
+    if (patch_.suspicious == 0 && std::all_of(patch_.kept, patch_.kept + kSlots,
+                                              [](std::uint32_t k) { return k == kWhole; })) {
+      return 0;
+    }
     std::uint32_t open = 0;
     float sum = 0.0F, count = 0.0F;
-    for (std::size_t slot = 0; slot < kPatchTiles * kPatchTiles; ++slot) {
-      const std::uint32_t kept = tiles_.kept_of(slot), bit = 1U << slot;
-      if (kept == 0) continue;
-      if (kept != 0xFFFFU || (tiles_.suspicious & bit) != 0) {
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::uint32_t bit = 1U << slot;
+      if (patch_.kept[slot] == 0) continue;
+      if (patch_.kept[slot] != kWhole || (patch_.suspicious & bit) != 0) {
         open |= bit;
       } else {
-        choice.as_they_are |= bit;
-        sum += tiles_.diagonal_sq[slot];
+        sum += patch_.diagonal_sq[slot];
         count += 1.0F;
       }
     }
     const float longest_sq = kAsLong * kAsLong * sum;
+    std::uint32_t gaps = 0;
     for (std::size_t slot = 0; open >> slot != 0; ++slot) {
       if ((open >> slot & 1U) == 0) continue;
-      const bool good = count > 0.0F && tiles_.diagonal_sq[slot] * count <= longest_sq;
-      (good ? choice.as_they_are : choice.to_be_parted) |= 1U << slot;
+      const bool good = count > 0.0F && patch_.diagonal_sq[slot] * count <= longest_sq;
+      if (!good) gaps |= 1U << slot;
     }
-    return choice;
-  }
-
-  // What the filter drops moves all that follow.
-  void keep_one_by_one(std::uint32_t which) {
-    std::array<PointTile, kPointWidth> tiles;
-    const PointTile* written = builder_.room(kPointWidth);
-    std::copy_n(written, kPointWidth, tiles.begin());
-    std::size_t i = 0;
-    for (std::size_t slot = 0; which >> slot != 0; ++slot) {
-      if ((which >> slot & 1U) == 0) continue;
-      *builder_.room(1) = tiles[i++];
-      builder_.keep(box_in(tiles_.boxes, static_cast<int>(slot)), drop_);
-    }
+    return gaps;
   }
 
   // Halves what has a gap in the middle of its longest side, and keeps the parts.
@@ -191,12 +338,17 @@ class ImageReader {
 
   const RawCloud& cloud_;
   const CropPose& pose_;
+  const PatchPose patch_pose_, anywhere_;
+  const Cut cut_;
+  const bool holds_floats_;
   const SelfFilter* on_robot_;
   PointFilter drop_;
   PointIndexBuilder& builder_;
   IngestCounts& counts_;
-  CropBlock block_;
-  PatchTiles tiles_;
+  std::array<std::uint32_t, kSlots> offset_;  // [pixels] by slot
+  std::size_t row_ = 0, column_ = 0;          // of the patch at work
+  Patch patch_;
+  alignas(64) float copy_[4 * kPatchSide * kPatchSide];
   std::size_t kept_ = 0;
 };
 
@@ -261,7 +413,7 @@ bool is_image(const RawCloud& cloud, const CropPose& pose) {
 
 std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
                         PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {
-  builder->start(pose.X_FO, index);
+  builder->start_image(pose.X_FO, cloud, pose.X_OS, index);
   const std::size_t kept = ImageReader(cloud, pose, on_robot, builder, counts).run();
   builder->finish();
   return kept;

@@ -1,8 +1,18 @@
 #include "ist_proximity/cloud/point_index.h"
 
 #include "cloud/point_index_builder.h"
+#include "cloud/tile_reader.h"
 
 namespace ist {
+
+const PointTile& PointIndex::read(std::size_t i, PointTile* room) const {
+  read_tile(image_, X_OS_, first_pixel_[i], room);
+  if (written_.claim(i)) {
+    tiles_[i] = *room;
+    written_.publish(i);
+  }
+  return *room;
+}
 
 void PointIndex::build(const Eigen::Vector3d& origin, const float* x, const float* y,
                        const float* z, const std::uint32_t* id, std::size_t n) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "cloud/tile_box.h"
+#include "cloud/tile_reader.h"
 
 namespace ist {
 namespace {
@@ -116,13 +117,18 @@ void PointIndexBuilder::start(const Eigen::Isometry3d& X_FO, PointIndex* index) 
   index->X_FO_ = X_FO;
   index->size_ = 0;
   index->nodes_.clear();
+  index->image_ = RawCloud();
+  unread_.clear();
   loose_.clear();
   neighbours_ = 0;
 }
 
 PointTile* PointIndexBuilder::room(std::size_t count) {
   std::vector<PointTile>& tiles = index_->tiles_;
-  if (used_ + count > tiles.size()) tiles.resize(used_ + count);
+  if (used_ + count > tiles.size()) {
+    tiles.resize(used_ + count);
+    index_->first_pixel_.resize(used_ + count);
+  }
   return &tiles[used_];
 }
 
@@ -143,25 +149,41 @@ void PointIndexBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
   ++used_;
 }
 
-void PointIndexBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) {
-  for (int k = 0; which >> k != 0; ++k) {
-    if ((which >> k & 1U) == 0) continue;
-    index_->size_ += static_cast<std::size_t>(index_->tiles_[used_].count);
-    loose_.emplace_back();
-    HierarchyChild& child = loose_.back();
-    child.box.min << boxes.min_x[k], boxes.min_y[k], boxes.min_z[k], 0.0F;
-    child.box.max << boxes.max_x[k], boxes.max_y[k], boxes.max_z[k], 0.0F;
-    child.child = ~static_cast<std::int32_t>(used_);
-    ++used_;
-  }
+void PointIndexBuilder::start_image(const Eigen::Isometry3d& X_FO, const RawCloud& image,
+                                    const Eigen::Isometry3d& X_OS, PointIndex* index) {
+  start(X_FO, index);
+  index->image_ = image;
+  index->X_OS_ = X_OS;
 }
 
-void PointIndexBuilder::keep_node(const BoxNode& boxes) {
+void PointIndexBuilder::add_unread(const std::uint32_t* first_pixels, std::size_t count) {
+  PointTile* tiles = room(count);
+  if (index_->image_.owner == nullptr) {
+    for (std::size_t i = 0; i < count; ++i) {
+      read_tile(index_->image_, index_->X_OS_, first_pixels[i], &tiles[i]);
+    }
+  } else {
+    std::copy_n(first_pixels, count, &index_->first_pixel_[used_]);
+    if (unread_.empty() || unread_.back().first + unread_.back().count != used_) {
+      unread_.push_back({used_, 0});
+    }
+    unread_.back().count += count;
+  }
+  used_ += count;
+  index_->size_ += count * static_cast<std::size_t>(kPointWidth);
+}
+
+void PointIndexBuilder::keep_unread(const PaddedBox& box, std::uint32_t first_pixel) {
+  loose_.push_back({box, ~static_cast<std::int32_t>(used_)});
+  add_unread(&first_pixel, 1);
+}
+
+void PointIndexBuilder::keep_unread_node(const BoxNode& boxes, const std::uint32_t* first_pixels) {
   index_->nodes_.push_back(boxes);
   BoxNode& node = index_->nodes_.back();
   node.count = kPointWidth;
-  for (std::int32_t& child : node.child) child = ~static_cast<std::int32_t>(used_++);
-  index_->size_ += static_cast<std::size_t>(kPointWidth) * static_cast<std::size_t>(kPointWidth);
+  for (int k = 0; k < kPointWidth; ++k) node.child[k] = ~(static_cast<std::int32_t>(used_) + k);
+  add_unread(first_pixels, kWidth);
 }
 
 void PointIndexBuilder::end_neighbours() {
@@ -180,6 +202,9 @@ void PointIndexBuilder::end_neighbours() {
 
 void PointIndexBuilder::finish() {
   index_->tiles_.resize(used_);
+  index_->first_pixel_.resize(used_);
+  index_->written_.reset(used_);
+  for (const Run& run : unread_) index_->written_.leave_out(run.first, run.count);
   std::vector<BoxNode>& nodes = index_->nodes_;
   hierarchy_.append_nodes(loose_, &nodes);
   hierarchy_.append_levels(&nodes);

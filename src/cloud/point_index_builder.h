@@ -46,20 +46,25 @@ class PointIndexBuilder {
   /// Keeps the first tile of room().
   /// @param box  of exactly its points
   void keep(const PaddedBox& box, const PointFilter& drop);
-  /// Keeps the first tiles of room(), whose unused slots are far away, without a filter.
-  /// @param boxes  of exactly the points of each tile, in order; others between them
-  /// @param which  bit k: slot k of `boxes` is a tile's
-  void keep_written(const BoxNode& boxes, std::uint32_t which);
-  /// Keeps the first sixteen tiles of room(), all full, as a node of their own. For neighbours that
-  /// lie close together.
-  /// @param boxes  of exactly the points of each tile, in order
-  void keep_node(const BoxNode& boxes);
+  /// Tiles of an image may be kept before they are read: start(), then keep_unread() for each.
+  /// @param image  where its bytes have no owner, tiles are read at once
+  /// @param X_OS   sensor frame -> O
+  void start_image(const Eigen::Isometry3d& X_FO, const RawCloud& image,
+                   const Eigen::Isometry3d& X_OS, PointIndex* index);
+  /// Keeps a whole tile.
+  /// @param box  of its points, at least
+  void keep_unread(const PaddedBox& box, std::uint32_t first_pixel);
+  /// Keeps sixteen whole tiles as a node of their own. For neighbours that lie close together.
+  /// @param boxes  of the points of each tile, at least
+  /// @param first_pixels  of each tile
+  void keep_unread_node(const BoxNode& boxes, const std::uint32_t* first_pixels);
   /// The tiles kept since the last call are neighbours: they become a node of their own if they
   /// fill it and lie close together, else they are grouped with others at the end.
   void end_neighbours();
   void finish();
 
  private:
+  void add_unread(const std::uint32_t* first_pixels, std::size_t count);
   void add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop);
   void end_cell();
 
@@ -68,7 +73,11 @@ class PointIndexBuilder {
   std::size_t neighbours_ = 0;         ///< first of them since the last end_neighbours()
   BoxHierarchy hierarchy_;
   PointIndex* index_ = nullptr;  ///< in work
-  std::size_t used_ = 0;         ///< its tiles that are complete; later ones are of last time
+  struct Run {
+    std::size_t first, count;
+  };
+  std::vector<Run> unread_;  ///< of its tiles
+  std::size_t used_ = 0;     ///< its tiles that are complete; later ones are of last time
 };
 
 }  // namespace ist

@@ -53,7 +53,9 @@ void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* b
   const Eigen::Vector3d& origin = all.X_FO().translation();
   const CellGrid grid = make_grid(R_FO, origin, fitting(cell_size, all));
   TileCells cells;
-  for (const PointTile& tile : all.tiles()) {
+  PointTile room;
+  for (std::size_t number = 0; number < all.tile_count(); ++number) {
+    const PointTile& tile = all.tile(number, &room);
     const std::size_t count = find_cells(grid, tile, &cells);
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t k = cells.nearest[i];

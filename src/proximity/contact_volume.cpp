@@ -21,13 +21,14 @@ constexpr std::size_t kStackSize = 160, kHalves = 128;
 template <typename Index, typename MayTouch, typename Visit>
 void visit_tiles(const Index& index, const MayTouch& may_touch, const Visit& visit) {
   if (index.empty()) return;
+  typename Index::Tile room;
   std::array<std::int32_t, kStackSize> stack;
   std::size_t top = 0;
   stack[top++] = index.root();
   while (top > 0) {
     const std::int32_t child = stack[--top];
     if (child < 0) {
-      visit(index.tiles()[static_cast<std::size_t>(~child)]);
+      visit(index.tile(static_cast<std::size_t>(~child), &room));
       continue;
     }
     const BoxNode& node = index.nodes()[static_cast<std::size_t>(child)];

@@ -52,13 +52,14 @@ double kept_share(const Eigen::Vector3d& p_F, double radius,
     const float reach = (R + r) * (R + r);
     const Eigen::Vector3f p =
         (index.X_FO().linear().transpose() * (p_F - index.X_FO().translation())).cast<float>();
+    PointTile room;
     std::array<std::int32_t, kStackSize> stack;
     std::size_t top = 0;
     stack[top++] = index.root();
     while (top > 0) {
       const std::int32_t child = stack[--top];
       if (child < 0) {
-        shared += lenses(index.tiles()[static_cast<std::size_t>(~child)], p, R, r);
+        shared += lenses(index.tile(static_cast<std::size_t>(~child), &room), p, R, r);
         continue;
       }
       const BoxNode& node = index.nodes()[static_cast<std::size_t>(child)];

@@ -98,13 +98,15 @@ LinkQuery::BoxDepth LinkQuery::box_depth(const Eigen::Vector3d& center, double r
 void LinkQuery::find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor) {
   const double interior = interior_reach();
   const std::uint64_t index = index_->generation();
-  const int count = index_->tiles()[static_cast<std::size_t>(tile)].count;
+  PointTile room;
+  const PointTile& points = index_->tile(static_cast<std::size_t>(tile), &room);
+  const int count = points.count;
   std::array<Eigen::Vector3d, kPointWidth> p_L;
   std::array<double, kPointWidth> bound;
   std::array<bool, kPointWidth> open;
   for (int k = 0; k < count; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    p_L[i] = X_LO_ * point_O(tile, k);
+    p_L[i] = X_LO_ * points.point(k);
     const double known =
         known_.at(index, KnownDistances::Kind::kPoint, key_of(tile, k), p_L[i]).floor;
     bound[i] = std::max(floor - (p_L[i] - center).norm(), known);

@@ -105,7 +105,8 @@ bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part)
 }
 
 Eigen::Vector3d LinkQuery::point_O(std::int32_t tile, int lane) const {
-  return index_->tiles()[static_cast<std::size_t>(tile)].point(lane);
+  PointTile room;
+  return index_->tile(static_cast<std::size_t>(tile), &room).point(lane);
 }
 
 double LinkQuery::wanted_below(double distance) const {
@@ -288,7 +289,7 @@ Traversal LinkQuery::make_traversal() {
     traversal.box_root = boxes_->root();
   } else {
     traversal.box_nodes = index_->nodes().data();
-    traversal.tiles = index_->tiles().data();
+    traversal.points = index_;
     traversal.box_root = index_->root();
   }
   for (int row = 0; row < 3; ++row) {
@@ -401,8 +402,9 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   result->p_FO = nearest.p_F;
   result->direction = -(X_FL_.linear() * nearest.exact.normal);
   result->source = nearest.cloud;
+  PointTile room;
   result->point = nearest.part == Part::kBoxes ? cloud.boxes->tiles()[tile].id[nearest.lane]
-                                               : cloud.index.tiles()[tile].id[nearest.lane];
+                                               : cloud.index.tile(tile, &room).id[nearest.lane];
 }
 
 }  // namespace ist

@@ -388,7 +388,8 @@ class Descent {
     if constexpr (kBoxes) {
       Leaves(pair, t_.box_tiles[~pair.box]);
     } else {
-      Leaves(pair, t_.tiles[~pair.box]);
+      PointTile room;
+      Leaves(pair, t_.points->tile(static_cast<std::size_t>(~pair.box), &room));
     }
   }
 

@@ -20,7 +20,7 @@ struct Traversal {
   const SphereNode* sphere_nodes = nullptr;
   const SphereLeaf* sphere_leaves = nullptr;
   const BoxNode* box_nodes = nullptr;
-  const PointTile* tiles = nullptr;    ///< either these
+  const PointIndex* points = nullptr;  ///< either these
   const BoxTile* box_tiles = nullptr;  ///< or these
   std::int32_t box_root = 0;
   float R_OL[9] = {};  ///< rotation, row-major

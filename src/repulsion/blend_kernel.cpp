@@ -148,6 +148,7 @@ HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const floa
     std::uint32_t groups;
     float bound;
   };
+  typename Index::Tile room;
   std::array<Entry, 160> stack;  // sixteen on each of the levels that 2^31 tiles can have
   std::size_t top = 0;
   stack[top++] = {index.root(), (1U << link.count) - 1U, -kFarAway};
@@ -155,7 +156,7 @@ HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const floa
     const Entry entry = stack[--top];
     if (!(entry.bound < limit)) continue;
     if (entry.child < 0) {
-      visit(index.tiles()[static_cast<std::size_t>(~entry.child)], entry.groups);
+      visit(index.tile(static_cast<std::size_t>(~entry.child), &room), entry.groups);
       continue;
     }
     const BoxNode& node = index.nodes()[static_cast<std::size_t>(entry.child)];

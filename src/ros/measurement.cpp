@@ -22,7 +22,9 @@ class CloudMeasurement : public Measurement {
   /// @param noise  null: none
   CloudMeasurement(const sensor_msgs::PointCloud2ConstPtr& message, const RawCloud& raw,
                    std::shared_ptr<NoiseFilter> noise)
-      : Measurement(message->header), message_(message), raw_(raw), noise_(std::move(noise)) {}
+      : Measurement(message->header), raw_(raw), noise_(std::move(noise)) {
+    raw_.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
+  }
 
   void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
     const auto begin = std::chrono::steady_clock::now();
@@ -36,8 +38,7 @@ class CloudMeasurement : public Measurement {
   }
 
  private:
-  sensor_msgs::PointCloud2ConstPtr message_;
-  RawCloud raw_;  ///< views the message
+  RawCloud raw_;  ///< views the message, and keeps it
   std::shared_ptr<NoiseFilter> noise_;
 };
 

@@ -5,15 +5,19 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <map>
+#include <memory>
 #include <random>
 #include <set>
 #include <stdexcept>
+#include <thread>
 
 #include "ist_proximity/cloud/cloud_layout.h"
+#include "support/tiles.h"
 
 namespace ist {
 namespace {
@@ -30,6 +34,7 @@ struct Format {
   std::size_t width = 0;        // 0: one row
   std::size_t row_padding = 0;  // bytes after each row
   std::size_t misaligned = 1;   // bytes before the first point; 1: nothing is aligned
+  bool owned = false;           // whether the bytes live as long as somebody wants them
 };
 
 template <typename T>
@@ -53,10 +58,10 @@ class Message {
     layout.fields = {{"x", static_cast<std::uint32_t>(format.x), type, 1},
                      {"y", static_cast<std::uint32_t>(format.y), type, 1},
                      {"z", static_cast<std::uint32_t>(format.z), type, 1}};
-    bytes_.assign(format.misaligned + std::size_t{layout.height} * layout.row_step, 0xFF);
+    bytes_->assign(format.misaligned + std::size_t{layout.height} * layout.row_step, 0xFF);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      std::uint8_t* point =
-          &bytes_[format.misaligned] + i / width * layout.row_step + i % width * format.point_step;
+      std::uint8_t* point = &(*bytes_)[format.misaligned] + i / width * layout.row_step +
+                            i % width * format.point_step;
       for (const auto& [offset, value] :
            {std::pair{format.x, points[i].x()}, std::pair{format.y, points[i].y()},
             std::pair{format.z, points[i].z()}}) {
@@ -67,16 +72,17 @@ class Message {
         }
       }
     }
-    layout.data = bytes_.data() + format.misaligned;
-    layout.data_size = bytes_.size() - format.misaligned;
+    layout.data = bytes_->data() + format.misaligned;
+    layout.data_size = bytes_->size() - format.misaligned;
     EXPECT_EQ(check_layout(layout, &raw), "");
+    if (format.owned) raw.owner = bytes_;
   }
   Message(const Message&) = delete;
 
   RawCloud raw;
 
  private:
-  std::vector<std::uint8_t> bytes_;
+  std::shared_ptr<std::vector<std::uint8_t>> bytes_ = std::make_shared<std::vector<std::uint8_t>>();
 };
 
 Format float64() {
@@ -106,7 +112,7 @@ CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
 // The points of an index in the fixed frame, by id.
 std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
   std::map<std::uint32_t, Eigen::Vector3d> points;
-  for (const PointTile& tile : index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(index)) {
     for (int k = 0; k < tile.count; ++k) {
       EXPECT_TRUE(points.emplace(tile.id[k], index.X_FO() * tile.point(k)).second) << "id twice";
     }
@@ -283,12 +289,14 @@ TEST(Ingest, pointsAreInTheFixedFrame) {
 }
 
 // Every tile has one parent, every box is that of the points below, unused slots are far away.
-void expect_hierarchy(const PointIndex& index) {
-  const std::size_t tiles = index.tiles().size();
+// @param slack  [m] by how much boxes of tiles may be larger
+void expect_hierarchy(const PointIndex& index, float slack = 0.0F) {
+  const std::size_t tiles = index.tile_count();
   std::vector<Eigen::AlignedBox3f> boxes(tiles + index.nodes().size());
   std::vector<int> parents(boxes.size(), 0);
   for (std::size_t i = 0; i < tiles; ++i) {
-    const PointTile& tile = index.tiles()[i];
+    PointTile room;
+    const PointTile& tile = index.tile(i, &room);
     for (int k = 0; k < kPointWidth; ++k) {
       const Eigen::Vector3f p(tile.x[k], tile.y[k], tile.z[k]);
       if (k < tile.count) boxes[i].extend(p);
@@ -309,8 +317,15 @@ void expect_hierarchy(const PointIndex& index) {
           child < 0 ? static_cast<std::size_t>(~child) : tiles + static_cast<std::size_t>(child);
       ASSERT_TRUE(child < static_cast<std::int32_t>(i)) << "children come before their parent";
       ++parents[at];
-      ASSERT_TRUE(min == boxes[at].min() && max == boxes[at].max());
-      boxes[tiles + i].extend(boxes[at]);
+      const Eigen::AlignedBox3f box(min, max);
+      if (child < 0) {
+        ASSERT_TRUE(box.contains(boxes[at]));
+        ASSERT_TRUE(((boxes[at].min() - min).array() <= slack).all());
+        ASSERT_TRUE(((max - boxes[at].max()).array() <= slack).all());
+      } else {
+        ASSERT_TRUE(min == boxes[at].min() && max == boxes[at].max());
+      }
+      boxes[tiles + i].extend(box);
     }
   }
   ASSERT_EQ(index.root() + 1, static_cast<std::int32_t>(index.nodes().size()));
@@ -382,32 +397,117 @@ void check_images(const Format& format, unsigned blind) {
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
     expect_same(points_by_id(a.index), points_by_id(b.index));
     // Tiles do not span the edge of the board, 0.6 m deep.
-    for (const PointTile& tile : b.index.tiles()) {
+    for (const PointTile& tile : test::tiles_of(b.index)) {
       Eigen::AlignedBox3f box;
       for (int k = 0; k < tile.count; ++k) {
         box.extend(Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]));
       }
       ASSERT_LT(box.diagonal().norm(), 0.25F);
     }
-    expect_hierarchy(b.index);
+    expect_hierarchy(b.index, 4e-6F);  // a millionth of the range, there and back
   }
 }
 
-TEST(Ingest, imageHoldsTheSamePointsAsAList) {
-  for_each_instruction_set([] { check_images({}, 10); });
-  for_each_instruction_set([] { check_images({}, 0); });
+// Whether tiles are written at once or when somebody looks.
+void check_images_both_ways(Format format) {
+  for (const bool owned : {false, true}) {
+    format.owned = owned;
+    for (const unsigned blind : {10U, 1000U, 0U}) {
+      for_each_instruction_set([&] { check_images(format, blind); });
+    }
+  }
 }
 
-// As drivers write it: sixteen bytes a point, read by another way.
+TEST(Ingest, imageHoldsTheSamePointsAsAList) { check_images_both_ways({}); }
+
+// As drivers write it: sixteen or more bytes a point, read by another way.
 TEST(Ingest, imageOfFourFloatsHoldsTheSamePointsAsAList) {
   Format four_floats;
   four_floats.point_step = 16;
   four_floats.misaligned = 0;
-  for (const unsigned blind : {10U, 0U}) {
-    four_floats.row_padding = 0;
-    for_each_instruction_set([&] { check_images(four_floats, blind); });
-    four_floats.row_padding = 48;
-    for_each_instruction_set([&] { check_images(four_floats, blind); });
+  check_images_both_ways(four_floats);
+  four_floats.row_padding = 48;
+  check_images_both_ways(four_floats);
+}
+
+TEST(Ingest, imageOfMoreThanFourFloatsHoldsTheSamePointsAsAList) {
+  Format coloured;
+  coloured.point_step = 32;
+  coloured.misaligned = 0;
+  check_images_both_ways(coloured);
+  coloured.point_step = 20;
+  coloured.x = 4;
+  coloured.y = 8;
+  coloured.z = 12;
+  check_images_both_ways(coloured);
+  coloured.is_bigendian = true;
+  check_images_both_ways(coloured);
+  check_images_both_ways(float64());
+}
+
+// Surfaces on which float does not tell what is in range: points lie on it, and a hair off.
+TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
+  IngestConfig config;
+  config.min_range = 0.7;
+  config.max_range = 1.1;
+  for (const double range : {config.min_range, config.max_range}) {
+    Points points;
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> hair(-2e-7, 2e-7);
+    for (std::size_t v = 0; v < 96; ++v) {
+      for (std::size_t u = 0; u < 128; ++u) {
+        const Eigen::Vector3d ray(static_cast<double>(u) / 100.0 - 0.6,
+                                  static_cast<double>(v) / 100.0 - 0.5, 1.0);
+        const Eigen::Vector3f p = (range * (1.0 + hair(random)) * ray.normalized()).cast<float>();
+        points.emplace_back(p.cast<double>());
+      }
+    }
+    Format image = float64();
+    image.width = 128;
+    Format floats;
+    floats.width = 128;
+    floats.point_step = 16;
+    floats.misaligned = 0;
+    for (const Format& format : {image, floats}) {
+      SCOPED_TRACE(format.point_step);
+      const CloudSnapshot a = ingest(points, config), b = ingest(points, config, format);
+      EXPECT_GT(a.counts.used, points.size() / 8);
+      EXPECT_LT(a.counts.used, points.size() * 7 / 8);
+      EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
+      expect_same(points_by_id(a.index), points_by_id(b.index));
+    }
+  }
+}
+
+// Several threads look at tiles that nobody has written yet.
+TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
+  const Points points = depth_image(320, 240, 1000);
+  Format image;
+  image.width = 320;
+  image.point_step = 16;
+  image.misaligned = 0;
+  const PointIndex at_once = ingest(points, {}, image).index;
+  image.owned = true;
+  for (int round = 0; round < 5; ++round) {
+    const PointIndex index = ingest(points, {}, image).index;
+    ASSERT_EQ(index.tile_count(), at_once.tile_count());
+    std::array<std::size_t, 4> same{};
+    std::vector<std::thread> threads;
+    for (std::size_t& count : same) {
+      threads.emplace_back([&index, &at_once, &count] {
+        PointTile room, other_room;
+        for (std::size_t i = 0; i < index.tile_count(); ++i) {
+          const PointTile &tile = index.tile(i, &room), &other = at_once.tile(i, &other_room);
+          count += static_cast<std::size_t>(tile.count == other.count &&
+                                            std::equal(tile.x, tile.x + kPointWidth, other.x) &&
+                                            std::equal(tile.y, tile.y + kPointWidth, other.y) &&
+                                            std::equal(tile.z, tile.z + kPointWidth, other.z) &&
+                                            std::equal(tile.id, tile.id + kPointWidth, other.id));
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (const std::size_t count : same) EXPECT_EQ(count, index.tile_count());
   }
 }
 
@@ -419,7 +519,7 @@ TEST(Ingest, shuffledImageIsIndexedAsAList) {
   image.width = 160;
   const CloudSnapshot a = ingest(points), b = ingest(points, {}, image);
   EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
-  EXPECT_EQ(a.index.tiles().size(), b.index.tiles().size());
+  EXPECT_EQ(a.index.tile_count(), b.index.tile_count());
 }
 
 TEST(Ingest, thinnedCloudCanBeLeftOut) {
@@ -486,7 +586,9 @@ TEST(Ingest, whatIsBeyondTheHorizonIsLeftOut) {
   image.width = four_floats.width = 160;
   four_floats.point_step = 16;
   four_floats.misaligned = 0;
-  for (const Format& format : {Format(), image, four_floats, float64()}) {
+  Format owned = four_floats;
+  owned.owned = true;
+  for (const Format& format : {Format(), image, four_floats, owned, float64()}) {
     const Message message(points, format);
     Ingest ingest(without_limits());
     CloudSnapshot all, cut;
@@ -558,12 +660,13 @@ TEST(Ingest, buffersAreReused) {
   Ingest ingest({});
   CloudSnapshot snapshot;
   ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  const auto* tiles = snapshot.index.tiles().data();
-  const auto* coarse = snapshot.coarse.tiles().data();
+  PointTile room;
+  const PointTile* tiles = &snapshot.index.tile(0, &room);
+  const PointTile* coarse = &snapshot.coarse.tile(0, &room);
   const auto expected = points_by_id(snapshot.index);
   for (int i = 0; i < 3; ++i) ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  EXPECT_EQ(snapshot.index.tiles().data(), tiles);
-  EXPECT_EQ(snapshot.coarse.tiles().data(), coarse);
+  EXPECT_EQ(&snapshot.index.tile(0, &room), tiles);
+  EXPECT_EQ(&snapshot.coarse.tile(0, &room), coarse);
   EXPECT_EQ(points_by_id(snapshot.index), expected);
 }
 

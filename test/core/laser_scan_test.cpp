@@ -8,6 +8,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "support/scene.h"
+#include "support/tiles.h"
 #include "support/whole_cloud.h"
 
 namespace ist {
@@ -39,7 +40,7 @@ CloudSnapshot ingested(const LaserScan& scan, double min_range, double max_range
 
 std::vector<Eigen::Vector3d> by_beam(const CloudSnapshot& snapshot, std::size_t count) {
   std::vector<Eigen::Vector3d> points(count, Eigen::Vector3d::Constant(NAN));
-  for (const PointTile& tile : snapshot.index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
     for (int k = 0; k < tile.count; ++k) {
       points[tile.id[k]] = snapshot.index.X_FO() * tile.point(static_cast<int>(k));
     }

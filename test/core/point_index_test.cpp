@@ -1,4 +1,5 @@
 #include "ist_proximity/cloud/point_index.h"
+#include "support/tiles.h"
 
 #include <gtest/gtest.h>
 
@@ -76,7 +77,7 @@ class Checker {
       : points_(points),
         index_(index),
         seen_(points.size(), 0),
-        tile_seen_(index.tiles().size(), 0) {}
+        tile_seen_(index.tile_count(), 0) {}
 
   void run() {
     ASSERT_EQ(index_.size(), points_.size());
@@ -121,7 +122,8 @@ class Checker {
   }
 
   Eigen::AlignedBox3f tile(std::int32_t i) {
-    const PointTile& tile_i = index_.tiles()[static_cast<std::size_t>(i)];
+    PointTile room;
+    const PointTile& tile_i = index_.tile(static_cast<std::size_t>(i), &room);
     ++tile_seen_[static_cast<std::size_t>(i)];
     EXPECT_GE(tile_i.count, 1);
     EXPECT_LE(tile_i.count, kPointWidth);
@@ -175,7 +177,8 @@ struct Nearest {
         continue;
       }
       ++tiles;
-      const PointTile& tile = index.tiles()[static_cast<std::size_t>(~child)];
+      PointTile room;
+      const PointTile& tile = index.tile(static_cast<std::size_t>(~child), &room);
       for (int k = 0; k < tile.count; ++k) {
         squared = std::min(squared, (point_of(tile, k) - query).squaredNorm());
       }
@@ -199,7 +202,7 @@ TEST(PointIndex, allPointsEqual) {
   check(points);
   const PointIndex index = build(points);
   EXPECT_EQ(index.bounds().sizes(), Eigen::Vector3f::Zero());
-  EXPECT_EQ(index.tiles().size(), (5000U + 15U) / 16U);
+  EXPECT_EQ(index.tile_count(), (5000U + 15U) / 16U);
 }
 
 TEST(PointIndex, pointsOnALineAndInAPlane) {
@@ -232,7 +235,7 @@ TEST(PointIndex, outliersDoNotSpoilTheTiles) {
   check(points);
   const PointIndex index = build(points);
   std::vector<float> diagonals;
-  for (const PointTile& tile : index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(index)) {
     Eigen::AlignedBox3f box;
     for (int k = 0; k < tile.count; ++k) box.extend(point_of(tile, k));
     diagonals.push_back(box.diagonal().norm());
@@ -248,7 +251,7 @@ TEST(PointIndex, outliersDoNotSpoilTheTiles) {
 TEST(PointIndex, tilesDoNotSpanLeaps) {
   const PointIndex index = build(depth_image(320, 240));
   std::vector<float> diagonals;
-  for (const PointTile& tile : index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(index)) {
     Eigen::AlignedBox3f box;
     for (int k = 0; k < tile.count; ++k) box.extend(point_of(tile, k));
     diagonals.push_back(box.diagonal().norm());
@@ -256,7 +259,7 @@ TEST(PointIndex, tilesDoNotSpanLeaps) {
   std::sort(diagonals.begin(), diagonals.end());
   EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.08F);
   EXPECT_LT(diagonals.back(), 0.2F);
-  EXPECT_GT(static_cast<double>(index.size()) / static_cast<double>(index.tiles().size()), 10.0)
+  EXPECT_GT(static_cast<double>(index.size()) / static_cast<double>(index.tile_count()), 10.0)
       << "points a tile: cutting must not empty the tiles";
 }
 
@@ -289,8 +292,8 @@ bool same(const PointIndex& a, const PointIndex& b) {
     return u.size() == v.size() &&
            (u.empty() || std::memcmp(u.data(), v.data(), u.size() * sizeof u[0]) == 0);
   };
-  return a.size() == b.size() && a.root() == b.root() && bytes_equal(a.tiles(), b.tiles()) &&
-         bytes_equal(a.nodes(), b.nodes());
+  return a.size() == b.size() && a.root() == b.root() &&
+         bytes_equal(test::tiles_of(a), test::tiles_of(b)) && bytes_equal(a.nodes(), b.nodes());
 }
 
 TEST(PointIndex, dependsOnNothingButItsArguments) {
@@ -314,11 +317,12 @@ TEST(PointIndex, buffersAreReused) {
     builder.build(kFrame, list.data(), list.size(), {}, &index);
   };
   run(large);
-  const auto* tiles = index.tiles().data();
+  PointTile room;
+  const PointTile* tiles = &index.tile(0, &room);
   const auto* nodes = index.nodes().data();
   run(small);
   run(large);
-  EXPECT_EQ(index.tiles().data(), tiles);
+  EXPECT_EQ(&index.tile(0, &room), tiles);
   EXPECT_EQ(index.nodes().data(), nodes);
   Checker(large, index).run();
 }
@@ -351,7 +355,7 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
   }
   ASSERT_EQ(index.size(), expected);
   std::size_t found = 0;
-  for (const PointTile& tile : index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(index)) {
     ASSERT_GE(tile.count, 1);
     for (int k = 0; k < tile.count; ++k, ++found) {
       const std::size_t source = (tile.id[k] - 7) / 3;
@@ -380,7 +384,7 @@ TEST(PointIndex, fiveMillionPoints) {
   const PointIndex index = build(points);
   ASSERT_EQ(index.size(), 5000000U);
   std::vector<bool> seen(points.size(), false);
-  for (const PointTile& tile : index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(index)) {
     for (int k = 0; k < tile.count; ++k) seen[(tile.id[k] - 7) / 3] = true;
   }
   EXPECT_EQ(std::count(seen.begin(), seen.end(), true), 5000000);

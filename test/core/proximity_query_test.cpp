@@ -10,6 +10,7 @@
 #include "support/oracle.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/tiles.h"
 
 namespace ist {
 namespace {
@@ -52,7 +53,7 @@ std::vector<Eigen::Vector3d> random_cloud(test::Rng* rng, int kind, int count) {
 std::vector<Eigen::Vector3d> stored_points(const CloudSnapshot& snapshot,
                                            const Eigen::Isometry3d& X_LF) {
   std::vector<Eigen::Vector3d> points;
-  for (const PointTile& tile : snapshot.index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
     for (int k = 0; k < tile.count; ++k) {
       points.push_back(X_LF * (snapshot.index.X_FO() * tile.point(k)));
     }

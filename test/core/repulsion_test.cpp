@@ -8,6 +8,7 @@
 #include <random>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "support/tiles.h"
 
 namespace ist {
 namespace {
@@ -72,7 +73,7 @@ struct Weighted {
 // The points of a cloud, by how much of its cell a surface through each covers.
 std::vector<Weighted> weighted_points(const CloudSnapshot& cloud) {
   std::vector<Weighted> all;
-  for (const PointTile& tile : cloud.coarse.tiles()) {
+  for (const PointTile& tile : test::tiles_of(cloud.coarse)) {
     for (int k = 0; k < tile.count; ++k) {
       const Vector3d p = cloud.coarse.X_FO() * tile.point(static_cast<int>(k));
       const Vector3d cells = p / cloud.thinning;

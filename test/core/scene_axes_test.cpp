@@ -12,6 +12,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "support/scene.h"
+#include "support/tiles.h"
 #include "support/whole_cloud.h"
 
 namespace ist {
@@ -132,7 +133,7 @@ TEST(SceneAxes, DoNotTurnTheThinnedCloud) {
     return (p / cell - cell_of(p) - Eigen::Vector3d::Constant(0.5)).norm();
   };
   std::vector<std::pair<Eigen::Vector3d, double>> kept;
-  for (const PointTile& tile : snapshot.coarse.tiles()) {
+  for (const PointTile& tile : test::tiles_of(snapshot.coarse)) {
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::Vector3d p = snapshot.coarse.X_FO() * tile.point(k);
       kept.emplace_back(cell_of(p), off_centre(p));
@@ -147,7 +148,7 @@ TEST(SceneAxes, DoNotTurnTheThinnedCloud) {
     ASSERT_TRUE(before(kept[i - 1].first, kept[i].first)) << "two in a cell";
   }
   std::size_t elsewhere = 0;
-  for (const PointTile& tile : snapshot.index.tiles()) {
+  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::Vector3d p = snapshot.index.X_FO() * tile.point(k);
       const auto at = std::lower_bound(

@@ -9,6 +9,7 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/packing/packer.h"
 #include "support/allocations.h"
+#include "support/tiles.h"
 
 namespace ist {
 namespace {
@@ -99,7 +100,7 @@ CloudSnapshot ingest(const std::vector<Eigen::Vector3f>& points, const PosedRobo
 
 std::set<std::uint32_t> ids(const PointIndex& index) {
   std::set<std::uint32_t> set;
-  for (const PointTile& tile : index.tiles()) set.insert(tile.id, tile.id + tile.count);
+  for (const PointTile& tile : test::tiles_of(index)) set.insert(tile.id, tile.id + tile.count);
   return set;
 }
 

@@ -12,6 +12,7 @@
 #include "ist_proximity/proximity/contact_volume.h"
 #include "support/random_links.h"
 #include "support/scene.h"
+#include "support/tiles.h"
 #include "support/whole_cloud.h"
 
 /// Contact volumes by brute force in double: all balls of the link against all of the obstacle.
@@ -79,7 +80,7 @@ inline void oracle_add(const std::vector<OracleBall>& balls, const Eigen::Vector
 
 inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
   std::vector<Eigen::Vector3d> points;
-  for (const PointTile& tile : cloud.coarse.tiles()) {
+  for (const PointTile& tile : tiles_of(cloud.coarse)) {
     for (int k = 0; k < tile.count; ++k) {
       points.push_back(cloud.coarse.X_FO() * tile.point(static_cast<int>(k)));
     }

@@ -10,6 +10,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/geometry/shapes.h"
 #include "support/oracle.h"
+#include "support/tiles.h"
 
 /// Exact signed distances of links, without tree or bound: primitives by their distance functions,
 /// meshes triangle by triangle.
@@ -57,7 +58,7 @@ inline double oracle_minimum(const LinkGeometry& link, const Eigen::Isometry3d& 
 inline std::vector<Eigen::Vector3d> stored_points(const PointIndex& index) {
   std::vector<Eigen::Vector3d> points;
   points.reserve(index.size());
-  for (const PointTile& tile : index.tiles()) {
+  for (const PointTile& tile : tiles_of(index)) {
     for (int k = 0; k < tile.count; ++k) {
       points.push_back(index.X_FO() * tile.point(static_cast<int>(k)));
     }

@@ -38,6 +38,9 @@ class BoxIndex {
   const std::vector<BoxNode>& nodes() const { return nodes_; }  ///< the root is nodes()[root()]
   std::int32_t root() const { return static_cast<std::int32_t>(nodes_.size()) - 1; }  ///< -1: empty
   const std::vector<BoxTile>& tiles() const { return tiles_; }
+  /// As PointIndex::tile().
+  using Tile = BoxTile;
+  const BoxTile& tile(std::size_t i, BoxTile* /*room*/) const { return tiles_[i]; }
   /// As PointIndex::generation(), and different from that of any PointIndex.
   std::uint64_t generation() const { return generation_; }
 

@@ -6,6 +6,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "ist_proximity/cloud/raw_cloud.h"
+#include "ist_proximity/cloud/written_tiles.h"
+
 namespace ist {
 
 constexpr int kPointWidth = 16;
@@ -34,6 +37,9 @@ constexpr float kFarAway = 1e15F;  ///< [m] coordinates of unused slots
 /// Coordinates are in a frame O of its own: its origin is near the points, so that float loses
 /// nothing far from zero, and its axes lie along the scene's surfaces where ingest has found such,
 /// so that boxes are thin; else along the fixed frame's. Thread safe.
+///
+/// Of an image whose bytes stay where they are, tiles are written when they are first looked at:
+/// queries look at few of them.
 class PointIndex {
  public:
   /// Builds over points given relative to `origin` (fixed frame, double) along the fixed frame's
@@ -50,7 +56,14 @@ class PointIndex {
   const Eigen::Isometry3d& X_FO() const { return X_FO_; }       ///< index's -> fixed frame
   const std::vector<BoxNode>& nodes() const { return nodes_; }  ///< the root is nodes()[root()]
   std::int32_t root() const { return root_; }                   ///< -1 when empty
-  const std::vector<PointTile>& tiles() const { return tiles_; }
+  using Tile = PointTile;
+  std::size_t tile_count() const { return tiles_.size(); }
+  /// Neither allocates nor waits.
+  /// @param i     below tile_count()
+  /// @param room  may be used for the answer
+  const PointTile& tile(std::size_t i, PointTile* room) const {
+    return written_.is_written(i) ? tiles_[i] : read(i, room);
+  }
   Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
   /// Another number after every build() of any index: tells whether an answer belongs to it.
   std::uint64_t generation() const { return generation_; }
@@ -58,10 +71,17 @@ class PointIndex {
  private:
   friend class PointIndexBuilder;
 
+  const PointTile& read(std::size_t i, PointTile* room) const;
+
   Eigen::Isometry3d X_FO_ = Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3f bounds_;
   std::vector<BoxNode> nodes_;  ///< level by level, the root last
-  std::vector<PointTile> tiles_;
+  mutable std::vector<PointTile> tiles_;
+  WrittenTiles written_;
+  // Where tiles are that have not been written.
+  RawCloud image_;
+  Eigen::Isometry3d X_OS_ = Eigen::Isometry3d::Identity();
+  std::vector<std::uint32_t> first_pixel_;  ///< by tile
   std::size_t size_ = 0;
   std::int32_t root_ = -1;
   std::uint64_t generation_ = 0;  ///< never 0 once built

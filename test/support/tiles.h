@@ -1,0 +1,17 @@
+#pragma once
+
+#include <vector>
+
+#include "ist_proximity/cloud/point_index.h"
+
+namespace ist::test {
+
+/// All tiles of an index, whether a query has looked at them or not.
+inline std::vector<PointTile> tiles_of(const PointIndex& index) {
+  std::vector<PointTile> tiles(index.tile_count());
+  PointTile room;
+  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = index.tile(i, &room);
+  return tiles;
+}
+
+}  // namespace ist::test
