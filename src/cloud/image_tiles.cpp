@@ -10,58 +10,14 @@
 #include "cloud/image_kernel.h"
 #include "cloud/point_reader.h"
 #include "cloud/tile_box.h"
+#include "cloud/tile_kernel.h"
 #include "cloud/tile_reader.h"
 
 namespace ist {
 namespace {
 
-constexpr std::size_t kSampledBlocks = 64;
-
 // A tile that is not known to be good may be this many times as long as those that are.
 constexpr float kAsLong = 1.5F;
-
-// Bits of the slots in the lower half of a box, across its longest side.
-std::uint32_t lower_half(const PointTile& tile, const PaddedBox& box) {
-  Eigen::Index axis;
-  (box.max - box.min).maxCoeff(&axis);
-  const float* along = axis == 0 ? tile.x : axis == 1 ? tile.y : tile.z;
-  const float middle = 0.5F * (box.min[axis] + box.max[axis]);
-  std::uint32_t bits = 0;
-  for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(kPointWidth); ++k) {
-    bits |= static_cast<std::uint32_t>(along[k] < middle) << k;
-  }
-  return bits;
-}
-
-// Of the points whose bit is set, one at least. Number by number: a vector made of three numbers
-// that were just written waits for them.
-PaddedBox box_of(const PointTile& tile, std::uint32_t points) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  float min_x = kInfinity, min_y = kInfinity, min_z = kInfinity;
-  float max_x = -kInfinity, max_y = -kInfinity, max_z = -kInfinity;
-  for (std::uint32_t k = 0; points >> k != 0; ++k) {
-    if ((points >> k & 1U) == 0) continue;
-    min_x = std::min(min_x, tile.x[k]);
-    min_y = std::min(min_y, tile.y[k]);
-    min_z = std::min(min_z, tile.z[k]);
-    max_x = std::max(max_x, tile.x[k]);
-    max_y = std::max(max_y, tile.y[k]);
-    max_z = std::max(max_z, tile.z[k]);
-  }
-  return {{min_x, min_y, min_z, 0.0F}, {max_x, max_y, max_z, 0.0F}};
-}
-
-void copy_points(const PointTile& from, std::uint32_t points, PointTile* to) {
-  to->count = 0;
-  for (std::uint32_t k = 0; points >> k != 0; ++k) {
-    if ((points >> k & 1U) == 0) continue;
-    const std::int32_t n = to->count++;
-    to->x[n] = from.x[k];
-    to->y[n] = from.y[k];
-    to->z[n] = from.z[k];
-    to->id[n] = from.id[k];
-  }
-}
 
 // Whether pixels can be read in blocks of four floats, the coordinates first, where they are.
 bool holds_floats(const RawCloud& cloud) {
@@ -320,17 +276,14 @@ class ImageReader {
     parts[count++] = {(1U << static_cast<std::uint32_t>(whole.count)) - 1U, whole_box};
     while (count > 0) {
       Part& part = parts[count - 1];
-      const std::uint32_t low = lower_half(whole, part.box) & part.points;
-      const std::uint32_t high = part.points & ~low;
-      if (low != 0 && high != 0) {
-        const PaddedBox low_box = box_of(whole, low), high_box = box_of(whole, high);
-        if (is_worth_a_cut(low_box, high_box, part.box)) {
-          part = {low, low_box};
-          parts[count++] = {high, high_box};
-          continue;
-        }
+      const TileHalves halves = halve_tile(whole, part.points, part.box);
+      if (halves.low != 0 && halves.high != 0 &&
+          is_worth_a_cut(halves.low_box, halves.high_box, part.box)) {
+        part = {halves.low, halves.low_box};
+        parts[count++] = {halves.high, halves.high_box};
+        continue;
       }
-      copy_points(whole, part.points, builder_.room(1));
+      pick_points(whole, part.points, builder_.room(1));
       builder_.keep(part.box, drop_);
       --count;
     }
@@ -352,64 +305,7 @@ class ImageReader {
   std::size_t kept_ = 0;
 };
 
-// Of sampled blocks.
-class Numbers {
- public:
-  void add(float value) { values_[size_++] = value; }
-  std::size_t size() const { return size_; }
-  float quantile(std::size_t tenths) {
-    const auto at = values_.begin() + static_cast<std::ptrdiff_t>(size_ * tenths / 10);
-    std::nth_element(values_.begin(), at, values_.begin() + static_cast<std::ptrdiff_t>(size_));
-    return *at;
-  }
-  /// Of the middle four fifths.
-  float span() { return quantile(9) - quantile(1); }
-
- private:
-  std::array<float, 2 * kSampledBlocks> values_;
-  std::size_t size_ = 0;
-};
-
 }  // namespace
-
-bool is_image(const RawCloud& cloud, const CropPose& pose) {
-  if (cloud.width < kPatchSide || cloud.height < kTileSide) return false;
-  const std::size_t across = cloud.width / kTileSide, blocks = across * (cloud.height / kTileSide);
-  // Not a divisor of the row: the samples are to be spread over the columns, too.
-  const std::size_t step = std::max<std::size_t>(1, blocks / kSampledBlocks) | 1U;
-  std::array<CropBlock, kTileSide> rows;
-  Numbers size_sq, x, y, z;
-  std::size_t kept = 0, seen = 0;
-  IngestCounts unused;
-  for (std::size_t i = 0; i < blocks; i += step) {
-    Eigen::AlignedBox3f box;
-    std::size_t here = 0;
-    for (std::size_t row = 0; row < kTileSide; ++row) {
-      here += crop_points(cloud, i / across * kTileSide + row, i % across * kTileSide, kTileSide,
-                          pose, &rows[row], &unused);
-      for (std::size_t k = 0; k < kTileSide; ++k) {
-        const CropBlock& r = rows[row];
-        if (r.x[k] == r.x[k]) box.extend(Eigen::Vector3f(r.x[k], r.y[k], r.z[k]));
-      }
-    }
-    kept += here;
-    seen += kTileSide * kTileSide;
-    if (here < kTileSide * kTileSide / 2) continue;
-    size_sq.add(box.diagonal().squaredNorm());
-    x.add(box.center().x());
-    y.add(box.center().y());
-    z.add(box.center().z());
-  }
-  if (size_sq.size() < kSampledBlocks / 8) return false;
-  const Eigen::Vector3f spread(x.span(), y.span(), z.span());
-  // On a surface that size n points make squares of sixteen this large; a few times that will do.
-  const float points =
-      static_cast<float>(cloud.size()) * static_cast<float>(kept) / static_cast<float>(seen);
-  constexpr float kFewTimes = 4.0F;
-  const float largest_sq =
-      kFewTimes * kFewTimes * spread.squaredNorm() * static_cast<float>(kPointWidth) / points;
-  return size_sq.quantile(5) <= largest_sq;
-}
 
 std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
                         PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {

@@ -4,14 +4,23 @@
 #include <cassert>
 #include <limits>
 
+#include "cloud/tile_kernel.h"
+
 namespace ist {
 namespace {
 
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
 static_assert(kTileSide * kTileSide == kSlots, "a square of pixels fills a tile");
 
-std::uint32_t pixel(std::size_t slot, std::size_t width, std::uint32_t first) {
-  return first + static_cast<std::uint32_t>(slot / kTileSide * width + slot % kTileSide);
+void copy_all(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
+              PointTile* tile) {
+  std::copy_n(block.x, kSlots, tile->x);
+  std::copy_n(block.y, kSlots, tile->y);
+  std::copy_n(block.z, kSlots, tile->z);
+  for (std::size_t k = 0; k < kSlots; ++k) {
+    tile->id[k] = first_pixel + static_cast<std::uint32_t>(k / kTileSide * width + k % kTileSide);
+  }
+  tile->count = kPointWidth;
 }
 
 }  // namespace
@@ -27,29 +36,18 @@ void read_tile(const RawCloud& image, const Eigen::Isometry3d& X_OS, std::uint32
       crop_tile(image, first_pixel / image.width, first_pixel % image.width, pose, &block, &unused);
   assert(kept == kSlots);
   static_cast<void>(kept);
-  std::copy_n(block.x, kSlots, tile->x);
-  std::copy_n(block.y, kSlots, tile->y);
-  std::copy_n(block.z, kSlots, tile->z);
-  for (std::size_t k = 0; k < kSlots; ++k) tile->id[k] = pixel(k, image.width, first_pixel);
-  tile->count = kPointWidth;
+  copy_all(block, image.width, first_pixel, tile);
 }
 
 void copy_kept(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
                PointTile* tile) {
-  std::int32_t n = 0;
+  PointTile all;
+  copy_all(block, width, first_pixel, &all);
+  std::uint32_t kept = 0;
   for (std::size_t k = 0; k < kSlots; ++k) {
-    if (block.x[k] != block.x[k]) continue;
-    tile->x[n] = block.x[k];
-    tile->y[n] = block.y[k];
-    tile->z[n] = block.z[k];
-    tile->id[n] = pixel(k, width, first_pixel);
-    ++n;
+    kept |= static_cast<std::uint32_t>(block.x[k] == block.x[k]) << k;
   }
-  tile->count = n;
-  for (; n < kPointWidth; ++n) {
-    tile->x[n] = tile->y[n] = tile->z[n] = kFarAway;
-    tile->id[n] = 0;
-  }
+  pick_points(all, kept, tile);
 }
 
 }  // namespace ist

@@ -14,7 +14,7 @@ namespace ist {
 void read_tile(const RawCloud& image, const Eigen::Isometry3d& X_OS, std::uint32_t first_pixel,
                PointTile* tile);
 
-/// The same for what crop_tile has left of a tile.
+/// The same for what crop_tile has left of a tile; unused slots get no meaning.
 void copy_kept(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
                PointTile* tile);
 

@@ -1,0 +1,167 @@
+// Queries among images of which no point has been read when the first query comes.
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/proximity/proximity_batch.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/allocations.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+#include "support/whole_cloud.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kWidth = 96, kHeight = 80;
+
+// A wall, a board before it and some pixels that see nothing, as four floats a point.
+std::shared_ptr<std::vector<float>> depth_image(test::Rng* rng) {
+  auto pixels = std::make_shared<std::vector<float>>(4 * kWidth * kHeight);
+  const double board = test::uniform(rng, 0.5, 0.7);
+  for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
+    const double a = static_cast<double>(i % kWidth) / 60.0 - 0.8,
+                 b = static_cast<double>(i / kWidth) / 60.0 - 0.7;
+    const double depth = a > 0.1 && b < 0.2 ? board : 0.9 + 0.1 * a;
+    const bool is_blind = (*rng)() % 300 == 0;
+    (*pixels)[4 * i] =
+        is_blind ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(a * depth);
+    (*pixels)[4 * i + 1] = static_cast<float>(b * depth);
+    (*pixels)[4 * i + 2] = static_cast<float>(depth);
+  }
+  return pixels;
+}
+
+RawCloud raw(const std::shared_ptr<std::vector<float>>& pixels) {
+  RawCloud cloud;
+  cloud.data = reinterpret_cast<const std::uint8_t*>(pixels->data());
+  cloud.width = kWidth;
+  cloud.height = kHeight;
+  cloud.point_step = 4 * sizeof(float);
+  cloud.row_step = kWidth * cloud.point_step;
+  cloud.y = sizeof(float);
+  cloud.z = 2 * sizeof(float);
+  cloud.owner = pixels;
+  return cloud;
+}
+
+std::vector<Eigen::Vector3d> points_F(const std::vector<float>& pixels,
+                                      const Eigen::Isometry3d& X_FS) {
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t i = 0; i < pixels.size(); i += 4) {
+    const Eigen::Vector3f p(pixels[i], pixels[i + 1], pixels[i + 2]);
+    if (p.allFinite()) points.push_back(X_FS * p.cast<double>());
+  }
+  return points;
+}
+
+struct Scene {
+  explicit Scene(test::Rng* rng) : X_FS(test::random_pose(rng, 0.5)), pixels(depth_image(rng)) {
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+      Eigen::Isometry3d X_SL = test::random_pose(rng, 0.25);
+      X_SL.pretranslate(Eigen::Vector3d(0.0, 0.0, 0.5));
+      X_FL.push_back(X_FS * X_SL);
+    }
+  }
+  double truth(std::size_t link) const {
+    std::vector<Eigen::Vector3d> points_L;
+    for (const Eigen::Vector3d& p : points_F(*pixels, X_FS)) {
+      points_L.push_back(X_FL[link].inverse() * p);
+    }
+    return test::oracle_minimum(meshes[link], points_L);
+  }
+
+  std::vector<TriangleMesh> meshes = {test::l_shape(0.2, 0.05), test::icosphere(0.08, 2),
+                                      test::box({0.05, 0.1, 0.2})};
+  Eigen::Isometry3d X_FS;
+  std::shared_ptr<std::vector<float>> pixels;
+  std::vector<Eigen::Isometry3d> X_FL;
+};
+
+TEST(UnreadTiles, AnswersAgainstBruteForce) {
+  test::Rng rng(71);
+  std::shared_ptr<RobotModel> model;
+  Ingest ingest(test::whole_cloud());
+  CloudSnapshot cloud;
+  QueryConfig config;
+  config.max_distance = 5.0;
+  config.tolerance = 0.0;
+  for (int i = 0; i < 12; ++i) {
+    const Scene scene(&rng);
+    if (!model) model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+    ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+    ProximityQuery query(model, config);
+    std::vector<LinkProximity> links;
+    ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+    for (std::size_t k = 0; k < links.size(); ++k) {
+      EXPECT_NEAR(links[k].distance, scene.truth(k), 2e-6) << "scene " << i << ", link " << k;
+    }
+  }
+}
+
+TEST(UnreadTiles, ReadingThemAllocatesNothing) {
+  test::Rng rng(72);
+  const Scene scene(&rng);
+  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+  Ingest ingest(test::whole_cloud(false));
+  CloudSnapshot cloud, other;
+  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &other);
+  ProximityQuery query(model, {});
+  std::vector<LinkProximity> links;
+  query.run(scene.X_FL, {true, true, true}, {&cloud}, &links);
+  const std::vector<const CloudSnapshot*> clouds = {&other};
+  const std::vector<bool> known = {true, true, true};
+  const long before = test::allocations;
+  query.run(scene.X_FL, known, clouds, &links);
+  EXPECT_EQ(test::allocations - before, 0);
+}
+
+// All start at tiles that nobody has read.
+TEST(UnreadTiles, ThreadsGetTheSameAnswers) {
+  test::Rng rng(73);
+  const Scene scene(&rng);
+  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+  Ingest ingest(test::whole_cloud(false));
+  std::vector<LinkProximity> first;
+  for (int round = 0; round < 10; ++round) {
+    CloudSnapshot cloud;
+    ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+    QueryConfig config;
+    config.tolerance = 0.0;
+    ProximityBatch batch(model, config, 3);
+    std::vector<std::vector<Eigen::Isometry3d>> poses(12, scene.X_FL);
+    std::vector<Eigen::Isometry3d> X_FL;
+    for (const auto& pose : poses) X_FL.insert(X_FL.end(), pose.begin(), pose.end());
+    std::vector<LinkProximity> links;
+    batch.run(X_FL, {true, true, true}, {&cloud}, &links);
+    if (first.empty()) first.assign(links.begin(), links.begin() + 3);
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      ASSERT_NEAR(links[i].distance, first[i % 3].distance, 1e-12);
+    }
+  }
+}
+
+TEST(UnreadTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
+  test::Rng rng(74);
+  std::weak_ptr<std::vector<float>> message;
+  Ingest ingest(test::whole_cloud());
+  CloudSnapshot cloud;
+  {
+    const Scene scene(&rng);
+    message = scene.pixels;
+    ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  }
+  EXPECT_FALSE(message.expired());
+  ingest.run(RawCloud(), Eigen::Isometry3d::Identity(), {}, 0.0, &cloud);
+  EXPECT_TRUE(message.expired());
+}
+
+}  // namespace
+}  // namespace ist
