@@ -38,6 +38,7 @@ constexpr std::size_t kFrameQueries = 33;  // at 1 kHz, between two images at 30
 
 struct Result {
   std::vector<double> ingest, query, free_query, motion, free_motion;  // [us]
+  std::vector<double> frame, free_frame, free_first;                   // [us]
   std::vector<double> error;                                           // [m] without contact
   std::size_t failures = 0, answers = 0;
 };
@@ -115,14 +116,20 @@ void time_queries(Method* method, const Scene& scene, Result* result) {
   }
 }
 
-// Images' worth of the motion, spread over it; all of it when there is time.
+// Of images' worth of the motion, spread over it; each when there is time.
+std::size_t frame_step(const DataSet& set, double one) {
+  const std::size_t frames = set.motion.size() / kFrameQueries;
+  const auto affordable = static_cast<std::size_t>(std::max(1.0, kBudget / one));
+  return std::max<std::size_t>(1, frames / affordable);
+}
+
+// Among one image.
 void time_motion(Method* method, const DataSet& set, const std::vector<bool>& contact,
                  Result* result) {
   std::vector<Answer> answers(set.robot.meshes.size());
   const std::size_t frames = set.motion.size() / kFrameQueries;
   const double one = std::max(1.0, quantile(result->query, 0.5)) * kFrameQueries;
-  const auto affordable = static_cast<std::size_t>(std::max(1.0, kBudget / one));
-  const std::size_t step = std::max<std::size_t>(1, frames / affordable);
+  const std::size_t step = frame_step(set, one);
   ThreadTimer timer;
   method->query(set.motion[0], &answers);
   for (std::size_t frame = 0; frame < frames; frame += step) {
@@ -133,6 +140,32 @@ void time_motion(Method* method, const DataSet& set, const std::vector<bool>& co
       result->motion.push_back(us);
       if (!contact[k]) result->free_motion.push_back(us);
     }
+  }
+}
+
+// All the work from one image to the next, which comes anew each time.
+void time_frames(Method* method, const DataSet& set, const Scene& scene,
+                 const std::vector<bool>& contact, Result* result) {
+  std::vector<Answer> answers(set.robot.meshes.size());
+  const std::size_t frames = set.motion.size() / kFrameQueries;
+  const double one = quantile(result->ingest, 0.5) + quantile(result->query, 0.5) * kFrameQueries;
+  const std::size_t step = frame_step(set, one);
+  ThreadTimer timer;
+  for (std::size_t frame = 0; frame < frames; frame += step) {
+    timer.lap();
+    method->ingest(scene.frame);
+    double sum = timer.lap();
+    bool is_free = true;
+    for (std::size_t k = frame * kFrameQueries; k < (frame + 1) * kFrameQueries; ++k) {
+      timer.lap();
+      method->query(set.motion[k], &answers);
+      const double us = timer.lap();
+      if (k == frame * kFrameQueries && !contact[k]) result->free_first.push_back(us);
+      sum += us;
+      is_free = is_free && !contact[k];
+    }
+    result->frame.push_back(sum);
+    if (is_free) result->free_frame.push_back(sum);
   }
 }
 
@@ -162,7 +195,7 @@ void print_header(std::FILE* csv) {
                "ingest_us,ingest_p99_us,query_us,query_p99_us,free_query_us,free_query_p99_us,"
                "error_mean_mm,error_least_mm,error_largest_mm,motion_queries,motion_us,"
                "motion_p99_us,motion_max_us,motion_mean_us,free_motion_us,free_motion_p99_us,"
-               "free_motion_max_us\n");
+               "free_motion_max_us,frames,frame_us,free_frame_us,free_first_us\n");
 }
 
 void print(std::FILE* csv, const DataSet& set, const Method& method, const Result& r) {
@@ -176,10 +209,12 @@ void print(std::FILE* csv, const DataSet& set, const Method& method, const Resul
   }
   std::fprintf(csv, ",%.5f,%.5f,%.5f,%zu", 1e3 * mean(size), 1e3 * quantile(r.error, 0.0),
                1e3 * quantile(r.error, 1.0), r.motion.size());
-  std::fprintf(csv, ",%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f\n", quantile(r.motion, 0.5),
+  std::fprintf(csv, ",%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f", quantile(r.motion, 0.5),
                quantile(r.motion, 0.99), quantile(r.motion, 1.0), mean(r.motion),
                quantile(r.free_motion, 0.5), quantile(r.free_motion, 0.99),
                quantile(r.free_motion, 1.0));
+  std::fprintf(csv, ",%zu,%.1f,%.1f,%.1f\n", r.frame.size(), quantile(r.frame, 0.5),
+               quantile(r.free_frame, 0.5), quantile(r.free_first, 0.5));
   std::fflush(csv);
 }
 
@@ -225,7 +260,10 @@ bool run(const DataSet& set, std::FILE* csv) {
       if (method->kind == Kind::kFloor) continue;
       check(method.get(), set.scenes[s], &result);
       time_queries(method.get(), set.scenes[s], &result);
-      if (method->every == 1) time_motion(method.get(), set, contact[s], &result);
+      if (method->every == 1) {
+        time_motion(method.get(), set, contact[s], &result);
+        time_frames(method.get(), set, set.scenes[s], contact[s], &result);
+      }
     }
     if (result.failures > 0) {
       std::fprintf(stderr, "  %zu of %zu answers are WRONG\n", result.failures, result.answers);

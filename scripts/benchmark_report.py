@@ -75,12 +75,13 @@ def error(row):
             f"({number(row['error_least_mm'])} … {number(row['error_largest_mm'])})")
 
 
-FREE = "free_motion_us"  # the median where no link is in contact; there is no mean of that
+FREE = "free_frame_us"  # where no link is in contact
 
 
-def frame(row, query="motion_mean_us"):
+def frame(row, measured="frame_us"):
     """[us] of work between two images."""
-    return row["ingest_us"] + QUERIES_PER_FRAME * (row[query] or row["query_us"])
+    query = "free_query_us" if measured == FREE else "query_us"
+    return row[measured] or row["ingest_us"] + QUERIES_PER_FRAME * row[query]
 
 
 def table(header, rows):
@@ -112,12 +113,14 @@ def short_table(rows):
 def motion_table(rows):
     return table(
         ["method", "queries", "median", "p99", "largest", "p99 / median", "largest / median",
-         "no contact: median", "p99", "largest"],
+         "no contact: median", "p99", "largest", "first after an image"],
         [[label(r), f"{r['motion_queries']:.0f}", time(r["motion_us"]), time(r["motion_p99_us"]),
           time(r["motion_max_us"]), f"{r['motion_p99_us'] / r['motion_us']:.1f}",
           f"{r['motion_max_us'] / r['motion_us']:.1f}"] +
          [time(r[f"free_motion_{k}"]) if r["free_motion_us"] else ""
-          for k in ("us", "p99_us", "max_us")] for r in rows if r["motion_queries"]])
+          for k in ("us", "p99_us", "max_us")] +
+         [time(r["free_first_us"]) if r["free_first_us"] else ""]
+         for r in rows if r["motion_queries"]])
 
 
 def growth_table(rows, what, unit):

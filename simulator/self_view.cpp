@@ -56,7 +56,9 @@ double smallest(const std::vector<LinkProximity>& answers) {
 std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, double stamp,
                              double noise) {
   std::uint64_t count = 0;
-  for (const PointTile& tile : index.tiles()) {
+  PointTile room;
+  for (std::size_t i = 0; i < index.tile_count(); ++i) {
+    const PointTile& tile = index.tile(i, &room);
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::Vector3d p = index.X_FO() * tile.point(k);
       const bool is_ball = ball != nullptr &&

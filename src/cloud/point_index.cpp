@@ -5,6 +5,23 @@
 
 namespace ist {
 
+PointIndex& PointIndex::operator=(const PointIndex& other) {
+  if (this == &other) return *this;
+  X_FO_ = other.X_FO_;
+  bounds_ = other.bounds_;
+  nodes_ = other.nodes_;
+  tiles_.resize(other.tile_count());
+  PointTile room;
+  for (std::size_t i = 0; i < tiles_.size(); ++i) tiles_[i] = other.tile(i, &room);
+  written_.reset(tiles_.size());
+  image_ = RawCloud();
+  first_pixel_.assign(tiles_.size(), 0U);
+  size_ = other.size_;
+  root_ = other.root_;
+  generation_ = other.generation_;
+  return *this;
+}
+
 const PointTile& PointIndex::read(std::size_t i, PointTile* room) const {
   read_tile(image_, X_OS_, first_pixel_[i], room);
   if (written_.claim(i)) {

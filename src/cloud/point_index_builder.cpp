@@ -208,6 +208,7 @@ void PointIndexBuilder::finish() {
   std::vector<BoxNode>& nodes = index_->nodes_;
   hierarchy_.append_nodes(loose_, &nodes);
   hierarchy_.append_levels(&nodes);
+  if (index_->image_.owner == nullptr) index_->image_ = RawCloud();  // its bytes may go
   index_->root_ = static_cast<std::int32_t>(nodes.size()) - 1;
   index_->bounds_.setEmpty();
   if (nodes.empty()) return;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
+#include "support/tiles.h"
 #include "support/whole_cloud.h"
 
 namespace ist {
@@ -145,6 +147,26 @@ TEST(UnreadTiles, ThreadsGetTheSameAnswers) {
     for (std::size_t i = 0; i < links.size(); ++i) {
       ASSERT_NEAR(links[i].distance, first[i % 3].distance, 1e-12);
     }
+  }
+}
+
+// A copy needs no message.
+TEST(UnreadTiles, CopyHoldsAllPoints) {
+  test::Rng rng(75);
+  const Scene scene(&rng);
+  Ingest ingest(test::whole_cloud(false));
+  CloudSnapshot cloud;
+  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  const CloudSnapshot copy = cloud;
+  const std::vector<PointTile> tiles = test::tiles_of(cloud.index);
+  ASSERT_EQ(copy.index.tile_count(), tiles.size());
+  EXPECT_EQ(copy.index.size(), cloud.index.size());
+  scene.pixels->assign(scene.pixels->size(), 0.0F);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    PointTile room;
+    const PointTile& tile = copy.index.tile(i, &room);
+    ASSERT_TRUE(std::equal(tile.x, tile.x + kPointWidth, tiles[i].x));
+    ASSERT_TRUE(std::equal(tile.id, tile.id + kPointWidth, tiles[i].id));
   }
 }
 

@@ -42,6 +42,13 @@ constexpr float kFarAway = 1e15F;  ///< [m] coordinates of unused slots
 /// queries look at few of them.
 class PointIndex {
  public:
+  PointIndex() = default;
+  PointIndex(const PointIndex& other) { *this = other; }
+  PointIndex& operator=(const PointIndex& other);  ///< reads all tiles
+  PointIndex(PointIndex&&) = default;
+  PointIndex& operator=(PointIndex&&) = default;
+  ~PointIndex() = default;
+
   /// Builds over points given relative to `origin` (fixed frame, double) along the fixed frame's
   /// axes, in structure-of-arrays.
   /// The result depends on nothing but the arguments. For a stream of clouds use
