@@ -76,11 +76,13 @@ HWY_INLINE PointBox BoxOf(const CloudPoint* points, std::size_t n) {
   return box;
 }
 
-bool FindSlices(const CloudPoint* points, std::size_t n, std::int32_t count, std::int32_t* slices) {
+bool FindSlices(const CloudPoint* points, std::size_t n, std::int32_t count, std::int32_t* slices,
+                BoxShape* shape) {
   const PointTag d;
   const SliceTag di;
   const PointBox box = BoxOf(points, n);
   const int axis = box.Longest();
+  *shape = {box.Size(axis), std::max(box.Size((axis + 1) % 3), box.Size((axis + 2) % 3))};
   const float per_metre = static_cast<float>(count) / box.Size(axis);
   if (!std::isfinite(per_metre) || !(per_metre > 0.0F)) return false;
   const auto min = hn::Set(d, box.min[axis]), scale = hn::Set(d, per_metre);
@@ -190,9 +192,9 @@ namespace ist {
 HWY_EXPORT(FindSlices);
 HWY_EXPORT(MakeTiles);
 
-bool find_slices(const CloudPoint* points, std::size_t n, std::int32_t count,
-                 std::int32_t* slices) {
-  return HWY_DYNAMIC_DISPATCH(FindSlices)(points, n, count, slices);
+bool find_slices(const CloudPoint* points, std::size_t n, std::int32_t count, std::int32_t* slices,
+                 BoxShape* shape) {
+  return HWY_DYNAMIC_DISPATCH(FindSlices)(points, n, count, slices, shape);
 }
 
 void make_tiles(CloudPoint* points, std::size_t n, TileBatch* batch) {

@@ -239,11 +239,10 @@ void PointIndexBuilder::for_each_slice(std::size_t n, std::size_t part, const Vi
   }
 }
 
-// Points of a cell: sliced until the parts are a node's worth.
+// Points of a cell: sliced until the parts are what is worked on at a time.
 void PointIndexBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::size_t n,
                                    const Filters& filters) {
-  constexpr std::size_t kNodePoints = kWidth * kWidth;
-  if (n <= kNodePoints) {
+  if (n <= TileBatch::kMost) {
     batch_.tiles = room(n);
     batch_.count = 0;
     if (n > 0) add_part(points, spare, n);
@@ -251,17 +250,24 @@ void PointIndexBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::s
     return;
   }
   if (!slicer_.sort(points, n, spare)) std::copy_n(points, n, spare);
-  for_each_slice(n, kNodePoints, [&](std::size_t begin, std::size_t end) {
+  for_each_slice(n, TileBatch::kMost, [&](std::size_t begin, std::size_t end) {
     add_points(spare + begin, points + begin, end - begin, filters);
   });
 }
 
-// A node's worth, or less: sliced until runs of sixteen are tiles.
+// Sliced until runs of sixteen are tiles.
 void PointIndexBuilder::add_part(CloudPoint* points, CloudPoint* spare, std::size_t n) {
-  constexpr std::size_t kLastSlices = 4;
   if (n <= kWidth || !slicer_.sort(points, n, spare)) {
     make_tiles(points, n, &batch_);
-  } else if (n <= kLastSlices * kWidth && slicer_.crowd_end() == 0) {
+    return;
+  }
+  // Runs of sixteen are as long as they are wide, or half as long: no need to slice the other way.
+  constexpr std::size_t kFewTiles = 4;
+  constexpr float kWidest = 2.0F;
+  const BoxShape& shape = slicer_.shape();
+  const float width = shape.second * static_cast<float>(n) / static_cast<float>(kWidth);
+  const bool is_narrow = n <= kFewTiles * kWidth || width <= kWidest * shape.longest;
+  if (is_narrow && slicer_.crowd_end() == 0) {
     make_tiles(spare, n, &batch_);
   } else {
     for_each_slice(n, kWidth, [&](std::size_t begin, std::size_t end) {

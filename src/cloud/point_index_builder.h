@@ -27,9 +27,9 @@ using BoxFilter = std::function<bool(const PaddedBox& box)>;
 /// Not thread safe.
 ///
 /// Points in any order are brought together by the cells of a coarse grid; then each cell, which
-/// fits the first caches, is divided across the longest side of its box, again and again: into
-/// nodes' worth of 256, and those into tiles of 16. A tile with a gap is divided further, so that
-/// no tile has a big box.
+/// fits the first caches, is sliced across the longest side of its box, and the slices again, until
+/// sixteen neighbours are a tile. A tile with a gap is divided further, so that no tile has a big
+/// box. Tiles that follow each other are a node's.
 class PointIndexBuilder {
  public:
   /// As PointIndex::build, in any frame.

@@ -13,7 +13,8 @@ bool PointSlicer::sort(const CloudPoint* from, std::size_t n, CloudPoint* to) {
   const std::size_t count = n <= kFew ? kFewSlices : kMostSlices;
   crowd_begin_ = crowd_end_ = 0;
   if (slices_.size() < n + kPointSlack) slices_.resize(2 * (n + kPointSlack));
-  if (!find_slices(from, n, static_cast<std::int32_t>(count), slices_.data())) return false;
+  if (!find_slices(from, n, static_cast<std::int32_t>(count), slices_.data(), &shape_))
+    return false;
   std::fill_n(at_.begin(), count, 0U);
   const std::int32_t* slices = slices_.data();
   for (std::size_t i = 0; i < n; ++i) ++at_[static_cast<std::size_t>(slices[i])];

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cloud/cloud_point.h"
+#include "cloud/divide_kernel.h"
 
 namespace ist {
 
@@ -19,6 +20,8 @@ class PointSlicer {
   /// @returns false: the points are one, or as good as one, and in any order
   bool sort(const CloudPoint* from, std::size_t n, CloudPoint* to);
 
+  /// Of what was sorted last.
+  const BoxShape& shape() const { return shape_; }
   /// Of what was sorted last: points too many for that order lie between these two, as close
   /// together as makes no difference for it; as where a few lie far away. Empty, as a rule.
   std::size_t crowd_begin() const { return crowd_begin_; }
@@ -29,6 +32,7 @@ class PointSlicer {
 
   std::vector<std::int32_t> slices_;  ///< by point
   std::array<std::uint32_t, kMostSlices> at_;
+  BoxShape shape_;
   std::size_t crowd_begin_ = 0, crowd_end_ = 0;
 };
 
