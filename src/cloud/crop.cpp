@@ -124,31 +124,6 @@ std::ptrdiff_t take(const CropTally& tally, IngestCounts* counts) {
 
 const float* floats(const std::uint8_t* bytes) { return reinterpret_cast<const float*>(bytes); }
 
-// One row of points where the rows follow each other without gaps, and a column is a row as well:
-// blocks are to be full.
-RawCloud flattened(RawCloud cloud) {
-  if (cloud.width == 1) {
-    cloud.point_step = cloud.row_step;
-  } else if (cloud.row_step != cloud.width * cloud.point_step) {
-    return cloud;
-  }
-  cloud.width *= cloud.height;
-  cloud.height = 1;
-  return cloud;
-}
-
-// Writes every point and moves on only past those to keep: no branch to mispredict.
-// @returns how many are kept
-std::size_t append(const CropBlock& block, std::size_t count, std::uint32_t first_id,
-                   CloudPoint* to) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    to[kept] = {block.x[i], block.y[i], block.z[i], first_id + static_cast<std::uint32_t>(i)};
-    kept += static_cast<std::size_t>(block.x[i] == block.x[i]);
-  }
-  return kept;
-}
-
 }  // namespace
 
 std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
@@ -178,26 +153,6 @@ std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column
   const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
   std::fill(block->x + used, block->x + kSlots, std::numeric_limits<float>::quiet_NaN());
   return kept;
-}
-
-std::size_t crop(const RawCloud& raw, const CropPose& pose, std::vector<CloudPoint>* points,
-                 IngestCounts* counts) {
-  // One to spare, for the point after the last that is kept.
-  if (points->size() <= raw.size()) points->resize(raw.size() + 1);
-  CloudPoint* to = points->data();
-  const RawCloud cloud = flattened(raw);
-  CropBlock block;
-  std::uint32_t id = 0;
-  for (std::size_t row = 0; row < cloud.height; ++row) {
-    for (std::size_t column = 0; column < cloud.width; column += kCropBlock) {
-      const std::size_t count = std::min(kCropBlock, cloud.width - column);
-      if (crop_points(cloud, row, column, count, pose, &block, counts) > 0) {
-        to += append(block, count, id, to);
-      }
-      id += static_cast<std::uint32_t>(count);
-    }
-  }
-  return static_cast<std::size_t>(to - points->data());
 }
 
 }  // namespace ist

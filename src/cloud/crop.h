@@ -2,10 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "cloud/crop_pose.h"
-#include "cloud/morton_order.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/cloud/raw_cloud.h"
 
@@ -35,13 +33,5 @@ constexpr std::size_t kTileSide = 4;  ///< pixels; a tile of an image is a squar
 /// @param row, column  of the first pixel
 std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
                       const CropPose& pose, CropBlock* block, IngestCounts* counts);
-
-/// Reads a message's bytes once: drops what is not finite or not in range, and counts
-/// `not_a_number` and `infinite`.
-/// @param points  in O; the id is the number of the point in the message. Grows to more than are
-///                kept, and never shrinks
-/// @returns how many are kept
-std::size_t crop(const RawCloud& raw, const CropPose& pose, std::vector<CloudPoint>* points,
-                 IngestCounts* counts);
 
 }  // namespace ist

@@ -10,7 +10,7 @@ namespace ist {
 namespace {
 
 constexpr double kFarFromSensor = 1000.0;  // [m]
-constexpr std::size_t kSamples = 1024;     // points that the middle of a cloud is made of
+constexpr std::size_t kSamples = 256;      // points that the middle of a cloud is made of
 
 // Where a cloud is that does not lie about its sensor: the median, axis by axis, of some of its
 // points. In the sensor frame [m]; zero where the cloud is about its sensor.

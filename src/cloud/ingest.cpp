@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "cloud/crop.h"
 #include "cloud/image_tiles.h"
+#include "cloud/list_tiles.h"
 #include "cloud/point_index_builder.h"
 #include "cloud/scene_axes.h"
 #include "cloud/self_filter.h"
@@ -37,7 +37,6 @@ void check(const IngestConfig& config) {
 struct Ingest::Impl {
   IngestConfig config;
   Horizon horizon;
-  std::vector<CloudPoint> points;
   PointIndexBuilder builder;
   SelfFilter self_filter;
   Thinning thinning;
@@ -86,10 +85,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   if (image) {
     kept = index_image(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
   } else {
-    kept = crop(cloud, pose, &impl_->points, &counts);
-    impl_->builder.build(pose.X_FO, impl_->points.data(), kept,
-                         on_robot == nullptr ? PointFilter() : on_robot->as_filter(),
-                         &snapshot->index);
+    kept = index_list(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -

@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "cloud/box_hierarchy.h"
-#include "cloud/morton_order.h"
+#include "cloud/cloud_point.h"
+#include "cloud/divide_kernel.h"
+#include "cloud/point_cells.h"
+#include "cloud/point_slicer.h"
 #include "ist_proximity/cloud/point_index.h"
 
 namespace ist {
@@ -17,13 +20,16 @@ namespace ist {
 /// tile's points; its unused slots have no meaning yet.
 using PointFilter = std::function<std::uint32_t(const PointTile& tile, const PaddedBox& box)>;
 
+/// Says whether a PointFilter may drop a point of this box.
+using BoxFilter = std::function<bool(const PaddedBox& box)>;
+
 /// Builds point indices; keeps its working memory, so a steady stream of clouds allocates nothing.
 /// Not thread safe.
 ///
-/// Morton order brings neighbours together. Runs of 16 become tiles, but a run is cut where the
-/// order leaps, so that no tile has a big box. Above the tiles, space is divided at medians across
-/// the longest side, cell by cell of the order's coarsest grid: grouping along the Morton order
-/// alone makes boxes that overlap, and doubles what a query visits.
+/// Points in any order are brought together by the cells of a coarse grid; then each cell, which
+/// fits the first caches, is sliced across the longest side of its box, and the slices again, until
+/// sixteen neighbours are a tile. A tile with a gap is divided further, so that no tile has a big
+/// box. Tiles that follow each other are a node's.
 class PointIndexBuilder {
  public:
   /// As PointIndex::build, in any frame.
@@ -33,6 +39,12 @@ class PointIndexBuilder {
   /// @param index   overwritten, its buffers reused
   void build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,
              const PointFilter& drop, PointIndex* index);
+
+  /// The same for the points in cells().
+  /// @param may_drop  may be empty: a filter may drop anything
+  void build(const Eigen::Isometry3d& X_FO, const PointFilter& drop, const BoxFilter& may_drop,
+             PointIndex* index);
+  PointCells& cells() { return cells_; }
 
   /// The same for points of which neighbours in the list are mostly neighbours in space.
   void build_in_order(const Eigen::Isometry3d& X_FO, const std::vector<CloudPoint>& points,
@@ -46,6 +58,10 @@ class PointIndexBuilder {
   /// Keeps the first tile of room().
   /// @param box  of exactly its points
   void keep(const PaddedBox& box, const PointFilter& drop);
+  /// Keeps the first tiles of room(), whose unused slots are far away, without a filter.
+  /// @param boxes  of exactly the points of each tile, in order; others between them
+  /// @param which  bit k: slot k of `boxes` is a tile's
+  void keep_written(const BoxNode& boxes, std::uint32_t which);
   /// Tiles of an image may be kept before they are read: start(), then keep_unread() for each.
   /// @param image  where its bytes have no owner, tiles are read at once
   /// @param X_OS   sensor frame -> O
@@ -66,9 +82,24 @@ class PointIndexBuilder {
  private:
   void add_unread(const std::uint32_t* first_pixels, std::size_t count);
   void add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop);
+  struct Filters {
+    const PointFilter& drop;
+    const BoxFilter& may_drop;
+  };
+  void add_points(CloudPoint* points, CloudPoint* spare, std::size_t n, const Filters& filters);
+  void add_part(CloudPoint* points, CloudPoint* spare, std::size_t n);
+  template <typename Visit>
+  void for_each_slice(std::size_t n, std::size_t part, const Visit& visit) const;
+  void keep_batch(const Filters& filters);
+  void keep_made(std::size_t begin, std::size_t end);
+  void keep_filtered(std::size_t begin, std::size_t end, const PointFilter& drop);
   void end_cell();
 
-  MortonOrder morton_;
+  PointCells cells_;
+  PointSlicer slicer_;
+  std::vector<CloudPoint> spare_;  ///< for the points of the cell in work
+  TileBatch batch_;
+  std::vector<PointTile> filtered_;    ///< tiles in work of which points may be dropped
   std::vector<HierarchyChild> loose_;  ///< tiles that no node holds yet
   std::size_t neighbours_ = 0;         ///< first of them since the last end_neighbours()
   BoxHierarchy hierarchy_;

@@ -91,6 +91,12 @@ Normals sample_image(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
 
 // Some points of a list, as they come.
 struct Samples {
+  static constexpr std::size_t kBlock = 16;
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  static_assert(kListed % kBlock == 0, "whole blocks");
+  using Block = Eigen::Array<float, kBlock, 1>;
+  using BlockMap = Eigen::Map<const Block>;
+
   std::array<float, kListed> x, y, z;
   std::size_t size = 0;
 
@@ -108,6 +114,7 @@ struct Samples {
       z[size] = p.z();
       ++size;
     }
+    for (std::size_t i = size; i % kBlock != 0; ++i) x[i] = y[i] = z[i] = kInfinity;
   }
   Eigen::Vector3f point(std::size_t i) const { return {x[i], y[i], z[i]}; }
 
@@ -115,19 +122,25 @@ struct Samples {
   std::array<std::size_t, kNeighbours> around(std::size_t seed) const {
     std::array<std::size_t, kNeighbours> nearest;
     std::array<float, kNeighbours> distance_sq;
-    distance_sq.fill(std::numeric_limits<float>::infinity());
+    distance_sq.fill(kInfinity);
     nearest.fill(seed);
-    for (std::size_t i = 0; i < size; ++i) {
-      const float dx = x[i] - x[seed], dy = y[i] - y[seed], dz = z[i] - z[seed];
-      const float d_sq = dx * dx + dy * dy + dz * dz;
-      if (!(d_sq < distance_sq.back())) continue;
-      std::size_t at = kNeighbours - 1;
-      for (; at > 0 && distance_sq[at - 1] > d_sq; --at) {
-        distance_sq[at] = distance_sq[at - 1];
-        nearest[at] = nearest[at - 1];
+    for (std::size_t first = 0; first < size; first += kBlock) {
+      // Eigen turns it into SIMD; mostly none of them is near.
+      const Block block_sq = (BlockMap(&x[first]) - x[seed]).square() +
+                             (BlockMap(&y[first]) - y[seed]).square() +
+                             (BlockMap(&z[first]) - z[seed]).square();
+      if (!(block_sq.minCoeff() < distance_sq.back())) continue;
+      for (std::size_t k = 0; k < kBlock; ++k) {
+        const float d_sq = block_sq[static_cast<Eigen::Index>(k)];
+        if (!(d_sq < distance_sq.back())) continue;
+        std::size_t at = kNeighbours - 1;
+        for (; at > 0 && distance_sq[at - 1] > d_sq; --at) {
+          distance_sq[at] = distance_sq[at - 1];
+          nearest[at] = nearest[at - 1];
+        }
+        distance_sq[at] = d_sq;
+        nearest[at] = first + k;
       }
-      distance_sq[at] = d_sq;
-      nearest[at] = i;
     }
     return nearest;
   }

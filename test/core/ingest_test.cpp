@@ -497,12 +497,8 @@ TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
       threads.emplace_back([&index, &at_once, &count] {
         PointTile room, other_room;
         for (std::size_t i = 0; i < index.tile_count(); ++i) {
-          const PointTile &tile = index.tile(i, &room), &other = at_once.tile(i, &other_room);
-          count += static_cast<std::size_t>(tile.count == other.count &&
-                                            std::equal(tile.x, tile.x + kPointWidth, other.x) &&
-                                            std::equal(tile.y, tile.y + kPointWidth, other.y) &&
-                                            std::equal(tile.z, tile.z + kPointWidth, other.z) &&
-                                            std::equal(tile.id, tile.id + kPointWidth, other.id));
+          count += static_cast<std::size_t>(
+              test::same_points(index.tile(i, &room), at_once.tile(i, &other_room)));
         }
       });
     }

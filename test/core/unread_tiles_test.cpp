@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -164,9 +163,7 @@ TEST(UnreadTiles, CopyHoldsAllPoints) {
   scene.pixels->assign(scene.pixels->size(), 0.0F);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     PointTile room;
-    const PointTile& tile = copy.index.tile(i, &room);
-    ASSERT_TRUE(std::equal(tile.x, tile.x + kPointWidth, tiles[i].x));
-    ASSERT_TRUE(std::equal(tile.id, tile.id + kPointWidth, tiles[i].id));
+    ASSERT_TRUE(test::same_points(copy.index.tile(i, &room), tiles[i]));
   }
 }
 

@@ -243,7 +243,9 @@ class JointStatesTest(unittest.TestCase):
                 X_WL = X_WB(t) @ X[name]
                 truth = pt.DISTANCE[name](pt.apply(pt.inverse(X_WL), obstacle)).min()
                 # The camera's pose lies between joint states, whose motion is not even.
-                self.assertAlmostEqual(pt.link(message, name).distance, truth, delta=0.003)
+                self.assertAlmostEqual(
+                    pt.link(message, name).distance, truth, delta=0.003, msg=str(message.sources[0])
+                )
             self.assertEqual(message.sources[0].points_on_robot, 2)
             speeds.append(pt.link(message, "ball_link").closing_speed)
         self.assertGreater(np.isfinite(speeds).mean(), 0.8)

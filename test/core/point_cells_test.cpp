@@ -1,0 +1,267 @@
+// How a list of points is brought into the order of an index: cells, slices, tiles.
+
+#include "cloud/point_cells.h"
+
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "cloud/divide_kernel.h"
+#include "cloud/point_index_builder.h"
+#include "cloud/point_slicer.h"
+#include "support/tiles.h"
+
+namespace ist {
+namespace {
+
+using Cloud = std::vector<CloudPoint>;
+
+// What the machine's processor can do, one instruction set after the other.
+template <typename Test>
+void for_each_instruction_set(const Test& test) {
+  const auto choose = [](std::int64_t targets) {
+    hwy::SetSupportedTargetsForTest(targets);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  };
+  choose(0);
+  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
+    choose(left & -left);
+    SCOPED_TRACE(hwy::TargetName(left & -left));
+    test();
+  }
+  choose(0);
+}
+
+Cloud numbered(Cloud points) {
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].id = static_cast<std::uint32_t>(i);
+  return points;
+}
+
+Cloud in_a_box(std::size_t n, float size, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> u(-size, size);
+  Cloud points;
+  for (std::size_t i = 0; i < n; ++i) {
+    const float x = u(random), y = u(random), z = u(random);
+    points.push_back({x, y, z, 0});
+  }
+  return numbered(points);
+}
+
+// Each point about half as far from the corner as the one before, over and over: whatever the
+// scale, nearly all are close together.
+Cloud nested(std::size_t n, int halvings) {
+  Cloud points = in_a_box(n, 1.0F, 3);
+  for (std::size_t i = 0; i < n; ++i) {
+    const float scale = std::ldexp(1.0F, -static_cast<int>(i % static_cast<std::size_t>(halvings)));
+    points[i].x = std::abs(points[i].x) * scale;
+    points[i].y *= scale;
+    points[i].z *= scale;
+  }
+  return points;
+}
+
+Cloud with_outliers(Cloud points, float distance) {
+  points.push_back({distance, 0.0F, 0.0F, 0});
+  points.push_back({0.0F, -distance, distance, 0});
+  return numbered(points);
+}
+
+// Two walls far apart.
+Cloud far_clusters(std::size_t n, float distance) {
+  Cloud points = in_a_box(n, 1.0F, 4);
+  for (std::size_t i = 0; i < n; ++i) {
+    points[i].z = 0.0F;
+    if (i % 2 == 0) points[i].x += distance;
+  }
+  return points;
+}
+
+Cloud on_a_line(std::size_t n) {
+  Cloud points;
+  for (std::size_t i = 0; i < n; ++i) {
+    const float t = static_cast<float>((i * 7919) % n) / static_cast<float>(n);
+    points.push_back({t, 2.0F * t, -t, 0});
+  }
+  return numbered(points);
+}
+
+Cloud of_two_places(std::size_t n, float a, float b) {
+  Cloud points;
+  for (std::size_t i = 0; i < n; ++i) points.push_back({i % 3 == 0 ? a : b, 0.5F, -0.5F, 0});
+  return numbered(points);
+}
+
+std::vector<Cloud> hard_clouds() {
+  return {{},
+          in_a_box(1, 1.0F, 1),
+          in_a_box(20000, 1.0F, 2),
+          in_a_box(5000, 1e-42F, 2),
+          in_a_box(5000, 1e14F, 2),
+          nested(20000, 40),
+          nested(20000, 120),
+          with_outliers(in_a_box(20000, 1.0F, 5), 1000.0F),
+          with_outliers(nested(20000, 40), 1e9F),
+          far_clusters(20000, 1e6F),
+          on_a_line(5000),
+          of_two_places(5000, 0.25F, 0.25F),
+          of_two_places(5000, 0.25F, std::nextafter(0.25F, 1.0F)),
+          of_two_places(5000, 0.0F, std::numeric_limits<float>::denorm_min()),
+          of_two_places(5000, -1e14F, 1e14F)};
+}
+
+bool is_same(const CloudPoint& a, const CloudPoint& b) {
+  return a.x == b.x && a.y == b.y && a.z == b.z && a.id == b.id;
+}
+
+TEST(PointCells, eachPointIsInOneCell) {
+  for_each_instruction_set([] {
+    PointCells cells;
+    for (const Cloud& cloud : hard_clouds()) {
+      Cloud sample(cloud.begin(), cloud.begin() + static_cast<std::ptrdiff_t>(
+                                                      std::min(cloud.size(), PointCells::kSample)));
+      cells.start(sample.data(), sample.size(), cloud.size());
+      cells.add(cloud.data(), cloud.size());
+      std::vector<bool> seen(cloud.size(), false);
+      for (auto cell = cells.next(); cell.size > 0; cell = cells.next()) {
+        for (std::size_t i = 0; i < cell.size; ++i) {
+          const std::uint32_t id = cell.points[i].id;
+          ASSERT_LT(id, cloud.size());
+          ASSERT_TRUE(is_same(cell.points[i], cloud[id]));
+          ASSERT_FALSE(seen[id]);
+          ASSERT_TRUE(i == 0 || cell.points[i - 1].id < id) << "in the order they came";
+          seen[id] = true;
+        }
+      }
+      EXPECT_EQ(std::count(seen.begin(), seen.end(), true),
+                static_cast<std::ptrdiff_t>(cloud.size()));
+      EXPECT_EQ(cells.next().size, 0U);
+    }
+  });
+}
+
+// A few points far away are no reason to lay the grid over them.
+TEST(PointCells, cellsAreSmall) {
+  Cloud cloud = with_outliers(in_a_box(100000, 1.0F, 6), 1000.0F);
+  Cloud sample(cloud.end() - PointCells::kSample, cloud.end());
+  PointCells cells;
+  cells.start(sample.data(), sample.size(), cloud.size());
+  cells.add(cloud.data(), cloud.size());
+  std::size_t most = 0;
+  for (auto cell = cells.next(); cell.size > 0; cell = cells.next()) {
+    most = std::max(most, cell.size);
+  }
+  EXPECT_LT(most, cloud.size() / 50);
+}
+
+TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
+  for_each_instruction_set([] {
+    PointSlicer slicer;
+    for (Cloud cloud : hard_clouds()) {
+      const std::size_t n = cloud.size();
+      if (n == 0) continue;
+      cloud.resize(n + kPointSlack, {std::numeric_limits<float>::quiet_NaN(), 0.0F, 1e30F, 0});
+      Cloud sorted(n);
+      Eigen::AlignedBox3f box;
+      for (std::size_t i = 0; i < n; ++i)
+        box.extend(Eigen::Vector3f(cloud[i].x, cloud[i].y, cloud[i].z));
+      Eigen::Index axis;
+      const float longest = box.sizes().maxCoeff(&axis);
+      if (!slicer.sort(cloud.data(), n, sorted.data())) {
+        EXPECT_LT(longest, 1e-36F) << "these can be told from each other";
+        continue;
+      }
+      std::set<std::uint32_t> ids;
+      float reached = -std::numeric_limits<float>::infinity();
+      for (const CloudPoint& p : sorted) {
+        ASSERT_TRUE(is_same(p, cloud[p.id]));
+        ids.insert(p.id);
+        const float along = axis == 0 ? p.x : axis == 1 ? p.y : p.z;
+        ASSERT_GE(along, reached - longest / 30.0F);
+        reached = std::max(reached, along);
+      }
+      EXPECT_EQ(ids.size(), n);
+      ASSERT_LE(slicer.crowd_end(), n);
+      const std::size_t crowd = slicer.crowd_end() - slicer.crowd_begin();
+      EXPECT_TRUE(slicer.crowd_end() == 0 || (crowd > n / 4 && crowd < n));
+    }
+  });
+}
+
+PointIndex build(const Cloud& cloud) {
+  PointIndex index;
+  PointIndexBuilder().build(Eigen::Isometry3d::Identity(), cloud.data(), cloud.size(), {}, &index);
+  return index;
+}
+
+// The same numbers whatever the processor: no answer may depend on it.
+TEST(PointCells, indexIsTheSameOnEveryInstructionSet) {
+  const std::vector<Cloud> clouds = hard_clouds();
+  std::vector<PointIndex> expected;
+  for_each_instruction_set([&] {
+    const bool is_first = expected.empty();
+    for (std::size_t i = 0; i < clouds.size(); ++i) {
+      PointIndex index = build(clouds[i]);
+      if (is_first) {
+        expected.push_back(std::move(index));
+        continue;
+      }
+      ASSERT_EQ(index.tile_count(), expected[i].tile_count());
+      ASSERT_EQ(index.nodes().size(), expected[i].nodes().size());
+      const std::vector<PointTile> a = test::tiles_of(index), b = test::tiles_of(expected[i]);
+      for (std::size_t t = 0; t < a.size(); ++t) ASSERT_TRUE(test::same_points(a[t], b[t]));
+    }
+  });
+}
+
+float diagonal_of(const PointTile& tile) {
+  Eigen::AlignedBox3f box;
+  for (int k = 0; k < tile.count; ++k) box.extend(Eigen::Vector3f(tile.x[k], tile.y[k], tile.z[k]));
+  return box.diagonal().norm();
+}
+
+// Tiles are full and small where points are close together, whatever there is besides.
+TEST(PointCells, tilesOfHardCloudsAreGood) {
+  for (const Cloud& cloud : hard_clouds()) {
+    const PointIndex index = build(cloud);
+    ASSERT_EQ(index.size(), cloud.size());
+    EXPECT_LE(index.tile_count(), cloud.size() / 8 + 1) << "half empty";
+  }
+  for (const Cloud& cloud : {with_outliers(in_a_box(20000, 1.0F, 5), 1e9F),
+                             with_outliers(in_a_box(20000, 1.0F, 5), 1e5F)}) {
+    const PointIndex index = build(cloud);
+    std::vector<float> diagonals;
+    for (const PointTile& tile : test::tiles_of(index)) diagonals.push_back(diagonal_of(tile));
+    std::sort(diagonals.begin(), diagonals.end());
+    // 16 of 20000 points in 8 m^3 fill a cube 0.32 m across.
+    EXPECT_LT(diagonals[diagonals.size() / 2], 0.4F);
+    EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.8F);
+  }
+  // The scales of nested clouds do not share tiles, but for few: tiles near the corner are as small
+  // as they are near to it.
+  const PointIndex index = build(nested(20000, 40));
+  std::size_t large = 0;
+  for (const PointTile& tile : test::tiles_of(index)) {
+    const Eigen::Vector3f p(tile.x[0], tile.y[0], tile.z[0]);
+    large += diagonal_of(tile) > 4.0F * p.norm();
+  }
+  EXPECT_LT(large, index.tile_count() / 10);
+}
+
+TEST(PointCells, orderOfPointsChangesNoTilesSize) {
+  Cloud cloud = far_clusters(20000, 3.0F);
+  const std::size_t tiles = build(cloud).tile_count();
+  std::shuffle(cloud.begin(), cloud.end(), std::mt19937(7));
+  const auto shuffled = static_cast<double>(build(cloud).tile_count());
+  EXPECT_NEAR(shuffled, static_cast<double>(tiles), 0.02 * shuffled);
+}
+
+}  // namespace
+}  // namespace ist
