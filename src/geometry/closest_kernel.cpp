@@ -1,6 +1,7 @@
 // Compiled once per instruction set; the best one there is gets chosen at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "geometry/closest_kernel.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/slab_reach-inl.h"
 #include "geometry/triangle_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -79,8 +81,13 @@ HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* 
 class Closest {
  public:
   Closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_sq,
-          const Eigen::Vector3d& toward, double enough_sq, ClosestPoint* result)
-      : tree_(tree), p_(p), best_sq_(max_sq), enough_sq_(enough_sq), result_(*result) {
+          const Eigen::Vector3d& toward, double enough_sq, double slack, ClosestPoint* result)
+      : tree_(tree),
+        p_(p),
+        best_sq_(max_sq),
+        enough_sq_(enough_sq),
+        slack_(slack),
+        result_(*result) {
     const Eigen::Vector3d local = p - tree.origin;
     for (int axis = 0; axis < 3; ++axis) p_float_[axis] = static_cast<float>(local[axis]);
     // What float loses, in distance.
@@ -95,23 +102,32 @@ class Closest {
     stack[top++] = {0, 0.0F};
     while (top > 0) {
       const Entry entry = stack[--top];
-      if (entry.distance_sq > limit_sq_) continue;
+      if (LeftOut(entry.distance_sq)) continue;
       if (entry.child < 0) {
         Visit(tree_.leaves[~entry.child]);
-        if (result_.distance_sq <= enough_sq_) return;
-        continue;
+        if (result_.distance_sq > enough_sq_) continue;
+        result_.lower_bound = 0.0;
+        return;
       }
       const TriangleBvh::Boxes& boxes = tree_.boxes[entry.child];
       alignas(32) float distance_sq[kTriangleWidth];
-      BoxDistancesSq(boxes, distance_sq);
+      ChildDistancesSq(boxes, tree_.slabs[entry.child], distance_sq);
       const std::size_t begin = top;
       for (int k = 0; k < boxes.count; ++k) {
-        if (distance_sq[k] > limit_sq_) continue;
+        if (LeftOut(distance_sq[k])) continue;
+        Prefetch(boxes.child[k]);
         std::size_t at = top++;  // nearest on top
         for (; at > begin && stack[at - 1].distance_sq < distance_sq[k]; --at)
           stack[at] = stack[at - 1];
         stack[at] = {boxes.child[k], distance_sq[k]};
       }
+    }
+    if (!(result_.distance_sq < std::numeric_limits<double>::infinity())) return;
+    const double nearest = std::sqrt(result_.distance_sq);
+    result_.lower_bound = nearest;
+    if (slack_ > 0.0) {
+      const double left_out = std::sqrt(static_cast<double>(left_out_sq_)) - rounding_;
+      result_.lower_bound = std::clamp(left_out, std::max(nearest - slack_, 0.0), nearest);
     }
   }
 
@@ -121,10 +137,31 @@ class Closest {
     float distance_sq;
   };
 
+  // What is looked at next, most likely: meshes are larger than caches near the core.
+  HWY_INLINE void Prefetch(std::int32_t child) const {
+    if (child < 0) {
+      PrefetchLines(&tree_.leaves[~child], sizeof(TriangleBvh::Leaf));
+    } else {
+      PrefetchLines(&tree_.boxes[child], sizeof(TriangleBvh::Boxes));
+      PrefetchLines(&tree_.slabs[child], sizeof(TriangleBvh::Slabs));
+    }
+  }
+  static HWY_INLINE void PrefetchLines(const void* begin, std::size_t size) {
+    const auto* bytes = static_cast<const char*>(begin);
+    for (std::size_t i = 0; i < size; i += 64) hwy::Prefetch(bytes + i);
+  }
+
+  // Whether what is this far does not matter.
+  HWY_INLINE bool LeftOut(float distance_sq) {
+    if (!(distance_sq > limit_sq_)) return false;
+    left_out_sq_ = std::min(left_out_sq_, distance_sq);
+    return true;
+  }
+
   void Tighten() {
-    const double limit = std::sqrt(best_sq_) + rounding_;
+    double limit = std::sqrt(best_sq_) + rounding_;
+    if (result_.distance_sq <= best_sq_) limit = std::max(limit - slack_, rounding_);
     limit_sq_ = static_cast<float>(std::min(1.00001 * limit * limit, 1e30));
-    limit_ = static_cast<float>(std::min(1.00001 * limit, 1e15));
   }
 
   // What is seen from p lies at least as far as it is along any direction: triangles aside of the
@@ -135,8 +172,9 @@ class Closest {
   }
 
   // Whether all triangles of a leaf are too far along that direction.
-  HWY_INLINE bool IsBeyond(const TriangleBvh::Leaf& leaf) const {
+  HWY_INLINE bool IsBeyond(const TriangleBvh::Leaf& leaf) {
     const TriangleTag d;
+    auto reach = hn::Set(d, std::numeric_limits<float>::lowest());
     for (std::size_t k = 0; k < kTriangleWidth; k += hn::Lanes(d)) {
       const auto along = [&](int row) {
         return hn::MulAdd(
@@ -144,15 +182,15 @@ class Closest {
             hn::MulAdd(hn::Set(d, toward_[1]), hn::Load(d, leaf.corner[row + 1] + k),
                        hn::Mul(hn::Set(d, toward_[2]), hn::Load(d, leaf.corner[row + 2] + k))));
       };
-      const auto highest = hn::Max(along(0), hn::Max(along(3), along(6)));
-      if (!hn::AllTrue(d, hn::Gt(hn::Sub(hn::Set(d, height_), highest), hn::Set(d, limit_)))) {
-        return false;
-      }
+      reach = hn::Max(reach, hn::Max(along(0), hn::Max(along(3), along(6))));
     }
-    return true;
+    const float ahead = height_ - hn::GetLane(hn::MaxOfLanes(d, reach));
+    return ahead > 0.0F && LeftOut(ahead * ahead);
   }
 
-  HWY_INLINE void BoxDistancesSq(const TriangleBvh::Boxes& boxes, float* out) const {
+  // As far as boxes and slabs tell.
+  HWY_INLINE void ChildDistancesSq(const TriangleBvh::Boxes& boxes, const TriangleBvh::Slabs& slabs,
+                                   float* out) const {
     const TriangleTag d;
     for (std::size_t k = 0; k < kTriangleWidth; k += hn::Lanes(d)) {
       auto sum = hn::Zero(d);
@@ -163,7 +201,9 @@ class Closest {
         const auto gap = hn::Max(hn::Max(low, high), hn::Zero(d));
         sum = hn::MulAdd(gap, gap, sum);
       }
-      hn::Store(sum, d, out + k);
+      const auto along = hn::Sub(hn::Set(d, height_), Reach(boxes, slabs, toward_, k));
+      const auto ahead = hn::Max(along, hn::Zero(d));
+      hn::Store(hn::Max(sum, hn::Mul(ahead, ahead)), d, out + k);
     }
   }
 
@@ -172,38 +212,47 @@ class Closest {
     if (IsBeyond(leaf)) return;
     alignas(32) float distance_sq[kTriangleWidth];
     TriangleDistancesSq(leaf, p_float_, distance_sq);
-    for (std::uint32_t k = 0; k < leaf.count; ++k) {
-      if (distance_sq[k] > limit_sq_) continue;
-      const TriangleBvh::Triangle& triangle = tree_.triangles[leaf.first + k];
-      const Eigen::Vector3d q = closest_point_on_triangle(p_, triangle.a, triangle.b, triangle.c);
-      const double exact_sq = (q - p_).squaredNorm();
-      const bool is_first = result_.distance_sq == std::numeric_limits<double>::infinity();
-      if (exact_sq < best_sq_ || (is_first && exact_sq == best_sq_)) {
-        best_sq_ = exact_sq;
-        result_.point = q;
-        result_.distance_sq = exact_sq;
-        result_.triangle = triangle.index;
-        Tighten();
-        if (exact_sq > 0.0) Aim((p_ - q) / std::sqrt(exact_sq));
-      }
+    std::uint32_t nearest = 0;
+    for (std::uint32_t k = 1; k < leaf.count; ++k) {
+      if (distance_sq[k] < distance_sq[nearest]) nearest = k;
     }
+    if (LeftOut(distance_sq[nearest])) return;
+    Measure(tree_.triangles[leaf.first + nearest]);
+    for (std::uint32_t k = 0; k < leaf.count; ++k) {
+      if (k != nearest && !LeftOut(distance_sq[k])) Measure(tree_.triangles[leaf.first + k]);
+    }
+  }
+
+  void Measure(const TriangleBvh::Triangle& triangle) {
+    const Eigen::Vector3d q = closest_point_on_triangle(p_, triangle.a, triangle.b, triangle.c);
+    const double exact_sq = (q - p_).squaredNorm();
+    const bool is_first = result_.distance_sq == std::numeric_limits<double>::infinity();
+    if (!(exact_sq < best_sq_ || (is_first && exact_sq == best_sq_))) return;
+    best_sq_ = exact_sq;
+    result_.point = q;
+    result_.distance_sq = exact_sq;
+    result_.triangle = triangle.index;
+    Tighten();
+    if (exact_sq > 0.0) Aim((p_ - q) / std::sqrt(exact_sq));
   }
 
   const TriangleBvh::View& tree_;
   const Eigen::Vector3d& p_;
   float p_float_[3];
   double best_sq_;
-  double enough_sq_;
+  double enough_sq_, slack_;
   double rounding_;
-  float limit_sq_ = 0.0F, limit_ = 0.0F;
+  float limit_sq_ = 0.0F;
+  float left_out_sq_ = std::numeric_limits<float>::max();  // least of all that was
   float toward_[3];
   float height_;  // of p along that
   ClosestPoint& result_;
 };
 
 void FindClosest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_distance_sq,
-                 const Eigen::Vector3d& toward, double enough_sq, ClosestPoint* closest) {
-  Closest(tree, p, max_distance_sq, toward, enough_sq, closest).Run();
+                 const Eigen::Vector3d& toward, double enough_sq, double slack,
+                 ClosestPoint* closest) {
+  Closest(tree, p, max_distance_sq, toward, enough_sq, slack, closest).Run();
 }
 
 }  // namespace HWY_NAMESPACE
@@ -216,9 +265,10 @@ namespace ist {
 HWY_EXPORT(FindClosest);
 
 void find_closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, double max_distance_sq,
-                  const Eigen::Vector3d& toward_M, double enough_sq, ClosestPoint* closest) {
+                  const Eigen::Vector3d& toward_M, double enough_sq, double slack,
+                  ClosestPoint* closest) {
   HWY_DYNAMIC_DISPATCH(FindClosest)
-  (tree, p_M, max_distance_sq, toward_M, enough_sq, closest);
+  (tree, p_M, max_distance_sq, toward_M, enough_sq, slack, closest);
 }
 
 }  // namespace ist

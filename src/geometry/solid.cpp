@@ -12,6 +12,8 @@ namespace {
 // Below this distance [m] the line from surface to point has no direction worth having.
 constexpr double kTouch = 1e-12;
 
+constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+
 SignedDistance to_box(const Box& box, const Eigen::Vector3d& p) {
   const Eigen::Vector3d half = 0.5 * box.size;
   const Eigen::Vector3d outside = p.cwiseAbs() - half;
@@ -131,11 +133,12 @@ SignedDistance with_sign(const TriangleBvh& bvh, const std::vector<Eigen::Vector
 }
 
 SignedDistance to_mesh(const TriangleBvh& bvh, const std::vector<Eigen::Vector3d>& normals,
-                       const Eigen::Vector3d& p, double max_distance, bool inside,
-                       const Eigen::Vector3d& toward = Eigen::Vector3d::Zero()) {
-  const double bound = std::isfinite(max_distance) ? max_distance * max_distance : max_distance;
-  return with_sign(bvh, normals, p, bvh.closest(p, bound, toward), inside);
+                       const Eigen::Vector3d& p, double max_distance, bool inside) {
+  return with_sign(bvh, normals, p, bvh.closest(p, max_distance * max_distance), inside);
 }
+
+// Where it is told that a surface is within some distance, that is not to be missed by a rounding.
+double a_little_more(double distance) { return (1.0 + 1e-9) * distance + kTouch; }
 
 }  // namespace
 
@@ -185,16 +188,26 @@ SignedDistance Solid::signed_distance(const Eigen::Vector3d& p_L) const {
 }
 
 SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_distance,
-                                       const Eigen::Vector3d& toward_L) const {
+                                       const Eigen::Vector3d& toward_L, double slack,
+                                       double* lower_bound) const {
   SignedDistance best;
+  if (lower_bound != nullptr) *lower_bound = std::max(max_distance, 0.0);
   if (!(max_distance > 0.0)) return best;
   double bound = max_distance;
   for (const Element& element : elements_) {
     const Eigen::Vector3d p_E = element.X_EL * p_L;
-    const SignedDistance candidate = element.bvh.size() > 0
-                                         ? to_mesh(element.bvh, element.normals, p_E, bound, false,
-                                                   element.X_EL.linear() * toward_L)
-                                         : to_primitive(element.primitive, p_E);
+    SignedDistance candidate;
+    double floor;
+    if (element.bvh.size() > 0) {
+      const ClosestPoint closest =
+          element.bvh.closest(p_E, bound * bound, element.X_EL.linear() * toward_L, 0.0, slack);
+      candidate = with_sign(element.bvh, element.normals, p_E, closest, false);
+      floor = closest.lower_bound;
+    } else {
+      candidate = to_primitive(element.primitive, p_E);
+      floor = candidate.distance;
+    }
+    if (lower_bound != nullptr) *lower_bound = std::min(*lower_bound, floor);
     if (candidate.distance < bound) {
       bound = candidate.distance;
       best.distance = candidate.distance;
@@ -206,9 +219,10 @@ SignedDistance Solid::distance_outside(const Eigen::Vector3d& p_L, double max_di
 }
 
 // Inside comes last: it is asked of few.
-PointDepth Solid::depth(const Eigen::Vector3d& p_L, double enough) const {
-  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+PointDepth Solid::depth(const Eigen::Vector3d& p_L, double enough, const NearSurface& known) const {
   const double enough_sq = enough > 0.0 ? enough * enough : -1.0;
+  const bool is_one = elements_.size() == 1;
+  const double within = is_one ? a_little_more(known.within) : kAnywhere;
   PointDepth result;
   bool is_known = true;
   for (const Element& element : elements_) {
@@ -219,14 +233,16 @@ PointDepth Solid::depth(const Eigen::Vector3d& p_L, double enough) const {
       result.floor = std::min(result.floor, candidate.distance);
     } else {
       const ClosestPoint closest =
-          element.bvh.closest(p_E, kAnywhere, Eigen::Vector3d::Zero(), enough_sq);
+          element.bvh.closest(p_E, within * within, Eigen::Vector3d::Zero(), enough_sq);
       const double distance = std::sqrt(closest.distance_sq);
       if (closest.distance_sq <= enough_sq) {
         is_known = false;
         result.floor = std::min(result.floor, -distance);
         continue;
       }
-      const bool inside = element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
+      const bool inside = is_one && known.side != NearSurface::Side::kUnknown
+                              ? known.side == NearSurface::Side::kInside
+                              : element.bvh.bounds().contains(p_E) && element.bvh.is_inside(p_E);
       candidate = with_sign(element.bvh, element.normals, p_E, closest, inside);
       result.floor = std::min(result.floor, element.is_closed && !inside ? distance : -distance);
     }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/slab_reach-inl.h"
 #include "geometry/triangle_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -49,7 +50,9 @@ class Farthest {
       }
       const TriangleBvh::Boxes& boxes = tree_.boxes[entry.child];
       alignas(32) float reach[kSupportWidth];
-      Reaches(boxes, reach);
+      for (std::size_t k = 0; k < kSupportWidth; k += hn::Lanes(SupportTag())) {
+        hn::Store(Reach(boxes, tree_.slabs[entry.child], n_float_, k), SupportTag(), reach + k);
+      }
       const std::size_t begin = top;
       for (int k = 0; k < boxes.count; ++k) {
         if (LeftOut(reach[k])) continue;
@@ -68,18 +71,6 @@ class Farthest {
     if (most > farthest_ + slack_) return false;
     left_out_ = std::max(left_out_, most);
     return true;
-  }
-
-  HWY_INLINE void Reaches(const TriangleBvh::Boxes& boxes, float* out) const {
-    const SupportTag d;
-    for (std::size_t k = 0; k < kSupportWidth; k += hn::Lanes(d)) {
-      auto sum = hn::Zero(d);
-      for (int axis = 0; axis < 3; ++axis) {
-        const float* side = n_float_[axis] > 0.0F ? boxes.max[axis] : boxes.min[axis];
-        sum = hn::MulAdd(hn::Set(d, n_float_[axis]), hn::Load(d, side + k), sum);
-      }
-      hn::Store(sum, d, out + k);
-    }
   }
 
   void Visit(const TriangleBvh::Leaf& leaf) {

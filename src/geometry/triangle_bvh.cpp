@@ -92,15 +92,23 @@ Eigen::Vector3d closest_point_on_triangle(const Eigen::Vector3d& p, const Eigen:
 TriangleBvh::TriangleBvh(const TriangleMesh& mesh) { TriangleBvhBuilder(mesh, this).run(); }
 
 TriangleBvh::View TriangleBvh::view() const {
-  return {boxes_.data(),     moments_.data(),  leaves_.data(),
-          triangles_.data(), bounds_.center(), 0.5 * bounds_.sizes().norm()};
+  return {boxes_.data(),
+          slabs_.data(),
+          moments_.data(),
+          leaves_.data(),
+          triangles_.data(),
+          bounds_.center(),
+          0.5 * bounds_.sizes().norm()};
 }
 
 ClosestPoint TriangleBvh::closest(const Eigen::Vector3d& p_M, double max_distance_sq,
-                                  const Eigen::Vector3d& toward_M, double enough_sq) const {
+                                  const Eigen::Vector3d& toward_M, double enough_sq,
+                                  double slack) const {
   ClosestPoint closest;
-  if (!triangles_.empty())
-    find_closest(view(), p_M, max_distance_sq, toward_M, enough_sq, &closest);
+  closest.lower_bound = std::sqrt(max_distance_sq);
+  if (!triangles_.empty()) {
+    find_closest(view(), p_M, max_distance_sq, toward_M, enough_sq, slack, &closest);
+  }
   return closest;
 }
 

@@ -55,6 +55,7 @@ std::int32_t TriangleBvhBuilder::add_node(const Range& range) {
   constexpr auto kWidth = static_cast<std::uint32_t>(TriangleBvh::kWidth);
   const std::size_t index = bvh_.boxes_.size();
   bvh_.boxes_.emplace_back();
+  bvh_.slabs_.emplace_back();
   bvh_.moments_.emplace_back();
   std::vector<Range> groups{range};
   for (int level = 0; level < 3; ++level) {
@@ -71,6 +72,7 @@ std::int32_t TriangleBvhBuilder::add_node(const Range& range) {
     groups = std::move(halves);
   }
   TriangleBvh::Boxes boxes{};
+  TriangleBvh::Slabs slabs{};
   TriangleBvh::Moments moments{};
   boxes.count = static_cast<std::int32_t>(groups.size());
   for (std::size_t slot = 0; slot < kWidth; ++slot) {
@@ -82,10 +84,12 @@ std::int32_t TriangleBvhBuilder::add_node(const Range& range) {
     }
     const Range& group = groups[slot];
     set_box(group, &boxes, slot);
+    set_slab(group, &slabs, slot);
     set_moments(group, &moments, slot);
     boxes.child[slot] = group.second - group.first <= kWidth ? ~add_leaf(group) : add_node(group);
   }
   bvh_.boxes_[index] = boxes;
+  bvh_.slabs_[index] = slabs;
   bvh_.moments_[index] = moments;
   return static_cast<std::int32_t>(index);
 }
@@ -121,6 +125,31 @@ void TriangleBvhBuilder::set_box(const Range& range, TriangleBvh::Boxes* boxes,
     boxes->min[axis][slot] = -round_up(origin_[axis] - box.min()[axis]);
     boxes->max[axis][slot] = round_up(box.max()[axis] - origin_[axis]);
   }
+}
+
+void TriangleBvhBuilder::set_slab(const Range& range, TriangleBvh::Slabs* slabs,
+                                  std::size_t slot) const {
+  constexpr double kLength = 127.0;  // as std::int8_t holds
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (std::uint32_t t = range.first; t < range.second; ++t)
+    mean += area_normal(bvh_.triangles_[t]);
+  const double largest = mean.cwiseAbs().maxCoeff();
+  if (!(largest > 0.0)) return;
+  const Eigen::Vector3d direction = (kLength / mean.norm() * mean).array().round();
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::uint32_t t = range.first; t < range.second; ++t) {
+    const TriangleBvh::Triangle& triangle = bvh_.triangles_[t];
+    for (const Eigen::Vector3d& corner : {triangle.a, triangle.b, triangle.c}) {
+      const double along = direction.dot(corner - origin_);
+      low = std::min(low, along);
+      high = std::max(high, along);
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    slabs->direction[axis][slot] = static_cast<std::int8_t>(direction[axis]);
+  }
+  slabs->low[slot] = round_down(low);
+  slabs->high[slot] = round_up(high);
 }
 
 // About the area-weighted centroid (Barill et al. 2018, section 3.2).

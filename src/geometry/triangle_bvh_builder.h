@@ -19,6 +19,7 @@ class TriangleBvhBuilder {
   std::int32_t add_leaf(const Range& range);
   std::uint32_t split(const Range& range);
   void set_box(const Range& range, TriangleBvh::Boxes* boxes, std::size_t slot) const;
+  void set_slab(const Range& range, TriangleBvh::Slabs* slabs, std::size_t slot) const;
   void set_moments(const Range& range, TriangleBvh::Moments* moments, std::size_t slot) const;
 
   const TriangleMesh& mesh_;

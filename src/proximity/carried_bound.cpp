@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+}  // namespace
+
 Eigen::AlignedBox3d box_of(const LinkModel& link) {
   Eigen::AlignedBox3d box;
   for (const SphereLeaf& leaf : link.tree.leaves()) {
@@ -23,8 +25,6 @@ Eigen::AlignedBox3d box_of(const LinkModel& link) {
   }
   return box.isEmpty() ? Eigen::AlignedBox3d(Eigen::Vector3d::Zero()) : box;
 }
-
-}  // namespace
 
 SeenClouds::Seen SeenClouds::look(const CloudSnapshot& cloud) {
   Seen seen;

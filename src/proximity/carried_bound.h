@@ -31,6 +31,9 @@ class SeenClouds {
   std::uint64_t number_ = 0;
 };
 
+/// Around all of a link, and of what it encloses, in its own frame [m].
+Eigen::AlignedBox3d box_of(const LinkModel& link);
+
 /// Where a link's parts are: a box in its own frame.
 ///
 /// A point of the link is an affine function of the pose, so what it goes from one pose to another

@@ -25,6 +25,8 @@ constexpr std::uint64_t kPairsBeforeAim = 8;
 constexpr double kStepsAhead = 8.0;
 // Planes may be this much [m] too far.
 constexpr double kSupportSlack = 1e-5;
+// What a point's own distance may take of the tolerance.
+constexpr double kPointShare = 0.25;
 
 }  // namespace
 
@@ -57,7 +59,7 @@ void LinkQuery::start(const Eigen::Isometry3d& X_FL,
       const double apart = part == Part::kPoints
                                ? (X_LO_ * point_O(last_tile_, last_lane_) - last_witness_L_).norm()
                                : kInfinity;
-      consider(last_tile_, last_lane_, false, (1.0 + 1e-9) * apart + kRounding);
+      consider(last_tile_, last_lane_, false, a_little_more(apart), aim_L_);
     }
   }
 }
@@ -70,7 +72,7 @@ void LinkQuery::start_cold(const Eigen::Isometry3d& X_FL, std::uint64_t seen,
   others_ = nearest;
   nearest_ = Nearest{};
   nearest_.exact.distance = kInfinity;
-  promised_ = kInfinity;
+  promised_ = evaluated_ = kInfinity;
   complete_ = false;
   ++epoch_;
   // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
@@ -120,26 +122,26 @@ double LinkQuery::threshold() const {
   return distance > range() ? range() : wanted_below(distance);
 }
 
-void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside, double below) {
+void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside, double below,
+                         const Eigen::Vector3d& toward) {
   if (boxes_ != nullptr) return consider_box(tile, lane, is_outside);
   const Eigen::Vector3d p_O = point_O(tile, lane), p_L = X_LO_ * p_O;
   const std::uint64_t index = index_->generation();
   const std::uint32_t key = key_of(tile, lane);
   if (is_outside) {
-    const double known = known_.at(index, KnownDistances::Kind::kOutside, key, p_L).floor;
+    const double known = known_.at(index, KnownDistances::Kind::kOutside, key, p_L);
     if (known >= threshold()) return drop(known);
   } else {
     is_outside = link_->tree.is_beyond(p_L, link_->tree.interior_gap());
   }
   if (statistics_ != nullptr) ++statistics_->exact_evaluations;
   const double limit = std::min({nearest_.exact.distance, others_, range() + rounding_, below});
-  const Eigen::Vector3d& toward =
-      nearest_.exact.distance == kInfinity ? aim_L_ : nearest_.exact.normal;
-  const SignedDistance exact = is_outside ? link_->solid.distance_outside(p_L, limit, toward)
-                                          : link_->solid.signed_distance(p_L);
-  if (is_outside) {
-    known_.keep(index, KnownDistances::Kind::kOutside, key, p_L, std::min(exact.distance, limit));
-  }
+  if (!is_outside) return take(link_->solid.signed_distance(p_L), p_L, p_O, tile, lane);
+  double floor;
+  const SignedDistance exact =
+      link_->solid.distance_outside(p_L, limit, toward, kPointShare * config_.tolerance, &floor);
+  known_.keep(index, KnownDistances::Kind::kOutside, key, p_L, floor);
+  if (floor < exact.distance) evaluated_ = std::min(evaluated_, floor);
   take(exact, p_L, p_O, tile, lane);
 }
 
@@ -181,7 +183,7 @@ void LinkQuery::on_aim(void* context) {
   const Eigen::Vector3f n = self->aim_L_.cast<float>();
   const double reached = self->aim_L_.dot(self->nearest_.exact.witness);
   const double most = self->link_->solid.support(self->aim_L_, kSupportSlack, reached);
-  find_support(self->link_->tree, n.data(), round_up(most), self->support_.data());
+  self->supports_.aim(n.data(), round_up(most));
   self->set_planes(self->traversal_);
 }
 
@@ -213,7 +215,7 @@ void LinkQuery::find_first(Traversal* traversal) {
   inner.aim_after = kNever;
   inner.front = nullptr;
   descend_inner(&inner);
-  if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false);
+  if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false, kInfinity, aim_L_);
   if (inner.inner_distance < 0.0F && boxes_ != nullptr) {
     take_ball(inner.inner_leaf, inner.inner_tile, inner.inner_lane);
   }
@@ -272,7 +274,7 @@ void LinkQuery::look_ahead() {
 }
 
 void LinkQuery::keep_bound() {
-  double bound = std::min(nearest_.exact.distance, dropped_);
+  double bound = least_bound();
   // Float loses more, the farther.
   if (bound > range()) bound -= kFloatError * (bound - range());
   proven_reach_ = reach_;
@@ -299,7 +301,7 @@ Traversal LinkQuery::make_traversal() {
     traversal.p_OL[row] = static_cast<float>(X_OL_.translation()[row]);
   }
   traversal.rounding = round_up(rounding_);
-  traversal.support = support_.data();
+  traversal.supports = &supports_;
   set_planes(&traversal);
   traversal.aim = &LinkQuery::on_aim;
   traversal.threshold = round_up(threshold() + rounding_);
@@ -369,7 +371,7 @@ bool LinkQuery::search(Deadline* deadline) {
 }
 
 double LinkQuery::proven() const {
-  const double bound = std::min(nearest_.exact.distance, dropped_);
+  const double bound = least_bound();
   if (bound == kInfinity) return bound;
   return bound - kPointError * (reach_ + std::abs(bound)) - config_.margin;
 }
@@ -396,7 +398,7 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   last_witness_L_ = nearest.exact.witness;
   result->state = nearest.exact.distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = nearest.exact.distance;
-  result->lower_bound = std::min(nearest.exact.distance, dropped_) - point_error - config_.margin;
+  result->lower_bound = least_bound() - point_error - config_.margin;
   result->p_LL = nearest.exact.witness;
   result->p_FL = X_FL_ * nearest.exact.witness;
   result->p_FO = nearest.p_F;

@@ -11,6 +11,7 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/carried_bound.h"
+#include "proximity/depth_grid.h"
 #include "proximity/front.h"
 #include "proximity/known_distances.h"
 #include "proximity/traversal.h"
@@ -33,10 +34,7 @@ class Deadline {
 class LinkQuery {
  public:
   explicit LinkQuery(const LinkModel& link)
-      : link_(&link),
-        carried_(link),
-        extent_(link),
-        support_(link.tree.nodes().size() * kSphereWidth, kNowhere) {}
+      : link_(&link), carried_(link), extent_(link), grid_(link), supports_(link.tree) {}
 
   /// Sets the pose and evaluates the last answer's point at it, if that point is still there.
   /// @param seen  by SeenClouds: whether bounds of other poses hold
@@ -84,6 +82,7 @@ class LinkQuery {
 
   /// [m] More than double loses where distances are compared.
   static constexpr double kRounding = 1e-12;
+  static double a_little_more(double distance) { return (1.0 + 1e-9) * distance + kRounding; }
 
   bool is_settled();
   void look_ahead();
@@ -94,8 +93,10 @@ class LinkQuery {
   }
   bool enter(const CloudSnapshot& cloud, std::int32_t index, Part part);
   Eigen::Vector3d point_O(std::int32_t tile, int lane) const;
-  void consider(std::int32_t tile, int lane, bool is_outside,
-                double below = std::numeric_limits<double>::infinity());
+  /// @param below   [m] what the point's distance is known to be below, or else does not matter
+  /// @param toward  unit, about the way from the surface to the point, link frame
+  void consider(std::int32_t tile, int lane, bool is_outside, double below,
+                const Eigen::Vector3d& toward);
   void take(const SignedDistance& exact, const Eigen::Vector3d& p_L, const Eigen::Vector3d& p_O,
             std::int32_t tile, int lane);
   bool search(Deadline* deadline);
@@ -109,14 +110,10 @@ class LinkQuery {
   void descend(Traversal* traversal);
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
-  struct BoxDepth {
-    bool matters = false;             ///< some of it may be inside
-    double floor = 0.0, guess = 0.0;  ///< [m] of its middle, see Entry
-  };
-  BoxDepth box_depth(const Eigen::Vector3d& center, double radius, std::uint32_t id);
+  double depth_bound(const Eigen::Vector3d& center, double radius);
   /// [m] What is farther from the balls is outside.
   double interior_reach() const { return link_->tree.interior_gap() + 3.0 * rounding_; }
-  void find_depth_in_tile(std::int32_t tile, const Eigen::Vector3d& center, double floor);
+  void find_depth_in_tile(std::int32_t tile, double tile_bound);
 
   // Of points that wait, in link_waiting.cpp.
   /// What became of a point in this descent.
@@ -131,6 +128,7 @@ class LinkQuery {
   bool first_visit(std::int32_t tile, int lane);
   static void on_candidate(void* context, std::int32_t tile, int lane, float bound);
   void keep_promise();
+  Eigen::Vector3d way_from_ball(std::int32_t leaf, const Eigen::Vector3d& p_L) const;
   void evaluate_waiting();
   void drop_far_waiting();
   void rule_out_waiting();
@@ -151,6 +149,7 @@ class LinkQuery {
   BoxCell make_cell(const Eigen::AlignedBox3d& box, std::int32_t tile, int lane);
   double to_horizon(const Horizon& horizon) const;
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
+  double least_bound() const { return std::min({nearest_.exact.distance, evaluated_, dropped_}); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
   double wanted_below(double distance) const;
   /// [m] bounds from here on cannot change the answer by more than the tolerance.
@@ -161,17 +160,19 @@ class LinkQuery {
   QueryConfig config_;
   Eigen::Isometry3d X_FL_ = Eigen::Isometry3d::Identity();
   Nearest nearest_;
-  double dropped_ = 0.0;   ///< [m] smallest bound of all that was not evaluated
-  double rounding_ = 0.0;  ///< [m] largest error of a float bound
-  double others_ = 0.0;    ///< [m] distance of other links, that this one need not be beyond
-  double reach_ = 0.0;     ///< [m] largest coordinate of the link in the index's frame
-  double horizon_ = 0.0;   ///< [m] no point that the clouds left out is nearer
+  double dropped_ = 0.0;    ///< [m] smallest bound of all that was not evaluated
+  double evaluated_ = 0.0;  ///< [m] and of what was, but not to the last
+  double rounding_ = 0.0;   ///< [m] largest error of a float bound
+  double others_ = 0.0;     ///< [m] distance of other links, that this one need not be beyond
+  double reach_ = 0.0;      ///< [m] largest coordinate of the link in the index's frame
+  double horizon_ = 0.0;    ///< [m] no point that the clouds left out is nearer
   bool complete_ = false;
 
   CarriedBound carried_;
   LinkExtent extent_;
   Fronts fronts_;
   KnownDistances known_;
+  DepthGrid grid_;
   std::uint64_t seen_ = 0;     ///< clouds, by SeenClouds
   double beyond_ = 0.0;        ///< [m] smallest bound of a point, by the balls alone
   double proven_reach_ = 0.0;  ///< [m] `reach_` where the carried bound was proven
@@ -195,7 +196,7 @@ class LinkQuery {
   Eigen::Vector3d last_witness_L_ = Eigen::Vector3d::Zero();
 
   // How far the link's parts reach toward the nearest point.
-  std::vector<float> support_;
+  Supports supports_;
   Eigen::Vector3d aim_L_ = Eigen::Vector3d::Zero();  ///< direction, in the link's frame
 
   // Points or boxes evaluated in this descent: several ball leaves meet the same one.

@@ -29,7 +29,9 @@ void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float b
   auto* self = static_cast<LinkQuery*>(context);
   self->beyond_ = std::min(self->beyond_, static_cast<double>(bound) - self->rounding_);
   if (self->boxes_ != nullptr) {
-    if (self->first_visit(tile, lane)) self->consider(tile, lane, true);
+    if (self->first_visit(tile, lane)) {
+      self->consider(tile, lane, true, kInfinity, Eigen::Vector3d::Zero());
+    }
     return;
   }
   const std::uint32_t key = key_of(tile, lane);
@@ -45,12 +47,31 @@ void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float b
   self->waiting_[self->waiting_count_++] = {bound, tile, lane};
 }
 
+// From the nearest ball of a leaf to a point.
+Eigen::Vector3d LinkQuery::way_from_ball(std::int32_t leaf, const Eigen::Vector3d& p_L) const {
+  const SphereLeaf& balls = link_->tree.leaves()[static_cast<std::size_t>(leaf)];
+  Eigen::Vector3d nearest = Eigen::Vector3d::Zero();
+  double least = kInfinity;
+  for (int k = 0; k < balls.count; ++k) {
+    const Eigen::Vector3d way = p_L - Eigen::Vector3d(balls.x[k], balls.y[k], balls.z[k]);
+    const double inner = way.norm() - static_cast<double>(balls.inner[k]);
+    if (!(inner < least)) continue;
+    least = inner;
+    nearest = way;
+  }
+  return nearest.normalized();
+}
+
 // The exact distance in the place of what the inner balls promise.
 void LinkQuery::keep_promise() {
   if (promised_ == kInfinity) return;
   const std::int32_t tile = traversal_->inner_tile;
   const int lane = traversal_->inner_lane;
-  if (first_visit(tile, lane)) consider(tile, lane, false);
+  if (first_visit(tile, lane)) {
+    const Eigen::Vector3d toward =
+        way_from_ball(traversal_->inner_leaf, X_LO_ * point_O(tile, lane));
+    consider(tile, lane, false, a_little_more(promised_), toward);
+  }
   is_broken_ = is_broken_ || nearest_.exact.distance > promised_;
   promised_ = kInfinity;
 }
@@ -71,7 +92,10 @@ void LinkQuery::evaluate_waiting() {
           return a.bound < b.bound;
         }));
     --waiting_count_;
-    if (first_visit(last->tile, last->lane)) consider(last->tile, last->lane, true);
+    if (first_visit(last->tile, last->lane)) {
+      const bool knows_way = nearest_.exact.distance < kInfinity;
+      consider(last->tile, last->lane, true, kInfinity, knows_way ? nearest_.exact.normal : aim_L_);
+    }
   }
 }
 

@@ -12,6 +12,7 @@
 #include <cmath>
 
 #include "proximity/cut_balls-inl.h"
+#include "proximity/supports-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
@@ -22,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // touch the other's memory.
 struct Pair {
   float bound;
-  std::int32_t slot;         // of the sphere in `support`
+  std::int32_t slot;         // of the sphere in the tree
   std::int32_t box_slot;     // as the front counts them
   std::int32_t parent;       // in the front: kPointWidth * pair + child; or one of those below
   std::int32_t sphere, box;  // child indices: >= 0 node, < 0 leaf or tile
@@ -288,6 +289,13 @@ class Descent {
     return hn::Max(bound, hn::Load(d, away));
   }
 
+  HWY_INLINE const float* SupportsOf(std::int32_t node) const {
+    return HWY_NAMESPACE::SupportsOf(node, t_.sphere_nodes, t_.sphere_leaves, t_.supports);
+  }
+  HWY_INLINE float SupportOf(std::int32_t slot) const {
+    return SupportsOf(slot / kSphereWidth)[slot % kSphereWidth];
+  }
+
   void ExpandSphere(const Pair& pair) {
     const std::int32_t index = Enter(pair);
     const std::uint32_t expanded = Expanded(index);
@@ -297,7 +305,8 @@ class Descent {
     Pose(t_, node.x, node.y, node.z, &posed);
     const auto ahead = hn::Set(d, planes_.Ahead(pair.min, pair.max));
     const Middle box = MiddleOf(pair);
-    const float* support = t_.support + pair.sphere * kSphereWidth;
+    const float* support = SupportsOf(pair.sphere);
+    if (pair.slot >= 0) Tighten(support, &t_.supports->reach[static_cast<std::size_t>(pair.slot)]);
     const float limit = Limit();
     std::uint32_t near = 0;
     auto dropped = hn::Set(d, kFarAway);
@@ -341,7 +350,7 @@ class Descent {
     const std::uint32_t expanded = Expanded(index);
     const BoxNode& node = t_.box_nodes[pair.box];
     const PointTag d;
-    const float offset = t_.offset + t_.support[pair.slot];
+    const float offset = t_.offset + SupportOf(pair.slot);
     const float center[3] = {pair.x, pair.y, pair.z};
     const auto radius = hn::Set(d, pair.radius);
     const auto height =
@@ -403,7 +412,7 @@ class Descent {
     Posed posed;
     Pose(t_, leaf.x, leaf.y, leaf.z, &posed);
     const float* radius = kExact ? leaf.outer : leaf.inner;
-    const float offset = t_.offset + t_.support[pair.slot];
+    const float offset = t_.offset + SupportOf(pair.slot);
     const PointTag d;
     alignas(64) float distance[kPointWidth];
     bool is_near = false;

@@ -7,6 +7,7 @@
 #include "ist_proximity/cloud/point_index.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 #include "proximity/front.h"
+#include "proximity/supports.h"
 
 namespace ist {
 
@@ -33,8 +34,8 @@ struct Traversal {
   /// May change from `aim`. Unit vector; zero, and infinite: no planes are known.
   float normal[3] = {};
   float offset = std::numeric_limits<float>::infinity();
-  float rounding = 0.0F;           ///< [m] largest error of a coordinate
-  const float* support = nullptr;  ///< by node and child, see find_support
+  float rounding = 0.0F;         ///< [m] largest error of a coordinate
+  Supports* supports = nullptr;  ///< of the link's parts
 
   /// [m] Pairs whose bound is not below it are dropped; may only shrink, also from `candidate`.
   float threshold = std::numeric_limits<float>::infinity();
@@ -69,16 +70,6 @@ struct Traversal {
   std::int32_t inner_leaf = -1;  ///< of the ball
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
 };
-
-constexpr float kNowhere = -1e15F;  ///< [m] how far nothing reaches
-
-/// How far the parts of a link reach along a direction: for each child of each node the largest
-/// n . x of its outer balls, or `most` if that is less; at least that of their centres.
-/// @param n        unit vector in the link's frame
-/// @param most     [m] how far the link's geometry itself reaches
-/// @param support  [m] kSphereWidth for each node, overwritten where there is a child; elsewhere
-///                 it must be kNowhere or less
-void find_support(const InnerSphereTree& tree, const float n[3], float most, float* support);
 
 /// Finds the point (or box) of least inner distance: an upper bound, cheaply. Fills `inner_*`.
 void descend_inner(Traversal* traversal);

@@ -20,22 +20,20 @@ using Kind = KnownDistances::Kind;
 TEST(KnownDistances, TellOfTheSamePointOfTheSameIndex) {
   KnownDistances known;
   const Eigen::Vector3d p(0.1, 0.2, 0.3), q(0.1, 0.2, 0.34);
-  EXPECT_TRUE(std::isinf(known.at(1, Kind::kPoint, 7, p).floor));
-  known.keep(1, Kind::kPoint, 7, p, 0.5, 0.6);
-  EXPECT_EQ(known.at(1, Kind::kPoint, 7, p).floor, 0.5);
-  EXPECT_EQ(known.at(1, Kind::kPoint, 7, p).way, 0.0);
-  EXPECT_LE(known.at(1, Kind::kPoint, 7, q).floor, 0.46);
-  EXPECT_NEAR(known.at(1, Kind::kPoint, 7, q).floor, 0.46, 1e-12);
-  EXPECT_NEAR(known.at(1, Kind::kPoint, 7, q).guess, 0.56, 1e-12);
-  EXPECT_EQ(known.at(1, Kind::kPoint, 7, p).floor, 0.5) << "ways do not add up";
-  for (const auto& other : {known.at(2, Kind::kPoint, 7, p), known.at(1, Kind::kOutside, 7, p),
-                            known.at(1, Kind::kPoint, 8, p)}) {
-    EXPECT_EQ(other.floor, -std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::isinf(known.at(1, Kind::kPoint, 7, p)));
+  known.keep(1, Kind::kPoint, 7, p, 0.5);
+  EXPECT_EQ(known.at(1, Kind::kPoint, 7, p), 0.5);
+  EXPECT_LE(known.at(1, Kind::kPoint, 7, q), 0.46);
+  EXPECT_NEAR(known.at(1, Kind::kPoint, 7, q), 0.46, 1e-12);
+  EXPECT_EQ(known.at(1, Kind::kPoint, 7, p), 0.5) << "ways do not add up";
+  for (const double other : {known.at(2, Kind::kPoint, 7, p), known.at(1, Kind::kOutside, 7, p),
+                             known.at(1, Kind::kPoint, 8, p)}) {
+    EXPECT_EQ(other, -std::numeric_limits<double>::infinity());
   }
   const Eigen::Vector3d none(0, std::numeric_limits<double>::quiet_NaN(), 0);
-  EXPECT_TRUE(std::isinf(known.at(1, Kind::kPoint, 7, none).floor));
+  EXPECT_TRUE(std::isinf(known.at(1, Kind::kPoint, 7, none)));
   known.keep(1, Kind::kPoint, 7, none, 0.5);
-  EXPECT_TRUE(std::isinf(known.at(1, Kind::kPoint, 7, p).floor));
+  EXPECT_TRUE(std::isinf(known.at(1, Kind::kPoint, 7, p)));
 }
 
 // Of more points than there is room for, which wander in and out of a link.
@@ -50,7 +48,7 @@ TEST(KnownDistances, AreNeverAboveTheTruth) {
     const auto i = static_cast<std::uint32_t>(rng() % points.size());
     Eigen::Vector3d& p = points[i];
     p += test::random_vector(&rng, std::pow(10.0, test::uniform(&rng, -6, -2)));
-    const double floor = known.at(1, Kind::kPoint, i, p).floor;
+    const double floor = known.at(1, Kind::kPoint, i, p);
     const PointDepth depth = solid.depth(p, -1.0);
     ASSERT_LE(floor, depth.exact.distance + 1e-12);
     told += std::isfinite(floor) ? 1 : 0;

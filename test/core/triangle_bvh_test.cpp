@@ -64,6 +64,28 @@ TEST(TriangleBvh, DirectionNeverChangesTheClosestPoint) {
   }
 }
 
+TEST(TriangleBvh, ClosestPointMayBeALittleFarther) {
+  test::Rng rng(7);
+  for (const TriangleMesh& mesh : meshes()) {
+    const TriangleBvh bvh(mesh);
+    for (int i = 0; i < 300; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, i % 3 == 0 ? 2.0 : 0.3);
+      const Eigen::Vector3d toward = test::random_vector(&rng, 1.0).normalized();
+      const double expected = test::oracle_distance(mesh, p);
+      const double slack = std::pow(10.0, test::uniform(&rng, -6, -1));
+      const ClosestPoint closest = bvh.closest(p, 100.0, toward, 0.0, slack);
+      const double found = std::sqrt(closest.distance_sq);
+      ASSERT_GE(found, expected - 1e-12);
+      ASSERT_LE(closest.lower_bound, expected + 1e-12);
+      ASSERT_GE(closest.lower_bound, found - slack - 1e-12);
+      const ClosestPoint exact = bvh.closest(p, 100.0, toward);
+      ASSERT_EQ(exact.lower_bound, std::sqrt(exact.distance_sq));
+      const double less = 0.9 * expected;
+      ASSERT_NEAR(bvh.closest(p, less * less, toward, 0.0, slack).lower_bound, less, 1e-12);
+    }
+  }
+}
+
 TEST(TriangleBvh, ClosestPointStopsWhereItIsNearEnough) {
   test::Rng rng(5);
   for (const TriangleMesh& mesh : meshes()) {

@@ -20,6 +20,12 @@ struct SignedDistance {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
 };
 
+/// What is known of where the surface is about a point, where a solid is one mesh.
+struct NearSurface {
+  double within = std::numeric_limits<double>::infinity();  ///< [m] it is no farther
+  enum class Side { kUnknown, kInside, kOutside } side = Side::kUnknown;
+};
+
 /// What a search for the deepest point wants to know of a point.
 struct PointDepth {
   /// signed_distance(p); `distance` is inf where all that is known is that it is not below what the
@@ -48,9 +54,12 @@ class Solid {
 
   /// As signed_distance, for a point known to be outside (no inside test is made), and only if it
   /// is nearer than `max_distance` [m]; otherwise `distance` is inf.
-  /// @param toward_L  unit, about the way from the surface to p_L; a guess for speed, or zero
+  /// @param toward_L     unit, about the way from the surface to p_L; a guess for speed, or zero
+  /// @param slack        [m] the distance may be this much too large, which is found sooner
+  /// @param lower_bound  [m] or null: what it is at least
   SignedDistance distance_outside(const Eigen::Vector3d& p_L, double max_distance,
-                                  const Eigen::Vector3d& toward_L = Eigen::Vector3d::Zero()) const;
+                                  const Eigen::Vector3d& toward_L = Eigen::Vector3d::Zero(),
+                                  double slack = 0.0, double* lower_bound = nullptr) const;
 
   /// [m] A lower bound that holds nearby too: no point has a signed distance below this minus its
   /// way to p_L. The signed distance itself, but for meshes with holes: through a hole it jumps
@@ -61,7 +70,8 @@ class Solid {
   /// signed_distance and distance_floor at once, for points deeper than `enough` [m]: an element
   /// whose surface is found to be no farther is left at that, so that `exact` may stay unknown and
   /// `floor` a little low. Below 0, everything is sought.
-  PointDepth depth(const Eigen::Vector3d& p_L, double enough) const;
+  /// @param known  of p_L, for speed
+  PointDepth depth(const Eigen::Vector3d& p_L, double enough, const NearSurface& known = {}) const;
 
   /// [m] How far the solid reaches along a direction: the largest n.x of its points. A point p that
   /// is farther that way is outside, and its distance is at least n.p less this for a unit n.
@@ -91,6 +101,8 @@ class Solid {
   /// Whether p_L is inside any element.
   bool is_inside(const Eigen::Vector3d& p_L) const;
 
+  /// Whether it is one mesh and nothing else.
+  bool is_one_mesh() const { return elements_.size() == 1 && elements_[0].bvh.size() > 0; }
   bool empty() const { return elements_.empty(); }
   /// Whether any element is a mesh that is not closed.
   bool has_holes() const;

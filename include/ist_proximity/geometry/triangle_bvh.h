@@ -17,6 +17,8 @@ struct ClosestPoint {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the frame of the query point
   double distance_sq = std::numeric_limits<double>::infinity();  ///< [m^2]; inf: none in range
   std::uint32_t triangle = 0;  ///< index into the mesh, valid when distance_sq is finite
+  /// [m] No point of the surface is nearer; 0 where the search ended with `enough_sq`.
+  double lower_bound = 0.0;
 };
 
 /// Nearest point of triangle abc to p (Ericson, Real-Time Collision Detection, 5.1.5), also for
@@ -37,11 +39,13 @@ class TriangleBvh {
   /// Nearest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
   /// @param toward_M   unit, about the way from the surface to p_M; a guess for speed, or zero
   /// @param enough_sq  [m^2] the first point found that is no farther than this will do
+  /// @param slack      [m] a point that is not more than this farther than the nearest one will do,
+  ///                   which is found sooner
   /// @returns distance_sq = inf when there is none.
   ClosestPoint closest(const Eigen::Vector3d& p_M,
                        double max_distance_sq = std::numeric_limits<double>::infinity(),
                        const Eigen::Vector3d& toward_M = Eigen::Vector3d::Zero(),
-                       double enough_sq = 0.0) const;
+                       double enough_sq = 0.0, double slack = 0.0) const;
 
   /// The surface and a solid box: the nearest pair of points, exact in double, if nearer than
   /// `max_distance` [m]. 0 where the surface touches or crosses the box; a box that lies within a
@@ -104,6 +108,12 @@ class TriangleBvh {
     std::int32_t count;                    ///< used slots, at the front
   };
 
+  /// Slabs that hold the same children: what a box tells little of, a patch of surface aslant.
+  struct alignas(32) Slabs {
+    float low[kWidth], high[kWidth];   ///< of direction . x, x from the middle of the mesh's box
+    std::int8_t direction[3][kWidth];  ///< about the mean normal, any length; zero: no slab
+  };
+
   /// Expansions of the same children's winding numbers about their own centres.
   struct alignas(32) Moments {
     float x[kWidth], y[kWidth], z[kWidth];     ///< [m] centre
@@ -129,6 +139,7 @@ class TriangleBvh {
   /// What the kernels read.
   struct View {
     const Boxes* boxes;
+    const Slabs* slabs;
     const Moments* moments;
     const Leaf* leaves;
     const Triangle* triangles;
@@ -141,6 +152,7 @@ class TriangleBvh {
   View view() const;
 
   std::vector<Boxes> boxes_;      // by node; node 0 is the root
+  std::vector<Slabs> slabs_;      // by node
   std::vector<Moments> moments_;  // by node
   std::vector<Leaf> leaves_;
   std::vector<Triangle> triangles_;

@@ -1,0 +1,84 @@
+// What a grid of cells tells of how deep places are in a link, against the link itself.
+
+#include "proximity/depth_grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/meshes.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+std::vector<Shape> shapes() {
+  return {Box{{0.2, 0.1, 0.3}},
+          Cylinder{0.05, 0.25},
+          test::l_shape(0.2, 0.05),
+          test::torus(0.1, 0.03, 12, 6),
+          test::open_box({0.15, 0.1, 0.2}),
+          test::thin_plate(0.2, 0.004)};
+}
+
+TEST(DepthGrid, IsNeverAboveTheTruth) {
+  const test::Trial trial(shapes(), 0.005);
+  test::Rng rng(93);
+  for (const LinkModel& link : trial.model().links) {
+    DepthGrid grid(link);
+    int known = 0, sides = 0, close = 0;
+    Eigen::Vector3d p = Eigen::Vector3d::Zero();
+    for (int i = 0; i < 6000; ++i) {
+      // Now and then somewhere, mostly nearby.
+      if (i % 4 == 0) {
+        p = link.tree.center() +
+            test::random_vector(&rng, i % 40 == 0 ? 5.0 : 0.5 * link.tree.radius());
+      } else {
+        p += test::random_vector(&rng, 2e-4);
+      }
+      DepthGrid::Found found;
+      known += grid.look(p, &found) ? 1 : 0;
+      found = grid.measure(p);
+      const PointDepth truth = link.solid.depth(p, -1.0);
+      ASSERT_LE(found.floor, truth.floor + 1e-12);
+      ASSERT_LE(found.floor, truth.exact.distance + 1e-12);
+      close += found.floor > truth.floor - 0.02 ? 1 : 0;
+      if (!link.solid.is_one_mesh()) continue;
+      ASSERT_GE(found.near.within, std::abs(truth.exact.distance) - 1e-12);
+      const bool is_inside = truth.exact.distance < 0.0;
+      if (found.near.side != NearSurface::Side::kUnknown) {
+        ASSERT_EQ(found.near.side == NearSurface::Side::kInside, is_inside);
+        ++sides;
+      }
+      // What is known of a place makes its depth no other.
+      const PointDepth hinted = link.solid.depth(p, -1.0, found.near);
+      ASSERT_EQ(hinted.exact.distance, truth.exact.distance);
+      ASSERT_EQ(hinted.floor, truth.floor);
+    }
+    EXPECT_GT(known, 300);
+    EXPECT_GT(close, 1000);
+    if (link.solid.is_one_mesh()) EXPECT_EQ(sides > 0, !link.solid.has_holes());
+  }
+}
+
+// What a look tells is what was measured, wherever in the cell; a place that is none has no cell.
+TEST(DepthGrid, TellsOnlyWhatWasMeasured) {
+  const test::Trial trial(shapes(), 0.005);
+  const LinkModel& link = trial.model().links[2];
+  DepthGrid grid(link);
+  const Eigen::Vector3d p = link.tree.center();
+  DepthGrid::Found found;
+  EXPECT_FALSE(grid.look(p, &found));
+  const double measured = grid.measure(p).floor;
+  ASSERT_TRUE(grid.look(p, &found));
+  EXPECT_EQ(found.floor, measured);
+  EXPECT_FALSE(grid.look(p + Eigen::Vector3d(10, 0, 0), &found));
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(grid.look({none, 0, 0}, &found));
+  EXPECT_TRUE(std::isnan(grid.measure({0, none, 0}).floor));
+}
+
+}  // namespace
+}  // namespace ist
