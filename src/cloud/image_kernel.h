@@ -19,6 +19,11 @@ constexpr std::size_t tile_column(std::size_t slot) { return kTileSide * (slot %
 /// what is longer is looked at closely. Here with squares, of which the sum has a factor of 2.
 constexpr float kLongestTile = 2.0F * 3.0F * 3.0F;
 
+/// A pixel's coordinate is rounded as it is read, turned (three numbers, three products) and moved
+/// (one number, three sums), the stored point once, the box once: ten times, each by at most 2^-24
+/// of the range and the translation together.
+constexpr float kBoxError = 12.0F / (1 << 24);
+
 /// How boxes are made of pixels: in float, which is four times as fast as moving points in double,
 /// and wider by what that may be off.
 struct PatchPose {

@@ -23,10 +23,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
-// A pixel's coordinate is rounded as it is read, turned (three numbers, three products) and moved
-// (one number, three sums), the stored point once, the box once: ten times, each by at most 2^-24
-// of the range and the translation together.
-constexpr float kBoxError = 12.0F / (1 << 24);
 
 // A vector of floats holds one or several pixels of four tiles side by side: lane 4 i + k is of
 // tile k. So the tiles are apart whatever the vector's width, and blocks of four lanes are loaded

@@ -22,10 +22,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
-// A pixel's coordinate is rounded as it is read, turned (three numbers, three products) and moved
-// (one number, three sums), the stored point once, the box once: ten times, each by at most 2^-24
-// of the range and the translation together.
-constexpr float kBoxError = 12.0F / (1 << 24);
 
 class Tile {
  public:

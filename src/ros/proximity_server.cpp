@@ -8,6 +8,7 @@
 #include <boost/make_shared.hpp>
 
 #include "ist_proximity/robot/package_resolver.h"
+#include "ist_proximity/robot/robot_horizon.h"
 #include "ist_proximity/ros/message_conversion.h"
 #include "ist_proximity/ros/object_conversion.h"
 #include "ist_proximity/ros/status_log.h"

@@ -1,6 +1,6 @@
 // Where clouds end: the robot's reach, and what queries do not know from beyond it.
 
-#include "ist_proximity/cloud/horizon.h"
+#include "ist_proximity/robot/robot_horizon.h"
 
 #include <gtest/gtest.h>
 

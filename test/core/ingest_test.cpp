@@ -1,8 +1,6 @@
 #include "ist_proximity/cloud/ingest.h"
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <array>
@@ -17,6 +15,7 @@
 #include <thread>
 
 #include "ist_proximity/cloud/cloud_layout.h"
+#include "support/instruction_sets.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -335,22 +334,6 @@ void expect_hierarchy(const PointIndex& index, float slack = 0.0F) {
   }
 }
 
-// What the machine's processor can do, one instruction set after the other.
-template <typename Test>
-void for_each_instruction_set(const Test& test) {
-  const auto choose = [](std::int64_t targets) {
-    hwy::SetSupportedTargetsForTest(targets);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  };
-  choose(0);
-  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
-    choose(left & -left);
-    SCOPED_TRACE(hwy::TargetName(left & -left));
-    test();
-  }
-  choose(0);
-}
-
 // Frames differ, and what float rounds with them.
 void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
                  const std::map<std::uint32_t, Eigen::Vector3d>& b) {
@@ -413,7 +396,7 @@ void check_images_both_ways(Format format) {
   for (const bool owned : {false, true}) {
     format.owned = owned;
     for (const unsigned blind : {10U, 1000U, 0U}) {
-      for_each_instruction_set([&] { check_images(format, blind); });
+      test::for_each_instruction_set([&] { check_images(format, blind); });
     }
   }
 }
@@ -697,7 +680,7 @@ void check_cells() {
   }
 }
 
-TEST(Thinning, onePointOfEachOccupiedCell) { for_each_instruction_set(check_cells); }
+TEST(Thinning, onePointOfEachOccupiedCell) { test::for_each_instruction_set(check_cells); }
 
 TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
   IngestConfig config = without_limits();

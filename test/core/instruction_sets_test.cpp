@@ -9,6 +9,7 @@
 
 #include "ist_proximity/repulsion/repulsion.h"
 #include "support/box_oracle.h"
+#include "support/instruction_sets.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/trial.h"
@@ -16,14 +17,8 @@
 namespace ist {
 namespace {
 
-// Makes the library choose among `targets` from now on; 0: among all that the machine has.
-void choose(std::int64_t targets) {
-  hwy::SetSupportedTargetsForTest(targets);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
 std::vector<std::int64_t> machine_targets() {
-  choose(0);
+  test::choose_instruction_sets(0);
   std::vector<std::int64_t> targets;
   for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
     targets.push_back(left & -left);
@@ -33,7 +28,7 @@ std::vector<std::int64_t> machine_targets() {
 
 class InstructionSets : public ::testing::Test {
  protected:
-  void TearDown() override { choose(0); }
+  void TearDown() override { test::choose_instruction_sets(0); }
 };
 
 TEST_F(InstructionSets, SameGeometry) {
@@ -45,7 +40,7 @@ TEST_F(InstructionSets, SameGeometry) {
     const double distance = test::oracle_distance(mesh, p), w = test::oracle_winding(mesh, p);
     for (const std::int64_t target : machine_targets()) {
       SCOPED_TRACE(hwy::TargetName(target));
-      choose(target);
+      test::choose_instruction_sets(target);
       ASSERT_NEAR(std::sqrt(bvh.closest(p).distance_sq), distance, 1e-12);
       ASSERT_NEAR(bvh.winding_number(p), w, 0.01);
       ASSERT_NEAR(bvh.quick_winding_number(p), w, TriangleBvh::kQuickWindingError);
@@ -71,7 +66,7 @@ TEST_F(InstructionSets, SameAnswers) {
       std::vector<LinkProximity> first, results;
       for (const std::int64_t target : targets) {
         SCOPED_TRACE(hwy::TargetName(target));
-        choose(target);
+        test::choose_instruction_sets(target);
         ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&cloud}, &results));
         if (first.empty()) first = results;
         for (std::size_t i = 0; i < links.size(); ++i) {
@@ -110,7 +105,7 @@ TEST_F(InstructionSets, SameDistancesToBoxes) {
     std::vector<LinkProximity> first, results;
     for (const std::int64_t target : machine_targets()) {
       SCOPED_TRACE(hwy::TargetName(target));
-      choose(target);
+      test::choose_instruction_sets(target);
       ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&map}, &results));
       if (first.empty()) first = results;
       for (std::size_t i = 0; i < links.size(); ++i) {
@@ -147,12 +142,12 @@ TEST_F(InstructionSets, SameRepulsion) {
     }
     const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.3);
     for (std::size_t i = 0; i < links.size(); ++i) {
-      choose(0);
+      test::choose_instruction_sets(0);
       const Push first = repulsion.push(i, X_FL, {&cloud}, proximity, {});
       ASSERT_TRUE(first.force.allFinite());
       for (const std::int64_t target : machine_targets()) {
         SCOPED_TRACE(hwy::TargetName(target));
-        choose(target);
+        test::choose_instruction_sets(target);
         const Push push = repulsion.push(i, X_FL, {&cloud}, proximity, {});
         ASSERT_LT((push.force - first.force).norm(), 1e-4);
         ASSERT_LT((push.torque - first.torque).norm(), 1e-4);

@@ -3,8 +3,6 @@
 #include "cloud/point_cells.h"
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,28 +14,13 @@
 #include "cloud/divide_kernel.h"
 #include "cloud/point_index_builder.h"
 #include "cloud/point_slicer.h"
+#include "support/instruction_sets.h"
 #include "support/tiles.h"
 
 namespace ist {
 namespace {
 
 using Cloud = std::vector<CloudPoint>;
-
-// What the machine's processor can do, one instruction set after the other.
-template <typename Test>
-void for_each_instruction_set(const Test& test) {
-  const auto choose = [](std::int64_t targets) {
-    hwy::SetSupportedTargetsForTest(targets);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  };
-  choose(0);
-  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
-    choose(left & -left);
-    SCOPED_TRACE(hwy::TargetName(left & -left));
-    test();
-  }
-  choose(0);
-}
 
 Cloud numbered(Cloud points) {
   for (std::size_t i = 0; i < points.size(); ++i) points[i].id = static_cast<std::uint32_t>(i);
@@ -122,7 +105,7 @@ bool is_same(const CloudPoint& a, const CloudPoint& b) {
 }
 
 TEST(PointCells, eachPointIsInOneCell) {
-  for_each_instruction_set([] {
+  test::for_each_instruction_set([] {
     PointCells cells;
     for (const Cloud& cloud : hard_clouds()) {
       Cloud sample(cloud.begin(), cloud.begin() + static_cast<std::ptrdiff_t>(
@@ -162,7 +145,7 @@ TEST(PointCells, cellsAreSmall) {
 }
 
 TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
-  for_each_instruction_set([] {
+  test::for_each_instruction_set([] {
     PointSlicer slicer;
     for (Cloud cloud : hard_clouds()) {
       const std::size_t n = cloud.size();
@@ -205,7 +188,7 @@ PointIndex build(const Cloud& cloud) {
 TEST(PointCells, indexIsTheSameOnEveryInstructionSet) {
   const std::vector<Cloud> clouds = hard_clouds();
   std::vector<PointIndex> expected;
-  for_each_instruction_set([&] {
+  test::for_each_instruction_set([&] {
     const bool is_first = expected.empty();
     for (std::size_t i = 0; i < clouds.size(); ++i) {
       PointIndex index = build(clouds[i]);

@@ -1,4 +1,4 @@
-#include "ist_proximity/cloud/horizon.h"
+#include "ist_proximity/robot/robot_horizon.h"
 
 #include "ist_proximity/robot/reach.h"
 
