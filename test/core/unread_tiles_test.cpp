@@ -1,4 +1,5 @@
-// Queries among images of which no point has been read when the first query comes.
+// Queries among images of which no point has been read when the first query comes; by several
+// threads, too.
 
 #include <gtest/gtest.h>
 
