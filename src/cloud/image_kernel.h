@@ -24,8 +24,8 @@ constexpr float kLongestTile = 2.0F * 3.0F * 3.0F;
 /// of the range and the translation together.
 constexpr float kBoxError = 12.0F / (1 << 24);
 
-/// How boxes are made of pixels: in float, which is four times as fast as moving points in double,
-/// and wider by what that may be off.
+/// How boxes are made of pixels: in float, of which a vector holds twice as many as of double, and
+/// wider by what that may be off.
 struct PatchPose {
   explicit PatchPose(const CropPose& pose);
   /// The same, for pixels of which all that are numbers are known to be kept.

@@ -51,39 +51,42 @@ TEST(TriangleBvh, ClosestPointKeepsToItsRange) {
   EXPECT_TRUE(std::isinf(TriangleBvh().closest({0, 0, 0}).distance_sq));
 }
 
-TEST(TriangleBvh, DirectionNeverChangesTheClosestPoint) {
-  test::Rng rng(3);
+// Calls check(bvh, place, direction, distance) for places about all meshes.
+template <typename Check>
+void for_each_place(test::Rng* rng, const Check& check) {
   for (const TriangleMesh& mesh : meshes()) {
     const TriangleBvh bvh(mesh);
     for (int i = 0; i < 300; ++i) {
-      const Eigen::Vector3d p = test::random_vector(&rng, i % 3 == 0 ? 2.0 : 0.3);
-      const Eigen::Vector3d toward = test::random_vector(&rng, 1.0).normalized();
-      const double expected = test::oracle_distance(mesh, p);
-      ASSERT_NEAR(std::sqrt(bvh.closest(p, 100.0, toward).distance_sq), expected, 1e-12);
+      const Eigen::Vector3d p = test::random_vector(rng, i % 3 == 0 ? 2.0 : 0.3);
+      const Eigen::Vector3d toward = test::random_vector(rng, 1.0).normalized();
+      check(bvh, p, toward, test::oracle_distance(mesh, p));
     }
   }
 }
 
+TEST(TriangleBvh, DirectionNeverChangesTheClosestPoint) {
+  test::Rng rng(3);
+  for_each_place(&rng, [](const TriangleBvh& bvh, const Eigen::Vector3d& p,
+                          const Eigen::Vector3d& toward, double expected) {
+    ASSERT_NEAR(std::sqrt(bvh.closest(p, 100.0, toward).distance_sq), expected, 1e-12);
+  });
+}
+
 TEST(TriangleBvh, ClosestPointMayBeALittleFarther) {
   test::Rng rng(7);
-  for (const TriangleMesh& mesh : meshes()) {
-    const TriangleBvh bvh(mesh);
-    for (int i = 0; i < 300; ++i) {
-      const Eigen::Vector3d p = test::random_vector(&rng, i % 3 == 0 ? 2.0 : 0.3);
-      const Eigen::Vector3d toward = test::random_vector(&rng, 1.0).normalized();
-      const double expected = test::oracle_distance(mesh, p);
-      const double slack = std::pow(10.0, test::uniform(&rng, -6, -1));
-      const ClosestPoint closest = bvh.closest(p, 100.0, toward, 0.0, slack);
-      const double found = std::sqrt(closest.distance_sq);
-      ASSERT_GE(found, expected - 1e-12);
-      ASSERT_LE(closest.lower_bound, expected + 1e-12);
-      ASSERT_GE(closest.lower_bound, found - slack - 1e-12);
-      const ClosestPoint exact = bvh.closest(p, 100.0, toward);
-      ASSERT_EQ(exact.lower_bound, std::sqrt(exact.distance_sq));
-      const double less = 0.9 * expected;
-      ASSERT_NEAR(bvh.closest(p, less * less, toward, 0.0, slack).lower_bound, less, 1e-12);
-    }
-  }
+  for_each_place(&rng, [&rng](const TriangleBvh& bvh, const Eigen::Vector3d& p,
+                              const Eigen::Vector3d& toward, double expected) {
+    const double slack = std::pow(10.0, test::uniform(&rng, -6, -1));
+    const ClosestPoint closest = bvh.closest(p, 100.0, toward, 0.0, slack);
+    const double found = std::sqrt(closest.distance_sq);
+    ASSERT_GE(found, expected - 1e-12);
+    ASSERT_LE(closest.lower_bound, expected + 1e-12);
+    ASSERT_GE(closest.lower_bound, found - slack - 1e-12);
+    const ClosestPoint exact = bvh.closest(p, 100.0, toward);
+    ASSERT_EQ(exact.lower_bound, std::sqrt(exact.distance_sq));
+    const double less = 0.9 * expected;
+    ASSERT_NEAR(bvh.closest(p, less * less, toward, 0.0, slack).lower_bound, less, 1e-12);
+  });
 }
 
 TEST(TriangleBvh, ClosestPointStopsWhereItIsNearEnough) {
