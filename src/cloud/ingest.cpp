@@ -83,7 +83,9 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   IngestCounts counts;
   std::size_t kept = 0;
   if (image) {
-    kept = index_image(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
+    RawCloud pixels = cloud;
+    if (config.thin) pixels.owner.reset();  // all will be read: best while they are in the cache
+    kept = index_image(pixels, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
   } else {
     kept = index_list(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
   }

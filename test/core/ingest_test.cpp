@@ -373,6 +373,7 @@ void check_images(const Format& format, unsigned blind) {
     points[5 * width / 2].y() = kInf;
     IngestConfig config;
     config.max_range = 1.7;
+    config.thin = !format.owned;  // else all is read at once
     const CloudSnapshot a = ingest(points, config, {}, pose(0.5, 0.2, 1.0));
     const CloudSnapshot b = ingest(points, config, image, pose(0.5, 0.2, 1.0));
     EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
@@ -471,8 +472,10 @@ TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
   image.misaligned = 0;
   const PointIndex at_once = ingest(points, {}, image).index;
   image.owned = true;
+  IngestConfig config;
+  config.thin = false;
   for (int round = 0; round < 5; ++round) {
-    const PointIndex index = ingest(points, {}, image).index;
+    const PointIndex index = ingest(points, config, image).index;
     ASSERT_EQ(index.tile_count(), at_once.tile_count());
     std::array<std::size_t, 4> same{};
     std::vector<std::thread> threads;
@@ -569,7 +572,9 @@ TEST(Ingest, whatIsBeyondTheHorizonIsLeftOut) {
   owned.owned = true;
   for (const Format& format : {Format(), image, four_floats, owned, float64()}) {
     const Message message(points, format);
-    Ingest ingest(without_limits());
+    IngestConfig config = without_limits();
+    config.thin = !format.owned;
+    Ingest ingest(config);
     CloudSnapshot all, cut;
     ingest.run(message.raw, X_FS, {}, 0.0, &all);
     ingest.set_horizon(horizon);

@@ -89,7 +89,7 @@ struct Scene {
 TEST(UnreadTiles, AnswersAgainstBruteForce) {
   test::Rng rng(71);
   std::shared_ptr<RobotModel> model;
-  Ingest ingest(test::whole_cloud());
+  Ingest ingest(test::whole_cloud(false));
   CloudSnapshot cloud;
   QueryConfig config;
   config.max_distance = 5.0;
@@ -171,7 +171,7 @@ TEST(UnreadTiles, CopyHoldsAllPoints) {
 TEST(UnreadTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
   test::Rng rng(74);
   std::weak_ptr<std::vector<float>> message;
-  Ingest ingest(test::whole_cloud());
+  Ingest ingest(test::whole_cloud(false));
   CloudSnapshot cloud;
   {
     const Scene scene(&rng);

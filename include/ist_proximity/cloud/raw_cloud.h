@@ -16,8 +16,9 @@ struct RawCloud {
   std::size_t x = 0, y = 0, z = 0;           ///< [bytes] offsets within a point
   bool is_double = false;                    ///< float64 coordinates, else float32
   bool swap_bytes = false;                   ///< the data's byte order is not the machine's
-  /// As long as it lives, `data` stays as it is, so that it need not be read at once. Null: there
-  /// may be other data there, or none, when a call has returned.
+  /// As long as it lives, `data` stays as it is, so that it need not be read at once (where no
+  /// thinned cloud is made). Null: there may be other data there, or none, when a call has
+  /// returned.
   std::shared_ptr<const void> owner;
 
   std::size_t size() const { return width * height; }
