@@ -97,16 +97,15 @@ class ImageReader {
     if (state != PatchState::kUnclear) {
       const Side side = cut_.side_of(patch_);
       if (side == Side::kAcross) state = PatchState::kUnclear;
-      if (side == Side::kBeyond) return leave_out(state);
+      if (side == Side::kBeyond) {
+        counts_.beyond_horizon += static_cast<std::uint32_t>(count_kept(state));
+        return;
+      }
     }
-    if (state == PatchState::kAll) {
-      std::fill_n(patch_.kept, kSlots, kWhole);
-      kept_ += kPatchSide * kPatchSide;
-    } else if (state == PatchState::kUnclear) {
-      look_closely();
-    } else {
-      note_kept();
-    }
+    if (state == PatchState::kAll) std::fill_n(patch_.kept, kSlots, kWhole);
+    const std::size_t kept = state == PatchState::kUnclear ? look_closely() : count_kept(state);
+    if (kept == 0) return;
+    kept_ += kept;
     const std::uint32_t gaps = find_gaps();
     if (state != PatchState::kAll || gaps != 0 || !keep_plain()) keep_tiles(gaps);
   }
@@ -142,33 +141,25 @@ class ImageReader {
     return copy_ + 4 * (kPatchSide * row + column);
   }
 
-  // Beyond the horizon.
-  void leave_out(PatchState state) {
-    std::size_t kept = kPatchSide * kPatchSide;
-    if (state != PatchState::kAll) {
-      const std::size_t kept_before = kept_;
-      note_kept();
-      kept = kept_ - kept_before;
-      kept_ = kept_before;
-    }
-    counts_.beyond_horizon += static_cast<std::uint32_t>(kept);
-  }
-
-  // Of a patch of which some pixels are kept.
-  void note_kept() {
+  // As surveyed; what is NaN is noted.
+  std::size_t count_kept(PatchState state) {
+    if (state == PatchState::kAll) return kPatchSide * kPatchSide;
     counts_.not_a_number +=
         patch_.not_a_number - static_cast<std::uint32_t>(kPatchSide * kPatchSide - received());
-    for (const std::uint32_t kept : patch_.kept) kept_ += std::bitset<kSlots>(kept).count();
+    std::size_t count = 0;
+    for (const std::uint32_t kept : patch_.kept) count += std::bitset<kSlots>(kept).count();
+    return count;
   }
 
-  // Pixel by pixel in double, which decides.
-  void look_closely() {
+  // Pixel by pixel in double, which decides. @returns how many are kept
+  std::size_t look_closely() {
     CropBlock block;
+    std::size_t kept = 0;
     copied();
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       const std::size_t row = tile_row(slot), column = tile_column(slot);
       if (row >= rows() || column >= columns()) continue;
-      kept_ += crop_tile(cloud_, row_ + row, column_ + column, pose_, &block, &counts_);
+      kept += crop_tile(cloud_, row_ + row, column_ + column, pose_, &block, &counts_);
       for (std::size_t k = 0; k < kSlots; ++k) {
         if (block.x[k] == block.x[k]) continue;
         copied_pixel(row + k / kTileSide, column + k % kTileSide)[0] =
@@ -178,6 +169,7 @@ class ImageReader {
     if (survey_patch(anywhere_, {copy_, 4, 4 * kPatchSide}, &patch_) == PatchState::kAll) {
       std::fill_n(patch_.kept, kSlots, kWhole);
     }
+    return kept;
   }
 
   // What most patches are, where a camera sees well: in a few steps what the rest does tile by
@@ -199,9 +191,6 @@ class ImageReader {
 
   // @param gaps  slots of the tiles that may have one
   void keep_tiles(std::uint32_t gaps) {
-    if (std::all_of(patch_.kept, patch_.kept + kSlots, [](std::uint32_t k) { return k == 0; })) {
-      return;
-    }
     const bool is_near_robot = on_robot_ != nullptr && on_robot_->may_drop(box_around_patch());
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       const std::uint32_t kept = patch_.kept[slot];

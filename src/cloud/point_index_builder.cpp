@@ -1,8 +1,6 @@
 #include "cloud/point_index_builder.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "cloud/tile_box.h"
 #include "cloud/tile_reader.h"

@@ -1,6 +1,8 @@
 // Points that are brought together before they become tiles: lists, of any order or in order.
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 
 #include "cloud/point_index_builder.h"
