@@ -142,7 +142,9 @@ def ratios(rows):
     """What the project set itself as goals: one row each."""
     by = {(r["max_error_mm"], r["tolerance_mm"]): r for r in rows if r["kind"] == "ours"}
     exact, coarse = by[2.0, 0.0], by[2.0, 1.0]
-    named = {r["method"].split(",")[0].split(" ")[0] + r["kind"]: r for r in rows}
+    named = {}
+    for r in rows:  # the first of a name: nanoflann on all points, not on voxels
+        named.setdefault(r["method"].split(",")[0].split(" ")[0] + r["kind"], r)
     lines = []
 
     def line(text, goal, free, everything=None):
@@ -163,7 +165,7 @@ def ratios(rows):
         line(f"work per 30 Hz frame: {rival['method'].split(',')[0]} / ours, exact",
              "≥ 50", frame(rival, FREE) / frame(exact, FREE), frame(rival) / frame(exact))
     if "nanoflannspheres" in named:
-        line("work per 30 Hz frame: nanoflann / ours to 1 mm",
+        line("work per 30 Hz frame: nanoflann on all points / ours to 1 mm",
              "≥ 5", frame(named["nanoflannspheres"], FREE) / frame(coarse, FREE),
              frame(named["nanoflannspheres"]) / frame(coarse))
     for key, text, goal in (("p99_us", "p99", "≤ 3"), ("max_us", "largest", "≤ 10")):
