@@ -107,15 +107,15 @@ int main(int argc, char** argv) {
   if (max_errors.empty()) max_errors = {0.005, 0.002};
   const auto scenes = ist::benchmark::truth_scenes(data);
   std::printf(
-      "| max_error | balls | packing | tolerance | cases | violations | wrong state | "
+      "| max_error | spheres | packing | tolerance | cases | violations | wrong state | "
       "error mean / p99 / max | width mean | query free median / p99 | in contact |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const double max_error : max_errors) {
     const Clock::time_point start = Clock::now();
     const auto model = ist::test::panda_model(data, max_error);
     const double packing = seconds_since(start);
-    std::size_t balls = 0;
-    for (const ist::LinkModel& link : model->links) balls += link.tree.ball_count();
+    std::size_t spheres = 0;
+    for (const ist::LinkModel& link : model->links) spheres += link.tree.sphere_count();
     for (const double tolerance : {0.001, 0.0}) {
       ist::QueryConfig config;
       config.max_distance = 10.0;
@@ -127,7 +127,7 @@ int main(int argc, char** argv) {
       std::printf(
           "| %.0f mm | %zu | %.1f s | %.0f mm | %zu | %d | %d | %.4f / %.4f / %.4f mm | "
           "%.3f mm | %.0f / %.0f us | %.0f / %.0f us |\n",
-          1e3 * max_error, balls, packing, 1e3 * tolerance, tally.error.size(), tally.violations,
+          1e3 * max_error, spheres, packing, 1e3 * tolerance, tally.error.size(), tally.violations,
           tally.wrong_state, 1e3 * mean(tally.error), 1e3 * quantile(tally.error, 0.99),
           1e3 * quantile(tally.error, 1.0), 1e3 * mean(tally.width), quantile(tally.free_us, 0.5),
           quantile(tally.free_us, 0.99), quantile(tally.contact_us, 0.5),

@@ -3,14 +3,14 @@
 //
 // Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: contact [poses per cloud]
 
-#include "ist_proximity/proximity/contact_volume.h"
+#include "ist_proximity/contact/contact_volume.h"
 
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <vector>
 
-#include "cloud/thinning.h"
+#include "cloud/filters/thinning.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
 #include "truth_scenes.h"
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
             ist::contact_volume(model->links[i], *contacts[i], truth.X_FL[i], {&cloud});
         contact_us.push_back(timer.lap());
         ratios.push_back(contact_us.back() / query_us.back());
-        points.push_back(static_cast<double>(found.balls));
+        points.push_back(static_cast<double>(found.spheres));
       }
     }
   }

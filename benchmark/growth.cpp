@@ -89,7 +89,7 @@ void measure(std::FILE* csv, const char* what, double value, const Model& model,
 
 std::size_t spheres_of(const Model& model) {
   std::size_t count = 0;
-  for (const ist::LinkModel& link : model->links) count += link.tree.ball_count();
+  for (const ist::LinkModel& link : model->links) count += link.tree.sphere_count();
   return count;
 }
 

@@ -1,4 +1,4 @@
-// Packings, as the tables of doc/packing.md: time against a yardstick, gaps by number of balls in
+// Packings, as the tables of doc/packing.md: time against a yardstick, gaps by number of spheres in
 // the three orders, how far the certificate is from the truth, growth, and ways to build the tree.
 //
 // Most of it needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/geometry/mesh_io.h"
+#include "internal/geometry/mesh_io.h"
 #include "packing/options.h"
 #include "support/data_dir.h"
 #include "support/truth.h"
@@ -54,7 +54,7 @@ constexpr const char* kUsage =
     "usage: packing [OPTION VALUE ...] [--update-doc] [TABLE ...]\n"
     "TABLE: time gaps certificate growth hierarchy; all of them by default\n"
     "  --links NAME,...      of the Panda, for gaps and certificate: link0 ... link7,hand,finger\n"
-    "  --balls N,...         for gaps (200,1000,5000,20000) and growth (50 ... 20000)\n"
+    "  --spheres N,...         for gaps (200,1000,5000,20000) and growth (50 ... 20000)\n"
     "  --max-errors MM,...   for time and hierarchy (5,2)\n"
     "  --scenes NAME,...     for hierarchy: Panda,demo,synthetic\n"
     "  --instructions        for hierarchy: counts them, by valgrind; takes minutes a scene\n"
@@ -95,8 +95,8 @@ bool read_arguments(int argc, char** argv, Options* options, std::string* scene)
       options->links = items(value);
     } else if (name == "--scenes") {
       options->scenes = items(value);
-    } else if (name == "--balls") {
-      for (const std::string& one : items(value)) options->balls.push_back(std::stoi(one));
+    } else if (name == "--spheres") {
+      for (const std::string& one : items(value)) options->spheres.push_back(std::stoi(one));
     } else if (name == "--max-errors") {
       for (const std::string& one : items(value)) {
         options->max_errors.push_back(1e-3 * std::stod(one));

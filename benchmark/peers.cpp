@@ -87,7 +87,7 @@ void check(Method* method, const Scene& scene, Result* result) {
       const double error = answers[i].distance - truth.distance[i];
       if (!contact) result->error.push_back(error);
       ++result->answers;
-      const double apart = (answers[i].p_FL - answers[i].p_FO).norm();
+      const double apart = (answers[i].p_FCl - answers[i].p_FCo).norm();
       const bool fits = std::abs(apart - std::abs(answers[i].distance)) <= method->witness_error ||
                         std::isinf(method->witness_error);
       const bool holds = error >= method->least_error && error <= method->largest_error;

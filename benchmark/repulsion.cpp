@@ -20,10 +20,10 @@ using ist::benchmark::Measured;
 using ist::benchmark::Noise;
 using ist::benchmark::quantile;
 
-// The resolutions: [m] of the packing for distances, and balls of the disjoint one.
+// The resolutions: [m] of the packing for distances, and spheres of the disjoint one.
 struct Resolution {
   double max_error;
-  std::size_t balls;
+  std::size_t spheres;
 };
 constexpr Resolution kResolutions[] = {{0.02, 125}, {0.01, 250}, {0.005, 500}};
 
@@ -129,7 +129,7 @@ int main(int argc, char** argv) {
         tables.add(scene.name, resolution.max_error,
                    ist::benchmark::measure(scene, model,
                                            ist::benchmark::pack_disjoint(
-                                               scene.robot, *model, resolution.balls, argv[1])));
+                                               scene.robot, *model, resolution.spheres, argv[1])));
       }
     }
   };

@@ -1,6 +1,9 @@
 # The core library, its tools and its installation: no ROS.
 
-set(core_folders geometry packing tree robot cloud proximity repulsion)
+set(core_folders
+  geometry packing tree robot
+  cloud cloud/format cloud/filters cloud/index cloud/maps
+  proximity contact repulsion)
 list(TRANSFORM core_folders PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/src/" OUTPUT_VARIABLE core_globs)
 list(TRANSFORM core_globs APPEND "/*.cpp")
 file(GLOB core_sources CONFIGURE_DEPENDS ${core_globs})

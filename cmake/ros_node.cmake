@@ -1,7 +1,8 @@
 # The ROS side: library, node, nodelet, and the files a robot's launch file refers to.
 
-file(GLOB ros_sources CONFIGURE_DEPENDS src/ros/*.cpp)
+file(GLOB ros_sources CONFIGURE_DEPENDS src/ros/*.cpp src/ros/*/*.cpp)
 add_library(ist_proximity_ros ${ros_sources})
+target_include_directories(ist_proximity_ros PRIVATE src)
 add_dependencies(ist_proximity_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
 target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRARIES})
 
@@ -22,6 +23,7 @@ add_library(ist_proximity_nodelet MODULE src/nodes/proximity_nodelet.cpp)
 target_link_libraries(ist_proximity_nodelet PRIVATE ist_proximity_ros)
 
 foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
+  target_include_directories(${target} PRIVATE src)
   # System headers: their warnings are not ours to mend.
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 endforeach()

@@ -18,10 +18,10 @@
 
 #include "dodge_controller.h"
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/contact/contact_model.h"
+#include "ist_proximity/contact/contact_wrench.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ist_proximity/repulsion/penetration.h"
 #include "ist_proximity/repulsion/repulsion.h"
-#include "ist_proximity/robot/contact_model.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace {
@@ -150,7 +150,7 @@ int run(const std::string& urdf_path) {
     for (std::size_t i = 0; i < answers.size(); ++i) {
       const Eigen::Vector3d away = repulsion(i, X_FL[i], {&snapshot}, answers[i], repulsion_config);
       const std::size_t link = *arm.kinematics.find_link(model->links[i].name);
-      reading.links.push_back({link, answers[i].lower_bound, answers[i].p_LL, away});
+      reading.links.push_back({link, answers[i].lower_bound, answers[i].p_LCl, away});
       smallest = std::min(smallest, answers[i].lower_bound);
       largest_force = std::max(largest_force, contact_force(model->links[i], *volumes[i],
                                                             answers[i], X_FL[i], snapshot));

@@ -118,8 +118,8 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
   Jacobian J;
   for (const LinkReading& link : reading.links) {
     const double length = link.away.norm();
-    if (!known[link.link] || !link.p_LL.allFinite() || !(length > 0.0)) continue;
-    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LL, &J);
+    if (!known[link.link] || !link.p_LCl.allFinite() || !(length > 0.0)) continue;
+    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LCl, &J);
     Constraint c;
     c.a.resize(q.size());
     bool can_move = false;

@@ -13,9 +13,9 @@ namespace ist::example {
 
 /// What is known of one link's surroundings: fields of ist_proximity/LinkProximity.
 struct LinkReading {
-  std::size_t link = 0;                            ///< index in the kinematics
-  double lower_bound = 0.0;                        ///< [m]
-  Eigen::Vector3d p_LL = Eigen::Vector3d::Zero();  ///< [m] point_on_link_local; NaN when CLEAR
+  std::size_t link = 0;                             ///< index in the kinematics
+  double lower_bound = 0.0;                         ///< [m]
+  Eigen::Vector3d p_LCl = Eigen::Vector3d::Zero();  ///< [m] point_on_link_local; NaN when CLEAR
   /// Which way the link should go, in the fixed frame: `repulsion`, of any length. (`direction` is
   /// one as well, but jumps.)
   Eigen::Vector3d away = Eigen::Vector3d::Zero();

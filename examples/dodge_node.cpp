@@ -181,7 +181,7 @@ class DodgeNode {
       reading.lower_bound = one.lower_bound;
       const auto& p = one.point_on_link_local;
       const auto& r = one.repulsion;
-      reading.p_LL = {p.x, p.y, p.z};
+      reading.p_LCl = {p.x, p.y, p.z};
       reading.away = {r.x, r.y, r.z};
       reading_.links.push_back(reading);
     }

@@ -18,7 +18,7 @@ example::Reading nothing_near() {
   reading.is_ok = true;
   reading.links.resize(1);
   reading.links[0].lower_bound = 1.0;
-  reading.links[0].p_LL.setConstant(std::numeric_limits<double>::quiet_NaN());
+  reading.links[0].p_LCl.setConstant(std::numeric_limits<double>::quiet_NaN());
   return reading;
 }
 
@@ -121,7 +121,7 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
     example::LinkReading link;
     link.link = *arm.kinematics.find_link(model_->links[i].name);
     link.lower_bound = results_[i].lower_bound;
-    link.p_LL = results_[i].p_LL;
+    link.p_LCl = results_[i].p_LCl;
     link.away = config_.avoidance == Avoidance::kNearest
                     ? results_[i].direction
                     : repulsion_(i, X_FL_[i], clouds, results_[i], config_.repulsion);

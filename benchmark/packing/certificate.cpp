@@ -7,8 +7,8 @@
 #include <random>
 #include <string>
 
+#include "internal/packing/packer.h"
 #include "ist_proximity/geometry/triangle_bvh.h"
-#include "ist_proximity/packing/packer.h"
 #include "packing/options.h"
 #include "packing/parallel.h"
 
@@ -83,13 +83,13 @@ class Trial {
     return a + u * (mesh_.corner(t, 1) - a) + v * (mesh_.corner(t, 2) - a);
   }
 
-  // By brute force over the balls.
+  // By brute force over the spheres.
   void check(const Eigen::Vector3d& p, double d_mesh, Counts* counts) const {
     double inner = std::numeric_limits<double>::infinity(), outer = inner;
-    for (const Ball& ball : packing_.balls) {
-      const double to_center = (p - ball.center).norm();
-      inner = std::min(inner, to_center - ball.radius);
-      outer = std::min(outer, to_center - ball.cover_radius);
+    for (const InnerSphere& sphere : packing_.spheres) {
+      const double to_center = (p - sphere.center).norm();
+      inner = std::min(inner, to_center - sphere.radius);
+      outer = std::min(outer, to_center - sphere.cover_radius);
     }
     counts->inner_below += inner < d_mesh - kRounding ? 1 : 0;
     counts->inner_above += inner > d_mesh + packing_.certificate.max_gap + kRounding ? 1 : 0;

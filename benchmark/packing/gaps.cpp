@@ -1,12 +1,12 @@
-// Gaps and filled volume by number of balls, in the three orders.
+// Gaps and filled volume by number of spheres, in the three orders.
 
 #include <algorithm>
 #include <cstdio>
 #include <mutex>
 #include <string>
 
-#include "ist_proximity/packing/packer.h"
-#include "ist_proximity/packing/packing_report.h"
+#include "internal/packing/packer.h"
+#include "internal/packing/packing_report.h"
 #include "packing/options.h"
 #include "packing/parallel.h"
 
@@ -20,7 +20,7 @@ constexpr std::size_t kOrderCount = std::size(kOrders);
 
 // What a prototype reached on one link, sampled: the design's goals.
 struct Prototype {
-  int balls;
+  int spheres;
   const char *medial, *disjoint, *volume;  // [mm] gap, largest / mean
 };
 constexpr const char* kPrototype = "prototype, one link, sampled";
@@ -30,18 +30,19 @@ constexpr Prototype kPrototypes[] = {{200, "6.3 / 1.74", "8.4 / 2.91", "9.7 / 2.
 
 struct Job {
   const PandaLink* link;
-  int balls;
+  int spheres;
 };
 
 // "largest / mean" and "filled".
-std::pair<std::string, std::string> measured(const PandaLink& link, int balls, PackingOrder order) {
+std::pair<std::string, std::string> measured(const PandaLink& link, int spheres,
+                                             PackingOrder order) {
   PackingConfig config;
-  config.max_error = 1e-5;  // [m] never reached: the number of balls decides
-  config.max_spheres = balls;
+  config.max_error = 1e-5;  // [m] never reached: the number of spheres decides
+  config.max_spheres = spheres;
   config.order = order;
   const Packing packing = pack_mesh(link.mesh, config);
   const Solid solid({{link.mesh, Eigen::Isometry3d::Identity(), ""}});
-  const PackingReport report = measure_packing(solid, packing.balls);
+  const PackingReport report = measure_packing(solid, packing.spheres);
   return {gaps(packing.certificate.max_gap, packing.certificate.mean_gap),
           text("%.1f", 100.0 * report.filled_volume / report.solid_volume)};
 }
@@ -50,12 +51,12 @@ std::pair<std::string, std::string> measured(const PandaLink& link, int balls, P
 
 Table gaps_table() {
   Table table("gaps",
-              {"balls", "link", "medial: gap, largest / mean [mm]", "filled [%]",
+              {"spheres", "link", "medial: gap, largest / mean [mm]", "filled [%]",
                "disjoint: gap [mm]", "filled [%]", "volume: gap [mm]", "filled [%]"},
               2);
-  for (const int balls : kCounts) {
-    table.place({std::to_string(balls), kPrototype});
-    for (const std::string& link : panda_names()) table.place({std::to_string(balls), link});
+  for (const int spheres : kCounts) {
+    table.place({std::to_string(spheres), kPrototype});
+    for (const std::string& link : panda_names()) table.place({std::to_string(spheres), link});
   }
   return table;
 }
@@ -64,28 +65,28 @@ bool measure_gaps(const Options& options, Table* table) {
   const std::vector<PandaLink> links = panda_links(options);
   if (links.empty()) return false;
   for (const Prototype& one : kPrototypes) {
-    table->add(
-        {std::to_string(one.balls), kPrototype, one.medial, "", one.disjoint, "", one.volume, ""});
+    table->add({std::to_string(one.spheres), kPrototype, one.medial, "", one.disjoint, "",
+                one.volume, ""});
   }
   std::vector<Job> jobs;  // the longest first
   for (std::size_t c = std::size(kCounts); c-- > 0;) {
-    const int balls = kCounts[c];
-    if (!options.balls.empty() &&
-        std::count(options.balls.begin(), options.balls.end(), balls) == 0) {
+    const int spheres = kCounts[c];
+    if (!options.spheres.empty() &&
+        std::count(options.spheres.begin(), options.spheres.end(), spheres) == 0) {
       continue;
     }
-    for (const PandaLink& link : links) jobs.push_back({&link, balls});
+    for (const PandaLink& link : links) jobs.push_back({&link, spheres});
   }
   std::vector<Table::Row> rows;
-  for (const Job& job : jobs) rows.push_back({std::to_string(job.balls), job.link->name});
+  for (const Job& job : jobs) rows.push_back({std::to_string(job.spheres), job.link->name});
   std::vector<std::pair<std::string, std::string>> cells(jobs.size() * kOrderCount);
   std::mutex printing;
   parallel_for(cells.size(), options.threads, [&](std::size_t i) {
     const Job& job = jobs[i / kOrderCount];
-    cells[i] = measured(*job.link, job.balls, kOrders[i % kOrderCount]);
+    cells[i] = measured(*job.link, job.spheres, kOrders[i % kOrderCount]);
     const std::lock_guard<std::mutex> lock(printing);
-    std::fprintf(stderr, "%s, %d balls, order %zu: %s mm, %s %%\n", job.link->name.c_str(),
-                 job.balls, i % kOrderCount, cells[i].first.c_str(), cells[i].second.c_str());
+    std::fprintf(stderr, "%s, %d spheres, order %zu: %s mm, %s %%\n", job.link->name.c_str(),
+                 job.spheres, i % kOrderCount, cells[i].first.c_str(), cells[i].second.c_str());
   });
   for (std::size_t i = 0; i < cells.size(); ++i) {
     rows[i / kOrderCount].push_back(cells[i].first);

@@ -1,4 +1,4 @@
-// How time and memory grow with the triangles of a mesh and the balls of a packing.
+// How time and memory grow with the triangles of a mesh and the spheres of a packing.
 
 #include <malloc.h>
 #include <sys/wait.h>
@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "ist_proximity/packing/packer.h"
+#include "internal/packing/packer.h"
 #include "packing/options.h"
 #include "support.h"
 
@@ -57,10 +57,10 @@ struct Result {
   double seconds = 0.0, gap = 0.0, megabytes = 0.0;
 };
 
-Result pack(const TriangleMesh& mesh, int balls) {
+Result pack(const TriangleMesh& mesh, int spheres) {
   PackingConfig config;
-  config.max_error = 1e-5;  // never reached: the number of balls decides
-  config.max_spheres = balls;
+  config.max_error = 1e-5;  // never reached: the number of spheres decides
+  config.max_spheres = spheres;
   const double before = memory("VmRSS");
   ThreadTimer timer;
   const Packing packing = pack_mesh(mesh, config);
@@ -69,14 +69,14 @@ Result pack(const TriangleMesh& mesh, int balls) {
 }
 
 // In a process of its own, so that its peak of memory is nobody else's.
-Result pack_alone(const TriangleMesh& mesh, int balls) {
+Result pack_alone(const TriangleMesh& mesh, int spheres) {
   int ends[2];
   Result result;
   if (pipe(ends) != 0) return result;
   malloc_trim(0);  // what was freed before would be taken first, and not count
   const pid_t child = fork();
   if (child == 0) {
-    result = pack(mesh, balls);
+    result = pack(mesh, spheres);
     const bool written = write(ends[1], &result, sizeof result) == sizeof result;
     _exit(written ? 0 : 1);
   }
@@ -87,7 +87,7 @@ Result pack_alone(const TriangleMesh& mesh, int balls) {
   return result;
 }
 
-// By the vase's fineness, and number of balls.
+// By the vase's fineness, and number of spheres.
 constexpr std::pair<int, int> kCases[] = {{23, 1000}, {71, 1000}, {224, 1000}, {708, 1000},
                                           {71, 50},   {71, 200},  {71, 5000},  {71, 20000}};
 
@@ -99,15 +99,16 @@ std::pair<std::string, std::string> key(const std::pair<int, int>& one) {
 
 Table growth_table() {
   Table table("growth",
-              {"triangles", "balls", "packing [s]", "certified gap [mm]", "memory, peak [MB]"}, 2);
+              {"triangles", "spheres", "packing [s]", "certified gap [mm]", "memory, peak [MB]"},
+              2);
   for (const auto& one : kCases) table.place({key(one).first, key(one).second});
   return table;
 }
 
 bool measure_growth(const Options& options, Table* table) {
   for (const auto& one : kCases) {
-    const bool wanted = options.balls.empty() ||
-                        std::count(options.balls.begin(), options.balls.end(), one.second) > 0;
+    const bool wanted = options.spheres.empty() ||
+                        std::count(options.spheres.begin(), options.spheres.end(), one.second) > 0;
     if (!wanted) continue;
     const Result result = pack_alone(vase(one.first), one.second);
     if (!(result.seconds > 0.0)) return false;

@@ -1,4 +1,4 @@
-// Ways to divide the balls of a packing into a tree, by what they spare a query.
+// Ways to divide the spheres of a packing into a tree, by what they spare a query.
 
 #include <algorithm>
 #include <cstdio>
@@ -164,7 +164,7 @@ bool make_scene(const Options& options, const std::string& name, double max_erro
 
 struct Built {
   std::shared_ptr<const RobotModel> model;
-  std::size_t nodes = 0, leaves = 0, balls = 0;
+  std::size_t nodes = 0, leaves = 0, spheres = 0;
   double us = 0.0;
 };
 
@@ -177,7 +177,7 @@ Built with_split(const RobotModel& model, const TreeConfig& config) {
   for (const LinkModel& link : copy->links) {
     built.nodes += link.tree.nodes().size();
     built.leaves += link.tree.leaves().size();
-    built.balls += link.tree.ball_count();
+    built.spheres += link.tree.sphere_count();
   }
   built.model = copy;
   return built;
@@ -250,7 +250,7 @@ void measure_scene(const Options& options, const std::string& name, double max_e
     table->add(
         {name, text("%g", 1e3 * max_error), kSplits[i].name,
          std::to_string(built[i].nodes) + " / " + std::to_string(built[i].leaves),
-         text("%.1f", static_cast<double>(built[i].balls) / static_cast<double>(built[i].leaves)),
+         text("%.1f", static_cast<double>(built[i].spheres) / static_cast<double>(built[i].leaves)),
          text("%.0f", 1e-3 * built[i].us), text("%.0f", cost.node_pairs / queries),
          text("%.0f", cost.leaf_pairs / queries), text("%.1f", cost.exact / queries),
          text("%.1f", quantile(cost.us, 0.5)), text("%.1f", mean(cost.us)),
@@ -269,7 +269,7 @@ std::vector<double> wanted_errors(const Options& options) {
 Table hierarchy_table() {
   Table table(
       "hierarchy",
-      {"scene", "max_error [mm]", "split", "nodes / leaves", "balls a leaf", "built [ms]",
+      {"scene", "max_error [mm]", "split", "nodes / leaves", "spheres a leaf", "built [ms]",
        "node pairs", "leaf pairs", "exact", "query, median [us]", "mean [us]", "1000 instructions"},
       3);
   for (const char* scene : kScenes) {

@@ -13,7 +13,7 @@ namespace ist::benchmark {
 struct Options {
   std::vector<std::string> tables;  ///< empty: all
   std::vector<std::string> links;   ///< of the Panda; empty: all
-  std::vector<int> balls;           ///< of the gaps; empty: all
+  std::vector<int> spheres;         ///< of the gaps; empty: all
   std::vector<double> max_errors;   ///< [m] of time and hierarchy; empty: all
   std::vector<std::string> scenes;  ///< of the hierarchy, by their first words; empty: all
   bool instructions = false;        ///< of the hierarchy's queries too, by valgrind: minutes each

@@ -109,8 +109,8 @@ void plot_growth(const std::string& document, const std::string& path) {
   svg << "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " << 2 * kPanel << ' '
       << kTop + kHeight + 50 << "\" font-family=\"sans-serif\" font-size=\"12\">\n"
       << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
-  Panel(0.0, rows, 1, "1000").draw("1000 balls", "triangles", &svg);
-  Panel(kPanel, rows, 0, "9940").draw("9940 triangles", "balls", &svg);
+  Panel(0.0, rows, 1, "1000").draw("1000 spheres", "triangles", &svg);
+  Panel(kPanel, rows, 0, "9940").draw("9940 triangles", "spheres", &svg);
   svg << "</svg>\n";
   std::ofstream(path) << svg.str();
 }

@@ -141,7 +141,7 @@ constexpr double kMaxErrors[] = {0.005, 0.002};  // [m]
 Table time_table() {
   Table table(
       "time",
-      {"max_error [mm]", "balls", "packing [s]", "processor time [s]", "in yardsticks",
+      {"max_error [mm]", "spheres", "packing [s]", "processor time [s]", "in yardsticks",
        "processor time per core, in yardsticks", "from the cache [s]", "share", "yardstick [s]"},
       1);
   for (const double max_error : kMaxErrors) table.place({text("%g", 1e3 * max_error)});
@@ -174,13 +174,13 @@ bool measure_time(const Options& options, Table* table) {
       build_robot_model(robot, config);
       cached = std::min(cached, reading.times().wall);
     }
-    std::size_t balls = 0;
-    for (const LinkModel& link : model->links) balls += link.packing.balls.size();
+    std::size_t spheres = 0;
+    for (const LinkModel& link : model->links) spheres += link.packing.spheres.size();
     const double cores = std::min<double>(std::max(1U, std::thread::hardware_concurrency()),
                                           static_cast<double>(robot.links.size()));
     const bool has_unit = unit.wall > 0.0;
     table->add(
-        {text("%g", 1e3 * max_error), std::to_string(balls), text("%.2f", packing.wall),
+        {text("%g", 1e3 * max_error), std::to_string(spheres), text("%.2f", packing.wall),
          text("%.2f", packing.processor),
          has_unit ? text("%.2f", packing.wall / unit.wall) : "not measured",
          has_unit ? text("%.2f", packing.processor / cores / unit.processor) : "not measured",

@@ -86,11 +86,11 @@ void BySpheres::query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<An
       const double reach = best.distance + sphere.radius;
       Nearest found;
       if (reach <= 0.0 || !nearest(center, reach, &found) || found.distance >= reach) continue;
-      const Eigen::Vector3d way = found.p_FO - center;
+      const Eigen::Vector3d way = found.p_FCo - center;
       const double length = way.norm();
       const Eigen::Vector3d direction =
           length > 0.0 ? Eigen::Vector3d(way / length) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-      best = {found.distance - sphere.radius, center + sphere.radius * direction, found.p_FO};
+      best = {found.distance - sphere.radius, center + sphere.radius * direction, found.p_FCo};
     }
   }
 }

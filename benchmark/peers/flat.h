@@ -34,7 +34,7 @@ class BySpheres : public Method {
 
  protected:
   struct Nearest {
-    Eigen::Vector3d p_FO;
+    Eigen::Vector3d p_FCo;
     double distance;  ///< [m]
   };
   /// What is nearest to `center` (fixed frame). @returns false where it can tell that nothing is

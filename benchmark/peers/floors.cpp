@@ -29,14 +29,14 @@ class BruteForce : public BySpheres {
     name = "brute force, SIMD";
     kind = Kind::kSpheres;
     largest_error = set.gap + kRounding;
-    least_error = -set.gap;  // a ball may come out through a hole of the mesh
+    least_error = -set.gap;  // a sphere may come out through a hole of the mesh
   }
   void ingest(const Frame& frame) override { points_.read(frame); }
 
  protected:
   bool nearest(const Eigen::Vector3d& center, double /*reach*/, Nearest* found) override {
-    found->p_FO = points_.at(nearest_of_all(points_, center.cast<float>())).cast<double>();
-    found->distance = (found->p_FO - center).norm();
+    found->p_FCo = points_.at(nearest_of_all(points_, center.cast<float>())).cast<double>();
+    found->distance = (found->p_FCo - center).norm();
     return true;
   }
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "ist_proximity/geometry/mesh_io.h"
+#include "internal/geometry/mesh_io.h"
 #include "peers/scene.h"
 #include "support/pcd.h"
 #include "support/truth.h"

@@ -13,9 +13,9 @@ namespace ist::benchmark {
 
 /// Of one link, in the fixed frame.
 struct Answer {
-  double distance;       ///< [m]
-  Eigen::Vector3d p_FL;  ///< [m] on the link (or what stands for it)
-  Eigen::Vector3d p_FO;  ///< [m] on the obstacle
+  double distance;        ///< [m]
+  Eigen::Vector3d p_FCl;  ///< [m] on the link (or what stands for it)
+  Eigen::Vector3d p_FCo;  ///< [m] on the obstacle
 };
 
 /// What the distance is measured to.

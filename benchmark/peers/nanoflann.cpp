@@ -56,8 +56,8 @@ class Nanoflann : public BySpheres {
     if (reach < 1e15) distance_sq = static_cast<float>(reach * reach);
     tree_->findNeighbors(result, c.data(), nanoflann::SearchParams());
     if (result.size() == 0) return false;
-    found->p_FO = cloud_.points.at(index).cast<double>();
-    found->distance = (found->p_FO - center).norm();
+    found->p_FCo = cloud_.points.at(index).cast<double>();
+    found->distance = (found->p_FCo - center).norm();
     return true;
   }
 

@@ -22,7 +22,7 @@ class Ours : public Method {
     max_error = max_error_;
     tolerance = tolerance_;
     largest_error = tolerance + kRounding;
-    for (const LinkModel& link : model->links) spheres += link.tree.ball_count();
+    for (const LinkModel& link : model->links) spheres += link.tree.sphere_count();
   }
 
   void ingest(const Frame& frame) override {
@@ -32,7 +32,7 @@ class Ours : public Method {
   void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
     query_.run(X_FL, known_, {&snapshot_}, &results_);
     for (std::size_t i = 0; i < results_.size(); ++i) {
-      (*answers)[i] = {results_[i].distance, results_[i].p_FL, results_[i].p_FO};
+      (*answers)[i] = {results_[i].distance, results_[i].p_FCl, results_[i].p_FCo};
     }
   }
 

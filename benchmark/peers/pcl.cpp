@@ -42,8 +42,8 @@ class PclMethod : public BySpheres {
   bool nearest(const Eigen::Vector3d& center, double reach, Nearest* found) override {
     const Eigen::Vector3f c = center.cast<float>();
     if (!find({c.x(), c.y(), c.z()}, reach)) return false;
-    found->p_FO = points_.at(static_cast<std::size_t>(index_[0])).cast<double>();
-    found->distance = (found->p_FO - center).norm();
+    found->p_FCo = points_.at(static_cast<std::size_t>(index_[0])).cast<double>();
+    found->distance = (found->p_FCo - center).norm();
     return true;
   }
 

@@ -66,9 +66,9 @@ std::size_t SphereSet::size() const {
 
 SphereSet few_spheres(const Robot& robot, std::size_t wanted) {
   const auto count = [](const RobotModel& model) {
-    std::size_t balls = 0;
-    for (const LinkModel& link : model.links) balls += link.packing.balls.size();
-    return balls;
+    std::size_t spheres = 0;
+    for (const LinkModel& link : model.links) spheres += link.packing.spheres.size();
+    return spheres;
   };
   double low = 0.002, high = 0.2;  // [m] many spheres, few
   std::shared_ptr<const RobotModel> best;
@@ -84,7 +84,8 @@ SphereSet few_spheres(const Robot& robot, std::size_t wanted) {
   SphereSet set;
   for (const LinkModel& link : best->links) {
     std::vector<SphereSet::Sphere> spheres;
-    for (const Ball& ball : link.packing.balls) spheres.push_back({ball.center, ball.radius});
+    for (const InnerSphere& sphere : link.packing.spheres)
+      spheres.push_back({sphere.center, sphere.radius});
     set.links.push_back(std::move(spheres));
     set.gap = std::max(set.gap, link.packing.certificate.max_gap);
   }

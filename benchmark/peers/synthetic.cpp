@@ -14,9 +14,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kConfigurations = 40;
 
-// Where the ray from `origin` along `d` (unit) meets a ball; inf: nowhere.
-double hit_ball(const Eigen::Vector3d& origin, const Eigen::Vector3d& d,
-                const Eigen::Vector3d& center, double radius) {
+// Where the ray from `origin` along `d` (unit) meets a sphere; inf: nowhere.
+double hit_sphere(const Eigen::Vector3d& origin, const Eigen::Vector3d& d,
+                  const Eigen::Vector3d& center, double radius) {
   const Eigen::Vector3d oc = origin - center;
   const double b = oc.dot(d), c = oc.squaredNorm() - radius * radius;
   const double root = b * b - c;
@@ -59,8 +59,8 @@ Frame synthetic_frame(std::size_t width, std::size_t height) {
       const Eigen::Vector3d d = frame.X_FS.linear() * d_S;
       const double range = std::min(
           {hit_box(eye, d, table), hit_box(eye, d, block), hit_box(eye, d, wall),
-           hit_ball(eye, d, {-0.2, 0.1, 0.08}, 0.08), hit_ball(eye, d, {0.0, -0.3, 0.05}, 0.05),
-           hit_ball(eye, d, {-0.35, -0.2, 0.03}, 0.03)});
+           hit_sphere(eye, d, {-0.2, 0.1, 0.08}, 0.08), hit_sphere(eye, d, {0.0, -0.3, 0.05}, 0.05),
+           hit_sphere(eye, d, {-0.35, -0.2, 0.03}, 0.03)});
       const Eigen::Vector3f p = std::isfinite(range) ? (range * d_S).cast<float>().eval()
                                                      : Eigen::Vector3f::Constant(NAN);
       frame.data.insert(frame.data.end(), {p.x(), p.y(), p.z(), 0.0F});
@@ -77,22 +77,22 @@ struct Enclosing {
 };
 
 Enclosing enclosing(const TriangleMesh& mesh) {
-  Enclosing ball{test::bounds(mesh).center(), 0.0};
+  Enclosing sphere{test::bounds(mesh).center(), 0.0};
   for (const Eigen::Vector3d& v : mesh.vertices) {
-    ball.radius = std::max(ball.radius, (v - ball.center).norm());
+    sphere.radius = std::max(sphere.radius, (v - sphere.center).norm());
   }
-  return ball;
+  return sphere;
 }
 
 // Brute force over points and triangles. What cannot be the nearest because the link's enclosing
-// ball is farther is skipped; negative: a point is within that ball.
-double true_distance(const TriangleMesh& mesh, const Enclosing& ball, const Eigen::Isometry3d& X_FL,
-                     const std::vector<Eigen::Vector3d>& points_F) {
-  const Eigen::Vector3d center = X_FL * ball.center;
+// sphere is farther is skipped; negative: a point is within that sphere.
+double true_distance(const TriangleMesh& mesh, const Enclosing& sphere,
+                     const Eigen::Isometry3d& X_FL, const std::vector<Eigen::Vector3d>& points_F) {
+  const Eigen::Vector3d center = X_FL * sphere.center;
   const Eigen::Isometry3d X_LF = X_FL.inverse();
   std::vector<std::pair<double, std::size_t>> bounds;
   for (std::size_t i = 0; i < points_F.size(); ++i) {
-    bounds.emplace_back((points_F[i] - center).norm() - ball.radius, i);
+    bounds.emplace_back((points_F[i] - center).norm() - sphere.radius, i);
   }
   if (std::min_element(bounds.begin(), bounds.end())->first < 0.0) return -1.0;
   std::sort(bounds.begin(), bounds.end());

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ist_proximity/proximity/contact_volume.h"
+#include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "support.h"

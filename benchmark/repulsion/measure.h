@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/robot/contact_model.h"
+#include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "repulsion/scene.h"
 

@@ -3,7 +3,7 @@
 #include <limits>
 #include <random>
 
-#include "ist_proximity/proximity/contact_volume.h"
+#include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "repulsion/measure.h"
 #include "support/tiles.h"
@@ -100,7 +100,7 @@ double variation(const std::vector<std::vector<bool>>& counts, std::size_t link,
   return sum * 180.0 / EIGEN_PI;
 }
 
-// A point counts from the surface on, in full from kFullDepth of its ball's radius.
+// A point counts from the surface on, in full from kFullDepth of its sphere's radius.
 Eigen::Vector3d contact_direction(const Solid& solid, const Matrix3X& samples,
                                   const Matrix3X& points_L, double full) {
   const Eigen::Vector3d middle = samples.rowwise().mean();
@@ -141,7 +141,7 @@ double wrench_reference_variation(const MovingScene& scene, const RobotModel& mo
                                   const std::vector<std::vector<bool>>& counts) {
   std::mt19937_64 rng(6);
   const Matrix3X points = thinned_points(scene.cloud);
-  const double full = kFullDepth * kBallPerCell * scene.cloud.thinning;
+  const double full = kFullDepth * kPointSphereRadius * scene.cloud.thinning;
   double sum = 0.0;
   for (std::size_t link = 0; link < scene.robot.links.size(); ++link) {
     const Matrix3X samples = surface_samples(scene.robot.links[link].geometry, kWayInSamples, &rng);

@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "internal/geometry/tessellation.h"
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/geometry/tessellation.h"
 #include "support/truth.h"
 
 namespace ist::benchmark {
@@ -166,7 +166,7 @@ std::vector<MovingScene> analytic_scenes() {
                         0.15 * s * std::sin(2.0 * EIGEN_PI * u), 0.15 * c);
       },
       &rng, &points);
-  scenes.push_back(analytic("rod past a ball", rod, points,
+  scenes.push_back(analytic("rod past a sphere", rod, points,
                             {pose({-0.4, 0, 0.22}, {0, 0, 0}), pose({0, 0.02, 0.34}, {0.4, 1.2, 0}),
                              pose({0.4, 0.1, 0.2}, {0.8, 2.0, 0.3})}));
   points.clear();
@@ -249,10 +249,10 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
 
 std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
                                                               const RobotModel& model,
-                                                              std::size_t balls,
+                                                              std::size_t spheres,
                                                               const std::string& cache_directory) {
   ContactConfig config;
-  config.packing.max_spheres = balls;
+  config.packing.max_spheres = spheres;
   std::vector<std::shared_ptr<const ContactBody>> bodies;
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     bodies.push_back(

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/robot/contact_model.h"
+#include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist::benchmark {
@@ -32,10 +32,10 @@ std::vector<MovingScene> analytic_scenes();
 /// The recorded motion among the recorded frames.
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data);
 
-/// By link, for wrenches: `balls` at most; from the cache where they are there.
+/// By link, for wrenches: `spheres` at most; from the cache where they are there.
 std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
                                                               const RobotModel& model,
-                                                              std::size_t balls,
+                                                              std::size_t spheres,
                                                               const std::string& cache_directory);
 
 /// Packed to `max_error` [m]; from the cache where it is there.

@@ -5,12 +5,12 @@
 #include <stdexcept>
 #include <string>
 
-#include "cloud/image_tiles.h"
-#include "cloud/list_tiles.h"
-#include "cloud/point_index_builder.h"
-#include "cloud/scene_axes.h"
-#include "cloud/self_filter.h"
-#include "cloud/thinning.h"
+#include "cloud/filters/self_filter.h"
+#include "cloud/filters/thinning.h"
+#include "cloud/index/image_tiles.h"
+#include "cloud/index/list_tiles.h"
+#include "cloud/index/point_index_builder.h"
+#include "cloud/index/scene_axes.h"
 
 namespace ist {
 namespace {
@@ -36,7 +36,7 @@ void check(const IngestConfig& config) {
 
 struct Ingest::Impl {
   IngestConfig config;
-  Horizon horizon;
+  RegionOfInterest region;
   PointIndexBuilder builder;
   SelfFilter self_filter;
   Thinning thinning;
@@ -53,12 +53,11 @@ Ingest& Ingest::operator=(Ingest&&) noexcept = default;
 
 const IngestConfig& Ingest::config() const { return impl_->config; }
 
-void Ingest::set_horizon(const Horizon& horizon) {
-  if (!horizon.center_F.allFinite() || !(horizon.radius >= 0.0)) {
-    throw std::invalid_argument(
-        "the horizon's centre is not finite, or its radius no number >= 0.");
+void Ingest::set_region_of_interest(const RegionOfInterest& region) {
+  if (!region.center_F.allFinite() || !(region.radius >= 0.0)) {
+    throw std::invalid_argument("the region's centre is not finite, or its radius no number >= 0.");
   }
-  impl_->horizon = horizon;
+  impl_->region = region;
 }
 
 void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
@@ -70,7 +69,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   const IngestConfig& config = impl_->config;
   CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
 
-  limit(impl_->horizon, X_FS, &pose);
+  limit(impl_->region, X_FS, &pose);
   const bool image = is_image(cloud, pose);
   turn(scene_axes(cloud, X_FS.linear(), image), &pose);
 
@@ -91,11 +90,11 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -
-                        counts.beyond_horizon - static_cast<std::uint32_t>(kept);
+                        counts.outside_region - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
   snapshot->thinning = config.thinning;
-  snapshot->horizon = impl_->horizon;
+  snapshot->region = impl_->region;
   if (config.thin) {
     impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
   } else {

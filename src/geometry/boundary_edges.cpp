@@ -1,4 +1,4 @@
-#include "geometry/boundary_edges.h"
+#include "internal/geometry/boundary_edges.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/mesh_io.h"
+#include "internal/geometry/mesh_io.h"
 
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
@@ -21,8 +21,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "geometry/orientation.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/geometry/orientation.h"
 
 namespace ist {
 namespace {

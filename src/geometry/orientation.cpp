@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/orientation.h"
+#include "geometry/orientation.h"
 
 #include <Eigen/Geometry>
 #include <cmath>

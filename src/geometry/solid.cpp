@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/boundary_edges.h"
-#include "ist_proximity/geometry/tessellation.h"
+#include "internal/geometry/boundary_edges.h"
+#include "internal/geometry/tessellation.h"
 
 namespace ist {
 namespace {

@@ -14,8 +14,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Flatter than this, a triangle's plane is uncertain: square of height over length.
 constexpr double kSliver = 1e-6;
 
-// From the centre to where the triangle's part in the ball ends: its highest corner, or where the
-// disc that its plane cuts out of the ball is highest, whichever is less.
+// From the centre to where the triangle's part in the sphere ends: its highest corner, or where the
+// disc that its plane cuts out of the sphere is highest, whichever is less.
 double reach_within(const TriangleBvh::Triangle& t, const Eigen::Vector3d& center, double radius,
                     const Eigen::Vector3d& n) {
   const Eigen::Vector3d a = t.a - center, b = t.b - center, c = t.c - center;

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "geometry/float_rounding.h"
+#include "internal/geometry/float_rounding.h"
 
 namespace ist {
 namespace {

@@ -55,31 +55,31 @@ class Contacts {
 
 }  // namespace
 
-MedialBallFinder::InnerBall climb(const MedialBallFinder& finder, const Eigen::Vector3d& x) {
-  MedialBallFinder::Obstacle obstacle = finder.nearest(x);
-  MedialBallFinder::InnerBall ball{x, obstacle.distance};
+MedialSphereFinder::InnerSphere climb(const MedialSphereFinder& finder, const Eigen::Vector3d& x) {
+  MedialSphereFinder::Obstacle obstacle = finder.nearest(x);
+  MedialSphereFinder::InnerSphere sphere{x, obstacle.distance};
   Contacts contacts;
   contacts.add(obstacle.contact);
-  double step = 0.5 * ball.radius;
-  for (int i = 0; i < kMaxSteps && step > kShortestStep * ball.radius; ++i) {
-    const Eigen::Vector3d direction = contacts.away(ball.center, ball.radius + step);
+  double step = 0.5 * sphere.radius;
+  for (int i = 0; i < kMaxSteps && step > kShortestStep * sphere.radius; ++i) {
+    const Eigen::Vector3d direction = contacts.away(sphere.center, sphere.radius + step);
     const double slope = direction.norm();
     if (slope < kFlat) {
       step *= 0.5;
       continue;
     }
     // A step shorter than the clearance crosses no triangle, and leaves through no hole.
-    const Eigen::Vector3d next = ball.center + step / slope * direction;
+    const Eigen::Vector3d next = sphere.center + step / slope * direction;
     obstacle = finder.nearest(next);
     contacts.add(obstacle.contact);
-    if (obstacle.distance > (1.0 + kLeastRise) * ball.radius) {
-      ball = {next, obstacle.distance};
-      step = std::min(1.5 * step, 0.9 * ball.radius);
+    if (obstacle.distance > (1.0 + kLeastRise) * sphere.radius) {
+      sphere = {next, obstacle.distance};
+      step = std::min(1.5 * step, 0.9 * sphere.radius);
     } else {
       step *= 0.5;
     }
   }
-  return ball;
+  return sphere;
 }
 
 }  // namespace ist

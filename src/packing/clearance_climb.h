@@ -2,15 +2,15 @@
 
 #include <Eigen/Core>
 
-#include "medial_ball.h"
+#include "medial_sphere.h"
 
 namespace ist {
 
 /// Climbs from x to a local maximum of the clearance (the distance to the nearest obstacle): the
 /// movement of a ProtoSphere prototype (Weller 2013, section 5.2), with a step away from all
 /// obstacles that are about as near at once, so that it follows ridges instead of zigzagging.
-/// @param x  inside and clear of all balls
-/// @returns a ball that touches no obstacle and is at least as large as the one about x
-MedialBallFinder::InnerBall climb(const MedialBallFinder& finder, const Eigen::Vector3d& x);
+/// @param x  inside and clear of all spheres
+/// @returns a sphere that touches no obstacle and is at least as large as the one about x
+MedialSphereFinder::InnerSphere climb(const MedialSphereFinder& finder, const Eigen::Vector3d& x);
 
 }  // namespace ist

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/boundary_edges.h"
-#include "geometry/hole_caps.h"
+#include "internal/geometry/boundary_edges.h"
+#include "internal/geometry/hole_caps.h"
 
 namespace ist {
 namespace {
@@ -28,9 +28,9 @@ constexpr double kGrowth = 0.2;  // of a step that the distance may lag behind
 // Where exits are looked for across a cap, as shares of its way to the mesh.
 constexpr double kOffsets[] = {0.02, 0.15, 0.4};
 constexpr int kHalvings = 5;
-constexpr std::size_t kMaxBalls = 2000;
+constexpr std::size_t kMaxSpheres = 2000;
 
-// Outside, or so near to it that a ball should not rely on being inside.
+// Outside, or so near to it that a sphere should not rely on being inside.
 constexpr double kOpen = 0.52;
 // So near to an integer, the winding number tells of no hole; elsewhere of one that is far.
 constexpr double kWhole = 0.02, kAboutWhole = 0.1;
@@ -117,21 +117,21 @@ void HoleGuard::look_about(const Corners& cap) {
   look_about({middle, turned.b, turned.c});
 }
 
-// Whether an obstacle holds the balls about all points of the cap that reach to the mesh:
+// Whether an obstacle holds the spheres about all points of the cap that reach to the mesh:
 // |x - center| + |x - q| is convex, and no less than what x needs, for any point q of the mesh.
 bool HoleGuard::is_held(const Corners& cap, const Eigen::Vector3d& q) const {
-  if (balls_.size() == 0) return false;
+  if (spheres_.size() == 0) return false;
   const Eigen::Vector3d y = (cap.a + cap.b + cap.c) / 3.0;
-  const BallSearch::Match match = balls_.best(&y, 1, 0);
-  const Eigen::Vector3d& center = balls_.center(match.ball);
+  const SphereSearch::Match match = spheres_.best(&y, 1, 0);
+  const Eigen::Vector3d& center = spheres_.center(match.sphere);
   const auto holds = [&](const Eigen::Vector3d& x) {
-    return (x - center).norm() + (x - q).norm() <= balls_.weight(match.ball);
+    return (x - center).norm() + (x - q).norm() <= spheres_.weight(match.sphere);
   };
   return holds(cap.a) && holds(cap.b) && holds(cap.c);
 }
 
-// From y in the cap's plane away from the mesh, as long as the ball there that reaches to the mesh
-// holds the one before: in the middle of a hole one obstacle stands for most of it.
+// From y in the cap's plane away from the mesh, as long as the sphere there that reaches to the
+// mesh holds the one before: in the middle of a hole one obstacle stands for most of it.
 Eigen::Vector3d HoleGuard::climbed(const Eigen::Vector3d& y, const Eigen::Vector3d& normal,
                                    const ClosestPoint& closest) const {
   Eigen::Vector3d x = y, q = closest.point;
@@ -179,8 +179,8 @@ std::optional<Eigen::Vector3d> HoleGuard::exit_across(const Eigen::Vector3d& y,
   return y + 0.5 * (low + high) * normal;
 }
 
-// A point outside keeps the ball as far away as the mesh. Along a ray, the way less the distance to
-// the mesh does not fall: beyond where it comes to the radius nothing matters.
+// A point outside keeps the sphere as far away as the mesh. Along a ray, the way less the distance
+// to the mesh does not fall: beyond where it comes to the radius nothing matters.
 std::optional<Eigen::Vector3d> HoleGuard::exit_along(const Eigen::Vector3d& center, double radius,
                                                      const Eigen::Vector3d& ray,
                                                      double* margin) const {
@@ -229,7 +229,7 @@ bool HoleGuard::admits(const Eigen::Vector3d& center, double radius) {
   }
   if (!exit && std::isfinite(least)) exit = exit_about(center, radius, nearest, least);
   if (!exit) return true;
-  if (balls_.size() < kMaxBalls) add(*exit);
+  if (spheres_.size() < kMaxSpheres) add(*exit);
   return false;
 }
 
@@ -266,10 +266,10 @@ HoleGuard::Obstacle HoleGuard::nearest(const Eigen::Vector3d& x, double at_most)
     const double distance = std::sqrt(edge.distance_sq) - tolerance_;
     if (distance < obstacle.distance) obstacle = {edge.point, tolerance_, distance};
   }
-  if (balls_.size() == 0) return obstacle;
-  const BallSearch::Match match = balls_.best(&x, 1, 0);
+  if (spheres_.size() == 0) return obstacle;
+  const SphereSearch::Match match = spheres_.best(&x, 1, 0);
   if (match.cost < obstacle.distance) {
-    obstacle = {balls_.center(match.ball), balls_.weight(match.ball), match.cost};
+    obstacle = {spheres_.center(match.sphere), spheres_.weight(match.sphere), match.cost};
   }
   return obstacle;
 }
@@ -286,8 +286,8 @@ double HoleGuard::to_mesh(const Eigen::Vector3d& p) const {
 
 void HoleGuard::add(const Eigen::Vector3d& exit) {
   const double needed = to_mesh(exit);
-  balls_.add(exit,
-             needed + std::clamp(kSlackShare * needed, 0.5 * tolerance_, kMaxSlack * tolerance_));
+  spheres_.add(exit,
+               needed + std::clamp(kSlackShare * needed, 0.5 * tolerance_, kMaxSlack * tolerance_));
 }
 
 }  // namespace ist

@@ -3,25 +3,25 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "ball_search.h"
 #include "ist_proximity/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/triangle_mesh.h"
+#include "sphere_search.h"
 
 namespace ist {
 
-/// Keeps inner balls away from the holes of a mesh.
+/// Keeps inner spheres away from the holes of a mesh.
 ///
 /// Outside is where the winding number is at most 0.5, so in a hole the inside ends without a
 /// triangle, at the exits: the points off the mesh where it is 0.5. With D(p) the distance to the
-/// mesh, a ball (c, r) is too near to a point p outside if |p - c| - r < D(p). On the way from p to
-/// c the left side falls by the way moved, the right side by no more: it is enough that no exit x
-/// has |x - c| - r < D(x), and that no triangle is in the ball. So the balls about all exits x that
-/// reach to the mesh, of radius D(x), are obstacles to inner balls; a few larger ones stand for
-/// them here.
+/// mesh, a sphere (c, r) is too near to a point p outside if |p - c| - r < D(p). On the way from p
+/// to c the left side falls by the way moved, the right side by no more: it is enough that no exit
+/// x has |x - c| - r < D(x), and that no triangle is in the sphere. So the spheres about all exits
+/// x that reach to the mesh, of radius D(x), are obstacles to inner spheres; a few larger ones
+/// stand for them here.
 ///
 /// Exits are looked for at first where triangles would close the holes. In open meshes that are not
 /// surfaces with holes (flaps, parts that overlap) they are elsewhere too: `admits` looks for them
-/// about each ball that is to be taken, and what it finds is an obstacle from then on. Open edges
+/// about each sphere that is to be taken, and what it finds is an obstacle from then on. Open edges
 /// are obstacles of a small radius, for cracks.
 ///
 /// Watertight meshes have no exits and cost nothing.
@@ -39,12 +39,12 @@ class HoleGuard {
   /// The obstacle nearest to x; `distance` is `at_most` where none is nearer.
   Obstacle nearest(const Eigen::Vector3d& x, double at_most) const;
 
-  /// Whether the ball, which touches no triangle and no obstacle, may be taken: its centre is
+  /// Whether the sphere, which touches no triangle and no obstacle, may be taken: its centre is
   /// inside and no exit was found too near. If one was, it is an obstacle now.
   bool admits(const Eigen::Vector3d& center, double radius);
 
   bool is_closed() const { return edges_.size() == 0; }
-  std::size_t ball_count() const { return balls_.size(); }
+  std::size_t sphere_count() const { return spheres_.size(); }
 
  private:
   struct Corners {
@@ -69,8 +69,8 @@ class HoleGuard {
   const TriangleBvh& bvh_;
   double tolerance_;
   TriangleBvh edges_;  // open edges, as triangles without area: obstacles of radius tolerance_
-  BallSearch balls_;
-  BallSearch doubtful_;  // where caps are, and exits that balls_ do not hold may be; with D
+  SphereSearch spheres_;
+  SphereSearch doubtful_;  // where caps are, and exits that spheres_ do not hold may be; with D
   std::size_t caps_seen_ = 0;
 };
 

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <vector>
 
-#include "ball_search.h"
+#include "sphere_search.h"
 
 namespace ist {
 namespace {
 
-// Where a hole leaves no room for inner balls, outer ones have this share of the way to the mesh,
+// Where a hole leaves no room for inner spheres, outer ones have this share of the way to the mesh,
 // and of the gap that is wanted.
 constexpr double kBehindHole = 0.5;
 
@@ -53,16 +53,17 @@ int cut(const Eigen::Vector3d& center, const Eigen::Vector3d& half, const Eigen:
 
 class InteriorCover {
  public:
-  InteriorCover(const TriangleBvh& bvh, const MedialBallFinder& finder, const PackingConfig& config,
-                BallSearch* balls, Packing* packing)
+  InteriorCover(const TriangleBvh& bvh, const MedialSphereFinder& finder,
+                const PackingConfig& config, SphereSearch* spheres, Packing* packing)
       : bvh_(bvh),
         finder_(finder),
         config_(config),
-        // Nearer than the surface is to the balls, the interior is of no use.
+        // Nearer than the surface is to the spheres, the interior is of no use.
         target_(std::max(config.max_error, packing->certificate.max_gap)),
-        balls_(*balls),
+        spheres_(*spheres),
         packing_(*packing) {
-    for (const Ball& ball : packing_.balls) search_.add(ball.center, ball.cover_radius);
+    for (const InnerSphere& sphere : packing_.spheres)
+      search_.add(sphere.center, sphere.cover_radius);
   }
 
   bool run(const PackingProgress& progress) {
@@ -106,7 +107,7 @@ class InteriorCover {
                                             (k & 2) != 0U ? half.y() : -half.y(),
                                             (k & 4) != 0U ? half.z() : -half.z());
     }
-    const BallSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
+    const SphereSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
     if (match.cost <= target_) return;
     const double radius = half.norm();
     const ClosestPoint surface = bvh_.closest(center);
@@ -121,28 +122,28 @@ class InteriorCover {
         kind == Cell::kInside || (kind == Cell::kUnclear && radius <= kUnclearSize * target_);
     if (is_wanted && fill(center, radius, kind, match)) return;
     for (const Eigen::Vector3d& corner : corners) {
-      visit(0.5 * (center + corner), 0.5 * half, match.ball);
+      visit(0.5 * (center + corner), 0.5 * half, match.sphere);
     }
   }
 
-  // Whether a ball covers what of the cell is deeper than target_: cut off across the way to the
-  // nearest surface point q, or from the ball.
+  // Whether a sphere covers what of the cell is deeper than target_: cut off across the way to the
+  // nearest surface point q, or from the sphere.
   bool is_covered_below(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
-                        const Eigen::Vector3d& q, const BallSearch::Match& match) const {
+                        const Eigen::Vector3d& q, const SphereSearch::Match& match) const {
     if (!finder_.is_closed()) return false;
-    const Eigen::Vector3d from_ball = center - search_.center(match.ball), from_q = center - q;
-    const double side = from_q.dot(from_ball) > 0.0 ? 1.0 : -1.0;
+    const Eigen::Vector3d from_sphere = center - search_.center(match.sphere), from_q = center - q;
+    const double side = from_q.dot(from_sphere) > 0.0 ? 1.0 : -1.0;
     return is_covered_along(side * from_q, center, half, match) ||
-           is_covered_along(from_ball, center, half, match);
+           is_covered_along(from_sphere, center, half, match);
   }
 
-  // Whether a ball covers what of the cell is deeper than target_, as far as one plane can tell.
+  // Whether a sphere covers what of the cell is deeper than target_, as far as one plane can tell.
   //
   // Beyond everything that the surface reaches along n, within target_ of the cell, all is outside
   // if one point is: it is convex, and no triangle crosses it. Points of the cell that come there
   // by a way of target_ are outside, or cross the surface on it.
   bool is_covered_along(const Eigen::Vector3d& way, const Eigen::Vector3d& center,
-                        const Eigen::Vector3d& half, const BallSearch::Match& match) const {
+                        const Eigen::Vector3d& half, const SphereSearch::Match& match) const {
     const double reach = half.norm() + target_;
     const Eigen::Vector3d n = way.stableNormalized();
     if (!(n.squaredNorm() > 0.5)) return false;  // no way at all
@@ -153,27 +154,27 @@ class InteriorCover {
     std::array<Eigen::Vector3d, kMaxCorners> corners;
     const int count = cut(center, half, n, highest - target_, &corners);
     return count == 0 ||
-           search_.best(corners.data(), count, match.ball, 0, target_).cost <= target_;
+           search_.best(corners.data(), count, match.sphere, 0, target_).cost <= target_;
   }
 
-  // A ball about the cell's centre, when the centre itself lacks one. False: divide the cell.
+  // A sphere about the cell's centre, when the centre itself lacks one. False: divide the cell.
   bool fill(const Eigen::Vector3d& center, double radius, Cell kind,
-            const BallSearch::Match& match) {
-    const double uncovered = search_.best(&center, 1, match.ball, 0, 0.5 * target_).cost;
+            const SphereSearch::Match& match) {
+    const double uncovered = search_.best(&center, 1, match.sphere, 0, 0.5 * target_).cost;
     if (uncovered <= 0.5 * target_ && 2.0 * radius > 0.5 * target_) return false;
-    if (packing_.balls.size() >= static_cast<std::size_t>(config_.max_spheres)) {
+    if (packing_.spheres.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
       return true;
     }
-    const MedialBallFinder::InnerBall ball =
+    const MedialSphereFinder::InnerSphere sphere =
         kind == Cell::kInside
             ? finder_.around(center, 0.1 * target_)
-            : MedialBallFinder::InnerBall{center, -std::sqrt(bvh_.closest(center).distance_sq)};
+            : MedialSphereFinder::InnerSphere{center, -std::sqrt(bvh_.closest(center).distance_sq)};
     const double cover_radius =
-        ball.radius < 0.0 ? kBehindHole * std::max(-ball.radius, target_) : ball.radius;
-    packing_.balls.push_back({ball.center, ball.radius, cover_radius});
-    search_.add(ball.center, cover_radius);
-    balls_.add(ball.center, ball.radius);
+        sphere.radius < 0.0 ? kBehindHole * std::max(-sphere.radius, target_) : sphere.radius;
+    packing_.spheres.push_back({sphere.center, sphere.radius, cover_radius});
+    search_.add(sphere.center, cover_radius);
+    spheres_.add(sphere.center, sphere.radius);
     return false;
   }
 
@@ -193,12 +194,12 @@ class InteriorCover {
   }
 
   const TriangleBvh& bvh_;
-  const MedialBallFinder& finder_;
+  const MedialSphereFinder& finder_;
   const PackingConfig& config_;
   const double target_;  // [m]
-  BallSearch& balls_;
+  SphereSearch& spheres_;
   Packing& packing_;
-  BallSearch search_;  // outer balls
+  SphereSearch search_;  // outer spheres
   PackingProgress progress_;
   double done_ = 0.0;
   int visits_ = 0;
@@ -207,10 +208,10 @@ class InteriorCover {
 
 }  // namespace
 
-bool cover_interior(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                    const PackingConfig& config, const PackingProgress& progress, BallSearch* balls,
-                    Packing* packing) {
-  return InteriorCover(bvh, finder, config, balls, packing).run(progress);
+bool cover_interior(const TriangleBvh& bvh, const MedialSphereFinder& finder,
+                    const PackingConfig& config, const PackingProgress& progress,
+                    SphereSearch* spheres, Packing* packing) {
+  return InteriorCover(bvh, finder, config, spheres, packing).run(progress);
 }
 
 }  // namespace ist

@@ -1,4 +1,4 @@
-#include "ist_proximity/packing/packer.h"
+#include "internal/packing/packer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include "hole_guard.h"
 #include "interior_cover.h"
+#include "internal/geometry/tessellation.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/geometry/tessellation.h"
-#include "medial_ball.h"
+#include "medial_sphere.h"
 #include "surface_cover.h"
 #include "volume_filler.h"
 
@@ -19,10 +19,10 @@ namespace {
 // The share of the wanted error that an inscribed prism may take.
 constexpr double kTessellationShare = 0.1;
 
-// Room for a ball smaller than this share of the wanted error is left as it is.
+// Room for a sphere smaller than this share of the wanted error is left as it is.
 constexpr double kHoleShare = 0.5;
 
-// How far beyond what they must, inner balls stay away from holes in the mesh, as a share of the
+// How far beyond what they must, inner spheres stay away from holes in the mesh, as a share of the
 // wanted error, and at least of the mesh's size.
 constexpr double kGuardShare = 0.1;
 constexpr double kLeastGuard = 1e-3;
@@ -55,7 +55,7 @@ Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& 
   PackingConfig inner = config;
   inner.max_error = config.max_error - tessellation.deviation;
   Packing packing = pack_mesh(tessellation.mesh, inner, progress);
-  for (Ball& ball : packing.balls) ball.cover_radius += tessellation.deviation;
+  for (InnerSphere& sphere : packing.spheres) sphere.cover_radius += tessellation.deviation;
   PackingCertificate& certificate = packing.certificate;
   certificate.max_gap += tessellation.deviation;
   certificate.mean_gap += tessellation.deviation;
@@ -66,7 +66,7 @@ Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& 
 
 Packing pack_sphere(const Sphere& sphere) {
   Packing packing;
-  packing.balls.push_back({Eigen::Vector3d::Zero(), sphere.radius, sphere.radius});
+  packing.spheres.push_back({Eigen::Vector3d::Zero(), sphere.radius, sphere.radius});
   packing.certificate.surface_area = 4.0 * M_PI * sphere.radius * sphere.radius;
   packing.certificate.reached = true;
   return packing;
@@ -83,22 +83,22 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
     return !stopped;
   };
   const TriangleBvh bvh(mesh);
-  BallSearch balls;
+  SphereSearch spheres;
   const bool may_overlap = config.order == PackingOrder::kMedial;
   const double tolerance =
       std::max(kGuardShare * config.max_error, kLeastGuard * bvh.bounds().sizes().norm());
   HoleGuard guard(mesh, bvh, tolerance);
-  const MedialBallFinder finder(bvh, &guard, may_overlap ? nullptr : &balls);
-  SurfaceCover cover(mesh, finder, &balls);
+  const MedialSphereFinder finder(bvh, &guard, may_overlap ? nullptr : &spheres);
+  SurfaceCover cover(mesh, finder, &spheres);
   std::optional<VolumeFiller> holes;
-  if (!may_overlap) holes.emplace(bvh, finder, balls, kHoleShare * config.max_error);
+  if (!may_overlap) holes.emplace(bvh, finder, spheres, kHoleShare * config.max_error);
   if (holes) holes->stop_with(watched);
   cover.refine(config, holes ? &*holes : nullptr, share_of(watched, 0.0, kSurfaceShare));
   if (!stopped) cover.sharpen();
   Packing packing;
   cover.certify(&packing);
   const PackingProgress rest = share_of(watched, kSurfaceShare, 1.0);
-  if (stopped || !cover_interior(bvh, finder, config, rest, &balls, &packing)) {
+  if (stopped || !cover_interior(bvh, finder, config, rest, &spheres, &packing)) {
     packing.certificate.interior_gap = bvh.bounds().sizes().norm();
   }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;

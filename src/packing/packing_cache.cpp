@@ -1,4 +1,4 @@
-#include "ist_proximity/packing/packing_cache.h"
+#include "internal/packing/packing_cache.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -15,21 +15,21 @@
 #include <fstream>
 #include <variant>
 
-#include "ist_proximity/packing/packer.h"
+#include "internal/packing/packer.h"
 
 namespace ist {
 namespace {
 
 namespace fs = std::filesystem;
 
-// A file: magic, format version, key, ball count, certificate, balls, checksum of all before it.
-// Integers and doubles are little-endian.
+// A file: magic, format version, key, sphere count, certificate, spheres, checksum of all before
+// it. Integers and doubles are little-endian.
 constexpr char kMagic[] = "ISTPACK";  // with its final 0: 8 bytes
 constexpr std::uint32_t kFormatVersion = 1;
 constexpr std::size_t kKeySize = 32;
 constexpr std::size_t kDouble = 8;
 constexpr std::size_t kHeaderSize = sizeof(kMagic) + 4 + kKeySize + 8 + 5 * kDouble + 4;
-constexpr std::size_t kBallSize = 5 * kDouble;
+constexpr std::size_t kSphereSize = 5 * kDouble;
 constexpr std::size_t kChecksumSize = 8;
 constexpr std::streamoff kMaxFileSize = 1LL << 32;
 
@@ -121,11 +121,11 @@ struct ShapeWriter {
 
 std::string serialized(const std::string& key, const Packing& packing) {
   Writer out;
-  out.reserve(kHeaderSize + kBallSize * packing.balls.size() + kChecksumSize);
+  out.reserve(kHeaderSize + kSphereSize * packing.spheres.size() + kChecksumSize);
   out.raw(kMagic, sizeof(kMagic));
   out.u32(kFormatVersion);
   out.raw(key.data(), key.size());
-  out.u64(packing.balls.size());
+  out.u64(packing.spheres.size());
   const PackingCertificate& certificate = packing.certificate;
   out.f64(certificate.max_gap);
   out.f64(certificate.mean_gap);
@@ -133,10 +133,10 @@ std::string serialized(const std::string& key, const Packing& packing) {
   out.f64(certificate.unreachable_area);
   out.f64(certificate.surface_area);
   out.u32(certificate.reached ? 1 : 0);
-  for (const Ball& ball : packing.balls) {
-    out.vector(ball.center);
-    out.f64(ball.radius);
-    out.f64(ball.cover_radius);
+  for (const InnerSphere& sphere : packing.spheres) {
+    out.vector(sphere.center);
+    out.f64(sphere.radius);
+    out.f64(sphere.cover_radius);
   }
   out.u64(out.hash(0));
   return out.bytes();
@@ -150,9 +150,9 @@ bool is_sound(const PackingCertificate& certificate) {
          is_length(certificate.surface_area);
 }
 
-bool is_sound(const Ball& ball) {
-  return ball.center.allFinite() && std::isfinite(ball.radius) && is_length(ball.cover_radius) &&
-         ball.cover_radius >= ball.radius;
+bool is_sound(const InnerSphere& sphere) {
+  return sphere.center.allFinite() && std::isfinite(sphere.radius) &&
+         is_length(sphere.cover_radius) && sphere.cover_radius >= sphere.radius;
 }
 
 // Why the bytes are no packing of this key; empty when they are.
@@ -168,7 +168,7 @@ std::string parse(const std::string& bytes, const std::string& key, Packing* pac
   if (in.raw(kKeySize) != key) return "it holds another packing";
   const std::uint64_t count = in.u64();
   const std::size_t payload = bytes.size() - kHeaderSize - kChecksumSize;
-  if (payload % kBallSize != 0 || payload / kBallSize != count) {
+  if (payload % kSphereSize != 0 || payload / kSphereSize != count) {
     return "its size does not fit the " + std::to_string(count) + " spheres it announces";
   }
   Reader end(bytes);
@@ -184,16 +184,16 @@ std::string parse(const std::string& bytes, const std::string& key, Packing* pac
   certificate.surface_area = in.f64();
   certificate.reached = in.u32() != 0;
   if (!is_sound(certificate)) return "its certificate is not finite";
-  packing->balls.reserve(count);
+  packing->spheres.reserve(count);
   for (std::uint64_t i = 0; i < count; ++i) {
-    Ball ball;
-    for (int k = 0; k < 3; ++k) ball.center[k] = in.f64();
-    ball.radius = in.f64();
-    ball.cover_radius = in.f64();
-    if (!is_sound(ball)) return "its sphere " + std::to_string(i) + " is not valid";
-    packing->balls.push_back(ball);
+    InnerSphere sphere;
+    for (int k = 0; k < 3; ++k) sphere.center[k] = in.f64();
+    sphere.radius = in.f64();
+    sphere.cover_radius = in.f64();
+    if (!is_sound(sphere)) return "its sphere " + std::to_string(i) + " is not valid";
+    packing->spheres.push_back(sphere);
   }
-  return packing->balls.empty() ? "it holds no sphere" : "";
+  return packing->spheres.empty() ? "it holds no sphere" : "";
 }
 
 // Writes and syncs a new file, so that after the rename it is whole even if the power fails.

@@ -1,11 +1,11 @@
-#include "ist_proximity/packing/packing_report.h"
+#include "internal/packing/packing_report.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
-#include "ball_search.h"
+#include "sphere_search.h"
 
 namespace ist {
 namespace {
@@ -30,14 +30,14 @@ Eigen::Vector3d direction(int i) {
   return {radius * std::cos(kGoldenAngle * i), radius * std::sin(kGoldenAngle * i), z};
 }
 
-// How much nearer the ball is than the mesh to the first point outside that is met along a ray.
-double bulge(const Solid& solid, const Ball& ball, const Eigen::Vector3d& ray) {
-  double way = ball.radius;
+// How much nearer the sphere is than the mesh to the first point outside that is met along a ray.
+double bulge(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3d& ray) {
+  double way = sphere.radius;
   for (int i = 0; i < kMarchSteps; ++i) {
-    const Eigen::Vector3d p = ball.center + way * ray;
+    const Eigen::Vector3d p = sphere.center + way * ray;
     const double distance =
         std::abs(solid.distance_outside(p, std::numeric_limits<double>::infinity()).distance);
-    const double nearer = ball.radius + distance - way;
+    const double nearer = sphere.radius + distance - way;
     // Along a ray this does not grow.
     if (nearer <= kTouch) return 0.0;
     if (!solid.is_inside(p)) return nearer;
@@ -46,44 +46,44 @@ double bulge(const Solid& solid, const Ball& ball, const Eigen::Vector3d& ray) {
   return 0.0;
 }
 
-double protrusion(const Solid& solid, const Ball& ball) {
-  const double depth = -solid.signed_distance(ball.center).distance;
-  double farthest = std::max(0.0, ball.radius - depth);
+double protrusion(const Solid& solid, const InnerSphere& sphere) {
+  const double depth = -solid.signed_distance(sphere.center).distance;
+  double farthest = std::max(0.0, sphere.radius - depth);
   if (!solid.has_holes()) return farthest;
   for (int i = 0; i < kDirections; ++i) {
-    farthest = std::max(farthest, bulge(solid, ball, direction(i)));
+    farthest = std::max(farthest, bulge(solid, sphere, direction(i)));
   }
   return farthest;
 }
 
 }  // namespace
 
-PackingReport measure_packing(const Solid& solid, const std::vector<Ball>& balls) {
+PackingReport measure_packing(const Solid& solid, const std::vector<InnerSphere>& spheres) {
   PackingReport report;
-  BallSearch search;
+  SphereSearch search;
   Eigen::AlignedBox3d box;
-  for (const Ball& ball : balls) {
-    if (ball.radius > 0.0) {
-      report.protrusion = std::max(report.protrusion, protrusion(solid, ball));
+  for (const InnerSphere& sphere : spheres) {
+    if (sphere.radius > 0.0) {
+      report.protrusion = std::max(report.protrusion, protrusion(solid, sphere));
       if (search.size() > 0) {
-        const double nearest = search.best(&ball.center, 1, 0).cost;
-        report.overlap = std::max(report.overlap, ball.radius - nearest);
+        const double nearest = search.best(&sphere.center, 1, 0).cost;
+        report.overlap = std::max(report.overlap, sphere.radius - nearest);
       }
     }
-    search.add(ball.center, ball.radius);
-    box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
-    box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
+    search.add(sphere.center, sphere.radius);
+    box.extend(Eigen::Vector3d(sphere.center.array() - sphere.cover_radius));
+    box.extend(Eigen::Vector3d(sphere.center.array() + sphere.cover_radius));
   }
-  if (balls.empty()) return report;
+  if (spheres.empty()) return report;
   int inside = 0, filled = 0;
   std::uint32_t hint = 0;
   for (int i = 0; i < kVolumeSamples; ++i) {
     const Eigen::Vector3d p = box.min() + cube_point(i).cwiseProduct(box.sizes());
-    const BallSearch::Match match = search.best(&p, 1, hint);
-    hint = match.ball;
-    const bool in_ball = match.cost < 0.0;
-    if (in_ball) ++filled;
-    if (in_ball || solid.is_inside(p)) ++inside;
+    const SphereSearch::Match match = search.best(&p, 1, hint);
+    hint = match.sphere;
+    const bool in_sphere = match.cost < 0.0;
+    if (in_sphere) ++filled;
+    if (in_sphere || solid.is_inside(p)) ++inside;
   }
   report.solid_volume = box.volume() * inside / kVolumeSamples;
   report.filled_volume = box.volume() * filled / kVolumeSamples;

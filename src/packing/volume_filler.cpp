@@ -21,9 +21,9 @@ constexpr int kMaxRefusalsInAll = 500;
 
 }  // namespace
 
-VolumeFiller::VolumeFiller(const TriangleBvh& bvh, const MedialBallFinder& finder,
-                           const BallSearch& balls, double min_radius)
-    : bvh_(bvh), finder_(finder), balls_(balls), min_radius_(min_radius) {
+VolumeFiller::VolumeFiller(const TriangleBvh& bvh, const MedialSphereFinder& finder,
+                           const SphereSearch& spheres, double min_radius)
+    : bvh_(bvh), finder_(finder), spheres_(spheres), min_radius_(min_radius) {
   const Eigen::AlignedBox3d box = bvh.bounds();
   const double half = 0.25 * box.sizes().maxCoeff();
   if (box.sizes().minCoeff() <= 0.0) return;  // flat: nothing to fill
@@ -37,11 +37,11 @@ VolumeFiller::VolumeFiller(const TriangleBvh& bvh, const MedialBallFinder& finde
 void VolumeFiller::add_cell(const Eigen::Vector3d& center, double half, const Cell* parent) {
   const double radius = std::sqrt(3.0) * half;
   const double to_surface = std::sqrt(bvh_.closest(center).distance_sq);
-  // Within the ball about the parent's centre that no triangle enters, the side is the same.
+  // Within the sphere about the parent's centre that no triangle enters, the side is the same.
   const bool same_side = parent != nullptr && finder_.is_closed() &&
                          std::abs(parent->room) > (center - parent->center).norm();
   const bool inside = same_side ? parent->room > 0.0 : bvh_.is_inside(center);
-  // Balls keep as far away from a point outside as the mesh, on the other side of a hole too.
+  // Spheres keep as far away from a point outside as the mesh, on the other side of a hole too.
   const double room = inside ? finder_.holes().nearest(center, to_surface).distance : -to_surface;
   Cell cell{center, half, room, room, room + radius, 0, false};
   update(&cell);
@@ -50,10 +50,10 @@ void VolumeFiller::add_cell(const Eigen::Vector3d& center, double half, const Ce
   std::push_heap(cells_.begin(), cells_.end(), BoundLess());
 }
 
-// Balls added since; true if they lower the bound.
+// Spheres added since; true if they lower the bound.
 bool VolumeFiller::update(Cell* cell) const {
   if (cell->seen == count()) return false;
-  const BallSearch::Match match = balls_.best(&cell->center, 1, count() - 1, cell->seen);
+  const SphereSearch::Match match = spheres_.best(&cell->center, 1, count() - 1, cell->seen);
   cell->seen = count();
   cell->clearance = std::min(cell->clearance, match.cost);
   const double bound = match.cost + std::sqrt(3.0) * cell->half;
@@ -63,27 +63,28 @@ bool VolumeFiller::update(Cell* cell) const {
 }
 
 void VolumeFiller::add_prototype(const Eigen::Vector3d& start, int refusals) {
-  const MedialBallFinder::InnerBall ball = climb(finder_, start);
+  const MedialSphereFinder::InnerSphere sphere = climb(finder_, start);
   // A little below min_radius too: what is left of a cell must be decided before its size is 0.
-  if (ball.radius < kEnough * min_radius_ || ball.radius <= 0.0) return;
-  prototypes_.push_back({ball, count(), refusals});
+  if (sphere.radius < kEnough * min_radius_ || sphere.radius <= 0.0) return;
+  prototypes_.push_back({sphere, count(), refusals});
   std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
 }
 
-// The largest prototype is clear of all balls afterwards. One that a new ball cuts into climbs
+// The largest prototype is clear of all spheres afterwards. One that a new sphere cuts into climbs
 // anew from where it is.
 void VolumeFiller::revise_prototypes() {
   while (!prototypes_.empty() && prototypes_.front().seen != count()) {
     std::pop_heap(prototypes_.begin(), prototypes_.end(), Smaller());
     Prototype prototype = prototypes_.back();
     prototypes_.pop_back();
-    const double clear = balls_.best(&prototype.ball.center, 1, count() - 1, prototype.seen).cost;
-    if (clear >= prototype.ball.radius) {
+    const double clear =
+        spheres_.best(&prototype.sphere.center, 1, count() - 1, prototype.seen).cost;
+    if (clear >= prototype.sphere.radius) {
       prototype.seen = count();
       prototypes_.push_back(prototype);
       std::push_heap(prototypes_.begin(), prototypes_.end(), Smaller());
     } else if (clear > 0.0) {
-      add_prototype(prototype.ball.center, prototype.refusals);
+      add_prototype(prototype.sphere.center, prototype.refusals);
     }
   }
 }
@@ -93,22 +94,22 @@ bool VolumeFiller::is_stopped() {
   return stopped_;
 }
 
-std::optional<MedialBallFinder::InnerBall> VolumeFiller::next(double at_least) {
+std::optional<MedialSphereFinder::InnerSphere> VolumeFiller::next(double at_least) {
   for (;;) {
     if (is_stopped()) return std::nullopt;
     revise_prototypes();
-    const double found = prototypes_.empty() ? 0.0 : prototypes_.front().ball.radius;
+    const double found = prototypes_.empty() ? 0.0 : prototypes_.front().sphere.radius;
     if (cells_.empty() || cells_.front().bound <= std::max(found / kEnough, at_least)) {
       if (found <= 0.0 || found < kEnough * at_least) return std::nullopt;
       std::pop_heap(prototypes_.begin(), prototypes_.end(), Smaller());
       const Prototype prototype = prototypes_.back();
       prototypes_.pop_back();
-      const MedialBallFinder::InnerBall& ball = prototype.ball;
-      if (finder_.is_closed() || finder_.admits(ball)) return ball;
+      const MedialSphereFinder::InnerSphere& sphere = prototype.sphere;
+      if (finder_.is_closed() || finder_.admits(sphere)) return sphere;
       stopped_ = ++refusals_ >= kMaxRefusalsInAll;
       // It climbs anew from where it is, away from the hole, but not without end.
-      if (prototype.refusals < kMaxRefusals && finder_.nearest(ball.center).distance > 0.0) {
-        add_prototype(ball.center, prototype.refusals + 1);
+      if (prototype.refusals < kMaxRefusals && finder_.nearest(sphere.center).distance > 0.0) {
+        add_prototype(sphere.center, prototype.refusals + 1);
       }
       continue;
     }

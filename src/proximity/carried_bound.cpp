@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/float_rounding.h"
+#include "internal/geometry/float_rounding.h"
 
 namespace ist {
 namespace {
@@ -28,14 +28,14 @@ Eigen::AlignedBox3d box_of(const LinkModel& link) {
 
 SeenClouds::Seen SeenClouds::look(const CloudSnapshot& cloud) {
   Seen seen;
-  if (!cloud.index.empty()) seen.points = cloud.index.generation();
+  if (!cloud.index.empty()) seen.points = cloud.index.build_id();
   if (cloud.boxes == nullptr || cloud.boxes->empty()) return seen;
-  seen.boxes = cloud.boxes->generation();
+  seen.boxes = cloud.boxes->build_id();
   seen.X_FM = cloud.X_FM.matrix().topRows<3>();
   return seen;
 }
 
-std::uint64_t SeenClouds::note(const std::vector<const CloudSnapshot*>& clouds) {
+std::uint64_t SeenClouds::note(SnapshotSpan clouds) {
   bool same = clouds.size() == count_;
   for (std::size_t i = 0; i < clouds.size() && i < seen_.size(); ++i) {
     const Seen now = look(*clouds[i]);

@@ -16,11 +16,11 @@ class SeenClouds {
  public:
   /// @returns a number that stays the same from call to call as long as all clouds do; 0 where
   ///          there are more of them than are remembered.
-  std::uint64_t note(const std::vector<const CloudSnapshot*>& clouds);
+  std::uint64_t note(SnapshotSpan clouds);
 
  private:
   struct Seen {
-    std::uint64_t points = 0, boxes = 0;  ///< generations; 0: there are none
+    std::uint64_t points = 0, boxes = 0;  ///< build ids; 0: there are none
     Eigen::Matrix<double, 3, 4> X_FM = Eigen::Matrix<double, 3, 4>::Zero();  ///< of the boxes
   };
   static constexpr std::size_t kMost = 16;
@@ -31,7 +31,7 @@ class SeenClouds {
   std::uint64_t number_ = 0;
 };
 
-/// Around all of a link, and of what it encloses, in its own frame [m].
+/// BoundingSphere all of a link, and of what it encloses, in its own frame [m].
 Eigen::AlignedBox3d box_of(const LinkModel& link);
 
 /// Where a link's parts are: a box in its own frame.
@@ -56,7 +56,7 @@ class LinkExtent {
 ///
 /// A solid is a set of points, each of which goes no farther than that. The inside of a mesh with
 /// holes ends where no surface is: a point outside may then be inside, and its distance jump to
-/// less than nothing, after a way as short as you like. But the balls leave no inside beyond
+/// less than nothing, after a way as short as you like. But the spheres leave no inside beyond
 /// InnerSphereTree::interior_gap(), and a point that is known to stay farther from them stays
 /// outside.
 class CarriedBound {
@@ -65,7 +65,7 @@ class CarriedBound {
 
   /// @param clouds  by SeenClouds; 0: nothing is carried
   /// @param bound   [m] of the distance to the stored points
-  /// @param beyond  [m] no point is nearer to the balls, or what planes of the link leave of them
+  /// @param beyond  [m] no point is nearer to the spheres, or what planes of the link leave of them
   void prove(std::uint64_t clouds, const Eigen::Isometry3d& X_FL, double bound, double beyond);
   void forget() { clouds_ = 0; }
 

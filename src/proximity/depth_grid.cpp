@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/float_rounding.h"
+#include "internal/geometry/float_rounding.h"
 #include "proximity/carried_bound.h"
 
 namespace ist {

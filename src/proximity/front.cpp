@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "geometry/float_rounding.h"
+#include "internal/geometry/float_rounding.h"
 
 namespace ist {
 namespace {

@@ -32,7 +32,7 @@ class Front {
   Front();
 
   /// To be called before a descent. Without a front to go on from, it is empty then.
-  /// @param index  generation of the index
+  /// @param index  build_id of the index
   /// @param X_OL   of the link, in its frame
   void go_to(std::uint64_t index, const Eigen::Isometry3d& X_OL, const LinkExtent& extent);
   /// To be called after it. False: it was cut short, or there was no room.

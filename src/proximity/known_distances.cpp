@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/float_rounding.h"
+#include "internal/geometry/float_rounding.h"
 
 namespace ist {
 

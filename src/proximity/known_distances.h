@@ -19,7 +19,7 @@ class KnownDistances {
 
   KnownDistances() : places_(kPlaces) {}
 
-  /// @param index  generation of the index, not 0
+  /// @param index  build_id of the index, not 0
   /// @param id     of the point there
   /// @returns [m] what is kept is at least, now that the point is at p_L; -inf: unknown
   double at(std::uint64_t index, Kind kind, std::uint32_t id, const Eigen::Vector3d& p_L) const;

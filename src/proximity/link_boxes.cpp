@@ -103,17 +103,18 @@ void LinkQuery::take_overlap(const BoxDistance& found, const Eigen::AlignedBox3d
   }
 }
 
-// The balls of a leaf and a box: the middle of a ball, or what of the box is nearest to it, is
+// The spheres of a leaf and a box: the middle of a sphere, or what of the box is nearest to it, is
 // where the depth is largest but for what the packing leaves open.
-void LinkQuery::take_ball(std::int32_t leaf, std::int32_t tile, int lane) {
-  const SphereLeaf& balls = link_->tree.leaves()[static_cast<std::size_t>(leaf)];
+void LinkQuery::take_sphere(std::int32_t leaf, std::int32_t tile, int lane) {
+  const SphereLeaf& spheres = link_->tree.leaves()[static_cast<std::size_t>(leaf)];
   const Eigen::AlignedBox3d box = boxes_->tiles()[static_cast<std::size_t>(tile)].box(lane);
   double deepest = kInfinity;
   Eigen::Vector3d p_O = box.center();
-  for (int b = 0; b < balls.count; ++b) {
-    const Eigen::Vector3d center = X_OL_ * Eigen::Vector3d(balls.x[b], balls.y[b], balls.z[b]);
+  for (int b = 0; b < spheres.count; ++b) {
+    const Eigen::Vector3d center =
+        X_OL_ * Eigen::Vector3d(spheres.x[b], spheres.y[b], spheres.z[b]);
     const Eigen::Vector3d nearest = clamp_to(box, center);
-    const double distance = (center - nearest).norm() - static_cast<double>(balls.inner[b]);
+    const double distance = (center - nearest).norm() - static_cast<double>(spheres.inner[b]);
     if (distance >= deepest) continue;
     deepest = distance;
     p_O = nearest;
@@ -124,7 +125,7 @@ void LinkQuery::take_ball(std::int32_t leaf, std::int32_t tile, int lane) {
 // As find_depth, of boxes: those that may hold points inside the link.
 void LinkQuery::find_overlap(Deadline* deadline) {
   struct Entry {
-    double distance;  // [m] of the node's middle from the link's outer balls, less its radius
+    double distance;  // [m] of the node's middle from the link's outer spheres, less its radius
     std::int32_t child;
   };
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "proximity/around.h"
+#include "internal/cloud/bounding_sphere.h"
 #include "proximity/link_query.h"
 
 namespace ist {
@@ -45,8 +45,8 @@ void LinkQuery::find_depth(Deadline* deadline) {
     const BoxNode& node = index_->nodes()[static_cast<std::size_t>(entry.child)];
     const std::size_t begin = top;
     for (int k = 0; k < node.count; ++k) {
-      const Around ball = around_child(node, k);
-      const double bound = depth_bound(X_LO_ * ball.center, ball.radius);
+      const BoundingSphere sphere = bounding_sphere(node, k);
+      const double bound = depth_bound(X_LO_ * sphere.center, sphere.radius);
       if (bound == kInfinity) continue;
       if (bound >= threshold()) {
         drop(bound);
@@ -59,8 +59,8 @@ void LinkQuery::find_depth(Deadline* deadline) {
   }
 }
 
-// [m] No point of a ball has a smaller signed distance; inf: what it holds the descent has seen,
-// all of it outside. Cells are measured only where balls of the link are near.
+// [m] No point of a sphere has a smaller signed distance; inf: what it holds the descent has seen,
+// all of it outside. Cells are measured only where spheres of the link are near.
 double LinkQuery::depth_bound(const Eigen::Vector3d& center, double radius) {
   DepthGrid::Found found;
   const bool is_known = grid_.look(center, &found);
@@ -79,7 +79,7 @@ double LinkQuery::depth_bound(const Eigen::Vector3d& center, double radius) {
 // Each point that is evaluated bounds its neighbours too, so few of the sixteen have to be.
 void LinkQuery::find_depth_in_tile(std::int32_t tile, double tile_bound) {
   const double interior = interior_reach();
-  const std::uint64_t index = index_->generation();
+  const std::uint64_t index = index_->build_id();
   PointTile room;
   const PointTile& points = index_->tile(static_cast<std::size_t>(tile), &room);
   const int count = points.count;

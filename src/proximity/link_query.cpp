@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/float_rounding.h"
-#include "geometry/relative_pose.h"
+#include "internal/geometry/float_rounding.h"
+#include "internal/geometry/relative_pose.h"
 
 namespace ist {
 namespace {
@@ -42,18 +42,17 @@ bool Deadline::passed() {
   return passed_;
 }
 
-std::uint64_t LinkQuery::generation(const CloudSnapshot& cloud, Part part) {
-  if (part == Part::kPoints) return cloud.index.generation();
-  return cloud.boxes ? cloud.boxes->generation() : 0;
+std::uint64_t LinkQuery::build_id(const CloudSnapshot& cloud, Part part) {
+  if (part == Part::kPoints) return cloud.index.build_id();
+  return cloud.boxes ? cloud.boxes->build_id() : 0;
 }
 
-void LinkQuery::start(const Eigen::Isometry3d& X_FL,
-                      const std::vector<const CloudSnapshot*>& clouds, std::uint64_t seen,
+void LinkQuery::start(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, std::uint64_t seen,
                       const QueryConfig& config) {
   start_cold(X_FL, seen, config, kInfinity);
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     for (const Part part : {Part::kPoints, Part::kBoxes}) {
-      if (last_generation_ == 0 || generation(*clouds[i], part) != last_generation_) continue;
+      if (last_build_id_ == 0 || build_id(*clouds[i], part) != last_build_id_) continue;
       if (!enter(*clouds[i], static_cast<std::int32_t>(i), part)) continue;
       // What was the surface's nearest point to it is no farther now than the two are apart.
       const double apart = part == Part::kPoints
@@ -78,13 +77,13 @@ void LinkQuery::start_cold(const Eigen::Isometry3d& X_FL, std::uint64_t seen,
   // Until something is proven: no point is deeper in the link than its bounding sphere's radius.
   dropped_ = -link_->tree.radius();
   rounding_ = reach_ = 0.0;
-  horizon_ = kInfinity;
+  region_ = kInfinity;
 }
 
-// How near to the link what lies beyond a horizon may be.
-double LinkQuery::to_horizon(const Horizon& horizon) const {
-  const double from_center = (X_FL_ * link_->tree.center() - horizon.center_F).norm();
-  return std::max(horizon.radius - from_center, 0.0) - link_->tree.radius();
+// How near to the link what lies beyond a region may be.
+double LinkQuery::to_region(const RegionOfInterest& region) const {
+  const double from_center = (X_FL_ * link_->tree.center() - region.center_F).norm();
+  return std::max(region.radius - from_center, 0.0) - link_->tree.radius();
 }
 
 bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part) {
@@ -126,7 +125,7 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside, double be
                          const Eigen::Vector3d& toward) {
   if (boxes_ != nullptr) return consider_box(tile, lane, is_outside);
   const Eigen::Vector3d p_O = point_O(tile, lane), p_L = X_LO_ * p_O;
-  const std::uint64_t index = index_->generation();
+  const std::uint64_t index = index_->build_id();
   const std::uint32_t key = key_of(tile, lane);
   if (is_outside) {
     const double known = known_.at(index, KnownDistances::Kind::kOutside, key, p_L);
@@ -207,7 +206,7 @@ bool LinkQuery::on_expired(void* context) {
   return static_cast<LinkQuery*>(context)->deadline_->passed();
 }
 
-// Without a last answer: the inner balls find a point that is near, its exact
+// Without a last answer: the inner spheres find a point that is near, its exact
 // distance is a bound.
 void LinkQuery::find_first(Traversal* traversal) {
   Traversal inner = *traversal;
@@ -217,17 +216,16 @@ void LinkQuery::find_first(Traversal* traversal) {
   descend_inner(&inner);
   if (inner.inner_tile >= 0) consider(inner.inner_tile, inner.inner_lane, false, kInfinity, aim_L_);
   if (inner.inner_distance < 0.0F && boxes_ != nullptr) {
-    take_ball(inner.inner_leaf, inner.inner_tile, inner.inner_lane);
+    take_sphere(inner.inner_leaf, inner.inner_tile, inner.inner_lane);
   }
   traversal->node_pairs += inner.node_pairs;
   traversal->leaf_pairs += inner.leaf_pairs;
 }
 
-bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
-                       QueryStatistics* statistics) {
-  horizon_ = kInfinity;
+bool LinkQuery::refine(SnapshotSpan clouds, Deadline* deadline, QueryStatistics* statistics) {
+  region_ = kInfinity;
   for (const CloudSnapshot* cloud : clouds) {
-    horizon_ = std::min(horizon_, to_horizon(cloud->horizon));
+    region_ = std::min(region_, to_region(cloud->region));
   }
   if (sees_all() && is_settled()) return true;
   if (deadline->passed()) return false;
@@ -239,8 +237,8 @@ bool LinkQuery::refine(const std::vector<const CloudSnapshot*>& clouds, Deadline
   cells_left_ = link_->solid.is_closed() ? kMaxCells : kMaxCells / 8;
   bool stopped = false;
   if (!sees_all()) {
-    drop(horizon_);
-    ++statistics->past_horizon;
+    drop(region_);
+    ++statistics->outside_region;
   }
   for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
     for (const Part part : {Part::kPoints, Part::kBoxes}) {
@@ -326,7 +324,7 @@ void LinkQuery::descend(Traversal* traversal) {
 
 // From where the last descent of this index ended, if that can be.
 void LinkQuery::go_on(Traversal* traversal) {
-  const std::uint64_t index = boxes_ != nullptr ? boxes_->generation() : index_->generation();
+  const std::uint64_t index = boxes_ != nullptr ? boxes_->build_id() : index_->build_id();
   traversal->front = fronts_.of(index);
   if (traversal->front != nullptr) traversal->front->go_to(index, X_OL_, extent_);
 }
@@ -376,10 +374,10 @@ double LinkQuery::proven() const {
   return bound - kPointError * (reach_ + std::abs(bound)) - config_.margin;
 }
 
-void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result) {
+void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   result->reset();
   statistics_ = nullptr;
-  last_generation_ = 0;
+  last_build_id_ = 0;
   if (nearest_.exact.distance > range()) {
     if (!complete_ || !sees_all()) return;  // UNKNOWN: nothing measured, and not all was seen
     result->state = LinkState::kClear;
@@ -392,16 +390,16 @@ void LinkQuery::answer(const std::vector<const CloudSnapshot*>& clouds, LinkProx
   const double point_error = kPointError * (reach_ + std::abs(nearest.exact.distance));
   const CloudSnapshot& cloud = *clouds[static_cast<std::size_t>(nearest.cloud)];
   const auto tile = static_cast<std::size_t>(nearest.tile);
-  last_generation_ = generation(cloud, nearest.part);
+  last_build_id_ = build_id(cloud, nearest.part);
   last_tile_ = nearest.tile;
   last_lane_ = nearest.lane;
   last_witness_L_ = nearest.exact.witness;
   result->state = nearest.exact.distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = nearest.exact.distance;
   result->lower_bound = least_bound() - point_error - config_.margin;
-  result->p_LL = nearest.exact.witness;
-  result->p_FL = X_FL_ * nearest.exact.witness;
-  result->p_FO = nearest.p_F;
+  result->p_LCl = nearest.exact.witness;
+  result->p_FCl = X_FL_ * nearest.exact.witness;
+  result->p_FCo = nearest.p_F;
   result->direction = -(X_FL_.linear() * nearest.exact.normal);
   result->source = nearest.cloud;
   PointTile room;

@@ -38,8 +38,8 @@ class LinkQuery {
 
   /// Sets the pose and evaluates the last answer's point at it, if that point is still there.
   /// @param seen  by SeenClouds: whether bounds of other poses hold
-  void start(const Eigen::Isometry3d& X_FL, const std::vector<const CloudSnapshot*>& clouds,
-             std::uint64_t seen, const QueryConfig& config);
+  void start(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, std::uint64_t seen,
+             const QueryConfig& config);
 
   /// As start(), without the last answer's point: for a link that need only be known where it is
   /// nearer than another.
@@ -52,17 +52,16 @@ class LinkQuery {
   /// [m] Proven: the link's distance is not below it. Inf where nothing is in range.
   double proven() const;
   /// After refine(): whether the clouds end nowhere that this link would have to know.
-  bool sees_all() const { return horizon_ >= config_.max_distance + config_.margin; }
+  bool sees_all() const { return region_ >= config_.max_distance + config_.margin; }
 
   /// The descent. False: the deadline passed first; what is known by then still holds.
-  bool refine(const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline,
-              QueryStatistics* statistics);
+  bool refine(SnapshotSpan clouds, Deadline* deadline, QueryStatistics* statistics);
 
   /// The answer as it stands after start() or refine().
-  void answer(const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result);
+  void answer(SnapshotSpan clouds, LinkProximity* result);
 
   void forget() {
-    last_generation_ = 0;
+    last_build_id_ = 0;
     carried_.forget();
     fronts_.forget();
   }
@@ -87,7 +86,7 @@ class LinkQuery {
   bool is_settled();
   void look_ahead();
   void keep_bound();
-  static std::uint64_t generation(const CloudSnapshot& cloud, Part part);
+  static std::uint64_t build_id(const CloudSnapshot& cloud, Part part);
   static std::uint32_t key_of(std::int32_t tile, int lane) {
     return static_cast<std::uint32_t>(tile) * kPointWidth + static_cast<std::uint32_t>(lane);
   }
@@ -111,7 +110,7 @@ class LinkQuery {
   void find_first(Traversal* traversal);
   void find_depth(Deadline* deadline);
   double depth_bound(const Eigen::Vector3d& center, double radius);
-  /// [m] What is farther from the balls is outside.
+  /// [m] What is farther from the spheres is outside.
   double interior_reach() const { return link_->tree.interior_gap() + 3.0 * rounding_; }
   void find_depth_in_tile(std::int32_t tile, double tile_bound);
 
@@ -128,7 +127,7 @@ class LinkQuery {
   bool first_visit(std::int32_t tile, int lane);
   static void on_candidate(void* context, std::int32_t tile, int lane, float bound);
   void keep_promise();
-  Eigen::Vector3d way_from_ball(std::int32_t leaf, const Eigen::Vector3d& p_L) const;
+  Eigen::Vector3d way_from_sphere(std::int32_t leaf, const Eigen::Vector3d& p_L) const;
   void evaluate_waiting();
   void drop_far_waiting();
   void rule_out_waiting();
@@ -142,12 +141,12 @@ class LinkQuery {
   void take_point(const Eigen::Vector3d& p_O, std::int32_t tile, int lane);
   void take_overlap(const BoxDistance& found, const Eigen::AlignedBox3d& box, std::int32_t tile,
                     int lane);
-  void take_ball(std::int32_t leaf, std::int32_t tile, int lane);
+  void take_sphere(std::int32_t leaf, std::int32_t tile, int lane);
   void find_overlap(Deadline* deadline);
   void find_overlap_in_tile(std::int32_t tile);
   void find_depth_in_box(const BoxCell& whole, std::int32_t tile, int lane);
   BoxCell make_cell(const Eigen::AlignedBox3d& box, std::int32_t tile, int lane);
-  double to_horizon(const Horizon& horizon) const;
+  double to_region(const RegionOfInterest& region) const;
   void drop(double bound) { dropped_ = std::min(dropped_, bound); }
   double least_bound() const { return std::min({nearest_.exact.distance, evaluated_, dropped_}); }
   double range() const { return config_.max_distance + config_.margin + rounding_; }
@@ -165,7 +164,7 @@ class LinkQuery {
   double rounding_ = 0.0;   ///< [m] largest error of a float bound
   double others_ = 0.0;     ///< [m] distance of other links, that this one need not be beyond
   double reach_ = 0.0;      ///< [m] largest coordinate of the link in the index's frame
-  double horizon_ = 0.0;    ///< [m] no point that the clouds left out is nearer
+  double region_ = 0.0;     ///< [m] no point that the clouds left out is nearer
   bool complete_ = false;
 
   CarriedBound carried_;
@@ -174,7 +173,7 @@ class LinkQuery {
   KnownDistances known_;
   DepthGrid grid_;
   std::uint64_t seen_ = 0;     ///< clouds, by SeenClouds
-  double beyond_ = 0.0;        ///< [m] smallest bound of a point, by the balls alone
+  double beyond_ = 0.0;        ///< [m] smallest bound of a point, by the spheres alone
   double proven_reach_ = 0.0;  ///< [m] `reach_` where the carried bound was proven
 
   // The index at work, in a frame O of its own.
@@ -190,7 +189,7 @@ class LinkQuery {
   QueryStatistics* statistics_ = nullptr;
 
   // The last answer's point, for the next warm start.
-  std::uint64_t last_generation_ = 0;
+  std::uint64_t last_build_id_ = 0;
   std::int32_t last_tile_ = 0;
   int last_lane_ = 0;
   Eigen::Vector3d last_witness_L_ = Eigen::Vector3d::Zero();
@@ -199,7 +198,7 @@ class LinkQuery {
   Supports supports_;
   Eigen::Vector3d aim_L_ = Eigen::Vector3d::Zero();  ///< direction, in the link's frame
 
-  // Points or boxes evaluated in this descent: several ball leaves meet the same one.
+  // Points or boxes evaluated in this descent: several sphere leaves meet the same one.
   static constexpr std::size_t kVisitedSize = 512;
   std::array<Visit, kVisitedSize> visited_{};
   std::uint32_t epoch_ = 0;
@@ -214,8 +213,9 @@ class LinkQuery {
   std::array<Waiting, kMaxWaiting> waiting_;
   std::size_t waiting_count_ = 0;
 
-  /// [m] What inner balls promise: the traversal's `inner` point is no farther. Where the mesh has
-  /// holes that may not be so; then the descent is made again without. Inf: nothing is promised.
+  /// [m] What inner spheres promise: the traversal's `inner` point is no farther. Where the mesh
+  /// has holes that may not be so; then the descent is made again without. Inf: nothing is
+  /// promised.
   double promised_ = 0.0;
   bool is_broken_ = false;
 };

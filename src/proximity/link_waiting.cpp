@@ -36,7 +36,7 @@ void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float b
   }
   const std::uint32_t key = key_of(tile, lane);
   Visit* visit = &self->visit_of(key);
-  if (self->is_visited(*visit, key)) {  // by other balls
+  if (self->is_visited(*visit, key)) {  // by other spheres
     if (visit->waiting < 0) return;
     float& known = self->waiting_[static_cast<std::size_t>(visit->waiting)].bound;
     known = std::min(known, bound);
@@ -47,14 +47,14 @@ void LinkQuery::on_candidate(void* context, std::int32_t tile, int lane, float b
   self->waiting_[self->waiting_count_++] = {bound, tile, lane};
 }
 
-// From the nearest ball of a leaf to a point.
-Eigen::Vector3d LinkQuery::way_from_ball(std::int32_t leaf, const Eigen::Vector3d& p_L) const {
-  const SphereLeaf& balls = link_->tree.leaves()[static_cast<std::size_t>(leaf)];
+// From the nearest sphere of a leaf to a point.
+Eigen::Vector3d LinkQuery::way_from_sphere(std::int32_t leaf, const Eigen::Vector3d& p_L) const {
+  const SphereLeaf& spheres = link_->tree.leaves()[static_cast<std::size_t>(leaf)];
   Eigen::Vector3d nearest = Eigen::Vector3d::Zero();
   double least = kInfinity;
-  for (int k = 0; k < balls.count; ++k) {
-    const Eigen::Vector3d way = p_L - Eigen::Vector3d(balls.x[k], balls.y[k], balls.z[k]);
-    const double inner = way.norm() - static_cast<double>(balls.inner[k]);
+  for (int k = 0; k < spheres.count; ++k) {
+    const Eigen::Vector3d way = p_L - Eigen::Vector3d(spheres.x[k], spheres.y[k], spheres.z[k]);
+    const double inner = way.norm() - static_cast<double>(spheres.inner[k]);
     if (!(inner < least)) continue;
     least = inner;
     nearest = way;
@@ -62,14 +62,14 @@ Eigen::Vector3d LinkQuery::way_from_ball(std::int32_t leaf, const Eigen::Vector3
   return nearest.normalized();
 }
 
-// The exact distance in the place of what the inner balls promise.
+// The exact distance in the place of what the inner spheres promise.
 void LinkQuery::keep_promise() {
   if (promised_ == kInfinity) return;
   const std::int32_t tile = traversal_->inner_tile;
   const int lane = traversal_->inner_lane;
   if (first_visit(tile, lane)) {
     const Eigen::Vector3d toward =
-        way_from_ball(traversal_->inner_leaf, X_LO_ * point_O(tile, lane));
+        way_from_sphere(traversal_->inner_leaf, X_LO_ * point_O(tile, lane));
     consider(tile, lane, false, a_little_more(promised_), toward);
   }
   is_broken_ = is_broken_ || nearest_.exact.distance > promised_;
@@ -99,7 +99,7 @@ void LinkQuery::evaluate_waiting() {
   }
 }
 
-// Their bound is that of the balls that were met so far; others may have less.
+// Their bound is that of the spheres that were met so far; others may have less.
 void LinkQuery::drop_far_waiting() {
   std::size_t left = 0;
   for (std::size_t i = 0; i < waiting_count_; ++i) {
@@ -116,7 +116,7 @@ void LinkQuery::drop_far_waiting() {
   waiting_count_ = left;
 }
 
-// Where obstacles are flat, or far, many points are about equally near as far as balls can tell.
+// Where obstacles are flat, or far, many points are about equally near as far as spheres can tell.
 // The link's surface itself tells more: it ends in a plane across the way to the nearest point, and
 // what of it is that near the plane is not wide. A point is at least as far as from a stack of
 // discs, each as wide as the surface is down to the next one.
@@ -153,7 +153,7 @@ void LinkQuery::rule_out_waiting() {
     const double bound = std::sqrt(bound_sq);
     if (bound >= limit) {
       drop(bound);
-      first_visit(waiting_[i].tile, waiting_[i].lane);  // holds for all balls: done with
+      first_visit(waiting_[i].tile, waiting_[i].lane);  // holds for all spheres: done with
     } else {
       waiting_[left++] = waiting_[i];
     }

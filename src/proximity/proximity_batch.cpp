@@ -80,8 +80,7 @@ ProximityBatch::ProximityBatch(ProximityBatch&&) noexcept = default;
 ProximityBatch& ProximityBatch::operator=(ProximityBatch&&) noexcept = default;
 
 bool ProximityBatch::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-                         const std::vector<const CloudSnapshot*>& clouds,
-                         std::vector<LinkProximity>* results) {
+                         SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   results->resize(X_FL.size());
   return impl_->run(impl_->count(X_FL), [&](Impl::Worker* worker, std::size_t k) {
     impl_->take(X_FL, k, worker);
@@ -93,8 +92,7 @@ bool ProximityBatch::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
 }
 
 bool ProximityBatch::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
-                                 const std::vector<bool>& known,
-                                 const std::vector<const CloudSnapshot*>& clouds,
+                                 const std::vector<bool>& known, SnapshotSpan clouds,
                                  std::vector<RobotProximity>* results) {
   results->resize(impl_->count(X_FL));
   return impl_->run(results->size(), [&](Impl::Worker* worker, std::size_t k) {

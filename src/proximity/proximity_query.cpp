@@ -12,7 +12,7 @@ void LinkProximity::reset() {
   state = LinkState::kUnknown;
   distance = kNaN;
   lower_bound = -std::numeric_limits<double>::infinity();
-  p_FL = p_LL = p_FO = direction = Eigen::Vector3d::Constant(kNaN);
+  p_FCl = p_LCl = p_FCo = direction = Eigen::Vector3d::Constant(kNaN);
   source = -1;
   point = 0;
 }
@@ -30,7 +30,7 @@ struct ProximityQuery::Impl {
 
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
-  bool refine(std::size_t i, const std::vector<const CloudSnapshot*>& clouds, Deadline* deadline) {
+  bool refine(std::size_t i, SnapshotSpan clouds, Deadline* deadline) {
     return links[i].refine(clouds, deadline, &statistics);
   }
 
@@ -47,8 +47,7 @@ ProximityQuery::ProximityQuery(ProximityQuery&&) noexcept = default;
 ProximityQuery& ProximityQuery::operator=(ProximityQuery&&) noexcept = default;
 
 bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-                         const std::vector<const CloudSnapshot*>& clouds,
-                         std::vector<LinkProximity>* results) {
+                         SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   const std::size_t count = impl_->links.size();
   assert(X_FL.size() == count && known.size() == count);
   results->resize(count);
@@ -75,8 +74,7 @@ bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
 }
 
 bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
-                                 const std::vector<bool>& known,
-                                 const std::vector<const CloudSnapshot*>& clouds,
+                                 const std::vector<bool>& known, SnapshotSpan clouds,
                                  RobotProximity* result) {
   const std::size_t count = impl_->links.size();
   assert(X_FL.size() == count && known.size() == count);
@@ -124,8 +122,7 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
   return complete;
 }
 
-bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL,
-                              const std::vector<const CloudSnapshot*>& clouds,
+bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                               LinkProximity* result) {
   assert(link < impl_->links.size());
   impl_->statistics = {};

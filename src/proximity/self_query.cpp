@@ -47,7 +47,7 @@ class PairSearch {
     }
     if (!queue_.empty()) lower_ = std::min(lower_, queue_.front().bound);
     lower_ = std::min(lower_, best_.distance);
-    lower_ -= beyond_balls();
+    lower_ -= beyond_spheres();
   }
 
   double lower() const { return lower_; }
@@ -57,9 +57,9 @@ class PairSearch {
   const Eigen::Vector3d& normal_B() const { return best_.normal; }
 
  private:
-  // Balls cover a link's surface; its inside may be the interior gap farther from them. What is
+  // Spheres cover a link's surface; its inside may be the interior gap farther from them. What is
   // inside cannot be nearest unless something of B is inside A too, or it shows through a hole.
-  double beyond_balls() const {
+  double beyond_spheres() const {
     const double gap_a = a_.tree.interior_gap(), gap_b = b_.tree.interior_gap();
     if (has_holes_) return gap_a + gap_b;
     return lower_ <= gap_a ? gap_a : 0.0;
@@ -69,13 +69,13 @@ class PairSearch {
   // the bound alone allows contact, all that may be in contact is looked at.
   double enough() const {
     const double decided = lower_ > 0.0 || best_.distance < 0.0 ? lower_ : 0.0;
-    const double beyond = has_holes_ ? beyond_balls() : 0.0;
+    const double beyond = has_holes_ ? beyond_spheres() : 0.0;
     return std::min({decided, best_.distance - config_.tolerance, config_.max_distance + beyond});
   }
 
-  // What B's balls alone prove of all points within `radius` of p_B: a lower bound of their signed
-  // distance; -inf: nothing. Through a hole the signed distance jumps, so there all of them must
-  // be outside.
+  // What B's spheres alone prove of all points within `radius` of p_B: a lower bound of their
+  // signed distance; -inf: nothing. Through a hole the signed distance jumps, so there all of them
+  // must be outside.
   double far_bound(const Eigen::Vector3d& p_B, double radius) const {
     const double gap = b_.tree.interior_gap();
     const double outer = b_.tree.outer_distance(p_B, gap + (has_holes_ ? radius : 0.0));
@@ -114,7 +114,7 @@ class PairSearch {
     }
   }
 
-  // A ball of A that reaches into B: its centre, and points of it that are deeper, it may be.
+  // A sphere of A that reaches into B: its centre, and points of it that are deeper, it may be.
   void go_deeper(const Eigen::Vector3d& p_A, const SignedDistance& measured, double inner) {
     const Eigen::Vector3d p_B = X_BA_ * p_A;
     if (measured.distance < best_.distance && a_.solid.is_inside(p_A)) take(p_B, measured);
@@ -165,7 +165,7 @@ void PairProximity::reset() {
   state = LinkState::kUnknown;
   distance = kNaN;
   lower_bound = -kInf;
-  p_FFirst = p_FSecond = direction = Eigen::Vector3d::Constant(kNaN);
+  p_FCa = p_FCb = direction = Eigen::Vector3d::Constant(kNaN);
 }
 
 struct SelfQuery::Impl {
@@ -204,8 +204,8 @@ void SelfQuery::Impl::run(const LinkPair& pair, const std::vector<Eigen::Isometr
   const auto report = [&](const PairSearch& found, std::size_t b, double sign) {
     if (found.distance() >= result->distance) return;
     result->distance = found.distance();
-    result->p_FFirst = X_FL[b] * (sign > 0.0 ? found.p_BA() : found.p_BB());
-    result->p_FSecond = X_FL[b] * (sign > 0.0 ? found.p_BB() : found.p_BA());
+    result->p_FCa = X_FL[b] * (sign > 0.0 ? found.p_BA() : found.p_BB());
+    result->p_FCb = X_FL[b] * (sign > 0.0 ? found.p_BB() : found.p_BA());
     result->direction = sign * (X_FL[b].linear() * found.normal_B());
   };
   // The link that is packed closer gives the tighter bound; apart, one way is as good as the other.

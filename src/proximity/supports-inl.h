@@ -20,16 +20,16 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using SupportTag = hn::CappedTag<float, static_cast<std::size_t>(kSphereWidth)>;
 
-template <class Balls>
-HWY_INLINE hn::Vec<SupportTag> Along(const Balls& balls, const float* n, std::size_t k) {
+template <class Spheres>
+HWY_INLINE hn::Vec<SupportTag> Along(const Spheres& spheres, const float* n, std::size_t k) {
   const SupportTag d;
-  return hn::MulAdd(hn::Set(d, n[0]), hn::Load(d, balls.x + k),
-                    hn::MulAdd(hn::Set(d, n[1]), hn::Load(d, balls.y + k),
-                               hn::Mul(hn::Set(d, n[2]), hn::Load(d, balls.z + k))));
+  return hn::MulAdd(hn::Set(d, n[0]), hn::Load(d, spheres.x + k),
+                    hn::MulAdd(hn::Set(d, n[1]), hn::Load(d, spheres.y + k),
+                               hn::Mul(hn::Set(d, n[2]), hn::Load(d, spheres.z + k))));
 }
 
-// How far a leaf's outer balls reach, or `most`; but never short of a centre: what planes leave of
-// a ball then has everything that is near the ball before the plane.
+// How far a leaf's outer spheres reach, or `most`; but never short of a centre: what planes leave
+// of a sphere then has everything that is near the sphere before the plane.
 HWY_INLINE float LeafSupport(const SphereLeaf& leaf, const float* n, float most) {
   const SupportTag d;
   const auto nowhere = hn::Set(d, kNowhere);

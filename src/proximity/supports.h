@@ -10,8 +10,8 @@ namespace ist {
 constexpr float kNowhere = -1e15F;  ///< [m] how far nothing reaches
 
 /// How far the parts of a link reach along a direction: for each child of a node at least as far as
-/// what of the link is in it; where the child is a leaf, at least to the centres of its balls, too.
-/// Found node by node, where a descent asks for it, and kept until the direction is another.
+/// what of the link is in it; where the child is a leaf, at least to the centres of its spheres,
+/// too. Found node by node, where a descent asks for it, and kept until the direction is another.
 struct Supports {
   explicit Supports(const InnerSphereTree& tree)
       : reach(tree.nodes().size() * kSphereWidth, kNowhere), found(tree.nodes().size(), 0) {}

@@ -46,8 +46,7 @@ struct TimeOfImpact::Impl {
     kinematics->place_links(moved, X_FR, &X_FL, &placed);
   }
 
-  const LinkProximity& measure(std::size_t link, const std::vector<const CloudSnapshot*>& clouds,
-                               double tolerance) {
+  const LinkProximity& measure(std::size_t link, SnapshotSpan clouds, double tolerance) {
     config.tolerance = tolerance;
     query.set_config(config);
     X_FM[link] = X_FL[places[link]];
@@ -56,7 +55,7 @@ struct TimeOfImpact::Impl {
   }
 
   ImpactTime find(std::size_t link, const JointMotion& motion, const JointPoses& still,
-                  const Eigen::Isometry3d& X_FR, const std::vector<const CloudSnapshot*>& clouds) {
+                  const Eigen::Isometry3d& X_FR, SnapshotSpan clouds) {
     ImpactTime impact;
     place(motion, still, X_FR, 0.0);
     if (!placed[places[link]]) return impact;
@@ -110,8 +109,7 @@ void TimeOfImpact::set_config(const QueryConfig& config) {
 
 void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
                        const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted,
-                       const std::vector<const CloudSnapshot*>& clouds,
-                       std::vector<ImpactTime>* results) {
+                       SnapshotSpan clouds, std::vector<ImpactTime>* results) {
   const std::size_t count = impl_->model->links.size();
   assert(wanted.size() == count && motion.duration > 0.0);
   assert(motion.from.size() == impl_->kinematics->joints().size());

@@ -11,7 +11,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "proximity/cut_balls-inl.h"
+#include "proximity/clipped_sphere-inl.h"
 #include "proximity/supports-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -402,7 +402,7 @@ class Descent {
     }
   }
 
-  // Up to 8 balls against 16 points or boxes: for each of these the least distance to a ball.
+  // Up to 8 spheres against 16 points or boxes: for each of these the least distance to a sphere.
   template <class Tile>
   HWY_INLINE void Leaves(const Pair& pair, const Tile& tile) {
     ++t_.leaf_pairs;
@@ -455,20 +455,20 @@ class Descent {
     }
   }
 
-  // What the plane leaves of the balls, and how far the points are at most.
+  // What the plane leaves of the spheres, and how far the points are at most.
   template <class Tile>
   HWY_INLINE void LookCloser(const Pair& pair, const SphereLeaf& leaf, const Posed& posed,
                              const Tile& tile, float offset, float* distance) {
     const PointTag d;
-    const SphereTag balls;
+    const SphereTag spheres;
     alignas(64) float height[kSphereWidth], rim[kSphereWidth], inner[kPointWidth];
-    for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(balls)) {
+    for (std::size_t b = 0; b < static_cast<std::size_t>(kSphereWidth); b += hn::Lanes(spheres)) {
       const auto over =
-          hn::Sub(hn::Set(balls, offset),
-                  planes_.Along(balls, hn::Load(balls, posed.x + b), hn::Load(balls, posed.y + b),
-                                hn::Load(balls, posed.z + b)));
-      hn::Store(over, balls, height + b);
-      hn::Store(RimRadius(balls, hn::Load(balls, leaf.outer + b), over, t_.rounding), balls,
+          hn::Sub(hn::Set(spheres, offset),
+                  planes_.Along(spheres, hn::Load(spheres, posed.x + b),
+                                hn::Load(spheres, posed.y + b), hn::Load(spheres, posed.z + b)));
+      hn::Store(over, spheres, height + b);
+      hn::Store(RimRadius(spheres, hn::Load(spheres, leaf.outer + b), over, t_.rounding), spheres,
                 rim + b);
     }
     bool is_nearer = false;

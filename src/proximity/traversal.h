@@ -29,9 +29,9 @@ struct Traversal {
 
   /// Every part of the link lies behind a plane across `normal`: none of its points x has
   /// normal . x > offset + support [m]. So a point p is at least normal . p - offset - support away
-  /// from the part, and at least as far as from what the plane leaves of its ball. Balls alone tell
-  /// little where obstacles are flat and far: their caps before the plane are nearer than the part.
-  /// May change from `aim`. Unit vector; zero, and infinite: no planes are known.
+  /// from the part, and at least as far as from what the plane leaves of its sphere. Spheres alone
+  /// tell little where obstacles are flat and far: their caps before the plane are nearer than the
+  /// part. May change from `aim`. Unit vector; zero, and infinite: no planes are known.
   float normal[3] = {};
   float offset = std::numeric_limits<float>::infinity();
   float rounding = 0.0F;         ///< [m] largest error of a coordinate
@@ -67,7 +67,7 @@ struct Traversal {
   float inner_distance = std::numeric_limits<float>::infinity();
   std::int32_t inner_tile = -1;  ///< of that point or box
   int inner_lane = 0;
-  std::int32_t inner_leaf = -1;  ///< of the ball
+  std::int32_t inner_leaf = -1;  ///< of the sphere
   std::uint64_t node_pairs = 0, leaf_pairs = 0;
 };
 

@@ -17,10 +17,10 @@ namespace ist {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Both sides are sixteen wide: children of a node beside each other, and balls of a group.
-static_assert(kBallWidth == kPointWidth);
-constexpr auto kWidth = static_cast<std::size_t>(kBallWidth);
-constexpr std::size_t kMostGroups = kCoarseBalls / kWidth;
+// Both sides are sixteen wide: children of a node beside each other, and spheres of a group.
+static_assert(kSphereGroupWidth == kPointWidth);
+constexpr auto kWidth = static_cast<std::size_t>(kSphereGroupWidth);
+constexpr std::size_t kMostGroups = kCoarseSpheres / kWidth;
 using Tag = hn::CappedTag<float, kWidth>;
 using V = hn::Vec<Tag>;
 
@@ -48,21 +48,21 @@ struct Posed {
   float center[3], reach;
 };
 
-HWY_INLINE void Pose(const PosedBalls& balls, const BallGroup& group, Posed* posed) {
+HWY_INLINE void Pose(const PosedSpheres& spheres, const SphereGroup& group, Posed* posed) {
   const Tag d;
   float* center[3] = {posed->x, posed->y, posed->z};
   float* arm[3] = {posed->arm_x, posed->arm_y, posed->arm_z};
   for (int row = 0; row < 3; ++row) {
-    const float* r = balls.R_OL + 3 * row;
+    const float* r = spheres.R_OL + 3 * row;
     for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
       const V sum = hn::MulAdd(hn::Set(d, r[0]), hn::Load(d, group.x + k),
                                hn::MulAdd(hn::Set(d, r[1]), hn::Load(d, group.y + k),
                                           hn::Mul(hn::Set(d, r[2]), hn::Load(d, group.z + k))));
       hn::Store(sum, d, arm[row] + k);
-      hn::Store(hn::Add(sum, hn::Set(d, balls.p_OL[row])), d, center[row] + k);
+      hn::Store(hn::Add(sum, hn::Set(d, spheres.p_OL[row])), d, center[row] + k);
     }
-    posed->center[row] =
-        r[0] * group.center[0] + r[1] * group.center[1] + r[2] * group.center[2] + balls.p_OL[row];
+    posed->center[row] = r[0] * group.center[0] + r[1] * group.center[1] + r[2] * group.center[2] +
+                         spheres.p_OL[row];
   }
   posed->radius = group.radius;
   posed->reach = group.reach;
@@ -73,12 +73,12 @@ HWY_INLINE V Gap(V low, V high, V value) {
   return hn::Max(hn::Max(hn::Sub(low, value), hn::Sub(value, high)), hn::Zero(d));
 }
 
-// From a point, or from the nearest point of a box, to the centres of balls k, k + 1, ...
-HWY_INLINE Offset ToBalls(const PointTile& tile, int point, const Posed& balls, std::size_t k) {
+// From a point, or from the nearest point of a box, to the centres of spheres k, k + 1, ...
+HWY_INLINE Offset ToSpheres(const PointTile& tile, int point, const Posed& spheres, std::size_t k) {
   const Tag d;
-  return {hn::Sub(hn::Load(d, balls.x + k), hn::Set(d, tile.x[point])),
-          hn::Sub(hn::Load(d, balls.y + k), hn::Set(d, tile.y[point])),
-          hn::Sub(hn::Load(d, balls.z + k), hn::Set(d, tile.z[point]))};
+  return {hn::Sub(hn::Load(d, spheres.x + k), hn::Set(d, tile.x[point])),
+          hn::Sub(hn::Load(d, spheres.y + k), hn::Set(d, tile.y[point])),
+          hn::Sub(hn::Load(d, spheres.z + k), hn::Set(d, tile.z[point]))};
 }
 
 HWY_INLINE V Beyond(float low, float high, V v) {
@@ -87,22 +87,22 @@ HWY_INLINE V Beyond(float low, float high, V v) {
 }
 
 template <class Boxes>
-HWY_INLINE Offset ToBalls(const Boxes& boxes, int box, const Posed& balls, std::size_t k) {
+HWY_INLINE Offset ToSpheres(const Boxes& boxes, int box, const Posed& spheres, std::size_t k) {
   const Tag d;
-  return {Beyond(boxes.min_x[box], boxes.max_x[box], hn::Load(d, balls.x + k)),
-          Beyond(boxes.min_y[box], boxes.max_y[box], hn::Load(d, balls.y + k)),
-          Beyond(boxes.min_z[box], boxes.max_z[box], hn::Load(d, balls.z + k))};
+  return {Beyond(boxes.min_x[box], boxes.max_x[box], hn::Load(d, spheres.x + k)),
+          Beyond(boxes.min_y[box], boxes.max_y[box], hn::Load(d, spheres.y + k)),
+          Beyond(boxes.min_z[box], boxes.max_z[box], hn::Load(d, spheres.z + k))};
 }
 
-// [m] Smallest distance of points (or boxes) begin to end to a ball of the group.
+// [m] Smallest distance of points (or boxes) begin to end to a sphere of the group.
 template <class Tile>
-HWY_INLINE float Nearest(const Tile& tile, int begin, int end, const Posed& balls) {
+HWY_INLINE float Nearest(const Tile& tile, int begin, int end, const Posed& spheres) {
   const Tag d;
   V nearest = hn::Set(d, kFarAway);
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
-    const V radius = hn::Load(d, balls.radius + k);
+    const V radius = hn::Load(d, spheres.radius + k);
     for (int i = begin; i < end; ++i) {
-      const V length = hn::Sqrt(SquaredNorm(ToBalls(tile, i, balls, k)));
+      const V length = hn::Sqrt(SquaredNorm(ToSpheres(tile, i, spheres, k)));
       nearest = hn::Min(nearest, hn::Sub(length, radius));
     }
   }
@@ -110,15 +110,17 @@ HWY_INLINE float Nearest(const Tile& tile, int begin, int end, const Posed& ball
 }
 
 // Bit k for a child whose box is nearer to the group's centre than `reach`.
-HWY_INLINE std::uint32_t Near(const BoxNode& node, const Posed& balls, float reach) {
+HWY_INLINE std::uint32_t Near(const BoxNode& node, const Posed& spheres, float reach) {
   const Tag d;
   const V limit = hn::Set(d, reach * reach);
   std::uint32_t near = 0;
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
-    const Offset gap = {
-        Gap(hn::Load(d, node.min_x + k), hn::Load(d, node.max_x + k), hn::Set(d, balls.center[0])),
-        Gap(hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k), hn::Set(d, balls.center[1])),
-        Gap(hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k), hn::Set(d, balls.center[2]))};
+    const Offset gap = {Gap(hn::Load(d, node.min_x + k), hn::Load(d, node.max_x + k),
+                            hn::Set(d, spheres.center[0])),
+                        Gap(hn::Load(d, node.min_y + k), hn::Load(d, node.max_y + k),
+                            hn::Set(d, spheres.center[1])),
+                        Gap(hn::Load(d, node.min_z + k), hn::Load(d, node.max_z + k),
+                            hn::Set(d, spheres.center[2]))};
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, hn::Lt(SquaredNorm(gap), limit), bits);
     near |= (bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U) << k;
@@ -132,13 +134,13 @@ struct PosedLink {
   std::size_t count;
 };
 
-HWY_INLINE void Pose(const PosedBalls& balls, PosedLink* link) {
-  link->count = std::min(balls.count, kMostGroups);
-  for (std::size_t g = 0; g < link->count; ++g) Pose(balls, balls.groups[g], &link->groups[g]);
+HWY_INLINE void Pose(const PosedSpheres& spheres, PosedLink* link) {
+  link->count = std::min(spheres.count, kMostGroups);
+  for (std::size_t g = 0; g < link->count; ++g) Pose(spheres, spheres.groups[g], &link->groups[g]);
 }
 
-// Calls visit(tile, groups) for the tiles that may hold a point nearer to a ball's surface than
-// `limit`, the nearest first; bit g of `groups`: to a ball of group g. The limit may shrink
+// Calls visit(tile, groups) for the tiles that may hold a point nearer to a sphere's surface than
+// `limit`, the nearest first; bit g of `groups`: to a sphere of group g. The limit may shrink
 // meanwhile.
 template <class Index, class Visit>
 HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const float& limit,
@@ -163,12 +165,12 @@ HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const floa
     std::array<Entry, kWidth> found{};
     std::uint32_t any = 0;
     for (std::uint32_t left = entry.groups; left != 0; left &= left - 1) {
-      const Posed& balls = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(left)];
-      const float reach = std::min(std::max(limit + balls.reach, 0.0F), kFarAway);
-      for (std::uint32_t near = Near(node, balls, reach); near != 0; near &= near - 1) {
+      const Posed& spheres = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(left)];
+      const float reach = std::min(std::max(limit + spheres.reach, 0.0F), kFarAway);
+      for (std::uint32_t near = Near(node, spheres, reach); near != 0; near &= near - 1) {
         const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
         const auto child = static_cast<int>(k);
-        const float bound = Nearest(node, child, child + 1, balls);
+        const float bound = Nearest(node, child, child + 1, spheres);
         if (!(bound < limit)) continue;
         found[k].bound = found[k].groups == 0 ? bound : std::min(bound, found[k].bound);
         found[k].groups |= left & (0U - left);
@@ -187,9 +189,9 @@ HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const floa
 }
 
 template <class Index>
-HWY_INLINE float NearestPair(const Index& index, const PosedBalls& balls, float limit) {
+HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, float limit) {
   PosedLink link;
-  Pose(balls, &link);
+  Pose(spheres, &link);
   VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
     for (; groups != 0; groups &= groups - 1) {
       const Posed& posed = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(groups)];
@@ -219,16 +221,16 @@ HWY_INLINE void CellWeights(const PointTile& tile, const CellGrid& grid, float* 
   }
 }
 
-// The sums of each ball of a group.
-struct BallSums {
+// The sums of each sphere of a group.
+struct SphereSums {
   alignas(64) float x[kWidth] = {}, y[kWidth] = {}, z[kWidth] = {};
   alignas(64) float weight[kWidth] = {}, undirected[kWidth] = {};
 };
 
 // weights: by point, or box.
 template <class Tile>
-HWY_INLINE void AddTile(const Tile& tile, const float* weights, const Posed& balls, float nearest,
-                        float per_smoothing, BallSums* sums) {
+HWY_INLINE void AddTile(const Tile& tile, const float* weights, const Posed& spheres, float nearest,
+                        float per_smoothing, SphereSums* sums) {
   const Tag d;
   // Shorter than this a direction is noise; the weight moves over to the fallback smoothly.
   constexpr float kTiny = 1e-6F;  // [m]
@@ -239,9 +241,9 @@ HWY_INLINE void AddTile(const Tile& tile, const float* weights, const Posed& bal
     V weight = hn::Load(d, sums->weight + k), undirected = hn::Load(d, sums->undirected + k);
     // 1 - (d - nearest) / smoothing = start - length / smoothing.
     const V start =
-        hn::MulAdd(hn::Add(hn::Load(d, balls.radius + k), hn::Set(d, nearest)), falls, one);
+        hn::MulAdd(hn::Add(hn::Load(d, spheres.radius + k), hn::Set(d, nearest)), falls, one);
     for (int i = 0; i < tile.count; ++i) {
-      const Offset o = ToBalls(tile, i, balls, k);
+      const Offset o = ToSpheres(tile, i, spheres, k);
       const V raw = SquaredNorm(o), squared = hn::Max(raw, tiny_sq);
       const V inverse = InverseRoot(squared);
       const V length = hn::Mul(squared, inverse);
@@ -265,13 +267,13 @@ HWY_INLINE void AddTile(const Tile& tile, const float* weights, const Posed& bal
 
 HWY_INLINE float Sum(V v) { return hn::GetLane(hn::SumOfLanes(Tag(), v)); }
 
-HWY_INLINE PairSums Total(const BallSums& sums, const Posed& balls) {
+HWY_INLINE PairSums Total(const SphereSums& sums, const Posed& spheres) {
   const Tag d;
   PairSums total;
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
     const V x = hn::Load(d, sums.x + k), y = hn::Load(d, sums.y + k), z = hn::Load(d, sums.z + k);
-    const V ax = hn::Load(d, balls.arm_x + k), ay = hn::Load(d, balls.arm_y + k),
-            az = hn::Load(d, balls.arm_z + k);
+    const V ax = hn::Load(d, spheres.arm_x + k), ay = hn::Load(d, spheres.arm_y + k),
+            az = hn::Load(d, spheres.arm_z + k);
     const V undirected = hn::Load(d, sums.undirected + k);
     total.weight += Sum(hn::Load(d, sums.weight + k));
     total.force[0] += Sum(x);
@@ -289,10 +291,10 @@ HWY_INLINE PairSums Total(const BallSums& sums, const Posed& balls) {
 }
 
 template <class Index>
-HWY_INLINE PairSums BlendPairs(const Index& index, const PosedBalls& balls, const Band& band) {
+HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, const Band& band) {
   PosedLink link;
-  Pose(balls, &link);
-  std::array<BallSums, kMostGroups> sums;
+  Pose(spheres, &link);
+  std::array<SphereSums, kMostGroups> sums;
   const float limit = band.nearest + band.smoothing;
   alignas(64) float weights[kWidth];
   std::fill_n(weights, kWidth, 1.0F);
@@ -308,17 +310,17 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedBalls& balls, cons
   return total;
 }
 
-float NearestPoint(const PointIndex& index, const PosedBalls& balls, float limit) {
-  return NearestPair(index, balls, limit);
+float NearestPoint(const PointIndex& index, const PosedSpheres& spheres, float limit) {
+  return NearestPair(index, spheres, limit);
 }
-float NearestBox(const BoxIndex& index, const PosedBalls& balls, float limit) {
-  return NearestPair(index, balls, limit);
+float NearestBox(const BoxIndex& index, const PosedSpheres& spheres, float limit) {
+  return NearestPair(index, spheres, limit);
 }
-PairSums BlendPoints(const PointIndex& index, const PosedBalls& balls, const Band& band) {
-  return BlendPairs(index, balls, band);
+PairSums BlendPoints(const PointIndex& index, const PosedSpheres& spheres, const Band& band) {
+  return BlendPairs(index, spheres, band);
 }
-PairSums BlendBoxes(const BoxIndex& index, const PosedBalls& balls, const Band& band) {
-  return BlendPairs(index, balls, band);
+PairSums BlendBoxes(const BoxIndex& index, const PosedSpheres& spheres, const Band& band) {
+  return BlendPairs(index, spheres, band);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -350,22 +352,22 @@ void PairSums::add(const PairSums& other) {
   }
 }
 
-float nearest_pair(const PointIndex& index, const PosedBalls& balls, float limit) {
-  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestPoint)(index, balls, limit);
+float nearest_pair(const PointIndex& index, const PosedSpheres& spheres, float limit) {
+  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestPoint)(index, spheres, limit);
 }
 
-float nearest_pair(const BoxIndex& index, const PosedBalls& balls, float limit) {
-  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestBox)(index, balls, limit);
+float nearest_pair(const BoxIndex& index, const PosedSpheres& spheres, float limit) {
+  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestBox)(index, spheres, limit);
 }
 
-PairSums blend_pairs(const PointIndex& index, const PosedBalls& balls, const Band& band) {
+PairSums blend_pairs(const PointIndex& index, const PosedSpheres& spheres, const Band& band) {
   if (index.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendPoints)(index, balls, band);
+  return HWY_DYNAMIC_DISPATCH(BlendPoints)(index, spheres, band);
 }
 
-PairSums blend_pairs(const BoxIndex& index, const PosedBalls& balls, const Band& band) {
+PairSums blend_pairs(const BoxIndex& index, const PosedSpheres& spheres, const Band& band) {
   if (index.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendBoxes)(index, balls, band);
+  return HWY_DYNAMIC_DISPATCH(BlendBoxes)(index, spheres, band);
 }
 
 }  // namespace ist

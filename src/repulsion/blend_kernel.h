@@ -9,31 +9,31 @@
 
 namespace ist {
 
-/// A link's balls, posed in the frame O of an index: its origin, and the axes of the fixed frame
-/// (points) or the map (boxes). A pair is a ball and a point, or a ball and the point of a box that
-/// is nearest to it.
-struct PosedBalls {
-  const BallGroup* groups = nullptr;
-  std::size_t count = 0;  ///< of groups, no more than kCoarseBalls fill
+/// A link's spheres, posed in the frame O of an index: its origin, and the axes of the fixed frame
+/// (points) or the map (boxes). A pair is a sphere and a point, or a sphere and the point of a box
+/// that is nearest to it.
+struct PosedSpheres {
+  const SphereGroup* groups = nullptr;
+  std::size_t count = 0;  ///< of groups, no more than kCoarseSpheres fill
   float R_OL[9] = {};     ///< rotation, row-major
   float p_OL[3] = {};     ///< [m] translation
 };
 
-/// Sums over pairs of weight w and unit vector n from point to ball centre, in O.
+/// Sums over pairs of weight w and unit vector n from point to sphere centre, in O.
 struct PairSums {
   float weight = 0.0F;
-  float force[3] = {};           ///< of w n
-  float torque[3] = {};          ///< [m] of a x w n, a from the link's origin to the ball's centre
-  float undirected = 0.0F;       ///< of w where a point is at a centre and there is no n
+  float force[3] = {};      ///< of w n
+  float torque[3] = {};     ///< [m] of a x w n, a from the link's origin to the sphere's centre
+  float undirected = 0.0F;  ///< of w where a point is at a centre and there is no n
   float undirected_arm[3] = {};  ///< [m] of w a of those
 
   void add(const PairSums& other);
 };
 
-/// [m] Smallest distance of a pair, negative where a point is in a ball; `limit` where that is not
-/// below it.
-float nearest_pair(const PointIndex& index, const PosedBalls& balls, float limit);
-float nearest_pair(const BoxIndex& index, const PosedBalls& balls, float limit);
+/// [m] Smallest distance of a pair, negative where a point is in a sphere; `limit` where that is
+/// not below it.
+float nearest_pair(const PointIndex& index, const PosedSpheres& spheres, float limit);
+float nearest_pair(const BoxIndex& index, const PosedSpheres& spheres, float limit);
 
 /// The cells that a cloud was thinned to, as its index's frame sees them.
 struct CellGrid {
@@ -61,7 +61,7 @@ constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
 
 /// Over all pairs nearer than nearest + smoothing, w = (1 - (d - nearest) / smoothing)^2 times the
 /// points' weight.
-PairSums blend_pairs(const PointIndex& index, const PosedBalls& balls, const Band& band);
-PairSums blend_pairs(const BoxIndex& index, const PosedBalls& balls, const Band& band);
+PairSums blend_pairs(const PointIndex& index, const PosedSpheres& spheres, const Band& band);
+PairSums blend_pairs(const BoxIndex& index, const PosedSpheres& spheres, const Band& band);
 
 }  // namespace ist

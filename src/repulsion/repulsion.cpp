@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/relative_pose.h"
+#include "internal/geometry/relative_pose.h"
 #include "repulsion/blend_kernel.h"
 
 namespace ist {
@@ -12,23 +12,22 @@ namespace {
 
 constexpr double kLeastSmoothing = 1e-3;  // [m] that float can tell from none, far away too
 
-// Calls visit(index, the link's balls in its frame, R_FO, its cells) for each thinned cloud and
+// Calls visit(index, the link's spheres in its frame, R_FO, its cells) for each thinned cloud and
 // each map.
 template <typename Visit>
-void for_each_index(const std::vector<const CloudSnapshot*>& clouds,
-                    const std::vector<BallGroup>& groups, const Eigen::Isometry3d& X_FL,
-                    const Visit& visit) {
+void for_each_index(SnapshotSpan clouds, const std::vector<SphereGroup>& groups,
+                    const Eigen::Isometry3d& X_FL, const Visit& visit) {
   const auto posed = [&groups](const Eigen::Isometry3d& X_OL) {
-    PosedBalls balls;
-    balls.groups = groups.data();
-    balls.count = groups.size();
+    PosedSpheres spheres;
+    spheres.groups = groups.data();
+    spheres.count = groups.size();
     for (int row = 0; row < 3; ++row) {
       for (int i = 0; i < 3; ++i) {
-        balls.R_OL[3 * row + i] = static_cast<float>(X_OL.linear()(row, i));
+        spheres.R_OL[3 * row + i] = static_cast<float>(X_OL.linear()(row, i));
       }
-      balls.p_OL[row] = static_cast<float>(X_OL.translation()[row]);
+      spheres.p_OL[row] = static_cast<float>(X_OL.translation()[row]);
     }
-    return balls;
+    return spheres;
   };
   const CellGrid no_grid(Eigen::Vector3d::Zero(), 1.0);
   for (const CloudSnapshot* cloud : clouds) {
@@ -46,7 +45,7 @@ void for_each_index(const std::vector<const CloudSnapshot*>& clouds,
 
 Eigen::Vector3d vector(const float v[3]) { return {v[0], v[1], v[2]}; }
 
-// Of all indices, in the fixed frame. A pair's line of action goes through its ball's centre.
+// Of all indices, in the fixed frame. A pair's line of action goes through its sphere's centre.
 struct Total {
   Eigen::Vector3d fallback;  // direction of what has none
   Push push;                 // times `weight`
@@ -77,34 +76,32 @@ double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig&
 Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
   groups_.reserve(model->links.size());
   for (const LinkModel& link : model->links) {
-    groups_.push_back(group_balls(coarse_balls(link.packing, kCoarseBalls)));
+    groups_.push_back(group_spheres(coarse_spheres(link.packing, kCoarseSpheres)));
   }
 }
 
-Push Repulsion::push(std::size_t link, const Eigen::Isometry3d& X_FL,
-                     const std::vector<const CloudSnapshot*>& clouds,
+Push Repulsion::push(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                      const LinkProximity& proximity, const RepulsionConfig& config) const {
   if (proximity.state == LinkState::kUnknown) return Push::unknown();
   const double strength = repulsion_strength(proximity, config);
   if (!(strength > 0.0)) return {};
 
-  const std::vector<BallGroup>& groups = groups_[link];
+  const std::vector<SphereGroup>& groups = groups_[link];
   float nearest = std::numeric_limits<float>::infinity();
   for_each_index(clouds, groups, X_FL,
-                 [&nearest](const auto& index, const PosedBalls& balls, const auto&, const auto&) {
-                   nearest = nearest_pair(index, balls, nearest);
-                 });
+                 [&nearest](const auto& index, const PosedSpheres& spheres, const auto&,
+                            const auto&) { nearest = nearest_pair(index, spheres, nearest); });
   const double length = config.gain * strength;
   if (!std::isfinite(nearest)) {
-    const Eigen::Vector3d arm = proximity.p_FL - X_FL.translation();
+    const Eigen::Vector3d arm = proximity.p_FCl - X_FL.translation();
     return scaled({proximity.direction, arm.cross(proximity.direction)}, length);
   }
   Total total{proximity.direction, {}, 0.0};
   const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
   for_each_index(clouds, groups, X_FL,
-                 [&](const auto& index, const PosedBalls& balls, const Eigen::Matrix3d& R_FO,
+                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO,
                      const CellGrid& grid) {
-                   total.add(blend_pairs(index, balls, {nearest, smoothing, grid}), R_FO);
+                   total.add(blend_pairs(index, spheres, {nearest, smoothing, grid}), R_FO);
                  });
   return scaled(total.push, length / total.weight);
 }

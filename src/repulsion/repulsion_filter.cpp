@@ -49,12 +49,12 @@ Push RepulsionFilter::update(double time, std::uint64_t obstacles, const Push& r
   return {filtered.head<3>(), filtered.tail<3>()};
 }
 
-std::uint64_t obstacles_key(const std::vector<const CloudSnapshot*>& clouds) {
+std::uint64_t obstacles_key(SnapshotSpan clouds) {
   std::uint64_t key = 1469598103934665603ULL;  // FNV-1a, by words
   const auto mix = [&key](std::uint64_t value) { key = (key ^ value) * 1099511628211ULL; };
   for (const CloudSnapshot* cloud : clouds) {
-    mix(cloud != nullptr ? cloud->index.generation() : 0);
-    mix(cloud != nullptr && cloud->boxes ? cloud->boxes->generation() : 0);
+    mix(cloud != nullptr ? cloud->index.build_id() : 0);
+    mix(cloud != nullptr && cloud->boxes ? cloud->boxes->build_id() : 0);
   }
   return key;
 }

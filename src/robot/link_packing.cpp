@@ -1,4 +1,4 @@
-#include "link_packing.h"
+#include "internal/robot/link_packing.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,10 +31,10 @@ double surface_area(const Shape& shape) {
   return area;
 }
 
-// Where a ball stands in the order of the link: what share of its element comes before it.
+// Where a sphere stands in the order of the link: what share of its element comes before it.
 struct Rank {
   double share;
-  std::size_t element, ball;
+  std::size_t element, sphere;
 
   bool operator<(const Rank& other) const {
     return share != other.share ? share < other.share : element < other.element;
@@ -78,7 +78,7 @@ Packing combine(const LinkGeometry& geometry, const std::vector<const Packing*>&
   PackingCertificate& all = link.certificate;
   all.reached = true;
   for (std::size_t e = 0; e < packings.size(); ++e) {
-    const std::size_t count = packings[e]->balls.size();
+    const std::size_t count = packings[e]->spheres.size();
     for (std::size_t i = 0; i < count; ++i) {
       order.push_back({static_cast<double>(i) / static_cast<double>(count), e, i});
     }
@@ -93,11 +93,11 @@ Packing combine(const LinkGeometry& geometry, const std::vector<const Packing*>&
   if (all.surface_area > 0.0) all.mean_gap /= all.surface_area;
 
   std::stable_sort(order.begin(), order.end());
-  link.balls.reserve(order.size());
+  link.spheres.reserve(order.size());
   for (const Rank& rank : order) {
-    Ball ball = packings[rank.element]->balls[rank.ball];
-    ball.center = geometry[rank.element].X_LE * ball.center;
-    link.balls.push_back(ball);
+    InnerSphere sphere = packings[rank.element]->spheres[rank.sphere];
+    sphere.center = geometry[rank.element].X_LE * sphere.center;
+    link.spheres.push_back(sphere);
   }
   return link;
 }

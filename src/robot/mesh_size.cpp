@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/mesh_size.h"
+#include "internal/robot/mesh_size.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "ist_proximity/packing/packer.h"
+#include "internal/packing/packer.h"
 
 namespace ist {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "internal/packing/packing_cache.h"
 #include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/packing/packing.h"
-#include "ist_proximity/packing/packing_cache.h"
 
 namespace ist {
 

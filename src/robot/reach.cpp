@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/reach.h"
+#include "internal/robot/reach.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "internal/geometry/mesh_io.h"
+#include "internal/robot/urdfdom_parser.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/geometry/mesh_io.h"
-#include "urdfdom_parser.h"
 
 namespace ist {
 namespace {

@@ -8,9 +8,9 @@
 #include <sstream>
 #include <utility>
 
+#include "internal/packing/packing_cache.h"
+#include "internal/robot/link_packing.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/packing/packing_cache.h"
-#include "link_packing.h"
 #include "packing_jobs.h"
 
 namespace ist {
@@ -164,7 +164,7 @@ void warn(const std::vector<MonitoredLink>& links, const std::vector<PackingJob>
     }
     if (!link.packing.certificate.reached) {
       warning("link '" + link.name + "' is packed with " +
-              std::to_string(link.packing.balls.size()) + " spheres to an error of " +
+              std::to_string(link.packing.spheres.size()) + " spheres to an error of " +
               millimetres(link.packing.certificate.max_gap) + " instead of " +
               millimetres(config.max_error) + ": packing/max_spheres (" +
               std::to_string(config.max_spheres) + ") was reached first; raise it, or max_error");

@@ -1,4 +1,4 @@
-#include "urdfdom_parser.h"
+#include "internal/robot/urdfdom_parser.h"
 
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>

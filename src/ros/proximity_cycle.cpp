@@ -1,13 +1,13 @@
-#include "ist_proximity/ros/proximity_cycle.h"
+#include "ros/proximity_cycle.h"
 
 #include <algorithm>
 #include <chrono>
 
-#include "ist_proximity/ros/joint_pose_source.h"
-#include "ist_proximity/ros/message_conversion.h"
-#include "ist_proximity/ros/ros_time.h"
-#include "ist_proximity/ros/tf_pose_source.h"
-#include "ist_proximity/ros/transforms.h"
+#include "ros/output/message_conversion.h"
+#include "ros/poses/joint_pose_source.h"
+#include "ros/poses/tf_pose_source.h"
+#include "ros/poses/transforms.h"
+#include "ros/ros_time.h"
 
 namespace ist {
 namespace {
@@ -102,7 +102,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && poses_.known[i];
   situation_.deadline_passed =
       !query_.run(poses_.X_FL, known, clouds_, &results_) && !clouds_.empty();
-  situation_.past_horizon = query_.statistics().past_horizon > 0;
+  situation_.outside_region = query_.statistics().outside_region > 0;
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;

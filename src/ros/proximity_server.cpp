@@ -8,11 +8,11 @@
 #include <boost/make_shared.hpp>
 
 #include "ist_proximity/robot/package_resolver.h"
-#include "ist_proximity/robot/robot_horizon.h"
-#include "ist_proximity/ros/message_conversion.h"
-#include "ist_proximity/ros/object_conversion.h"
-#include "ist_proximity/ros/status_log.h"
-#include "ist_proximity/ros/thread_name.h"
+#include "ist_proximity/robot/robot_region.h"
+#include "ros/model/object_conversion.h"
+#include "ros/output/message_conversion.h"
+#include "ros/status/status_log.h"
+#include "ros/thread_name.h"
 
 namespace ist {
 namespace {
@@ -209,14 +209,14 @@ void ProximityServer::take_model() {
 void ProximityServer::aim_sources(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
   margin_ = query.margin;
-  Horizon horizon;
+  RegionOfInterest region;
   // tf may know better than the URDF where links are.
   const bool computes_poses = config_.pose_source == PoseSourceKind::kJointStates;
   if (computes_poses && model_->robot && model_->kinematics) {
-    horizon = horizon_of(*model_->robot, *model_->kinematics, fixed_frame,
-                         query.max_distance + query.margin);
+    region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
+                                query.max_distance + query.margin);
   }
-  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, horizon);
+  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
 
 void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& message) {

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "internal/packing/packing_cache.h"
+#include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/packing/packing_cache.h"
-#include "ist_proximity/robot/mesh_size.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "pack_robot/input.h"
 #include "pack_robot/output.h"
@@ -56,7 +56,7 @@ void declare(CLI::App* app, Options* options) {
                   "volume: disjoint, the largest that fits first")
       ->check(CLI::IsMember(kOrders));
   app->add_option("--tree", options->tree,
-                  "how balls are divided into a tree: median, surface, gas, gas-by-volume; for "
+                  "how spheres are divided into a tree: median, surface, gas, gas-by-volume; for "
                   "its size in the table, packings are the same (default: gas, as in the node)")
       ->check(CLI::IsMember(kTrees));
   app->add_option("--links", options->model.links, "only these links of the robot");

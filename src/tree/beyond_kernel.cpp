@@ -11,26 +11,26 @@ namespace ist {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using BallTag = hn::CappedTag<float, static_cast<std::size_t>(kSphereWidth)>;
+using SphereTag = hn::CappedTag<float, static_cast<std::size_t>(kSphereWidth)>;
 
-// Of a point to balls that are larger by the margin: [m^2] above 0 outside. Unused slots, whose
+// Of a point to spheres that are larger by the margin: [m^2] above 0 outside. Unused slots, whose
 // radius is far below 0, count as points a metre farther away.
-template <class Balls>
-HWY_INLINE hn::Vec<BallTag> Power(const Balls& balls, const float* radii, std::size_t k,
-                                  const float* p, float margin) {
-  const BallTag d;
-  const auto dx = hn::Sub(hn::Load(d, balls.x + k), hn::Set(d, p[0]));
-  const auto dy = hn::Sub(hn::Load(d, balls.y + k), hn::Set(d, p[1]));
-  const auto dz = hn::Sub(hn::Load(d, balls.z + k), hn::Set(d, p[2]));
+template <class Spheres>
+HWY_INLINE hn::Vec<SphereTag> Power(const Spheres& spheres, const float* radii, std::size_t k,
+                                    const float* p, float margin) {
+  const SphereTag d;
+  const auto dx = hn::Sub(hn::Load(d, spheres.x + k), hn::Set(d, p[0]));
+  const auto dy = hn::Sub(hn::Load(d, spheres.y + k), hn::Set(d, p[1]));
+  const auto dz = hn::Sub(hn::Load(d, spheres.z + k), hn::Set(d, p[2]));
   const auto reach =
       hn::Max(hn::Add(hn::Load(d, radii + k), hn::Set(d, margin)), hn::Set(d, -1.0F));
   const auto distance_sq = hn::MulAdd(dx, dx, hn::MulAdd(dy, dy, hn::Mul(dz, dz)));
   return hn::NegMulAdd(reach, hn::Abs(reach), distance_sq);
 }
 
-bool IsBeyondBalls(const SphereNode* nodes, const SphereLeaf* leaves, const float* p,
-                   float margin) {
-  const BallTag d;
+bool IsBeyondSpheres(const SphereNode* nodes, const SphereLeaf* leaves, const float* p,
+                     float margin) {
+  const SphereTag d;
   struct Entry {
     std::int32_t child;
     float power;  // [m^2] of its sphere
@@ -71,11 +71,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(IsBeyondBalls);
+HWY_EXPORT(IsBeyondSpheres);
 
-bool is_beyond_balls(const SphereNode* nodes, const SphereLeaf* leaves, const float p_L[3],
-                     float margin) {
-  return HWY_DYNAMIC_DISPATCH(IsBeyondBalls)(nodes, leaves, p_L, margin);
+bool is_beyond_spheres(const SphereNode* nodes, const SphereLeaf* leaves, const float p_L[3],
+                       float margin) {
+  return HWY_DYNAMIC_DISPATCH(IsBeyondSpheres)(nodes, leaves, p_L, margin);
 }
 
 }  // namespace ist

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "geometry/float_rounding.h"
+#include "internal/geometry/float_rounding.h"
 #include "tree/beyond_kernel.h"
 #include "tree/partition.h"
 
@@ -27,23 +27,23 @@ struct Enclosing {
   double radius;
 };
 
-// The ball in float: its inner ball lies in the given one, its outer ball about it.
-Ball rounded(const Ball& ball) {
-  const Eigen::Vector3d center = to_float(ball.center).cast<double>();
-  const double moved = (center - ball.center).norm();
-  return {center, round_down(ball.radius - moved), round_up(ball.cover_radius + moved)};
+// The sphere in float: its inner sphere lies in the given one, its outer sphere about it.
+InnerSphere rounded(const InnerSphere& sphere) {
+  const Eigen::Vector3d center = to_float(sphere.center).cast<double>();
+  const double moved = (center - sphere.center).norm();
+  return {center, round_down(sphere.radius - moved), round_up(sphere.cover_radius + moved)};
 }
 
 class Builder {
  public:
-  Builder(const std::vector<Ball>& balls, const TreeConfig& config, std::vector<SphereNode>* nodes,
-          std::vector<SphereLeaf>* leaves)
+  Builder(const std::vector<InnerSphere>& spheres, const TreeConfig& config,
+          std::vector<SphereNode>* nodes, std::vector<SphereLeaf>* leaves)
       : config_(config),
         nodes_(*nodes),
         leaves_(*leaves),
-        balls_(balls.size()),
-        order_{&balls_, std::vector<std::uint32_t>(balls.size())} {
-    std::transform(balls.begin(), balls.end(), balls_.begin(), rounded);
+        spheres_(spheres.size()),
+        order_{&spheres_, std::vector<std::uint32_t>(spheres.size())} {
+    std::transform(spheres.begin(), spheres.end(), spheres_.begin(), rounded);
     std::iota(order_.indices.begin(), order_.indices.end(), 0U);
   }
   Builder(const Builder&) = delete;
@@ -52,68 +52,68 @@ class Builder {
   // The root is always a node, so that a query starts the same way for every link.
   void run() { add_node(all(), kMaxTreeLevels - 1); }
 
-  Enclosing enclose(const BallRange& range) const;
-  BallRange all() const { return {0, static_cast<std::uint32_t>(order_.indices.size())}; }
+  Enclosing enclose(const SphereRange& range) const;
+  SphereRange all() const { return {0, static_cast<std::uint32_t>(order_.indices.size())}; }
 
  private:
-  static bool is_leaf(const BallRange& range) {
+  static bool is_leaf(const SphereRange& range) {
     return size(range) <= static_cast<std::uint32_t>(kSphereWidth);
   }
-  std::int32_t add_node(const BallRange& range, int levels_left);
-  std::int32_t add_leaf(const BallRange& range);
+  std::int32_t add_node(const SphereRange& range, int levels_left);
+  std::int32_t add_leaf(const SphereRange& range);
 
   const TreeConfig config_;
   std::vector<SphereNode>& nodes_;
   std::vector<SphereLeaf>& leaves_;
-  std::vector<Ball> balls_;  // rounded: what the leaves hold is what the nodes enclose
-  BallOrder order_;
+  std::vector<InnerSphere> spheres_;  // rounded: what the leaves hold is what the nodes enclose
+  SphereOrder order_;
 };
 
-// A small sphere about the outer balls: start at the box's middle and step toward the farthest
-// ball with ever shorter steps (Badoiu and Clarkson 2003), then measure the radius in full.
-Enclosing Builder::enclose(const BallRange& range) const {
+// A small sphere about the outer spheres: start at the box's middle and step toward the farthest
+// sphere with ever shorter steps (Badoiu and Clarkson 2003), then measure the radius in full.
+Enclosing Builder::enclose(const SphereRange& range) const {
   Eigen::AlignedBox3d box;
   for (std::uint32_t i = range.first; i < range.second; ++i) {
-    const Ball& ball = order_[i];
-    box.extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
-    box.extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
+    const InnerSphere& sphere = order_[i];
+    box.extend(Eigen::Vector3d(sphere.center.array() - sphere.cover_radius));
+    box.extend(Eigen::Vector3d(sphere.center.array() + sphere.cover_radius));
   }
-  const auto farthest = [&](const Eigen::Vector3d& center, const Ball** ball) {
+  const auto farthest = [&](const Eigen::Vector3d& center, const InnerSphere** sphere) {
     double largest = -1.0;
     for (std::uint32_t i = range.first; i < range.second; ++i) {
-      const Ball& candidate = order_[i];
+      const InnerSphere& candidate = order_[i];
       const double reach = (candidate.center - center).norm() + candidate.cover_radius;
       if (reach > largest) {
         largest = reach;
-        *ball = &candidate;
+        *sphere = &candidate;
       }
     }
     return largest;
   };
-  const Ball* ball = nullptr;
+  const InnerSphere* sphere = nullptr;
   Eigen::Vector3d center = box.center(), best = center;
-  double smallest = farthest(center, &ball);
+  double smallest = farthest(center, &sphere);
   for (int step = 1; step <= kEnclosingSteps && size(range) > 1; ++step) {
-    const Eigen::Vector3d to_ball = ball->center - center;
-    const double distance = to_ball.norm();
-    const double reach = distance + ball->cover_radius;
-    if (distance > 0.0) center += to_ball / distance * (0.5 * reach / (step + 1));
-    const double radius = farthest(center, &ball);
+    const Eigen::Vector3d to_sphere = sphere->center - center;
+    const double distance = to_sphere.norm();
+    const double reach = distance + sphere->cover_radius;
+    if (distance > 0.0) center += to_sphere / distance * (0.5 * reach / (step + 1));
+    const double radius = farthest(center, &sphere);
     if (radius < smallest) {
       smallest = radius;
       best = center;
     }
   }
   const Eigen::Vector3f rounded = to_float(best);
-  return {rounded, farthest(rounded.cast<double>(), &ball)};
+  return {rounded, farthest(rounded.cast<double>(), &sphere)};
 }
 
-std::int32_t Builder::add_node(const BallRange& range, int levels_left) {
+std::int32_t Builder::add_node(const SphereRange& range, int levels_left) {
   const auto index = static_cast<std::int32_t>(nodes_.size());
   nodes_.emplace_back();
-  const std::vector<BallRange> groups = is_leaf(range)
-                                            ? std::vector<BallRange>{range}
-                                            : partition(config_, range, levels_left, &order_);
+  const std::vector<SphereRange> groups = is_leaf(range)
+                                              ? std::vector<SphereRange>{range}
+                                              : partition(config_, range, levels_left, &order_);
   SphereNode node{};
   node.count = static_cast<std::int32_t>(groups.size());
   for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
@@ -134,18 +134,18 @@ std::int32_t Builder::add_node(const BallRange& range, int levels_left) {
   return index;
 }
 
-std::int32_t Builder::add_leaf(const BallRange& range) {
+std::int32_t Builder::add_leaf(const SphereRange& range) {
   SphereLeaf leaf{};
   leaf.count = static_cast<std::int32_t>(size(range));
   for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(kSphereWidth); ++k) {
     leaf.inner[k] = leaf.outer[k] = kNoRadius;
     if (range.first + k >= range.second) continue;
-    const Ball& ball = order_[range.first + k];
-    leaf.x[k] = static_cast<float>(ball.center.x());
-    leaf.y[k] = static_cast<float>(ball.center.y());
-    leaf.z[k] = static_cast<float>(ball.center.z());
-    leaf.inner[k] = static_cast<float>(ball.radius);
-    leaf.outer[k] = static_cast<float>(ball.cover_radius);
+    const InnerSphere& sphere = order_[range.first + k];
+    leaf.x[k] = static_cast<float>(sphere.center.x());
+    leaf.y[k] = static_cast<float>(sphere.center.y());
+    leaf.z[k] = static_cast<float>(sphere.center.z());
+    leaf.inner[k] = static_cast<float>(sphere.radius);
+    leaf.outer[k] = static_cast<float>(sphere.cover_radius);
   }
   leaves_.push_back(leaf);
   return static_cast<std::int32_t>(leaves_.size()) - 1;
@@ -154,10 +154,10 @@ std::int32_t Builder::add_leaf(const BallRange& range) {
 }  // namespace
 
 InnerSphereTree::InnerSphereTree(const Packing& packing, const TreeConfig& config)
-    : interior_gap_(packing.certificate.interior_gap), ball_count_(packing.balls.size()) {
+    : interior_gap_(packing.certificate.interior_gap), sphere_count_(packing.spheres.size()) {
   assert(config.magnification >= 0.0 && config.magnification <= 1.0);
-  if (packing.balls.empty()) return;
-  Builder builder(packing.balls, config, &nodes_, &leaves_);
+  if (packing.spheres.empty()) return;
+  Builder builder(packing.spheres, config, &nodes_, &leaves_);
   const Enclosing all = builder.enclose(builder.all());
   center_ = all.center.cast<double>();
   radius_ = round_up(all.radius);
@@ -224,8 +224,8 @@ bool InnerSphereTree::is_beyond(const Eigen::Vector3d& p_L, double distance) con
   const Eigen::Vector3f p = p_L.cast<float>();
   // As in outer_distance.
   const double rounding = 1e-6 * (p_L.cwiseAbs().maxCoeff() + radius_ + center_.norm());
-  return is_beyond_balls(nodes_.data(), leaves_.data(), p.data(),
-                         static_cast<float>(distance + rounding));
+  return is_beyond_spheres(nodes_.data(), leaves_.data(), p.data(),
+                           static_cast<float>(distance + rounding));
 }
 
 }  // namespace ist

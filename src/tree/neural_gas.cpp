@@ -12,8 +12,8 @@ constexpr std::size_t kMostPrototypes = static_cast<std::size_t>(kSphereWidth);
 constexpr int kSteps = 20;
 // Neighbourhoods shrink from half the prototypes to, in effect, the nearest one alone.
 constexpr double kLastReach = 0.01;
-// Groups come out unequal: aiming at full leaves would leave many a ball too many.
-constexpr std::uint32_t kBallsPerLeaf = 6;
+// Groups come out unequal: aiming at full leaves would leave many a sphere too many.
+constexpr std::uint32_t kSpheresPerLeaf = 6;
 
 using Prototypes = std::array<Eigen::Vector3d, kMostPrototypes>;
 using Distances = std::array<double, kMostPrototypes>;
@@ -37,18 +37,18 @@ std::array<std::size_t, kMostPrototypes> ranks(const Distances& distances, std::
   return rank;
 }
 
-// A ball counts by a power of its volume; of the outer ball's, for that is what nodes enclose.
-double weight(const Ball& ball, double magnification) {
+// A sphere counts by a power of its volume; of the outer sphere's, for that is what nodes enclose.
+double weight(const InnerSphere& sphere, double magnification) {
   if (magnification == 0.0) return 1.0;
-  return std::max(std::pow(ball.cover_radius, 3.0 * magnification), 1e-30);
+  return std::max(std::pow(sphere.cover_radius, 3.0 * magnification), 1e-30);
 }
 
 // The prototypes start at the middles of parts between medians, so no chance is involved.
-Prototypes first_places(const BallRange& range, std::size_t count, BallOrder* order,
+Prototypes first_places(const SphereRange& range, std::size_t count, SphereOrder* order,
                         std::size_t* found) {
   Prototypes prototypes;
   *found = 0;
-  for (const BallRange& part : split_at_medians(range, count, order)) {
+  for (const SphereRange& part : split_at_medians(range, count, order)) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::uint32_t i = part.first; i < part.second; ++i) sum += (*order)[i].center;
     prototypes[(*found)++] = sum / static_cast<double>(size(part));
@@ -56,21 +56,21 @@ Prototypes first_places(const BallRange& range, std::size_t count, BallOrder* or
   return prototypes;
 }
 
-// One step of the batch: each prototype moves to the mean of all balls, weighted by how many other
-// prototypes are nearer to them, and by `weights`.
-void move(const BallRange& range, const BallOrder& order, const std::vector<double>& weights,
+// One step of the batch: each prototype moves to the mean of all spheres, weighted by how many
+// other prototypes are nearer to them, and by `weights`.
+void move(const SphereRange& range, const SphereOrder& order, const std::vector<double>& weights,
           std::size_t count, double reach, Prototypes* prototypes) {
   std::array<double, kMostPrototypes> share{}, total{};
   for (std::size_t k = 0; k < count; ++k) share[k] = std::exp(-static_cast<double>(k) / reach);
   Prototypes sum;
   sum.fill(Eigen::Vector3d::Zero());
   for (std::uint32_t i = range.first; i < range.second; ++i) {
-    const Ball& ball = order[i];
-    const auto rank = ranks(distances_sq(*prototypes, count, ball.center), count);
+    const InnerSphere& sphere = order[i];
+    const auto rank = ranks(distances_sq(*prototypes, count, sphere.center), count);
     const double v = weights[i - range.first];
     for (std::size_t k = 0; k < count; ++k) {
       const double w = share[rank[k]] * v;
-      sum[k] += w * ball.center;
+      sum[k] += w * sphere.center;
       total[k] += w;
     }
   }
@@ -81,10 +81,10 @@ void move(const BallRange& range, const BallOrder& order, const std::vector<doub
 
 }  // namespace
 
-std::vector<BallRange> split_by_neural_gas(const BallRange& range, double magnification,
-                                           BallOrder* order) {
+std::vector<SphereRange> split_by_neural_gas(const SphereRange& range, double magnification,
+                                             SphereOrder* order) {
   const std::size_t wanted =
-      std::min<std::size_t>(kMostPrototypes, (size(range) + kBallsPerLeaf - 1) / kBallsPerLeaf);
+      std::min<std::size_t>(kMostPrototypes, (size(range) + kSpheresPerLeaf - 1) / kSpheresPerLeaf);
   std::size_t count = 0;
   Prototypes prototypes = first_places(range, wanted, order, &count);
   std::vector<double> weights;
@@ -106,7 +106,7 @@ std::vector<BallRange> split_by_neural_gas(const BallRange& range, double magnif
     of_prototype.emplace_back(static_cast<std::size_t>(nearest - rank.begin()), order->indices[i]);
   }
   std::sort(of_prototype.begin(), of_prototype.end());
-  std::vector<BallRange> groups;
+  std::vector<SphereRange> groups;
   for (std::uint32_t i = 0; i < of_prototype.size(); ++i) {
     const std::uint32_t at = range.first + i;
     order->indices[at] = of_prototype[i].second;

@@ -10,7 +10,7 @@ namespace {
 constexpr auto kWidth = static_cast<std::uint32_t>(kSphereWidth);
 
 // Median along the longest axis of the centres.
-std::uint32_t halve(const BallRange& range, BallOrder* order) {
+std::uint32_t halve(const SphereRange& range, SphereOrder* order) {
   Eigen::AlignedBox3d box;
   for (std::uint32_t i = range.first; i < range.second; ++i) box.extend((*order)[i].center);
   Eigen::Index axis;
@@ -19,8 +19,8 @@ std::uint32_t halve(const BallRange& range, BallOrder* order) {
   const auto begin = order->indices.begin();
   std::nth_element(begin + range.first, begin + middle, begin + range.second,
                    [&](std::uint32_t a, std::uint32_t b) {
-                     const double ca = (*order->balls)[a].center[axis];
-                     const double cb = (*order->balls)[b].center[axis];
+                     const double ca = (*order->spheres)[a].center[axis];
+                     const double cb = (*order->spheres)[b].center[axis];
                      return ca < cb || (ca == cb && a < b);
                    });
   return middle;
@@ -34,32 +34,32 @@ int median_levels(std::uint32_t count) {
   return levels;
 }
 
-// The one with the most balls is halved until there are enough.
-std::vector<BallRange> split_at_medians(const BallRange& range, std::size_t most,
-                                        BallOrder* order) {
-  std::vector<BallRange> groups{range};
+// The one with the most spheres is halved until there are enough.
+std::vector<SphereRange> split_at_medians(const SphereRange& range, std::size_t most,
+                                          SphereOrder* order) {
+  std::vector<SphereRange> groups{range};
   while (groups.size() < most) {
-    const auto largest =
-        std::max_element(groups.begin(), groups.end(),
-                         [](const BallRange& a, const BallRange& b) { return size(a) < size(b); });
+    const auto largest = std::max_element(
+        groups.begin(), groups.end(),
+        [](const SphereRange& a, const SphereRange& b) { return size(a) < size(b); });
     if (size(*largest) <= kWidth) break;
     const std::uint32_t middle = halve(*largest, order);
-    const BallRange upper{middle, largest->second};
+    const SphereRange upper{middle, largest->second};
     largest->second = middle;
     groups.insert(largest + 1, upper);
   }
   return groups;
 }
 
-std::vector<BallRange> partition(const TreeConfig& config, const BallRange& range, int levels_left,
-                                 BallOrder* order) {
-  std::vector<BallRange> groups;
+std::vector<SphereRange> partition(const TreeConfig& config, const SphereRange& range,
+                                   int levels_left, SphereOrder* order) {
+  std::vector<SphereRange> groups;
   if (config.split == TreeSplit::kSurfaceArea) groups = split_by_surface(range, order);
   if (config.split == TreeSplit::kNeuralGas) {
     groups = split_by_neural_gas(range, config.magnification, order);
   }
   std::uint32_t largest = 0;
-  for (const BallRange& group : groups) largest = std::max(largest, size(group));
+  for (const SphereRange& group : groups) largest = std::max(largest, size(group));
   // Uneven groups make a deep tree; from the medians' it can still be completed.
   const bool fits = groups.size() > 1 && median_levels(largest) <= levels_left;
   return fits ? groups : split_at_medians(range, kWidth, order);

@@ -9,33 +9,34 @@
 
 namespace ist {
 
-/// Balls that belong together: from first to before second, in an order of indices.
-using BallRange = std::pair<std::uint32_t, std::uint32_t>;
+/// Spheres that belong together: from first to before second, in an order of indices.
+using SphereRange = std::pair<std::uint32_t, std::uint32_t>;
 
-/// The balls of a tree, and the order that its ranges are of.
-struct BallOrder {
-  const std::vector<Ball>* balls;
+/// The spheres of a tree, and the order that its ranges are of.
+struct SphereOrder {
+  const std::vector<InnerSphere>* spheres;
   std::vector<std::uint32_t> indices;
 
-  const Ball& operator[](std::uint32_t i) const { return (*balls)[indices[i]]; }
+  const InnerSphere& operator[](std::uint32_t i) const { return (*spheres)[indices[i]]; }
 };
 
-inline std::uint32_t size(const BallRange& range) { return range.second - range.first; }
+inline std::uint32_t size(const SphereRange& range) { return range.second - range.first; }
 
-/// Divides a range of more than kSphereWidth balls into 2 to kSphereWidth groups, a node's
+/// Divides a range of more than kSphereWidth spheres into 2 to kSphereWidth groups, a node's
 /// children, one after another and none empty; reorders the range. Groups of up to kSphereWidth
-/// balls become leaves. Deterministic.
+/// spheres become leaves. Deterministic.
 /// @param levels_left  the groups' own trees may be this deep, leaves included
-std::vector<BallRange> partition(const TreeConfig& config, const BallRange& range, int levels_left,
-                                 BallOrder* order);
+std::vector<SphereRange> partition(const TreeConfig& config, const SphereRange& range,
+                                   int levels_left, SphereOrder* order);
 
-/// The levels of a tree over `count` balls that is halved at medians.
+/// The levels of a tree over `count` spheres that is halved at medians.
 int median_levels(std::uint32_t count);
 
-/// The three ways. The last one gives a single group where no prototypes divide the balls.
-std::vector<BallRange> split_at_medians(const BallRange& range, std::size_t most, BallOrder* order);
-std::vector<BallRange> split_by_surface(const BallRange& range, BallOrder* order);
-std::vector<BallRange> split_by_neural_gas(const BallRange& range, double magnification,
-                                           BallOrder* order);
+/// The three ways. The last one gives a single group where no prototypes divide the spheres.
+std::vector<SphereRange> split_at_medians(const SphereRange& range, std::size_t most,
+                                          SphereOrder* order);
+std::vector<SphereRange> split_by_surface(const SphereRange& range, SphereOrder* order);
+std::vector<SphereRange> split_by_neural_gas(const SphereRange& range, double magnification,
+                                             SphereOrder* order);
 
 }  // namespace ist

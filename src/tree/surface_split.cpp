@@ -9,9 +9,9 @@ namespace {
 
 constexpr auto kWidth = static_cast<std::uint32_t>(kSphereWidth);
 
-void extend(Eigen::AlignedBox3d* box, const Ball& ball) {
-  box->extend(Eigen::Vector3d(ball.center.array() - ball.cover_radius));
-  box->extend(Eigen::Vector3d(ball.center.array() + ball.cover_radius));
+void extend(Eigen::AlignedBox3d* box, const InnerSphere& sphere) {
+  box->extend(Eigen::Vector3d(sphere.center.array() - sphere.cover_radius));
+  box->extend(Eigen::Vector3d(sphere.center.array() + sphere.cover_radius));
 }
 
 double area(const Eigen::AlignedBox3d& box) {
@@ -19,21 +19,21 @@ double area(const Eigen::AlignedBox3d& box) {
   return 2.0 * (s.x() * s.y() + s.y() * s.z() + s.z() * s.x());
 }
 
-double leaves(std::uint32_t balls) {
-  const std::uint32_t count = (balls + kWidth - 1) / kWidth;
+double leaves(std::uint32_t spheres) {
+  const std::uint32_t count = (spheres + kWidth - 1) / kWidth;
   return static_cast<double>(count);
 }
 
-void sort_along(int axis, const BallRange& range, BallOrder* order) {
+void sort_along(int axis, const SphereRange& range, SphereOrder* order) {
   const auto begin = order->indices.begin();
   std::sort(begin + range.first, begin + range.second, [&](std::uint32_t a, std::uint32_t b) {
-    const double ca = (*order->balls)[a].center[axis], cb = (*order->balls)[b].center[axis];
+    const double ca = (*order->spheres)[a].center[axis], cb = (*order->spheres)[b].center[axis];
     return ca < cb || (ca == cb && a < b);
   });
 }
 
 // The cheapest of all places along all axes.
-std::uint32_t best_place(const BallRange& range, BallOrder* order) {
+std::uint32_t best_place(const SphereRange& range, SphereOrder* order) {
   double least = std::numeric_limits<double>::infinity();
   int best_axis = 0;
   std::uint32_t best = range.first + size(range) / 2;
@@ -62,21 +62,21 @@ std::uint32_t best_place(const BallRange& range, BallOrder* order) {
 }  // namespace
 
 // What is met most often, and is no leaf yet, is divided first.
-std::vector<BallRange> split_by_surface(const BallRange& range, BallOrder* order) {
-  const auto weight = [order](const BallRange& group) {
+std::vector<SphereRange> split_by_surface(const SphereRange& range, SphereOrder* order) {
+  const auto weight = [order](const SphereRange& group) {
     if (size(group) <= kWidth) return -1.0;
     Eigen::AlignedBox3d box;
     for (std::uint32_t i = group.first; i < group.second; ++i) extend(&box, (*order)[i]);
     return area(box);
   };
-  std::vector<BallRange> groups{range};
+  std::vector<SphereRange> groups{range};
   while (groups.size() < kWidth) {
     const auto next = std::max_element(
         groups.begin(), groups.end(),
-        [&](const BallRange& a, const BallRange& b) { return weight(a) < weight(b); });
+        [&](const SphereRange& a, const SphereRange& b) { return weight(a) < weight(b); });
     if (size(*next) <= kWidth) break;
     const std::uint32_t middle = best_place(*next, order);
-    const BallRange upper{middle, next->second};
+    const SphereRange upper{middle, next->second};
     next->second = middle;
     groups.insert(next + 1, upper);
   }

@@ -34,9 +34,9 @@ RobotDescription robot() {
   return result;
 }
 
-AttachedObject ball_on(const std::string& link) {
+AttachedObject sphere_on(const std::string& link) {
   AttachedObject object;
-  object.name = "ball on " + link;
+  object.name = "sphere on " + link;
   object.link = link;
   object.element.shape = Sphere{0.07};
   object.element.X_LE.translation() << 0.05, -0.1, 0.2;
@@ -57,9 +57,9 @@ void expect_equal(const RobotModel& a, const RobotModel& b) {
   for (std::size_t i = 0; i < a.links.size(); ++i) {
     EXPECT_EQ(a.links[i].name, b.links[i].name);
     EXPECT_EQ(a.links[i].error, b.links[i].error);
-    ASSERT_EQ(a.links[i].packing.balls.size(), b.links[i].packing.balls.size());
-    for (std::size_t k = 0; k < a.links[i].packing.balls.size(); ++k) {
-      EXPECT_EQ(a.links[i].packing.balls[k].center, b.links[i].packing.balls[k].center);
+    ASSERT_EQ(a.links[i].packing.spheres.size(), b.links[i].packing.spheres.size());
+    for (std::size_t k = 0; k < a.links[i].packing.spheres.size(); ++k) {
+      EXPECT_EQ(a.links[i].packing.spheres[k].center, b.links[i].packing.spheres[k].center);
     }
     for (int k = 0; k < 100 && a.links[i].usable(); ++k) {
       const Eigen::Vector3d p(number(random), number(random), number(random));
@@ -72,7 +72,7 @@ void expect_equal(const RobotModel& a, const RobotModel& b) {
 TEST(AttachedObject, rebuildingOneLinkGivesWhatBuildingAllWould) {
   const auto bare = build_robot_model(robot(), config());
   for (const char* name : {"arm", "flange", "finger"}) {
-    const RobotDescription carrying = with_objects(robot(), {ball_on(name)});
+    const RobotDescription carrying = with_objects(robot(), {sphere_on(name)});
     const auto whole = build_robot_model(carrying, config());
     const auto rebuilt = rebuild_link(*bare, carrying, name, config());
     expect_equal(*rebuilt, *whole);
@@ -82,15 +82,15 @@ TEST(AttachedObject, rebuildingOneLinkGivesWhatBuildingAllWould) {
 }
 
 TEST(AttachedObject, isPartOfItsLink) {
-  const auto model = build_robot_model(with_objects(robot(), {ball_on("finger")}), config());
+  const auto model = build_robot_model(with_objects(robot(), {sphere_on("finger")}), config());
   const Box box{{0.02, 0.03, 0.2}};
   std::mt19937 random(5);
   std::uniform_real_distribution<double> number(-0.4, 0.4);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d p(number(random), number(random), number(random));
     const Eigen::Vector3d beyond = (p.cwiseAbs() - 0.5 * box.size).cwiseMax(0.0);
-    const double to_ball = (p - Eigen::Vector3d(0.05, -0.1, 0.2)).norm() - 0.07;
-    const double expected = std::min(beyond.norm(), to_ball);
+    const double to_sphere = (p - Eigen::Vector3d(0.05, -0.1, 0.2)).norm() - 0.07;
+    const double expected = std::min(beyond.norm(), to_sphere);
     if (expected > 0.0) {
       EXPECT_NEAR(model->links[1].solid.signed_distance(p).distance, expected, 1e-12);
     }
@@ -99,16 +99,16 @@ TEST(AttachedObject, isPartOfItsLink) {
 
 TEST(AttachedObject, doesNotTakeSpheresFromItsLink) {
   const auto bare = build_robot_model(robot(), config());
-  const auto carrying = build_robot_model(with_objects(robot(), {ball_on("arm")}), config());
-  // The ball is one sphere; the arm's stay as many as they were.
-  EXPECT_EQ(carrying->links[0].packing.balls.size(), bare->links[0].packing.balls.size() + 1);
+  const auto carrying = build_robot_model(with_objects(robot(), {sphere_on("arm")}), config());
+  // The sphere is one sphere; the arm's stay as many as they were.
+  EXPECT_EQ(carrying->links[0].packing.spheres.size(), bare->links[0].packing.spheres.size() + 1);
 }
 
 TEST(AttachedObject, onlyLinksThatAreAskedFor) {
   RobotModelConfig some = config();
   some.links = {"finger"};
   const auto bare = build_robot_model(robot(), some);
-  const RobotDescription carrying = with_objects(robot(), {ball_on("flange")});
+  const RobotDescription carrying = with_objects(robot(), {sphere_on("flange")});
   EXPECT_EQ(rebuild_link(*bare, carrying, "flange", some)->links.size(), 1U);
   some.links = {"finger", "flange"};
   const auto rebuilt = rebuild_link(*bare, carrying, "flange", some);
@@ -122,7 +122,7 @@ TEST(AttachedObject, onlyLinksThatAreAskedFor) {
 TEST(AttachedObject, linksThatCannotCarry) {
   const auto message_of = [](const std::string& link) {
     try {
-      with_objects(robot(), {ball_on(link)});
+      with_objects(robot(), {sphere_on(link)});
     } catch (const ModelError& error) {
       return std::string(error.what());
     }

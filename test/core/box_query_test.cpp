@@ -253,10 +253,10 @@ TEST_P(Boxes, AgainstOracle) {
           continue;
         }
         ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
-        ASSERT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
-        ASSERT_LT((X_FL[i] * result.p_LL - result.p_FL).norm(), 1e-12);
-        ASSERT_TRUE(in_a_box(map, result.p_FO));
-        ASSERT_LT(test::oracle_distance(meshes[i], result.p_LL), 1e-9);
+        ASSERT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
+        ASSERT_LT((X_FL[i] * result.p_LCl - result.p_FCl).norm(), 1e-12);
+        ASSERT_TRUE(in_a_box(map, result.p_FCo));
+        ASSERT_LT(test::oracle_distance(meshes[i], result.p_LCl), 1e-9);
         ASSERT_LE(result.lower_bound, result.distance);
         ASSERT_EQ(result.state == LinkState::kContact, truth.is_contact) << result.distance;
         if (result.state == LinkState::kNear) {
@@ -267,7 +267,7 @@ TEST_P(Boxes, AgainstOracle) {
           continue;
         }
         ++contact;
-        const Eigen::Vector3d p_L = X_FL[i].inverse() * result.p_FO;
+        const Eigen::Vector3d p_L = X_FL[i].inverse() * result.p_FCo;
         ASSERT_NEAR(result.distance, test::oracle_signed_distance(meshes[i], p_L), 1e-9);
         widest = std::max(widest, result.distance - result.lower_bound);
         if (cases % 10 == 0) {
@@ -309,10 +309,10 @@ TEST(Boxes, EveryKindOfLink) {
       const LinkProximity& result = results[i];
       ASSERT_GE(result.state, LinkState::kNear);
       ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
-      ASSERT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
-      ASSERT_TRUE(in_a_box(map, result.p_FO));
+      ASSERT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
+      ASSERT_TRUE(in_a_box(map, result.p_FCo));
       const Eigen::Isometry3d X_LM = X_FL[i].inverse() * map.X_FM;
-      ASSERT_NEAR(solids[i].signed_distance(X_FL[i].inverse() * result.p_FO).distance,
+      ASSERT_NEAR(solids[i].signed_distance(X_FL[i].inverse() * result.p_FCo).distance,
                   result.distance, 1e-7);
       for (const Eigen::AlignedBox3d& box : boxes) {
         // With holes, a box that touches nothing is outside as a whole, also where the winding
@@ -352,7 +352,7 @@ TEST(Boxes, TouchAndAlignment) {
       SCOPED_TRACE(gap);
       ASSERT_GE(result.state, LinkState::kNear);
       EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
-      EXPECT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
+      EXPECT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
       if (gap > 0.0) {
         EXPECT_EQ(result.state, LinkState::kNear);
         EXPECT_NEAR(result.distance, gap, 1e-7);

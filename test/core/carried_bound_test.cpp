@@ -112,7 +112,7 @@ TEST(CarriedBound, HoldsAmongTheSameCloudsOnly) {
   EXPECT_EQ(carried.at(1, Eigen::Isometry3d::Identity()), -kInfinity) << "in contact";
 }
 
-TEST(CarriedBound, WithHolesOnlyFarFromTheBalls) {
+TEST(CarriedBound, WithHolesOnlyFarFromTheSpheres) {
   const LinkModel& link = links().model().links[4];
   ASSERT_TRUE(link.solid.has_holes());
   const double gap = link.tree.interior_gap();
@@ -135,7 +135,7 @@ TEST(SeenClouds, KnowsThemAgain) {
   SeenClouds seen;
   std::uint64_t last = seen.note({&a});
   EXPECT_NE(last, 0U);
-  const auto changes = [&](const std::vector<const CloudSnapshot*>& clouds) {
+  const auto changes = [&](SnapshotSpan clouds) {
     const std::uint64_t before = last;
     last = seen.note(clouds);
     EXPECT_EQ(seen.note(clouds), last);

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "ist_proximity/geometry/mesh_io.h"
+#include "internal/geometry/mesh_io.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/data_dir.h"
 #include "support/oracle.h"

@@ -79,13 +79,13 @@ void check(const std::string& name, const std::string& header, const Rows& rows)
 }
 
 bool holds(const Shape& shape, const Eigen::Vector3d& p) {
-  if (const auto* ball = std::get_if<Sphere>(&shape)) return p.norm() < ball->radius;
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return p.norm() < sphere->radius;
   return (p.cwiseAbs() - 0.5 * std::get<Box>(shape).size).maxCoeff() < 0.0;
 }
 
 Eigen::Vector3d half_extent(const Shape& shape) {
-  if (const auto* ball = std::get_if<Sphere>(&shape))
-    return Eigen::Vector3d::Constant(ball->radius);
+  if (const auto* sphere = std::get_if<Sphere>(&shape))
+    return Eigen::Vector3d::Constant(sphere->radius);
   return 0.5 * std::get<Box>(shape).size;
 }
 
@@ -107,12 +107,12 @@ double true_overlap(const Shape& a, const Shape& b, const Eigen::Isometry3d& X_A
   return static_cast<double>(inside) * step.prod();
 }
 
-// A ball as a mesh of its volume, so that its packing has many balls.
+// A sphere as a mesh of its volume, so that its packing has many spheres.
 LinkGeometry packed_shape(const Shape& shape) {
-  const auto* ball = std::get_if<Sphere>(&shape);
-  if (ball == nullptr) return one(shape);
-  TriangleMesh mesh = test::icosphere(ball->radius, 3);
-  const double volume = 4.0 * M_PI / 3.0 * std::pow(ball->radius, 3);
+  const auto* sphere = std::get_if<Sphere>(&shape);
+  if (sphere == nullptr) return one(shape);
+  TriangleMesh mesh = test::icosphere(sphere->radius, 3);
+  const double volume = 4.0 * M_PI / 3.0 * std::pow(sphere->radius, 3);
   const double scale = std::cbrt(volume / test::signed_volume(mesh));
   for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
   return one(mesh);
@@ -124,8 +124,8 @@ struct Pair {
 };
 
 std::vector<Pair> pairs() {
-  return {{"two balls", Sphere{0.1}, Sphere{0.07}},
-          {"ball and box", Sphere{0.1}, Box{{0.2, 0.15, 0.1}}},
+  return {{"two spheres", Sphere{0.1}, Sphere{0.07}},
+          {"sphere and box", Sphere{0.1}, Box{{0.2, 0.15, 0.1}}},
           {"box and box", Box{{0.2, 0.15, 0.1}}, Box{{0.15, 0.1, 0.12}}}};
 }
 
@@ -237,9 +237,9 @@ TEST(ContactDocument, ForcesDoNotJump) {
   const auto bodies = [](const ContactLink& a, const ContactLink& b) {
     return [&a, &b](double s) { return contact_volume(*a.body, *b.body, along(s)); };
   };
-  rows["ball through a ball, concentric"] = jumps(bodies(big, small), -0.15, 0.15);
-  rows["ball through a ball of its size, concentric"] = jumps(bodies(big, big), -0.21, 0.21);
-  rows["ball through a box"] = jumps(bodies(box, small), -0.16, 0.16);
+  rows["sphere through a sphere, concentric"] = jumps(bodies(big, small), -0.15, 0.15);
+  rows["sphere through a sphere of its size, concentric"] = jumps(bodies(big, big), -0.21, 0.21);
+  rows["sphere through a box"] = jumps(bodies(box, small), -0.16, 0.16);
   rows["small box through a box, wholly inside"] = jumps(bodies(box, small_box), -0.15, 0.15);
   const CloudSnapshot point = test::thinned({Eigen::Vector3d::Zero()});
   const CloudSnapshot block = test::thinned(samples(Box{{0.06, 0.06, 0.06}}, 0.003));
@@ -248,7 +248,7 @@ TEST(ContactDocument, ForcesDoNotJump) {
       return contact_volume(a.link(), *a.body, along(-s), {&obstacle});
     };
   };
-  rows["one point through a ball, concentric"] = jumps(cloud(big, point), -0.12, 0.12);
+  rows["one point through a sphere, concentric"] = jumps(cloud(big, point), -0.12, 0.12);
   rows["one point through a box"] = jumps(cloud(box, point), -0.12, 0.12);
   rows["filled cloud through a box"] = jumps(cloud(box, block), -0.15, 0.15);
   check("jumps", "| way | force [%] | torque [%] |", rows);

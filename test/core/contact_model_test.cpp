@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/contact_model.h"
+#include "ist_proximity/contact/contact_model.h"
 
 #include <gtest/gtest.h>
 
@@ -19,8 +19,8 @@ using test::one;
 
 double counted(const ContactBody& body) {
   double volume = 0.0;
-  for (const test::OracleBall& ball : test::balls_of(body)) {
-    volume += ball.share * 4.0 * M_PI / 3.0 * std::pow(ball.radius, 3);
+  for (const test::OracleSphere& sphere : test::spheres_of(body)) {
+    volume += sphere.share * 4.0 * M_PI / 3.0 * std::pow(sphere.radius, 3);
   }
   return volume;
 }
@@ -45,7 +45,7 @@ TEST(ContactBody, StandsForTheLinksVolume) {
       EXPECT_NEAR(link.body->volume, one_case.volume, 0.03 * one_case.volume);
       EXPECT_NEAR(counted(*link.body), link.body->volume, 1e-3 * one_case.volume);
       EXPECT_LE(link.body->packed_volume, link.body->volume * (1.0 + 1e-12));
-      EXPECT_LE(link.body->ball_count, static_cast<std::size_t>(spheres));
+      EXPECT_LE(link.body->sphere_count, static_cast<std::size_t>(spheres));
       EXPECT_TRUE(link.body->note.empty()) << link.body->note;
     }
   }
@@ -54,13 +54,13 @@ TEST(ContactBody, StandsForTheLinksVolume) {
 TEST(ContactBody, WayOutPointsToTheNearestSide) {
   const ContactLink link(one(Box{{0.2, 0.15, 0.1}}));
   int near_a_side = 0;
-  for (const test::OracleBall& ball : test::balls_of(*link.body)) {
-    const Eigen::Vector3d way_out = ball.way_out(ball.center);
+  for (const test::OracleSphere& sphere : test::spheres_of(*link.body)) {
+    const Eigen::Vector3d way_out = sphere.way_out(sphere.center);
     EXPECT_LT(way_out.norm(), 1.0);
     // Right under the top, all other sides farther: up.
-    const double depth = 0.05 - ball.center.z();
+    const double depth = 0.05 - sphere.center.z();
     const bool alone =
-        depth < 0.01 && std::abs(ball.center.x()) < 0.06 && std::abs(ball.center.y()) < 0.04;
+        depth < 0.01 && std::abs(sphere.center.x()) < 0.06 && std::abs(sphere.center.y()) < 0.04;
     if (!alone) continue;
     ++near_a_side;
     EXPECT_GT(way_out.normalized().z(), 0.97);
@@ -68,12 +68,12 @@ TEST(ContactBody, WayOutPointsToTheNearestSide) {
   }
   EXPECT_GT(near_a_side, 0);
   // In the middle all ways are equally long.
-  const ContactLink ball(one(Sphere{0.1}), 1);
-  const auto balls = test::balls_of(*ball.body);
-  ASSERT_EQ(balls.size(), 1U);
-  EXPECT_LT(balls[0].way_out(Eigen::Vector3d::Zero()).norm(), 0.01);
+  const ContactLink sphere(one(Sphere{0.1}), 1);
+  const auto spheres = test::spheres_of(*sphere.body);
+  ASSERT_EQ(spheres.size(), 1U);
+  EXPECT_LT(spheres[0].way_out(Eigen::Vector3d::Zero()).norm(), 0.01);
   for (const Eigen::Vector3d& u : {Eigen::Vector3d(0.07, 0, 0), Eigen::Vector3d(0, -0.05, 0.05)}) {
-    EXPECT_GT(balls[0].way_out(u).dot(u.normalized()), 0.9);
+    EXPECT_GT(spheres[0].way_out(u).dot(u.normalized()), 0.9);
   }
 }
 
@@ -99,7 +99,7 @@ TEST(ContactBody, ComesFromTheCacheTheNextTime) {
   const auto first = build(), second = build();
   EXPECT_FALSE(first->from_cache);
   EXPECT_TRUE(second->from_cache);
-  const auto a = test::balls_of(*first), b = test::balls_of(*second);
+  const auto a = test::spheres_of(*first), b = test::spheres_of(*second);
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].center, b[i].center);
@@ -125,12 +125,12 @@ TEST(ContactBody, TakesTheOtherPackingWhenTimeIsUp) {
   const auto body = build_contact_body(geometry, 0, model->links[0], config, "");
   EXPECT_FALSE(body->note.empty());
   EXPECT_NEAR(body->volume, 0.001, 0.1 * 0.001);
-  const auto balls = test::balls_of(*body);
-  EXPECT_GT(balls.size(), 3U);
-  for (std::size_t i = 0; i < balls.size(); ++i) {
+  const auto spheres = test::spheres_of(*body);
+  EXPECT_GT(spheres.size(), 3U);
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      EXPECT_GE((balls[i].center - balls[j].center).norm(),
-                balls[i].radius + balls[j].radius - 1e-6);
+      EXPECT_GE((spheres[i].center - spheres[j].center).norm(),
+                spheres[i].radius + spheres[j].radius - 1e-6);
     }
   }
 }

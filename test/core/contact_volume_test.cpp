@@ -1,4 +1,4 @@
-#include "ist_proximity/proximity/contact_volume.h"
+#include "ist_proximity/contact/contact_volume.h"
 
 #include <gtest/gtest.h>
 
@@ -19,12 +19,12 @@ using test::ContactLink;
 using test::one;
 using Points = std::vector<Eigen::Vector3d>;
 
-// Relative to what is shared, and to the ball of one point: float, most of all in the depth of
+// Relative to what is shared, and to the sphere of one point: float, most of all in the depth of
 // points that have just come in.
-constexpr double kRounding = 5e-5, kBall = 2e-6;
+constexpr double kRounding = 5e-5, kSphere = 2e-6;
 
 void expect_same(const ContactVolume& found, const ContactVolume& truth, double size) {
-  const double scale = truth.volume + kBall;
+  const double scale = truth.volume + kSphere;
   EXPECT_NEAR(found.volume, truth.volume, kRounding * scale);
   EXPECT_LT((found.push - truth.push).norm(), kRounding * scale);
   EXPECT_LT((found.turn - truth.turn).norm(), kRounding * scale * size);
@@ -124,8 +124,8 @@ TEST(ContactVolume, CountsNothingTwice) {
   // A second camera sees the same.
   EXPECT_NEAR(contact_volume(link.link(), *link.body, X_FL, {&once, &once}).volume, volume,
               1e-6 * volume);
-  // No more than the union of all balls within the link: the wall's layer.
-  const double layer = 2.0 * kBallPerCell * once.thinning;
+  // No more than the union of all spheres within the link: the wall's layer.
+  const double layer = 2.0 * kPointSphereRadius * once.thinning;
   EXPECT_LT(volume, 0.2 * 0.15 * layer);
   EXPECT_GT(volume, 0.5 * 0.2 * 0.15 * layer);
 }
@@ -221,13 +221,13 @@ TEST(ContactVolume, OfAMapIsThatOfItsBoxes) {
 
 // Concentric, touching, one within the other: finite and continuous.
 TEST(ContactVolume, HasNoJumpsAlongAnyWay) {
-  const ContactLink ball(one(Sphere{0.1}), 1);
+  const ContactLink sphere(one(Sphere{0.1}), 1);
   const ContactLink box(one(Box{{0.2, 0.15, 0.1}}));
   const CloudSnapshot cloud = test::thinned({Eigen::Vector3d::Zero()});
   const CloudSnapshot block = test::thinned(filled(one(Box{{0.06, 0.06, 0.06}}), 0.04, 0.004));
   test::Rng rng(105);
   constexpr double kStep = 5e-5;  // [m]
-  for (const ContactLink* link : {&ball, &box}) {
+  for (const ContactLink* link : {&sphere, &box}) {
     for (const CloudSnapshot* obstacle : {&cloud, &block}) {
       for (int way = 0; way < test::scaled(2); ++way) {
         const Eigen::Vector3d u =
@@ -246,8 +246,9 @@ TEST(ContactVolume, HasNoJumpsAlongAnyWay) {
           before = now;
         }
         EXPECT_GT(largest_volume, 0.0);
-        // The steepest rise is over kFullDepth of a point's ball.
-        EXPECT_LT(largest_step, 4.0 * kStep / (kFullDepth * kBallPerCell * 0.01) * largest_volume);
+        // The steepest rise is over kFullDepth of a point's sphere.
+        EXPECT_LT(largest_step,
+                  4.0 * kStep / (kFullDepth * kPointSphereRadius * 0.01) * largest_volume);
       }
     }
   }

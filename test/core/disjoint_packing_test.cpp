@@ -1,5 +1,5 @@
-// Disjoint packings of whole links: no two inner balls of an element overlap, and none reaches out
-// of its element, by more than 1e-6 m.
+// Disjoint packings of whole links: no two inner spheres of an element overlap, and none reaches
+// out of its element, by more than 1e-6 m.
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "ist_proximity/geometry/mesh_io.h"
-#include "ist_proximity/packing/packer.h"
-#include "ist_proximity/packing/packing_report.h"
+#include "internal/geometry/mesh_io.h"
+#include "internal/packing/packer.h"
+#include "internal/packing/packing_report.h"
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
 #include "support/hard_shapes.h"
@@ -26,28 +26,28 @@ constexpr double kAllowed = 1e-6;  // [m]
 constexpr PackingOrder kOrders[] = {PackingOrder::kDisjoint, PackingOrder::kVolume};
 
 // By brute force over pairs.
-double overlap(const std::vector<Ball>& balls) {
+double overlap(const std::vector<InnerSphere>& spheres) {
   double deepest = 0.0;
-  for (std::size_t i = 0; i < balls.size(); ++i) {
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      if (balls[i].radius == 0.0 || balls[j].radius == 0.0) continue;
-      const double apart = (balls[i].center - balls[j].center).norm();
-      deepest = std::max(deepest, balls[i].radius + balls[j].radius - apart);
+      if (spheres[i].radius == 0.0 || spheres[j].radius == 0.0) continue;
+      const double apart = (spheres[i].center - spheres[j].center).norm();
+      deepest = std::max(deepest, spheres[i].radius + spheres[j].radius - apart);
     }
   }
   return deepest;
 }
 
-// A ball lies inside where its centre does, and is no farther from the surface than its radius.
-void expect_inside(const GeometryElement& element, const std::vector<Ball>& balls) {
+// A sphere lies inside where its centre does, and is no farther from the surface than its radius.
+void expect_inside(const GeometryElement& element, const std::vector<InnerSphere>& spheres) {
   const GeometryElement alone{element.shape, Eigen::Isometry3d::Identity(), element.source};
   const auto* mesh = std::get_if<TriangleMesh>(&element.shape);
   const Solid solid({alone});
-  for (const Ball& ball : balls) {
-    if (ball.radius == 0.0) continue;
-    const double depth = mesh != nullptr ? -test::oracle_signed_distance(*mesh, ball.center)
-                                         : -solid.signed_distance(ball.center).distance;
-    ASSERT_GE(depth, ball.radius - kAllowed) << ball.center.transpose();
+  for (const InnerSphere& sphere : spheres) {
+    if (sphere.radius == 0.0) continue;
+    const double depth = mesh != nullptr ? -test::oracle_signed_distance(*mesh, sphere.center)
+                                         : -solid.signed_distance(sphere.center).distance;
+    ASSERT_GE(depth, sphere.radius - kAllowed) << sphere.center.transpose();
   }
 }
 
@@ -58,11 +58,11 @@ void expect_disjoint(const GeometryElement& element, int max_spheres) {
     config.order = order;
     config.max_error = test::packed_to(0.005);
     config.max_spheres = max_spheres;
-    const std::vector<Ball> balls = pack_element(element.shape, config).balls;
-    EXPECT_LE(overlap(balls), kAllowed);
-    expect_inside(element, balls);
+    const std::vector<InnerSphere> spheres = pack_element(element.shape, config).spheres;
+    EXPECT_LE(overlap(spheres), kAllowed);
+    expect_inside(element, spheres);
     const PackingReport report =
-        measure_packing(Solid({{element.shape, Eigen::Isometry3d::Identity(), ""}}), balls);
+        measure_packing(Solid({{element.shape, Eigen::Isometry3d::Identity(), ""}}), spheres);
     EXPECT_LE(report.overlap, kAllowed);
     EXPECT_LE(report.protrusion, kAllowed);
     EXPECT_LE(report.filled_volume, 1.01 * report.solid_volume);
@@ -86,7 +86,7 @@ TEST(DisjointPacking, OfMeshesMadeHere) {
       {"box", test::box({0.1, 0.2, 0.3})},
       {"L", test::l_shape(0.2, 0.05)},
       {"torus", test::torus(0.1, 0.03, 24, 12)},
-      {"hollow ball",
+      {"hollow sphere",
        test::joined(test::icosphere(0.1, 2), test::inside_out(test::icosphere(0.05, 2)))},
       {"Chazelle's polyhedron", test::chazelle(3, 0.002, 0.2)},
       {"plate, 0.5 mm", test::thin_plate(0.1, 0.0005)}};
@@ -95,7 +95,7 @@ TEST(DisjointPacking, OfMeshesMadeHere) {
   }
 }
 
-// With up to 2010 open edges a link: balls may bulge through holes.
+// With up to 2010 open edges a link: spheres may bulge through holes.
 TEST(DisjointPacking, OfAPandasLinks) {
   const auto data = test::data_dir();
   if (!data) GTEST_SKIP() << test::kNoData;
@@ -108,15 +108,15 @@ TEST(DisjointPacking, OfAPandasLinks) {
       PackingConfig config;
       config.order = order;
       config.max_spheres = test::scaled(60);
-      const std::vector<Ball> balls = pack_mesh(mesh, config).balls;
-      EXPECT_LE(overlap(balls), kAllowed);
-      for (const Ball& ball : balls) {
-        if (ball.radius == 0.0) continue;
-        ASSERT_GT(test::oracle_winding(mesh, ball.center), 0.5);
-        ASSERT_LE(ball.radius, test::oracle_distance(mesh, ball.center) + kAllowed);
+      const std::vector<InnerSphere> spheres = pack_mesh(mesh, config).spheres;
+      EXPECT_LE(overlap(spheres), kAllowed);
+      for (const InnerSphere& sphere : spheres) {
+        if (sphere.radius == 0.0) continue;
+        ASSERT_GT(test::oracle_winding(mesh, sphere.center), 0.5);
+        ASSERT_LE(sphere.radius, test::oracle_distance(mesh, sphere.center) + kAllowed);
       }
       const PackingReport report =
-          measure_packing(Solid({{mesh, Eigen::Isometry3d::Identity(), ""}}), balls);
+          measure_packing(Solid({{mesh, Eigen::Isometry3d::Identity(), ""}}), spheres);
       EXPECT_LE(report.protrusion, kAllowed);
     }
   }

@@ -42,13 +42,13 @@ class DodgeController : public ::testing::Test {
     LinkReading link;
     link.link = *arm.kinematics.find_link("gripper_link");
     link.lower_bound = 1.0;
-    link.p_LL.setConstant(kNan);
+    link.p_LCl.setConstant(kNan);
     return link;
   }
   LinkReading near(double bound, const Eigen::Vector3d& away) const {
     LinkReading link = clear();
     link.lower_bound = bound;
-    link.p_LL = {0.0, 0.01, 0.05};
+    link.p_LCl = {0.0, 0.01, 0.05};
     link.away = away;
     return link;
   }
@@ -60,7 +60,7 @@ class DodgeController : public ::testing::Test {
     arm.kinematics.place_joints(q, &poses);
     arm.kinematics.place_links(poses, Eigen::Isometry3d::Identity(), &X_FL, &known);
     Jacobian J;
-    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LL, &J);
+    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LCl, &J);
     double speed = 0.0;
     for (std::size_t j = 0; j < arm.joints.size(); ++j) {
       speed +=
@@ -130,7 +130,7 @@ TEST_F(DodgeController, StepsAside) {
 TEST_F(DodgeController, SlowsDownByTheSmallestBound) {
   goal[5] += 1.0;  // turns the wrist; the obstacle is not in its way
   reading.links = {near(config.stop_distance, {1.0, 0.0, 0.0})};
-  reading.links[0].p_LL = {0.0, 0.0, 0.05};
+  reading.links[0].p_LCl = {0.0, 0.0, 0.05};
   EXPECT_NEAR(run()[5], 0.0, 0.02);
   reading.links[0].lower_bound = config.slow_distance;
   EXPECT_NEAR(run()[5], config.task_speed, 1e-6);
@@ -160,7 +160,7 @@ TEST_F(DodgeController, KeepsLimitsAndIsContinuous) {
     for (const char* name : {"upper_arm_link", "forearm_link", "wrist_link", "gripper_link"}) {
       LinkReading link = near(test::uniform(&rng, -0.02, 0.4), test::random_vector(&rng, 1.0));
       link.link = *arm.kinematics.find_link(name);
-      link.p_LL = test::random_vector(&rng, 0.1);
+      link.p_LCl = test::random_vector(&rng, 0.1);
       reading.links.push_back(link);
     }
     const Eigen::VectorXd dq = run();

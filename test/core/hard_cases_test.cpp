@@ -16,7 +16,7 @@ namespace {
 using Point = Eigen::Vector3d;
 using Points = std::vector<Eigen::Vector3d>;
 
-// A box, a cylinder and a ball, as primitives and as meshes, and a concave mesh.
+// A box, a cylinder and a sphere, as primitives and as meshes, and a concave mesh.
 const test::Trial& common_links() {
   static const test::Trial trial({Box{{0.2, 0.1, 0.3}}, Cylinder{0.08, 0.25}, Sphere{0.1},
                                   test::box({0.2, 0.1, 0.3}), test::icosphere(0.1, 2),
@@ -51,7 +51,7 @@ TEST(HardCases, OnSurfaceEdgeAndVertex) {
       expect_each(trial, features(*mesh));
     }
   }
-  // Of the primitives: cap, wall and rim of the cylinder, pole and equator of the ball.
+  // Of the primitives: cap, wall and rim of the cylinder, pole and equator of the sphere.
   expect_each(trial, {{0, 0, 0.125},
                       {0.08, 0, 0},
                       {0.08, 0, 0.125},
@@ -86,9 +86,9 @@ TEST(HardCases, AtCentresAndOnTheMedialAxis) {
                    {1e-300, 0, 0},
                    {0, 5e-324, 0}};
   for (std::size_t i = 0; i < trial.model().links.size(); ++i) {
-    const std::vector<Ball>& balls = trial.model().links[i].packing.balls;
-    for (std::size_t k = 0; k < balls.size(); k += 1 + balls.size() / 6) {
-      points.push_back(balls[k].center);
+    const std::vector<InnerSphere>& spheres = trial.model().links[i].packing.spheres;
+    for (std::size_t k = 0; k < spheres.size(); k += 1 + spheres.size() / 6) {
+      points.push_back(spheres[k].center);
     }
   }
   expect_each(trial, points);
@@ -149,7 +149,7 @@ TEST(HardCases, Chazelle) {
   }
 }
 
-// Thin parts are where balls are small and winding numbers change fast.
+// Thin parts are where spheres are small and winding numbers change fast.
 TEST(HardCases, ThinPlatesAndNeedles) {
   test::Rng rng(23);
   const std::vector<TriangleMesh> meshes = {test::thin_plate(0.2, 1e-3),

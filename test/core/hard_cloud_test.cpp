@@ -25,8 +25,8 @@ const test::Trial& common_links() {
   return trial;
 }
 
-std::vector<LinkProximity> query(const std::vector<const CloudSnapshot*>& clouds,
-                                 const Eigen::Isometry3d& X_FL, const QueryConfig& config) {
+std::vector<LinkProximity> query(SnapshotSpan clouds, const Eigen::Isometry3d& X_FL,
+                                 const QueryConfig& config) {
   const std::size_t count = common_links().model().links.size();
   std::vector<LinkProximity> results;
   ProximityQuery(common_links().shared_model(), config)
@@ -214,7 +214,7 @@ TEST(HardCloud, FarFromTheOrigin) {
         if (a[i].state < LinkState::kNear) continue;
         EXPECT_NEAR(a[i].distance, b[i].distance, 1e-6);
         EXPECT_NEAR(a[i].lower_bound, b[i].lower_bound, 1e-5);
-        EXPECT_LT((a[i].p_FO + far - b[i].p_FO).norm(), 1e-5);
+        EXPECT_LT((a[i].p_FCo + far - b[i].p_FCo).norm(), 1e-5);
       }
       for (std::size_t i = 0; i < c.size(); ++i) {
         if (c[i].state >= LinkState::kNear) EXPECT_NEAR(c[i].distance, d[i].distance, 1e-6);

@@ -1,5 +1,5 @@
-// Packings made by hand: equal and concentric balls, and radii from 1e-6 to 1e3 m, in the tree and
-// in the query.
+// Packings made by hand: equal and concentric spheres, and radii from 1e-6 to 1e3 m, in the tree
+// and in the query.
 
 #include <gtest/gtest.h>
 
@@ -17,22 +17,22 @@ namespace {
 
 using Point = Eigen::Vector3d;
 
-// A link that is the union of some balls, packed with exactly those.
-struct BallLink {
-  std::vector<Ball> balls;
+// A link that is the union of some spheres, packed with exactly those.
+struct SphereLink {
+  std::vector<InnerSphere> spheres;
 
   Packing packing() const {
     Packing packing;
-    packing.balls = balls;
+    packing.spheres = spheres;
     packing.certificate.reached = true;
     return packing;
   }
 
   LinkGeometry geometry() const {
     LinkGeometry link;
-    for (const Ball& ball : balls) {
-      GeometryElement element{Sphere{ball.radius}, Eigen::Isometry3d::Identity(), "test"};
-      element.X_LE.translation() = ball.center;
+    for (const InnerSphere& sphere : spheres) {
+      GeometryElement element{Sphere{sphere.radius}, Eigen::Isometry3d::Identity(), "test"};
+      element.X_LE.translation() = sphere.center;
       link.push_back(element);
     }
     return link;
@@ -41,7 +41,7 @@ struct BallLink {
   std::shared_ptr<const RobotModel> model() const {
     auto robot = std::make_shared<RobotModel>();
     LinkModel link;
-    link.name = "balls";
+    link.name = "spheres";
     link.packing = packing();
     link.tree = InnerSphereTree(link.packing);
     link.solid = Solid(geometry());
@@ -51,50 +51,51 @@ struct BallLink {
 
   double extent() const {
     double extent = 0.0;
-    for (const Ball& ball : balls) extent = std::max(extent, ball.center.norm() + ball.radius);
+    for (const InnerSphere& sphere : spheres)
+      extent = std::max(extent, sphere.center.norm() + sphere.radius);
     return extent;
   }
 };
 
 // `gap` [m] between inner and outer radius.
-double nearest_ball(const std::vector<Ball>& balls, const Point& p, bool outer) {
+double nearest_sphere(const std::vector<InnerSphere>& spheres, const Point& p, bool outer) {
   double nearest = std::numeric_limits<double>::infinity();
-  for (const Ball& ball : balls) {
-    nearest =
-        std::min(nearest, (p - ball.center).norm() - (outer ? ball.cover_radius : ball.radius));
+  for (const InnerSphere& sphere : spheres) {
+    nearest = std::min(nearest,
+                       (p - sphere.center).norm() - (outer ? sphere.cover_radius : sphere.radius));
   }
   return nearest;
 }
 
-BallLink random_balls(test::Rng* rng, int count, double smallest, double largest) {
-  BallLink link;
+SphereLink random_spheres(test::Rng* rng, int count, double smallest, double largest) {
+  SphereLink link;
   for (int i = 0; i < count; ++i) {
     const double low = std::log10(smallest), high = std::log10(largest);
     const double radius = std::pow(10.0, test::uniform(rng, low, high));
     const double away = std::pow(10.0, test::uniform(rng, low, high));
-    link.balls.push_back({test::random_vector(rng, 2.0 * away), radius, radius});
+    link.spheres.push_back({test::random_vector(rng, 2.0 * away), radius, radius});
   }
   return link;
 }
 
-Point random_point(test::Rng* rng, const BallLink& link) {
+Point random_point(test::Rng* rng, const SphereLink& link) {
   const auto i =
-      static_cast<std::size_t>(test::uniform(rng, 0, 1) * static_cast<double>(link.balls.size()));
-  const Ball& ball = link.balls[i];
-  const double reach = ball.radius * std::pow(10.0, test::uniform(rng, -3, 1));
-  return ball.center + test::random_vector(rng, 1.0).normalized() *
-                           (test::uniform(rng, 0, 1) < 0.5 ? reach : ball.radius + 0.1 * reach);
+      static_cast<std::size_t>(test::uniform(rng, 0, 1) * static_cast<double>(link.spheres.size()));
+  const InnerSphere& sphere = link.spheres[i];
+  const double reach = sphere.radius * std::pow(10.0, test::uniform(rng, -3, 1));
+  return sphere.center + test::random_vector(rng, 1.0).normalized() *
+                             (test::uniform(rng, 0, 1) < 0.5 ? reach : sphere.radius + 0.1 * reach);
 }
 
-void expect_tree(const BallLink& link, test::Rng* rng, int points) {
-  BallLink covered = link;
-  for (Ball& ball : covered.balls) ball.cover_radius += 0.1 * ball.radius;
+void expect_tree(const SphereLink& link, test::Rng* rng, int points) {
+  SphereLink covered = link;
+  for (InnerSphere& sphere : covered.spheres) sphere.cover_radius += 0.1 * sphere.radius;
   const InnerSphereTree tree(covered.packing());
   for (int i = 0; i < points; ++i) {
     const Point p = random_point(rng, link);
     const double rounding = 4e-6 * (link.extent() + p.norm());
-    const double inner = nearest_ball(covered.balls, p, false);
-    const double outer = nearest_ball(covered.balls, p, true);
+    const double inner = nearest_sphere(covered.spheres, p, false);
+    const double outer = nearest_sphere(covered.spheres, p, true);
     EXPECT_GE(tree.inner_distance(p), inner - 1e-12 * link.extent());
     EXPECT_LE(tree.inner_distance(p), inner + rounding);
     EXPECT_LE(tree.outer_distance(p), outer) << "a lower bound";
@@ -107,7 +108,7 @@ void expect_tree(const BallLink& link, test::Rng* rng, int points) {
   }
 }
 
-void expect_query(const BallLink& link, test::Rng* rng, int clouds) {
+void expect_query(const SphereLink& link, test::Rng* rng, int clouds) {
   test::Trial trial(link.model(), {link.geometry()}, 1e-12 * link.extent() + 1e-15);
   trial.size = std::max(1.0, link.extent());
   trial.max_distance = 10.0 * trial.size;
@@ -115,27 +116,27 @@ void expect_query(const BallLink& link, test::Rng* rng, int clouds) {
     std::vector<Point> points;
     for (int k = 0; k < 1 + i % 7; ++k) points.push_back(random_point(rng, link));
     trial.expect(points);
-    trial.expect({link.balls[0].center});
+    trial.expect({link.spheres[0].center});
   }
 }
 
 TEST(HardSpheres, Concentric) {
   test::Rng rng(51);
-  BallLink link;
-  for (int i = 1; i <= 40; ++i) link.balls.push_back({{0.1, -0.2, 0.3}, 0.01 * i, 0.01 * i});
-  std::reverse(link.balls.begin(), link.balls.end());
+  SphereLink link;
+  for (int i = 1; i <= 40; ++i) link.spheres.push_back({{0.1, -0.2, 0.3}, 0.01 * i, 0.01 * i});
+  std::reverse(link.spheres.begin(), link.spheres.end());
   expect_tree(link, &rng, test::scaled(2000));
   expect_query(link, &rng, test::scaled(200));
 }
 
 TEST(HardSpheres, Equal) {
   test::Rng rng(52);
-  BallLink link;
-  link.balls.assign(300, {{0.1, -0.2, 0.3}, 0.05, 0.05});
+  SphereLink link;
+  link.spheres.assign(300, {{0.1, -0.2, 0.3}, 0.05, 0.05});
   expect_tree(link, &rng, test::scaled(2000));
   expect_query(link, &rng, test::scaled(100));
-  link.balls.assign(300, {{0.1, -0.2, 0.3}, 0.0, 0.0});
-  link.balls.push_back({{0.1, -0.2, 0.3}, 0.01, 0.01});
+  link.spheres.assign(300, {{0.1, -0.2, 0.3}, 0.0, 0.0});
+  link.spheres.push_back({{0.1, -0.2, 0.3}, 0.01, 0.01});
   expect_tree(link, &rng, test::scaled(500));
 }
 
@@ -143,7 +144,7 @@ TEST(HardSpheres, EveryScale) {
   test::Rng rng(53);
   for (const double scale : {1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e3}) {
     SCOPED_TRACE(::testing::Message() << "radii about " << scale << " m");
-    const BallLink link = random_balls(&rng, 60, 0.1 * scale, scale);
+    const SphereLink link = random_spheres(&rng, 60, 0.1 * scale, scale);
     expect_tree(link, &rng, test::scaled(2000));
     expect_query(link, &rng, test::scaled(200));
   }
@@ -152,7 +153,7 @@ TEST(HardSpheres, EveryScale) {
 TEST(HardSpheres, AllScalesInOneTree) {
   test::Rng rng(54);
   for (int i = 0; i < 10; ++i) {
-    const BallLink link = random_balls(&rng, 100, 1e-6, i < 5 ? 1.0 : 1e3);
+    const SphereLink link = random_spheres(&rng, 100, 1e-6, i < 5 ? 1.0 : 1e3);
     expect_tree(link, &rng, test::scaled(1000));
     expect_query(link, &rng, test::scaled(100));
   }

@@ -1,4 +1,4 @@
-#include "geometry/hole_caps.h"
+#include "internal/geometry/hole_caps.h"
 
 #include <gtest/gtest.h>
 

@@ -103,7 +103,7 @@ CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
   const IngestCounts& n = snapshot.counts;
   EXPECT_EQ(n.received, points.size());
   EXPECT_EQ(n.received,
-            n.not_a_number + n.infinite + n.out_of_range + n.beyond_horizon + n.on_robot + n.used);
+            n.not_a_number + n.infinite + n.out_of_range + n.outside_region + n.on_robot + n.used);
   EXPECT_EQ(n.used, snapshot.index.size());
   return snapshot;
 }
@@ -558,12 +558,12 @@ TEST(Ingest, originIsOnWholeMetres) {
 }
 
 // Every way that points are read: float or double, image or list, four floats or not.
-TEST(Ingest, whatIsBeyondTheHorizonIsLeftOut) {
+TEST(Ingest, whatIsBeyondTheRegionIsLeftOut) {
   const Points points = depth_image(160, 120);
   const Eigen::Isometry3d X_FS = pose(0.5, 0.2, 1.0);
-  Horizon horizon;
-  horizon.center_F << 0.3, -0.4, 0.9;
-  horizon.radius = 1.5;
+  RegionOfInterest region;
+  region.center_F << 0.3, -0.4, 0.9;
+  region.radius = 1.5;
   Format image, four_floats;
   image.width = four_floats.width = 160;
   four_floats.point_step = 16;
@@ -577,31 +577,33 @@ TEST(Ingest, whatIsBeyondTheHorizonIsLeftOut) {
     Ingest ingest(config);
     CloudSnapshot all, cut;
     ingest.run(message.raw, X_FS, {}, 0.0, &all);
-    ingest.set_horizon(horizon);
+    ingest.set_region_of_interest(region);
     ingest.run(message.raw, X_FS, {}, 0.0, &cut);
-    EXPECT_EQ(all.horizon.radius, kInf);
-    EXPECT_EQ(cut.horizon.radius, 1.5);
+    EXPECT_EQ(all.region.radius, kInf);
+    EXPECT_EQ(cut.region.radius, 1.5);
     const auto kept = points_by_id(cut.index);
     std::size_t expected = 0;
     for (const auto& [id, p] : points_by_id(all.index)) {
-      const double from_center = (p - horizon.center_F).norm();
+      const double from_center = (p - region.center_F).norm();
       ASSERT_GT(std::abs(from_center - 1.5), 1e-9) << "nobody knows";
       ASSERT_EQ(kept.count(id), from_center < 1.5 ? 1U : 0U) << from_center;
       expected += from_center < 1.5;
     }
     EXPECT_GT(expected, 1000U);
     EXPECT_EQ(cut.counts.used, expected);
-    EXPECT_EQ(cut.counts.beyond_horizon, all.counts.used - expected);
+    EXPECT_EQ(cut.counts.outside_region, all.counts.used - expected);
     EXPECT_EQ(cut.counts.out_of_range, 0U);
   }
 }
 
-TEST(Ingest, aHorizonThatIsNoBallIsRefused) {
+TEST(Ingest, aRegionThatIsNoSphereIsRefused) {
   Ingest ingest{IngestConfig()};
   for (const double radius : {kNan, -1.0}) {
-    EXPECT_THROW(ingest.set_horizon({Eigen::Vector3d::Zero(), radius}), std::invalid_argument);
+    EXPECT_THROW(ingest.set_region_of_interest({Eigen::Vector3d::Zero(), radius}),
+                 std::invalid_argument);
   }
-  EXPECT_THROW(ingest.set_horizon({Eigen::Vector3d(0, kInf, 0), 1.0}), std::invalid_argument);
+  EXPECT_THROW(ingest.set_region_of_interest({Eigen::Vector3d(0, kInf, 0), 1.0}),
+               std::invalid_argument);
 }
 
 TEST(Ingest, badConfigurationIsNamed) {

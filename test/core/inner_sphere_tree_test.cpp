@@ -11,8 +11,8 @@
 #include <tuple>
 #include <vector>
 
-#include "ist_proximity/geometry/mesh_io.h"
-#include "ist_proximity/packing/packer.h"
+#include "internal/geometry/mesh_io.h"
+#include "internal/packing/packer.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
@@ -33,37 +33,39 @@ struct NamedPacking {
   Packing packing;
 };
 
-// Balls as packings have them, and as none has.
-std::vector<NamedPacking> hard_balls() {
+// Spheres as packings have them, and as none has.
+std::vector<NamedPacking> hard_spheres() {
   test::Rng rng(11);
   std::vector<NamedPacking> all;
   const auto add = [&](const std::string& name, int count, const auto& make) {
     Packing packing;
     for (int i = 0; i < count; ++i) {
-      Ball ball = make(i);
-      ball.cover_radius = ball.radius + test::uniform(&rng, 0.0, 0.005);
-      packing.balls.push_back(ball);
+      InnerSphere sphere = make(i);
+      sphere.cover_radius = sphere.radius + test::uniform(&rng, 0.0, 0.005);
+      packing.spheres.push_back(sphere);
     }
     all.push_back({name, packing});
   };
-  const auto anywhere = [&](int) { return Ball{test::random_vector(&rng, 0.2), 0.01, 0}; };
+  const auto anywhere = [&](int) { return InnerSphere{test::random_vector(&rng, 0.2), 0.01, 0}; };
   for (const int count : {1, 2, 8, 9, 16, 17, 64, 65, 3000}) {
     add(std::to_string(count) + " anywhere", count, anywhere);
   }
-  add("all at one place", 1000, [](int) { return Ball{{0.1, 0.2, 0.3}, 0.01, 0}; });
-  add("on a line", 500, [](int i) { return Ball{{0.001 * i, 0, 0}, 0.002, 0}; });
-  add("without radius", 500, [&](int) { return Ball{test::random_vector(&rng, 0.2), 0.0, 0}; });
+  add("all at one place", 1000, [](int) { return InnerSphere{{0.1, 0.2, 0.3}, 0.01, 0}; });
+  add("on a line", 500, [](int i) { return InnerSphere{{0.001 * i, 0, 0}, 0.002, 0}; });
+  add("without radius", 500, [&](int) {
+    return InnerSphere{test::random_vector(&rng, 0.2), 0.0, 0};
+  });
   add("one giant, the rest dust", 2000, [&](int i) {
-    return Ball{test::random_vector(&rng, 0.2), i == 700 ? 1e3 : 1e-6, 0};
+    return InnerSphere{test::random_vector(&rng, 0.2), i == 700 ? 1e3 : 1e-6, 0};
   });
   add("ever farther apart", 400, [](int i) {
-    return Ball{{1e-3 * std::pow(1.03, i), 0, 0}, 1e-3 * std::pow(1.03, i), 0};
+    return InnerSphere{{1e-3 * std::pow(1.03, i), 0, 0}, 1e-3 * std::pow(1.03, i), 0};
   });
   add("ever nearer to a point", 2000, [](int i) {
-    return Ball{{std::pow(0.98, i), 0, 0}, 0.5 * std::pow(0.98, i), 0};
+    return InnerSphere{{std::pow(0.98, i), 0, 0}, 0.5 * std::pow(0.98, i), 0};
   });
   add("100 km away", 500, [&](int) {
-    return Ball{Eigen::Vector3d(1e5, 0, 0) + test::random_vector(&rng, 0.2), 0.01, 0};
+    return InnerSphere{Eigen::Vector3d(1e5, 0, 0) + test::random_vector(&rng, 0.2), 0.01, 0};
   });
   return all;
 }
@@ -91,12 +93,12 @@ std::vector<NamedPacking> packings() {
   return all;
 }
 
-struct LeafBall {
+struct LeafSphere {
   Eigen::Vector3d center;
   double inner, outer;
 };
 
-// All balls below a child, by walking the tree; with what is wrong on the way.
+// All spheres below a child, by walking the tree; with what is wrong on the way.
 class Walk {
  public:
   explicit Walk(const InnerSphereTree& tree) : tree_(tree) {}
@@ -111,7 +113,7 @@ class Walk {
         ASSERT_LT(node.radius[k], -1e20F);
         continue;
       }
-      const std::size_t first = balls_.size();
+      const std::size_t first = spheres_.size();
       if (node.child[k] < 0) {
         add_leaf(~node.child[k], level + 1);
       } else {
@@ -123,7 +125,7 @@ class Walk {
     }
   }
 
-  const std::vector<LeafBall>& balls() const { return balls_; }
+  const std::vector<LeafSphere>& spheres() const { return spheres_; }
   int deepest() const { return deepest_; }
 
  private:
@@ -137,27 +139,27 @@ class Walk {
         ASSERT_LT(leaf.outer[k], -1e20F);
         continue;
       }
-      balls_.push_back({{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.inner[k], leaf.outer[k]});
+      spheres_.push_back({{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.inner[k], leaf.outer[k]});
     }
   }
 
   // The node's own numbers about its leaves' own numbers: float has no part in it.
   void check_enclosed(const SphereNode& node, int k, std::size_t first) const {
     const Eigen::Vector3d center(node.x[k], node.y[k], node.z[k]);
-    for (std::size_t i = first; i < balls_.size(); ++i) {
-      const double reach = (balls_[i].center - center).norm() + balls_[i].outer;
+    for (std::size_t i = first; i < spheres_.size(); ++i) {
+      const double reach = (spheres_[i].center - center).norm() + spheres_[i].outer;
       ASSERT_LE(reach, node.radius[k] * (1.0 + 1e-14));
-      ASSERT_LE(balls_[i].inner, node.max_inner[k]);
+      ASSERT_LE(spheres_[i].inner, node.max_inner[k]);
     }
   }
 
   const InnerSphereTree& tree_;
-  std::vector<LeafBall> balls_;
+  std::vector<LeafSphere> spheres_;
   int deepest_ = 0;
 };
 
 // By place, so that the tree's order does not matter.
-bool before(const LeafBall& a, const LeafBall& b) {
+bool before(const LeafSphere& a, const LeafSphere& b) {
   return std::make_tuple(a.center.x(), a.center.y(), a.center.z(), a.inner, a.outer) <
          std::make_tuple(b.center.x(), b.center.y(), b.center.z(), b.inner, b.outer);
 }
@@ -169,33 +171,33 @@ Eigen::Vector3d in_float(const Eigen::Vector3d& p) {
   return {x, y, z};
 }
 
-// Every ball once: its inner ball about the leaf's, its outer ball within the leaf's.
-void expect_every_ball(const Packing& packing, std::vector<LeafBall> found) {
-  ASSERT_EQ(found.size(), packing.balls.size());
-  std::vector<LeafBall> given;
-  for (const Ball& ball : packing.balls) {
-    const Eigen::Vector3d rounded = in_float(ball.center);
-    given.push_back({rounded, ball.radius, ball.cover_radius});
+// Every sphere once: its inner sphere about the leaf's, its outer sphere within the leaf's.
+void expect_every_sphere(const Packing& packing, std::vector<LeafSphere> found) {
+  ASSERT_EQ(found.size(), packing.spheres.size());
+  std::vector<LeafSphere> given;
+  for (const InnerSphere& sphere : packing.spheres) {
+    const Eigen::Vector3d rounded = in_float(sphere.center);
+    given.push_back({rounded, sphere.radius, sphere.cover_radius});
   }
   std::sort(found.begin(), found.end(), before);
   std::sort(given.begin(), given.end(), before);
   for (std::size_t i = 0; i < given.size(); ++i) {
     ASSERT_EQ(found[i].center, given[i].center);
   }
-  for (const Ball& ball : packing.balls) {
-    const Eigen::Vector3d rounded = in_float(ball.center);
-    const double moved = (rounded - ball.center).norm();
-    const double inner = ball.radius - moved, outer = ball.cover_radius + moved;
+  for (const InnerSphere& sphere : packing.spheres) {
+    const Eigen::Vector3d rounded = in_float(sphere.center);
+    const double moved = (rounded - sphere.center).norm();
+    const double inner = sphere.radius - moved, outer = sphere.cover_radius + moved;
     const double rounding = 1e-15 * (1.0 + outer), resolution = 2.5e-7 * (1.0 + outer);
-    const auto matches = [&](const LeafBall& leaf) {
+    const auto matches = [&](const LeafSphere& leaf) {
       return leaf.center == rounded && leaf.inner <= inner + rounding &&
              leaf.inner >= inner - resolution && leaf.outer >= outer - rounding &&
              leaf.outer <= outer + resolution;
     };
-    LeafBall key{rounded, -std::numeric_limits<double>::infinity(), 0.0};
+    LeafSphere key{rounded, -std::numeric_limits<double>::infinity(), 0.0};
     auto at = std::lower_bound(found.begin(), found.end(), key, before);
     while (at != found.end() && at->center == rounded && !matches(*at)) ++at;
-    ASSERT_TRUE(at != found.end() && at->center == rounded) << ball.center.transpose();
+    ASSERT_TRUE(at != found.end() && at->center == rounded) << sphere.center.transpose();
   }
 }
 
@@ -205,14 +207,14 @@ void expect_sound(const Packing& packing, const TreeConfig& config) {
   walk.check(0, 1);
   if (testing::Test::HasFatalFailure()) return;
   EXPECT_LE(walk.deepest(), kMaxTreeLevels);
-  expect_every_ball(packing, walk.balls());
-  for (const LeafBall& ball : walk.balls()) {
-    ASSERT_LE((ball.center - tree.center()).norm() + ball.outer, tree.radius() * (1.0 + 1e-14));
+  expect_every_sphere(packing, walk.spheres());
+  for (const LeafSphere& sphere : walk.spheres()) {
+    ASSERT_LE((sphere.center - tree.center()).norm() + sphere.outer, tree.radius() * (1.0 + 1e-14));
   }
 }
 
 TEST(InnerSphereTree, EveryNodeEnclosesItsLeavesHoweverItIsSplit) {
-  for (const auto& list : {hard_balls(), packings()}) {
+  for (const auto& list : {hard_spheres(), packings()}) {
     for (const auto& [name, packing] : list) {
       for (const TreeConfig& tree : kTrees) {
         SCOPED_TRACE(name + ", split " + std::to_string(static_cast<int>(tree.split)));
@@ -227,8 +229,8 @@ TEST(InnerSphereTree, EveryNodeEnclosesItsLeavesHoweverItIsSplit) {
 constexpr std::size_t kNodeBytes = offsetof(SphereNode, count) + sizeof(SphereNode::count);
 constexpr std::size_t kLeafBytes = offsetof(SphereLeaf, count) + sizeof(SphereLeaf::count);
 
-TEST(InnerSphereTree, SameBallsSameBytes) {
-  for (const auto& [name, packing] : hard_balls()) {
+TEST(InnerSphereTree, SameSpheresSameBytes) {
+  for (const auto& [name, packing] : hard_spheres()) {
     for (const TreeConfig& tree : kTrees) {
       SCOPED_TRACE(name);
       const InnerSphereTree a = InnerSphereTree(packing, tree), b = InnerSphereTree(packing, tree);

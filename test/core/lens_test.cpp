@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/lens.h"
+#include "internal/geometry/lens.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-// Both balls' sections, along the line of their centres.
+// Both spheres' sections, along the line of their centres.
 double integrated(double R, double r, double d) {
   const double low = std::max(-R, d - r), high = std::min(R, d + r);
   if (high <= low) return 0.0;
@@ -26,28 +26,28 @@ double integrated(double R, double r, double d) {
   return volume;
 }
 
-TEST(Lens, IsTheVolumeThatBothBallsHold) {
+TEST(Lens, IsTheVolumeThatBothSpheresHold) {
   test::Rng rng(21);
   for (int i = 0; i < test::scaled(300); ++i) {
     const double R = test::uniform(&rng, 0.001, 0.2), r = test::uniform(&rng, 0.001, 0.2);
     const double d = test::uniform(&rng, 0.0, 1.1) * (R + r);
     const double truth = integrated(R, r, d);
-    const double ball = 4.0 * M_PI / 3.0 * std::pow(std::min(R, r), 3);
-    EXPECT_NEAR(lens_volume(R, r, d), truth, 1e-5 * ball);
-    EXPECT_NEAR(lens_volume(R, r, d), test::oracle_lens(R, r, d), 1e-12 * ball);
+    const double sphere = 4.0 * M_PI / 3.0 * std::pow(std::min(R, r), 3);
+    EXPECT_NEAR(lens_volume(R, r, d), truth, 1e-5 * sphere);
+    EXPECT_NEAR(lens_volume(R, r, d), test::oracle_lens(R, r, d), 1e-12 * sphere);
     EXPECT_DOUBLE_EQ(lens_volume(R, r, d), lens_volume(r, R, d));
     EXPECT_NEAR(lens_volume(static_cast<float>(R), static_cast<float>(r), static_cast<float>(d)),
-                truth, 1e-4 * ball);
+                truth, 1e-4 * sphere);
   }
 }
 
 TEST(Lens, HoldsAtTouchContainmentAndCommonCentres) {
   for (const double R : {1e-6, 0.01, 0.1, 10.0}) {
     for (const double ratio : {1e-3, 0.5, 1.0 - 1e-12, 1.0}) {
-      const double r = ratio * R, ball = 4.0 * M_PI / 3.0 * r * r * r;
+      const double r = ratio * R, sphere = 4.0 * M_PI / 3.0 * r * r * r;
       for (const double tiny : {0.0, 1e-15, 1e-9}) {
-        EXPECT_NEAR(lens_volume(R, r, tiny * R), ball, 1e-8 * ball);
-        EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R - r)), ball, 1e-8 * ball);
+        EXPECT_NEAR(lens_volume(R, r, tiny * R), sphere, 1e-8 * sphere);
+        EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R - r)), sphere, 1e-8 * sphere);
         EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R + r)), 0.0, 1e-12 * R * R * R);
         EXPECT_EQ(lens_volume(R, r, (1.0 + tiny) * (R + r) * (1.0 + 1e-15)), 0.0);
         const double place = lens_place(R, r, tiny * R);
@@ -78,7 +78,8 @@ TEST(Lens, GrowsSmoothlyFromTouchToContainment) {
     double slope_before = 0.0, before = 0.0;
     for (double d = R + r + kStep; d >= 0.0; d -= kStep) {
       const double now = lens_volume(R, r, d), slope = (now - before) / kStep;
-      // No face between balls is larger than the smaller ball's equator, nor grows faster than it.
+      // No face between spheres is larger than the smaller sphere's equator, nor grows faster than
+      // it.
       EXPECT_LE(slope, M_PI * r * r * (1.0 + 1e-6));
       EXPECT_LE(std::abs(slope - slope_before), 4.0 * M_PI * r * kStep) << d;
       before = now;

@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/mesh_io.h"
+#include "internal/geometry/mesh_io.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/orientation.h"
+#include "geometry/orientation.h"
 
 #include <gtest/gtest.h>
 
@@ -26,17 +26,17 @@ TriangleMesh turned(TriangleMesh mesh) {
 double volume(const TriangleMesh& mesh) { return test::signed_volume(mesh); }
 
 TEST(TurnOutward, TurnsWhatIsInsideOut) {
-  const TriangleMesh ball = test::icosphere(0.1, 2), cube = test::box({0.1, 0.1, 0.1});
-  const double v = volume(ball);
-  EXPECT_NEAR(volume(turned(inside_out(ball))), v, 1e-12);
-  EXPECT_NEAR(volume(turned(shifted(inside_out(ball), {10, -20, 30}))), v, 1e-9);
+  const TriangleMesh sphere = test::icosphere(0.1, 2), cube = test::box({0.1, 0.1, 0.1});
+  const double v = volume(sphere);
+  EXPECT_NEAR(volume(turned(inside_out(sphere))), v, 1e-12);
+  EXPECT_NEAR(volume(turned(shifted(inside_out(sphere), {10, -20, 30}))), v, 1e-9);
   // Parts apart from one another, whichever is the larger.
-  for (const TriangleMesh& other : {scaled(ball, 0.5), scaled(ball, 2.0)}) {
+  for (const TriangleMesh& other : {scaled(sphere, 0.5), scaled(sphere, 2.0)}) {
     const TriangleMesh apart = shifted(other, {0.5, 0, 0});
     const double both = v + volume(other);
-    EXPECT_NEAR(volume(turned(joined(inside_out(ball), apart))), both, 1e-12);
-    EXPECT_NEAR(volume(turned(joined(ball, inside_out(apart)))), both, 1e-12);
-    EXPECT_NEAR(volume(turned(inside_out(joined(ball, apart)))), both, 1e-12);
+    EXPECT_NEAR(volume(turned(joined(inside_out(sphere), apart))), both, 1e-12);
+    EXPECT_NEAR(volume(turned(joined(sphere, inside_out(apart)))), both, 1e-12);
+    EXPECT_NEAR(volume(turned(inside_out(joined(sphere, apart)))), both, 1e-12);
   }
   // That touch or cross.
   EXPECT_NEAR(volume(turned(joined(cube, shifted(inside_out(cube), {0.1, 0, 0})))), 0.002, 1e-12);
@@ -44,9 +44,9 @@ TEST(TurnOutward, TurnsWhatIsInsideOut) {
 }
 
 TEST(TurnOutward, KeepsCavities) {
-  const TriangleMesh ball = test::icosphere(0.1, 2);
-  const TriangleMesh hollow = joined(ball, inside_out(scaled(ball, 0.5)));
-  const TriangleMesh nested = joined(hollow, scaled(ball, 0.2));
+  const TriangleMesh sphere = test::icosphere(0.1, 2);
+  const TriangleMesh hollow = joined(sphere, inside_out(scaled(sphere, 0.5)));
+  const TriangleMesh nested = joined(hollow, scaled(sphere, 0.2));
   EXPECT_NEAR(volume(turned(hollow)), volume(hollow), 1e-12);
   EXPECT_NEAR(volume(turned(inside_out(hollow))), volume(hollow), 1e-12);
   EXPECT_NEAR(volume(turned(nested)), volume(nested), 1e-12);
@@ -57,18 +57,18 @@ TEST(TurnOutward, KeepsCavities) {
 }
 
 TEST(TurnOutward, LeavesAloneWhatNobodyKnows) {
-  const TriangleMesh ball = test::icosphere(0.1, 2);
+  const TriangleMesh sphere = test::icosphere(0.1, 2);
   const std::vector<std::pair<std::string, TriangleMesh>> meshes = {
       {"nothing", {}},
-      {"as it should be", ball},
+      {"as it should be", sphere},
       {"open", inside_out(test::open_box({0.3, 0.2, 0.1}))},
       {"a sheet", test::sheet(0.1)},
       {"a sheet seen from both sides",
        test::merged(joined(test::sheet(0.1), inside_out(test::sheet(0.1))))},
-      {"every face in both directions", test::merged(joined(ball, inside_out(ball)))},
+      {"every face in both directions", test::merged(joined(sphere, inside_out(sphere)))},
       {"no area", {{{1, 2, 3}}, {{0, 0, 0}}}},
-      {"a ball with an open sheet", joined(ball, shifted(test::sheet(0.1), {0.2, 0, 0}))},
-      {"some faces flipped", test::partly_flipped(ball, 7)}};
+      {"a sphere with an open sheet", joined(sphere, shifted(test::sheet(0.1), {0.2, 0, 0}))},
+      {"some faces flipped", test::partly_flipped(sphere, 7)}};
   for (const auto& [name, mesh] : meshes) {
     EXPECT_EQ(turned(mesh).triangles, mesh.triangles) << name;
   }

@@ -1,4 +1,4 @@
-#include "ist_proximity/packing/packer.h"
+#include "internal/packing/packer.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "internal/packing/packing_report.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/solid.h"
-#include "ist_proximity/packing/packing_report.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
@@ -35,7 +35,7 @@ TriangleMesh shifted(const TriangleMesh& mesh, const Eigen::Vector3d& by) {
 }
 
 std::vector<NamedMesh> hostile_meshes() {
-  const TriangleMesh ball = test::icosphere(0.1, 2);
+  const TriangleMesh sphere = test::icosphere(0.1, 2);
   return {{"box", test::box({0.1, 0.2, 0.3})},
           {"icosphere", test::icosphere(0.1, 3)},
           {"torus", test::torus(0.1, 0.03, 32, 16)},
@@ -44,12 +44,12 @@ std::vector<NamedMesh> hostile_meshes() {
           {"thin plate", test::thin_plate(0.1, 0.0005)},
           {"plate as thick as the error", test::thin_plate(0.1, 0.01)},
           {"sheet", test::sheet(0.05)},
-          {"inside out", test::inside_out(ball)},
-          {"duplicated faces", test::joined(ball, ball)},
-          {"two shells", test::joined(ball, shifted(ball, {0.3, 0, 0}))},
-          {"overlapping shells", test::joined(ball, shifted(ball, {0.1, 0, 0}))},
-          {"nested cavity", test::joined(ball, test::inside_out(scaled(ball, 0.5)))},
-          {"ball with a fin", test::joined(ball, shifted(test::sheet(0.05), {0.12, 0, 0}))},
+          {"inside out", test::inside_out(sphere)},
+          {"duplicated faces", test::joined(sphere, sphere)},
+          {"two shells", test::joined(sphere, shifted(sphere, {0.3, 0, 0}))},
+          {"overlapping shells", test::joined(sphere, shifted(sphere, {0.1, 0, 0}))},
+          {"nested cavity", test::joined(sphere, test::inside_out(scaled(sphere, 0.5)))},
+          {"sphere with a fin", test::joined(sphere, shifted(test::sheet(0.05), {0.12, 0, 0}))},
           {"one triangle", {{{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}}, {{0, 1, 2}}}},
           {"needle", {{{0, 0, 0}, {0.1, 1e-9, 0}, {0.05, 0, 0}}, {{0, 1, 2}}}},
           {"a point", {{{1, 2, 3}}, {{0, 0, 0}}}}};
@@ -68,8 +68,8 @@ void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, 
                                                  .cwiseProduct(test::random_vector(&rng, 1.0));
     const double truth = test::oracle_signed_distance(mesh, p);
     double outer = 1e9;
-    for (const Ball& ball : packing.balls) {
-      outer = std::min(outer, (p - ball.center).norm() - ball.cover_radius);
+    for (const InnerSphere& sphere : packing.spheres) {
+      outer = std::min(outer, (p - sphere.center).norm() - sphere.cover_radius);
     }
     const double tree_outer = tree.outer_distance(p);
     ASSERT_LE(tree_outer, outer) << "the float tree may only be more careful";
@@ -118,32 +118,32 @@ TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
                                 mesh.corner(t, 2) * v + test::random_vector(&rng, 4.0 * gap);
       if (!bvh.is_inside(p)) continue;
       double outer = size;
-      for (const Ball& ball : packing.balls) {
-        outer = std::min(outer, (p - ball.center).norm() - ball.cover_radius);
+      for (const InnerSphere& sphere : packing.spheres) {
+        outer = std::min(outer, (p - sphere.center).norm() - sphere.cover_radius);
       }
       ASSERT_LE(outer, gap + 1e-9 * size) << p.transpose();
     }
   }
 }
 
-TEST(PackMesh, InnerBallsOfClosedMeshesStayInside) {
+TEST(PackMesh, InnerSpheresOfClosedMeshesStayInside) {
   for (const TriangleMesh& mesh :
        {test::box({0.1, 0.2, 0.3}), test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 32, 16)}) {
     PackingConfig config;
     config.max_error = 0.004;
-    for (const Ball& ball : pack_mesh(mesh, config).balls) {
-      if (ball.radius > 0.0) EXPECT_GT(test::oracle_winding(mesh, ball.center), 0.5);
-      EXPECT_LE(ball.radius, test::oracle_distance(mesh, ball.center) + 1e-9);
-      EXPECT_GE(ball.cover_radius, ball.radius);
+    for (const InnerSphere& sphere : pack_mesh(mesh, config).spheres) {
+      if (sphere.radius > 0.0) EXPECT_GT(test::oracle_winding(mesh, sphere.center), 0.5);
+      EXPECT_LE(sphere.radius, test::oracle_distance(mesh, sphere.center) + 1e-9);
+      EXPECT_GE(sphere.cover_radius, sphere.radius);
     }
   }
 }
 
-// Balls beside a hole bulged through it, or came nearer to points before it than its rim, by up to
-// 5 mm on links of the Franka Panda.
-TEST(PackMesh, InnerBallsKeepAwayFromHoles) {
-  const TriangleMesh ball = test::icosphere(0.1, 2);
-  TriangleMesh with_hole = ball;
+// Spheres beside a hole bulged through it, or came nearer to points before it than its rim, by up
+// to 5 mm on links of the Franka Panda.
+TEST(PackMesh, InnerSpheresKeepAwayFromHoles) {
+  const TriangleMesh sphere = test::icosphere(0.1, 2);
+  TriangleMesh with_hole = sphere;
   with_hole.triangles.resize(with_hole.triangles.size() - 6);
   for (const TriangleMesh& mesh : {test::open_box({0.1, 0.1, 0.2}), with_hole}) {
     PackingConfig config;
@@ -154,7 +154,8 @@ TEST(PackMesh, InnerBallsKeepAwayFromHoles) {
     for (int i = 0; i < 20000; ++i) {
       const Eigen::Vector3d p = test::random_vector(&rng, 0.15);
       double inner = 1e9;
-      for (const Ball& b : packing.balls) inner = std::min(inner, (p - b.center).norm() - b.radius);
+      for (const InnerSphere& b : packing.spheres)
+        inner = std::min(inner, (p - b.center).norm() - b.radius);
       if (inner > 0.1) continue;
       const double distance = test::oracle_distance(mesh, p);
       if (inner >= distance) continue;
@@ -163,12 +164,12 @@ TEST(PackMesh, InnerBallsKeepAwayFromHoles) {
     }
     EXPECT_GT(before_hole, 100) << "points inside";
     const Solid solid({GeometryElement{mesh, Eigen::Isometry3d::Identity(), ""}});
-    EXPECT_LT(measure_packing(solid, packing.balls).protrusion, 1e-6);
+    EXPECT_LT(measure_packing(solid, packing.spheres).protrusion, 1e-6);
   }
 }
 
 // Triangles of any size and place: a soup, all edges open; the same twice, also shifted a little in
-// its own planes; a closed ball through it; far from the origin.
+// its own planes; a closed sphere through it; far from the origin.
 std::vector<NamedMesh> random_meshes(test::Rng* rng) {
   TriangleMesh soup;
   for (std::uint32_t t = 0; t < 40; ++t) {
@@ -182,12 +183,12 @@ std::vector<NamedMesh> random_meshes(test::Rng* rng) {
     const Eigen::Vector3d by = 0.3 * (soup.corner(t, 1) - soup.corner(t, 0));
     for (const std::uint32_t v : slid.triangles[t]) slid.vertices[v] += by;
   }
-  const TriangleMesh with_ball = test::joined(soup, test::icosphere(0.06, 2));
+  const TriangleMesh with_sphere = test::joined(soup, test::icosphere(0.06, 2));
   return {{"soup", soup},
           {"soup and the same again", test::joined(soup, soup)},
           {"soup with coplanar neighbours", test::joined(soup, slid)},
-          {"ball in a soup", with_ball},
-          {"far away", shifted(with_ball, {3.0, -20.0, 1.0})}};
+          {"sphere in a soup", with_sphere},
+          {"far away", shifted(with_sphere, {3.0, -20.0, 1.0})}};
 }
 
 /// To 1 cm, with a certificate that holds but for `slack` [m].
@@ -212,7 +213,7 @@ TEST(PackMesh, CertificateHoldsOnRandomMeshes) {
   }
 }
 
-// Where every seventh face is inside out, room for a ball that no hole speaks against was looked
+// Where every seventh face is inside out, room for a sphere that no hole speaks against was looked
 // for without end.
 TEST(PackMesh, DisjointPackingsOfOpenMeshesEnd) {
   TriangleMesh mesh = test::icosphere(0.1, 2);
@@ -241,7 +242,7 @@ TEST(PackMesh, CertificateHoldsInEveryOrder) {
   }
 }
 
-TEST(PackMesh, DisjointBallsNeitherOverlapNorProtrude) {
+TEST(PackMesh, DisjointSpheresNeitherOverlapNorProtrude) {
   for (const auto& [name, mesh] : hostile_meshes()) {
     for (const PackingOrder order : {PackingOrder::kDisjoint, PackingOrder::kVolume}) {
       SCOPED_TRACE(name);
@@ -249,15 +250,15 @@ TEST(PackMesh, DisjointBallsNeitherOverlapNorProtrude) {
       config.max_error = 0.004;
       config.max_spheres = 500;
       config.order = order;
-      const std::vector<Ball> balls = pack_mesh(mesh, config).balls;
-      EXPECT_LE(balls.size(), 500U);
-      for (std::size_t i = 0; i < balls.size(); ++i) {
-        if (balls[i].radius == 0.0) continue;
-        EXPECT_GT(test::oracle_winding(mesh, balls[i].center), 0.5);
-        EXPECT_LE(balls[i].radius, test::oracle_distance(mesh, balls[i].center) + 1e-9);
+      const std::vector<InnerSphere> spheres = pack_mesh(mesh, config).spheres;
+      EXPECT_LE(spheres.size(), 500U);
+      for (std::size_t i = 0; i < spheres.size(); ++i) {
+        if (spheres[i].radius == 0.0) continue;
+        EXPECT_GT(test::oracle_winding(mesh, spheres[i].center), 0.5);
+        EXPECT_LE(spheres[i].radius, test::oracle_distance(mesh, spheres[i].center) + 1e-9);
         for (std::size_t j = 0; j < i; ++j) {
-          ASSERT_GE((balls[i].center - balls[j].center).norm() + 1e-9,
-                    balls[i].radius + balls[j].radius)
+          ASSERT_GE((spheres[i].center - spheres[j].center).norm() + 1e-9,
+                    spheres[i].radius + spheres[j].radius)
               << i << " and " << j;
         }
       }
@@ -265,31 +266,32 @@ TEST(PackMesh, DisjointBallsNeitherOverlapNorProtrude) {
   }
 }
 
-// The ball of a cube, then the eight in its corners: each touches three faces and the first ball.
+// The sphere of a cube, then the eight in its corners: each touches three faces and the first
+// sphere.
 TEST(PackMesh, VolumeOrderTakesTheLargestFirst) {
   PackingConfig config;
   config.max_error = 0.002;
   config.max_spheres = 100;
   config.order = PackingOrder::kVolume;
-  const std::vector<Ball> balls = pack_mesh(test::box({0.2, 0.2, 0.2}), config).balls;
-  ASSERT_GT(balls.size(), 30U);
-  EXPECT_NEAR(balls[0].radius, 0.1, 0.001);
+  const std::vector<InnerSphere> spheres = pack_mesh(test::box({0.2, 0.2, 0.2}), config).spheres;
+  ASSERT_GT(spheres.size(), 30U);
+  EXPECT_NEAR(spheres[0].radius, 0.1, 0.001);
   const double corner = 0.1 * (2.0 - std::sqrt(3.0));
-  for (std::size_t i = 1; i <= 8; ++i) EXPECT_NEAR(balls[i].radius, corner, 0.1 * corner) << i;
-  EXPECT_LT(balls[30].radius, corner);
+  for (std::size_t i = 1; i <= 8; ++i) EXPECT_NEAR(spheres[i].radius, corner, 0.1 * corner) << i;
+  EXPECT_LT(spheres[30].radius, corner);
 }
 
-TEST(PackMesh, SmallerErrorsTakeMoreBallsAndLessGap) {
+TEST(PackMesh, SmallerErrorsTakeMoreSpheresAndLessGap) {
   const TriangleMesh mesh = test::l_shape(0.2, 0.05);
-  std::size_t balls = 0;
+  std::size_t spheres = 0;
   double mean_gap = 1.0;
   for (const double max_error : {0.02, 0.01, 0.005, 0.0025}) {
     PackingConfig config;
     config.max_error = max_error;
     const Packing packing = pack_mesh(mesh, config);
-    EXPECT_GT(packing.balls.size(), balls);
+    EXPECT_GT(packing.spheres.size(), spheres);
     EXPECT_LT(packing.certificate.mean_gap, mean_gap);
-    balls = packing.balls.size();
+    spheres = packing.spheres.size();
     mean_gap = packing.certificate.mean_gap;
   }
 }
@@ -300,7 +302,7 @@ TEST(PackMesh, MaxSpheresReachedFirstIsSaidAndStillHolds) {
   config.max_error = 0.001;
   config.max_spheres = 30;
   const Packing packing = pack_mesh(mesh, config);
-  EXPECT_EQ(packing.balls.size(), 30U);
+  EXPECT_EQ(packing.spheres.size(), 30U);
   EXPECT_FALSE(packing.certificate.reached);
   EXPECT_GT(packing.certificate.max_gap, 0.001);
   double excess = 0.0;
@@ -308,17 +310,17 @@ TEST(PackMesh, MaxSpheresReachedFirstIsSaidAndStillHolds) {
   EXPECT_LE(excess, packing.certificate.max_gap);
 }
 
-TEST(PackMesh, SameInputSameBalls) {
+TEST(PackMesh, SameInputSameSpheres) {
   const TriangleMesh mesh = test::l_shape(0.2, 0.05);
   for (const PackingOrder order : kOrders) {
     PackingConfig config;
     config.order = order;
     const Packing a = pack_mesh(mesh, config), b = pack_mesh(mesh, config);
-    ASSERT_EQ(a.balls.size(), b.balls.size());
-    for (std::size_t i = 0; i < a.balls.size(); ++i) {
-      EXPECT_EQ(a.balls[i].center, b.balls[i].center);
-      EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
-      EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+    ASSERT_EQ(a.spheres.size(), b.spheres.size());
+    for (std::size_t i = 0; i < a.spheres.size(); ++i) {
+      EXPECT_EQ(a.spheres[i].center, b.spheres[i].center);
+      EXPECT_EQ(a.spheres[i].radius, b.spheres[i].radius);
+      EXPECT_EQ(a.spheres[i].cover_radius, b.spheres[i].cover_radius);
     }
   }
 }

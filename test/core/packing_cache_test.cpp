@@ -1,4 +1,4 @@
-#include "ist_proximity/packing/packing_cache.h"
+#include "internal/packing/packing_cache.h"
 
 #include <gtest/gtest.h>
 
@@ -27,18 +27,18 @@ const std::string kKey = "0123456789abcdef0123456789abcdef";
 Packing sample_packing() {
   Packing packing;
   for (int i = 0; i < 12; ++i) {
-    packing.balls.push_back({{0.1 * i, -1.0 / (i + 1), 1e-9 * i}, 0.01 * i, 0.01 * i + 0.003});
+    packing.spheres.push_back({{0.1 * i, -1.0 / (i + 1), 1e-9 * i}, 0.01 * i, 0.01 * i + 0.003});
   }
   packing.certificate = {0.003, 0.001, 0.002, 1e-4, 0.5, true};
   return packing;
 }
 
 void expect_equal(const Packing& a, const Packing& b) {
-  ASSERT_EQ(a.balls.size(), b.balls.size());
-  for (std::size_t i = 0; i < a.balls.size(); ++i) {
-    EXPECT_EQ(a.balls[i].center, b.balls[i].center);
-    EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
-    EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+  ASSERT_EQ(a.spheres.size(), b.spheres.size());
+  for (std::size_t i = 0; i < a.spheres.size(); ++i) {
+    EXPECT_EQ(a.spheres[i].center, b.spheres[i].center);
+    EXPECT_EQ(a.spheres[i].radius, b.spheres[i].radius);
+    EXPECT_EQ(a.spheres[i].cover_radius, b.spheres[i].cover_radius);
   }
   EXPECT_EQ(a.certificate.max_gap, b.certificate.max_gap);
   EXPECT_EQ(a.certificate.mean_gap, b.certificate.mean_gap);
@@ -95,7 +95,7 @@ TEST_F(PackingCacheTest, returnsWhatWasStored) {
 TEST_F(PackingCacheTest, storingAgainReplaces) {
   store(sample_packing());
   Packing other = sample_packing();
-  other.balls.resize(3);
+  other.spheres.resize(3);
   store(other);
   std::string warning;
   expect_equal(cache_.load(kKey, &warning).value(), other);
@@ -160,14 +160,14 @@ TEST_F(PackingCacheTest, refusesNumbersThatAreNoPacking) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
   std::vector<Packing> bad(8, sample_packing());
-  bad[0].balls[7].center.y() = nan;
-  bad[1].balls[7].radius = inf;
-  bad[2].balls[7].cover_radius = -0.1;
-  bad[3].balls[7].cover_radius = 0.0;  // below the radius
+  bad[0].spheres[7].center.y() = nan;
+  bad[1].spheres[7].radius = inf;
+  bad[2].spheres[7].cover_radius = -0.1;
+  bad[3].spheres[7].cover_radius = 0.0;  // below the radius
   bad[4].certificate.max_gap = nan;
   bad[5].certificate.surface_area = -1.0;
   bad[6].certificate.interior_gap = inf;
-  bad[7].balls.clear();
+  bad[7].spheres.clear();
   for (std::size_t i = 0; i < bad.size(); ++i) {
     std::string warning;
     ASSERT_TRUE(cache_.store(kKey, bad[i], &warning));
@@ -198,7 +198,7 @@ TEST_F(PackingCacheTest, saysWhenTheDiskRefuses) {
 // Every reader sees a whole file or none, whoever writes meanwhile.
 TEST_F(PackingCacheTest, writersAndReadersDoNotMeetHalfAFile) {
   Packing big = sample_packing();
-  while (big.balls.size() < 3000) big.balls.push_back(big.balls[big.balls.size() % 12]);
+  while (big.spheres.size() < 3000) big.spheres.push_back(big.spheres[big.spheres.size() % 12]);
   store(big);
   std::vector<std::thread> threads;
   std::vector<std::string> warnings(4);

@@ -11,9 +11,9 @@
 #include <set>
 #include <string>
 
+#include "geometry/orientation.h"
+#include "internal/packing/packer.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/geometry/orientation.h"
-#include "ist_proximity/packing/packer.h"
 #include "support/accuracy.h"
 #include "support/hostile_meshes.h"
 #include "support/oracle.h"
@@ -32,10 +32,10 @@ void check_point(const TriangleMesh& mesh, const Packing& packing, const Eigen::
                  double rounding) {
   const double truth = test::oracle_signed_distance(mesh, p);
   double inner = 1e300, outer = 1e300;
-  for (const Ball& ball : packing.balls) {
-    const double to_center = (p - ball.center).norm();
-    inner = std::min(inner, to_center - ball.radius);
-    outer = std::min(outer, to_center - ball.cover_radius);
+  for (const InnerSphere& sphere : packing.spheres) {
+    const double to_center = (p - sphere.center).norm();
+    inner = std::min(inner, to_center - sphere.radius);
+    outer = std::min(outer, to_center - sphere.cover_radius);
   }
   if (truth < 0.0) {
     ASSERT_LE(outer, packing.certificate.interior_gap + rounding) << p.transpose();
@@ -98,7 +98,7 @@ std::string outcome(const test::HostileMesh& hostile) {
     const double sheet_share = certificate.surface_area > 0.0
                                    ? certificate.unreachable_area / certificate.surface_area
                                    : 1.0;
-    return "packed | " + std::to_string(packing.balls.size()) + " | " +
+    return "packed | " + std::to_string(packing.spheres.size()) + " | " +
            test::number(1e3 * hostile.max_error) + " | " +
            test::number(std::ceil(1e4 * sheet_share) / 100.0);
   } catch (const ModelError& error) {
@@ -117,7 +117,7 @@ void write_table(const std::string& name, const std::string& table) {
 
 TEST(PackingDocument, HostileMeshesArePackedOrRefusedAsStated) {
   std::string table =
-      "| mesh | outcome | balls | certified below [mm] | surface without inner balls [%] |\n"
+      "| mesh | outcome | spheres | certified below [mm] | surface without inner spheres [%] |\n"
       "|---|---|---|---|---|\n";
   std::set<std::string> names;
   const test::TableRows stated = test::parse_table(test::read_text(kDocument), "hostile meshes");
@@ -133,9 +133,9 @@ TEST(PackingDocument, HostileMeshesArePackedOrRefusedAsStated) {
       found = true;
       EXPECT_EQ(result.substr(0, result.find(" |")), row[1]);
       if (result.rfind("packed", 0) != 0) continue;
-      // The order of a search differs between machines: not to the last ball.
-      const double balls = std::stod(result.substr(std::string("packed | ").size()));
-      EXPECT_NEAR(balls, std::stod(row[2]), 0.1 * balls + 2.0);
+      // The order of a search differs between machines: not to the last sphere.
+      const double spheres = std::stod(result.substr(std::string("packed | ").size()));
+      EXPECT_NEAR(spheres, std::stod(row[2]), 0.1 * spheres + 2.0);
     }
     EXPECT_TRUE(found) << "not in doc/packing.md";
   }

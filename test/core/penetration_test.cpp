@@ -1,4 +1,4 @@
-#include "ist_proximity/repulsion/penetration.h"
+#include "ist_proximity/contact/contact_wrench.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // How a list of points is brought into the order of an index: cells, slices, tiles.
 
-#include "cloud/point_cells.h"
+#include "cloud/index/point_cells.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include <set>
 #include <vector>
 
-#include "cloud/divide_kernel.h"
-#include "cloud/point_index_builder.h"
-#include "cloud/point_slicer.h"
+#include "cloud/index/divide_kernel.h"
+#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_slicer.h"
 #include "support/instruction_sets.h"
 #include "support/tiles.h"
 

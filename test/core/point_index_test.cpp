@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "cloud/point_index_builder.h"
+#include "cloud/index/point_index_builder.h"
 
 namespace ist {
 namespace {

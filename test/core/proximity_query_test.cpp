@@ -64,8 +64,8 @@ std::vector<Eigen::Vector3d> stored_points(const CloudSnapshot& snapshot,
 void expect_consistent(const LinkProximity& result, const Eigen::Isometry3d& X_FL) {
   if (result.state < LinkState::kNear) return;
   EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
-  EXPECT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9);
-  EXPECT_LT((X_FL * result.p_LL - result.p_FL).norm(), 1e-12);
+  EXPECT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
+  EXPECT_LT((X_FL * result.p_LCl - result.p_FCl).norm(), 1e-12);
   EXPECT_EQ(result.state == LinkState::kContact, result.distance < 0.0);
   EXPECT_LE(result.lower_bound, result.distance);
 }
@@ -119,7 +119,7 @@ TEST_P(AgainstOracle, RandomScenes) {
   EXPECT_GT(contact, test::scaled(50));
 }
 
-// Many points are about equally near, the more the farther they are; through a hole, inner balls
+// Many points are about equally near, the more the farther they are; through a hole, inner spheres
 // may come nearer to a point than the mesh.
 TEST_P(AgainstOracle, FlatObstaclesNearAndFar) {
   const double tolerance = GetParam();
@@ -223,7 +223,7 @@ TEST(ProximityQuery, WhatIsNotKnownIsUnknown) {
     EXPECT_EQ(result.state, LinkState::kUnknown);
     EXPECT_TRUE(std::isnan(result.distance));
     EXPECT_EQ(result.lower_bound, -kInfinity);
-    EXPECT_TRUE(result.p_FL.array().isNaN().all() && result.direction.array().isNaN().all());
+    EXPECT_TRUE(result.p_FCl.array().isNaN().all() && result.direction.array().isNaN().all());
   };
   query.run(X_FL, {true, true}, {&snapshot}, &results);
   EXPECT_EQ(results[0].state, LinkState::kNear);

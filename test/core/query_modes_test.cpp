@@ -100,7 +100,7 @@ TEST_P(QueryModes, AgainstBruteForce) {
       ASSERT_LE(answer.distance, least + tolerance + kRounding);
       ASSERT_LE(answer.distance - answer.lower_bound, tolerance + 3e-6);
       const auto i = static_cast<std::size_t>(robot.link);
-      ASSERT_NEAR((answer.p_FL - answer.p_FO).norm(), std::abs(answer.distance), 1e-9);
+      ASSERT_NEAR((answer.p_FCl - answer.p_FCo).norm(), std::abs(answer.distance), 1e-9);
       ASSERT_GE(answer.distance, truth_of(meshes[i], X_FL[i], points) - kRounding);
     }
   }

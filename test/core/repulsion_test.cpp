@@ -17,20 +17,22 @@ using Eigen::Vector3d;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-Ball ball(double x, double y, double z, double radius) { return {{x, y, z}, radius, radius}; }
+InnerSphere sphere(double x, double y, double z, double radius) {
+  return {{x, y, z}, radius, radius};
+}
 
-std::shared_ptr<const RobotModel> robot_of(const std::vector<Ball>& balls) {
+std::shared_ptr<const RobotModel> robot_of(const std::vector<InnerSphere>& spheres) {
   auto model = std::make_shared<RobotModel>();
   model->links.resize(1);
-  model->links[0].packing.balls = balls;
+  model->links[0].packing.spheres = spheres;
   return model;
 }
 
-// A bar of seven overlapping balls along x.
-std::vector<Ball> bar() {
-  std::vector<Ball> balls;
-  for (int i = -3; i <= 3; ++i) balls.push_back(ball(0.03 * i, 0.0, 0.0, 0.03));
-  return balls;
+// A bar of seven overlapping spheres along x.
+std::vector<InnerSphere> bar() {
+  std::vector<InnerSphere> spheres;
+  for (int i = -3; i <= 3; ++i) spheres.push_back(sphere(0.03 * i, 0.0, 0.0, 0.03));
+  return spheres;
 }
 
 CloudSnapshot cloud_of(const std::vector<Vector3d>& points, const Vector3d& origin = {0, 0, 0}) {
@@ -90,24 +92,24 @@ struct Expected {
   double nearest = kInf;  // [m] smallest distance
   Vector3d nearest_direction = Vector3d::Zero();
   Vector3d blend = Vector3d::Zero();
-  Vector3d torque = Vector3d::Zero();  // each pair's force acts at its own witness on the ball
+  Vector3d torque = Vector3d::Zero();  // each pair's force acts at its own witness on the sphere
 };
 
-Expected expected(const std::vector<Ball>& balls, const Eigen::Isometry3d& X_FL,
+Expected expected(const std::vector<InnerSphere>& spheres, const Eigen::Isometry3d& X_FL,
                   const CloudSnapshot& cloud, double smoothing) {
   const std::vector<Weighted> points = weighted_points(cloud);
   Expected result;
-  for (const Ball& b : balls) {
+  for (const InnerSphere& b : spheres) {
     for (const Weighted& point : points) {
-      const Vector3d to_ball = X_FL * b.center - point.p;
-      if (to_ball.norm() - b.radius < result.nearest) {
-        result.nearest = to_ball.norm() - b.radius;
-        result.nearest_direction = to_ball.normalized();
+      const Vector3d to_sphere = X_FL * b.center - point.p;
+      if (to_sphere.norm() - b.radius < result.nearest) {
+        result.nearest = to_sphere.norm() - b.radius;
+        result.nearest_direction = to_sphere.normalized();
       }
     }
   }
   double weights = 0.0;
-  for (const Ball& b : balls) {
+  for (const InnerSphere& b : spheres) {
     for (const Weighted& point : points) {
       const Vector3d n = (X_FL * b.center - point.p).normalized();
       const Vector3d witness = X_FL * b.center - b.radius * n;
@@ -147,7 +149,7 @@ TEST(Repulsion, unknownIsNanAndClearIsZero) {
 }
 
 TEST(Repulsion, lengthFallsFromGainAtTouchToZeroAtTheInfluenceDistance) {
-  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0.1)}));
+  const Repulsion repulsion(robot_of({sphere(0, 0, 0, 0.1)}));
   RepulsionConfig config;
   config.influence_distance = 0.2;
   config.gain = 3.0;
@@ -166,8 +168,8 @@ TEST(Repulsion, lengthFallsFromGainAtTouchToZeroAtTheInfluenceDistance) {
 TEST(Repulsion, agreesWithTheFormula) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> u(-0.4, 0.4);
-  const std::vector<Ball> balls = bar();
-  const Repulsion repulsion(robot_of(balls));
+  const std::vector<InnerSphere> spheres = bar();
+  const Repulsion repulsion(robot_of(spheres));
   RepulsionConfig config;
   config.influence_distance = 1.0;
   config.gain = 2.0;
@@ -183,7 +185,7 @@ TEST(Repulsion, agreesWithTheFormula) {
     const CloudSnapshot cloud = cloud_of(points, {1.0, 0.0, -2.0});
     Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
     X_FL.rotate(Eigen::AngleAxisd(5.0 * u(random), Vector3d(1, 2, 3).normalized()));
-    const Expected e = expected(balls, X_FL, cloud, config.smoothing);
+    const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
     const Push push = repulsion.push(0, X_FL, {&cloud}, near_by(e.nearest), config);
     const double length = config.gain * std::min(1.0, 1.0 - e.nearest);
     ASSERT_LT((push.force - length * e.blend).norm(), 2e-4) << trial;
@@ -203,8 +205,8 @@ TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
     points.push_back(p);
   }
   const CloudSnapshot cloud = cloud_of(points);
-  const std::vector<Ball> balls = bar();
-  const Repulsion repulsion(robot_of(balls));
+  const std::vector<InnerSphere> spheres = bar();
+  const Repulsion repulsion(robot_of(spheres));
   const RepulsionConfig config;
   Vector3d last = Vector3d::Zero(), last_nearest = Vector3d::UnitZ();
   double largest_step = 0.0, largest_jump = 0.0;
@@ -212,7 +214,7 @@ TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
   for (int i = 0; i <= kSteps; ++i) {
     const double s = static_cast<double>(i) / kSteps;  // 0.15 m up and 0.1 m forward: 0.12 mm each
     const Eigen::Isometry3d X_FL = at({0.1 * s, 0.0033, -0.075 + 0.15 * s});
-    const Expected e = expected(balls, X_FL, cloud, config.smoothing);
+    const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
     const Vector3d v = repulsion(0, X_FL, {&cloud}, near_by(e.nearest), config);
     if (i > 0) {
       largest_step = std::max(largest_step, (v - last).norm());
@@ -226,7 +228,7 @@ TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
 }
 
 TEST(Repulsion, symmetricSqueezeCancels) {
-  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0.1)}));
+  const Repulsion repulsion(robot_of({sphere(0, 0, 0, 0.1)}));
   const CloudSnapshot cloud = cloud_of({{0, 0, -0.15}, {0, 0, 0.15}});
   EXPECT_LT(repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.05), {}).norm(), 1e-6);
 }
@@ -251,8 +253,8 @@ TEST(Repulsion, doesNotDependOnDensity) {
   }
 }
 
-// A ball of radius 0.15 m, seen at `count` points, thinned as clouds are.
-CloudSnapshot seen_ball(int count) {
+// A sphere of radius 0.15 m, seen at `count` points, thinned as clouds are.
+CloudSnapshot seen_sphere(int count) {
   std::mt19937 random(9);  // fewer points are the first of more
   std::normal_distribution<double> normal;
   std::vector<float> data;
@@ -276,19 +278,20 @@ CloudSnapshot seen_ball(int count) {
   return cloud;
 }
 
-// At 1 m/s and 1 kHz, past a ball and turning: direction and length change little in each step, and
-// half or twice as many points change either little (doc/repulsion.md).
+// At 1 m/s and 1 kHz, past a sphere and turning: direction and length change little in each step,
+// and half or twice as many points change either little (doc/repulsion.md).
 TEST(Repulsion, isSmoothAndIndependentOfTheNumberOfPoints) {
-  const CloudSnapshot cloud = seen_ball(12000), half = seen_ball(6000), twice = seen_ball(24000);
-  const std::vector<Ball> balls = bar();
-  const Repulsion repulsion(robot_of(balls));
+  const CloudSnapshot cloud = seen_sphere(12000), half = seen_sphere(6000),
+                      twice = seen_sphere(24000);
+  const std::vector<InnerSphere> spheres = bar();
+  const Repulsion repulsion(robot_of(spheres));
   Vector3d last = Vector3d::Zero();
   double turn = 0.0, length = 0.0;
   for (int i = -250; i <= 250; ++i) {
     Eigen::Isometry3d X_FL = at({0.001 * i, 0.02, 0.22});
     X_FL.rotate(Eigen::AngleAxisd(0.002 * i, Vector3d(1, 2, 3).normalized()));
     double distance = kInf;
-    for (const Ball& b : balls) {
+    for (const InnerSphere& b : spheres) {
       distance = std::min(distance, (X_FL * b.center).norm() - b.radius - 0.15);
     }
     const auto ask = [&](const CloudSnapshot& c) {
@@ -308,7 +311,7 @@ TEST(Repulsion, isSmoothAndIndependentOfTheNumberOfPoints) {
 }
 
 TEST(Repulsion, contactIsBoundedAndContinuous) {
-  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0.1)}));
+  const Repulsion repulsion(robot_of({sphere(0, 0, 0, 0.1)}));
   RepulsionConfig config;
   config.gain = 2.0;
   Vector3d last(0, 0, 2.0 * (1.0 - 0.02 / 0.3));
@@ -317,14 +320,14 @@ TEST(Repulsion, contactIsBoundedAndContinuous) {
     const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(-z - 0.1), config);
     EXPECT_LE(v.norm(), 2.0 * (1.0 + 1e-6));
     EXPECT_LT((v - last).norm(), 0.01);
-    EXPECT_GT(v.z(), 0.0) << "the way out of the ball is away from the point";
+    EXPECT_GT(v.z(), 0.0) << "the way out of the sphere is away from the point";
     last = v;
   }
   EXPECT_NEAR(last.norm(), 2.0, 1e-5);
 }
 
-TEST(Repulsion, isDefinedAtTouchAndAtABallsCentre) {
-  const Repulsion repulsion(robot_of({ball(0.5, 0.25, 0, 0.125)}));
+TEST(Repulsion, isDefinedAtTouchAndAtASpheresCentre) {
+  const Repulsion repulsion(robot_of({sphere(0.5, 0.25, 0, 0.125)}));
   const Vector3d direction = Vector3d(1, 2, -2) / 3.0;
   const CloudSnapshot touch = cloud_of({{0.625, 0.25, 0}});
   EXPECT_LT((repulsion(0, at({0, 0, 0}), {&touch}, near_by(0.0), {}) - Vector3d(-1, 0, 0)).norm(),
@@ -336,16 +339,16 @@ TEST(Repulsion, isDefinedAtTouchAndAtABallsCentre) {
   EXPECT_TRUE(repulsion(0, at({0, 0, 0}), {&both}, near_by(-0.125, direction), {}).allFinite());
 }
 
-TEST(Repulsion, ballsOfRadiusZeroCount) {
-  const Repulsion repulsion(robot_of({ball(0, 0, 0, 0)}));
+TEST(Repulsion, spheresOfRadiusZeroCount) {
+  const Repulsion repulsion(robot_of({sphere(0, 0, 0, 0)}));
   const CloudSnapshot cloud = cloud_of({{0.1, 0, 0}});
   const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.1), {});
   EXPECT_LT((v - Vector3d(-1.0 + 0.1 / 0.3, 0, 0)).norm(), 1e-6);
 }
 
 TEST(Repulsion, severalCloudsAreOneObstacle) {
-  const std::vector<Ball> balls = bar();
-  const Repulsion repulsion(robot_of(balls));
+  const std::vector<InnerSphere> spheres = bar();
+  const Repulsion repulsion(robot_of(spheres));
   const std::vector<Vector3d> a = wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
   const std::vector<Vector3d> b = wall({-0.2, 0, 0.2}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01);
   std::vector<Vector3d> all = a;
@@ -359,13 +362,13 @@ TEST(Repulsion, severalCloudsAreOneObstacle) {
   EXPECT_LT((together - apart).norm(), 1e-4);
 }
 
-// Leaves of a map count with the point that is nearest to each ball.
+// Leaves of a map count with the point that is nearest to each sphere.
 TEST(Repulsion, boxesAgreeWithTheFormula) {
   std::mt19937_64 rng(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   const auto vector = [&] { return Vector3d(unit(rng), unit(rng), unit(rng)); };
-  const std::vector<Ball> balls = bar();
-  const Repulsion repulsion(robot_of(balls));
+  const std::vector<InnerSphere> spheres = bar();
+  const Repulsion repulsion(robot_of(spheres));
   const RepulsionConfig config;
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<Eigen::AlignedBox3d> boxes;
@@ -383,16 +386,16 @@ TEST(Repulsion, boxesAgreeWithTheFormula) {
     Expected truth;
     double weights = 0.0;
     for (const bool second : {false, true}) {
-      for (const Ball& b : balls) {
+      for (const InnerSphere& b : spheres) {
         for (const Eigen::AlignedBox3d& box : boxes) {
           const Vector3d center_M = X_FM.inverse() * b.center;
-          const Vector3d to_ball =
+          const Vector3d to_sphere =
               X_FM.linear() * (center_M - center_M.cwiseMax(box.min()).cwiseMin(box.max()));
-          const double d = to_ball.norm() - b.radius;
+          const double d = to_sphere.norm() - b.radius;
           if (!second) truth.nearest = std::min(truth.nearest, d);
           const double root = 1.0 - (d - truth.nearest) / config.smoothing;
           if (!second || root <= 0.0) continue;
-          truth.blend += root * root * to_ball.normalized();
+          truth.blend += root * root * to_sphere.normalized();
           weights += root * root;
         }
       }
@@ -448,40 +451,40 @@ TEST(Repulsion, withoutPairsTheLinksDirectionServes) {
   EXPECT_LT((v - 0.5 * Vector3d::UnitY()).norm(), 1e-12);
 }
 
-TEST(CoarseBalls, beginWithTheLargestAndSpread) {
-  // Two elements of a link, packed one after the other: the first 50 balls are all in the first.
+TEST(CoarseSpheres, beginWithTheLargestAndSpread) {
+  // Two elements of a link, packed one after the other: the first 50 spheres are all in the first.
   Packing packing;
   std::mt19937 random(2);
   std::uniform_real_distribution<double> u(-0.1, 0.1);
   for (int i = 0; i < 500; ++i) {
-    packing.balls.push_back(ball(u(random), u(random), u(random), 0.01));
+    packing.spheres.push_back(sphere(u(random), u(random), u(random), 0.01));
   }
-  packing.balls.push_back(ball(0, 0, 0, 0.03));
+  packing.spheres.push_back(sphere(0, 0, 0, 0.03));
   for (int i = 0; i < 500; ++i) {
-    packing.balls.push_back(ball(1.0 + u(random), u(random), u(random), 0.01));
+    packing.spheres.push_back(sphere(1.0 + u(random), u(random), u(random), 0.01));
   }
-  const std::vector<Ball> chosen = coarse_balls(packing, kCoarseBalls);
-  ASSERT_EQ(chosen.size(), kCoarseBalls);
+  const std::vector<InnerSphere> chosen = coarse_spheres(packing, kCoarseSpheres);
+  ASSERT_EQ(chosen.size(), kCoarseSpheres);
   EXPECT_EQ(chosen[0].radius, 0.03);
-  const auto in_second =
-      std::count_if(chosen.begin(), chosen.end(), [](const Ball& b) { return b.center.x() > 0.5; });
+  const auto in_second = std::count_if(chosen.begin(), chosen.end(),
+                                       [](const InnerSphere& b) { return b.center.x() > 0.5; });
   EXPECT_GT(in_second, 15);
   EXPECT_LT(in_second, 35);
-  for (const Ball& b : packing.balls) {
+  for (const InnerSphere& b : packing.spheres) {
     double beyond = kInf;
-    for (const Ball& c : chosen) {
+    for (const InnerSphere& c : chosen) {
       beyond = std::min(beyond, (b.center - c.center).norm() + b.radius - c.radius);
     }
     EXPECT_LT(beyond, 0.1);
   }
 }
 
-TEST(CoarseBalls, endWhenTheRestLiesWithin) {
+TEST(CoarseSpheres, endWhenTheRestLiesWithin) {
   Packing packing;
-  EXPECT_TRUE(coarse_balls(packing, 50).empty());
-  packing.balls = {ball(0, 0, 0, 0.01), ball(0, 0, 0, 0.1), ball(0.05, 0, 0, 0.02),
-                   ball(0.5, 0, 0, 0.1), ball(0.5, 0, 0, 0.1)};
-  EXPECT_EQ(coarse_balls(packing, 50).size(), 2U);
+  EXPECT_TRUE(coarse_spheres(packing, 50).empty());
+  packing.spheres = {sphere(0, 0, 0, 0.01), sphere(0, 0, 0, 0.1), sphere(0.05, 0, 0, 0.02),
+                     sphere(0.5, 0, 0, 0.1), sphere(0.5, 0, 0, 0.1)};
+  EXPECT_EQ(coarse_spheres(packing, 50).size(), 2U);
 }
 
 }  // namespace

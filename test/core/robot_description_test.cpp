@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
+#include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/robot/mesh_size.h"
 #include "support/data_dir.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"

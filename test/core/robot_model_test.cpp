@@ -15,9 +15,9 @@
 #include <thread>
 #include <vector>
 
+#include "internal/packing/packer.h"
+#include "internal/robot/link_packing.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/packing/packer.h"
-#include "robot/link_packing.h"
 #include "support/data_dir.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
@@ -68,26 +68,26 @@ std::vector<std::string> names(const RobotModel& model) {
 }
 
 void expect_same(const Packing& a, const Packing& b) {
-  ASSERT_EQ(a.balls.size(), b.balls.size());
-  for (std::size_t i = 0; i < a.balls.size(); ++i) {
-    EXPECT_EQ(a.balls[i].center, b.balls[i].center);
-    EXPECT_EQ(a.balls[i].radius, b.balls[i].radius);
-    EXPECT_EQ(a.balls[i].cover_radius, b.balls[i].cover_radius);
+  ASSERT_EQ(a.spheres.size(), b.spheres.size());
+  for (std::size_t i = 0; i < a.spheres.size(); ++i) {
+    EXPECT_EQ(a.spheres[i].center, b.spheres[i].center);
+    EXPECT_EQ(a.spheres[i].radius, b.spheres[i].radius);
+    EXPECT_EQ(a.spheres[i].cover_radius, b.spheres[i].cover_radius);
   }
 }
 
 double outer_distance(const Packing& packing, const Eigen::Vector3d& p) {
   double nearest = std::numeric_limits<double>::infinity();
-  for (const Ball& ball : packing.balls) {
-    nearest = std::min(nearest, (p - ball.center).norm() - ball.cover_radius);
+  for (const InnerSphere& sphere : packing.spheres) {
+    nearest = std::min(nearest, (p - sphere.center).norm() - sphere.cover_radius);
   }
   return nearest;
 }
 
-double inner_distance(const Packing& packing, std::size_t first_balls, const Eigen::Vector3d& p) {
+double inner_distance(const Packing& packing, std::size_t first_spheres, const Eigen::Vector3d& p) {
   double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < std::min(first_balls, packing.balls.size()); ++i) {
-    nearest = std::min(nearest, (p - packing.balls[i].center).norm() - packing.balls[i].radius);
+  for (std::size_t i = 0; i < std::min(first_spheres, packing.spheres.size()); ++i) {
+    nearest = std::min(nearest, (p - packing.spheres[i].center).norm() - packing.spheres[i].radius);
   }
   return nearest;
 }
@@ -100,8 +100,8 @@ TEST(RobotModel, buildsEveryLinkThatHasGeometry) {
   EXPECT_EQ(names(*model), (std::vector<std::string>{"hand", "left", "faulty", "right"}));
   for (const LinkModel& l : model->links) {
     EXPECT_EQ(l.usable(), l.name != "faulty");
-    EXPECT_EQ(l.packing.balls.empty(), !l.usable());
-    EXPECT_EQ(l.tree.ball_count(), l.packing.balls.size());
+    EXPECT_EQ(l.packing.spheres.empty(), !l.usable());
+    EXPECT_EQ(l.tree.sphere_count(), l.packing.spheres.size());
     EXPECT_EQ(l.solid.empty(), !l.usable());
     EXPECT_FALSE(l.from_cache);
     if (!l.usable()) continue;
@@ -135,9 +135,9 @@ TEST(RobotModel, packingsBoundTheExactGeometry) {
       const double exact = l.solid.signed_distance(p).distance;
       if (exact <= 0.0) continue;
       EXPECT_LE(outer_distance(l.packing, p), exact + 1e-9) << l.name << " " << p.transpose();
-      EXPECT_LE(inner_distance(l.packing, l.packing.balls.size(), p),
+      EXPECT_LE(inner_distance(l.packing, l.packing.spheres.size(), p),
                 exact + l.packing.certificate.max_gap + 1e-9);
-      EXPECT_GE(inner_distance(l.packing, l.packing.balls.size(), p), exact - 1e-9);
+      EXPECT_GE(inner_distance(l.packing, l.packing.spheres.size(), p), exact - 1e-9);
     }
   }
 }
@@ -149,11 +149,11 @@ TEST(RobotModel, equalShapesArePackedOnce) {
   const auto model = build_robot_model(gripper(), {}, callbacks);
   EXPECT_EQ(at_work, (std::set<std::string>{"hand", "left"}));
   const Packing &left = model->links[1].packing, &right = model->links[3].packing;
-  ASSERT_EQ(left.balls.size(), right.balls.size());
-  for (std::size_t i = 0; i < left.balls.size(); ++i) {
-    const Eigen::Vector3d turned(-left.balls[i].center.x(), -left.balls[i].center.y(),
-                                 left.balls[i].center.z());
-    EXPECT_TRUE(right.balls[i].center.isApprox(turned, 1e-12));
+  ASSERT_EQ(left.spheres.size(), right.spheres.size());
+  for (std::size_t i = 0; i < left.spheres.size(); ++i) {
+    const Eigen::Vector3d turned(-left.spheres[i].center.x(), -left.spheres[i].center.y(),
+                                 left.spheres[i].center.z());
+    EXPECT_TRUE(right.spheres[i].center.isApprox(turned, 1e-12));
   }
 }
 
@@ -327,23 +327,23 @@ TEST(LinkPacking, everyPrefixPacksTheWholeLink) {
   const Packing box = pack_element(geometry[0].shape, {});
   const Packing ring = pack_element(geometry[1].shape, {});
   const Packing all = combine(geometry, {&box, &ring});
-  ASSERT_EQ(all.balls.size(), box.balls.size() + ring.balls.size());
-  EXPECT_GT(all.balls[0].center.x(), 0.0);
-  EXPECT_LT(all.balls[1].center.x(), 0.0);
+  ASSERT_EQ(all.spheres.size(), box.spheres.size() + ring.spheres.size());
+  EXPECT_GT(all.spheres[0].center.x(), 0.0);
+  EXPECT_LT(all.spheres[1].center.x(), 0.0);
   for (const double share : {0.1, 0.3, 0.7}) {
-    const auto prefix = static_cast<std::size_t>(share * static_cast<double>(all.balls.size()));
-    const auto of_box =
-        std::count_if(all.balls.begin(), all.balls.begin() + static_cast<std::ptrdiff_t>(prefix),
-                      [](const Ball& ball) { return ball.center.x() > 0.05; });
-    EXPECT_NEAR(static_cast<double>(of_box), share * static_cast<double>(box.balls.size()), 2.0);
+    const auto prefix = static_cast<std::size_t>(share * static_cast<double>(all.spheres.size()));
+    const auto of_box = std::count_if(
+        all.spheres.begin(), all.spheres.begin() + static_cast<std::ptrdiff_t>(prefix),
+        [](const InnerSphere& sphere) { return sphere.center.x() > 0.05; });
+    EXPECT_NEAR(static_cast<double>(of_box), share * static_cast<double>(box.spheres.size()), 2.0);
   }
 }
 
 TEST(LinkPacking, combinesCertificates) {
   const LinkGeometry geometry = {element(Sphere{1}), element(Sphere{1})};
   Packing a, b;
-  a.balls.push_back({Eigen::Vector3d::Zero(), 1, 1});
-  b.balls = a.balls;
+  a.spheres.push_back({Eigen::Vector3d::Zero(), 1, 1});
+  b.spheres = a.spheres;
   a.certificate = {0.003, 0.001, 0.004, 0.1, 1.0, true};
   b.certificate = {0.002, 0.002, 0.005, 0.2, 3.0, false};
   const PackingCertificate all = combine(geometry, {&a, &b}).certificate;
@@ -373,8 +373,8 @@ TEST(RobotModelPanda, packsAllElevenLinks) {
     EXPECT_TRUE(l.usable()) << l.error;
     EXPECT_TRUE(l.packing.certificate.reached) << l.name;
     EXPECT_LE(l.packing.certificate.max_gap, config.packing.max_error) << l.name;
-    EXPECT_GE(l.packing.balls.size(), test::kSanitized ? 1U : 10U) << l.name;
-    EXPECT_LE(l.packing.balls.size(), 20000U) << l.name;
+    EXPECT_GE(l.packing.spheres.size(), test::kSanitized ? 1U : 10U) << l.name;
+    EXPECT_LE(l.packing.spheres.size(), 20000U) << l.name;
   }
 }
 

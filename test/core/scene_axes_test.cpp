@@ -1,6 +1,6 @@
 // The axes of an index lie along the scene's surfaces, and say nothing of what is measured.
 
-#include "cloud/scene_axes.h"
+#include "cloud/index/scene_axes.h"
 
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@ namespace {
 using Names = std::set<std::string>;
 
 // base - turn - a - (fixed) plain, without geometry - turn - b - (fixed) tip; base - slide - c,
-// whose ball is in a's at rest.
+// whose sphere is in a's at rest.
 const char* const kRobot = R"(<robot name="r">
   <link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
   <link name="a"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
@@ -80,7 +80,7 @@ TEST(SelfCollisionPairs, siblingsAreNotAdjacent) {
 
 TEST(SelfCollisionPairs, inContactAtRest) {
   const Robot robot;
-  // c's lower limit brings it to 0.85 m, into a's ball at 1 m.
+  // c's lower limit brings it to 0.85 m, into a's sphere at 1 m.
   const auto found = in_contact_at_rest(robot.model, robot.kinematics, robot.pairs());
   EXPECT_EQ(robot.names(found), Names{"a-c"});
 }
@@ -88,7 +88,7 @@ TEST(SelfCollisionPairs, inContactAtRest) {
 // Two carts with a tool each, one cart floating: where they are at zero says nothing of where they
 // are.
 TEST(SelfCollisionPairs, floatingBodiesHaveNoRest) {
-  const auto ball = [](const std::string& name) {
+  const auto sphere = [](const std::string& name) {
     return "<link name='" + name +
            "'><collision><geometry><sphere radius='0.1'/></geometry></collision></link>";
   };
@@ -98,8 +98,8 @@ TEST(SelfCollisionPairs, floatingBodiesHaveNoRest) {
            "'/><child link='" + child + "'/></joint>";
   };
   const RobotDescription carts =
-      parse_urdf("<robot name='r'><link name='world'/>" + ball("a") + "<link name='a0'/>" +
-                     ball("a1") + ball("b") + "<link name='b0'/>" + ball("b1") +
+      parse_urdf("<robot name='r'><link name='world'/>" + sphere("a") + "<link name='a0'/>" +
+                     sphere("a1") + sphere("b") + "<link name='b0'/>" + sphere("b1") +
                      joint("planar", "world", "a") + joint("continuous", "a", "a0") +
                      joint("continuous", "a0", "a1") + joint("floating", "world", "b") +
                      joint("continuous", "b", "b0") + joint("continuous", "b0", "b1") + "</robot>",

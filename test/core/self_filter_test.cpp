@@ -1,4 +1,4 @@
-#include "cloud/self_filter.h"
+#include "cloud/filters/self_filter.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <random>
 #include <set>
 
+#include "internal/packing/packer.h"
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/packing/packer.h"
 #include "support/allocations.h"
 #include "support/tiles.h"
 
@@ -27,12 +27,13 @@ LinkModel link_of(const std::string& name, const Shape& shape, double max_error)
   return link;
 }
 
-// Coarsely packed, so that there is much between inner and outer balls for the geometry to decide.
+// Coarsely packed, so that there is much between inner and outer spheres for the geometry to
+// decide.
 RobotModel coarse_robot() {
   RobotModel model;
   model.links.push_back(link_of("box", Box{{0.3, 0.2, 0.1}}, 0.02));
   model.links.push_back(link_of("cylinder", Cylinder{0.08, 0.4}, 0.02));
-  model.links.push_back(link_of("ball", Sphere{0.12}, 0.02));
+  model.links.push_back(link_of("sphere", Sphere{0.12}, 0.02));
   return model;
 }
 

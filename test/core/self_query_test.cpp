@@ -93,15 +93,15 @@ void check_witnesses(const Scene& scene, const LinkPair& pair, const PairProximi
     return test::oracle_signed_distance(scene.links[link], scene.X_FL[link].inverse() * p_F);
   };
   EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
-  const Eigen::Vector3d apart = result.p_FFirst - result.p_FSecond;
+  const Eigen::Vector3d apart = result.p_FCa - result.p_FCb;
   EXPECT_LT((apart - result.distance * result.direction).norm(), 1e-7);
   // One of them is a point of its link with that signed distance to the other.
-  const double of_first = signed_distance(pair.second, result.p_FFirst);
-  const double of_second = signed_distance(pair.first, result.p_FSecond);
+  const double of_first = signed_distance(pair.second, result.p_FCa);
+  const double of_second = signed_distance(pair.first, result.p_FCb);
   const bool first_searched = std::abs(of_first - result.distance) < 1e-7 &&
-                              signed_distance(pair.first, result.p_FFirst) < 1e-7;
+                              signed_distance(pair.first, result.p_FCa) < 1e-7;
   const bool second_searched = std::abs(of_second - result.distance) < 1e-7 &&
-                               signed_distance(pair.second, result.p_FSecond) < 1e-7;
+                               signed_distance(pair.second, result.p_FCb) < 1e-7;
   EXPECT_TRUE(first_searched || second_searched)
       << of_first << " " << of_second << " " << result.distance;
 }

@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/tessellation.h"
+#include "internal/geometry/tessellation.h"
 
 #include <gtest/gtest.h>
 

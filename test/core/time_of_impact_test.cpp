@@ -53,7 +53,7 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   EXPECT_GT(motions - contacts, motions / 10);
 }
 
-// A ball on an arm of 1 m that turns, by hand: it touches the point when they are 0.1 m apart.
+// A sphere on an arm of 1 m that turns, by hand: it touches the point when they are 0.1 m apart.
 TEST(TimeOfImpact, handComputed) {
   RobotDescription robot;
   robot.root_link = "base";
@@ -67,11 +67,11 @@ TEST(TimeOfImpact, handComputed) {
   joint = {};
   joint.name = "tip";
   joint.parent_link = "arm";
-  joint.child_link = "ball";
+  joint.child_link = "sphere";
   joint.X_PJ.translation() = Eigen::Vector3d(1, 0, 0);
   robot.joints.push_back(joint);
   const auto model = test::make_model({Sphere{0.1}}, 0.005);
-  model->links[0].name = "ball";
+  model->links[0].name = "sphere";
   const auto kinematics = std::make_shared<const Kinematics>(robot);
   JointPoses still;
   kinematics->place_joints({0.0, 0.0}, &still);
@@ -81,7 +81,7 @@ TEST(TimeOfImpact, handComputed) {
   std::vector<ImpactTime> impact;
   QueryConfig config;
   TimeOfImpact impacts(model, kinematics, config);
-  const auto run = [&](const std::vector<const CloudSnapshot*>& clouds) {
+  const auto run = [&](SnapshotSpan clouds) {
     impacts.run(motion, still, Eigen::Isometry3d::Identity(), {true}, clouds, &impact);
     return impact[0].time;
   };

@@ -128,7 +128,7 @@ TEST(TriangleBvh, SupportEqualsBruteForce) {
   EXPECT_EQ(TriangleBvh().support({1, 0, 0}), -std::numeric_limits<double>::infinity());
 }
 
-TEST(TriangleBvh, SupportWithinABallIsNoLessThanAnyPointThere) {
+TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   test::Rng rng(8);
   for (const TriangleMesh& mesh : meshes()) {

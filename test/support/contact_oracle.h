@@ -7,19 +7,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "internal/geometry/lens.h"
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/geometry/lens.h"
-#include "ist_proximity/proximity/contact_volume.h"
+#include "ist_proximity/contact/contact_volume.h"
 #include "support/random_links.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"
 
-/// Contact volumes by brute force in double: all balls of the link against all of the obstacle.
+/// Contact volumes by brute force in double: all spheres of the link against all of the obstacle.
 namespace ist::test {
 
-/// A ball of a contact body, taken out of its leaves.
-struct OracleBall {
+/// A sphere of a contact body, taken out of its leaves.
+struct OracleSphere {
   Eigen::Vector3d center;  ///< [m] link frame
   double radius, share;
   Eigen::Vector3d out;
@@ -32,21 +32,21 @@ struct OracleBall {
   }
 };
 
-inline std::vector<OracleBall> balls_of(const ContactBody& body) {
-  std::vector<OracleBall> balls;
+inline std::vector<OracleSphere> spheres_of(const ContactBody& body) {
+  std::vector<OracleSphere> spheres;
   for (const ContactLeaf& leaf : body.leaves) {
     for (int k = 0; k < kSphereWidth; ++k) {
       if (!(leaf.radius[k] > 0.0F)) continue;
-      OracleBall ball{{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.radius[k], leaf.share[k], {}, {}};
-      for (int i = 0; i < 3; ++i) ball.out[i] = leaf.out[i][k];
-      for (int i = 0; i < 9; ++i) ball.slope(i / 3, i % 3) = leaf.slope[i][k];
-      balls.push_back(ball);
+      OracleSphere sphere{{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.radius[k], leaf.share[k], {}, {}};
+      for (int i = 0; i < 3; ++i) sphere.out[i] = leaf.out[i][k];
+      for (int i = 0; i < 9; ++i) sphere.slope(i / 3, i % 3) = leaf.slope[i][k];
+      spheres.push_back(sphere);
     }
   }
-  return balls;
+  return spheres;
 }
 
-/// The lens's middle, from the extents of both balls along the line of their centres.
+/// The lens's middle, from the extents of both spheres along the line of their centres.
 inline Eigen::Vector3d oracle_lens_middle(const Eigen::Vector3d& a, double R,
                                           const Eigen::Vector3d& b, double r) {
   const double d = (b - a).norm();
@@ -55,7 +55,7 @@ inline Eigen::Vector3d oracle_lens_middle(const Eigen::Vector3d& a, double R,
   return a + 0.5 * (low + high) / d * (b - a);
 }
 
-/// pi s^2 (...) / 12 d with the smaller ball where the other one holds it, as the formula stands.
+/// pi s^2 (...) / 12 d with the smaller sphere where the other one holds it, as the formula stands.
 inline double oracle_lens(double R, double r, double d) {
   if (d >= R + r) return 0.0;
   if (d <= std::abs(R - r)) return 4.0 * M_PI / 3.0 * std::pow(std::min(R, r), 3);
@@ -63,15 +63,15 @@ inline double oracle_lens(double R, double r, double d) {
          (12.0 * d);
 }
 
-/// A ball of the obstacle and its weight, in the link's frame.
-inline void oracle_add(const std::vector<OracleBall>& balls, const Eigen::Vector3d& center,
+/// A sphere of the obstacle and its weight, in the link's frame.
+inline void oracle_add(const std::vector<OracleSphere>& spheres, const Eigen::Vector3d& center,
                        double radius, double weight, ContactVolume* sum) {
-  for (const OracleBall& ball : balls) {
+  for (const OracleSphere& sphere : spheres) {
     const double volume =
-        weight * ball.share * oracle_lens(ball.radius, radius, (center - ball.center).norm());
+        weight * sphere.share * oracle_lens(sphere.radius, radius, (center - sphere.center).norm());
     if (!(volume > 0.0)) continue;
-    const Eigen::Vector3d middle = oracle_lens_middle(ball.center, ball.radius, center, radius);
-    const Eigen::Vector3d push = -volume * ball.way_out(middle);
+    const Eigen::Vector3d middle = oracle_lens_middle(sphere.center, sphere.radius, center, radius);
+    const Eigen::Vector3d push = -volume * sphere.way_out(middle);
     sum->volume += volume;
     sum->push += push;
     sum->turn += middle.cross(push);
@@ -88,57 +88,57 @@ inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
   return points;
 }
 
-/// How much of a ball's weight its depth in the link leaves.
+/// How much of a sphere's weight its depth in the link leaves.
 inline double oracle_depth_weight(const LinkModel& link, const Eigen::Vector3d& p_L,
                                   double radius) {
   double depth = 0.0;
-  for (const Ball& ball : link.packing.balls) {
-    depth = std::max(depth, ball.radius - (p_L - ball.center).norm());
+  for (const InnerSphere& sphere : link.packing.spheres) {
+    depth = std::max(depth, sphere.radius - (p_L - sphere.center).norm());
   }
   return std::min(depth / (kFullDepth * radius), 1.0);
 }
 
 inline ContactVolume oracle_contact(const LinkModel& link, const ContactBody& body,
-                                    const Eigen::Isometry3d& X_FL,
-                                    const std::vector<const CloudSnapshot*>& clouds) {
-  const std::vector<OracleBall> balls = balls_of(body);
+                                    const Eigen::Isometry3d& X_FL, SnapshotSpan clouds) {
+  const std::vector<OracleSphere> spheres = spheres_of(body);
   ContactVolume sum;
   for (const CloudSnapshot* cloud : clouds) {
-    const double radius = kBallPerCell * cloud->thinning;
+    const double radius = kPointSphereRadius * cloud->thinning;
     for (const Eigen::Vector3d& p_F : points_F(*cloud)) {
       const Eigen::Vector3d p_L = X_FL.inverse() * p_F;
       const double weight = oracle_depth_weight(link, p_L, radius);
       if (!(weight > 0.0)) continue;
       double shared = 0.0;
       for (const CloudSnapshot* other : clouds) {
-        const double other_radius = kBallPerCell * other->thinning;
+        const double other_radius = kPointSphereRadius * other->thinning;
         for (const Eigen::Vector3d& q_F : points_F(*other)) {
           shared += oracle_lens(radius, other_radius, (q_F - p_F).norm());
         }
       }
       const double own = 4.0 * M_PI / 3.0 * std::pow(radius, 3);
-      oracle_add(balls, p_L, radius, weight * own / shared, &sum);
+      oracle_add(spheres, p_L, radius, weight * own / shared, &sum);
     }
   }
   return sum;
 }
 
-/// Of two links, all balls against all.
+/// Of two links, all spheres against all.
 inline ContactVolume oracle_contact(const ContactBody& a, const ContactBody& b,
                                     const Eigen::Isometry3d& X_AB) {
   ContactVolume sum;
-  const std::vector<OracleBall> second = balls_of(b);
-  for (const OracleBall& ball : balls_of(a)) {
-    for (const OracleBall& other : second) {
+  const std::vector<OracleSphere> second = spheres_of(b);
+  for (const OracleSphere& sphere : spheres_of(a)) {
+    for (const OracleSphere& other : second) {
       const Eigen::Vector3d center = X_AB * other.center;
-      const double volume = ball.share * other.share *
-                            oracle_lens(ball.radius, other.radius, (center - ball.center).norm());
+      const double volume =
+          sphere.share * other.share *
+          oracle_lens(sphere.radius, other.radius, (center - sphere.center).norm());
       if (!(volume > 0.0)) continue;
       const Eigen::Vector3d middle =
-          oracle_lens_middle(ball.center, ball.radius, center, other.radius);
+          oracle_lens_middle(sphere.center, sphere.radius, center, other.radius);
       const Eigen::Vector3d push =
           0.5 * volume *
-          (X_AB.linear() * other.way_out(X_AB.inverse() * middle) - ball.way_out(middle));
+          (X_AB.linear() * other.way_out(X_AB.inverse() * middle) - sphere.way_out(middle));
       sum.volume += volume;
       sum.push += push;
       sum.turn += middle.cross(push);

@@ -47,7 +47,7 @@ inline std::vector<HardScene> hard_scenes() {
       {"points on a surface", {one(concave)}, apart(places[0])},
       {"points on an edge", {one(concave)}, apart(places[1])},
       {"points on a vertex", {one(concave)}, apart(places[2])},
-      {"points at a ball's centre", common, apart({{0, 0, 0}, {1e-300, 0, 0}})},
+      {"points at a sphere's centre", common, apart({{0, 0, 0}, {1e-300, 0, 0}})},
       {"points on the medial axis", common,
        apart({{0, 0, 0.05}, {0.1, 0.025, 0.025}, {0, 0, -0.1}})},
       {"one point", common, apart({{0.3, 0.2, 0.1}, {0.9, 0, 0}, {3, 3, 3}})},
@@ -75,11 +75,11 @@ inline std::vector<HardScene> hard_scenes() {
   add_near("plate of slivers (1:1500)", sliver_plate(0.3, 0.01, 1e-3, 50));
   add_near("mesh with a hole (open box)", open_box({0.1, 0.1, 0.1}));
   add_near("sheet without thickness", sheet(0.2));
-  HardScene concentric{"concentric and equal balls", {LinkGeometry()}, {}};
+  HardScene concentric{"concentric and equal spheres", {LinkGeometry()}, {}};
   for (int i = 0; i < 20; ++i) concentric.links[0].push_back(one(Sphere{0.01 * (1 + i / 2)})[0]);
   concentric.clouds = apart({{0, 0, 0}, {0.05, 0, 0}, {0.1, 0, 0}, {0.3, 0.1, 0}});
   scenes.push_back(concentric);
-  HardScene small{"balls of radius 1e-6 m to 1 m", {}, {}};
+  HardScene small{"spheres of radius 1e-6 m to 1 m", {}, {}};
   for (const double radius : {1e-6, 1e-4, 1e-2, 1.0}) small.links.push_back(one(Sphere{radius}));
   small.clouds = apart({{0, 0, 0}, {1e-6, 0, 0}, {1e-4, 1e-5, 0}, {0.9, 0.5, 0}, {1.0, 1.0, 1.0}});
   scenes.push_back(small);

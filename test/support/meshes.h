@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "ist_proximity/geometry/tessellation.h"
+#include "internal/geometry/tessellation.h"
 #include "ist_proximity/geometry/triangle_mesh.h"
 
 /// Meshes whose distances are known. Counter-clockwise from outside, closed unless said.

@@ -14,7 +14,7 @@
 /// Small links of every kind, for as many cases as an oracle that tries every triangle can take.
 namespace ist::test {
 
-/// A ball with a random surface, star-shaped.
+/// A sphere with a random surface, star-shaped.
 inline TriangleMesh random_lump(Rng* rng) {
   TriangleMesh mesh = icosphere(0.1, 1);
   for (Eigen::Vector3d& v : mesh.vertices) v *= uniform(rng, 0.3, 1.2);

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "internal/packing/packer.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/packing/packer.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "support/sanitizers.h"
 

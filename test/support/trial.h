@@ -32,10 +32,11 @@ inline Truth truth_of(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
 inline void expect_witness(const LinkProximity& result, const Eigen::Isometry3d& X_FL,
                            double scale = 1.0) {
   ASSERT_GE(result.state, LinkState::kNear);
-  ASSERT_TRUE(result.p_FL.allFinite() && result.p_LL.allFinite() && result.p_FO.allFinite());
+  ASSERT_TRUE(result.p_FCl.allFinite() && result.p_LCl.allFinite() && result.p_FCo.allFinite());
   EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
-  EXPECT_LT((result.p_FL - result.p_FO - result.distance * result.direction).norm(), 1e-9 * scale);
-  EXPECT_LT((X_FL * result.p_LL - result.p_FL).norm(), 1e-12 * scale);
+  EXPECT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(),
+            1e-9 * scale);
+  EXPECT_LT((X_FL * result.p_LCl - result.p_FCl).norm(), 1e-12 * scale);
   EXPECT_EQ(result.state == LinkState::kContact, result.distance < 0.0);
 }
 

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "internal/geometry/mesh_io.h"
+#include "internal/packing/packer.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/geometry/mesh_io.h"
-#include "ist_proximity/packing/packer.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "support/npy.h"
 #include "support/pcd.h"

@@ -41,15 +41,15 @@ class BoxIndex {
   /// As PointIndex::tile().
   using Tile = BoxTile;
   const BoxTile& tile(std::size_t i, BoxTile* /*room*/) const { return tiles_[i]; }
-  /// As PointIndex::generation(), and different from that of any PointIndex.
-  std::uint64_t generation() const { return generation_; }
+  /// As PointIndex::build_id(), and different from that of any PointIndex.
+  std::uint64_t build_id() const { return build_id_; }
 
  private:
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   std::vector<BoxNode> nodes_;  ///< level by level, the root last
   std::vector<BoxTile> tiles_;
   std::size_t size_ = 0;
-  std::uint64_t generation_ = 0;  ///< never 0 once built
+  std::uint64_t build_id_ = 0;  ///< never 0 once built
 };
 
 }  // namespace ist

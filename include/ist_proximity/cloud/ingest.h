@@ -40,10 +40,10 @@ class Ingest {
   Ingest& operator=(Ingest&&) noexcept;
 
   /// Where to end from the next cloud on; nowhere at first.
-  /// @throws std::invalid_argument when it is not a ball; the last one stays then
-  void set_horizon(const Horizon& horizon);
+  /// @throws std::invalid_argument when it is not a sphere; the last one stays then
+  void set_region_of_interest(const RegionOfInterest& region);
 
-  /// Drops what is not finite, out of range or beyond the horizon, moves the rest to the fixed
+  /// Drops what is not finite, out of range or beyond the region, moves the rest to the fixed
   /// frame in double, removes the robot's own points and builds the index. Its origin, on whole
   /// metres, is where the sensor is, or in the middle of a cloud that is far from its sensor's
   /// frame (map coordinates): it is subtracted before double becomes float.

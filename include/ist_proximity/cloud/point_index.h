@@ -73,7 +73,7 @@ class PointIndex {
   }
   Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
   /// Another number after every build() of any index: tells whether an answer belongs to it.
-  std::uint64_t generation() const { return generation_; }
+  std::uint64_t build_id() const { return build_id_; }
 
  private:
   friend class PointIndexBuilder;
@@ -91,7 +91,7 @@ class PointIndex {
   std::vector<std::uint32_t> first_pixel_;  ///< by tile
   std::size_t size_ = 0;
   std::int32_t root_ = -1;
-  std::uint64_t generation_ = 0;  ///< never 0 once built
+  std::uint64_t build_id_ = 0;  ///< never 0 once built
 };
 
 }  // namespace ist

@@ -31,7 +31,7 @@ BoxDistance segment_to_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
 BoxDistance triangle_to_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c, const Eigen::AlignedBox3d& box);
 
-/// Ball and a box: exact.
+/// InnerSphere and a box: exact.
 BoxDistance sphere_to_box(const Sphere& sphere, const Eigen::Vector3d& center_O,
                           const Eigen::AlignedBox3d& box);
 

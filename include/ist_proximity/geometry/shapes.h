@@ -21,7 +21,7 @@ struct Cylinder {
   double length;  ///< [m] > 0
 };
 
-/// Ball about the origin of its frame.
+/// InnerSphere about the origin of its frame.
 struct Sphere {
   double radius;  ///< [m] > 0
 };

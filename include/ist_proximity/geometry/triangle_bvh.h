@@ -62,10 +62,10 @@ class TriangleBvh {
   double support(const Eigen::Vector3d& n_M, double slack = 0.0,
                  double reached = -std::numeric_limits<double>::infinity()) const;
 
-  /// [m] How far beyond a ball's centre the surface within the ball reaches along a direction, at
-  /// most: no point of it that is in the ball has a larger n.(x - center). -inf where there is
+  /// [m] How far beyond a sphere's centre the surface within the sphere reaches along a direction,
+  /// at most: no point of it that is in the sphere has a larger n.(x - center). -inf where there is
   /// none; inf where that is more than `limit` [m]. Large triangles count as discs that end at the
-  /// ball.
+  /// sphere.
   /// @param n_M  unit
   double support_within(const Eigen::Vector3d& center_M, double radius, const Eigen::Vector3d& n_M,
                         double limit) const;

@@ -30,13 +30,12 @@ class ProximityBatch {
   /// @param results  n times the number of links, in the order of X_FL, overwritten
   /// @returns false when a deadline passed before every link of a configuration met its tolerance
   bool run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-           const std::vector<const CloudSnapshot*>& clouds, std::vector<LinkProximity>* results);
+           SnapshotSpan clouds, std::vector<LinkProximity>* results);
 
   /// As ProximityQuery::run_minimum for each configuration.
   /// @param results  n, overwritten
   bool run_minimum(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-                   const std::vector<const CloudSnapshot*>& clouds,
-                   std::vector<RobotProximity>* results);
+                   SnapshotSpan clouds, std::vector<RobotProximity>* results);
 
  private:
   struct Impl;

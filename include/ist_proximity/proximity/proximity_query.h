@@ -31,13 +31,13 @@ enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kCont
 /// Answer for one link; vectors and points in the fixed frame F unless said.
 struct LinkProximity {
   LinkState state = LinkState::kUnknown;
-  double distance;       ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
-  double lower_bound;    ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
-  Eigen::Vector3d p_FL;  ///< [m] witness on the link; NaN unless NEAR or CONTACT
-  Eigen::Vector3d p_LL;  ///< [m] the same in the link's own frame
-  Eigen::Vector3d p_FO;  ///< [m] witness on the obstacle
+  double distance;        ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
+  double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
+  Eigen::Vector3d p_FCl;  ///< [m] witness on the link; NaN unless NEAR or CONTACT
+  Eigen::Vector3d p_LCl;  ///< [m] the same in the link's own frame
+  Eigen::Vector3d p_FCo;  ///< [m] witness on the obstacle
   Eigen::Vector3d
-      direction;  ///< unit, the way the link should go: p_FL - p_FO = distance * direction
+      direction;  ///< unit, the way the link should go: p_FCl - p_FCo = distance * direction
   std::int32_t source = -1;  ///< index of the snapshot the nearest point is in
   std::uint32_t point = 0;   ///< id of that point in its message
 
@@ -55,9 +55,9 @@ struct RobotProximity {
 /// What a query cost, for tuning and tests.
 struct QueryStatistics {
   std::uint64_t node_pairs = 0;         ///< pairs of tree node and box expanded
-  std::uint64_t leaf_pairs = 0;         ///< ball leaf against point tile
+  std::uint64_t leaf_pairs = 0;         ///< sphere leaf against point tile
   std::uint64_t exact_evaluations = 0;  ///< point against the link's exact geometry
-  std::uint64_t past_horizon = 0;       ///< links that would see beyond a cloud's horizon
+  std::uint64_t outside_region = 0;     ///< links that would see beyond a cloud's region
 };
 
 /// Distances from the links of a robot to point clouds.
@@ -85,19 +85,19 @@ class ProximityQuery {
   /// @param results one per link, overwritten
   /// @returns false when the deadline passed before every link met its tolerance
   bool run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-           const std::vector<const CloudSnapshot*>& clouds, std::vector<LinkProximity>* results);
+           SnapshotSpan clouds, std::vector<LinkProximity>* results);
 
   /// The robot's minimum only, several times faster than all links: they share one bound.
   /// @param result  overwritten; UNKNOWN when no link is known or no cloud is given
   /// @returns as run()
   bool run_minimum(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-                   const std::vector<const CloudSnapshot*>& clouds, RobotProximity* result);
+                   SnapshotSpan clouds, RobotProximity* result);
 
   /// One link only.
   /// @param link  index in the model
   /// @returns as run()
-  bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL,
-                const std::vector<const CloudSnapshot*>& clouds, LinkProximity* result);
+  bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
+                LinkProximity* result);
 
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);

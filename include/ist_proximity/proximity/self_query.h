@@ -19,11 +19,11 @@ struct LinkPair {
 /// How near two links are; points and vectors in the fixed frame.
 struct PairProximity {
   LinkState state = LinkState::kUnknown;
-  double distance;     ///< [m] signed: of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
-  double lower_bound;  ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
-  Eigen::Vector3d p_FFirst;   ///< [m] witness on the first link; NaN unless NEAR or CONTACT
-  Eigen::Vector3d p_FSecond;  ///< [m] on the second
-  /// Unit, the way the first link should go: p_FFirst - p_FSecond = distance * direction.
+  double distance;        ///< [m] signed: of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
+  double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
+  Eigen::Vector3d p_FCa;  ///< [m] witness on the first link; NaN unless NEAR or CONTACT
+  Eigen::Vector3d p_FCb;  ///< [m] on the second
+  /// Unit, the way the first link should go: p_FCa - p_FCb = distance * direction.
   Eigen::Vector3d direction;
 
   PairProximity() { reset(); }
@@ -34,13 +34,13 @@ struct PairProximity {
 ///
 /// The distance of two solids is the smallest signed distance of any point of either to the other:
 /// positive when they are apart, minus the depth of the deepest point when they are not. The outer
-/// balls of a link A cover it, so a lower bound is the smallest, over balls, of the exact signed
-/// distance of the centre to the other link B less the cover radius (signed distances change no
-/// faster than points move). It is found best first in A's tree; bounds from B's tree spare most
+/// spheres of a link A cover it, so a lower bound is the smallest, over spheres, of the exact
+/// signed distance of the centre to the other link B less the cover radius (signed distances change
+/// no faster than points move). It is found best first in A's tree; bounds from B's tree spare most
 /// exact evaluations. A is the link that is packed closer, and where they may touch, each in turn.
 /// `distance` is measured between two real points, found by going to and fro between the surfaces
-/// from the balls that are nearest. It is not below the true distance. For links that are apart it
-/// is above `lower_bound` by no more than max_error of A's packing and the tolerance (where they
+/// from the spheres that are nearest. It is not below the true distance. For links that are apart
+/// it is above `lower_bound` by no more than max_error of A's packing and the tolerance (where they
 /// nearly touch, its interior gap comes on top, and both gaps wherever one of the meshes has holes,
 /// because its inside shows there); in contact the two may differ by more. Where
 /// solids merely touch, NEAR with a lower bound below 0 may be said.

@@ -54,8 +54,7 @@ class TimeOfImpact {
   /// @param clouds   as for ProximityQuery::run; none makes every link unknown
   /// @param results  by link of the model, overwritten
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
-           const std::vector<bool>& wanted, const std::vector<const CloudSnapshot*>& clouds,
-           std::vector<ImpactTime>* results);
+           const std::vector<bool>& wanted, SnapshotSpan clouds, std::vector<ImpactTime>* results);
 
   void set_config(const QueryConfig& config);
 

@@ -33,19 +33,20 @@ struct Push {
   static Push unknown();
 };
 
-constexpr int kBallWidth = 16;
+constexpr int kSphereGroupWidth = 16;
 
-/// Balls side by side for SIMD, in metres in the link's frame. Unused slots are far away.
-struct alignas(64) BallGroup {
-  float x[kBallWidth], y[kBallWidth], z[kBallWidth], radius[kBallWidth];
-  float center[3], reach;  ///< a ball around all of them
+/// Spheres side by side for SIMD, in metres in the link's frame. Unused slots are far away.
+struct alignas(64) SphereGroup {
+  float x[kSphereGroupWidth], y[kSphereGroupWidth], z[kSphereGroupWidth], radius[kSphereGroupWidth];
+  float center[3], reach;  ///< a sphere around all of them
 };
 
 /// Blended repulsion, continuous in the robot's motion.
 ///
-/// A link is a fixed, coarse set of its inner balls, an obstacle the thinned points; of a map, each
-/// box's point that is nearest to the ball, so that a large leaf counts once. With d the distance
-/// of a pair (negative for a point in a ball) and n its unit vector from point to ball centre,
+/// A link is a fixed, coarse set of its inner spheres, an obstacle the thinned points; of a map,
+/// each box's point that is nearest to the sphere, so that a large leaf counts once. With d the
+/// distance of a pair (negative for a point in a sphere) and n its unit vector from point to sphere
+/// centre,
 ///   u = sum(a w n) / sum(a w),  w = max(0, 1 - (d - d_min) / smoothing)^2,
 /// over all pairs: the nearest pair alone would jump when two obstacles are equally near. a is how
 /// much of its cell a surface through the thinned point covers, about (1 - rho^2)^2 with rho = 0 in
@@ -56,16 +57,17 @@ struct alignas(64) BallGroup {
 /// stays at the gain (how deep is for the penetration wrench to say), and in a symmetric squeeze
 /// the terms cancel.
 ///
-/// The torque is that of the same terms, each with its own witness on the link: the terms of a ball
-/// act along lines through its centre, so no other witness than the centre is needed. With J the
-/// Jacobian of the link's origin, J^T (force; torque) is the sum of every term through the Jacobian
-/// at its own witness: as continuous as the force, which the nearest pair's witness is not.
+/// The torque is that of the same terms, each with its own witness on the link: the terms of a
+/// sphere act along lines through its centre, so no other witness than the centre is needed. With J
+/// the Jacobian of the link's origin, J^T (force; torque) is the sum of every term through the
+/// Jacobian at its own witness: as continuous as the force, which the nearest pair's witness is
+/// not.
 ///
-/// A point at a ball's very centre has no direction, nor has a box that holds the centre; it takes
-/// the link's `direction`.
+/// A point at a sphere's very centre has no direction, nor has a box that holds the centre; it
+/// takes the link's `direction`.
 class Repulsion {
  public:
-  /// Chooses the balls; the model is not needed afterwards.
+  /// Chooses the spheres; the model is not needed afterwards.
   explicit Repulsion(const std::shared_ptr<const RobotModel>& model);
 
   /// @param link      index in the model
@@ -74,33 +76,31 @@ class Repulsion {
   /// @param proximity the link's answer: supplies state, distance, direction and witness
   /// @returns zero when CLEAR, NaN when UNKNOWN
   /// Allocates nothing. Thread safe.
-  Push push(std::size_t link, const Eigen::Isometry3d& X_FL,
-            const std::vector<const CloudSnapshot*>& clouds, const LinkProximity& proximity,
-            const RepulsionConfig& config) const;
+  Push push(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
+            const LinkProximity& proximity, const RepulsionConfig& config) const;
 
   /// The force alone.
-  Eigen::Vector3d operator()(std::size_t link, const Eigen::Isometry3d& X_FL,
-                             const std::vector<const CloudSnapshot*>& clouds,
+  Eigen::Vector3d operator()(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                              const LinkProximity& proximity, const RepulsionConfig& config) const {
     return push(link, X_FL, clouds, proximity, config).force;
   }
 
  private:
-  std::vector<std::vector<BallGroup>> groups_;  ///< by link, of at most kCoarseBalls balls
+  std::vector<std::vector<SphereGroup>> groups_;  ///< by link, of at most kCoarseSpheres spheres
 };
 
 /// 1 - distance / influence_distance, from 0 to 1: 0 when CLEAR or UNKNOWN, 1 in contact.
 double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig& config);
 
-/// Balls that stand for a link: whole groups.
-constexpr std::size_t kCoarseBalls = 48;
+/// Spheres that stand for a link: whole groups.
+constexpr std::size_t kCoarseSpheres = 48;
 
-/// The first `count` balls of those that stand for a link best: starting with the largest, the ball
-/// that reaches farthest beyond the chosen ones is next. Unlike the first balls of the packing,
-/// which may be those of the link's first element, they are spread over the whole link.
-std::vector<Ball> coarse_balls(const Packing& packing, std::size_t count);
+/// The first `count` spheres of those that stand for a link best: starting with the largest, the
+/// sphere that reaches farthest beyond the chosen ones is next. Unlike the first spheres of the
+/// packing, which may be those of the link's first element, they are spread over the whole link.
+std::vector<InnerSphere> coarse_spheres(const Packing& packing, std::size_t count);
 
-/// The same balls in groups of neighbours.
-std::vector<BallGroup> group_balls(std::vector<Ball> balls);
+/// The same spheres in groups of neighbours.
+std::vector<SphereGroup> group_spheres(std::vector<InnerSphere> spheres);
 
 }  // namespace ist

@@ -51,6 +51,6 @@ class RepulsionFilter {
 };
 
 /// Tells sets of clouds apart: the same only for the same snapshots, in the same order.
-std::uint64_t obstacles_key(const std::vector<const CloudSnapshot*>& clouds);
+std::uint64_t obstacles_key(SnapshotSpan clouds);
 
 }  // namespace ist

@@ -14,17 +14,17 @@
 #include <mutex>
 #include <thread>
 
-#include "ist_proximity/ros/contact_loader.h"
-#include "ist_proximity/ros/diagnostics.h"
-#include "ist_proximity/ros/joint_state_listener.h"
-#include "ist_proximity/ros/live_parameters.h"
-#include "ist_proximity/ros/markers.h"
-#include "ist_proximity/ros/model_loader.h"
-#include "ist_proximity/ros/parameters.h"
-#include "ist_proximity/ros/proximity_cycle.h"
-#include "ist_proximity/ros/query_service.h"
-#include "ist_proximity/ros/self_proximity.h"
-#include "ist_proximity/ros/transform_listener.h"
+#include "ros/model/contact_loader.h"
+#include "ros/model/model_loader.h"
+#include "ros/output/markers.h"
+#include "ros/parameters/live_parameters.h"
+#include "ros/parameters/parameters.h"
+#include "ros/poses/joint_state_listener.h"
+#include "ros/poses/transform_listener.h"
+#include "ros/proximity_cycle.h"
+#include "ros/services/query_service.h"
+#include "ros/services/self_proximity.h"
+#include "ros/status/diagnostics.h"
 
 namespace ist {
 

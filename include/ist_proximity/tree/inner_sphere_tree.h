@@ -10,9 +10,9 @@
 
 namespace ist {
 
-/// Children of an inner node, or balls of a leaf, side by side for SIMD.
+/// Children of an inner node, or spheres of a leaf, side by side for SIMD.
 constexpr int kSphereWidth = 8;
-/// No tree is deeper, for up to 2^31 balls: what descends needs a stack of no more than
+/// No tree is deeper, for up to 2^31 spheres: what descends needs a stack of no more than
 /// kSphereWidth * kMaxTreeLevels entries.
 constexpr int kMaxTreeLevels = 16;
 
@@ -20,13 +20,13 @@ constexpr int kMaxTreeLevels = 16;
 /// negative that they are farther than anything.
 struct alignas(32) SphereNode {
   float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres, link frame
-  float radius[kSphereWidth];        ///< [m] encloses all outer balls below (wrapped hierarchy)
-  float max_inner[kSphereWidth];     ///< [m] largest inner radius below: no ball is entered deeper
+  float radius[kSphereWidth];     ///< [m] encloses all outer spheres below (wrapped hierarchy)
+  float max_inner[kSphereWidth];  ///< [m] largest inner radius below: no sphere is entered deeper
   std::int32_t child[kSphereWidth];  ///< >= 0: inner node; < 0: leaf ~child
   std::int32_t count;                ///< used slots
 };
 
-/// A leaf: up to eight balls.
+/// A leaf: up to eight spheres.
 struct alignas(32) SphereLeaf {
   float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres, link frame
   float inner[kSphereWidth];                                ///< [m] inner radius, rounded down
@@ -36,9 +36,9 @@ struct alignas(32) SphereLeaf {
 
 /// The Inner Sphere Tree of one link: flat, wide, float, in the link's frame.
 ///
-/// A wrapped hierarchy (Weller 2013, section 5.2): the sphere of a node encloses the outer balls
+/// A wrapped hierarchy (Weller 2013, section 5.2): the sphere of a node encloses the outer spheres
 /// of all its leaves, not its child spheres. Deterministic. Radii are rounded so that bounds
-/// survive float: the outer balls cover what the double balls covered. Immutable, thread safe.
+/// survive float: the outer spheres cover what the double spheres covered. Immutable, thread safe.
 class InnerSphereTree {
  public:
   InnerSphereTree() = default;
@@ -50,14 +50,14 @@ class InnerSphereTree {
 
   const Eigen::Vector3d& center() const { return center_; }  ///< [m] root sphere, link frame
   double radius() const { return radius_; }                  ///< [m] of the root sphere
-  std::size_t ball_count() const { return ball_count_; }
-  /// [m] no interior point is farther than this from the outer balls.
+  std::size_t sphere_count() const { return sphere_count_; }
+  /// [m] no interior point is farther than this from the outer spheres.
   double interior_gap() const { return interior_gap_; }
 
-  /// min over balls of |p - c| - radius [m]; the brute-force meaning of the inner distance.
+  /// min over spheres of |p - c| - radius [m]; the brute-force meaning of the inner distance.
   double inner_distance(const Eigen::Vector3d& p_L) const;
-  /// min over balls of |p - c| - cover_radius [m], rounded down: a lower bound of the distance from
-  /// an outside p_L to the solid. A value above interior_gap() proves that p_L is outside.
+  /// min over spheres of |p - c| - cover_radius [m], rounded down: a lower bound of the distance
+  /// from an outside p_L to the solid. A value above interior_gap() proves that p_L is outside.
   /// Stops early, with any value below `stop_below`, once it cannot exceed that.
   double outer_distance(const Eigen::Vector3d& p_L, double stop_below = -1e30) const;
   /// outer_distance(p_L) > distance, found sooner.
@@ -69,7 +69,7 @@ class InnerSphereTree {
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_ = 0.0;
   double interior_gap_ = 0.0;
-  std::size_t ball_count_ = 0;
+  std::size_t sphere_count_ = 0;
 };
 
 }  // namespace ist

@@ -2,14 +2,14 @@
 
 namespace ist {
 
-/// How the balls of a node are divided among its children.
+/// How the spheres of a node are divided among its children.
 enum class TreeSplit {
   /// Halved at the median along the longest axis, the fullest part first, until there are enough.
   kMedian,
   /// Halved where the boxes of the two parts have the least surface, weighted by how many leaves
   /// are in them (surface-area heuristic, Goldsmith and Salmon 1987).
   kSurfaceArea,
-  /// Batch neural gas: prototypes settle among the balls, and each ball goes to the nearest one
+  /// Batch neural gas: prototypes settle among the spheres, and each sphere goes to the nearest one
   /// (Weller 2013, section 5.2.1; Hammer, Hasenfuss and Villmann 2007).
   kNeuralGas,
 };
@@ -17,9 +17,9 @@ enum class TreeSplit {
 /// How an Inner Sphere Tree is built. It changes what a query costs, never what it answers.
 struct TreeConfig {
   TreeSplit split = TreeSplit::kNeuralGas;
-  /// Of neural gas, 0 to 1: each ball counts by this power of its volume. 1 draws prototypes to
-  /// large balls, as the book does; 0 lets every ball count alike, which serves distances better
-  /// (doc/packing.md).
+  /// Of neural gas, 0 to 1: each sphere counts by this power of its volume. 1 draws prototypes to
+  /// large spheres, as the book does; 0 lets every sphere count alike, which serves distances
+  /// better (doc/packing.md).
   double magnification = 0.0;
 };
 

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <sstream>
 
+#include "internal/geometry/mesh_io.h"
+#include "internal/robot/urdfdom_parser.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/geometry/mesh_io.h"
-#include "robot/urdfdom_parser.h"
 
 namespace ist::tools {
 namespace {

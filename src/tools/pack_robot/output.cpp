@@ -6,9 +6,9 @@
 #include <sstream>
 #include <variant>
 
-#include "geometry/boundary_edges.h"
+#include "internal/geometry/boundary_edges.h"
+#include "internal/packing/packing_report.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/packing/packing_report.h"
 
 namespace ist::tools {
 
@@ -26,8 +26,8 @@ std::vector<Row> measure(const Input& input, const RobotModel& model) {
         if (mesh != nullptr) row.boundary_edges += count_boundary_edges(*mesh);
       }
     }
-    const PackingReport report = measure_packing(link.solid, link.packing.balls);
-    row.spheres = link.packing.balls.size();
+    const PackingReport report = measure_packing(link.solid, link.packing.spheres);
+    row.spheres = link.packing.spheres.size();
     row.nodes = link.tree.nodes().size();
     row.leaves = link.tree.leaves().size();
     row.solid_volume = report.solid_volume;
@@ -80,11 +80,11 @@ std::string ply(const Input& input, const RobotModel& model) {
     const LinkModel& link = model.links[l];
     links += "comment link " + std::to_string(l) + " " + link.name + "\n";
     const auto pose = input.X_RL.find(link.name);
-    for (const Ball& ball : link.packing.balls) {
+    for (const InnerSphere& sphere : link.packing.spheres) {
       const Eigen::Vector3d c =
-          pose == input.X_RL.end() ? ball.center : Eigen::Vector3d(pose->second * ball.center);
-      vertices << c.x() << ' ' << c.y() << ' ' << c.z() << ' ' << std::max(ball.radius, 0.0) << ' '
-               << ball.cover_radius << ' ' << l << '\n';
+          pose == input.X_RL.end() ? sphere.center : Eigen::Vector3d(pose->second * sphere.center);
+      vertices << c.x() << ' ' << c.y() << ' ' << c.z() << ' ' << std::max(sphere.radius, 0.0)
+               << ' ' << sphere.cover_radius << ' ' << l << '\n';
       ++count;
     }
   }

@@ -45,8 +45,8 @@ class Canvas {
         depth_(color_.size(), -std::numeric_limits<double>::infinity()) {}
 
   // Center and radius in pixels; x to the right, y up, z towards the eye.
-  void ball(const Eigen::Vector3d& c, double radius, const Eigen::Vector3d& color, int left,
-            int right) {
+  void sphere(const Eigen::Vector3d& c, double radius, const Eigen::Vector3d& color, int left,
+              int right) {
     const Eigen::Vector3d light = Eigen::Vector3d(-0.5, 0.6, 0.8).normalized();
     const int x0 = std::max(left, static_cast<int>(std::floor(c.x() - radius)));
     const int x1 = std::min(right - 1, static_cast<int>(std::ceil(c.x() + radius)));
@@ -99,37 +99,37 @@ class Canvas {
   std::vector<double> depth_;
 };
 
-struct PlacedBall {
+struct PlacedSphere {
   Eigen::Vector3d center;  // [m] in the view
   double radius;
   std::size_t link;
 };
 
-std::vector<PlacedBall> placed(const Input& input, const RobotModel& model) {
+std::vector<PlacedSphere> placed(const Input& input, const RobotModel& model) {
   const Eigen::Matrix3d R = view();
-  std::vector<PlacedBall> balls;
+  std::vector<PlacedSphere> spheres;
   for (std::size_t l = 0; l < model.links.size(); ++l) {
     const auto pose = input.X_RL.find(model.links[l].name);
-    for (const Ball& ball : model.links[l].packing.balls) {
+    for (const InnerSphere& sphere : model.links[l].packing.spheres) {
       const Eigen::Vector3d c =
-          pose == input.X_RL.end() ? ball.center : Eigen::Vector3d(pose->second * ball.center);
-      balls.push_back({R * c, std::max(ball.radius, 0.0), l});
+          pose == input.X_RL.end() ? sphere.center : Eigen::Vector3d(pose->second * sphere.center);
+      spheres.push_back({R * c, std::max(sphere.radius, 0.0), l});
     }
   }
-  return balls;
+  return spheres;
 }
 
 }  // namespace
 
 void draw(const Input& input, const std::vector<std::shared_ptr<const RobotModel>>& models,
           const std::string& path) {
-  std::vector<std::vector<PlacedBall>> panels;
+  std::vector<std::vector<PlacedSphere>> panels;
   Eigen::AlignedBox2d box;
   for (const auto& model : models) {
     panels.push_back(placed(input, *model));
-    for (const PlacedBall& ball : panels.back()) {
-      box.extend(Eigen::Vector2d(ball.center.head<2>().array() - ball.radius));
-      box.extend(Eigen::Vector2d(ball.center.head<2>().array() + ball.radius));
+    for (const PlacedSphere& sphere : panels.back()) {
+      box.extend(Eigen::Vector2d(sphere.center.head<2>().array() - sphere.radius));
+      box.extend(Eigen::Vector2d(sphere.center.head<2>().array() + sphere.radius));
     }
   }
   if (box.isEmpty()) throw ModelError("there is nothing to draw: no link was packed");
@@ -144,12 +144,12 @@ void draw(const Input& input, const std::vector<std::shared_ptr<const RobotModel
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const int left = width * static_cast<int>(p);
     const Eigen::Vector3d middle(left + 0.5 * width, 0.5 * height, 0.0);
-    for (const PlacedBall& ball : panels[p]) {
-      Eigen::Vector3d c = ball.center;
+    for (const PlacedSphere& sphere : panels[p]) {
+      Eigen::Vector3d c = sphere.center;
       c.head<2>() -= box.center();
       // What has no radius is drawn all the same.
-      canvas.ball(middle + scale * c, std::max(scale * ball.radius, 1.0), link_color(ball.link),
-                  left, left + width);
+      canvas.sphere(middle + scale * c, std::max(scale * sphere.radius, 1.0),
+                    link_color(sphere.link), left, left + width);
     }
   }
   canvas.write(path);

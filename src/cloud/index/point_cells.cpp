@@ -1,0 +1,131 @@
+#include "cloud/index/point_cells.h"
+
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cloud/index/divide_kernel.h"
+
+namespace ist {
+namespace {
+
+// Points on a surface: so many of them share a cell.
+constexpr double kPointsPerCell = 400.0;
+
+// The bounds of most of a sample along an axis.
+template <typename Of>
+void find_bounds(CloudPoint* sample, std::size_t count, const Of& of, float* min, float* max) {
+  const auto nth = [&](std::size_t n) {
+    std::nth_element(sample, sample + n, sample + count,
+                     [&of](const CloudPoint& a, const CloudPoint& b) { return of(a) < of(b); });
+    return of(sample[n]);
+  };
+  constexpr std::size_t kLeftOut = 32;  // one of so many at either end
+  *min = nth(count / kLeftOut);
+  *max = nth(count - 1 - count / kLeftOut);
+}
+
+}  // namespace
+
+void PointCells::start(CloudPoint* sample, std::size_t count, std::size_t n) {
+  first_.fill(0);
+  end_.fill(0);
+  chunks_ = 1;
+  size_ = taken_ = 0;
+  grid_ = PointGrid();
+  if (count == 0) return;
+  float max[3];
+  find_bounds(
+      sample, count, [](const CloudPoint& p) { return p.x; }, &grid_.min[0], &max[0]);
+  find_bounds(
+      sample, count, [](const CloudPoint& p) { return p.y; }, &grid_.min[1], &max[1]);
+  find_bounds(
+      sample, count, [](const CloudPoint& p) { return p.z; }, &grid_.min[2], &max[2]);
+  float extent = 0.0F;
+  for (int i = 0; i < 3; ++i) extent = std::max(extent, max[i] - grid_.min[i]);
+  constexpr double kMost = 1 << PointGrid::kBits;
+  const double side = std::floor(std::sqrt(static_cast<double>(n) / kPointsPerCell));
+  const auto cells = static_cast<float>(std::clamp(side, 1.0, kMost));
+  const float per_metre = cells / extent;
+  if (!std::isfinite(per_metre) || !(per_metre > 0.0F)) return;  // as good as one point
+  grid_.per_metre = per_metre;
+  for (int i = 0; i < 3; ++i) {
+    grid_.last[i] = std::min(std::floor((max[i] - grid_.min[i]) * per_metre), cells - 1.0F);
+  }
+}
+
+void PointCells::add(const CropBlock& block, std::size_t count, std::uint32_t first_id) {
+  scatter(find_cells(grid_, block, count, first_id, &block_));
+}
+
+void PointCells::add(const CloudPoint* points, std::size_t n) {
+  while (n > 0) {
+    const std::size_t count = std::min(n, kCropBlock);
+    std::copy_n(points, count, block_.points);
+    scatter(find_cells(grid_, count, &block_));
+    points += count;
+    n -= count;
+  }
+}
+
+void PointCells::scatter(std::size_t count) {
+  size_ += count;
+  CloudPoint* pool = pool_.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t cell = block_.cells[i] >> 8;
+    std::uint32_t end = end_[cell];
+    if (end % kChunk == 0) {
+      end = next_chunk(cell, end);
+      pool = pool_.data();
+    }
+    hwy::Prefetch(pool + end + 4);  // the next line of four
+    pool[end] = block_.points[block_.cells[i] & 0xFFU];
+    end_[cell] = end + 1;
+  }
+}
+
+// @param end  of the last chunk, or 0: there is none
+// @returns the first point of a new one
+std::uint32_t PointCells::next_chunk(std::size_t cell, std::uint32_t end) {
+  const std::size_t chunk = chunks_++;
+  if (next_.size() < chunks_) {
+    next_.resize(2 * chunks_);
+    pool_.resize(next_.size() * kChunk + kPointSlack);
+  }
+  const auto begin = static_cast<std::uint32_t>(chunk * kChunk);
+  if (end == 0) {
+    first_[cell] = begin;
+  } else {
+    next_[end / kChunk - 1] = static_cast<std::uint32_t>(chunk);
+  }
+  return begin;
+}
+
+// To the next cell that is not empty, of which the first points are fetched.
+void PointCells::skip_empty() {
+  while (taken_ < end_.size() && end_[taken_] == 0) ++taken_;
+  if (taken_ == end_.size()) return;
+  const std::size_t begin = first_[taken_], end = end_[taken_];
+  const std::size_t here = (end - 1) / kChunk == begin / kChunk ? end - begin : kChunk;
+  for (std::size_t i = 0; i < here; i += 4) hwy::Prefetch(&pool_[begin + i]);
+}
+
+PointCells::Cell PointCells::next() {
+  if (taken_ == 0) skip_empty();
+  if (taken_ == end_.size()) return {nullptr, 0};
+  const std::size_t i = taken_++;
+  skip_empty();
+  const std::size_t end = end_[i], last = (end - 1) / kChunk;
+  std::size_t chunk = first_[i] / kChunk, count = 0;
+  if (chunk == last) return {&pool_[chunk * kChunk], end - chunk * kChunk};
+  for (;; chunk = next_[chunk]) {
+    const std::size_t begin = chunk * kChunk, here = chunk == last ? end - begin : kChunk;
+    if (cell_.size() < count + here + kPointSlack) cell_.resize(2 * (count + here + kPointSlack));
+    std::copy_n(&pool_[begin], here, &cell_[count]);
+    count += here;
+    if (chunk == last) return {cell_.data(), count};
+  }
+}
+
+}  // namespace ist

@@ -1,0 +1,40 @@
+#include "cloud/index/point_slicer.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <numeric>
+
+#include "cloud/index/divide_kernel.h"
+
+namespace ist {
+
+bool PointSlicer::sort(const CloudPoint* from, std::size_t n, CloudPoint* to) {
+  constexpr std::size_t kFew = 128, kFewSlices = 32;
+  const std::size_t count = n <= kFew ? kFewSlices : kMostSlices;
+  crowd_begin_ = crowd_end_ = 0;
+  if (slices_.size() < n + kPointSlack) slices_.resize(2 * (n + kPointSlack));
+  if (!find_slices(from, n, static_cast<std::int32_t>(count), slices_.data(), &shape_))
+    return false;
+  std::fill_n(at_.begin(), count, 0U);
+  const std::int32_t* slices = slices_.data();
+  for (std::size_t i = 0; i < n; ++i) ++at_[static_cast<std::size_t>(slices[i])];
+  const std::uint32_t most = Eigen::Map<Eigen::Array<std::uint32_t, Eigen::Dynamic, 1>>(
+                                 at_.data(), static_cast<Eigen::Index>(count))
+                                 .maxCoeff();
+  constexpr std::size_t kTile = 16;
+  if (most > kTile && 4 * most > n) {
+    const auto crowd = std::find(at_.begin(), at_.end(), most);
+    crowd_begin_ = std::accumulate(at_.begin(), crowd, std::size_t{0});
+    crowd_end_ = crowd_begin_ + most;
+  }
+  std::uint32_t begin = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t here = at_[k];
+    at_[k] = begin;  // grows with every point that is put there
+    begin += here;
+  }
+  for (std::size_t i = 0; i < n; ++i) to[at_[static_cast<std::size_t>(slices[i])]++] = from[i];
+  return true;
+}
+
+}  // namespace ist

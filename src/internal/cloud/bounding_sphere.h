@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "ist_proximity/cloud/point_index.h"
+
+namespace ist {
+
+/// A sphere, in the frame of an index.
+struct BoundingSphere {
+  Eigen::Vector3d center;
+  double radius;  ///< [m]
+};
+
+/// BoundingSphere the box of a node's child.
+inline BoundingSphere bounding_sphere(const BoxNode& node, int k) {
+  const Eigen::Vector3d low(node.min_x[k], node.min_y[k], node.min_z[k]);
+  const Eigen::Vector3d high(node.max_x[k], node.max_y[k], node.max_z[k]);
+  return {0.5 * (low + high), 0.5 * (high - low).norm()};
+}
+
+}  // namespace ist

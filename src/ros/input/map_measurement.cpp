@@ -1,0 +1,111 @@
+#include "ros/input/map_measurement.h"
+
+#include <ros/serialization.h>
+
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+#include "ist_proximity/cloud/octree.h"
+
+namespace ist {
+namespace {
+
+namespace ser = ros::serialization;
+
+// A map stays in a frame of its own, so it waits for no transform: the query asks where it is.
+class MapMeasurement : public Measurement {
+ public:
+  MapMeasurement(const std_msgs::Header& header, const Octree& octree,
+                 std::chrono::steady_clock::time_point begin)
+      : Measurement(header) {
+    auto index = std::make_shared<BoxIndex>();
+    index->build(octree.occupied);
+    index_ = index;
+    received_ = static_cast<std::uint32_t>(octree.occupied.size() + octree.free);
+    took_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+
+  std::vector<ros::Time> instants() const override { return {}; }
+
+  void ingest(const Placement& /*placement*/, Ingest* /*ingest*/,
+              CloudSnapshot* snapshot) const override {
+    snapshot->boxes = index_;
+    snapshot->counts = IngestCounts();
+    snapshot->counts.received = received_;
+    snapshot->counts.used = static_cast<std::uint32_t>(index_->size());
+    snapshot->stamp = header().stamp.toSec();
+    snapshot->ingest_time = took_;
+  }
+
+ private:
+  std::shared_ptr<const BoxIndex> index_;
+  std::uint32_t received_;
+  double took_;
+};
+
+Received made(const std_msgs::Header& header, const Octree& octree,
+              std::chrono::steady_clock::time_point begin) {
+  return {header, "", std::make_shared<MapMeasurement>(header, octree, begin)};
+}
+
+// Header header, bool binary, string id, float64 resolution, int8[] data. Throws where the bytes
+// end too early.
+void parse(ser::IStream* stream, std_msgs::Header* header, OctreeData* data) {
+  std::uint8_t is_binary = 0;
+  std::uint32_t size = 0;
+  ser::deserialize(*stream, *header);
+  ser::deserialize(*stream, is_binary);
+  ser::deserialize(*stream, data->id);
+  ser::deserialize(*stream, data->resolution);
+  ser::deserialize(*stream, size);
+  data->is_binary = is_binary != 0;
+  data->data = stream->advance(size);
+  data->size = size;
+}
+
+}  // namespace
+
+Received read_map(const topic_tools::ShapeShifter& message) {
+  const auto begin = std::chrono::steady_clock::now();
+  Received received;
+  if (message.getDataType() != message_type(SourceType::kMap)) {
+    // Without a header to tell the stamp.
+    received.header.stamp = ros::Time::now();
+    received.header.frame_id = "?";
+    received.fault =
+        "a " + message.getDataType() + " comes in, it must be a " + message_type(SourceType::kMap);
+    return received;
+  }
+  std::vector<std::uint8_t> bytes(message.size());
+  ser::OStream out(bytes.data(), message.size());
+  message.write(out);
+  OctreeData data;
+  Octree octree;
+  try {
+    ser::IStream in(bytes.data(), message.size());
+    parse(&in, &received.header, &data);
+    received.fault = read_octree(data, &octree);
+    if (received.fault.empty()) return made(received.header, octree, begin);
+  } catch (const std::exception& error) {  // a stream that ends, or memory
+    received.fault = error.what();
+  }
+  received.fault = "malformed map: " + received.fault;
+  return received;
+}
+
+Received read_map_file(const std::string& path, const std::string& frame_id) {
+  const auto begin = std::chrono::steady_clock::now();
+  Received received;
+  received.header.frame_id = frame_id;
+  Octree octree;
+  try {
+    received.fault = read_octree_file(path, &octree);
+    if (received.fault.empty()) return made(received.header, octree, begin);
+  } catch (const std::exception& error) {
+    received.fault = "map file '" + path + "' cannot be read: " + error.what() + ".";
+  }
+  return received;
+}
+
+}  // namespace ist

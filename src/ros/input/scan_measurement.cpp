@@ -1,0 +1,72 @@
+#include "ros/input/scan_measurement.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ist_proximity/cloud/laser_scan.h"
+
+namespace ist {
+namespace {
+
+// The robot is posed this often during a scan: a link at 1 m/s is never farther from one of the
+// poses than half the self-filter's usual padding.
+constexpr double kBetweenPoses = 0.025;  // [s]
+
+// Simulated time begins at 0, and stamps cannot be before.
+ros::Time shifted(const ros::Time& stamp, double seconds) {
+  return stamp.toSec() + seconds > 0.0 ? stamp + ros::Duration(seconds) : ros::Time(0, 1);
+}
+
+class ScanMeasurement : public Measurement {
+ public:
+  ScanMeasurement(const sensor_msgs::LaserScanConstPtr& message, const LaserScan& scan,
+                  double min_range, double max_range)
+      : Measurement(message->header),
+        message_(message),
+        scan_(scan),
+        min_range_(min_range),
+        max_range_(max_range) {}
+
+  std::vector<ros::Time> instants() const override {
+    const double duration = scan_.duration();
+    const auto steps = static_cast<int>(std::ceil(std::abs(duration) / kBetweenPoses));
+    std::vector<ros::Time> times = {header().stamp};
+    for (int i = 1; i <= steps; ++i) {
+      times.push_back(shifted(header().stamp, duration * i / steps));
+    }
+    return times;
+  }
+
+  void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
+    ScanPoints points;
+    to_points(scan_, min_range_, max_range_, placement.X_FS.inverse() * placement.X_FS_end,
+              &points);
+    ingest->run(points.raw(), placement.X_FS, placement.robot, header().stamp.toSec(), snapshot,
+                placement.later);
+  }
+
+ private:
+  sensor_msgs::LaserScanConstPtr message_;
+  LaserScan scan_;  ///< views the message
+  double min_range_, max_range_;
+};
+
+}  // namespace
+
+Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_range,
+                   double max_range) {
+  LaserScan scan;
+  scan.angle_min = static_cast<double>(message->angle_min);
+  scan.angle_increment = static_cast<double>(message->angle_increment);
+  scan.time_increment = static_cast<double>(message->time_increment);
+  scan.range_min = static_cast<double>(message->range_min);
+  scan.range_max = static_cast<double>(message->range_max);
+  scan.ranges = message->ranges.data();
+  scan.count = message->ranges.size();
+  const std::string fault = check_scan(scan);
+  if (!fault.empty()) return {message->header, "malformed scan: " + fault, nullptr};
+  return {message->header, "",
+          std::make_shared<ScanMeasurement>(message, scan, min_range, max_range)};
+}
+
+}  // namespace ist

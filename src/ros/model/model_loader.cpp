@@ -1,0 +1,281 @@
+#include "ros/model/model_loader.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+
+#include "internal/robot/mesh_size.h"
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/robot/package_resolver.h"
+#include "ist_proximity/robot/robot_description.h"
+#include "ros/model/progress_report.h"
+#include "ros/thread_name.h"
+
+namespace ist {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll(500);
+
+/// Monitored links in the order in which the model has them.
+std::vector<std::string> monitored_links(const RobotDescription& description,
+                                         const std::vector<std::string>& wanted) {
+  std::vector<std::string> names;
+  const auto is_wanted = [&](const std::string& name) {
+    return wanted.empty() || std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+  };
+  const auto has_geometry = [&](const std::string& name) {
+    return std::any_of(description.links.begin(), description.links.end(),
+                       [&](const LinkDescription& link) { return link.name == name; });
+  };
+  for (const std::string& name : description.link_order) {
+    if (is_wanted(name) && (!wanted.empty() || has_geometry(name))) names.push_back(name);
+  }
+  for (const std::string& name : wanted) {  // not in the URDF
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+void add_name(const std::string& name, std::vector<std::string>* names) {
+  if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
+}
+
+bool any_self_filter(const std::vector<SourceConfig>& sources) {
+  return std::any_of(sources.begin(), sources.end(),
+                     [](const SourceConfig& source) { return source.ingest.self_filter; });
+}
+
+void warn_of_visual_fallback(const RobotDescription& description) {
+  std::string names;
+  for (const LinkDescription& link : description.links) {
+    if (link.used_visual_fallback) names += (names.empty() ? "" : ", ") + link.name;
+  }
+  if (!names.empty()) {
+    ROS_WARN_STREAM("no collision geometry, the visual one is used: " << names);
+  }
+}
+
+}  // namespace
+
+ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
+    : config_(config), nh_(nh) {
+  ModelState waiting;
+  waiting.problem = "waiting for the parameter '" + nh_.resolveName(config.robot_description) +
+                    "' with the robot's URDF";
+  set_state(std::move(waiting));
+  thread_ = std::thread(&ModelLoader::run, this);
+}
+
+ModelLoader::~ModelLoader() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+std::shared_ptr<const ModelState> ModelLoader::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return state_;
+}
+
+void ModelLoader::set_state(ModelState state) {
+  auto shared = std::make_shared<const ModelState>(std::move(state));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  // After reload() only its own state may be seen, not the rest of what it interrupted.
+  if (!reload_) state_ = std::move(shared);
+}
+
+std::string ModelLoader::reload(bool* found) {
+  std::string urdf, problem;
+  *found = fetch(&urdf, &problem);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    auto state = std::make_shared<ModelState>(*state_);
+    state->phase = ModelState::Phase::kWaiting;
+    state->problem = "the robot's model is being loaded again";
+    state->fraction = 0.0;
+    state->robot = nullptr;
+    state->monitored.clear();
+    state_ = std::move(state);
+    reload_ = true;
+  }
+  wake_.notify_all();
+  return *found ? "reading '" + nh_.resolveName(config_.robot_description) + "' again" : problem;
+}
+
+void ModelLoader::wait() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (state_->phase == ModelState::Phase::kReady) {
+    wake_.wait(lock, [this] { return cancelled(); });
+  } else {
+    wake_.wait_for(lock, kPoll, [this] { return cancelled(); });
+  }
+}
+
+void ModelLoader::run() {
+  name_thread("ist model");
+  while (!stop_) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (reload_) rejected_.clear();
+      reload_ = false;
+    }
+    load_once();
+    wait();
+  }
+}
+
+/// Searched upwards from the node's namespace, as robot_state_publisher does.
+bool ModelLoader::fetch(std::string* urdf, std::string* problem) const {
+  const std::string& name = config_.robot_description;
+  std::string key = nh_.resolveName(name);
+  nh_.searchParam(name, key);
+  XmlRpc::XmlRpcValue value;
+  if (!nh_.getParam(key, value)) {
+    *problem = "waiting for the parameter '" + nh_.resolveName(name) + "' with the robot's URDF";
+    return false;
+  }
+  if (value.getType() != XmlRpc::XmlRpcValue::TypeString) {
+    *problem = "the parameter '" + key + "' is no string; it must hold the robot's URDF";
+    return false;
+  }
+  *urdf = static_cast<std::string&>(value);
+  return true;
+}
+
+void ModelLoader::load_once() {
+  std::string urdf;
+  ModelState state;
+  if (!fetch(&urdf, &state.problem)) {
+    ROS_WARN_STREAM_THROTTLE(5.0, state.problem);
+    rejected_.clear();
+    set_state(std::move(state));
+    return;
+  }
+  if (!rejected_.empty() && urdf == rejected_) return;
+  try {
+    load(urdf);
+  } catch (const std::exception& error) {  // ModelError, or no memory
+    rejected_ = urdf;
+    state.phase = ModelState::Phase::kFailed;
+    state.problem = std::string("the robot's URDF in '") + config_.robot_description +
+                    "' cannot be used: " + error.what() +
+                    "; set it anew, it is read again when it changes";
+    ROS_ERROR_STREAM(state.problem);
+    set_state(std::move(state));
+  }
+}
+
+/// The self-filter drops points on the whole robot, whatever part of it is monitored.
+RobotModelConfig ModelLoader::model_config(const RobotDescription& description,
+                                           const std::vector<AttachedObject>& objects) const {
+  RobotModelConfig config = config_.model;
+  if (config.links.empty()) return config;
+  for (const AttachedObject& object : objects) add_name(object.link, &config.links);
+  if (!any_self_filter(config_.sources)) return config;
+  std::vector<std::string> links = monitored_links(description, {});
+  for (const std::string& name : config.links) add_name(name, &links);
+  config.links = links;
+  return config;
+}
+
+/// The rest of a state whose robot is built.
+void ModelLoader::finish(const RobotDescription& description, ModelState* state) const {
+  std::vector<std::string> wanted = config_.model.links;
+  if (!wanted.empty()) {
+    for (const AttachedObject& object : state->objects) add_name(object.link, &wanted);
+  }
+  const std::vector<std::string> names = monitored_links(description, wanted);
+  const std::set<std::string> monitored(names.begin(), names.end());
+  state->links.clear();
+  state->monitored.clear();
+  for (std::size_t i = 0; i < state->robot->links.size(); ++i) {
+    const std::string& name = state->robot->links[i].name;
+    if (monitored.count(name) == 0) continue;
+    state->monitored.push_back(i);
+    state->links.push_back(name);
+  }
+  state->phase = ModelState::Phase::kReady;
+  state->problem = state->links.empty() ? "no link of the robot '" + description.name +
+                                              "' has geometry: nothing can be measured"
+                                        : "";
+  state->fraction = 1.0;
+}
+
+/// The description with what is attached to links that are still there.
+RobotDescription ModelLoader::carry_objects(ModelState* state) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    state->objects = objects_;
+  }
+  RobotDescription carrying = *state->description;
+  std::vector<AttachedObject> kept;
+  for (const AttachedObject& object : state->objects) {
+    try {
+      carrying = with_objects(carrying, {object});
+      kept.push_back(object);
+    } catch (const ModelError& error) {
+      ROS_WARN_STREAM("no longer attached: " << error.what());
+    }
+  }
+  state->objects = kept;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  objects_ = std::move(kept);
+  return carrying;
+}
+
+void ModelLoader::load(const std::string& urdf) {
+  ModelState state;
+  state.description = std::make_shared<const RobotDescription>(
+      parse_urdf(urdf, config_.geometry, environment_package_finder()));
+  warn_of_visual_fallback(*state.description);
+  const RobotDescription description = carry_objects(&state);
+
+  state.phase = ModelState::Phase::kPacking;
+  state.problem = "packing of the robot '" + description.name + "' begins";
+  state.root_link = description.root_link;
+  state.links = monitored_links(description, config_.model.links);
+  state.warnings = doubtful_sizes(description, model_config(description, state.objects).links);
+  for (const std::string& doubt : state.warnings) ROS_WARN_STREAM(doubt);
+  try {
+    state.kinematics = std::make_shared<const Kinematics>(description);
+  } catch (const ModelError& error) {
+    state.kinematics_problem = error.what();
+    ROS_WARN_STREAM("link poses cannot be computed from joint states: " << error.what());
+  }
+  set_state(state);
+
+  ProgressReport report;
+  std::mutex report_mutex;  // several packing threads
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = [this] { return cancelled(); };
+  callbacks.warning = [&](const std::string& warning) {
+    const std::lock_guard<std::mutex> lock(report_mutex);
+    ROS_WARN_STREAM(warning);
+    state.warnings.push_back(warning);
+  };
+  callbacks.progress = [&](const ModelProgress& progress) {
+    const std::lock_guard<std::mutex> lock(report_mutex);
+    report.update(progress);
+    state.problem = ProgressReport::sentence(progress);
+    state.fraction = progress.fraction;
+    set_state(state);
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  state.robot = build_robot_model(description, model_config(description, state.objects), callbacks);
+  report.finish();
+  if (!state.robot) return;  // cancelled
+
+  finish(description, &state);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  ROS_INFO("model of '%s' ready after %.1f s: %zu links monitored, %zu packed",
+           description.name.c_str(), took.count(), state.monitored.size(),
+           state.robot->links.size());
+  set_state(std::move(state));
+}
+
+}  // namespace ist

@@ -1,0 +1,92 @@
+#include "ros/output/message_conversion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ros/ros_time.h"
+
+namespace ist {
+namespace {
+
+using LinkMessage = ist_proximity::LinkProximity;
+using ist_proximity::ProximityArray;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+template <typename Message>
+void assign(const Eigen::Vector3d& v, Message* message) {
+  message->x = v.x();
+  message->y = v.y();
+  message->z = v.z();
+}
+
+void assign(const Wrench& from, geometry_msgs::Wrench* wrench) {
+  assign(from.force, &wrench->force);
+  assign(from.torque, &wrench->torque);
+}
+
+void assign(const ClosingRates& closing, LinkMessage* message) {
+  message->closing_speed = closing.total;
+  message->closing_speed_robot = closing.robot;
+  message->closing_speed_obstacles = closing.obstacles;
+  message->time_to_contact = closing.time_to_contact;
+  if (std::isnan(closing.robot)) message->closing_unknown |= LinkMessage::ROBOT_UNKNOWN;
+  if (std::isnan(closing.obstacles)) message->closing_unknown |= LinkMessage::OBSTACLES_UNKNOWN;
+}
+
+}  // namespace
+
+LinkMessage unknown_link(const std::string& name) {
+  return to_message(name, LinkProximity(), Push::unknown(), Wrench::unknown(), {}, "");
+}
+
+LinkMessage to_message(const std::string& name, const LinkProximity& result, const Push& repulsion,
+                       const Wrench& penetration, const ClosingRates& closing,
+                       const std::string& source) {
+  LinkMessage message;
+  message.link = name;
+  message.state = static_cast<std::uint8_t>(result.state);
+  message.distance = result.distance;
+  message.lower_bound = result.lower_bound;
+  assign(result.p_FCl, &message.point_on_link);
+  assign(result.p_LCl, &message.point_on_link_local);
+  assign(result.p_FCo, &message.point_on_obstacle);
+  assign(result.direction, &message.direction);
+  assign(repulsion.force, &message.repulsion);
+  assign(repulsion.torque, &message.repulsion_torque);
+  assign(penetration, &message.penetration);
+  assign(closing, &message);
+  if (result.state >= LinkState::kNear) message.source = source;
+  return message;
+}
+
+ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict& verdict,
+                                       const ros::Time& stamp) {
+  ist_proximity::SourceStatus message;
+  message.name = source.name;
+  message.status = verdict.status;
+  message.age = kNaN;
+  if (!source.has_snapshot) return message;
+  message.stamp = source.stamp;
+  if (!source.is_file) message.age = seconds_between(message.stamp, stamp);
+  message.points_received = source.counts.received;
+  message.points_used = source.counts.used + source.counts.outside_region;
+  message.points_on_robot = source.counts.on_robot;
+  return message;
+}
+
+double min_distance(const ProximityArray& message) {
+  if (message.links.empty() ||
+      (message.status != ProximityArray::OK && message.status != ProximityArray::DEGRADED)) {
+    return kNaN;
+  }
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const LinkMessage& link : message.links) {
+    if (link.state == LinkMessage::UNKNOWN) return kNaN;
+    smallest = std::min(smallest, link.lower_bound);
+  }
+  return smallest;
+}
+
+}  // namespace ist

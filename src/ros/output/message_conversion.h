@@ -1,0 +1,38 @@
+#pragma once
+
+#include <ist_proximity/LinkProximity.h>
+#include <ist_proximity/ProximityArray.h>
+#include <ist_proximity/SourceStatus.h>
+
+#include <Eigen/Core>
+#include <string>
+
+#include "ist_proximity/contact/contact_wrench.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ros/output/closing_speed.h"
+#include "ros/status/status.h"
+
+namespace ist {
+
+/// A link of which nothing is known: NaN everywhere, lower bound -inf.
+ist_proximity::LinkProximity unknown_link(const std::string& name);
+
+/// @param result         in the fixed frame
+/// @param repulsion      of the same link
+/// @param penetration    of the same link, in the fixed frame
+/// @param closing        of the same link
+/// @param source         name of the source of the nearest point; ignored unless NEAR or CONTACT
+ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
+                                        const Push& repulsion, const Wrench& penetration,
+                                        const ClosingRates& closing, const std::string& source);
+
+/// @param stamp  of the ProximityArray, which `age` counts from
+ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict& verdict,
+                                       const ros::Time& stamp);
+
+/// The smallest lower bound [m]; NaN when a link is UNKNOWN, when there is no link, or when the
+/// status is neither OK nor DEGRADED. All CLEAR gives ~max_distance.
+double min_distance(const ist_proximity::ProximityArray& message);
+
+}  // namespace ist

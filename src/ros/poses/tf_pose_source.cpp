@@ -1,0 +1,90 @@
+#include "ros/poses/tf_pose_source.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "ros/poses/transforms.h"
+#include "ros/ros_time.h"
+
+namespace ist {
+
+TfPoseSource::TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
+                           std::vector<std::string> link_frames, std::vector<bool> wanted,
+                           double timeout)
+    : buffer_(buffer),
+      fixed_frame_(std::move(fixed_frame)),
+      frames_(std::move(link_frames)),
+      wanted_(std::move(wanted)),
+      timeout_(timeout) {}
+
+bool TfPoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* stamp,
+                          std::string* problem) {
+  Eigen::Isometry3d ignored;
+  *problem = ist::look_up(buffer_, fixed_frame_, frames_[link], ros::Time(), &ignored, stamp);
+  if (!problem->empty()) return false;
+  if (stamp->isZero()) return true;
+  const double age = seconds_between(*stamp, now);
+  if (age <= timeout_) return true;
+  char text[96];
+  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
+                timeout_);
+  *problem = "the newest transform from '" + frames_[link] + "' to '" + fixed_frame_ + text;
+  return false;
+}
+
+void TfPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+  const std::size_t n = frames_.size();
+  poses->reset(now, n);
+  if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
+
+  // Not later than now: a transform stamped ahead of the clock must not push the instant there.
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!wanted_[i]) continue;
+    ros::Time stamp;
+    poses->known[i] = newest(i, now, &stamp, &poses->problems[i]);
+    if (poses->known[i] && !stamp.isZero()) poses->stamp = std::min(poses->stamp, stamp);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!poses->known[i]) continue;
+    poses->problems[i] =
+        ist::look_up(buffer_, fixed_frame_, frames_[i], poses->stamp, &poses->X_FL[i]);
+    poses->known[i] = poses->problems[i].empty();
+  }
+}
+
+void TfPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                               std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
+  const auto& links = kinematics.links();
+  X_FL->resize(links.size());
+  known->resize(links.size());
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    (*known)[i] = ist::look_up(buffer_, fixed_frame_, links[i], instant, &(*X_FL)[i]).empty();
+  }
+}
+
+/// A frame of tf that ends in a link's name.
+std::string TfPoseSource::with_prefix() const {
+  std::vector<std::string> known;
+  buffer_._getFrameStrings(known);
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (!wanted_[i] || buffer_._frameExists(without_slash(frames_[i]))) continue;
+    const std::string end = "/" + without_slash(frames_[i]);
+    for (const std::string& frame : known) {
+      const bool fits = frame.size() > end.size() &&
+                        frame.compare(frame.size() - end.size(), end.size(), end) == 0;
+      if (fits) return frame;
+    }
+  }
+  return "";
+}
+
+std::string TfPoseSource::hint() const {
+  const std::string other = with_prefix();
+  if (!other.empty()) {
+    return "tf has '" + other +
+           "': is a tf_prefix set? Frames have to have the names of the URDF's links";
+  }
+  return "is robot_state_publisher running, with joint states coming in?";
+}
+
+}  // namespace ist

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <tf2/buffer_core.h>
+
+#include <string>
+#include <vector>
+
+#include "ros/poses/pose_source.h"
+
+namespace ist {
+
+/// Reads link poses from tf.
+///
+/// All poses belong to one instant, the newest at which every fresh link is known; mixing instants
+/// would tear a moving arm apart. A link that has not moved on for longer than the timeout is not
+/// known and does not hold back the others. Static links are known at any instant.
+/// The buffer may be fed meanwhile.
+class TfPoseSource : public PoseSource {
+ public:
+  /// @param buffer        outlives this
+  /// @param fixed_frame   frame F
+  /// @param link_frames   by link
+  /// @param wanted        by link: false leaves it unknown and out of everything
+  /// @param timeout       [s]
+  TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
+               std::vector<std::string> link_frames, std::vector<bool> wanted, double timeout);
+
+  void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
+                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
+  std::string hint() const override;
+
+ private:
+  std::string with_prefix() const;
+  /// Newest instant of one link; false and a sentence when there is none or it is too old.
+  bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, std::string* problem);
+
+  const tf2::BufferCore& buffer_;
+  std::string fixed_frame_;
+  std::vector<std::string> frames_;
+  std::vector<bool> wanted_;
+  double timeout_;
+};
+
+}  // namespace ist

@@ -1,0 +1,191 @@
+#include "ros/services/query_service.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+
+#include "ros/thread_name.h"
+
+namespace ist {
+
+using ist_proximity::ProximityArray;
+
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// Empty, or what is wrong with the times of a motion.
+std::string check_times(const std::vector<double>& times, std::size_t states) {
+  if (times.empty()) return "";
+  if (times.size() != states || states < 2) {
+    return std::to_string(times.size()) + " times and " + std::to_string(states) +
+           " states: a motion needs one time per state, and two states";
+  }
+  for (std::size_t i = 0; i < states; ++i) {
+    if (!std::isfinite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) {
+      return "times[" + std::to_string(i) + "] is " + std::to_string(times[i]) +
+             ": times have to be finite and to rise";
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
+                           const CloudSources& sources, const tf2::BufferCore& buffer,
+                           std::function<LiveConfig()> live)
+    : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
+  private_nh.setCallbackQueue(&queue_);
+  service_ = private_nh.advertiseService("query", &QueryService::answer, this);
+  thread_ = std::thread([this] {
+    name_thread("ist query");
+    while (running_) queue_.callAvailable(ros::WallDuration(0.05));
+  });
+}
+
+QueryService::~QueryService() {
+  running_ = false;
+  thread_.join();
+  service_.shutdown();
+}
+
+void QueryService::set_model(std::shared_ptr<const ModelState> model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  newest_model_ = std::move(model);
+}
+
+bool QueryService::answer(Service::Request& request, Service::Response& response) {
+  try {
+    response.message = run(request, &response);
+    response.success = response.message.empty();
+  } catch (const std::exception& error) {  // no memory for a monstrous request
+    response.success = false;
+    response.message = error.what();
+  }
+  if (!response.success) {
+    response.results.clear();
+    response.impact_links.clear();
+    response.impact_times.clear();
+    return true;
+  }
+  const auto bad =
+      std::find_if(response.results.begin(), response.results.end(),
+                   [](const ProximityArray& result) { return result.status != result.OK; });
+  if (bad != response.results.end()) {
+    response.message =
+        "results[" + std::to_string(bad - response.results.begin()) + "]: " + bad->status_text;
+  }
+  return true;
+}
+
+/// Empty, or why there is nothing to query with.
+std::string QueryService::take_model() {
+  std::shared_ptr<const ModelState> model;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    model = newest_model_;
+  }
+  if (!model || model->phase != ModelState::Phase::kReady) {
+    return model ? model->problem : "the robot's model is not there yet";
+  }
+  if (!model->kinematics) return "of the URDF, " + model->kinematics_problem;
+  if (model == model_) return "";
+  model_ = std::move(model);
+  auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
+                                                  fixed_frame_of(*model_, config_),
+                                                  link_names(*model_->robot), config_.pose_timeout);
+  poses_ = poses.get();
+  cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
+                                            ProximityCycle::Reader::kOther);
+  impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
+  return "";
+}
+
+/// Empty, or which of them is none that is monitored.
+std::string QueryService::choose_links(const std::vector<std::string>& links) {
+  chosen_.assign(model_->links.size(), links.empty());
+  for (const std::string& name : links) {
+    const auto found = std::find(model_->links.begin(), model_->links.end(), name);
+    if (found == model_->links.end()) return "link '" + name + "' is not monitored";
+    chosen_[static_cast<std::size_t>(found - model_->links.begin())] = true;
+  }
+  std::vector<bool> wanted = wanted_links(*model_);
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    if (!chosen_[i]) wanted[model_->monitored[i]] = false;
+  }
+  poses_->set_wanted(wanted);
+  return "";
+}
+
+std::string QueryService::run(const Service::Request& request, Service::Response* response) {
+  std::string problem = check_times(request.times, request.states.size());
+  if (problem.empty()) problem = take_model();
+  if (problem.empty()) problem = choose_links(request.links);
+  if (!problem.empty()) return problem;
+
+  LiveConfig live = live_();
+  live.query.deadline = 0.0;
+  CycleReport ignored;
+  std::vector<std::vector<double>> positions;
+  for (std::size_t i = 0; i < request.states.size(); ++i) {
+    problem = poses_->state(request.states[i]);
+    if (!problem.empty()) return "states[" + std::to_string(i) + "]: " + problem;
+    positions.push_back(poses_->positions());
+    response->results.emplace_back();
+    ProximityArray& result = response->results.back();
+    cycle_->forget();  // one configuration after the other is no motion
+    cycle_->run(ros::Time::now(), sources_, live, &result, &ignored);
+    for (std::size_t link = chosen_.size(); link-- > 0;) {
+      if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
+    }
+    if (!running_) return "the node ends";
+  }
+  if (request.times.empty()) return "";
+  impacts_->set_config(live.query);
+  return find_impacts(request, positions, response);
+}
+
+/// Against the obstacles of the last result, straight from state to state.
+std::string QueryService::find_impacts(const Service::Request& request,
+                                       const std::vector<std::vector<double>>& positions,
+                                       Service::Response* response) {
+  const auto& joints = model_->kinematics->joints();
+  std::vector<bool> wanted = cycle_->measurable();
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    const std::size_t link = model_->monitored[i];
+    wanted[link] = wanted[link] && chosen_[i];
+  }
+  std::vector<double> first;
+  for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
+  std::vector<ImpactTime> impacts;
+  for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
+    const JointMotion motion{positions[k], positions[k + 1],
+                             request.times[k + 1] - request.times[k]};
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j].is_free() || std::isnan(motion.from[j]) == std::isnan(motion.to[j])) continue;
+      return "joint '" + joints[j].name + "' is stated in one of states[" + std::to_string(k) +
+             "] and states[" + std::to_string(k + 1) + "] only: a motion has to state it in all";
+    }
+    impacts_->run(motion, poses_->joints(), poses_->root(), wanted, cycle_->clouds(), &impacts);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      if (std::isfinite(impacts[i].time)) {
+        first[i] = request.times[k] + impacts[i].time;
+        wanted[i] = false;  // the first contact is what is asked for
+      } else if (std::isnan(impacts[i].time) && first[i] == kInf) {
+        first[i] = impacts[i].time;
+        wanted[i] = false;
+      }
+    }
+    if (!running_) return "the node ends";
+  }
+  for (std::size_t i = 0; i < chosen_.size(); ++i) {
+    if (!chosen_[i]) continue;
+    response->impact_links.push_back(model_->links[i]);
+    response->impact_times.push_back(first[model_->monitored[i]]);
+  }
+  return "";
+}
+
+}  // namespace ist

@@ -1,0 +1,220 @@
+#include "ros/services/self_proximity.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <boost/make_shared.hpp>
+#include <chrono>
+#include <cmath>
+
+#include "ist_proximity/geometry/error.h"
+#include "ros/output/message_conversion.h"
+#include "ros/proximity_cycle.h"
+#include "ros/status/status.h"
+#include "ros/thread_name.h"
+
+namespace ist {
+
+using ist_proximity::ProximityArray;
+using Clock = std::chrono::steady_clock;
+
+SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
+                             const ServerConfig& config, const tf2::BufferCore& buffer,
+                             JointStateListener* joints, std::function<LiveConfig()> live)
+    : config_(config), nh_(nh), buffer_(buffer), joints_(joints), live_(std::move(live)) {
+  publisher_ = private_nh.advertise<ProximityArray>("self_proximity", 10);
+  thread_ = std::thread(&SelfProximity::run, this);
+}
+
+SelfProximity::~SelfProximity() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stop_ = true;
+  }
+  stop_signal_.notify_all();
+  thread_.join();
+}
+
+void SelfProximity::set_model(std::shared_ptr<const ModelState> model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  newest_model_ = std::move(model);
+}
+
+void SelfProximity::run() {
+  name_thread("ist self");
+  const auto period = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(1.0 / config_.self_collision.rate));
+  Clock::time_point next = Clock::now();
+  while (true) {
+    next = std::max(next + period, Clock::now());
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      if (stop_signal_.wait_until(lock, next, [this] { return stop_; })) return;
+    }
+    take_model();
+    if (model_) run_once();
+  }
+}
+
+void SelfProximity::take_model() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (newest_model_ == model_) return;
+    model_ = newest_model_;
+  }
+  query_.reset();
+  if (!model_->robot || !model_->kinematics) return;
+  query_ = std::make_unique<SelfQuery>(model_->robot, choose_pairs(), config_.query);
+  pose_source_ =
+      make_pose_source(*model_, config_, buffer_, joints_, JointPoseSource::Which::kNewest);
+  speeds_.assign(model_->robot->links.size(), ClosingSpeed());
+}
+
+NamePairs SelfProximity::ignored_pairs() const {
+  NamePairs ignored = config_.self_collision.ignore;
+  for (const auto& pair : ignored) {
+    for (const std::string& name : {pair.first, pair.second}) {
+      if (model_->kinematics->find_link(name)) continue;
+      ROS_WARN_STREAM("~self_collision/ignore names '" << name
+                                                       << "', which is no link of the URDF");
+    }
+  }
+  const std::string name = config_.robot_description + "_semantic";
+  std::string key, srdf;
+  if (!nh_.searchParam(name, key) || !nh_.getParam(key, srdf)) return ignored;
+  try {
+    const NamePairs disabled = disabled_collisions(srdf);
+    ignored.insert(ignored.end(), disabled.begin(), disabled.end());
+  } catch (const ModelError& error) {
+    ROS_WARN_STREAM("'" << key << "' is not used: " << error.what());
+  }
+  return ignored;
+}
+
+std::vector<LinkPair> SelfProximity::choose_pairs() const {
+  const RobotModel& robot = *model_->robot;
+  std::vector<LinkPair> pairs =
+      self_collision_pairs(robot, *model_->kinematics, wanted_links(*model_), ignored_pairs());
+  std::string at_rest;
+  if (config_.self_collision.ignore_contact_at_rest) {
+    for (const LinkPair& found : in_contact_at_rest(model_->robot, *model_->kinematics, pairs)) {
+      at_rest += (at_rest.empty() ? "; in contact at rest, and left out: " : ", ") +
+                 robot.links[found.first].name + " and " + robot.links[found.second].name;
+      pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                                 [&](const LinkPair& pair) {
+                                   return pair.first == found.first && pair.second == found.second;
+                                 }),
+                  pairs.end());
+    }
+  }
+  ROS_INFO_STREAM("self-collision: " << pairs.size() << " pairs of links are watched" << at_rest);
+  return pairs;
+}
+
+/// What the nearest other link is to one; UNKNOWN if any of its pairs is.
+LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const {
+  LinkProximity answer;
+  if (!poses_.known[link]) return answer;
+  answer.state = LinkState::kClear;
+  answer.distance = std::numeric_limits<double>::infinity();
+  answer.lower_bound = config_.query.max_distance;
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    const LinkPair& pair = query_->pairs()[i];
+    if (pair.first != link && pair.second != link) continue;
+    const PairProximity& result = results_[i];
+    if (result.state == LinkState::kUnknown) return LinkProximity();
+    const double lower_bound = std::min(answer.lower_bound, result.lower_bound);
+    if (result.distance < answer.distance) {
+      const bool is_first = pair.first == link;
+      *other = is_first ? pair.second : pair.first;
+      answer.state = result.state;
+      answer.distance = result.distance;
+      answer.p_FCl = is_first ? result.p_FCa : result.p_FCb;
+      answer.p_FCo = is_first ? result.p_FCb : result.p_FCa;
+      answer.p_LCl = poses_.X_FL[link].inverse() * answer.p_FCl;
+      answer.direction = is_first ? result.direction : Eigen::Vector3d(-result.direction);
+    }
+    answer.lower_bound = lower_bound;
+  }
+  return answer;
+}
+
+void SelfProximity::find_wrenches(const LiveConfig& live) {
+  const RobotModel& robot = *model_->robot;
+  wrenches_.assign(results_.size(), Wrench::zero());
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    if (results_[i].state != LinkState::kContact) continue;
+    const LinkPair& pair = query_->pairs()[i];
+    const ContactBody* first = find_body(live.contacts.get(), robot, pair.first);
+    const ContactBody* second = find_body(live.contacts.get(), robot, pair.second);
+    const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
+    wrenches_[i] = first == nullptr || second == nullptr
+                       ? Wrench::unknown()
+                       : contact_wrench(contact_volume(*first, *second,
+                                                       X_FA.inverse() * poses_.X_FL[pair.second]),
+                                        X_FA, live.penetration);
+  }
+}
+
+/// Of all links that touch this one.
+Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer) const {
+  if (answer.state == LinkState::kUnknown) return Wrench::unknown();
+  Wrench all = Wrench::zero();
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    const LinkPair& pair = query_->pairs()[i];
+    if (pair.first == link) all += wrenches_[i];
+    if (pair.second != link) continue;
+    const Eigen::Vector3d p_SecondFirst =
+        poses_.X_FL[pair.first].translation() - poses_.X_FL[pair.second].translation();
+    all += reaction(wrenches_[i], p_SecondFirst);
+  }
+  return all;
+}
+
+void SelfProximity::run_once() {
+  const ros::Time now = ros::Time::now();
+  if (now < last_now_) speeds_.assign(speeds_.size(), ClosingSpeed());
+  last_now_ = now;
+  const auto message = boost::make_shared<ProximityArray>();
+  Situation situation;
+  situation.clock_runs = !now.isZero();
+  situation.model_problem =
+      model_->problem.empty() && !model_->kinematics ? model_->kinematics_problem : model_->problem;
+  message->header.frame_id = fixed_frame_of(*model_, config_);
+  message->header.stamp = now;
+  if (query_) {
+    pose_source_->look_up(now, &poses_);
+    const auto begin = Clock::now();
+    const LiveConfig live = live_();
+    query_->set_config(live.query);
+    query_->run(poses_.X_FL, poses_.known, &results_);
+    find_wrenches(live);
+    message->header.stamp = poses_.stamp;
+    for (const std::size_t i : model_->monitored) {
+      const LinkModel& link = model_->robot->links[i];
+      if (!link.usable()) situation.link_errors.push_back(link.error);
+      if (!poses_.problems[i].empty()) {
+        situation.pose_problems.push_back("link '" + link.name +
+                                          "' has no pose: " + poses_.problems[i]);
+      }
+      std::size_t other = i;
+      const LinkProximity answer = nearest(i, &other);
+      const std::string& name = model_->robot->links[other].name;
+      ClosingRates closing =
+          speeds_[i].update(poses_.stamp, answer, poses_.X_FL[i], {name, 0, 0.0});
+      closing.robot = ClosingRates::kNaN;  // both links move: it has no parts
+      message->links.push_back(
+          to_message(link.name, answer, Push::unknown(), penetration(i, answer), closing, name));
+    }
+    const std::chrono::duration<double> took = Clock::now() - begin;
+    message->computation_time = took.count();
+  } else {
+    for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
+  }
+  const Verdict verdict = judge(situation, now.toSec());
+  message->status = verdict.status;
+  message->status_text = verdict.text;
+  publisher_.publish(message);
+}
+
+}  // namespace ist

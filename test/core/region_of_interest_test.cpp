@@ -1,0 +1,184 @@
+// Where clouds end: the robot's reach, and what queries do not know from beyond it.
+
+#include "ist_proximity/robot/robot_region.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "internal/robot/reach.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/random_robots.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kRounding = 1e-6;  // [m]
+
+// A sphere for each of the links l0, l1 ...
+std::shared_ptr<RobotModel> spheres(std::size_t count, double radius) {
+  const auto model = test::make_model(std::vector<Shape>(count, Sphere{radius}), 0.01);
+  for (std::size_t i = 0; i < count; ++i) model->links[i].name = "l" + std::to_string(i);
+  return model;
+}
+
+// A sphere for each of a random robot's links.
+struct Arm {
+  Arm(test::Rng* rng, int max_joints) : description(test::random_robot(rng, max_joints)) {
+    for (JointDescription& joint : description.joints) {
+      joint.lower = test::uniform(rng, -1.0, 0.0);
+      joint.upper = test::uniform(rng, 0.0, 1.0);
+    }
+    model = spheres(description.joints.size() + 1, 0.05);
+  }
+
+  RobotDescription description;
+  std::shared_ptr<RobotModel> model;
+};
+
+TEST(Reach, NoLinkGetsFarther) {
+  test::Rng rng(5);
+  for (int k = 0; k < test::scaled(60); ++k) {
+    const Arm arm(&rng, 6);
+    const Kinematics kinematics(arm.description);
+    const double far = reach(*arm.model, kinematics);
+    double farthest = 0.0;
+    for (int i = 0; i < 200; ++i) {
+      std::vector<double> q;
+      for (const Kinematics::Joint& joint : kinematics.joints()) {
+        const bool slides = joint.type == JointType::kPrismatic;
+        const bool is_source = std::any_of(
+            kinematics.joints().begin(), kinematics.joints().end(), [&](const auto& other) {
+              return other.type == JointType::kPrismatic && other.source == q.size();
+            });
+        q.push_back(slides || is_source ? test::uniform(&rng, joint.lower, joint.upper)
+                                        : test::uniform(&rng, -4.0, 4.0));
+      }
+      JointPoses poses;
+      kinematics.place_joints(q, &poses);
+      std::vector<Eigen::Isometry3d> X_RL;
+      std::vector<bool> known;
+      kinematics.place_links(poses, Eigen::Isometry3d::Identity(), &X_RL, &known);
+      for (const Eigen::Isometry3d& X : X_RL) {
+        farthest = std::max(farthest, X.translation().norm() + 0.05);
+      }
+    }
+    ASSERT_LE(farthest, far + 1e-9);
+  }
+}
+
+JointDescription joint(JointType type, const std::string& parent, const std::string& child,
+                       const Eigen::Vector3d& p_PJ) {
+  JointDescription result;
+  result.name = "to_" + child;
+  result.type = type;
+  result.parent_link = parent;
+  result.child_link = child;
+  result.X_PJ.translation() = p_PJ;
+  return result;
+}
+
+TEST(Reach, OfAnArmThatIsStretched) {
+  RobotDescription arm;
+  arm.root_link = "l0";
+  arm.joints = {joint(JointType::kRevolute, "l0", "l1", {0.0, 0.0, 0.3}),
+                joint(JointType::kPrismatic, "l1", "l2", {0.5, 0.0, 0.0})};
+  arm.joints[1].lower = -0.4;
+  arm.joints[1].upper = 0.2;
+  const auto model = spheres(3, 0.1);
+  EXPECT_NEAR(reach(*model, Kinematics(arm)), 0.3 + 0.5 + 0.4 + 0.1, 0.02);
+  arm.joints[1].upper = kInfinity;
+  EXPECT_EQ(reach(*model, Kinematics(arm)), kInfinity);
+  arm.joints[1].upper = 0.2;
+  arm.joints[0].type = JointType::kFloating;
+  EXPECT_EQ(reach(*model, Kinematics(arm)), kInfinity);
+}
+
+// The root stands still in the frames that fixed joints hang on it, and in no others.
+TEST(RegionOfInterest, OnlyInFramesThatStandStill) {
+  RobotDescription robot;
+  robot.root_link = "world";
+  robot.joints = {joint(JointType::kFixed, "world", "l0", {1.0, 2.0, 3.0}),
+                  joint(JointType::kRevolute, "l0", "l1", Eigen::Vector3d::Zero())};
+  const auto model = spheres(2, 0.1);
+  const Kinematics kinematics(robot);
+  const double far = reach(*model, kinematics);
+  for (const char* frame : {"l1", "map", ""}) {
+    EXPECT_EQ(region_of_interest(*model, kinematics, frame, 0.5).radius, kInfinity) << frame;
+  }
+  const RegionOfInterest at_root = region_of_interest(*model, kinematics, "world", 0.5);
+  EXPECT_EQ(at_root.center_F, Eigen::Vector3d::Zero());
+  EXPECT_NEAR(at_root.radius, far + 0.5, 0.01);
+  EXPECT_GE(at_root.radius, far + 0.5);
+  const RegionOfInterest at_base = region_of_interest(*model, kinematics, "l0", 0.5);
+  EXPECT_EQ(at_base.center_F, Eigen::Vector3d(-1.0, -2.0, -3.0));
+  EXPECT_EQ(at_base.radius, at_root.radius);
+}
+
+// Links about the edge of what is kept: what is said holds for all points, also for those left out.
+TEST(RegionOfInterest, WhatIsBeyondIsNotKnown) {
+  test::Rng rng(17);
+  const std::vector<TriangleMesh> meshes = {test::l_shape(0.2, 0.05), test::icosphere(0.08, 2)};
+  const auto model = test::make_model({meshes.begin(), meshes.end()}, 0.005);
+  QueryConfig config;
+  config.max_distance = 0.3;
+  ProximityQuery query(model, config);
+  const std::vector<bool> known(meshes.size(), true);
+  int clear = 0, measured = 0, unknown = 0, cut = 0;
+  for (int scene = 0; scene < (test::kSanitized ? 20 : 40); ++scene) {
+    std::vector<Eigen::Vector3d> points, kept;
+    RegionOfInterest region;
+    region.center_F = test::random_vector(&rng, 0.2);
+    region.radius = 1.0;
+    for (int i = 0; i < 60; ++i) {
+      points.push_back(test::random_vector(&rng, 1.2));
+      if ((points.back() - region.center_F).norm() <= region.radius) kept.push_back(points.back());
+    }
+    CloudSnapshot cloud = test::make_snapshot(kept);
+    cloud.region = region;
+    std::vector<Eigen::Isometry3d> X_FL;
+    double least = kInfinity;
+    bool all_inside = true;
+    for (const TriangleMesh& mesh : meshes) {
+      X_FL.push_back(test::random_pose(&rng, 0.8));
+      std::vector<Eigen::Vector3d> points_L;
+      for (const Eigen::Vector3d& p : points) points_L.push_back(X_FL.back().inverse() * p);
+      const double truth = test::oracle_minimum(mesh, points_L);
+      least = std::min(least, truth);
+      const std::size_t i = X_FL.size() - 1;
+      LinkProximity link;
+      ASSERT_TRUE(query.run_link(i, X_FL[i], {&cloud}, &link));
+      ASSERT_LE(link.lower_bound, truth + kRounding);
+      const InnerSphereTree& tree = model->links[i].tree;
+      const double from_center = (X_FL[i] * tree.center() - region.center_F).norm();
+      const bool inside = from_center + tree.radius() + config.max_distance <= region.radius;
+      all_inside = all_inside && inside;
+      clear += link.state == LinkState::kClear;
+      unknown += link.state == LinkState::kUnknown;
+      if (link.state == LinkState::kClear) ASSERT_GE(truth, config.max_distance - kRounding);
+      if (inside) ASSERT_NE(link.state, LinkState::kUnknown);
+      if (link.state != LinkState::kNear && link.state != LinkState::kContact) continue;
+      ++measured;
+      cut += link.distance > link.lower_bound + config.tolerance + kRounding;
+      ASSERT_GE(link.distance, truth - kRounding);
+    }
+    RobotProximity robot;
+    ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));
+    ASSERT_LE(robot.nearest.lower_bound, least + kRounding);
+    if (robot.nearest.state == LinkState::kClear) ASSERT_TRUE(all_inside);
+  }
+  EXPECT_GT(clear, 0);
+  EXPECT_GT(measured, 0);
+  EXPECT_GT(unknown, 0);
+  EXPECT_GT(cut, 0);
+}
+
+}  // namespace
+}  // namespace ist
