@@ -55,7 +55,7 @@ ContactLeaf make_leaf(const SphereLeaf& leaf) {
     result.x[k] = leaf.x[k];
     result.y[k] = leaf.y[k];
     result.z[k] = leaf.z[k];
-    result.radius[k] = k < leaf.count ? leaf.inner[k] : -1.0F;
+    result.radius[k] = k < leaf.count ? leaf.inner_radius[k] : -1.0F;
   }
   return result;
 }

@@ -171,7 +171,7 @@ double depth_in_spheres(const InnerSphereTree& tree, const Eigen::Vector3d& p_L,
     if (!(entry.bound > deepest)) continue;
     if (entry.child < 0) {
       const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~entry.child)];
-      const Lanes depth = LaneMap(leaf.inner) - distances(p, leaf.x, leaf.y, leaf.z);
+      const Lanes depth = LaneMap(leaf.inner_radius) - distances(p, leaf.x, leaf.y, leaf.z);
       deepest = std::max(deepest, depth.maxCoeff());
       if (deepest > stop) break;
       continue;

@@ -199,7 +199,7 @@ class InteriorCover {
   const double target_;  // [m]
   SphereSearch& spheres_;
   Packing& packing_;
-  SphereSearch search_;  // outer spheres
+  SphereSearch search_;  // cover spheres
   PackingProgress progress_;
   double done_ = 0.0;
   int visits_ = 0;

@@ -18,7 +18,7 @@ Eigen::AlignedBox3d box_of(const LinkModel& link) {
   for (const SphereLeaf& leaf : link.tree.leaves()) {
     for (int k = 0; k < leaf.count; ++k) {
       const Eigen::Vector3d center(leaf.x[k], leaf.y[k], leaf.z[k]);
-      const double radius = static_cast<double>(leaf.outer[k]) + link.tree.interior_gap();
+      const double radius = static_cast<double>(leaf.cover_radius[k]) + link.tree.interior_gap();
       box.extend(Eigen::Vector3d(center.array() - radius));
       box.extend(Eigen::Vector3d(center.array() + radius));
     }

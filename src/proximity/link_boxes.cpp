@@ -58,7 +58,7 @@ void LinkQuery::consider_box(std::int32_t tile, int lane, bool is_outside) {
   if (found.distance > 0.0) {
     if (!is_outside) {  // as a whole it may be inside
       const Eigen::Vector3d middle = box.center();
-      if (link_->tree.outer_distance(X_LO_ * middle, 0.0) <= link_->tree.interior_gap()) {
+      if (link_->tree.cover_distance(X_LO_ * middle, 0.0) <= link_->tree.interior_gap()) {
         take_point(middle, tile, lane);
       }
     }
@@ -114,7 +114,8 @@ void LinkQuery::take_sphere(std::int32_t leaf, std::int32_t tile, int lane) {
     const Eigen::Vector3d center =
         X_OL_ * Eigen::Vector3d(spheres.x[b], spheres.y[b], spheres.z[b]);
     const Eigen::Vector3d nearest = clamp_to(box, center);
-    const double distance = (center - nearest).norm() - static_cast<double>(spheres.inner[b]);
+    const double distance =
+        (center - nearest).norm() - static_cast<double>(spheres.inner_radius[b]);
     if (distance >= deepest) continue;
     deepest = distance;
     p_O = nearest;
@@ -125,7 +126,7 @@ void LinkQuery::take_sphere(std::int32_t leaf, std::int32_t tile, int lane) {
 // As find_depth, of boxes: those that may hold points inside the link.
 void LinkQuery::find_overlap(Deadline* deadline) {
   struct Entry {
-    double distance;  // [m] of the node's middle from the link's outer spheres, less its radius
+    double distance;  // [m] of the node's middle from the link's cover spheres, less its radius
     std::int32_t child;
   };
   const double interior = link_->tree.interior_gap() + 3.0 * rounding_;
@@ -147,7 +148,7 @@ void LinkQuery::find_overlap(Deadline* deadline) {
     for (int k = 0; k < node.count; ++k) {
       const Eigen::AlignedBox3d box = child_box(node, k);
       const double near = interior + radius_of(box);
-      const double distance = link_->tree.outer_distance(X_LO_ * box.center(), near);
+      const double distance = link_->tree.cover_distance(X_LO_ * box.center(), near);
       // Farther boxes hold no point inside; what they hold outside the descent has seen.
       if (distance > near) continue;
       std::size_t at = top++;
@@ -169,7 +170,7 @@ void LinkQuery::find_overlap_in_tile(std::int32_t tile) {
     const Eigen::AlignedBox3d box = boxes.box(lane);
     const Eigen::Vector3d middle_L = X_LO_ * box.center();
     const double near = interior + radius_of(box);
-    const double outer = link_->tree.outer_distance(middle_L, interior);
+    const double outer = link_->tree.cover_distance(middle_L, interior);
     if (outer > near) continue;
     ++statistics_->exact_evaluations;
     const BoxDistance found =

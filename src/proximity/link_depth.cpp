@@ -68,7 +68,7 @@ double LinkQuery::depth_bound(const Eigen::Vector3d& center, double radius) {
     const double bound = found.floor - radius - kRounding;
     if (bound >= threshold()) return bound;
   }
-  if (link_->tree.is_beyond(center, interior_reach() + radius)) return kInfinity;
+  if (link_->tree.cover_distance_exceeds(center, interior_reach() + radius)) return kInfinity;
   if (!is_known) {
     ++statistics_->exact_evaluations;
     found = grid_.measure(center);
@@ -118,7 +118,7 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, double tile_bound) {
       return;
     }
     open[i] = false;
-    if (link_->tree.is_beyond(p_L[i], interior)) continue;
+    if (link_->tree.cover_distance_exceeds(p_L[i], interior)) continue;
     ++statistics_->exact_evaluations;
     DepthGrid::Found found;
     grid_.look(p_L[i], &found);

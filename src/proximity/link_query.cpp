@@ -131,7 +131,7 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside, double be
     const double known = known_.at(index, KnownDistances::Kind::kOutside, key, p_L);
     if (known >= threshold()) return drop(known);
   } else {
-    is_outside = link_->tree.is_beyond(p_L, link_->tree.interior_gap());
+    is_outside = link_->tree.cover_distance_exceeds(p_L, link_->tree.interior_gap());
   }
   if (statistics_ != nullptr) ++statistics_->exact_evaluations;
   const double limit = std::min({nearest_.exact.distance, others_, range() + rounding_, below});

@@ -54,7 +54,7 @@ Eigen::Vector3d LinkQuery::way_from_sphere(std::int32_t leaf, const Eigen::Vecto
   double least = kInfinity;
   for (int k = 0; k < spheres.count; ++k) {
     const Eigen::Vector3d way = p_L - Eigen::Vector3d(spheres.x[k], spheres.y[k], spheres.z[k]);
-    const double inner = way.norm() - static_cast<double>(spheres.inner[k]);
+    const double inner = way.norm() - static_cast<double>(spheres.inner_radius[k]);
     if (!(inner < least)) continue;
     least = inner;
     nearest = way;

@@ -78,7 +78,7 @@ class PairSearch {
   // must be outside.
   double far_bound(const Eigen::Vector3d& p_B, double radius) const {
     const double gap = b_.tree.interior_gap();
-    const double outer = b_.tree.outer_distance(p_B, gap + (has_holes_ ? radius : 0.0));
+    const double outer = b_.tree.cover_distance(p_B, gap + (has_holes_ ? radius : 0.0));
     return outer > gap + (has_holes_ ? radius : 0.0) ? outer - radius : -kInf;
   }
 
@@ -99,16 +99,16 @@ class PairSearch {
   void look_at(const SphereLeaf& leaf) {
     for (int k = 0; k < leaf.count; ++k) {
       const Eigen::Vector3d p_A(leaf.x[k], leaf.y[k], leaf.z[k]), p_B = X_BA_ * p_A;
-      const double far = far_bound(p_B, leaf.outer[k]);
+      const double far = far_bound(p_B, leaf.cover_radius[k]);
       if (far >= enough()) {
         skip(far);
         continue;
       }
       const SignedDistance measured = b_.solid.signed_distance(p_B);
-      const double near = b_.solid.distance_floor(p_B, measured) - leaf.outer[k];
+      const double near = b_.solid.distance_floor(p_B, measured) - leaf.cover_radius[k];
       lower_ = std::min(lower_, std::max(near, far));
-      if (measured.distance < std::max(leaf.inner[k], 0.0F)) {
-        go_deeper(p_A, measured, leaf.inner[k]);
+      if (measured.distance < std::max(leaf.inner_radius[k], 0.0F)) {
+        go_deeper(p_A, measured, leaf.inner_radius[k]);
       }
       go_to_and_fro(measured.witness);
     }

@@ -28,14 +28,14 @@ HWY_INLINE hn::Vec<SupportTag> Along(const Spheres& spheres, const float* n, std
                                hn::Mul(hn::Set(d, n[2]), hn::Load(d, spheres.z + k))));
 }
 
-// How far a leaf's outer spheres reach, or `most`; but never short of a centre: what planes leave
+// How far a leaf's cover spheres reach, or `most`; but never short of a centre: what planes leave
 // of a sphere then has everything that is near the sphere before the plane.
 HWY_INLINE float LeafSupport(const SphereLeaf& leaf, const float* n, float most) {
   const SupportTag d;
   const auto nowhere = hn::Set(d, kNowhere);
   auto farthest = nowhere, center = nowhere;
   for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
-    const auto outer = hn::Load(d, leaf.outer + k), along = Along(leaf, n, k);
+    const auto outer = hn::Load(d, leaf.cover_radius + k), along = Along(leaf, n, k);
     farthest = hn::Max(farthest, hn::Add(along, outer));
     center = hn::Max(center, hn::IfThenElse(hn::Gt(outer, nowhere), along, nowhere));
   }

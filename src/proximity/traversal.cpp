@@ -411,7 +411,7 @@ class Descent {
     const std::int32_t tile_index = ~pair.box;
     Posed posed;
     Pose(t_, leaf.x, leaf.y, leaf.z, &posed);
-    const float* radius = kExact ? leaf.outer : leaf.inner;
+    const float* radius = kExact ? leaf.cover_radius : leaf.inner_radius;
     const float offset = t_.offset + SupportOf(pair.slot);
     const PointTag d;
     alignas(64) float distance[kPointWidth];
@@ -468,8 +468,8 @@ class Descent {
                   planes_.Along(spheres, hn::Load(spheres, posed.x + b),
                                 hn::Load(spheres, posed.y + b), hn::Load(spheres, posed.z + b)));
       hn::Store(over, spheres, height + b);
-      hn::Store(RimRadius(spheres, hn::Load(spheres, leaf.outer + b), over, t_.rounding), spheres,
-                rim + b);
+      hn::Store(RimRadius(spheres, hn::Load(spheres, leaf.cover_radius + b), over, t_.rounding),
+                spheres, rim + b);
     }
     bool is_nearer = false;
     for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {
@@ -477,12 +477,13 @@ class Descent {
       auto nearest = hn::Set(d, kFarAway), nearest_inner = nearest;
       for (int b = 0; b < leaf.count; ++b) {
         const float center[3] = {posed.x[b], posed.y[b], posed.z[b]};
-        const auto radius = hn::Set(d, leaf.outer[b]);
+        const auto radius = hn::Set(d, leaf.cover_radius[b]);
         const auto to_center = Distance(tile, k, center[0], center[1], center[2]);
         const auto cut = CutDistance(d, ahead, planes_.Aside(tile, k, center), radius,
                                      hn::Set(d, height[b]), hn::Set(d, rim[b]));
         nearest = hn::Min(nearest, hn::Max(hn::Sub(to_center, radius), cut));
-        nearest_inner = hn::Min(nearest_inner, hn::Sub(to_center, hn::Set(d, leaf.inner[b])));
+        nearest_inner =
+            hn::Min(nearest_inner, hn::Sub(to_center, hn::Set(d, leaf.inner_radius[b])));
       }
       hn::Store(hn::Max(nearest, hn::Load(d, distance + k)), d, distance + k);
       hn::Store(nearest_inner, d, inner + k);

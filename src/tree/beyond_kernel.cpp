@@ -43,7 +43,7 @@ bool IsBeyondSpheres(const SphereNode* nodes, const SphereLeaf* leaves, const fl
     if (entry.child < 0) {
       const SphereLeaf& leaf = leaves[~entry.child];
       for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
-        const auto power = Power(leaf, leaf.outer, k, p, margin);
+        const auto power = Power(leaf, leaf.cover_radius, k, p, margin);
         if (!hn::AllTrue(d, hn::Gt(power, hn::Zero(d)))) return false;
       }
       continue;
@@ -73,8 +73,8 @@ namespace ist {
 
 HWY_EXPORT(IsBeyondSpheres);
 
-bool is_beyond_spheres(const SphereNode* nodes, const SphereLeaf* leaves, const float p_L[3],
-                       float margin) {
+bool cover_distance_exceeds_spheres(const SphereNode* nodes, const SphereLeaf* leaves,
+                                    const float p_L[3], float margin) {
   return HWY_DYNAMIC_DISPATCH(IsBeyondSpheres)(nodes, leaves, p_L, margin);
 }
 

@@ -4,10 +4,10 @@
 
 namespace ist {
 
-/// Whether a point is farther from all outer spheres than a margin [m].
+/// Whether a point is farther from all cover spheres than a margin [m].
 /// @param nodes   nodes[0] is the root
 /// @param p_L     [m] link frame
-bool is_beyond_spheres(const SphereNode* nodes, const SphereLeaf* leaves, const float p_L[3],
-                       float margin);
+bool cover_distance_exceeds_spheres(const SphereNode* nodes, const SphereLeaf* leaves,
+                                    const float p_L[3], float margin);
 
 }  // namespace ist

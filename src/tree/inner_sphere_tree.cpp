@@ -27,7 +27,7 @@ struct Enclosing {
   double radius;
 };
 
-// The sphere in float: its inner sphere lies in the given one, its outer sphere about it.
+// The sphere in float: its inner sphere lies in the given one, its cover sphere about it.
 InnerSphere rounded(const InnerSphere& sphere) {
   const Eigen::Vector3d center = to_float(sphere.center).cast<double>();
   const double moved = (center - sphere.center).norm();
@@ -69,7 +69,7 @@ class Builder {
   SphereOrder order_;
 };
 
-// A small sphere about the outer spheres: start at the box's middle and step toward the farthest
+// A small sphere about the cover spheres: start at the box's middle and step toward the farthest
 // sphere with ever shorter steps (Badoiu and Clarkson 2003), then measure the radius in full.
 Enclosing Builder::enclose(const SphereRange& range) const {
   Eigen::AlignedBox3d box;
@@ -138,14 +138,14 @@ std::int32_t Builder::add_leaf(const SphereRange& range) {
   SphereLeaf leaf{};
   leaf.count = static_cast<std::int32_t>(size(range));
   for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(kSphereWidth); ++k) {
-    leaf.inner[k] = leaf.outer[k] = kNoRadius;
+    leaf.inner_radius[k] = leaf.cover_radius[k] = kNoRadius;
     if (range.first + k >= range.second) continue;
     const InnerSphere& sphere = order_[range.first + k];
     leaf.x[k] = static_cast<float>(sphere.center.x());
     leaf.y[k] = static_cast<float>(sphere.center.y());
     leaf.z[k] = static_cast<float>(sphere.center.z());
-    leaf.inner[k] = static_cast<float>(sphere.radius);
-    leaf.outer[k] = static_cast<float>(sphere.cover_radius);
+    leaf.inner_radius[k] = static_cast<float>(sphere.radius);
+    leaf.cover_radius[k] = static_cast<float>(sphere.cover_radius);
   }
   leaves_.push_back(leaf);
   return static_cast<std::int32_t>(leaves_.size()) - 1;
@@ -169,13 +169,14 @@ double InnerSphereTree::inner_distance(const Eigen::Vector3d& p_L) const {
   for (const SphereLeaf& leaf : leaves_) {
     for (int k = 0; k < leaf.count; ++k) {
       const Eigen::Vector3d center(leaf.x[k], leaf.y[k], leaf.z[k]);
-      nearest = std::min(nearest, (p_L - center).norm() - static_cast<double>(leaf.inner[k]));
+      nearest =
+          std::min(nearest, (p_L - center).norm() - static_cast<double>(leaf.inner_radius[k]));
     }
   }
   return nearest;
 }
 
-double InnerSphereTree::outer_distance(const Eigen::Vector3d& p_L, double stop_below) const {
+double InnerSphereTree::cover_distance(const Eigen::Vector3d& p_L, double stop_below) const {
   double nearest = std::numeric_limits<double>::infinity();
   if (nodes_.empty()) return nearest;
   const Eigen::Vector3f p = p_L.cast<float>();
@@ -201,7 +202,7 @@ double InnerSphereTree::outer_distance(const Eigen::Vector3d& p_L, double stop_b
     if (entry.bound >= nearest) continue;
     if (entry.child < 0) {
       const SphereLeaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
-      distances(leaf.x, leaf.y, leaf.z, leaf.outer);
+      distances(leaf.x, leaf.y, leaf.z, leaf.cover_radius);
       for (const float d : distance) nearest = std::min(nearest, static_cast<double>(d));
       if (nearest - rounding < stop_below) break;
       continue;
@@ -219,13 +220,13 @@ double InnerSphereTree::outer_distance(const Eigen::Vector3d& p_L, double stop_b
   return nearest - rounding;
 }
 
-bool InnerSphereTree::is_beyond(const Eigen::Vector3d& p_L, double distance) const {
+bool InnerSphereTree::cover_distance_exceeds(const Eigen::Vector3d& p_L, double distance) const {
   if (nodes_.empty()) return true;
   const Eigen::Vector3f p = p_L.cast<float>();
-  // As in outer_distance.
+  // As in cover_distance.
   const double rounding = 1e-6 * (p_L.cwiseAbs().maxCoeff() + radius_ + center_.norm());
-  return is_beyond_spheres(nodes_.data(), leaves_.data(), p.data(),
-                           static_cast<float>(distance + rounding));
+  return cover_distance_exceeds_spheres(nodes_.data(), leaves_.data(), p.data(),
+                                        static_cast<float>(distance + rounding));
 }
 
 }  // namespace ist

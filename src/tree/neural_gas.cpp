@@ -37,7 +37,7 @@ std::array<std::size_t, kMostPrototypes> ranks(const Distances& distances, std::
   return rank;
 }
 
-// A sphere counts by a power of its volume; of the outer sphere's, for that is what nodes enclose.
+// A sphere counts by a power of its volume; of the cover sphere's, for that is what nodes enclose.
 double weight(const InnerSphere& sphere, double magnification) {
   if (magnification == 0.0) return 1.0;
   return std::max(std::pow(sphere.cover_radius, 3.0 * magnification), 1e-30);

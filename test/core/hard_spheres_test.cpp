@@ -98,13 +98,13 @@ void expect_tree(const SphereLink& link, test::Rng* rng, int points) {
     const double outer = nearest_sphere(covered.spheres, p, true);
     EXPECT_GE(tree.inner_distance(p), inner - 1e-12 * link.extent());
     EXPECT_LE(tree.inner_distance(p), inner + rounding);
-    EXPECT_LE(tree.outer_distance(p), outer) << "a lower bound";
-    EXPECT_GE(tree.outer_distance(p), outer - rounding);
+    EXPECT_LE(tree.cover_distance(p), outer) << "a lower bound";
+    EXPECT_GE(tree.cover_distance(p), outer - rounding);
     const double stop = outer + test::uniform(rng, -1, 1) * std::abs(outer);
-    const double stopped = tree.outer_distance(p, stop);
-    EXPECT_EQ(stopped > stop, tree.outer_distance(p) > stop) << "stopping early decides the same";
-    EXPECT_FALSE(tree.is_beyond(p, stop) && outer <= stop);
-    EXPECT_TRUE(tree.is_beyond(p, stop) || outer - rounding <= stop);
+    const double stopped = tree.cover_distance(p, stop);
+    EXPECT_EQ(stopped > stop, tree.cover_distance(p) > stop) << "stopping early decides the same";
+    EXPECT_FALSE(tree.cover_distance_exceeds(p, stop) && outer <= stop);
+    EXPECT_TRUE(tree.cover_distance_exceeds(p, stop) || outer - rounding <= stop);
   }
 }
 

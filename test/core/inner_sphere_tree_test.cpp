@@ -95,7 +95,7 @@ std::vector<NamedPacking> packings() {
 
 struct LeafSphere {
   Eigen::Vector3d center;
-  double inner, outer;
+  double inner_radius, cover_radius;
 };
 
 // All spheres below a child, by walking the tree; with what is wrong on the way.
@@ -136,10 +136,11 @@ class Walk {
     ASSERT_LE(leaf.count, kSphereWidth);
     for (int k = 0; k < kSphereWidth; ++k) {
       if (k >= leaf.count) {
-        ASSERT_LT(leaf.outer[k], -1e20F);
+        ASSERT_LT(leaf.cover_radius[k], -1e20F);
         continue;
       }
-      spheres_.push_back({{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.inner[k], leaf.outer[k]});
+      spheres_.push_back(
+          {{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.inner_radius[k], leaf.cover_radius[k]});
     }
   }
 
@@ -147,9 +148,9 @@ class Walk {
   void check_enclosed(const SphereNode& node, int k, std::size_t first) const {
     const Eigen::Vector3d center(node.x[k], node.y[k], node.z[k]);
     for (std::size_t i = first; i < spheres_.size(); ++i) {
-      const double reach = (spheres_[i].center - center).norm() + spheres_[i].outer;
+      const double reach = (spheres_[i].center - center).norm() + spheres_[i].cover_radius;
       ASSERT_LE(reach, node.radius[k] * (1.0 + 1e-14));
-      ASSERT_LE(spheres_[i].inner, node.max_inner[k]);
+      ASSERT_LE(spheres_[i].inner_radius, node.max_inner[k]);
     }
   }
 
@@ -160,8 +161,8 @@ class Walk {
 
 // By place, so that the tree's order does not matter.
 bool before(const LeafSphere& a, const LeafSphere& b) {
-  return std::make_tuple(a.center.x(), a.center.y(), a.center.z(), a.inner, a.outer) <
-         std::make_tuple(b.center.x(), b.center.y(), b.center.z(), b.inner, b.outer);
+  return std::make_tuple(a.center.x(), a.center.y(), a.center.z(), a.inner_radius, a.cover_radius) <
+         std::make_tuple(b.center.x(), b.center.y(), b.center.z(), b.inner_radius, b.cover_radius);
 }
 
 // Volatile: GCC 12, vectorizing, takes two conversions to float and back for none at all.
@@ -171,7 +172,7 @@ Eigen::Vector3d in_float(const Eigen::Vector3d& p) {
   return {x, y, z};
 }
 
-// Every sphere once: its inner sphere about the leaf's, its outer sphere within the leaf's.
+// Every sphere once: its inner sphere about the leaf's, its cover sphere within the leaf's.
 void expect_every_sphere(const Packing& packing, std::vector<LeafSphere> found) {
   ASSERT_EQ(found.size(), packing.spheres.size());
   std::vector<LeafSphere> given;
@@ -190,9 +191,9 @@ void expect_every_sphere(const Packing& packing, std::vector<LeafSphere> found) 
     const double inner = sphere.radius - moved, outer = sphere.cover_radius + moved;
     const double rounding = 1e-15 * (1.0 + outer), resolution = 2.5e-7 * (1.0 + outer);
     const auto matches = [&](const LeafSphere& leaf) {
-      return leaf.center == rounded && leaf.inner <= inner + rounding &&
-             leaf.inner >= inner - resolution && leaf.outer >= outer - rounding &&
-             leaf.outer <= outer + resolution;
+      return leaf.center == rounded && leaf.inner_radius <= inner + rounding &&
+             leaf.inner_radius >= inner - resolution && leaf.cover_radius >= outer - rounding &&
+             leaf.cover_radius <= outer + resolution;
     };
     LeafSphere key{rounded, -std::numeric_limits<double>::infinity(), 0.0};
     auto at = std::lower_bound(found.begin(), found.end(), key, before);
@@ -209,7 +210,8 @@ void expect_sound(const Packing& packing, const TreeConfig& config) {
   EXPECT_LE(walk.deepest(), kMaxTreeLevels);
   expect_every_sphere(packing, walk.spheres());
   for (const LeafSphere& sphere : walk.spheres()) {
-    ASSERT_LE((sphere.center - tree.center()).norm() + sphere.outer, tree.radius() * (1.0 + 1e-14));
+    ASSERT_LE((sphere.center - tree.center()).norm() + sphere.cover_radius,
+              tree.radius() * (1.0 + 1e-14));
   }
 }
 

@@ -71,7 +71,7 @@ void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, 
     for (const InnerSphere& sphere : packing.spheres) {
       outer = std::min(outer, (p - sphere.center).norm() - sphere.cover_radius);
     }
-    const double tree_outer = tree.outer_distance(p);
+    const double tree_outer = tree.cover_distance(p);
     ASSERT_LE(tree_outer, outer) << "the float tree may only be more careful";
     ASSERT_GT(tree_outer, outer - 1e-5 * (1.0 + p.norm()));
     if (truth < 0.0) {
@@ -383,7 +383,7 @@ TEST(PackElement, PrimitivesAreCoveredAsTheyAre) {
     for (int i = 0; i < 20000; ++i) {
       const Eigen::Vector3d p = test::random_vector(&rng, 0.15);
       const double truth = solid.signed_distance(p).distance;
-      const double outer = tree.outer_distance(p);
+      const double outer = tree.cover_distance(p);
       if (truth < 0.0) {
         ASSERT_LE(outer, tree.interior_gap());
       } else {

@@ -76,7 +76,7 @@ void expect_same(const Packing& a, const Packing& b) {
   }
 }
 
-double outer_distance(const Packing& packing, const Eigen::Vector3d& p) {
+double cover_distance(const Packing& packing, const Eigen::Vector3d& p) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const InnerSphere& sphere : packing.spheres) {
     nearest = std::min(nearest, (p - sphere.center).norm() - sphere.cover_radius);
@@ -134,7 +134,7 @@ TEST(RobotModel, packingsBoundTheExactGeometry) {
       const Eigen::Vector3d p(uniform(random), uniform(random), uniform(random));
       const double exact = l.solid.signed_distance(p).distance;
       if (exact <= 0.0) continue;
-      EXPECT_LE(outer_distance(l.packing, p), exact + 1e-9) << l.name << " " << p.transpose();
+      EXPECT_LE(cover_distance(l.packing, p), exact + 1e-9) << l.name << " " << p.transpose();
       EXPECT_LE(inner_distance(l.packing, l.packing.spheres.size(), p),
                 exact + l.packing.certificate.max_gap + 1e-9);
       EXPECT_GE(inner_distance(l.packing, l.packing.spheres.size(), p), exact - 1e-9);

@@ -27,7 +27,7 @@ LinkModel link_of(const std::string& name, const Shape& shape, double max_error)
   return link;
 }
 
-// Coarsely packed, so that there is much between inner and outer spheres for the geometry to
+// Coarsely packed, so that there is much between inner and cover spheres for the geometry to
 // decide.
 RobotModel coarse_robot() {
   RobotModel model;

@@ -27,13 +27,13 @@ struct PackingConfig {
   PackingOrder order = PackingOrder::kMedial;
 };
 
-/// One sphere of a packing, twice: an inner sphere of `radius` inside the link, and an outer sphere
-/// of `cover_radius` about the same centre. The outer spheres of a packing cover the link's
+/// One sphere of a packing, twice: an inner sphere of `radius` inside the link, and an cover sphere
+/// of `cover_radius` about the same centre. The cover spheres of a packing cover the link's
 /// surface.
 struct InnerSphere {
   Eigen::Vector3d center;  ///< [m] in the link's frame
   /// [m] of the inner sphere. 0: a point of the surface that no inner sphere reaches (sheets,
-  /// flaps, some rims of holes). Negative: there is none, the outer sphere covers some of the
+  /// flaps, some rims of holes). Negative: there is none, the cover sphere covers some of the
   /// inside by a hole, and the surface is that far from the centre. Neither has a volume.
   double radius;
   double cover_radius;  ///< [m] >= 0, >= radius; the difference is this sphere's gap
@@ -43,13 +43,13 @@ struct InnerSphere {
 struct PackingCertificate {
   double max_gap = 0.0;       ///< [m] proven: no surface point is farther from the inner spheres
   double mean_gap = 0.0;      ///< [m] area-weighted mean of the per-patch bounds
-  double interior_gap = 0.0;  ///< [m] proven: no interior point is farther from the outer spheres
+  double interior_gap = 0.0;  ///< [m] proven: no interior point is farther from the cover spheres
   double unreachable_area = 0.0;  ///< [m^2] surface only spheres of radius 0 reach (sheets, flaps)
   double surface_area = 0.0;      ///< [m^2]
   bool reached = false;           ///< max_gap <= max_error
 };
 
-/// Inner and outer spheres of one link or element.
+/// Inner and cover spheres of one link or element.
 ///
 /// For every point p outside, with d_in(p) = min(|p - c| - radius) and d_out(p) likewise with
 /// cover_radius: d_out(p) <= distance(p, surface). A point with d_out(p) > interior_gap is outside

@@ -94,7 +94,7 @@ std::uint32_t SelfFilter::on_link(const PosedLink& link, const PointTile& tile,
   return mask;
 }
 
-// Asks for all points within `radius` of a centre at once. Walks down where an outer sphere may be
+// Asks for all points within `radius` of a centre at once. Walks down where an cover sphere may be
 // near enough, deepest child first; the first inner sphere that holds all of them ends it.
 SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vector3d& center_L,
                                          double radius) const {
@@ -129,8 +129,8 @@ SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vec
     const std::int32_t child = stack[--top].child;
     if (child < 0) {
       const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
-      if (within(leaf.x, leaf.y, leaf.z, leaf.inner, held)) return Verdict::kOnLink;
-      open = open || within(leaf.x, leaf.y, leaf.z, leaf.outer, near);
+      if (within(leaf.x, leaf.y, leaf.z, leaf.inner_radius, held)) return Verdict::kOnLink;
+      open = open || within(leaf.x, leaf.y, leaf.z, leaf.cover_radius, near);
       continue;
     }
     const SphereNode& node = tree.nodes()[static_cast<std::size_t>(child)];
@@ -152,7 +152,7 @@ bool SelfFilter::ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L)
   if (model.solid.distance_outside(p_L, just_beyond).distance <= padding_) return true;
   // Beyond the padding from the surface: outside, where the tree can tell, or deep inside.
   const double gap = model.tree.interior_gap();
-  return model.tree.outer_distance(p_L, gap) <= gap && model.solid.is_inside(p_L);
+  return model.tree.cover_distance(p_L, gap) <= gap && model.solid.is_inside(p_L);
 }
 
 }  // namespace ist

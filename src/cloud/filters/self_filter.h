@@ -13,7 +13,7 @@ namespace ist {
 /// Tells the robot's own points from obstacles: a point is the robot's when its exact distance to a
 /// link of known pose is at most the padding, or when it is inside.
 ///
-/// The points of a tile are first asked for as one sphere: outer spheres of the tree prove it
+/// The points of a tile are first asked for as one sphere: cover spheres of the tree prove it
 /// clear of the link, an inner sphere proves it the robot's. Only where both leave it open are the
 /// points asked for one by one, and only where that leaves it open, the exact geometry.
 /// Keeps its memory. Not thread safe.

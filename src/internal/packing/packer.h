@@ -16,7 +16,7 @@ constexpr int kPackingVersion = 4;
 /// that touches it. Where no sphere fits (open sheets, flaps), spheres of radius 0 on the surface
 /// take over, so any mesh can be covered. Deterministic.
 ///
-/// In disjoint packings no two inner spheres overlap, interior ones included; their outer spheres
+/// In disjoint packings no two inner spheres overlap, interior ones included; their cover spheres
 /// do.
 /// @throws ModelError if the mesh has no triangle, or one with a corner that is not finite or not
 ///         there.
