@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/relative_pose.h"
 
 namespace ist {
@@ -121,12 +122,11 @@ SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vec
     std::int32_t child;
     float inside;
   };
-  std::array<Entry, 512> stack;  // eight children on each of the levels that 2^31 spheres can have
-  std::size_t top = 0;
-  stack[top++] = {0, 0.0F};
+  TraversalStack<Entry, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
+  stack.push({0, 0.0F});
   bool open = false;
-  while (top > 0) {
-    const std::int32_t child = stack[--top].child;
+  while (!stack.empty()) {
+    const std::int32_t child = stack.pop().child;
     if (child < 0) {
       const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
       if (within(leaf.x, leaf.y, leaf.z, leaf.inner_radius, held)) return Verdict::kOnLink;
@@ -135,12 +135,10 @@ SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vec
     }
     const SphereNode& node = tree.nodes()[static_cast<std::size_t>(child)];
     within(node.x, node.y, node.z, node.radius, near);
-    const std::size_t begin = top;
+    const std::size_t first = stack.size();
     for (std::size_t k = 0; k < static_cast<std::size_t>(node.count); ++k) {
-      if (inside[k] <= 0.0F) continue;
-      std::size_t at = top++;
-      for (; at > begin && stack[at - 1].inside > inside[k]; --at) stack[at] = stack[at - 1];
-      stack[at] = {node.child[k], inside[k]};
+      if (inside[k] > 0.0F)
+        stack.push_greatest_on_top<&Entry::inside>(first, {node.child[k], inside[k]});
     }
   }
   return open ? Verdict::kOpen : Verdict::kClear;

@@ -205,7 +205,7 @@ class ImageReader {
       if (may_have_gap) {
         PointTile tile;
         read_kept(slot, &tile);
-        keep_parts(tile, box);
+        keep_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box);
       } else {
         read_kept(slot, builder_.room(1));
         builder_.keep(box, drop_);
@@ -254,28 +254,19 @@ class ImageReader {
     return gaps;
   }
 
-  // Halves what has a gap in the middle of its longest side, and keeps the parts.
-  void keep_parts(const PointTile& whole, const PaddedBox& whole_box) {
-    struct Part {
-      std::uint32_t points;  // bit k: that in slot k
-      PaddedBox box;
-    };
-    std::array<Part, kPointWidth> parts;
-    std::size_t count = 0;
-    parts[count++] = {(1U << static_cast<std::uint32_t>(whole.count)) - 1U, whole_box};
-    while (count > 0) {
-      Part& part = parts[count - 1];
-      const TileHalves halves = halve_tile(whole, part.points, part.box);
-      if (halves.low != 0 && halves.high != 0 &&
-          is_worth_a_cut(halves.low_box, halves.high_box, part.box)) {
-        part = {halves.low, halves.low_box};
-        parts[count++] = {halves.high, halves.high_box};
-        continue;
-      }
-      pick_points(whole, part.points, builder_.room(1));
-      builder_.keep(part.box, drop_);
-      --count;
+  // Splits points at a gap in the middle of their box's longest side, and keeps the parts. Each
+  // split takes one point at least, so the recursion is at most fifteen calls deep.
+  // @param points  bit k: the point in slot k belongs
+  void keep_parts(const PointTile& whole, std::uint32_t points, const PaddedBox& box) {
+    const TileHalves halves = halve_tile(whole, points, box);
+    if (halves.low != 0 && halves.high != 0 &&
+        is_worth_a_cut(halves.low_box, halves.high_box, box)) {
+      keep_parts(whole, halves.high, halves.high_box);
+      keep_parts(whole, halves.low, halves.low_box);
+      return;
     }
+    pick_points(whole, points, builder_.room(1));
+    builder_.keep(box, drop_);
   }
 
   const RawCloud& cloud_;
