@@ -6,6 +6,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/posed_solids.h"
 #include "scene.h"
 
 namespace ist::sim {
@@ -116,7 +117,8 @@ std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
     const double t = world.time();
     world.step((positions(t + Simulation::kStep) - world.arm().positions()) / Simulation::kStep);
     for (const Picture& picture : world.take_pictures()) {
-      const PosedRobot posed{model.get(), world.link_poses(picture.stamp), known};
+      const std::vector<PosedSolid> posed =
+          posed_solids(*model, world.link_poses(picture.stamp), known);
       for (Trial& trial : trials) {
         trial.ingest.run(picture.raw(), camera.X_FC, posed, picture.stamp, &trial.cloud);
         trial.result.pictures += 1;

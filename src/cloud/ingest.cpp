@@ -60,8 +60,8 @@ void Ingest::set_region_of_interest(const RegionOfInterest& region) {
   impl_->region = region;
 }
 
-void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
-                 double stamp, CloudSnapshot* snapshot, const std::vector<PosedRobot>& also) {
+void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
+                 double stamp, CloudSnapshot* snapshot) {
   const auto start = std::chrono::steady_clock::now();
   if (!X_FS.matrix().allFinite()) {
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
@@ -74,9 +74,8 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   turn(scene_axes(cloud, X_FS.linear(), image), &pose);
 
   const SelfFilter* on_robot = nullptr;
-  if (config.self_filter && robot.model != nullptr) {
-    impl_->self_filter.pose(robot, pose.X_FO, config.self_filter_padding);
-    for (const PosedRobot& later : also) impl_->self_filter.add(later, pose.X_FO);
+  if (config.self_filter && !robot.empty()) {
+    impl_->self_filter.set_poses(robot, pose.X_FO, config.self_filter_padding);
     on_robot = &impl_->self_filter;
   }
   IngestCounts counts;

@@ -96,7 +96,7 @@ Format float64() {
 CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
                      const Format& format = {},
                      const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity(),
-                     const PosedRobot& robot = {}) {
+                     const std::vector<PosedSolid>& robot = {}) {
   const Message message(points, format);
   CloudSnapshot snapshot;
   Ingest(config).run(message.raw, X_FS, robot, 12.5, &snapshot);
