@@ -4,8 +4,8 @@
 #include <Eigen/Geometry>
 #include <memory>
 
+#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/cloud/raw_cloud.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/posed_solid.h"
 

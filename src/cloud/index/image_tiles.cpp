@@ -61,7 +61,7 @@ class Cut {
 class ImageReader {
  public:
   ImageReader(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-              PointIndexBuilder* builder, IngestCounts* counts)
+              PointBvhBuilder* builder, IngestCounts* counts)
       : cloud_(cloud),
         pose_(pose),
         patch_pose_(pose),
@@ -276,7 +276,7 @@ class ImageReader {
   const bool holds_floats_;
   const SelfFilter* on_robot_;
   PointFilter drop_;
-  PointIndexBuilder& builder_;
+  PointBvhBuilder& builder_;
   IngestCounts& counts_;
   std::array<std::uint32_t, kSlots> offset_;  // [pixels] by slot
   std::size_t row_ = 0, column_ = 0;          // of the patch at work
@@ -288,7 +288,7 @@ class ImageReader {
 }  // namespace
 
 std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                        PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {
+                        PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts) {
   builder->start_image(pose.X_FO, cloud, pose.X_OS, index);
   const std::size_t kept = ImageReader(cloud, pose, on_robot, builder, counts).run();
   builder->finish();
