@@ -3,9 +3,15 @@
 #include <cassert>
 #include <limits>
 
+#include "proximity/coherence/scene_tracker.h"
 #include "proximity/link_query.h"
 
 namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
 
 void LinkProximity::reset() {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -30,12 +36,8 @@ struct ProximityQuery::Impl {
 
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
-  bool refine(std::size_t i, SnapshotSpan clouds, Deadline* deadline) {
-    return links[i].refine(clouds, deadline, &statistics);
-  }
-
   std::vector<LinkQuery> links;
-  SeenClouds seen;
+  SceneTracker scene;
   std::size_t last_nearest = 0;  // link
   QueryStatistics statistics;
 };
@@ -53,11 +55,12 @@ bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
   results->resize(count);
   impl_->statistics = {};
   Deadline deadline(impl_->config.deadline);
-  const std::uint64_t seen = impl_->seen.note(clouds);
+  const SceneId scene = impl_->scene.identify(clouds);
   // All warm starts before the first descent: should the deadline pass, every link has an answer.
   for (std::size_t i = 0; i < count; ++i) {
     if (impl_->can_query(i, known, !clouds.empty())) {
-      impl_->links[i].start(X_FL[i], clouds, seen, impl_->config);
+      impl_->links[i].begin(X_FL[i], scene, impl_->config, kInfinity, &impl_->statistics);
+      impl_->links[i].warm_start(clouds);
     }
   }
   bool complete = true;
@@ -67,7 +70,7 @@ bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
       impl_->links[i].forget();
       continue;
     }
-    complete = impl_->refine(i, clouds, &deadline) && complete;
+    complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
   }
   return complete;
@@ -82,11 +85,10 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
   *result = RobotProximity();
   result->all_known = true;
   Deadline deadline(impl_->config.deadline);
-  const std::uint64_t seen = impl_->seen.note(clouds);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const SceneId scene = impl_->scene.identify(clouds);
   double nearest = kInfinity, proven = kInfinity;
   std::size_t best = count;
-  bool complete = true, sees_all = true;
+  bool complete = true, all_in_regions = true;
   // Begins with the link that was nearest last time: its bound rules most of the others out.
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
@@ -96,14 +98,11 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
       continue;
     }
     LinkQuery& link = impl_->links[i];
-    if (best == count) {
-      link.start(X_FL[i], clouds, seen, impl_->config);
-    } else {
-      link.start_cold(X_FL[i], seen, impl_->config, nearest);
-    }
-    complete = impl_->refine(i, clouds, &deadline) && complete;
-    sees_all = sees_all && link.sees_all();
-    proven = std::min(proven, link.proven());
+    link.begin(X_FL[i], scene, impl_->config, nearest, &impl_->statistics);
+    if (best == count) link.warm_start(clouds);
+    complete = impl_->links[i].run(clouds, &deadline) && complete;
+    all_in_regions = all_in_regions && link.is_inside_regions();
+    proven = std::min(proven, link.proven_bound());
     if (best == count || link.distance() < nearest) {
       best = i;
       nearest = link.distance();
@@ -116,7 +115,7 @@ bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
     result->link = static_cast<std::int32_t>(best);
     answer.lower_bound = std::min(answer.lower_bound, proven);
     impl_->last_nearest = best;
-  } else if (!complete || !sees_all) {
+  } else if (!complete || !all_in_regions) {
     answer.reset();
   }
   return complete;
@@ -133,8 +132,10 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
     return true;
   }
   Deadline deadline(impl_->config.deadline);
-  impl_->links[link].start(X_FL, clouds, impl_->seen.note(clouds), impl_->config);
-  const bool complete = impl_->refine(link, clouds, &deadline);
+  impl_->links[link].begin(X_FL, impl_->scene.identify(clouds), impl_->config, kInfinity,
+                           &impl_->statistics);
+  impl_->links[link].warm_start(clouds);
+  const bool complete = impl_->links[link].run(clouds, &deadline);
   impl_->links[link].answer(clouds, result);
   return complete;
 }

@@ -1,7 +1,7 @@
-// Bounds proven at one pose that hold at others: what they are made of, and queries that use them,
-// on long motions against brute force.
+// Temporal coherence: bounds that were proven at one pose and hold at others, and queries that use
+// them, on long motions against brute force.
 
-#include "proximity/carried_bound.h"
+#include "proximity/coherence/link_bound.h"
 
 #include <gtest/gtest.h>
 
@@ -49,10 +49,10 @@ Eigen::Isometry3d turned(const Eigen::Isometry3d& X, const Eigen::Vector3d& cent
   return result;
 }
 
-TEST(LinkExtent, NoPointOfTheLinkGoesFarther) {
+TEST(DisplacementBound, NoPointOfTheLinkMovesFarther) {
   test::Rng rng(61);
   for (std::size_t i = 2; i < shapes().size(); ++i) {
-    const LinkExtent extent(links().model().links[i]);
+    const DisplacementBound bound(links().model().links[i]);
     const auto& mesh = std::get<TriangleMesh>(shapes()[i]);
     for (int k = 0; k < 300; ++k) {
       const Eigen::Isometry3d A = test::random_pose(&rng, 3.0);
@@ -60,7 +60,7 @@ TEST(LinkExtent, NoPointOfTheLinkGoesFarther) {
       const Eigen::Isometry3d B =
           turned(A, test::random_vector(&rng, 5.0), test::uniform(&rng, -size, size),
                  test::random_vector(&rng, 1.0).normalized(), test::random_vector(&rng, size));
-      const double motion = extent.motion(A, B);
+      const double motion = bound.between(A, B);
       double farthest = 0.0;
       for (const Eigen::Vector3d& v : mesh.vertices) {
         farthest = std::max(farthest, (A * v - B * v).norm());
@@ -70,75 +70,75 @@ TEST(LinkExtent, NoPointOfTheLinkGoesFarther) {
       ASSERT_LE(motion, 4.0 * farthest + 1e-9);
     }
     const Eigen::Isometry3d still = test::random_pose(&rng, 3.0);
-    EXPECT_EQ(extent.motion(still, still), 0.0);
+    EXPECT_EQ(bound.between(still, still), 0.0);
   }
 }
 
-TEST(LinkExtent, PosesThatAreNone) {
-  const LinkExtent extent(links().model().links[0]);
+TEST(DisplacementBound, PosesThatAreNotFinite) {
+  const DisplacementBound bound(links().model().links[0]);
   const Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
   for (const double odd : {kNaN, kInfinity, -kInfinity, 1e300}) {
     for (int entry = 0; entry < 12; ++entry) {
       Eigen::Isometry3d bad = X;
       bad.matrix()(entry % 3, entry / 3) = odd;
-      EXPECT_FALSE(extent.motion(X, bad) < 1e100) << odd;
-      EXPECT_FALSE(extent.motion(bad, X) < 1e100) << odd;
+      EXPECT_FALSE(bound.between(X, bad) < 1e100) << odd;
+      EXPECT_FALSE(bound.between(bad, X) < 1e100) << odd;
     }
   }
 }
 
-TEST(CarriedBound, HoldsAmongTheSameCloudsOnly) {
+TEST(LinkBound, HoldsAmongTheSameCloudsOnly) {
   const LinkModel& link = links().model().links[0];
-  CarriedBound carried(link);
+  LinkBound kept(link);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  EXPECT_EQ(carried.at(1, X), -kInfinity);
-  carried.prove(1, X, 0.3, 0.0);
-  EXPECT_EQ(carried.at(1, X), 0.3);
+  EXPECT_EQ(kept.at(1, X), -kInfinity);
+  kept.prove(1, X, 0.3, 0.0, 1.0);
+  EXPECT_EQ(kept.at(1, X), 0.3);
   X.translation().x() = 0.1;
-  EXPECT_NEAR(carried.at(1, X), 0.2, 1e-12);
-  EXPECT_LE(carried.at(1, X), 0.2);
-  EXPECT_EQ(carried.at(2, X), -kInfinity);
-  EXPECT_EQ(carried.at(0, X), -kInfinity);
+  EXPECT_NEAR(kept.at(1, X), 0.2, 1e-12);
+  EXPECT_LE(kept.at(1, X), 0.2);
+  EXPECT_EQ(kept.at(2, X), -kInfinity);
+  EXPECT_EQ(kept.at(0, X), -kInfinity);
   X.translation().x() = 0.31;
-  EXPECT_EQ(carried.at(1, X), -kInfinity) << "may be in contact";
+  EXPECT_EQ(kept.at(1, X), -kInfinity) << "may be in contact";
   X.translation().x() = kNaN;
-  EXPECT_EQ(carried.at(1, X), -kInfinity);
-  carried.prove(1, X, 0.3, 0.0);  // at a pose that is none
-  EXPECT_EQ(carried.at(1, X), -kInfinity);
-  EXPECT_EQ(carried.at(1, Eigen::Isometry3d::Identity()), -kInfinity);
-  carried.prove(0, Eigen::Isometry3d::Identity(), 0.3, 0.0);
-  EXPECT_EQ(carried.at(0, Eigen::Isometry3d::Identity()), -kInfinity);
-  carried.prove(1, Eigen::Isometry3d::Identity(), -0.1, 0.0);
-  EXPECT_EQ(carried.at(1, Eigen::Isometry3d::Identity()), -kInfinity) << "in contact";
+  EXPECT_EQ(kept.at(1, X), -kInfinity);
+  kept.prove(1, X, 0.3, 0.0, 1.0);  // at a pose that is none
+  EXPECT_EQ(kept.at(1, X), -kInfinity);
+  EXPECT_EQ(kept.at(1, Eigen::Isometry3d::Identity()), -kInfinity);
+  kept.prove(0, Eigen::Isometry3d::Identity(), 0.3, 0.0, 1.0);
+  EXPECT_EQ(kept.at(0, Eigen::Isometry3d::Identity()), -kInfinity);
+  kept.prove(1, Eigen::Isometry3d::Identity(), -0.1, 0.0, 1.0);
+  EXPECT_EQ(kept.at(1, Eigen::Isometry3d::Identity()), -kInfinity) << "in contact";
 }
 
-TEST(CarriedBound, WithHolesOnlyFarFromTheSpheres) {
+TEST(LinkBound, WithHolesOnlyFarFromTheSpheres) {
   const LinkModel& link = links().model().links[4];
   ASSERT_TRUE(link.solid.has_holes());
   const double gap = link.tree.interior_gap();
-  CarriedBound carried(link);
+  LinkBound kept(link);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  carried.prove(1, X, 0.3, gap + 0.02);
-  EXPECT_EQ(carried.at(1, X), 0.3);
+  kept.prove(1, X, 0.3, gap + 0.02, 1.0);
+  EXPECT_EQ(kept.at(1, X), 0.3);
   X.translation().z() = 0.019;
-  EXPECT_GT(carried.at(1, X), 0.28);
+  EXPECT_GT(kept.at(1, X), 0.28);
   X.translation().z() = 0.021;
-  EXPECT_EQ(carried.at(1, X), -kInfinity);
-  carried.prove(1, X, 0.3, gap);
-  EXPECT_EQ(carried.at(1, X), -kInfinity);
+  EXPECT_EQ(kept.at(1, X), -kInfinity);
+  kept.prove(1, X, 0.3, gap, 1.0);
+  EXPECT_EQ(kept.at(1, X), -kInfinity);
 }
 
-TEST(SeenClouds, KnowsThemAgain) {
+TEST(SceneTracker, RecognizesTheSameScene) {
   CloudSnapshot a = test::make_snapshot({{0, 0, 1}});
   const CloudSnapshot b = test::make_snapshot({{0, 0, 1}}), nothing = test::make_snapshot({});
   CloudSnapshot map = test::make_map({{Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 1, 2)}});
-  SeenClouds seen;
-  std::uint64_t last = seen.note({&a});
+  SceneTracker tracker;
+  SceneId last = tracker.identify({&a});
   EXPECT_NE(last, 0U);
   const auto changes = [&](SnapshotSpan clouds) {
-    const std::uint64_t before = last;
-    last = seen.note(clouds);
-    EXPECT_EQ(seen.note(clouds), last);
+    const SceneId before = last;
+    last = tracker.identify(clouds);
+    EXPECT_EQ(tracker.identify(clouds), last);
     return last != before;
   };
   EXPECT_FALSE(changes({&a}));
@@ -153,8 +153,8 @@ TEST(SeenClouds, KnowsThemAgain) {
   EXPECT_TRUE(changes({&a, &map})) << "the map has moved";
   a = test::make_snapshot({{0, 0, 1}});
   EXPECT_TRUE(changes({&a, &map})) << "in the same place";
-  EXPECT_EQ(seen.note(std::vector<const CloudSnapshot*>(100, &a)), 0U);
-  EXPECT_NE(seen.note({&a, &map}), last);
+  EXPECT_EQ(tracker.identify(std::vector<const CloudSnapshot*>(100, &a)), 0U);
+  EXPECT_NE(tracker.identify({&a, &map}), last);
 }
 
 // A motion of all links, and what they move among.

@@ -1,6 +1,6 @@
-// What a grid of cells tells of how deep places are in a link, against the link itself.
+// The lower bounds of a grid of signed distances, against the link itself.
 
-#include "proximity/depth_grid.h"
+#include "proximity/signed_distance_grid.h"
 
 #include <gtest/gtest.h>
 
@@ -23,11 +23,11 @@ std::vector<Shape> shapes() {
           test::thin_plate(0.2, 0.004)};
 }
 
-TEST(DepthGrid, IsNeverAboveTheTruth) {
+TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
   const test::Trial trial(shapes(), 0.005);
   test::Rng rng(93);
   for (const LinkModel& link : trial.model().links) {
-    DepthGrid grid(link);
+    SignedDistanceGrid grid(link);
     int known = 0, sides = 0, close = 0;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     for (int i = 0; i < 6000; ++i) {
@@ -38,13 +38,13 @@ TEST(DepthGrid, IsNeverAboveTheTruth) {
       } else {
         p += test::random_vector(&rng, 2e-4);
       }
-      DepthGrid::Found found;
-      known += grid.look(p, &found) ? 1 : 0;
+      SignedDistanceGrid::Sample found;
+      known += grid.find(p, &found) ? 1 : 0;
       found = grid.measure(p);
       const PointDepth truth = link.solid.depth(p, -1.0);
-      ASSERT_LE(found.floor, truth.floor + 1e-12);
-      ASSERT_LE(found.floor, truth.exact.distance + 1e-12);
-      close += found.floor > truth.floor - 0.02 ? 1 : 0;
+      ASSERT_LE(found.lower_bound, truth.floor + 1e-12);
+      ASSERT_LE(found.lower_bound, truth.exact.distance + 1e-12);
+      close += found.lower_bound > truth.floor - 0.02 ? 1 : 0;
       if (!link.solid.is_one_mesh()) continue;
       ASSERT_GE(found.near.within, std::abs(truth.exact.distance) - 1e-12);
       const bool is_inside = truth.exact.distance < 0.0;
@@ -63,21 +63,22 @@ TEST(DepthGrid, IsNeverAboveTheTruth) {
   }
 }
 
-// What a look tells is what was measured, wherever in the cell; a place that is none has no cell.
-TEST(DepthGrid, TellsOnlyWhatWasMeasured) {
+// A sample is the same before and after its cell was measured; a place that is not finite has no
+// cell.
+TEST(SignedDistanceGrid, HoldsOnlyWhatWasMeasured) {
   const test::Trial trial(shapes(), 0.005);
   const LinkModel& link = trial.model().links[2];
-  DepthGrid grid(link);
+  SignedDistanceGrid grid(link);
   const Eigen::Vector3d p = link.tree.center();
-  DepthGrid::Found found;
-  EXPECT_FALSE(grid.look(p, &found));
-  const double measured = grid.measure(p).floor;
-  ASSERT_TRUE(grid.look(p, &found));
-  EXPECT_EQ(found.floor, measured);
-  EXPECT_FALSE(grid.look(p + Eigen::Vector3d(10, 0, 0), &found));
+  SignedDistanceGrid::Sample found;
+  EXPECT_FALSE(grid.find(p, &found));
+  const double measured = grid.measure(p).lower_bound;
+  ASSERT_TRUE(grid.find(p, &found));
+  EXPECT_EQ(found.lower_bound, measured);
+  EXPECT_FALSE(grid.find(p + Eigen::Vector3d(10, 0, 0), &found));
   const double none = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(grid.look({none, 0, 0}, &found));
-  EXPECT_TRUE(std::isnan(grid.measure({0, none, 0}).floor));
+  EXPECT_FALSE(grid.find({none, 0, 0}, &found));
+  EXPECT_TRUE(std::isnan(grid.measure({0, none, 0}).lower_bound));
 }
 
 }  // namespace

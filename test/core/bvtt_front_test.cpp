@@ -1,6 +1,6 @@
-// Descents that go on from where the last one ended, against descents from the root.
+// Traversals that resume the front of the last one, against traversals from the root.
 
-#include "proximity/front.h"
+#include "proximity/coherence/bvtt_front.h"
 
 #include <gtest/gtest.h>
 
@@ -28,81 +28,81 @@ const std::vector<Shape>& shapes() {
 
 Eigen::Isometry3d at(double x) { return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0)); }
 
-TEST(Front, WaysAddUpUntilItIsClosedOrTooLong) {
+TEST(BvttFront, DisplacementsAddUpUntilItIsDiscarded) {
   const auto model = test::make_model({shapes()[0]}, 0.01);
-  const LinkExtent extent(model->links[0]);
-  Front front;
-  front.go_to(7, at(0.0), extent);
+  const DisplacementBound bound(model->links[0]);
+  BvttFront front;
+  front.begin(7, at(0.0), bound, 0.0F);
   EXPECT_TRUE(front.empty());
   for (int i = 0; i < 10; ++i) EXPECT_EQ(front.add(i, 0), i);
-  front.leave(3, 0.5F);
-  front.leave(3, 0.6F);
-  front.close(true);
-  front.go_to(7, at(0.02), extent);
-  front.go_to(7, at(0.0), extent);
-  EXPECT_GE(front.way(), 0.04F);
-  EXPECT_NEAR(front.way(), 0.04F, 1e-6);
+  front.prune(3, 0.5F);
+  front.prune(3, 0.6F);
+  front.end(true);
+  front.begin(7, at(0.02), bound, 0.0F);
+  front.begin(7, at(0.0), bound, 0.0F);
+  EXPECT_GE(front.offset(), 0.04F);
+  EXPECT_NEAR(front.offset(), 0.04F, 1e-6);
   EXPECT_EQ(front.size(), 10U);
-  EXPECT_EQ(front.left()[3], 0.5F);
-  EXPECT_EQ(front.left()[4], kFarAway);
-  front.go_to(7, at(0.2), extent);
+  EXPECT_EQ(front.stored_bounds()[3], 0.5F);
+  EXPECT_EQ(front.stored_bounds()[4], kFarAway);
+  front.begin(7, at(0.2), bound, 0.0F);
   EXPECT_TRUE(front.empty()) << "gone too far";
-  EXPECT_EQ(front.way(), 0.0F);
-  EXPECT_EQ(front.left()[3], kFarAway);
+  EXPECT_EQ(front.offset(), 0.0F);
+  EXPECT_EQ(front.stored_bounds()[3], kFarAway);
   front.add(0, 0);
-  front.close(true);
-  front.go_to(8, at(0.2), extent);
+  front.end(true);
+  front.begin(8, at(0.2), bound, 0.0F);
   EXPECT_TRUE(front.empty()) << "another index";
   front.add(0, 0);
-  front.close(false);
-  front.go_to(8, at(0.2), extent);
+  front.end(false);
+  front.begin(8, at(0.2), bound, 0.0F);
   EXPECT_TRUE(front.empty()) << "cut short";
   front.add(0, 0);
-  front.close(true);
-  front.go_to(8, at(std::numeric_limits<double>::quiet_NaN()), extent);
+  front.end(true);
+  front.begin(8, at(std::numeric_limits<double>::quiet_NaN()), bound, 0.0F);
   EXPECT_TRUE(front.empty()) << "no pose";
   front.add(0, 0);
-  front.close(true);
-  front.go_to(8, at(0.2), extent);
+  front.end(true);
+  front.begin(8, at(0.2), bound, 0.0F);
   EXPECT_TRUE(front.empty()) << "from no pose";
 }
 
-TEST(Front, IsMadeAnewWhenItHasGrown) {
+TEST(BvttFront, IsDiscardedWhenItHasGrown) {
   const auto model = test::make_model({shapes()[0]}, 0.01);
-  const LinkExtent extent(model->links[0]);
-  Front front;
-  front.go_to(7, at(0.0), extent);
+  const DisplacementBound bound(model->links[0]);
+  BvttFront front;
+  front.begin(7, at(0.0), bound, 0.0F);
   front.add(0, 0);
-  front.close(true);
+  front.end(true);
   std::size_t size = 1;
-  for (; !front.empty() && size < 2 * Front::kMost; ++size) {
+  for (; !front.empty() && size < 2 * BvttFront::kMaxPairs; ++size) {
     front.add(0, 0);
-    front.close(true);
-    front.go_to(7, at(0.0), extent);
+    front.end(true);
+    front.begin(7, at(0.0), bound, 0.0F);
   }
-  EXPECT_LT(size, Front::kMost);
-  while (front.add(0, 0) != Front::kFull) {
+  EXPECT_LT(size, BvttFront::kMaxPairs);
+  while (front.add(0, 0) != BvttFront::kFull) {
   }
-  EXPECT_EQ(front.size(), Front::kMost);
+  EXPECT_EQ(front.size(), BvttFront::kMaxPairs);
 }
 
-TEST(Fronts, KeepThoseAskedForLately) {
+TEST(BvttFronts, KeepThoseUsedLately) {
   const auto model = test::make_model({shapes()[0]}, 0.01);
-  const LinkExtent extent(model->links[0]);
-  Fronts fronts;
+  const DisplacementBound bound(model->links[0]);
+  BvttFronts fronts;
   const auto ask = [&](std::uint64_t index) {
-    Front* front = fronts.of(index);
+    BvttFront* front = fronts.find(index);
     if (front == nullptr) return false;
-    const bool known = front->index() == index;
-    front->go_to(index, at(0.0), extent);
+    const bool known = front->build_id() == index;
+    front->begin(index, at(0.0), bound, 0.0F);
     front->add(0, 0);
-    front->close(true);
+    front->end(true);
     return known;
   };
   for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(ask(index));
   for (const std::uint64_t index : {1, 3, 2, 4}) EXPECT_TRUE(ask(index));
   for (int i = 0; i < 200; ++i) {
-    EXPECT_EQ(fronts.of(5), nullptr);
+    EXPECT_EQ(fronts.find(5), nullptr);
     for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(ask(index));
   }
   for (int i = 0; i < 20; ++i) {

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "internal/bvh/box_node.h"
+#include "proximity/coherence/displacement.h"
+
+namespace ist {
+
+/// The front of a bounding volume test tree (BVTT; Ehmann and Lin 2001): the pairs of sphere node
+/// and box node that the last dual-tree traversals of a link against one index expanded, each with
+/// the least lower bound that was pruned below it. At the next pose only those pairs are expanded
+/// again whose pruned bound, less the displacement, is below what is asked for; nothing above them
+/// is visited.
+///
+/// Stored bounds are relative to the front's first pose: the displacement since then is added when
+/// one is stored and subtracted when it is read. So one number updates all of them. It is a sum of
+/// displacements between successive poses, which is never below the displacement of any point.
+class BvttFront {
+ public:
+  struct Pair {
+    /// Slots: kSphereWidth * node + child and kBoxWidth * node + child, or kRoot.
+    std::int32_t sphere, box;
+    std::uint32_t expanded;  ///< bit k: child k of the pair is a pair of the front, too
+  };
+  static constexpr std::int32_t kRoot = -1;
+  static constexpr std::size_t kMaxPairs = 512;  ///< a traversal that expands more keeps no front
+  static constexpr std::int32_t kFull = -1;      ///< instead of a pair's index: there is no place
+
+  BvttFront();
+
+  /// Begins a traversal at a new pose. The front is empty afterwards where it is of another index,
+  /// where the link has moved far, or where it has grown too much.
+  /// @param build_id  of the index
+  /// @param X_OL      link -> the index's frame
+  /// @param rounding  [m] largest error of a lower bound of this traversal
+  void begin(std::uint64_t build_id, const Eigen::Isometry3d& X_OL,
+             const DisplacementBound& displacement, float rounding);
+  /// Ends a traversal.
+  /// @param is_complete  false: it was stopped, or a pair found no place; the front is discarded
+  void end(bool is_complete);
+  /// Of which index; 0: there is no front.
+  std::uint64_t build_id() const { return build_id_; }
+
+  bool empty() const { return size_ == 0; }
+  std::size_t size() const { return size_; }
+  const Pair& pair(std::int32_t i) const { return pairs_[static_cast<std::size_t>(i)]; }
+
+  /// [m] By pair, as stored: kFarAway where nothing was pruned, and beyond size().
+  const float* stored_bounds() const { return bounds_.data(); }
+  /// [m] What is added to a bound of this traversal when it is stored.
+  float offset() const { return offset_; }
+
+  /// Adds a pair. @returns its index, or kFull
+  std::int32_t add(std::int32_t sphere, std::int32_t box) {
+    if (size_ == kMaxPairs) return kFull;
+    pairs_[size_] = {sphere, box, 0};
+    return static_cast<std::int32_t>(size_++);
+  }
+  void mark_expanded(std::int32_t i, int child) {
+    pairs_[static_cast<std::size_t>(i)].expanded |= 1U << static_cast<std::uint32_t>(child);
+  }
+  /// Something with this lower bound [m] of this traversal was pruned below the pair.
+  void prune(std::int32_t i, float bound) {
+    float& stored = bounds_[static_cast<std::size_t>(i)];
+    stored = bound + offset_ < stored ? bound + offset_ : stored;
+  }
+  /// The pair is expanded once more: nothing is pruned below it for now.
+  void reopen(std::int32_t i) { bounds_[static_cast<std::size_t>(i)] = kFarAway; }
+
+ private:
+  void clear();
+
+  std::vector<Pair> pairs_;
+  std::vector<float> bounds_;
+  std::size_t size_ = 0, first_size_ = 0;
+  std::uint64_t build_id_ = 0;
+  Eigen::Isometry3d X_OL_ = Eigen::Isometry3d::Identity();
+  double displacement_ = 0.0;  ///< [m] since the first pose
+  float offset_ = 0.0F;
+};
+
+/// The fronts of one link, one for each of the last few indices.
+class BvttFronts {
+ public:
+  /// The front of an index, or the one that has not been used for longest. Null where all were used
+  /// lately: with more indices in use than fronts, it is best that some keep theirs.
+  BvttFront* find(std::uint64_t build_id);
+  void forget();
+
+ private:
+  struct Slot {
+    BvttFront front;
+    std::uint64_t last_used = 0;
+  };
+  std::array<Slot, 4> slots_;
+  std::uint64_t now_ = 0;
+};
+
+}  // namespace ist

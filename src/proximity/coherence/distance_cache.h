@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace ist {
+
+/// Lower bounds of exact distances of obstacle points to a link, kept for the poses to come (the
+/// invariant is in displacement.h). Each entry holds the place in the link's frame where the point
+/// was when its distance was measured, so displacements do not add up. The cache is direct-mapped:
+/// a new entry replaces an older one.
+class DistanceCache {
+ public:
+  /// Which distance of the point.
+  enum class Quantity : std::uint8_t {
+    kUnsigned,  ///< to the surface, for a point outside
+    kSigned     ///< PointDepth::floor
+  };
+
+  DistanceCache() : entries_(kEntries) {}
+
+  /// @param build_id  of the point's index, not 0
+  /// @param key       of the point in its index
+  /// @param p_LQ      [m] where the point is now, link frame
+  /// @returns [m] a lower bound of the distance; -inf: none is known
+  double find(std::uint64_t build_id, Quantity quantity, std::uint32_t key,
+              const Eigen::Vector3d& p_LQ) const;
+  void store(std::uint64_t build_id, Quantity quantity, std::uint32_t key,
+             const Eigen::Vector3d& p_LQ, double lower_bound);
+
+ private:
+  struct Entry {
+    std::uint64_t build_id = 0;
+    std::uint32_t key = 0;
+    Quantity quantity = Quantity::kUnsigned;
+    double lower_bound = 0.0;
+    Eigen::Vector3d p_LQ = Eigen::Vector3d::Zero();
+  };
+  static constexpr std::size_t kEntries = 512;
+  static std::size_t slot(Quantity quantity, std::uint32_t key) {
+    return ((key + (static_cast<std::uint32_t>(quantity) << 30U)) * 2654435761U) >> 23U;
+  }
+
+  std::vector<Entry> entries_;
+};
+
+}  // namespace ist

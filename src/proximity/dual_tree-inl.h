@@ -1,0 +1,467 @@
+// Dual-tree traversal: branch and bound over pairs of a sphere node and a box node. Compiled once
+// per instruction set: to be included again for each.
+#if defined(IST_PROXIMITY_DUAL_TREE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_PROXIMITY_DUAL_TREE_INL_H
+#undef IST_PROXIMITY_DUAL_TREE_INL_H
+#else
+#define IST_PROXIMITY_DUAL_TREE_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "internal/bvh/traversal_stack.h"
+#include "proximity/clipped_sphere-inl.h"
+#include "proximity/dual_tree.h"
+#include "proximity/supporting_planes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist {
+namespace HWY_NAMESPACE {
+namespace dual_tree {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// A pair of a tree node's child and a box. It carries both volumes, so that expanding one side does
+// not touch the other's memory.
+struct Pair {
+  float bound;               // [m] lower bound of the distance
+  std::int32_t sphere_slot;  // BvttFront::Pair::sphere
+  std::int32_t box_slot;     // BvttFront::Pair::box
+  std::int32_t parent;       // in the front: kBoxWidth * pair + child; or one of those below
+  std::int32_t sphere, box;  // children: >= 0 node, < 0 leaf or tile
+  float x, y, z, radius;     // the bounding sphere, posed
+  float min[3], max[3];
+};
+
+// Parents that are no pair of the front: none is kept, or the pair itself is in the front (from
+// kReopened down) and is expanded again.
+constexpr std::int32_t kNoParent = -1, kReopened = -2;
+
+constexpr std::uint64_t kDeadlineInterval = 16;  // node pairs between two looks at the clock
+
+// Centres of eight spheres in the index's frame [m].
+struct PosedCenters {
+  alignas(64) float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];
+};
+
+template <class Bvh>
+HWY_INLINE void PoseCenters(const DualTreeInput<Bvh>& input, const float* x, const float* y,
+                            const float* z, PosedCenters* posed) {
+  const SphereTag d;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
+    const auto vx = hn::Load(d, x + k), vy = hn::Load(d, y + k), vz = hn::Load(d, z + k);
+    float* out[3] = {posed->x, posed->y, posed->z};
+    for (int row = 0; row < 3; ++row) {
+      const float* r = input.R_OL + 3 * row;
+      const auto sum =
+          hn::MulAdd(hn::Set(d, r[0]), vx,
+                     hn::MulAdd(hn::Set(d, r[1]), vy,
+                                hn::MulAdd(hn::Set(d, r[2]), vz, hn::Set(d, input.p_OL[row]))));
+      hn::Store(sum, d, out[row] + k);
+    }
+  }
+}
+
+template <class D>
+HWY_INLINE std::uint32_t MaskBits(D d, hn::Mask<D> mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(d, mask, bits);
+  return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
+}
+
+// A sphere leaf and a tile, for the visitor.
+template <class Tile>
+struct LeafPair {
+  const SphereLeaf& leaf;
+  const Tile& tile;
+  std::int32_t leaf_index, tile_index;
+  const PosedCenters& centers;
+  float plane_offset;  // [m] of the leaf's supporting plane
+  const PlaneFrame& planes;
+};
+
+// A visitor has
+//   float Limit() const;                      pairs whose bound is not below it are pruned
+//   bool IsSettled() const;                   nothing that is left can matter
+//   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the deadline has passed
+//   float Visit(const LeafPair<Tile>&);       returns the least lower bound of the tile's points
+//   float pruned_bound                        [m] least bound of what it pruned itself
+template <class Visitor, class Bvh>
+class DualTree {
+ public:
+  DualTree(const DualTreeInput<Bvh>& input, Visitor* visitor)
+      : in_(input),
+        visitor_(*visitor),
+        nodes_(input.tree->nodes().data()),
+        leaves_(input.tree->leaves().data()),
+        box_nodes_(input.bvh->nodes().data()),
+        front_(input.front) {
+    planes_.Set(input.planes);
+  }
+
+  void Run() {
+    if (front_ == nullptr || front_->empty()) {
+      stack_.push(Root());
+      Traverse();
+    } else {
+      ResumeFront();
+    }
+    if (front_ != nullptr) front_->end(!is_cut_short_ && !front_is_full_);
+  }
+
+  float pruned_bound() const { return pruned_bound_; }
+  bool stopped() const { return stopped_; }
+  std::uint64_t node_pairs() const { return node_pairs_; }
+  std::uint64_t leaf_pairs() const { return leaf_pairs_; }
+
+ private:
+  // Until the stack is empty.
+  void Traverse() {
+    while (!stack_.empty()) {
+      const Pair pair = stack_.pop();
+      if (!(pair.bound < visitor_.Limit())) {
+        PrunePair(pair);
+        continue;
+      }
+      if (visitor_.IsSettled()) {
+        // What is left is outside and too far, or the depth search's.
+        Prune(in_.inside_bound);
+        is_cut_short_ = true;
+        stack_.clear();
+        return;
+      }
+      if (visitor_.Stops(++node_pairs_, &planes_)) {
+        stopped_ = is_cut_short_ = true;
+        Prune(pair.bound);
+        while (!stack_.empty()) Prune(stack_.pop().bound);
+        return;
+      }
+      Expand(pair);
+    }
+  }
+
+  void Expand(const Pair& pair) {
+    if (pair.sphere < 0 && pair.box < 0) {
+      VisitLeaves(pair);
+    } else if (pair.sphere < 0 || (pair.box >= 0 && BoxIsLarger(pair))) {
+      ExpandBox(pair);
+    } else {
+      ExpandSphere(pair);
+    }
+  }
+
+  // Expands the pairs of the last traversal's front of which what was pruned may matter now, the
+  // most promising first.
+  void ResumeFront() {
+    std::array<std::int32_t, BvttFront::kMaxPairs> pairs;
+    const std::size_t count = FindOpenPairs(pairs.data());
+    const float* stored = front_->stored_bounds();
+    std::sort(pairs.begin(), pairs.begin() + static_cast<std::ptrdiff_t>(count),
+              [stored](std::int32_t a, std::int32_t b) { return stored[a] < stored[b]; });
+    for (std::size_t i = 0; i < count; ++i) {
+      const float bound = stored[pairs[i]] - front_->offset();
+      if (stopped_ || !(bound < visitor_.Limit())) {
+        Prune(bound);
+        continue;
+      }
+      Reopen(pairs[i], bound);
+      Traverse();
+      if (is_cut_short_ && !stopped_) return;
+    }
+  }
+
+  // The pairs whose stored bound is below the limit; the least bound of the others is pruned.
+  std::size_t FindOpenPairs(std::int32_t* pairs) {
+    const BoxTag d;
+    const float offset = front_->offset();
+    const auto limit = hn::Set(d, std::min(visitor_.Limit() + offset, kFarAway));
+    auto pruned = hn::Set(d, kFarAway);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < front_->size(); i += hn::Lanes(d)) {
+      const auto stored = hn::LoadU(d, front_->stored_bounds() + i);
+      const auto is_open = hn::Lt(stored, limit);
+      pruned = hn::Min(pruned, hn::IfThenElse(is_open, pruned, stored));
+      for (std::uint32_t bits = MaskBits(d, is_open); bits != 0; bits &= bits - 1) {
+        pairs[count++] = static_cast<std::int32_t>(i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+      }
+    }
+    Prune(hn::GetLane(hn::MinOfLanes(d, pruned)) - offset);
+    return count;
+  }
+
+  // The bound of a reopened pair is only that of what was pruned below it; it is expanded in any
+  // case.
+  void Reopen(std::int32_t index, float bound) {
+    const BvttFront::Pair& kept = front_->pair(index);
+    Pair pair = Root();
+    pair.parent = kReopened - index;
+    pair.bound = bound;
+    if (kept.sphere != BvttFront::kRoot) {
+      const SphereNode& node = nodes_[kept.sphere / kSphereWidth];
+      const int k = kept.sphere % kSphereWidth;
+      const float* r = in_.R_OL;
+      pair.sphere_slot = kept.sphere;
+      pair.sphere = node.child[k];
+      pair.x = r[0] * node.x[k] + r[1] * node.y[k] + r[2] * node.z[k] + in_.p_OL[0];
+      pair.y = r[3] * node.x[k] + r[4] * node.y[k] + r[5] * node.z[k] + in_.p_OL[1];
+      pair.z = r[6] * node.x[k] + r[7] * node.y[k] + r[8] * node.z[k] + in_.p_OL[2];
+      pair.radius = node.radius[k];
+    }
+    if (kept.box != BvttFront::kRoot) SetBox(kept.box, &pair);
+    stack_.push(pair);
+  }
+
+  HWY_INLINE void SetBox(std::int32_t slot, Pair* pair) const {
+    const BoxNode& node = box_nodes_[slot / kBoxWidth];
+    const int k = slot % kBoxWidth;
+    pair->box_slot = slot;
+    pair->box = node.child[k];
+    pair->min[0] = node.min_x[k];
+    pair->min[1] = node.min_y[k];
+    pair->min[2] = node.min_z[k];
+    pair->max[0] = node.max_x[k];
+    pair->max[1] = node.max_y[k];
+    pair->max[2] = node.max_z[k];
+  }
+
+  // The volumes of the root pair are never compared: it is expanded on the sphere's side first.
+  Pair Root() const {
+    Pair root{};
+    root.bound = -std::numeric_limits<float>::infinity();
+    root.sphere_slot = root.box_slot = BvttFront::kRoot;
+    root.parent = kNoParent;
+    root.radius = std::numeric_limits<float>::infinity();
+    root.box = in_.bvh->root();
+    for (int i = 0; i < 3; ++i) {
+      root.min[i] = -kFarAway;
+      root.max[i] = kFarAway;
+    }
+    return root;
+  }
+
+  void Prune(float bound) { pruned_bound_ = std::min(pruned_bound_, bound); }
+
+  // Prunes a pair that was pushed before the limit fell.
+  void PrunePair(const Pair& pair) {
+    Prune(pair.bound);
+    if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, pair.bound);
+  }
+
+  // Prunes some children of a pair.
+  void PruneChildren(std::int32_t front_index, float bound) {
+    Prune(bound);
+    if (front_index >= 0) front_->prune(front_index, bound);
+  }
+
+  // Gives a pair that is expanded now its place in the front.
+  std::int32_t EnterFront(const Pair& pair) {
+    if (front_ == nullptr) return BvttFront::kFull;
+    if (pair.parent <= kReopened) {
+      front_->reopen(kReopened - pair.parent);
+      return kReopened - pair.parent;
+    }
+    const std::int32_t index = front_->add(pair.sphere_slot, pair.box_slot);
+    front_is_full_ = front_is_full_ || index == BvttFront::kFull;
+    if (index >= 0 && pair.parent >= 0) {
+      front_->mark_expanded(pair.parent / kBoxWidth, pair.parent % kBoxWidth);
+    }
+    return index;
+  }
+
+  // Children that are pairs of the front themselves: they have a place, and a bound, of their own.
+  std::uint32_t ExpandedChildren(std::int32_t front_index) const {
+    return front_index < 0 ? 0U : front_->pair(front_index).expanded;
+  }
+
+  static bool BoxIsLarger(const Pair& pair) {
+    float size_sq = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      size_sq += (pair.max[i] - pair.min[i]) * (pair.max[i] - pair.min[i]);
+    }
+    return size_sq > 4.0F * pair.radius * pair.radius;
+  }
+
+  // Pushes the children whose bits are set, the nearest on top. `set_child` fills in the volume and
+  // the slot of the side that is expanded.
+  template <class SetChild>
+  HWY_INLINE void PushChildren(const Pair& pair, std::int32_t front_index, std::uint32_t near,
+                               const float* bound, const SetChild& set_child) {
+    std::array<int, kBoxWidth> order;  // farthest first
+    int count = 0;
+    for (; near != 0; near &= near - 1) {
+      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(near));
+      int at = count++;
+      for (; at > 0 && bound[order[static_cast<std::size_t>(at - 1)]] < bound[k]; --at) {
+        order[static_cast<std::size_t>(at)] = order[static_cast<std::size_t>(at - 1)];
+      }
+      order[static_cast<std::size_t>(at)] = k;
+    }
+    for (int i = 0; i < count; ++i) {
+      const int k = order[static_cast<std::size_t>(i)];
+      Pair& child = stack_.push();
+      child = pair;
+      child.bound = bound[k];
+      child.parent = front_index < 0 ? kNoParent : kBoxWidth * front_index + k;
+      set_child(k, &child);
+    }
+  }
+
+  // Bit k for a bound below the limit; the least of the others goes to `pruned`. Unused slots are
+  // far away.
+  template <class D, class V>
+  static HWY_INLINE std::uint32_t BitsBelow(D d, V bound, float limit, V* pruned) {
+    const auto below = hn::Lt(bound, hn::Set(d, limit));
+    *pruned = hn::Min(*pruned, hn::IfThenElse(below, *pruned, bound));
+    return MaskBits(d, below);
+  }
+
+  // Moves the children whose bits are set far away.
+  template <class D>
+  static HWY_INLINE hn::Vec<D> MaskOut(D d, hn::Vec<D> bound, std::uint32_t bits) {
+    if (bits == 0) return bound;
+    alignas(64) float far[kBoxWidth];
+    for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
+      far[k] = ((bits >> k) & 1U) != 0 ? kFarAway : -kFarAway;
+    }
+    return hn::Max(bound, hn::Load(d, far));
+  }
+
+  HWY_INLINE const float* ChildSupports(std::int32_t node) const {
+    return SupportsOf(node, nodes_, leaves_, in_.supports);
+  }
+  HWY_INLINE float SupportOfSlot(std::int32_t slot) const {
+    return ChildSupports(slot / kSphereWidth)[slot % kSphereWidth];
+  }
+
+  void ExpandSphere(const Pair& pair) {
+    const std::int32_t front_index = EnterFront(pair);
+    const std::uint32_t expanded = ExpandedChildren(front_index);
+    const SphereNode& node = nodes_[pair.sphere];
+    const SphereTag d;
+    PosedCenters centers;
+    PoseCenters(in_, node.x, node.y, node.z, &centers);
+    const auto box_height = hn::Set(d, planes_.Height(pair.min, pair.max));
+    const BoxSphere box = CircumscribedSphere(pair);
+    const float* support = ChildSupports(pair.sphere);
+    if (pair.sphere_slot >= 0) {
+      TightenSupport(support, &in_.supports->support[static_cast<std::size_t>(pair.sphere_slot)]);
+    }
+    const float limit = visitor_.Limit();
+    std::uint32_t near = 0;
+    auto pruned = hn::Set(d, kFarAway);
+    alignas(64) float bound[kSphereWidth];
+    for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
+      const auto x = hn::Load(d, centers.x + k), y = hn::Load(d, centers.y + k),
+                 z = hn::Load(d, centers.z + k), radius = hn::Load(d, node.radius + k);
+      const auto dx = IntervalDistance(d, hn::Set(d, pair.min[0]), hn::Set(d, pair.max[0]), x);
+      const auto dy = IntervalDistance(d, hn::Set(d, pair.min[1]), hn::Set(d, pair.max[1]), y);
+      const auto dz = IntervalDistance(d, hn::Set(d, pair.min[2]), hn::Set(d, pair.max[2]), z);
+      const auto child_support = hn::LoadU(d, support + k);
+      const auto sphere_bound = hn::Sub(Norm(dx, dy, dz), radius);
+      const auto plane_height = hn::Sub(hn::Add(hn::Set(d, planes_.offset()), child_support),
+                                        planes_.AlongNormal(d, x, y, z));
+      const auto lateral =
+          hn::Sub(planes_.Lateral(d, hn::Sub(hn::Set(d, box.x), x), hn::Sub(hn::Set(d, box.y), y),
+                                  hn::Sub(hn::Set(d, box.z), z)),
+                  hn::Set(d, box.radius));
+      const auto clipped_bound =
+          ClippedDistance(d, hn::Sub(box_height, child_support), hn::Max(lateral, hn::Zero(d)),
+                          radius, plane_height, RimRadius(d, radius, plane_height, in_.rounding));
+      const auto least = hn::Max(sphere_bound, clipped_bound);
+      near |= BitsBelow(d, MaskOut(d, least, expanded >> k), limit, &pruned) << k;
+      hn::Store(least, d, bound + k);
+    }
+    near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
+    PruneChildren(front_index, hn::GetLane(hn::MinOfLanes(d, pruned)));
+    PushChildren(pair, front_index, near, bound, [&](int k, Pair* child) {
+      child->sphere_slot = pair.sphere * kSphereWidth + k;
+      child->sphere = node.child[k];
+      child->x = centers.x[k];
+      child->y = centers.y[k];
+      child->z = centers.z[k];
+      child->radius = node.radius[k];
+    });
+  }
+
+  void ExpandBox(const Pair& pair) {
+    const std::int32_t front_index = EnterFront(pair);
+    const std::uint32_t expanded = ExpandedChildren(front_index);
+    const BoxNode& node = box_nodes_[pair.box];
+    const BoxTag d;
+    const float plane_offset = planes_.offset() + SupportOfSlot(pair.sphere_slot);
+    const float center[3] = {pair.x, pair.y, pair.z};
+    const auto radius = hn::Set(d, pair.radius);
+    const auto plane_height =
+        hn::Sub(hn::Set(d, plane_offset),
+                planes_.AlongNormal(d, hn::Set(d, pair.x), hn::Set(d, pair.y), hn::Set(d, pair.z)));
+    const auto rim_radius = RimRadius(d, radius, plane_height, in_.rounding);
+    const float limit = visitor_.Limit();
+    std::uint32_t near = 0;
+    auto pruned = hn::Set(d, kFarAway);
+    alignas(64) float bound[kBoxWidth];
+    for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
+      const auto sphere_bound = hn::Sub(Distance(node, k, pair.x, pair.y, pair.z), radius);
+      const auto clipped_bound =
+          ClippedDistance(d, planes_.Height(node, k, plane_offset),
+                          planes_.Lateral(node, k, center), radius, plane_height, rim_radius);
+      const auto least = hn::Max(sphere_bound, clipped_bound);
+      near |= BitsBelow(d, MaskOut(d, least, expanded >> k), limit, &pruned) << k;
+      hn::Store(least, d, bound + k);
+    }
+    near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
+    PruneChildren(front_index, hn::GetLane(hn::MinOfLanes(d, pruned)));
+    PushChildren(pair, front_index, near, bound,
+                 [&](int k, Pair* child) { SetBox(pair.box * kBoxWidth + k, child); });
+  }
+
+  // The sphere through the corners of a pair's box.
+  struct BoxSphere {
+    float x, y, z, radius;
+  };
+  static BoxSphere CircumscribedSphere(const Pair& pair) {
+    float size_sq = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      size_sq += (pair.max[i] - pair.min[i]) * (pair.max[i] - pair.min[i]);
+    }
+    return {0.5F * (pair.min[0] + pair.max[0]), 0.5F * (pair.min[1] + pair.max[1]),
+            0.5F * (pair.min[2] + pair.max[2]), 0.5F * std::sqrt(size_sq)};
+  }
+
+  HWY_INLINE void VisitLeaves(const Pair& pair) {
+    ++leaf_pairs_;
+    const std::int32_t front_index = EnterFront(pair);
+    const SphereLeaf& leaf = leaves_[~pair.sphere];
+    PosedCenters centers;
+    PoseCenters(in_, leaf.x, leaf.y, leaf.z, &centers);
+    typename Bvh::Tile scratch;
+    const typename Bvh::Tile& tile = in_.bvh->tile(static_cast<std::size_t>(~pair.box), &scratch);
+    const float plane_offset = planes_.offset() + SupportOfSlot(pair.sphere_slot);
+    const float least = visitor_.Visit(LeafPair<typename Bvh::Tile>{
+        leaf, tile, ~pair.sphere, ~pair.box, centers, plane_offset, planes_});
+    if (front_index >= 0) front_->prune(front_index, least);
+  }
+
+  const DualTreeInput<Bvh>& in_;
+  Visitor& visitor_;
+  const SphereNode* nodes_;
+  const SphereLeaf* leaves_;
+  const BoxNode* box_nodes_;
+  BvttFront* front_;
+  PlaneFrame planes_;
+  float pruned_bound_ = std::numeric_limits<float>::infinity();
+  std::uint64_t node_pairs_ = 0, leaf_pairs_ = 0;
+  bool front_is_full_ = false;
+  bool is_cut_short_ = false;  // the stack was not emptied
+  bool stopped_ = false;       // by the deadline
+  TraversalStack<Pair, stack_capacity(kMaxTreeLevels + kMaxBoxLevels, kBoxWidth)> stack_;
+};
+
+}  // namespace dual_tree
+}  // namespace HWY_NAMESPACE
+}  // namespace ist
+HWY_AFTER_NAMESPACE();
+
+#endif  // IST_PROXIMITY_DUAL_TREE_INL_H

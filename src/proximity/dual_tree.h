@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "internal/cloud/box_bvh.h"
+#include "internal/cloud/point_bvh.h"
+#include "ist_proximity/tree/inner_sphere_tree.h"
+#include "proximity/coherence/bvtt_front.h"
+#include "proximity/supporting_planes.h"
+
+namespace ist {
+
+class PointRefinement;
+class BoxRefinement;
+
+/// What a dual-tree traversal works on: a link's Inner Sphere Tree, posed, and the BVH of an index,
+/// in the index's frame O, all in float. Lower bounds of the traversal have an error of `rounding`,
+/// which the caller takes off; `prune_bound` and `inside_bound` contain it already.
+template <class Bvh>
+struct DualTreeInput {
+  const InnerSphereTree* tree = nullptr;
+  const Bvh* bvh = nullptr;  ///< of points or boxes, not empty
+  float R_OL[9] = {};        ///< rotation, row-major
+  float p_OL[3] = {};        ///< [m] translation
+  float rounding = 0.0F;     ///< [m] largest error of a coordinate or a bound
+  /// [m] Pairs whose lower bound is not below it are pruned.
+  float prune_bound = std::numeric_limits<float>::infinity();
+  /// [m] A point, or a part of a box, whose lower bound is at most this may be inside the link.
+  float inside_bound = 0.0F;
+  SupportCache* supports = nullptr;
+  SupportingPlanes planes;
+  BvttFront* front = nullptr;  ///< begun at this pose, or null
+};
+
+struct DualTreeResult {
+  float pruned_bound = std::numeric_limits<float>::infinity();  ///< [m] least of all pruned pairs
+  bool may_be_inside = false;  ///< some point's lower bound is at most `inside_bound`
+  bool stopped = false;        ///< by the deadline; `pruned_bound` bounds what was left
+  std::uint64_t node_pairs = 0, leaf_pairs = 0;  ///< expanded
+};
+
+/// Branch and bound over pairs of a sphere node and a box node, depth first, nearest child first:
+/// every point that may be nearer to the link than the prune bound is refined, those that may be
+/// inside are only noted. A refinement returns the new prune bound, which never rises.
+///
+/// A refinement policy has
+///   float refine(std::int32_t tile, int lane, float lower_bound);   // returns the prune bound
+///   bool update_planes(SupportingPlanes* planes);                   // true: they have changed
+///   bool deadline_passed();
+/// PointRefinement and BoxRefinement are the two there are (refinement.h).
+DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input, PointRefinement* policy);
+DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxRefinement* policy);
+
+/// The box that is nearest to the inner spheres, if nearer than the prune bound.
+struct NearestToInnerSpheres {
+  float distance = std::numeric_limits<float>::infinity();  ///< [m] |p - c| - radius, with rounding
+  std::int32_t tile = -1;                                   ///< of the box; -1: none
+  int lane = 0;
+  std::int32_t leaf = -1;  ///< of the sphere
+  std::uint64_t node_pairs = 0, leaf_pairs = 0;
+};
+NearestToInnerSpheres find_nearest_to_inner_spheres(const DualTreeInput<BoxBvh>& input);
+
+}  // namespace ist

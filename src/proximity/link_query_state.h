@@ -1,0 +1,133 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <type_traits>
+
+#include "internal/geometry/float_rounding.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "proximity/coherence/bvtt_front.h"
+#include "proximity/coherence/distance_cache.h"
+#include "proximity/coherence/link_bound.h"
+#include "proximity/deadline.h"
+#include "proximity/posed_index.h"
+#include "proximity/signed_distance_grid.h"
+#include "proximity/supporting_planes.h"
+#include "proximity/visited_set.h"
+
+/// What the query of one link works with: three types, by how long their content lives.
+namespace ist {
+
+/// What belongs to the link for ever, whatever its pose and whatever the clouds.
+struct LinkContext {
+  explicit LinkContext(const LinkModel& link) : model(&link), displacement(link), grid(link) {}
+
+  const LinkModel* model;
+  DisplacementBound displacement;
+  SignedDistanceGrid grid;
+
+  const InnerSphereTree& tree() const { return model->tree; }
+  const Solid& solid() const { return model->solid; }
+};
+
+/// What is kept from one query to the next. It speeds queries up and never changes what an answer
+/// promises.
+struct LinkCoherence {
+  explicit LinkCoherence(const LinkModel& link) : bound(link), supports(link.tree) {}
+
+  LinkBound bound;
+  BvttFronts fronts;
+  DistanceCache distances;
+  /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
+  struct {
+    std::uint64_t build_id = 0;  ///< of its index; 0: there was no answer
+    ObstacleId id;
+    Eigen::Vector3d p_LCl = Eigen::Vector3d::Zero();  ///< [m] closest point of the link
+  } last;
+  SupportCache supports;
+  Eigen::Vector3d plane_normal_L = Eigen::Vector3d::Zero();  ///< of `supports`; zero: none yet
+
+  void forget() {
+    last.build_id = 0;
+    bound.forget();
+    fronts.forget();
+  }
+};
+
+/// The closest obstacle that a query has found, measured exactly.
+struct ClosestObstacle {
+  SignedDistance exact;  ///< link frame; `distance` is the upper bound, inf: none was found
+  Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
+  std::int32_t source = -1;
+  ObstacleId id;
+  bool is_box = false;
+};
+
+/// The state of one query.
+///
+/// Branch and bound: `closest` holds the upper bound, and whatever is not measured exactly leaves
+/// its lower bound in `pruned_bound`. So at any time no obstacle has a smaller signed distance than
+/// lower_bound().
+struct LinkSearch {
+  // What is asked.
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  SceneId scene = kUnknownScene;
+  QueryConfig config;
+  double other_links = 0.0;  ///< [m] upper bound of other links, below which this one matters only
+  Deadline* deadline = nullptr;
+  QueryStatistics* statistics = nullptr;
+
+  // What is known.
+  ClosestObstacle closest;
+  double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured
+  double refined_bound = 0.0;   ///< [m] the same of what was measured, to within the tolerance
+  double cover_bound = 0.0;     ///< [m] no point is nearer to the clipped cover spheres
+  double region_bound = 0.0;    ///< [m] no point outside the regions of interest is nearer
+  double rounding = 0.0;        ///< [m] largest error of a lower bound of the traversals
+  double max_coordinate = 0.0;  ///< [m] of the link in the frames of the indices
+  bool is_complete = false;     ///< nothing that matters was left
+  VisitedSet visited;           ///< obstacles of the index at work that were refined
+  int box_cells_left = 0;       ///< into which overlapping boxes may still be divided
+
+  /// [m] Beyond it nothing matters.
+  double range() const { return config.max_distance + config.margin + rounding; }
+
+  /// [m] A lower bound that is not below this cannot change the answer by more than the tolerance.
+  double prune_bound() const {
+    const double distance = std::min(closest.exact.distance, other_links);
+    if (distance > range()) return range();
+    const double width = std::max(config.tolerance, config.relative_tolerance * distance);
+    // Whether any point is inside is always decided, however wide the tolerance.
+    return distance > 0.0 ? std::max(distance - width, 0.0) : distance - config.tolerance;
+  }
+  /// [m] The same for lower bounds in float.
+  float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }
+
+  void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }
+
+  /// [m] No obstacle has a smaller signed distance; inf where none is in range.
+  double lower_bound() const {
+    return std::min({closest.exact.distance, refined_bound, pruned_bound});
+  }
+
+  /// Takes an exact distance as the upper bound, if it is one. Obstacles out of range never are.
+  template <class Bvh>
+  void offer(const SignedDistance& exact, const Eigen::Vector3d& p_OQ,
+             const PosedIndex<Bvh>& obstacles, ObstacleId id) {
+    if (!(exact.distance < closest.exact.distance)) return;
+    closest = {exact, obstacles.X_FO * p_OQ, obstacles.source, id, std::is_same_v<Bvh, BoxBvh>};
+  }
+};
+
+/// The three of one link. One thread.
+struct LinkQueryState {
+  explicit LinkQueryState(const LinkModel& link) : context(link), kept(link) {}
+
+  LinkContext context;
+  LinkCoherence kept;
+  LinkSearch search;
+};
+
+}  // namespace ist

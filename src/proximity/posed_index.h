@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+
+#include "internal/cloud/box_bvh.h"
+#include "internal/cloud/point_bvh.h"
+#include "internal/geometry/relative_pose.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
+
+namespace ist {
+
+/// An index of a snapshot and where the link is in its frame O.
+template <class Bvh>
+struct PosedIndex {
+  PosedIndex(const Bvh& index, std::int32_t source_index, const Eigen::Isometry3d& X_FO_,
+             const Eigen::Isometry3d& X_FL)
+      : bvh(&index),
+        source(source_index),
+        X_FO(X_FO_),
+        X_OL(relative_pose(X_FO, X_FL)),
+        X_LO(X_OL.inverse()) {}
+
+  const Bvh* bvh;
+  std::int32_t source;  ///< index of the snapshot among those of the query
+  Eigen::Isometry3d X_FO, X_OL, X_LO;
+};
+
+using PointObstacles = PosedIndex<PointBvh>;
+using BoxObstacles = PosedIndex<BoxBvh>;
+
+/// Names a point, or a box, of an index.
+struct ObstacleId {
+  std::int32_t tile = 0;
+  int lane = 0;
+
+  std::uint32_t key() const {
+    return static_cast<std::uint32_t>(tile) * kBoxWidth + static_cast<std::uint32_t>(lane);
+  }
+};
+
+inline Eigen::Vector3d point_O(const PointBvh& bvh, ObstacleId id) {
+  PointTile scratch;
+  return bvh.tile(static_cast<std::size_t>(id.tile), &scratch).point(id.lane);
+}
+inline Eigen::AlignedBox3d box_O(const BoxBvh& bvh, ObstacleId id) {
+  return bvh.tiles()[static_cast<std::size_t>(id.tile)].box(id.lane);
+}
+/// As the message, or BoxIndex::build(), numbered it.
+template <class Bvh>
+std::uint32_t message_id(const Bvh& bvh, ObstacleId id) {
+  typename Bvh::Tile scratch;
+  return bvh.tile(static_cast<std::size_t>(id.tile), &scratch).id[id.lane];
+}
+
+/// Calls visit(PosedIndex) for the points of a snapshot and then for its boxes, where there are
+/// any.
+/// @param source  index of the snapshot among those of the query
+template <class Visit>
+void for_each_index(const CloudSnapshot& cloud, std::int32_t source, const Eigen::Isometry3d& X_FL,
+                    const Visit& visit) {
+  if (!cloud.index.empty()) {
+    const PointBvh& bvh = cloud.index.bvh();
+    visit(PointObstacles(bvh, source, bvh.X_FO(), X_FL));
+  }
+  if (cloud.boxes != nullptr && !cloud.boxes->empty()) {
+    const BoxBvh& bvh = cloud.boxes->bvh();
+    visit(BoxObstacles(bvh, source, cloud.X_FM * Eigen::Translation3d(bvh.origin()), X_FL));
+  }
+}
+
+}  // namespace ist

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+
+#include "proximity/link_query_state.h"
+
+namespace ist {
+
+/// Measures points of an index exactly: the refinement policy of the dual-tree traversal (see
+/// search_dual_tree), and what warm starts use. Results go to LinkSearch. Functions neither
+/// allocate nor throw.
+class PointRefinement {
+ public:
+  PointRefinement(const PointObstacles& obstacles, LinkQueryState* link)
+      : obstacles_(obstacles), link_(*link) {}
+
+  /// Measures a point that is outside the link, unless it was measured in this traversal or a kept
+  /// bound proves that it does not matter.
+  /// @param lower_bound  [m] by the clipped cover spheres
+  /// @returns [m] the new prune bound
+  float refine(std::int32_t tile, int lane, float lower_bound);
+  /// As update_supporting_planes().
+  bool update_planes(SupportingPlanes* planes);
+  bool deadline_passed() { return link_.search.deadline->passed(); }
+
+  /// Measures a point that may be inside.
+  /// @param max_distance  [m] what its distance is known not to exceed, or does not matter beyond
+  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
+
+ private:
+  void measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
+                       double max_distance, const Eigen::Vector3d& direction_L);
+
+  const PointObstacles& obstacles_;
+  LinkQueryState& link_;
+};
+
+/// The same for solid boxes. While a box is outside the link, its distance is exact: triangle
+/// against box, or primitive against box. A box that touches no triangle of a mesh is inside or
+/// outside as a whole; if the mesh has holes, the winding number at the box's centre decides.
+class BoxRefinement {
+ public:
+  BoxRefinement(const BoxObstacles& obstacles, LinkQueryState* link)
+      : obstacles_(obstacles), link_(*link) {}
+
+  /// As PointRefinement::refine().
+  float refine(std::int32_t tile, int lane, float lower_bound);
+  bool update_planes(SupportingPlanes* planes);
+  bool deadline_passed() { return link_.search.deadline->passed(); }
+
+  /// Measures a box that may be inside.
+  void measure(ObstacleId id);
+  /// Takes the distance of a box that is outside, or does not touch the surface.
+  void take_outside(const BoxDistance& found, ObstacleId id);
+  /// Takes the signed distance of one point of a box.
+  void take_point(const Eigen::Vector3d& p_OQ, ObstacleId id);
+  /// Takes points of a box that has at least one in common with the link: that one, and some that
+  /// are deeper.
+  void take_overlap(const BoxDistance& found, ObstacleId id);
+  /// Takes the point of a box that is deepest in a sphere of a leaf: there the depth is largest but
+  /// for what the packing leaves open.
+  void take_deepest_in_spheres(std::int32_t leaf, ObstacleId id);
+
+ private:
+  void measure_outside(ObstacleId id);
+
+  const BoxObstacles& obstacles_;
+  LinkQueryState& link_;
+};
+
+template <class Obstacles>
+struct RefinementOf;
+template <>
+struct RefinementOf<PointObstacles> {
+  using Type = PointRefinement;
+};
+template <>
+struct RefinementOf<BoxObstacles> {
+  using Type = BoxRefinement;
+};
+template <class Obstacles>
+using Refinement = typename RefinementOf<Obstacles>::Type;
+
+/// Chooses supporting planes across the direction of the closest obstacle, which touch the link
+/// where it ends in that direction. Where the link is convex there, they touch the closest point,
+/// and what lies beyond the obstacle's own plane is farther. They belong to the link and stay from
+/// query to query while the direction is nearly the same.
+/// @param X_OL    link -> the index's frame
+/// @param planes  set when they have changed
+/// @returns whether they have changed
+bool update_supporting_planes(const Eigen::Isometry3d& X_OL, LinkQueryState* link,
+                              SupportingPlanes* planes);
+
+/// The planes that there are, in the index's frame.
+SupportingPlanes supporting_planes(const Eigen::Isometry3d& X_OL, const LinkQueryState& link);
+
+}  // namespace ist

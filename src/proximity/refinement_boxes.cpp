@@ -1,0 +1,110 @@
+// The exact distances of solid boxes.
+
+#include <algorithm>
+#include <array>
+
+#include "proximity/refinement.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// [m] Where box and surface meet, steps of these lengths inward decide whether they overlap.
+constexpr std::array<double, 3> kSteps = {1e-6, 1e-4, 1e-3};
+
+}  // namespace
+
+float BoxRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
+  LinkSearch& search = link_.search;
+  search.cover_bound =
+      std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
+  const ObstacleId id{tile, lane};
+  if (search.visited.insert(id.key())) measure_outside(id);
+  return search.traversal_prune_bound();
+}
+
+bool BoxRefinement::update_planes(SupportingPlanes* planes) {
+  return update_supporting_planes(obstacles_.X_OL, &link_, planes);
+}
+
+// A box whose cover distance is above the interior gap: if it overlaps the link all the same,
+// points of it are measured.
+void BoxRefinement::measure_outside(ObstacleId id) {
+  const LinkSearch& search = link_.search;
+  ++search.statistics->exact_evaluations;
+  const double limit = std::min(search.closest.exact.distance, search.range() + search.rounding);
+  const BoxDistance found =
+      link_.context.solid().distance_to_box(box_O(*obstacles_.bvh, id), obstacles_.X_OL, limit);
+  if (found.distance > 0.0) {
+    take_outside(found, id);
+  } else {
+    take_overlap(found, id);
+  }
+}
+
+void BoxRefinement::measure(ObstacleId id) {
+  ++link_.search.statistics->exact_evaluations;
+  const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
+  const BoxDistance found = link_.context.solid().distance_to_box(box, obstacles_.X_OL, kInfinity);
+  if (!(found.distance > 0.0)) return take_overlap(found, id);
+  const InnerSphereTree& tree = link_.context.tree();
+  const Eigen::Vector3d center_O = box.center();  // as a whole it may be inside
+  if (tree.cover_distance(obstacles_.X_LO * center_O, 0.0) <= tree.interior_gap()) {
+    take_point(center_O, id);
+  }
+  take_outside(found, id);
+}
+
+void BoxRefinement::take_outside(const BoxDistance& found, ObstacleId id) {
+  LinkSearch& search = link_.search;
+  const double upper_bound = search.closest.exact.distance;
+  if (found.lower_bound < std::min(found.distance, upper_bound)) search.prune(found.lower_bound);
+  if (!(found.distance < upper_bound)) return;
+  SignedDistance exact;
+  exact.distance = found.distance;
+  exact.witness = obstacles_.X_LO * found.p_OS;
+  exact.normal = (obstacles_.X_LO.linear() * (found.p_OB - found.p_OS)) / found.distance;
+  search.offer(exact, found.p_OB, obstacles_, id);
+}
+
+void BoxRefinement::take_point(const Eigen::Vector3d& p_OQ, ObstacleId id) {
+  ++link_.search.statistics->exact_evaluations;
+  link_.search.offer(link_.context.solid().signed_distance(obstacles_.X_LO * p_OQ), p_OQ,
+                     obstacles_, id);
+}
+
+void BoxRefinement::take_overlap(const BoxDistance& found, ObstacleId id) {
+  const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
+  const Eigen::Vector3d p_LQ = obstacles_.X_LO * found.p_OB;
+  SignedDistance touch = link_.context.solid().signed_distance(p_LQ);
+  touch.distance = std::min(touch.distance, 0.0);  // what rounding has put outside touches
+  if (touch.distance == 0.0) touch.witness = p_LQ;
+  link_.search.offer(touch, found.p_OB, obstacles_, id);
+  const Eigen::Vector3d into_link = obstacles_.X_OL.linear() * -touch.normal;
+  const Eigen::Vector3d into_box = (box.center() - found.p_OB).stableNormalized();
+  for (const double step : kSteps) {
+    take_point(clamp_to(box, found.p_OB + step * into_link), id);
+    take_point(clamp_to(box, found.p_OB + step * (into_link + into_box)), id);
+  }
+}
+
+void BoxRefinement::take_deepest_in_spheres(std::int32_t leaf, ObstacleId id) {
+  const SphereLeaf& spheres = link_.context.tree().leaves()[static_cast<std::size_t>(leaf)];
+  const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
+  double deepest = kInfinity;
+  Eigen::Vector3d p_OQ = box.center();
+  for (int b = 0; b < spheres.count; ++b) {
+    const Eigen::Vector3d center_O =
+        obstacles_.X_OL * Eigen::Vector3d(spheres.x[b], spheres.y[b], spheres.z[b]);
+    const Eigen::Vector3d nearest = clamp_to(box, center_O);
+    const double distance =
+        (center_O - nearest).norm() - static_cast<double>(spheres.inner_radius[b]);
+    if (distance >= deepest) continue;
+    deepest = distance;
+    p_OQ = nearest;
+  }
+  take_point(p_OQ, id);
+}
+
+}  // namespace ist

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace ist {
+
+/// Which obstacles of an index a traversal has refined: several sphere leaves meet the same one. A
+/// direct-mapped table of fixed size: an obstacle whose place another one took counts as new.
+class VisitedSet {
+ public:
+  void clear() {
+    if (++epoch_ != 0) return;
+    entries_.fill({});  // the number wrapped around: entries of old epochs must not come back
+    epoch_ = 1;
+  }
+
+  /// @returns whether it was not in the set
+  bool insert(std::uint32_t key) {
+    Entry& entry = entries_[(key * 2654435761U) >> 23U];
+    const bool is_new = entry.epoch != epoch_ || entry.key != key;
+    entry = {epoch_, key};
+    return is_new;
+  }
+
+ private:
+  struct Entry {
+    std::uint32_t epoch = 0, key = 0;
+  };
+  std::array<Entry, 512> entries_{};
+  std::uint32_t epoch_ = 1;
+};
+
+}  // namespace ist

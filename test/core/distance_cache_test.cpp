@@ -1,0 +1,62 @@
+// Bounds of the distances of points, kept for the places where the points have moved since.
+
+#include "proximity/coherence/distance_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/geometry/solid.h"
+#include "support/meshes.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+using Quantity = DistanceCache::Quantity;
+
+TEST(DistanceCache, FindsTheSamePointOfTheSameIndex) {
+  DistanceCache cache;
+  const Eigen::Vector3d p(0.1, 0.2, 0.3), q(0.1, 0.2, 0.34);
+  EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, p)));
+  cache.store(1, Quantity::kSigned, 7, p, 0.5);
+  EXPECT_EQ(cache.find(1, Quantity::kSigned, 7, p), 0.5);
+  EXPECT_LE(cache.find(1, Quantity::kSigned, 7, q), 0.46);
+  EXPECT_NEAR(cache.find(1, Quantity::kSigned, 7, q), 0.46, 1e-12);
+  EXPECT_EQ(cache.find(1, Quantity::kSigned, 7, p), 0.5) << "displacements do not add up";
+  for (const double other :
+       {cache.find(2, Quantity::kSigned, 7, p), cache.find(1, Quantity::kUnsigned, 7, p),
+        cache.find(1, Quantity::kSigned, 8, p)}) {
+    EXPECT_EQ(other, -std::numeric_limits<double>::infinity());
+  }
+  const Eigen::Vector3d none(0, std::numeric_limits<double>::quiet_NaN(), 0);
+  EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, none)));
+  cache.store(1, Quantity::kSigned, 7, none, 0.5);
+  EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, p)));
+}
+
+// Of more points than there is room for, which wander in and out of a link.
+TEST(DistanceCache, AreNeverAboveTheTruth) {
+  test::Rng rng(91);
+  const Solid solid({GeometryElement{test::l_shape(0.2, 0.05), Eigen::Isometry3d::Identity(), ""}});
+  DistanceCache cache;
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 800; ++i) points.push_back(test::random_vector(&rng, 0.2));
+  int found = 0;
+  for (int step = 0; step < 20000; ++step) {
+    const auto i = static_cast<std::uint32_t>(rng() % points.size());
+    Eigen::Vector3d& p = points[i];
+    p += test::random_vector(&rng, std::pow(10.0, test::uniform(&rng, -6, -2)));
+    const double floor = cache.find(1, Quantity::kSigned, i, p);
+    const PointDepth depth = solid.depth(p, -1.0);
+    ASSERT_LE(floor, depth.exact.distance + 1e-12);
+    found += std::isfinite(floor) ? 1 : 0;
+    if (step % 3 == 0) cache.store(1, Quantity::kSigned, i, p, depth.floor);
+  }
+  EXPECT_GT(found, 1000);
+}
+
+}  // namespace
+}  // namespace ist
