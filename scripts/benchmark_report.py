@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Makes tables and plot of what scripts/benchmark measured. Needs nothing but Python.
+"""Makes the tables and plots of the numbers that scripts/benchmark measured. Needs Python only.
 
 Writes FOLDER/benchmark.csv and benchmark_growth.csv (with commit and machine), the plots
-FOLDER/benchmark.svg and benchmark_growth.svg, and the tables between the markers `<!-- NAME -->` and `<!-- end of NAME -->` of FOLDER/benchmark.md
-and of the README.
+FOLDER/benchmark.svg and benchmark_growth.svg, and the tables of FOLDER/benchmark.md and of the
+README: the lines between the markers `<!-- NAME -->` and `<!-- end of NAME -->`.
 """
 
 import argparse
@@ -337,7 +337,7 @@ class GrowthPlot(Drawing):
 
 
 def fill(path, parts):
-    """Replaces what is between the markers; a document without some of them is left so there."""
+    """Replaces the text between the markers. Markers that the document lacks are skipped."""
     text = path.read_text(encoding="utf-8")
     for name, content in parts.items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
