@@ -45,6 +45,14 @@ void print_each(const std::vector<SceneResult>& results, std::uint64_t first) {
   }
 }
 
+void print_self(const std::vector<SceneResult>& results, std::uint64_t first) {
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const ClosedLoopResult& r = results[i].modes[1];
+    std::printf("seed %d: obstacles %.1f mm, own links %.1f mm\n", static_cast<int>(first + i),
+                1e3 * r.smallest_distance, 1e3 * r.smallest_self_distance);
+  }
+}
+
 std::string table(const std::vector<SceneResult>& results) {
   std::string text =
       "| avoidance | collisions | smallest true distance, least / median | task done | goals | "
@@ -72,76 +80,82 @@ std::string table(const std::vector<SceneResult>& results) {
   return text;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+struct Options {
   std::uint64_t first = 1;
   std::size_t count = 50;
   int threads = 1;
   double noise = -1.0;  // [m] negative: as the cameras have it
   std::string document;
   bool each = false, only_self = false;
+};
+
+// False: an argument is unknown, which is printed.
+bool parse(int argc, char** argv, Options* options) {
   for (int i = 1; i < argc; ++i) {
     const bool has_value = i + 1 < argc;
     if (std::strcmp(argv[i], "--each") == 0) {
-      each = true;
+      options->each = true;
     } else if (std::strcmp(argv[i], "--self") == 0) {
-      only_self = true;
+      options->only_self = true;
     } else if (std::strcmp(argv[i], "--first") == 0 && has_value) {
-      first = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+      options->first = static_cast<std::uint64_t>(std::atoll(argv[++i]));
     } else if (std::strcmp(argv[i], "--count") == 0 && has_value) {
-      count = static_cast<std::size_t>(std::atoll(argv[++i]));
+      options->count = static_cast<std::size_t>(std::atoll(argv[++i]));
     } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
-      document = argv[++i];
+      options->document = argv[++i];
     } else if (std::strcmp(argv[i], "--threads") == 0 && has_value) {
-      threads = std::atoi(argv[++i]);
+      options->threads = std::atoi(argv[++i]);
     } else if (std::strcmp(argv[i], "--noise") == 0 && has_value) {
-      noise = 1e-3 * std::atof(argv[++i]);
+      options->noise = 1e-3 * std::atof(argv[++i]);
     } else {
       std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
-      return 1;
+      return false;
     }
   }
+  return true;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  if (!parse(argc, argv, &options)) return 1;
 
   const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
-  std::vector<SceneResult> results(count);
+  std::vector<SceneResult> results(options.count);
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
+    for (std::size_t i = next++; i < options.count; i = next++) {
       ist::sim::ClosedLoopConfig config;
       const auto nominal = [&](const ist::sim::Scene& scene) {
         return ist::sim::nominal_motion(robot, scene, config.controller);
       };
-      const std::uint64_t seed = first + i;
+      const std::uint64_t seed = options.first + i;
       ist::sim::Scene scene = ist::sim::make_scene(robot, seed, {}, nominal);
       for (ist::sim::DepthCameraConfig& camera : scene.cameras) {
-        if (noise >= 0.0) camera.noise = noise;
+        if (options.noise >= 0.0) camera.noise = options.noise;
       }
-      config.check_self = only_self;
+      config.check_self = options.only_self;
       for (std::size_t m = 0; m < 3; ++m) {
         config.avoidance = kModes[m];
-        if (only_self && config.avoidance != Avoidance::kBlend) continue;
+        if (options.only_self && config.avoidance != Avoidance::kBlend) continue;
         results[i].modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
       }
     }
   };
   std::vector<std::thread> pool;
-  for (int t = 1; t < threads; ++t) pool.emplace_back(work);
+  for (int t = 1; t < options.threads; ++t) pool.emplace_back(work);
   work();
   for (std::thread& thread : pool) thread.join();
 
-  if (only_self) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const ClosedLoopResult& r = results[i].modes[1];
-      std::printf("seed %d: obstacles %.1f mm, own links %.1f mm\n", static_cast<int>(first + i),
-                  1e3 * r.smallest_distance, 1e3 * r.smallest_self_distance);
-    }
+  if (options.only_self) {
+    print_self(results, options.first);
     return 0;
   }
-  if (each) print_each(results, first);
+  if (options.each) print_each(results, options.first);
   std::printf("\n%s", table(results).c_str());
-  const bool fails =
-      !document.empty() && !ist::benchmark::write_table(document, "closed loop", table(results));
+  const bool fails = !options.document.empty() &&
+                     !ist::benchmark::write_table(options.document, "closed loop", table(results));
   return fails ? 1 : 0;
 }

@@ -120,6 +120,28 @@ class Fcl {
 };
 #endif
 
+struct Comparison {
+  std::vector<double> fcl_us;  // of a configuration
+  int apart = 0;               // links that are near, and not in contact
+  double largest = 0.0;        // [m] difference of their distances
+};
+
+#ifdef IST_PROXIMITY_HAS_FCL
+void compare(Fcl* fcl, const std::vector<Eigen::Isometry3d>& X_FL,
+             const std::vector<ist::LinkProximity>& results, Comparison* comparison) {
+  const Clock::time_point start = Clock::now();
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < results.size(); ++i) distances.push_back(fcl->distance(i, X_FL[i]));
+  comparison->fcl_us.push_back(microseconds_since(start));
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (results[i].state != ist::LinkState::kNear) continue;
+    ++comparison->apart;
+    comparison->largest =
+        std::max(comparison->largest, std::abs(results[i].distance - distances[i]));
+  }
+}
+#endif
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -152,12 +174,12 @@ int main(int argc, char** argv) {
     config.tolerance = tolerance;
     for (const char* motion : {"traj", "rand"}) {
       ist::ProximityQuery query(model, config);
-      std::vector<double> us, free_us, fcl_us;
+      std::vector<double> us, free_us;
       std::vector<ist::LinkProximity> results;
-      int apart = 0, count = 0;
-      double largest = 0.0;
+      Comparison fcl_comparison;
+      int count = 0;
       for (const ist::test::TruthCase& truth : ist::test::truth_cases(data, "mosd0", motion)) {
-        Clock::time_point start = Clock::now();
+        const Clock::time_point start = Clock::now();
         query.run(truth.X_FL, known, {&map}, &results);
         us.push_back(microseconds_since(start));
         const bool is_free =
@@ -167,27 +189,17 @@ int main(int argc, char** argv) {
         if (is_free) free_us.push_back(us.back());
         if (count++ >= queries) continue;
 #ifdef IST_PROXIMITY_HAS_FCL
-        start = Clock::now();
-        std::vector<double> distances;
-        for (std::size_t i = 0; i < results.size(); ++i) {
-          distances.push_back(fcl.distance(i, truth.X_FL[i]));
-        }
-        fcl_us.push_back(microseconds_since(start));
-        for (std::size_t i = 0; i < results.size(); ++i) {
-          if (results[i].state != ist::LinkState::kNear) continue;
-          ++apart;
-          largest = std::max(largest, std::abs(results[i].distance - distances[i]));
-        }
+        compare(&fcl, truth.X_FL, results, &fcl_comparison);
 #endif
       }
-      const double median = quantile(us, 0.5), fcl_median = quantile(fcl_us, 0.5);
+      const double median = quantile(us, 0.5), fcl_median = quantile(fcl_comparison.fcl_us, 0.5);
       std::printf(
           "| %.0f mm | %s | %zu | %.0f us | %.0f us | %zu | %.0f us | %.0f us | %.0f us | %.0f | "
           "%d "
           "| %.4f mm |\n",
           1e3 * tolerance, motion, us.size(), median, quantile(us, 0.99), free_us.size(),
-          quantile(free_us, 0.5), quantile(free_us, 0.99), fcl_median, fcl_median / median, apart,
-          1e3 * largest);
+          quantile(free_us, 0.5), quantile(free_us, 0.99), fcl_median, fcl_median / median,
+          fcl_comparison.apart, 1e3 * fcl_comparison.largest);
     }
   }
   return 0;

@@ -121,7 +121,7 @@ if(catkin_FOUND)
     get_filename_component(name ${source} NAME_WE)
     file(GLOB parts CONFIGURE_DEPENDS benchmark/ros/${name}/*.cpp)
     add_executable(benchmark_${name} EXCLUDE_FROM_ALL ${source} ${parts})
-    target_include_directories(benchmark_${name} PRIVATE benchmark test)
+    target_include_directories(benchmark_${name} PRIVATE benchmark src test)
     target_include_directories(benchmark_${name} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
     target_link_libraries(benchmark_${name} PRIVATE ist_proximity_ros)
     target_compile_definitions(benchmark_${name} PRIVATE

@@ -132,7 +132,7 @@ std::string describe(const ProximityArray& message) {
 
 class DodgeNode {
  public:
-  DodgeNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+  DodgeNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
       : DodgeNode(nh, private_nh, read_robot(nh)) {}
 
  private:

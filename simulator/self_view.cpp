@@ -72,6 +72,27 @@ std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, doub
   return count;
 }
 
+// A ball beside the forearm's tube, as seen from the camera, so that the gap is in view.
+// p_FC is the camera's position; the ball keeps `distance` [m] from the tube.
+Obstacle ball_at_forearm(const RobotDescription& robot, const Eigen::Vector3d& p_FC,
+                         double distance) {
+  const Arm arm(robot, demo_arm());
+  const auto is_forearm = [](const LinkDescription& l) { return l.name == "forearm_link"; };
+  const auto forearm = static_cast<std::size_t>(
+      std::find_if(robot.links.begin(), robot.links.end(), is_forearm) - robot.links.begin());
+  const double beside = 0.026 + distance + kBallRadius;
+  Obstacle ball;
+  ball.name = "ball";
+  ball.shape = Sphere{kBallRadius};
+  ball.path = [arm, forearm, beside, p_FC](double t) -> Eigen::Vector3d {
+    const Eigen::Isometry3d X_FL = arm.link_poses(positions(t))[forearm];
+    const Eigen::Vector3d p = X_FL * Eigen::Vector3d(0.0, 0.0, 0.170);
+    const Eigen::Vector3d side = X_FL.linear().col(2).cross(p - p_FC).normalized();
+    return p + beside * (side.z() < 0.0 ? -side : side);
+  };
+  return ball;
+}
+
 }  // namespace
 
 std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
@@ -83,25 +104,9 @@ std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
   camera.latency = config.latency;
   camera.period = config.camera_period;
 
-  const Arm model_arm(robot, demo_arm());
   std::vector<Obstacle> obstacles;
   if (config.ball_distance > 0.0) {
-    // Beside the forearm's tube, as seen from the camera, so that the gap is in view.
-    const auto is_forearm = [](const LinkDescription& l) { return l.name == "forearm_link"; };
-    const auto forearm = static_cast<std::size_t>(
-        std::find_if(robot.links.begin(), robot.links.end(), is_forearm) - robot.links.begin());
-    const double beside = 0.026 + config.ball_distance + kBallRadius;
-    const Eigen::Vector3d eye = camera.X_FC.translation();
-    Obstacle ball;
-    ball.name = "ball";
-    ball.shape = Sphere{kBallRadius};
-    ball.path = [model_arm, forearm, beside, eye](double t) -> Eigen::Vector3d {
-      const Eigen::Isometry3d X_FL = model_arm.link_poses(positions(t))[forearm];
-      const Eigen::Vector3d p = X_FL * Eigen::Vector3d(0.0, 0.0, 0.170);
-      const Eigen::Vector3d side = X_FL.linear().col(2).cross(p - eye).normalized();
-      return p + beside * (side.z() < 0.0 ? -side : side);
-    };
-    obstacles.push_back(ball);
+    obstacles.push_back(ball_at_forearm(robot, camera.X_FC.translation(), config.ball_distance));
   }
   const Obstacle* ball = obstacles.empty() ? nullptr : obstacles.data();
 

@@ -105,6 +105,17 @@ std::vector<Poses> demo_poses(const RobotDescription& robot, const RobotModel& m
   return poses;
 }
 
+// Each link anywhere in the synthetic scene.
+std::vector<Poses> synthetic_poses(std::size_t links, bool motion) {
+  std::mt19937_64 rng(1);
+  const std::size_t count = motion ? 4 : kSteps / 4;
+  std::vector<Poses> poses(count);
+  for (Poses& X_FL : poses) {
+    for (std::size_t i = 0; i < links; ++i) X_FL.push_back(synthetic_pose(&rng));
+  }
+  return motion ? interpolated(poses, 400) : poses;
+}
+
 // What touches, or what was gone through, has its own query, which does not depend on the tree.
 void find_free(HierarchyScene* scene) {
   ProximityQuery query(scene->model, query_config());
@@ -148,14 +159,7 @@ bool make_scene(const Options& options, const std::string& name, double max_erro
     robot.meshes = synthetic_meshes();
     scene->model = robot.pack(max_error);
     scene->clouds.push_back(ingested(synthetic_frame(640, 480)));
-    std::mt19937_64 rng(1);
-    const std::size_t count = motion ? 4 : kSteps / 4;
-    while (scene->poses.size() < count) {
-      Poses X_FL;
-      for (std::size_t i = 0; i < robot.meshes.size(); ++i) X_FL.push_back(synthetic_pose(&rng));
-      scene->poses.push_back(std::move(X_FL));
-    }
-    if (motion) scene->poses = interpolated(scene->poses, 400);
+    scene->poses = synthetic_poses(robot.meshes.size(), motion);
   }
   if (motion) scene->poses.resize(std::min(scene->poses.size(), kSteps));
   find_free(scene);

@@ -107,6 +107,18 @@ class Contact {
   double largest_ = 0.0;
 };
 
+// Adds the steps of the wrench of every link, and overwrites `counts` (by step and link) for it.
+void add_wrenches(const std::vector<Contact>& contacts, Noise* noise,
+                  std::vector<std::vector<bool>>* counts) {
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    std::vector<bool> of_link;
+    contacts[i].add_to(noise, &of_link);
+    for (std::size_t k = 0; k < counts->size(); ++k) {
+      (*counts)[k][i] = k < of_link.size() && of_link[k];
+    }
+  }
+}
+
 }  // namespace
 
 void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool is_free,
@@ -169,13 +181,7 @@ Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotMode
     }
   }
   measured.reference_variation = reference_variation(scene, counts);
-  for (std::size_t i = 0; i < links; ++i) {
-    std::vector<bool> of_link;
-    contacts[i].add_to(&measured.wrench, &of_link);
-    for (std::size_t k = 0; k < counts.size(); ++k) {
-      counts[k][i] = k < of_link.size() && of_link[k];
-    }
-  }
+  add_wrenches(contacts, &measured.wrench, &counts);
   measured.wrench_reference_variation = wrench_reference_variation(scene, *model, counts);
   return measured;
 }

@@ -19,6 +19,7 @@ using Points = std::vector<Eigen::Vector3d>;
 constexpr double kStep = 0.001;       // [m] that no point of the robot is moved farther in
 constexpr double kSpacing = 0.005;    // [m] about, between the points on analytic obstacles
 constexpr double kNeighbours = 0.03;  // [m] pixels nearer to each other are on one surface
+constexpr std::size_t kPoses = 2000;  // of the recorded motion
 
 CloudSnapshot ingested(const Points& points) {
   IngestConfig config;
@@ -187,9 +188,11 @@ std::vector<MovingScene> analytic_scenes() {
   return scenes;
 }
 
-std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
+namespace {
+
+// X_FL of each link, at each pose of the recorded motion.
+std::vector<std::vector<Eigen::Isometry3d>> recorded_motion(const std::filesystem::path& data) {
   const test::Npy poses = test::read_npy((data / "poses/traj.npy").string());
-  constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 25, kWidth = 640;
   std::vector<std::vector<Eigen::Isometry3d>> way(kPoses);
   for (std::size_t k = 0; k < kPoses; ++k) {
     for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
@@ -202,6 +205,14 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
       way[k].push_back(X);
     }
   }
+  return way;
+}
+
+}  // namespace
+
+std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
+  constexpr std::size_t kStretches = 10, kLength = 25, kWidth = 640;
+  const std::vector<std::vector<Eigen::Isometry3d>> way = recorded_motion(data);
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   std::ifstream file(data / "clouds/T_base_cam.txt");
   for (int i = 0; i < 16; ++i) file >> X_FS.matrix()(i / 4, i % 4);

@@ -59,7 +59,8 @@ sensor_msgs::PointCloud2 to_message(const Picture& picture) {
   message.point_step = sizeof(Eigen::Vector3f);
   message.row_step = message.width * message.point_step;
   message.data.resize(message.row_step * message.height);
-  std::memcpy(message.data.data(), picture.points.data(), message.data.size());
+  const void* points = picture.points.data();
+  std::memcpy(message.data.data(), points, message.data.size());
   return message;
 }
 

@@ -141,15 +141,15 @@ int pack(Options options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
-      "Packs the links of a robot (URDF) or one mesh with inner spheres, offline, into the cache "
-      "that the node reads. Exit code 1: something could not be packed.",
-      "pack_robot");
-  Options options;
-  options.model.cache_directory = ist::default_cache_directory();
-  declare(&app, &options);
-  CLI11_PARSE(app, argc, argv);
   try {
+    CLI::App app(
+        "Packs the links of a robot (URDF) or one mesh with inner spheres, offline, into the cache "
+        "that the node reads. Exit code 1: something could not be packed.",
+        "pack_robot");
+    Options options;
+    options.model.cache_directory = ist::default_cache_directory();
+    declare(&app, &options);
+    CLI11_PARSE(app, argc, argv);
     return pack(options);
   } catch (const std::exception& error) {
     std::cerr << "error: " << error.what() << '\n';

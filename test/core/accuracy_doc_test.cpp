@@ -62,8 +62,20 @@ void measure_synthetic(Measured* measured) {
 }
 
 // Cases without contact; the depth in contact has a test of its own (contact_depth_test).
-void measure_robot(const std::filesystem::path& data, Measured* measured) {
+void measure_cases(const std::vector<test::TruthCase>& cases, const CloudSnapshot& cloud,
+                   const QueryConfig& config, ProximityQuery* query, test::Accuracy* row) {
   const std::vector<bool> known(test::kPandaLinks, true);
+  std::vector<LinkProximity> results;
+  for (const test::TruthCase& truth : cases) {
+    query->run(truth.X_FL, known, {&cloud}, &results);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      if (truth.links[i].points_inside > 0) continue;
+      row->add(results[i], truth.links[i].distance, config.max_distance, kTruthRounding);
+    }
+  }
+}
+
+void measure_robot(const std::filesystem::path& data, Measured* measured) {
   std::vector<double> max_errors = {0.005};
   if (updating()) max_errors.push_back(0.002);
   for (const double max_error : max_errors) {
@@ -78,14 +90,7 @@ void measure_robot(const std::filesystem::path& data, Measured* measured) {
           config.max_distance = 10.0;
           config.tolerance = tolerance;
           ProximityQuery query(model, config);
-          std::vector<LinkProximity> results;
-          for (const test::TruthCase& truth : cases) {
-            query.run(truth.X_FL, known, {&cloud}, &results);
-            for (std::size_t i = 0; i < results.size(); ++i) {
-              if (truth.links[i].points_inside > 0) continue;
-              row.add(results[i], truth.links[i].distance, config.max_distance, kTruthRounding);
-            }
-          }
+          measure_cases(cases, cloud, config, &query, &row);
         }
       }
     }
