@@ -26,13 +26,4 @@ T lens_volume(T R, T r, T d) {
   return T(M_PI / 12.0) * s * s * (apart + T(2) * (R + r) - T(3) * (R - r) * q);
 }
 
-/// Where the lens is, as a share of the way from the centre of sphere R to that of sphere r: the
-/// middle of its thickness, and the smaller sphere's centre where the other one holds it.
-/// Continuous in the place that it stands for; 0 to 1.
-template <typename T>
-T lens_place(T R, T r, T d) {
-  if (!(d > T(0))) return R > r ? T(1) : T(0);
-  return std::min(std::max((d + R - r) / (T(2) * d), T(0)), T(1));
-}
-
 }  // namespace ist
