@@ -269,26 +269,6 @@ double Solid::support(const Eigen::Vector3d& n_L, double slack, double reached) 
   return farthest;
 }
 
-bool Solid::end_widths(const Eigen::Vector3d& n_L, const Eigen::Vector3d& p_L, double highest,
-                       const TriangleBvh::EndDepths& depths, int budget,
-                       TriangleBvh::EndDepths* widths) const {
-  widths->fill(0.0);
-  for (const Element& element : elements_) {
-    const Eigen::Vector3d n_E = element.X_EL.linear() * n_L, p_E = element.X_EL * p_L;
-    const double highest_E = highest - n_L.dot(element.X_LE.translation());
-    const TriangleBvh& surface = element.bvh.size() > 0 ? element.bvh : element.sides;
-    if (surface.size() > 0) {
-      if (!surface.end_widths(n_E, p_E, highest_E, depths, &budget, widths)) return false;
-      continue;
-    }
-    const double depth = highest_E - primitive_support(element.primitive, n_E);
-    for (std::size_t i = 0; i < depths.size(); ++i) {
-      if (depth <= depths[i]) (*widths)[i] = std::numeric_limits<double>::infinity();
-    }
-  }
-  return true;
-}
-
 BoxDistance Solid::distance_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OL,
                                    double max_distance) const {
   BoxDistance best;

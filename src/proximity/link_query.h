@@ -130,7 +130,6 @@ class LinkQuery {
   Eigen::Vector3d way_from_sphere(std::int32_t leaf, const Eigen::Vector3d& p_L) const;
   void evaluate_waiting();
   void drop_far_waiting();
-  void rule_out_waiting();
 
   // Of boxes, in link_boxes.cpp.
   double depth_threshold() const;

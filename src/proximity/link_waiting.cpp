@@ -1,8 +1,6 @@
 // Points that a descent has found and that wait for their exact distance.
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 
 #include "proximity/link_query.h"
@@ -11,9 +9,6 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// So many points that may be nearest are worth a look at where the link ends.
-constexpr std::size_t kManyWaiting = 16;
 
 }  // namespace
 
@@ -79,13 +74,9 @@ void LinkQuery::keep_promise() {
 // The most promising first: most of the others are spared.
 void LinkQuery::evaluate_waiting() {
   keep_promise();
-  for (int evaluated = 0;; ++evaluated) {
+  while (true) {
     drop_far_waiting();
     if (waiting_count_ == 0) return;
-    if (evaluated == 2 && waiting_count_ >= kManyWaiting) {
-      rule_out_waiting();
-      continue;
-    }
     const auto last = waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_count_) - 1;
     std::iter_swap(
         last, std::min_element(waiting_.begin(), last + 1, [](const Waiting& a, const Waiting& b) {
@@ -112,51 +103,6 @@ void LinkQuery::drop_far_waiting() {
     const std::uint32_t key = key_of(point.tile, point.lane);
     Visit& visit = visit_of(key);
     if (is_visited(visit, key)) visit.epoch = 0;
-  }
-  waiting_count_ = left;
-}
-
-// Where obstacles are flat, or far, many points are about equally near as far as spheres can tell.
-// The link's surface itself tells more: it ends in a plane across the way to the nearest point, and
-// what of it is that near the plane is not wide. A point is at least as far as from a stack of
-// discs, each as wide as the surface is down to the next one.
-void LinkQuery::rule_out_waiting() {
-  if (!(nearest_.exact.distance > 0.0) || nearest_.exact.distance == kInfinity) return;
-  const Solid& solid = link_->solid;
-  const Eigen::Vector3d n = nearest_.exact.normal, end = nearest_.exact.witness;
-  const double limit = threshold(), highest = solid.support(n, 0.0, n.dot(end));
-  std::array<double, kMaxWaiting> ahead, aside_sq;  // [m], [m^2] of the plane and of its axis
-  double deepest = 0.0;
-  for (std::size_t i = 0; i < waiting_count_; ++i) {
-    const Eigen::Vector3d from_end = X_LO_ * point_O(waiting_[i].tile, waiting_[i].lane) - end;
-    const double along = n.dot(from_end);
-    ahead[i] = along + n.dot(end) - highest - kRounding;
-    aside_sq[i] = (from_end - along * n).squaredNorm();
-    deepest = std::max(deepest, limit - ahead[i]);
-  }
-  deepest = (1.0 + 1e-9) * std::max(deepest, kRounding);  // rounding must not leave it short
-  TriangleBvh::EndDepths depths, widths;
-  for (std::size_t k = depths.size(); k-- > 0; deepest *= 0.25) depths[k] = deepest;
-  if (!solid.end_widths(n, end, highest, depths, static_cast<int>(4 * waiting_count_), &widths)) {
-    return;
-  }
-  std::size_t left = 0;
-  for (std::size_t i = 0; i < waiting_count_; ++i) {
-    double bound_sq = ahead[i] + depths.back();
-    bound_sq *= bound_sq;
-    const double aside = std::max(std::sqrt(aside_sq[i]) - kRounding, 0.0);
-    for (std::size_t k = 0; k < depths.size(); ++k) {
-      const double above = std::max(ahead[i] + (k > 0 ? depths[k - 1] : 0.0), 0.0);
-      const double beyond = std::max(aside - widths[k], 0.0);
-      bound_sq = std::min(bound_sq, above * above + beyond * beyond);
-    }
-    const double bound = std::sqrt(bound_sq);
-    if (bound >= limit) {
-      drop(bound);
-      first_visit(waiting_[i].tile, waiting_[i].lane);  // holds for all spheres: done with
-    } else {
-      waiting_[left++] = waiting_[i];
-    }
   }
   waiting_count_ = left;
 }

@@ -156,37 +156,6 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
   EXPECT_EQ(TriangleBvh().support_within({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
 }
 
-TEST(TriangleBvh, EndsAreNoWiderThanTold) {
-  test::Rng rng(6);
-  for (const TriangleMesh& mesh : meshes()) {
-    const TriangleBvh bvh(mesh);
-    for (int i = 0; i < 30; ++i) {
-      const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
-      const Eigen::Vector3d on_line = test::random_vector(&rng, 0.1);
-      const double highest = bvh.support(n), deepest = test::uniform(&rng, 0.001, 0.1);
-      const TriangleBvh::EndDepths depths = {deepest / 64, deepest / 16, deepest / 4, deepest};
-      TriangleBvh::EndDepths widths = {};
-      int budget = 1000000;
-      ASSERT_TRUE(bvh.end_widths(n, on_line, highest, depths, &budget, &widths));
-      for (int sample = 0; sample < 2000; ++sample) {
-        const auto t = static_cast<std::size_t>(sample) % mesh.triangles.size();
-        const double u = test::uniform(&rng, 0, 1), v = test::uniform(&rng, 0, 1 - u);
-        const Eigen::Vector3d x =
-            mesh.corner(t, 0) * (1 - u - v) + mesh.corner(t, 1) * u + mesh.corner(t, 2) * v;
-        const Eigen::Vector3d from_line = x - on_line;
-        const double aside = (from_line - n.dot(from_line) * n).norm();
-        for (std::size_t k = 0; k < depths.size(); ++k) {
-          if (highest - n.dot(x) > depths[k]) continue;
-          ASSERT_LE(aside, widths[k] + 1e-9);
-        }
-      }
-      ASSERT_LE(widths.front(), widths.back());
-      budget = 0;
-      ASSERT_FALSE(bvh.end_widths(n, on_line, highest, depths, &budget, &widths));
-    }
-  }
-}
-
 TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {
   test::Rng rng(2);
   for (const TriangleMesh& mesh : meshes()) {

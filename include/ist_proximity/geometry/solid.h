@@ -80,12 +80,6 @@ class Solid {
   double support(const Eigen::Vector3d& n_L, double slack = 0.0,
                  double reached = -std::numeric_limits<double>::infinity()) const;
 
-  /// How wide the solid is near its end along a direction, see TriangleBvh::end_widths; inf for
-  /// primitives that are not flat. False: it takes more triangles than the budget to tell.
-  bool end_widths(const Eigen::Vector3d& n_L, const Eigen::Vector3d& p_L, double highest,
-                  const TriangleBvh::EndDepths& depths, int budget,
-                  TriangleBvh::EndDepths* widths) const;
-
   /// The nearest pair of points of the solid and a solid box, if nearer than `max_distance` [m];
   /// `lower_bound` holds in any case.
   /// 0 where they touch or overlap; only a box within a mesh, which touches no triangle of it, has

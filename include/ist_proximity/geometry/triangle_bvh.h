@@ -70,20 +70,6 @@ class TriangleBvh {
   double support_within(const Eigen::Vector3d& center_M, double radius, const Eigen::Vector3d& n_M,
                         double limit) const;
 
-  /// How wide the surface is near its end along a direction: for each depth, how far from a line
-  /// along the direction any of its points is that is no deeper below `highest`.
-  /// @param n_M      unit
-  /// @param p_M      on the line
-  /// @param highest  [m] no point has a larger n.x
-  /// @param depths   [m] ascending
-  /// @param budget   triangles that may be looked at; what was is taken off
-  /// @param widths   [m] by depth, raised where they are less
-  /// @returns false when there are too many triangles.
-  static constexpr std::size_t kEndDepths = 4;
-  using EndDepths = std::array<double, kEndDepths>;
-  bool end_widths(const Eigen::Vector3d& n_M, const Eigen::Vector3d& p_M, double highest,
-                  const EndDepths& depths, int* budget, EndDepths* widths) const;
-
   /// Generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. By a hierarchical expansion of second order (Barill et al. 2018); error
   /// below 0.01.
