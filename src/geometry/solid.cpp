@@ -319,11 +319,6 @@ bool Solid::is_inside(const Eigen::Vector3d& p_L) const {
   });
 }
 
-bool Solid::has_holes() const {
-  return std::any_of(elements_.begin(), elements_.end(),
-                     [](const Element& element) { return !element.is_closed; });
-}
-
 std::size_t Solid::triangle_count() const {
   std::size_t count = 0;
   for (const Element& element : elements_) count += element.bvh.size();

@@ -49,7 +49,7 @@ double bulge(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3
 double protrusion(const Solid& solid, const InnerSphere& sphere) {
   const double depth = -solid.signed_distance(sphere.center).distance;
   double farthest = std::max(0.0, sphere.radius - depth);
-  if (!solid.has_holes()) return farthest;
+  if (solid.is_closed()) return farthest;
   for (int i = 0; i < kDirections; ++i) {
     farthest = std::max(farthest, bulge(solid, sphere, direction(i)));
   }

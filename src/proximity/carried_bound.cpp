@@ -76,7 +76,7 @@ double LinkExtent::motion(const Eigen::Isometry3d& X_FA, const Eigen::Isometry3d
 
 CarriedBound::CarriedBound(const LinkModel& link)
     : extent_(link),
-      least_beyond_(link.solid.has_holes() ? link.tree.interior_gap() : -kInfinity) {}
+      least_beyond_(!link.solid.is_closed() ? link.tree.interior_gap() : -kInfinity) {}
 
 void CarriedBound::prove(std::uint64_t clouds, const Eigen::Isometry3d& X_FL, double bound,
                          double beyond) {

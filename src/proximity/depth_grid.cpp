@@ -19,7 +19,7 @@ constexpr double kRounding = 1e-12;
 DepthGrid::DepthGrid(const LinkModel& link)
     : solid_(&link.solid),
       tells_surface_(link.solid.is_one_mesh()),
-      has_holes_(link.solid.has_holes()) {
+      has_holes_(!link.solid.is_closed()) {
   const Eigen::AlignedBox3d box = box_of(link);
   const Eigen::Vector3d sizes = box.sizes();
   const auto cells = [&](int axis) {

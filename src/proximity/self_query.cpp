@@ -26,7 +26,7 @@ class PairSearch {
         X_BA_(X_BA),
         X_AB_(X_BA.inverse()),
         config_(config),
-        has_holes_(a.solid.has_holes() || b.solid.has_holes()),
+        has_holes_(!a.solid.is_closed() || !b.solid.is_closed()),
         queue_(*queue) {}
 
   void run() {

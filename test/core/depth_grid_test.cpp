@@ -59,7 +59,7 @@ TEST(DepthGrid, IsNeverAboveTheTruth) {
     }
     EXPECT_GT(known, 300);
     EXPECT_GT(close, 1000);
-    if (link.solid.is_one_mesh()) EXPECT_EQ(sides > 0, !link.solid.has_holes());
+    if (link.solid.is_one_mesh()) EXPECT_EQ(sides > 0, link.solid.is_closed());
   }
 }
 

@@ -88,8 +88,8 @@ class Solid {
   BoxDistance distance_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OL,
                               double max_distance) const;
 
-  /// Whether every element is a primitive or a mesh without holes: then its inside ends at its
-  /// surface and nowhere else.
+  /// Whether every element is a primitive or a closed mesh. The inside of a mesh with holes ends
+  /// in the holes too, not at its surface alone.
   bool is_closed() const;
 
   /// Whether p_L is inside any element.
@@ -98,8 +98,6 @@ class Solid {
   /// Whether it is one mesh and nothing else.
   bool is_one_mesh() const { return elements_.size() == 1 && elements_[0].bvh.size() > 0; }
   bool empty() const { return elements_.empty(); }
-  /// Whether any element is a mesh that is not closed.
-  bool has_holes() const;
   std::size_t triangle_count() const;
 
  private:
