@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "ist_proximity/packing/packing.h"
-#include "ist_proximity/tree/tree_config.h"
+#include "ist_proximity/tree/inner_sphere_tree.h"
 
 namespace ist {
 
