@@ -1,4 +1,5 @@
 #include "obstacle.h"
+#include "internal/geometry/solid_queries.h"
 
 #include <algorithm>
 #include <cmath>
@@ -43,7 +44,7 @@ double distance(const Solid& solid, const Eigen::Isometry3d& X_FL, const Obstacl
   }
   const Eigen::Vector3d half = 0.5 * std::get<Box>(obstacle.shape).size;
   const Eigen::AlignedBox3d box(Eigen::Vector3d(-half), half);
-  return solid.distance_to_box(box, X_FO.inverse() * X_FL, max_distance).distance;
+  return distance_to_box(solid, box, X_FO.inverse() * X_FL, max_distance).distance;
 }
 
 }  // namespace ist::sim

@@ -1,4 +1,5 @@
 #include "scene.h"
+#include "internal/geometry/solid_queries.h"
 
 #include <algorithm>
 #include <cmath>
@@ -83,7 +84,7 @@ bool keeps_rules(const Obstacle& body, const Simulation& world, const std::vecto
     if ((p - kShoulder).norm() < rules.hub_clearance + body.radius()) return false;
     const double near = rules.base_clearance + body.radius();
     for (const Solid& solid : immovable) {
-      if (solid.distance_outside(p, near).distance < near) return false;
+      if (distance_outside(solid, p, near).distance < near) return false;
     }
     for (const Obstacle& other : world.obstacles()) {
       const Eigen::Vector3d p_O = other.pose(0.0).inverse() * p;

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
 namespace ist {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
 namespace ist {
 

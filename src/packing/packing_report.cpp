@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "internal/geometry/solid_queries.h"
 #include "sphere_search.h"
 
 namespace ist {
@@ -36,7 +37,7 @@ double bulge(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3
   for (int i = 0; i < kMarchSteps; ++i) {
     const Eigen::Vector3d p = sphere.center + way * ray;
     const double distance =
-        std::abs(solid.distance_outside(p, std::numeric_limits<double>::infinity()).distance);
+        std::abs(distance_outside(solid, p, std::numeric_limits<double>::infinity()).distance);
     const double nearer = sphere.radius + distance - way;
     // Along a ray this does not grow.
     if (nearer <= kTouch) return 0.0;

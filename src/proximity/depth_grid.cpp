@@ -18,7 +18,7 @@ constexpr double kRounding = 1e-12;
 
 DepthGrid::DepthGrid(const LinkModel& link)
     : solid_(&link.solid),
-      tells_surface_(link.solid.is_one_mesh()),
+      tells_surface_(is_one_mesh(link.solid)),
       has_holes_(!link.solid.is_closed()) {
   const Eigen::AlignedBox3d box = box_of(link);
   const Eigen::Vector3d sizes = box.sizes();
@@ -74,7 +74,7 @@ bool DepthGrid::look(const Eigen::Vector3d& p_L, Found* found) const {
 DepthGrid::Found DepthGrid::measure(const Eigen::Vector3d& p_L) {
   const Cell cell = this->cell(p_L);
   float& value = values_[cell.index];
-  if (!(value < kUnknown)) value = round_down(solid_->depth(cell.middle, -1.0).floor);
+  if (!(value < kUnknown)) value = round_down(point_depth(*solid_, cell.middle, -1.0).floor);
   return tell(p_L, cell);
 }
 

@@ -54,7 +54,7 @@ void LinkQuery::consider_box(std::int32_t tile, int lane, bool is_outside) {
   if (statistics_ != nullptr) ++statistics_->exact_evaluations;
   const double limit = std::min(nearest_.exact.distance, range() + rounding_);
   const BoxDistance found =
-      link_->solid.distance_to_box(box, X_OL_, is_outside ? limit : kInfinity);
+      distance_to_box(link_->solid, box, X_OL_, is_outside ? limit : kInfinity);
   if (found.distance > 0.0) {
     if (!is_outside) {  // as a whole it may be inside
       const Eigen::Vector3d middle = box.center();
@@ -174,7 +174,7 @@ void LinkQuery::find_overlap_in_tile(std::int32_t tile) {
     if (outer > near) continue;
     ++statistics_->exact_evaluations;
     const BoxDistance found =
-        link_->solid.distance_to_box(box, X_OL_, std::max(nearest_.exact.distance, kTouching));
+        distance_to_box(link_->solid, box, X_OL_, std::max(nearest_.exact.distance, kTouching));
     if (found.distance > 0.0 && (outer > interior || !link_->solid.is_inside(middle_L))) {
       take_outside(found, tile, lane);
       continue;
@@ -195,7 +195,7 @@ LinkQuery::BoxCell LinkQuery::make_cell(const Eigen::AlignedBox3d& box, std::int
   ++statistics_->exact_evaluations;
   const SignedDistance measured = link_->solid.signed_distance(p_L);
   take(measured, p_L, p_O, tile, lane);
-  return {box, link_->solid.distance_floor(p_L, measured) - radius_of(box)};
+  return {box, distance_floor(link_->solid, p_L, measured) - radius_of(box)};
 }
 
 // Best first: the part that may be deepest is halved across its longest edge, until no part can be

@@ -122,7 +122,7 @@ void LinkQuery::find_depth_in_tile(std::int32_t tile, double tile_bound) {
     ++statistics_->exact_evaluations;
     DepthGrid::Found found;
     grid_.look(p_L[i], &found);
-    const PointDepth depth = link_->solid.depth(p_L[i], -threshold(), found.near);
+    const PointDepth depth = point_depth(link_->solid, p_L[i], -threshold(), found.near);
     known_.keep(index, KnownDistances::Kind::kPoint, key_of(tile, next), p_L[i], depth.floor);
     if (depth.exact.distance < kInfinity) {
       take(depth.exact, p_L[i], point_O(tile, next), tile, next);

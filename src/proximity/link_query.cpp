@@ -138,7 +138,7 @@ void LinkQuery::consider(std::int32_t tile, int lane, bool is_outside, double be
   if (!is_outside) return take(link_->solid.signed_distance(p_L), p_L, p_O, tile, lane);
   double floor;
   const SignedDistance exact =
-      link_->solid.distance_outside(p_L, limit, toward, kPointShare * config_.tolerance, &floor);
+      distance_outside(link_->solid, p_L, limit, toward, kPointShare * config_.tolerance, &floor);
   known_.keep(index, KnownDistances::Kind::kOutside, key, p_L, floor);
   if (floor < exact.distance) evaluated_ = std::min(evaluated_, floor);
   take(exact, p_L, p_O, tile, lane);
@@ -181,7 +181,7 @@ void LinkQuery::on_aim(void* context) {
   self->aim_L_ = self->nearest_.exact.normal;
   const Eigen::Vector3f n = self->aim_L_.cast<float>();
   const double reached = self->aim_L_.dot(self->nearest_.exact.witness);
-  const double most = self->link_->solid.support(self->aim_L_, kSupportSlack, reached);
+  const double most = support(self->link_->solid, self->aim_L_, kSupportSlack, reached);
   self->supports_.aim(n.data(), round_up(most));
   self->set_planes(self->traversal_);
 }

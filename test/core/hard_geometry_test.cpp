@@ -6,7 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/closest_point_on_triangle.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 #include "support/oracle.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "support/hostile_meshes.h"
 #include "support/scene.h"
 

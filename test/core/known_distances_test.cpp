@@ -1,6 +1,7 @@
 // What is known about places in a link's frame, carried to where points have moved since.
 
 #include "proximity/known_distances.h"
+#include "internal/geometry/solid_queries.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +9,6 @@
 #include <limits>
 #include <vector>
 
-#include "ist_proximity/geometry/solid.h"
 #include "support/meshes.h"
 #include "support/scene.h"
 
@@ -49,7 +49,7 @@ TEST(KnownDistances, AreNeverAboveTheTruth) {
     Eigen::Vector3d& p = points[i];
     p += test::random_vector(&rng, std::pow(10.0, test::uniform(&rng, -6, -2)));
     const double floor = known.at(1, Kind::kPoint, i, p);
-    const PointDepth depth = solid.depth(p, -1.0);
+    const PointDepth depth = point_depth(solid, p, -1.0);
     ASSERT_LE(floor, depth.exact.distance + 1e-12);
     told += std::isfinite(floor) ? 1 : 0;
     if (step % 3 == 0) known.keep(1, Kind::kPoint, i, p, depth.floor);

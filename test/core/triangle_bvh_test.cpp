@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
 #include <gtest/gtest.h>
 
@@ -137,7 +137,7 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
       const Eigen::Vector3d center = test::random_vector(&rng, 0.2);
       const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
       const double radius = test::uniform(&rng, 0.005, 0.2);
-      const double reach = bvh.support_within(center, radius, n, kInfinity);
+      const double reach = bvh.support_in_sphere(center, radius, n, kInfinity);
       double sampled = -kInfinity;
       for (int sample = 0; sample < 4000; ++sample) {
         const auto t = static_cast<std::size_t>(sample) % mesh.triangles.size();
@@ -148,12 +148,12 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
       }
       ASSERT_GE(reach, sampled - 1e-12);
       ASSERT_LE(reach, radius + 1e-12);
-      ASSERT_EQ(bvh.support_within(center, radius, n, reach - 1e-6),
+      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, reach - 1e-6),
                 reach == -kInfinity ? -kInfinity : kInfinity);
-      ASSERT_EQ(bvh.support_within(center, radius, n, reach), reach);
+      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, reach), reach);
     }
   }
-  EXPECT_EQ(TriangleBvh().support_within({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
+  EXPECT_EQ(TriangleBvh().support_in_sphere({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
 }
 
 TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "internal/geometry/relative_pose.h"
+#include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -149,7 +150,7 @@ SelfFilter::Verdict SelfFilter::ask_tree(const PosedLink& link, const Eigen::Vec
 bool SelfFilter::ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L) const {
   const LinkModel& model = *link.model;
   const double just_beyond = padding_ + kRounding;
-  if (model.solid.distance_outside(p_L, just_beyond).distance <= padding_) return true;
+  if (distance_outside(model.solid, p_L, just_beyond).distance <= padding_) return true;
   // Beyond the padding from the surface: outside, where the tree can tell, or deep inside.
   const double gap = model.tree.interior_gap();
   return model.tree.cover_distance(p_L, gap) <= gap && model.solid.is_inside(p_L);

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "internal/geometry/boundary_edges.h"
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
 

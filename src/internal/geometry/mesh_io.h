@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
 
