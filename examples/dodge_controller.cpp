@@ -20,7 +20,7 @@ Eigen::VectorXd commanded(const ControlledArm& arm, const std::vector<double>& a
   return q;
 }
 
-/// a . x >= b, which gives way a little where `softness` is not 0.
+/// The constraint a . x >= b, which is soft where `softness` is not 0.
 struct Constraint {
   Eigen::VectorXd a;
   double b = 0.0;
@@ -28,7 +28,8 @@ struct Constraint {
   double force = 0.0;  // Lagrange multiplier
 };
 
-/// The x nearest to `wanted` that keeps the constraints: Hildreth's method on the dual problem.
+/// The x nearest to `wanted` that satisfies the constraints, by Hildreth's method on the dual
+/// problem.
 Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint>* constraints) {
   Eigen::VectorXd x = wanted;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
@@ -43,7 +44,7 @@ Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint
   return x;
 }
 
-/// Toward the goal; all joints arrive together.
+/// The task's velocity: straight to the goal, so that all joints arrive together.
 Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double smallest_bound,
                        const DodgeConfig& config) {
   const Eigen::VectorXd wanted = config.task_gain * (goal - q);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kTruthRange = 10.0;  // [m]
 
-/// A reading of nothing near: for an arm that is blind, or undisturbed.
+/// A reading without obstacles, for an arm that is blind or undisturbed.
 example::Reading nothing_near() {
   example::Reading reading;
   reading.is_ok = true;
@@ -22,7 +22,7 @@ example::Reading nothing_near() {
   return reading;
 }
 
-/// Deviation of the accelerations from their own mean over 0.1 s.
+/// Accumulates the deviation of the accelerations from their moving average over 0.1 s.
 double noise(const std::vector<Eigen::VectorXd>& accelerations) {
   constexpr std::size_t kHalf = 50;  // steps
   if (accelerations.size() <= 2 * kHalf) return 0.0;
@@ -47,7 +47,7 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(at)];
 }
 
-/// Distances between the robot's own links.
+/// Measures the distances between the robot's own links.
 class SelfWatch {
  public:
   SelfWatch(const std::shared_ptr<const RobotModel>& model, const Kinematics& kinematics)

@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// Sorts a mesh's triangles into an 8-wide tree: three median splits a level.
+/// Builds an 8-wide hierarchy from the root down, by three levels of median splits per node.
 class TriangleBvhBuilder {
  public:
   TriangleBvhBuilder(const TriangleMesh& mesh, TriangleBvh* bvh) : mesh_(mesh), bvh_(*bvh) {}

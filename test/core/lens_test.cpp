@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-// Both spheres' sections, along the line of their centres.
+// The volume of the intersection, integrated along the line of the centres.
 double integrated(double R, double r, double d) {
   const double low = std::max(-R, d - r), high = std::min(R, d + r);
   if (high <= low) return 0.0;
@@ -63,8 +63,8 @@ TEST(Lens, GrowsSmoothlyFromTouchToContainment) {
     double slope_before = 0.0, before = 0.0;
     for (double d = R + r + kStep; d >= 0.0; d -= kStep) {
       const double now = lens_volume(R, r, d), slope = (now - before) / kStep;
-      // No face between spheres is larger than the smaller sphere's equator, nor grows faster than
-      // it.
+      // The slope is the area of the section between the spheres: no larger than the smaller
+      // sphere's equator, nor does it grow faster.
       EXPECT_LE(slope, M_PI * r * r * (1.0 + 1e-6));
       EXPECT_LE(std::abs(slope - slope_before), 4.0 * M_PI * r * kStep) << d;
       before = now;

@@ -82,7 +82,8 @@ TEST(Solid, UnionTakesTheNearestOutsideAndTheDeepestInside) {
   EXPECT_NEAR(solid.signed_distance({0.15, 0, 0}).distance, -0.1, 1e-15);
 }
 
-// With and without holes, alone and together: the depth where it may matter, a bound elsewhere.
+// Solids with and without holes, of one element and of several: the exact depth where it is asked
+// for, a bound elsewhere.
 TEST(Solid, DepthEqualsTheSignedDistanceWhereItIsAsked) {
   test::Rng rng(8);
   const GeometryElement closed{test::box({0.2, 0.2, 0.4}), Eigen::Isometry3d::Identity(), "box"};

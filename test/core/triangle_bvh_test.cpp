@@ -51,7 +51,7 @@ TEST(TriangleBvh, ClosestPointKeepsToItsRange) {
   EXPECT_TRUE(std::isinf(TriangleBvh().closest({0, 0, 0}).distance_sq));
 }
 
-// Calls check(bvh, place, direction, distance) for places about all meshes.
+// Calls check(bvh, point, direction, distance) for points about all meshes.
 template <typename Check>
 void for_each_place(test::Rng* rng, const Check& check) {
   for (const TriangleMesh& mesh : meshes()) {
@@ -137,7 +137,7 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
       const Eigen::Vector3d center = test::random_vector(&rng, 0.2);
       const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
       const double radius = test::uniform(&rng, 0.005, 0.2);
-      const double reach = bvh.support_in_sphere(center, radius, n, kInfinity);
+      const double support = bvh.support_in_sphere(center, radius, n, kInfinity);
       double sampled = -kInfinity;
       for (int sample = 0; sample < 4000; ++sample) {
         const auto t = static_cast<std::size_t>(sample) % mesh.triangles.size();
@@ -146,11 +146,11 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
                                   mesh.corner(t, 2) * v - center;
         if (x.norm() <= radius) sampled = std::max(sampled, n.dot(x));
       }
-      ASSERT_GE(reach, sampled - 1e-12);
-      ASSERT_LE(reach, radius + 1e-12);
-      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, reach - 1e-6),
-                reach == -kInfinity ? -kInfinity : kInfinity);
-      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, reach), reach);
+      ASSERT_GE(support, sampled - 1e-12);
+      ASSERT_LE(support, radius + 1e-12);
+      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, support - 1e-6),
+                support == -kInfinity ? -kInfinity : kInfinity);
+      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, support), support);
     }
   }
   EXPECT_EQ(TriangleBvh().support_in_sphere({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
