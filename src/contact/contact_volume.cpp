@@ -8,6 +8,8 @@
 #include "contact/kept_share.h"
 #include "contact/lens_sum.h"
 #include "internal/cloud/bounding_sphere.h"
+#include "internal/cloud/box_bvh.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 namespace {
@@ -47,7 +49,7 @@ class LinkContact {
     const Eigen::Isometry3d &X_FO = cloud.coarse.X_FO(), X_LO = X_LF * X_FO;
     const double radius = point_sphere_radius(cloud);
     visit_tiles(
-        cloud.coarse,
+        cloud.coarse.bvh(),
         [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const PointTile& tile) {
           for (int k = 0; k < tile.count; ++k) {
@@ -58,7 +60,7 @@ class LinkContact {
   }
 
   void boxes(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF) {
-    const BoxIndex& index = *cloud.boxes;
+    const BoxBvh& index = cloud.boxes->bvh();
     const Eigen::Isometry3d X_LO = X_LF * cloud.X_FM * Eigen::Translation3d(index.origin());
     const double cell = std::max(cloud.thinning, std::cbrt(body_.volume / kCellsPerLink));
     visit_tiles(

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "internal/cloud/point_bvh.h"
 #include "ist_proximity/contact/contact_volume.h"
 
 namespace ist {
@@ -47,7 +48,7 @@ double kept_share(const Eigen::Vector3d& p_F, double radius, SnapshotSpan clouds
   const auto r = static_cast<float>(radius);
   float shared = 0.0F;
   for (const CloudSnapshot* cloud : clouds) {
-    const PointIndex& index = cloud->coarse;
+    const PointBvh& index = cloud->coarse.bvh();
     if (index.empty()) continue;
     const auto R = static_cast<float>(point_sphere_radius(*cloud));
     const float reach = (R + r) * (R + r);

@@ -45,7 +45,7 @@ Eigen::Vector3d closest_on_sliver(const Eigen::Vector3d& p, const Eigen::Vector3
   const double area = n.norm();
   if (!(area > kNoArea * longest_sq)) return nearest;
   const Eigen::Vector3d normal = n / area, off = p - nearest;
-  const Eigen::Vector3d projected = p - normal.dot(off) * normal;
+  Eigen::Vector3d projected = p - normal.dot(off) * normal;
   if ((projected - nearest).squaredNorm() * longest_sq > area * area) return nearest;
   for (std::size_t k = 0; k < 3; ++k) {
     const Eigen::Vector3d edge = *corner[k + 1] - *corner[k];

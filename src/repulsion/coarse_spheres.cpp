@@ -2,6 +2,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/bvh/box_node.h"
 #include "ist_proximity/repulsion/repulsion.h"
 
 namespace ist {
