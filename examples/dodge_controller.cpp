@@ -45,8 +45,8 @@ Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint
 }
 
 /// The task's velocity: straight to the goal, so that all joints arrive together.
-Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double smallest_bound,
-                       const DodgeConfig& config) {
+Eigen::VectorXd task_velocity(const Eigen::VectorXd& q, const Eigen::VectorXd& goal,
+                              double smallest_bound, const DodgeConfig& config) {
   const Eigen::VectorXd wanted = config.task_gain * (goal - q);
   const double share =
       (smallest_bound - config.stop_distance) / (config.slow_distance - config.stop_distance);
@@ -60,8 +60,8 @@ void add_joint_limits(const ControlledArm& arm, const Eigen::VectorXd& q, const 
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const Kinematics::Joint& joint =
         arm.kinematics.joints()[arm.joints[static_cast<std::size_t>(j)]];
-    const auto bound = [&](double room) {
-      return std::clamp(config.limit_gain * room, 0.0, config.max_joint_speed);
+    const auto bound = [&](double distance) {
+      return std::clamp(config.limit_gain * distance, 0.0, config.max_joint_speed);
     };
     Constraint c;
     c.a = Eigen::VectorXd::Unit(q.size(), j);
@@ -136,7 +136,7 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
     constraints.push_back(c);
   }
   add_joint_limits(arm, q, config, &constraints);
-  return nearest_to(toward(q, goal, smallest_bound, config), &constraints);
+  return nearest_to(task_velocity(q, goal, smallest_bound, config), &constraints);
 }
 
 }  // namespace ist::example

@@ -82,7 +82,7 @@ Perception::Perception(std::shared_ptr<const RobotModel> model, const ClosedLoop
 }
 
 bool Perception::has_seen() const {
-  return std::all_of(seen_.begin(), seen_.end(), [](bool seen) { return seen; });
+  return std::all_of(seen_.begin(), seen_.end(), [](bool has_image) { return has_image; });
 }
 
 void Perception::look(Simulation* world) {

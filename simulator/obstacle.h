@@ -19,7 +19,7 @@ struct Obstacle {
   Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();  ///< [m] its centre
   double start = 0.0;   ///< [s] when the motion from `from` begins; it ends at `to`
   double speed = 0.0;   ///< [m/s] 0: it stays at `from`
-  double repeat = 0.0;  ///< [s] > 0: period after which the motion starts anew
+  double repeat = 0.0;  ///< [s] > 0: after this time it moves back, then forth again, and so on
 
   /// The centre [m] at a time [s], if set: it replaces the line.
   std::function<Eigen::Vector3d(double)> path;

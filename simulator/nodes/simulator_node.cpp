@@ -68,9 +68,9 @@ visualization_msgs::Marker to_marker(const Obstacle& obstacle, double time) {
   marker.ns = obstacle.name;
   marker.pose = tf2::toMsg(obstacle.pose(time));
   Eigen::Vector3d size;
-  if (const auto* ball = std::get_if<Sphere>(&obstacle.shape)) {
+  if (const auto* sphere = std::get_if<Sphere>(&obstacle.shape)) {
     marker.type = visualization_msgs::Marker::SPHERE;
-    size.setConstant(2.0 * ball->radius);
+    size.setConstant(2.0 * sphere->radius);
   } else {
     marker.type = visualization_msgs::Marker::CUBE;
     size = std::get<Box>(obstacle.shape).size;

@@ -52,7 +52,7 @@ PointDepth point_depth(const Solid& solid, const Eigen::Vector3d& p_L, double mi
       result.exact = to_link_frame(element, candidate);
     }
   }
-  // Where nothing is deeper than `min_depth`, an element whose search ended early may be deepest.
+  // If nothing is deeper than `min_depth`, an element whose search ended early may be the deepest.
   if (!is_complete && result.exact.distance >= -min_depth) result.exact = SignedDistance();
   return result;
 }

@@ -33,7 +33,7 @@ double triangle_support(const TriangleBvh::Triangle& t, const Eigen::Vector3d& c
   return std::min(corners, plane * cosine + std::sqrt((radius - plane) * (radius + plane)) * sine);
 }
 
-// Of each child's box: the squared distance from a point, and the support relative to it.
+// For each child's box, the squared distance from a point and the support relative to that point.
 struct ChildBounds {
   ChildBounds(const TriangleBvh::Boxes& boxes, const Eigen::Vector3d& center,
               const Eigen::Vector3d& n) {

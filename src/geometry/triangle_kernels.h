@@ -9,12 +9,12 @@ namespace ist {
 /// @param beta  a node's expansion is used where the point is at least beta radii of the node away
 double sum_winding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta);
 
-/// As TriangleBvh::closest.
+/// The kernel of TriangleBvh::closest.
 void find_closest(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, double max_distance_sq,
                   const Eigen::Vector3d& outward_hint_M, double early_out_sq, double tolerance,
                   ClosestPoint* closest);
 
-/// As TriangleBvh::support.
+/// The kernel of TriangleBvh::support.
 double find_support(const TriangleBvh::View& bvh, const Eigen::Vector3d& n_M, double tolerance,
                     double at_least);
 

@@ -47,10 +47,31 @@ double HalfAngle(const TriangleBvh::Triangle& triangle, const Eigen::Vector3d& p
 }
 
 // A phasor smaller than this share of the lengths' product is the difference of much larger terms:
-// a sliver seen from nearby, or a point next to an edge. In float its sign would be chance.
+// a sliver seen from nearby, or a point next to an edge. In float its sign would be random.
 constexpr float kCancelled = 1e-3F;
 
-// Half the solid angle of each triangle, as a phasor (van Oosterom and Strackee 1983).
+// The terms of all lanes of a vector.
+struct LaneTerms {
+  alignas(64) float re[kWidth], im[kWidth];            // phasor of the triangle's angle
+  alignas(64) float is_precise[kWidth], fits[kWidth];  // 1 or 0
+};
+
+// Adds the terms that do not fit into a lane's product, and that product, to the sum in double.
+void AddInDouble(const TriangleBvh::View& bvh, const TriangleBvh::Leaf& leaf,
+                 const Eigen::Vector3d& p_M, std::size_t k, const LaneTerms& terms,
+                 Angles* angles) {
+  for (std::size_t lane = 0; lane < hn::Lanes(FloatTag()); ++lane) {
+    if (terms.fits[lane] != 0.0F) continue;
+    angles->sum +=
+        terms.is_precise[lane] != 0.0F
+            ? std::atan2(static_cast<double>(terms.im[lane]), static_cast<double>(terms.re[lane]))
+            : HalfAngle(bvh.triangles[leaf.first + k + lane], p_M);
+    angles->sum += std::atan2(static_cast<double>(angles->im[k + lane]),
+                              static_cast<double>(angles->re[k + lane]));
+  }
+}
+
+// Adds half the solid angle of each triangle, as a phasor (van Oosterom and Strackee 1983).
 HWY_INLINE void AddTriangles(const TriangleBvh::View& bvh, const TriangleBvh::Leaf& leaf,
                              const Eigen::Vector3d& p_M, const float* p, Angles* angles) {
   const FloatTag d;
@@ -89,19 +110,12 @@ HWY_INLINE void AddTriangles(const TriangleBvh::View& bvh, const TriangleBvh::Le
     // double.
     const auto fits = hn::And(is_precise, hn::And(hn::Gt(re, zero), hn::Gt(new_re, zero)));
     if (!hn::AllTrue(d, fits)) {
-      alignas(64) float r[kWidth], i[kWidth], is_added[kWidth], precise[kWidth];
-      hn::Store(re, d, r);
-      hn::Store(im, d, i);
-      hn::Store(hn::IfThenElse(is_precise, hn::Set(d, 1.0F), zero), d, precise);
-      hn::Store(hn::IfThenElse(fits, hn::Set(d, 1.0F), zero), d, is_added);
-      for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-        if (is_added[lane] != 0.0F) continue;
-        angles->sum += precise[lane] != 0.0F
-                           ? std::atan2(static_cast<double>(i[lane]), static_cast<double>(r[lane]))
-                           : HalfAngle(bvh.triangles[leaf.first + k + lane], p_M);
-        angles->sum += std::atan2(static_cast<double>(angles->im[k + lane]),
-                                  static_cast<double>(angles->re[k + lane]));
-      }
+      LaneTerms terms;
+      hn::Store(re, d, terms.re);
+      hn::Store(im, d, terms.im);
+      hn::Store(hn::IfThenElse(is_precise, hn::Set(d, 1.0F), zero), d, terms.is_precise);
+      hn::Store(hn::IfThenElse(fits, hn::Set(d, 1.0F), zero), d, terms.fits);
+      AddInDouble(bvh, leaf, p_M, k, terms, angles);
       new_re = hn::IfThenElse(fits, new_re, hn::Set(d, 1.0F));
       new_im = hn::IfThenElse(fits, new_im, zero);
     }

@@ -7,7 +7,7 @@
 #include "internal/geometry/box_distance.h"
 #include "ist_proximity/geometry/solid.h"
 
-/// What the library asks of a Solid, besides its public members. Thread safe, allocation free.
+/// The library's own queries of a Solid. They are thread safe and allocate nothing.
 namespace ist {
 
 /// The distance of a point that is known to be outside: no inside test is made.
@@ -26,7 +26,7 @@ struct NearSurface {
   enum class Side { kUnknown, kInside, kOutside } side = Side::kUnknown;
 };
 
-/// What a search for the deepest point asks of one point.
+/// The answer for one point in a search for the deepest point.
 struct PointDepth {
   /// The signed distance; `distance` = inf where the search proved no more than that the point is
   /// not deeper than was asked.
