@@ -1,6 +1,6 @@
 // A controller that links the library directly, without ROS: from a sensor's points to joint
-// velocities, in one loop. The sensor is made up here (a ball that flies through the arm), and so
-// is the arm (its joints move as they are told); the rest is what a real controller would do.
+// velocities, in one loop. The sensor is simulated (a ball that flies through the arm), and so is
+// the arm (its joints follow their commands exactly); the rest is as in a real controller.
 //
 // Usage: direct_controller demo_arm.urdf       (meshes are found by ROS_PACKAGE_PATH)
 
@@ -32,12 +32,12 @@ constexpr int kCyclesPerCloud = 16;
 constexpr double kDuration = 8.0;  // [s]
 constexpr double kBallRadius = 0.08;
 
-/// What a sensor would deliver: points of a ball, float32 x, y, z, in the sensor's frame.
+/// The points of a ball as a sensor delivers them: float32 x, y, z, in the sensor's frame.
 std::vector<float> ball_points(const Eigen::Vector3d& center) {
   constexpr int kCount = 400;
   std::vector<float> points;
   for (int i = 0; i < kCount; ++i) {
-    // A Fibonacci lattice: evenly spread.
+    // A Fibonacci lattice spreads points evenly.
     const double z = 1.0 - (2.0 * i + 1.0) / kCount, r = std::sqrt(1.0 - z * z);
     const double angle = i * M_PI * (3.0 - std::sqrt(5.0));
     const Eigen::Vector3d n(r * std::cos(angle), r * std::sin(angle), z);
@@ -75,7 +75,7 @@ std::vector<Eigen::Isometry3d> link_poses(const ist::Kinematics& kinematics,
   return poses;
 }
 
-/// Once: the links' volumes, for forces in contact. 100 balls are quick to pack, and coarse.
+/// The links' volumes for contact forces, packed once. 100 spheres are quick to pack, and coarse.
 std::vector<std::shared_ptr<const ist::ContactBody>> link_volumes(
     const ist::RobotDescription& robot, const ist::RobotModel& model) {
   ist::ContactConfig config;
@@ -89,7 +89,7 @@ std::vector<std::shared_ptr<const ist::ContactBody>> link_volumes(
   return bodies;
 }
 
-/// [N] What presses on a link: 0 out of contact, NaN where it is not known.
+/// The contact force [N] on a link: 0 out of contact, NaN where it is not known.
 double contact_force(const ist::LinkModel& link, const ist::ContactBody& body,
                      const ist::LinkProximity& answer, const Eigen::Isometry3d& X_FL,
                      const ist::CloudSnapshot& cloud) {
@@ -104,7 +104,7 @@ int run(const std::string& urdf_path) {
   std::stringstream urdf;
   urdf << file.rdbuf();
 
-  // Once: the robot, packed (RobotModelConfig::cache_directory makes the next start quick).
+  // The robot is packed once (with RobotModelConfig::cache_directory the next start is quick).
   const ist::RobotDescription robot = ist::parse_urdf(urdf.str(), ist::GeometrySource::kCollision,
                                                       ist::environment_package_finder());
   const auto model = ist::build_robot_model(robot, {});
@@ -135,14 +135,14 @@ int run(const std::string& urdf_path) {
     const double now = cycle * kControlPeriod;
     const std::vector<Eigen::Isometry3d> X_FL = link_poses(arm.kinematics, *model, q);
 
-    // A new cloud: what lies on the robot, where it was at the cloud's stamp, is dropped.
+    // A new cloud loses its points on the robot, whose poses are those at the cloud's stamp.
     if (cycle % kCyclesPerCloud == 0) {
       const std::vector<float> points = ball_points({0.55, -1.0 + 0.25 * now, 0.30});
       const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
       ingest.run(as_cloud(points), X_FS, ist::posed_solids(*model, X_FL, known), now, &snapshot);
     }
 
-    // In a controller's own thread: allocates nothing, never throws.
+    // The query may run in a controller's own thread: it allocates nothing and never throws.
     query.run(X_FL, known, {&snapshot}, &answers);
 
     ist::example::Reading reading;

@@ -20,7 +20,7 @@ Eigen::VectorXd commanded(const ControlledArm& arm, const std::vector<double>& a
   return q;
 }
 
-/// a . x >= b, which gives way a little where `softness` is not 0.
+/// The constraint a . x >= b, which is soft where `softness` is not 0.
 struct Constraint {
   Eigen::VectorXd a;
   double b = 0.0;
@@ -28,7 +28,8 @@ struct Constraint {
   double force = 0.0;  // Lagrange multiplier
 };
 
-/// The x nearest to `wanted` that keeps the constraints: Hildreth's method on the dual problem.
+/// The x nearest to `wanted` that satisfies the constraints, by Hildreth's method on the dual
+/// problem.
 Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint>* constraints) {
   Eigen::VectorXd x = wanted;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
@@ -43,9 +44,9 @@ Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint
   return x;
 }
 
-/// Toward the goal; all joints arrive together.
-Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double smallest_bound,
-                       const DodgeConfig& config) {
+/// The task's velocity: straight to the goal, so that all joints arrive together.
+Eigen::VectorXd task_velocity(const Eigen::VectorXd& q, const Eigen::VectorXd& goal,
+                              double smallest_bound, const DodgeConfig& config) {
   const Eigen::VectorXd wanted = config.task_gain * (goal - q);
   const double share =
       (smallest_bound - config.stop_distance) / (config.slow_distance - config.stop_distance);
@@ -59,8 +60,8 @@ void add_joint_limits(const ControlledArm& arm, const Eigen::VectorXd& q, const 
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const Kinematics::Joint& joint =
         arm.kinematics.joints()[arm.joints[static_cast<std::size_t>(j)]];
-    const auto bound = [&](double room) {
-      return std::clamp(config.limit_gain * room, 0.0, config.max_joint_speed);
+    const auto bound = [&](double distance) {
+      return std::clamp(config.limit_gain * distance, 0.0, config.max_joint_speed);
     };
     Constraint c;
     c.a = Eigen::VectorXd::Unit(q.size(), j);
@@ -135,7 +136,7 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
     constraints.push_back(c);
   }
   add_joint_limits(arm, q, config, &constraints);
-  return nearest_to(toward(q, goal, smallest_bound, config), &constraints);
+  return nearest_to(task_velocity(q, goal, smallest_bound, config), &constraints);
 }
 
 }  // namespace ist::example

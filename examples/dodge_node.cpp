@@ -1,4 +1,4 @@
-// The example controller as a node: it reads nothing but ~proximity of the proximity node and the
+// The example controller as a node. Its only inputs are the proximity node's ~proximity and the
 // joint states.
 //
 //   proximity     subscribed, ist_proximity/ProximityArray; its fixed frame is the root link
@@ -6,13 +6,13 @@
 //   joint_velocity_controller/command
 //                 published, std_msgs/Float64MultiArray [rad/s], by ~joints; with each
 //                 ProximityArray
-//   ~state        published, std_msgs/String: moving, and what nears or touches (time_to_contact,
-//                 closing_speed and penetration of the message); or why it stands still; with each
-//                 command
-//   ~goals        published, std_msgs/UInt32, latched: how many goals were reached
+//   ~state        published, std_msgs/String, with each command: moving, with the link that
+//                 approaches or touches an obstacle (time_to_contact, closing_speed and penetration
+//                 of the message); or the reason for standing still
+//   ~goals        published, std_msgs/UInt32, latched: the number of goals reached
 //
-// Parameters: ~joints (names), ~goals (a list of joint positions, gone to in turn), and those of
-// DodgeConfig by name.
+// Parameters: ~joints (names), ~goals (a list of joint positions, visited in turn), and the members
+// of DodgeConfig by name.
 
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
@@ -108,8 +108,8 @@ std::string number(double value) {
   return text;
 }
 
-// The link that comes into contact first, as the message estimates it, and what presses where one
-// touches. The control law goes by bounds, which are proven; this is for people to read.
+// Describes the link that will be in contact first, as the message estimates it, or the force on a
+// link in contact. This is for people to read; the control law uses the proven bounds.
 std::string describe(const ProximityArray& message) {
   const ist_proximity::LinkProximity* first = nullptr;
   std::string contacts;
@@ -120,7 +120,7 @@ std::string describe(const ProximityArray& message) {
       contacts += "; " + link.link + " is in contact";
       if (std::isfinite(force)) contacts += ", pressed by " + number(force) + " N";
     }
-    if (!std::isfinite(link.time_to_contact)) continue;  // not nearing, or not known
+    if (!std::isfinite(link.time_to_contact)) continue;  // not approaching, or unknown
     if (!first || link.time_to_contact < first->time_to_contact) first = &link;
   }
   if (!first || !contacts.empty()) return contacts;
@@ -148,7 +148,7 @@ class DodgeNode {
     const auto no_delay = ros::TransportHints().tcpNoDelay();
     joints_ = nh.subscribe("joint_states", 10, &DodgeNode::on_joints, this, no_delay);
     proximity_ = nh.subscribe("proximity", 1, &DodgeNode::on_proximity, this, no_delay);
-    // When nothing comes any more, somebody has to say stop.
+    // The timer commands a stop when messages cease.
     timer_ = nh.createWallTimer(ros::WallDuration(0.05), &DodgeNode::on_timer, this);
   }
 

@@ -19,15 +19,17 @@ struct ArmConfig {
   double rest = 0.0;               ///< [rad, m] position of joints without command
 };
 
-/// A kinematic arm: its joints follow velocity commands as fast as their limits of velocity and
-/// acceleration allow, and stop at the URDF's limits.
+/// A kinematic arm. Its joints follow velocity commands as fast as the limits of velocity and
+/// acceleration allow, and stop at the URDF's position limits.
 class Arm {
  public:
   /// @throws std::invalid_argument naming a joint that the URDF lacks or that takes no position
   Arm(const RobotDescription& description, const ArmConfig& config);
 
-  /// At rest in a position, by commanded joint.
+  /// Puts the arm at rest in a position.
+  /// @param q  [rad, m] by commanded joint
   void reset(const Eigen::VectorXd& q);
+  /// Follows a velocity command for one step.
   /// @param command  [rad/s, m/s] by commanded joint; finite
   /// @param dt       [s]
   void step(const Eigen::VectorXd& command, double dt);
@@ -35,7 +37,7 @@ class Arm {
   const Eigen::VectorXd& positions() const { return q_; }        ///< by commanded joint
   const Eigen::VectorXd& velocities() const { return dq_; }      ///< by commanded joint
   const Eigen::VectorXd& accelerations() const { return ddq_; }  ///< in the last step
-  /// By joint of the kinematics; NaN where a joint has no position of its own.
+  /// Positions by joint of the kinematics; NaN where a joint has no position of its own.
   std::vector<double> all_positions(const Eigen::VectorXd& q) const;
 
   const Kinematics& kinematics() const { return kinematics_; }
@@ -44,7 +46,7 @@ class Arm {
 
   /// Poses of the description's links (those with geometry), root link -> fixed frame = identity.
   std::vector<Eigen::Isometry3d> link_poses(const Eigen::VectorXd& q) const;
-  /// By link of the description: whether a commanded joint moves it.
+  /// Whether a commanded joint moves a link, by link of the description.
   const std::vector<bool>& moved() const { return moved_; }
 
  private:

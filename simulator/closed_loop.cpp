@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kTruthRange = 10.0;  // [m]
 
-/// A reading of nothing near: for an arm that is blind, or undisturbed.
+/// A reading without obstacles, for an arm that is blind or undisturbed.
 example::Reading nothing_near() {
   example::Reading reading;
   reading.is_ok = true;
@@ -23,7 +23,7 @@ example::Reading nothing_near() {
   return reading;
 }
 
-/// Deviation of the accelerations from their own mean over 0.1 s.
+/// Accumulates the deviation of the accelerations from their moving average over 0.1 s.
 double noise(const std::vector<Eigen::VectorXd>& accelerations) {
   constexpr std::size_t kHalf = 50;  // steps
   if (accelerations.size() <= 2 * kHalf) return 0.0;
@@ -48,7 +48,7 @@ double quantile(std::vector<double> values, double q) {
   return values[static_cast<std::size_t>(at)];
 }
 
-/// Distances between the robot's own links.
+/// Measures the distances between the robot's own links.
 class SelfWatch {
  public:
   SelfWatch(const std::shared_ptr<const RobotModel>& model, const Kinematics& kinematics)
@@ -82,7 +82,7 @@ Perception::Perception(std::shared_ptr<const RobotModel> model, const ClosedLoop
 }
 
 bool Perception::has_seen() const {
-  return std::all_of(seen_.begin(), seen_.end(), [](bool seen) { return seen; });
+  return std::all_of(seen_.begin(), seen_.end(), [](bool has_image) { return has_image; });
 }
 
 void Perception::look(Simulation* world) {

@@ -17,42 +17,42 @@
 
 namespace ist::sim {
 
-/// What the controller follows.
+/// The avoidance signal that the controller follows.
 enum class Avoidance {
-  kNone,     ///< nothing: it does its task blindly
+  kNone,     ///< none: the task is done blindly
   kBlend,    ///< `repulsion`
   kNearest,  ///< the nearest pair's `direction`
 };
 
 struct ClosedLoopConfig {
   Avoidance avoidance = Avoidance::kBlend;
-  bool check_self = false;  ///< look whether links come near one another
-  int control_period = 2;   ///< [steps of the simulation] between two answers and commands
+  bool check_self = false;  ///< measure the distances between links, too
+  int control_period = 2;   ///< [simulation steps] between two queries and commands
   example::DodgeConfig controller;
   IngestConfig ingest;
   QueryConfig query;
   RepulsionConfig repulsion;
   ClosedLoopConfig() {
     ingest.self_filter_padding = 0.03;   // six times the cameras' noise
-    repulsion.influence_distance = 0.5;  // `away` is known wherever the controller looks at it
+    repulsion.influence_distance = 0.5;  // more than any distance the controller reacts to
   }
 };
 
-/// From the pictures of the simulated cameras to what a controller reads: what the node does.
+/// Does the node's work: from the images of the simulated cameras to a controller's reading.
 class Perception {
  public:
   Perception(std::shared_ptr<const RobotModel> model, const ClosedLoopConfig& config,
              std::size_t cameras);
 
-  /// Takes the pictures that have arrived, filtered by the robot's poses at their own stamps.
+  /// Takes the images that have arrived, self-filtered by the robot's poses at their own stamps.
   void look(Simulation* world);
-  /// Answers for the robot as it is now.
+  /// Runs the query for the robot's present pose.
   const std::vector<LinkProximity>& answer(const Simulation& world);
-  /// The answers as the controller reads them.
+  /// The last answers as the controller reads them.
   example::Reading reading(const Simulation& world, const example::ControlledArm& arm);
 
   const std::vector<CloudSnapshot>& snapshots() const { return snapshots_; }  ///< by camera
-  bool has_seen() const;  ///< every camera has delivered
+  bool has_seen() const;  ///< every camera has delivered an image
 
  private:
   std::shared_ptr<const RobotModel> model_;
@@ -66,17 +66,17 @@ class Perception {
   std::vector<Eigen::Isometry3d> X_FL_;
 };
 
-/// How a scene went.
+/// Measurements of one run of a scene.
 struct ClosedLoopResult {
-  double smallest_distance = 0.0;  ///< [m] true, of any moved link and obstacle, at any step
-  double when = 0.0;               ///< [s]
-  std::string link, obstacle;      ///< the two
-  int goals = 0;                   ///< reached
-  /// [m] of two links that may meet, lower bound, every 20 ms; the controller does not mind it. Inf
-  /// unless `check_self` asks for it.
+  double smallest_distance = 0.0;  ///< [m] true distance of any moved link to any obstacle
+  double when = 0.0;               ///< [s] of the smallest distance
+  std::string link, obstacle;      ///< of the smallest distance
+  int goals = 0;                   ///< number of goals reached
+  /// [m] Smallest lower bound of the distance of two links that may collide, every 20 ms; the
+  /// controller ignores it. Inf unless `check_self` asks for it.
   double smallest_self_distance = std::numeric_limits<double>::infinity();
-  /// [rad/s^2] root mean square, over joints and steps, of the acceleration's deviation from its
-  /// mean over the 0.1 s about it.
+  /// [rad/s^2] Root mean square, over joints and steps, of the acceleration's deviation from its
+  /// moving average over 0.1 s.
   double acceleration_noise = 0.0;
   double largest_command_step = 0.0;  ///< [rad/s] 99.9th percentile, between two commands
 };
@@ -86,7 +86,7 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
                                  const std::shared_ptr<const RobotModel>& model, const Scene& scene,
                                  std::uint64_t seed, const ClosedLoopConfig& config);
 
-/// Positions of the undisturbed arm, every 10 ms: for make_scene().
+/// Positions of the undisturbed arm every 10 ms, as make_scene() needs them.
 std::vector<Eigen::VectorXd> nominal_motion(const RobotDescription& robot, const Scene& scene,
                                             const example::DodgeConfig& config);
 

@@ -8,7 +8,7 @@ namespace ist::sim {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::infinity();
-constexpr double kJump = 0.05;  // [m] neighbours that differ more are beside an edge
+constexpr double kJump = 0.05;  // [m] a larger difference of neighbours is an edge
 
 }  // namespace
 
@@ -39,7 +39,7 @@ void DepthCamera::draw(const Body& body, std::vector<double>* depth) const {
   if (c.z() + r <= 0.0) return;
   int first[2] = {0, 0}, last[2] = {config_.width - 1, config_.height - 1};
   for (int k = 0; k < 2 && c.z() > r; ++k) {
-    // The corners of a box about the ball, seen from the camera.
+    // Projects the corners of a box about the bounding sphere.
     const double near = c.z() - r, far = c.z() + r;
     const double low = std::min((c[k] - r) / near, (c[k] - r) / far);
     const double high = std::max((c[k] + r) / near, (c[k] + r) / far);

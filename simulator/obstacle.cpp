@@ -1,4 +1,5 @@
 #include "obstacle.h"
+#include "internal/geometry/solid_queries.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +15,8 @@ Eigen::Isometry3d Obstacle::pose(double time) const {
     X_FO.translation() = path(time);
     return X_FO;
   }
-  const Eigen::Vector3d way = to - from;
-  const double length = way.norm();
+  const Eigen::Vector3d displacement = to - from;
+  const double length = displacement.norm();
   double since = time - start;
   bool back = false;
   if (repeat > 0.0 && since > 0.0) {
@@ -23,27 +24,28 @@ Eigen::Isometry3d Obstacle::pose(double time) const {
     since -= rounds * repeat;
     back = std::fmod(rounds, 2.0) == 1.0;
   }
-  double gone = std::clamp(speed * since, 0.0, length);
-  if (back) gone = length - gone;
-  X_FO.translation() = length > 0.0 ? Eigen::Vector3d(from + gone / length * way) : from;
+  double travelled = std::clamp(speed * since, 0.0, length);
+  if (back) travelled = length - travelled;
+  X_FO.translation() =
+      length > 0.0 ? Eigen::Vector3d(from + travelled / length * displacement) : from;
   return X_FO;
 }
 
 double Obstacle::radius() const {
-  if (const auto* ball = std::get_if<Sphere>(&shape)) return ball->radius;
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
   return 0.5 * std::get<Box>(shape).size.norm();
 }
 
 double distance(const Solid& solid, const Eigen::Isometry3d& X_FL, const Obstacle& obstacle,
                 const Eigen::Isometry3d& X_FO, double max_distance) {
-  if (const auto* ball = std::get_if<Sphere>(&obstacle.shape)) {
+  if (const auto* sphere = std::get_if<Sphere>(&obstacle.shape)) {
     const Eigen::Vector3d c_L = X_FL.inverse() * X_FO.translation();
-    const double d = solid.signed_distance(c_L).distance - ball->radius;
+    const double d = solid.signed_distance(c_L).distance - sphere->radius;
     return d < max_distance ? d : std::numeric_limits<double>::infinity();
   }
   const Eigen::Vector3d half = 0.5 * std::get<Box>(obstacle.shape).size;
   const Eigen::AlignedBox3d box(Eigen::Vector3d(-half), half);
-  return solid.distance_to_box(box, X_FO.inverse() * X_FL, max_distance).distance;
+  return distance_to_box(solid, box, X_FO.inverse() * X_FL, max_distance).distance;
 }
 
 }  // namespace ist::sim

@@ -12,7 +12,7 @@ namespace {
 constexpr double kMiss = std::numeric_limits<double>::infinity();
 constexpr std::size_t kLeafSize = 4;
 
-/// Where a ray is inside something.
+/// The part of a ray that is inside a shape.
 struct Span {
   double enter, leave;
 
@@ -34,7 +34,7 @@ Span slab(double origin, double direction, double min, double max) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-// Where a t^2 + 2 b t + c <= 0.
+// The interval of a t^2 + 2 b t + c <= 0.
 Span quadratic(double a, double b, double c) {
   if (a == 0.0) return c <= 0.0 ? Span{-kMiss, kMiss} : Span{kMiss, -kMiss};
   const double discriminant = b * b - a * c;
@@ -136,9 +136,9 @@ double RayShape::hit(const Ray& ray) const {
   return std::visit([&ray](const auto& s) { return hit_primitive(s, ray); }, primitive_);
 }
 
-// Triangles by Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997.
+// Ray and triangle: Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997.
 double RayShape::hit_mesh(const Ray& ray) const {
-  // No zeros: 0 * inf is not a number.
+  // Zeros are replaced, because 0 * inf is NaN.
   const Eigen::Vector3d inverse =
       ray.direction.unaryExpr([](double d) { return 1.0 / (d == 0.0 ? 1e-200 : d); });
   double nearest = kMiss;

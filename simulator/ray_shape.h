@@ -12,24 +12,24 @@ struct Ray {
   Eigen::Vector3d origin, direction;  ///< the direction need not be of unit length
 };
 
-/// A shape that rays can hit: primitives in closed form, meshes through a hierarchy of boxes.
-/// Immutable; thread safe.
+/// A shape for ray casting: primitives in closed form, meshes through a BVH of boxes. Immutable;
+/// thread safe.
 class RayShape {
  public:
   explicit RayShape(const Shape& shape);
 
-  /// The smallest t > 0 at which origin + t * direction lies on the shape's surface; inf: misses.
+  /// The smallest t > 0 at which origin + t * direction lies on the surface; inf if the ray misses.
   /// @param ray  in the shape's frame
   double hit(const Ray& ray) const;
 
-  const Eigen::Vector3d& center() const { return center_; }  ///< [m] of a ball that holds the shape
-  double radius() const { return radius_; }                  ///< [m] of that ball
+  const Eigen::Vector3d& center() const { return center_; }  ///< [m] of a bounding sphere
+  double radius() const { return radius_; }                  ///< [m] of that sphere
 
  private:
   struct Node {
     Eigen::Vector3d min, max;
-    std::uint32_t first;  ///< leaf: its first triangle; else: its second child (the first is next)
-    std::uint32_t count;  ///< leaf: triangles; else 0
+    std::uint32_t first;  ///< leaf: its first triangle; else its second child (the first is next)
+    std::uint32_t count;  ///< leaf: number of triangles; else 0
   };
   struct Triangle {
     Eigen::Vector3d a, ab, ac;
@@ -39,8 +39,8 @@ class RayShape {
   void build_node(std::vector<Triangle>* triangles, std::size_t begin, std::size_t end);
   double hit_mesh(const Ray& ray) const;
 
-  Shape primitive_;          // a mesh is empty here
-  std::vector<Node> nodes_;  // of a mesh; depth first
+  Shape primitive_;          // an empty mesh if the shape is a mesh
+  std::vector<Node> nodes_;  // of a mesh, depth first
   std::vector<Triangle> triangles_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_ = 0.0;

@@ -1,4 +1,5 @@
 #include "scene.h"
+#include "internal/geometry/solid_queries.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +22,7 @@ double uniform(Rng* rng, double low, double high) {
   throw std::runtime_error(std::string("no ") + what + " that keeps the rules of the scene.");
 }
 
-// Above the bench, to both sides of it.
+// Goals above the bench, on both sides of it.
 Eigen::VectorXd random_goal(Rng* rng) {
   Eigen::VectorXd q(6);
   q << uniform(rng, -1.2, 1.2), uniform(rng, -0.2, 0.9), uniform(rng, 0.5, 1.6),
@@ -67,14 +68,14 @@ Obstacle random_body(Rng* rng) {
   return body;
 }
 
-// How far to go from p along d until the shoulder is `distance` away.
-double way_out(const Eigen::Vector3d& p, const Eigen::Vector3d& d, double distance) {
+// The length [m] from p along d to where the shoulder is `distance` away.
+double exit_length(const Eigen::Vector3d& p, const Eigen::Vector3d& d, double distance) {
   const Eigen::Vector3d s = p - kShoulder;
   const double b = s.dot(d);
   return -b + std::sqrt(b * b - s.squaredNorm() + distance * distance);
 }
 
-// What cannot yield is not in the way, and a camera can see it where the arm is.
+// Whether an obstacle keeps clear of the links that cannot yield, and is in view at the arm.
 bool keeps_rules(const Obstacle& body, const Simulation& world, const std::vector<Solid>& immovable,
                  const Eigen::Vector3d& aim, const SceneRules& rules) {
   const double length = (body.to - body.from).norm();
@@ -83,7 +84,7 @@ bool keeps_rules(const Obstacle& body, const Simulation& world, const std::vecto
     if ((p - kShoulder).norm() < rules.hub_clearance + body.radius()) return false;
     const double near = rules.base_clearance + body.radius();
     for (const Solid& solid : immovable) {
-      if (solid.distance_outside(p, near).distance < near) return false;
+      if (distance_outside(solid, p, near).distance < near) return false;
     }
     for (const Obstacle& other : world.obstacles()) {
       const Eigen::Vector3d p_O = other.pose(0.0).inverse() * p;
@@ -160,7 +161,7 @@ Scene make_scene(const RobotDescription& robot, std::uint64_t seed, const SceneR
   const std::vector<Eigen::VectorXd> motion = nominal(scene);
 
   std::vector<Solid> immovable;
-  std::vector<std::size_t> targets;  // links beyond the elbow
+  std::vector<std::size_t> targets;  // links distal to the elbow
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
     if (!world.arm().moved()[i]) immovable.emplace_back(robot.links[i].geometry);
   }
@@ -182,9 +183,9 @@ Scene make_scene(const RobotDescription& robot, std::uint64_t seed, const SceneR
       const Eigen::Vector3d aim = world.middle(target, X_FL) + rules.aim_error * error;
       const Eigen::Vector3d direction = random_direction(&rng, rules.max_slope);
       body.speed = uniform(&rng, rules.min_speed, rules.max_speed);
-      const double before = way_out(aim, -direction, rules.park_distance);
+      const double before = exit_length(aim, -direction, rules.park_distance);
       body.from = aim - before * direction;
-      body.to = aim + way_out(aim, direction, rules.park_distance) * direction;
+      body.to = aim + exit_length(aim, direction, rules.park_distance) * direction;
       body.start = aim_time - before / body.speed;
       body.name = "body" + std::to_string(n);
       found = keeps_rules(body, world, immovable, aim, rules);

@@ -16,30 +16,30 @@ struct SelfViewConfig {
   double flying_pixels = 0.0;             ///< see DepthCameraConfig
   double latency = 0.05;                  ///< [s]
   double camera_period = 1.0 / 15.0;      ///< [s]
-  int query_period = 10;                  ///< [steps of the simulation]
-  std::vector<double> paddings = {0.03};  ///< [m] of the self-filter; each is tried
-  /// [m] A ball that stays this far from the forearm; 0: there is none.
+  int query_period = 10;                  ///< [simulation steps]
+  std::vector<double> paddings = {0.03};  ///< [m] of the self-filter, one run each
+  /// [m] Distance of a ball that stays near the forearm; 0: there is no ball.
   double ball_distance = 0.0;
   std::uint64_t seed = 1;
 };
 
-/// What came of one padding.
+/// Measurements of one padding.
 struct SelfViewResult {
   double padding = 0.0;  ///< [m]
   int pictures = 0, answers = 0;
   std::uint64_t on_robot = 0;      ///< points that the self-filter dropped
-  std::uint64_t phantoms = 0;      ///< points of the robot that it did not
+  std::uint64_t phantoms = 0;      ///< points of the robot that passed the self-filter
   int contacts = 0;                ///< answers in which a link is in CONTACT
-  double smallest_distance = 0.0;  ///< [m] of any answer; inf: every link always CLEAR
-  /// With a ball: answers while it was truly within 5 cm of the arm, and the most [m] that one of
-  /// them was larger than the distance to the ball as it was at the cloud's stamp. (The camera does
-  /// not see all of the side that faces the arm.)
+  double smallest_distance = 0.0;  ///< [m] of any answer; inf: every link was always CLEAR
+  /// Answers while the ball was truly within 5 cm of the arm, and the largest excess [m] of such an
+  /// answer over the distance to the ball at the cloud's stamp. (The camera does not see all of the
+  /// side that faces the arm.)
   int near = 0;
   double largest_excess = -1.0;
 };
 
-/// The demo arm moves (joints as fast as 1 rad/s, no bench about), one camera sees it and nothing
-/// else: whatever is found is false, but for the ball.
+/// The demo arm moves without a bench, its joints as fast as 1 rad/s, in view of one camera.
+/// Nothing else is there but the ball, so that every other point found is a false one.
 std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
                                           const std::shared_ptr<const RobotModel>& model,
                                           const SelfViewConfig& config);

@@ -54,7 +54,7 @@ Simulation::Simulation(const RobotDescription& robot, const ArmConfig& arm,
   }
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     cameras_.emplace_back(cameras[i], background);
-    // They do not take their pictures at the same time.
+    // The cameras are out of phase.
     next_picture_.push_back(
         steps_of(cameras[i].period * static_cast<double>(i) / static_cast<double>(cameras.size())));
   }
@@ -62,7 +62,7 @@ Simulation::Simulation(const RobotDescription& robot, const ArmConfig& arm,
 }
 
 void Simulation::step(const Eigen::VectorXd& command) {
-  history_.back() = arm_.positions();  // it may have been put somewhere
+  history_.back() = arm_.positions();  // reset() may have moved it
   take_pictures_now();
   arm_.step(command, kStep);
   ++steps_;
@@ -121,7 +121,7 @@ Simulation::Truth Simulation::nearest_then(double max_distance, double when) con
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       if (!arm_.moved()[i]) continue;
       const LinkBody& body = bodies_[i];
-      // No farther than the ball about the link is from the obstacle.
+      // The bounding sphere's distance to the obstacle is a lower bound.
       const Eigen::Vector3d c_O = X_OF * (X_FL[i] * body.center);
       double bound = c_O.norm() - obstacles_[o].radius();
       if (const auto* box = std::get_if<Box>(&obstacles_[o].shape)) {

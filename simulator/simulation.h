@@ -16,25 +16,27 @@
 
 namespace ist::sim {
 
-/// A picture that has arrived.
+/// A depth image that has arrived.
 struct Picture {
   std::size_t camera = 0;  ///< index
-  double stamp = 0.0;      ///< [s] when it was taken
+  double stamp = 0.0;      ///< [s] time of exposure
   int width = 0, height = 0;
   std::vector<Eigen::Vector3f> points;  ///< see DepthCamera::picture
 
   RawCloud raw() const;  ///< refers to `points`
 };
 
-/// A kinematic arm among obstacles, and depth cameras that see both. Steps of one millisecond; the
-/// same arguments give the same pictures. Frames: the robot's root link is the fixed frame F.
+/// A kinematic arm among obstacles, and depth cameras that see both, in steps of one millisecond.
+/// Deterministic: the same arguments give the same images. The robot's root link is the fixed
+/// frame F.
 class Simulation {
  public:
   Simulation(const RobotDescription& robot, const ArmConfig& arm,
              const std::vector<Obstacle>& obstacles, const std::vector<DepthCameraConfig>& cameras,
              std::uint64_t seed);
 
-  /// One step on. @param command  [rad/s, m/s] by commanded joint
+  /// Advances by one step.
+  /// @param command  [rad/s, m/s] by commanded joint
   void step(const Eigen::VectorXd& command);
   static constexpr double kStep = 0.001;  ///< [s]
 
@@ -44,9 +46,9 @@ class Simulation {
   const std::vector<DepthCamera>& cameras() const { return cameras_; }
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
 
-  /// Pictures that have arrived since the last call.
+  /// Images that have arrived since the last call.
   std::vector<Picture> take_pictures();
-  /// While false no pictures are taken: cameras that died.
+  /// Starts or stops all cameras; stopped cameras take no images.
   void set_cameras_alive(bool alive) { cameras_alive_ = alive; }
 
   /// Poses of the links with geometry, now and at the step nearest to an instant [s] at most two
@@ -54,19 +56,19 @@ class Simulation {
   std::vector<Eigen::Isometry3d> link_poses() const { return arm_.link_poses(arm_.positions()); }
   std::vector<Eigen::Isometry3d> link_poses(double time) const;
 
-  /// [m] Middle of a link, in the fixed frame.
+  /// [m] Centre of a link's bounding sphere, in the fixed frame.
   Eigen::Vector3d middle(std::size_t link, const Eigen::Isometry3d& X_FL) const {
     return X_FL * bodies_[link].center;
   }
 
-  /// What is nearest to what, exactly.
+  /// The nearest link and obstacle, and their exact distance.
   struct Truth {
-    double distance;  ///< [m] inf: nothing within the range asked for
+    double distance;  ///< [m] inf: none within the range asked for
     std::size_t link = 0, obstacle = 0;
   };
-  /// Over the links that commanded joints move and all obstacles.
+  /// The minimum over the links that commanded joints move and all obstacles.
   Truth nearest(double max_distance) const { return nearest_then(max_distance, time()); }
-  /// The same of the arm as it is and the obstacles as they are at an instant [s].
+  /// The same for the arm as it is now and the obstacles as they are at another time [s].
   Truth nearest_then(double max_distance, double when) const;
 
  private:
@@ -77,7 +79,7 @@ class Simulation {
   };
   struct LinkBody {
     Solid solid;
-    Eigen::Vector3d center;  // [m] of a ball that holds the link
+    Eigen::Vector3d center;  // [m] of a bounding sphere, link frame
     double radius;
   };
 

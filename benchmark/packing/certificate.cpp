@@ -7,8 +7,8 @@
 #include <random>
 #include <string>
 
+#include "internal/geometry/triangle_bvh.h"
 #include "internal/packing/packer.h"
-#include "ist_proximity/geometry/triangle_bvh.h"
 #include "packing/options.h"
 #include "packing/parallel.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 #include "packing/table.h"
 
 namespace ist::benchmark {

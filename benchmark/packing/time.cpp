@@ -14,7 +14,8 @@
 #include <embree3/rtcore.h>
 #endif
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/closest_point_on_triangle.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "packing/options.h"
 #include "support.h"

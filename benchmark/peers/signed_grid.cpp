@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "peers/flat.h"
 
 // A grid of distances about each link, made beforehand: every point that the link's box leaves is

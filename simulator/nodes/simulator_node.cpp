@@ -1,15 +1,15 @@
-// The demo arm in the simulator, as a robot and its cameras are seen in ROS: joint states, clouds,
-// and joint velocities as commands. It makes the time, unless told not to.
+// The simulated demo arm and its cameras, with the interface of a real robot: joint states, clouds,
+// and joint velocities as commands. It publishes the clock unless ~clock is false.
 //
 //   joint_states                published, sensor_msgs/JointState, 200 Hz
 //   CAMERA/points               published, sensor_msgs/PointCloud2, `front` and `back`
 //   /clock                      published, with ~clock
-//   obstacles                   published, visualization_msgs/MarkerArray, where they truly are
+//   obstacles                   published, visualization_msgs/MarkerArray, their true poses
 //   ~distance                   published, std_msgs/Float64 [m], the smallest true distance
 //   joint_velocity_controller/command
 //                               subscribed, std_msgs/Float64MultiArray [rad/s], by ~joints;
-//                               what is older than ~command_timeout is zero
-//   ~cameras                    service, std_srvs/SetBool: false makes the cameras die
+//                               commands older than ~command_timeout count as zero
+//   ~cameras                    service, std_srvs/SetBool: false stops the cameras
 
 #include <geometry_msgs/TransformStamped.h>
 #include <ros/ros.h>
@@ -39,8 +39,8 @@ namespace {
 
 constexpr std::int64_t kJointPeriod = 5;    // [steps]
 constexpr std::int64_t kMarkerPeriod = 40;  // [steps]
-constexpr int kMostSteps = 40;              // at once: a machine that was busy is not hurried
-constexpr double kMostLag = 0.1;            // [s] behind the wall clock, where that is the time
+constexpr int kMostSteps = 40;              // per timer event; more are dropped
+constexpr double kMostLag = 0.1;            // [s] behind the wall clock, without ~clock
 
 std::string frame_of(const DepthCamera& camera) { return camera.config().name + "_optical_frame"; }
 
@@ -69,9 +69,9 @@ visualization_msgs::Marker to_marker(const Obstacle& obstacle, double time) {
   marker.ns = obstacle.name;
   marker.pose = tf2::toMsg(obstacle.pose(time));
   Eigen::Vector3d size;
-  if (const auto* ball = std::get_if<Sphere>(&obstacle.shape)) {
+  if (const auto* sphere = std::get_if<Sphere>(&obstacle.shape)) {
     marker.type = visualization_msgs::Marker::SPHERE;
-    size.setConstant(2.0 * ball->radius);
+    size.setConstant(2.0 * sphere->radius);
   } else {
     marker.type = visualization_msgs::Marker::CUBE;
     size = std::get<Box>(obstacle.shape).size;
@@ -112,7 +112,7 @@ class SimulatorNode {
     world_ = std::make_unique<Simulation>(robot, demo_arm(), demo_obstacles(), cameras,
                                           static_cast<std::uint64_t>(seed));
     world_->arm().reset(start_position(private_nh));
-    // Any time but 0, which means "no time yet".
+    // The clock starts above 0, which means "no time yet".
     start_ = own_clock_ ? ros::Time(1000.0) : ros::Time::now();
 
     joints_ = nh.advertise<sensor_msgs::JointState>("joint_states", 100);
@@ -128,7 +128,7 @@ class SimulatorNode {
                      ros::TransportHints().tcpNoDelay());
     service_ = private_nh.advertiseService("cameras", &SimulatorNode::on_cameras, this);
     publish_frames();
-    // Wall time: nobody else makes the time.
+    // The timer runs on wall time, because this node publishes the ROS time.
     last_ = ros::WallTime::now();
     timer_ = nh.createWallTimer(ros::WallDuration(0.004), &SimulatorNode::on_timer, this);
   }
@@ -186,7 +186,7 @@ class SimulatorNode {
     if (own_clock_) {
       due_ = std::min(due_, static_cast<double>(kMostSteps));
     } else {
-      // The time goes on whether we keep up or not; what is too much is skipped.
+      // The wall clock does not wait: simulation steps that are overdue for too long are skipped.
       due_ = (ros::Time::now() - start_).toSec() / Simulation::kStep - world_->time() * 1e3;
       if (due_ * Simulation::kStep > kMostLag) {
         start_ += ros::Duration(due_ * Simulation::kStep);

@@ -9,8 +9,8 @@
 namespace ist {
 namespace {
 
-// A number for each vertex, the same for vertices at the same place.
-std::vector<std::uint32_t> place_ids(const std::vector<Eigen::Vector3d>& vertices) {
+// Maps each vertex to the first vertex at the same place.
+std::vector<std::uint32_t> representatives(const std::vector<Eigen::Vector3d>& vertices) {
   std::vector<std::uint32_t> order(vertices.size());
   std::iota(order.begin(), order.end(), 0U);
   const auto less = [&](std::uint32_t i, std::uint32_t j) {
@@ -29,8 +29,8 @@ std::vector<std::uint32_t> place_ids(const std::vector<Eigen::Vector3d>& vertice
 }  // namespace
 
 std::vector<OpenEdge> open_edges(const TriangleMesh& mesh) {
-  const std::vector<std::uint32_t> id = place_ids(mesh.vertices);
-  // An edge, and whether it is passed forward (1) or backward (-1).
+  const std::vector<std::uint32_t> id = representatives(mesh.vertices);
+  // Each edge as a pair of vertices, low in the upper half, and its direction: 1 or -1.
   std::vector<std::pair<std::uint64_t, int>> edges;
   edges.reserve(3 * mesh.triangles.size());
   for (const TriangleMesh::Triangle& t : mesh.triangles) {

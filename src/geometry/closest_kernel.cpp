@@ -1,4 +1,5 @@
-// Compiled once per instruction set; the best one there is gets chosen at run time.
+// Closest point on a TriangleBvh, by branch and bound. Compiled once per instruction set; the best
+// one available is chosen at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "geometry/closest_kernel.cpp"
 #include <hwy/cache_control.h>
@@ -9,16 +10,18 @@
 #include <cmath>
 #include <limits>
 
-#include "geometry/slab_reach-inl.h"
+#include "geometry/child_support-inl.h"
 #include "geometry/triangle_kernels.h"
+#include "internal/geometry/closest_point_on_triangle.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
+namespace closest_point {
 namespace hn = hwy::HWY_NAMESPACE;
+using triangle_bvh::FloatTag;
 
-constexpr std::size_t kTriangleWidth = TriangleBvh::kWidth;
-using TriangleTag = hn::CappedTag<float, kTriangleWidth>;
+constexpr std::size_t kWidth = TriangleBvh::kWidth;
 
 template <class V>
 struct Vec3 {
@@ -52,11 +55,12 @@ HWY_INLINE V SegmentSq(D d, const Vec3<V>& e, const Vec3<V>& v) {
   return Dot3(r, r);
 }
 
-// Distances to eight triangles: to the plane where the point projects inside, else to an edge.
+// Squared distances [m^2] from p to the triangles of a leaf: to a triangle's plane where p projects
+// inside it, else to its nearest edge.
 HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* p, float* out) {
-  const TriangleTag d;
-  using V = hn::Vec<TriangleTag>;
-  for (std::size_t k = 0; k < kTriangleWidth; k += hn::Lanes(d)) {
+  const FloatTag d;
+  using V = hn::Vec<FloatTag>;
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
     const auto corner = [&](int row) {
       return Vec3<V>{hn::Load(d, leaf.corner[row] + k), hn::Load(d, leaf.corner[row + 1] + k),
                      hn::Load(d, leaf.corner[row + 2] + k)};
@@ -78,72 +82,69 @@ HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* 
   }
 }
 
-class Closest {
+class ClosestPointSearch {
  public:
-  Closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_sq,
-          const Eigen::Vector3d& toward, double enough_sq, double slack, ClosestPoint* result)
-      : tree_(tree),
+  ClosestPointSearch(const TriangleBvh::View& bvh, const Eigen::Vector3d& p, double max_sq,
+                     const Eigen::Vector3d& outward_hint, double early_out_sq, double tolerance,
+                     ClosestPoint* result)
+      : bvh_(bvh),
         p_(p),
         best_sq_(max_sq),
-        enough_sq_(enough_sq),
-        slack_(slack),
+        early_out_sq_(early_out_sq),
+        tolerance_(tolerance),
         result_(*result) {
-    const Eigen::Vector3d local = p - tree.origin;
+    const Eigen::Vector3d local = p - bvh.origin;
     for (int axis = 0; axis < 3; ++axis) p_float_[axis] = static_cast<float>(local[axis]);
-    // What float loses, in distance.
-    rounding_ = 2e-6 * (local.norm() + tree.radius);
-    Tighten();
-    Aim(toward);
+    // Float's error, in distance.
+    rounding_ = 2e-6 * (local.norm() + bvh.radius);
+    UpdatePruneBound();
+    SetOutward(outward_hint);
   }
 
   void Run() {
-    Entry stack[512];
-    std::size_t top = 0;
-    stack[top++] = {0, 0.0F};
-    while (top > 0) {
-      const Entry entry = stack[--top];
-      if (LeftOut(entry.distance_sq)) continue;
+    TriangleBvh::Stack<Entry> stack;
+    stack.push({0, 0.0F});
+    while (!stack.empty()) {
+      const Entry entry = stack.pop();
+      if (Prune(entry.distance_sq)) continue;
       if (entry.child < 0) {
-        Visit(tree_.leaves[~entry.child]);
-        if (result_.distance_sq > enough_sq_) continue;
+        VisitLeaf(bvh_.leaves[~entry.child]);
+        if (result_.distance_sq > early_out_sq_) continue;
         result_.lower_bound = 0.0;
         return;
       }
-      const TriangleBvh::Boxes& boxes = tree_.boxes[entry.child];
-      alignas(32) float distance_sq[kTriangleWidth];
-      ChildDistancesSq(boxes, tree_.slabs[entry.child], distance_sq);
-      const std::size_t begin = top;
+      const TriangleBvh::Boxes& boxes = bvh_.boxes[entry.child];
+      alignas(32) float distance_sq[kWidth];
+      ChildDistancesSq(boxes, bvh_.slabs[entry.child], distance_sq);
+      const std::size_t first = stack.size();
       for (int k = 0; k < boxes.count; ++k) {
-        if (LeftOut(distance_sq[k])) continue;
+        if (Prune(distance_sq[k])) continue;
         Prefetch(boxes.child[k]);
-        std::size_t at = top++;  // nearest on top
-        for (; at > begin && stack[at - 1].distance_sq < distance_sq[k]; --at)
-          stack[at] = stack[at - 1];
-        stack[at] = {boxes.child[k], distance_sq[k]};
+        stack.push_least_on_top<&Entry::distance_sq>(first, {boxes.child[k], distance_sq[k]});
       }
     }
     if (!(result_.distance_sq < std::numeric_limits<double>::infinity())) return;
     const double nearest = std::sqrt(result_.distance_sq);
     result_.lower_bound = nearest;
-    if (slack_ > 0.0) {
-      const double left_out = std::sqrt(static_cast<double>(left_out_sq_)) - rounding_;
-      result_.lower_bound = std::clamp(left_out, std::max(nearest - slack_, 0.0), nearest);
+    if (tolerance_ > 0.0) {
+      const double pruned = std::sqrt(static_cast<double>(least_pruned_sq_)) - rounding_;
+      result_.lower_bound = std::clamp(pruned, std::max(nearest - tolerance_, 0.0), nearest);
     }
   }
 
  private:
   struct Entry {
     std::int32_t child;
-    float distance_sq;
+    float distance_sq;  // [m^2] lower bound
   };
 
-  // What is looked at next, most likely: meshes are larger than caches near the core.
+  // Loads the memory that is most likely visited next: meshes are larger than the fastest caches.
   HWY_INLINE void Prefetch(std::int32_t child) const {
     if (child < 0) {
-      PrefetchLines(&tree_.leaves[~child], sizeof(TriangleBvh::Leaf));
+      PrefetchLines(&bvh_.leaves[~child], sizeof(TriangleBvh::Leaf));
     } else {
-      PrefetchLines(&tree_.boxes[child], sizeof(TriangleBvh::Boxes));
-      PrefetchLines(&tree_.slabs[child], sizeof(TriangleBvh::Slabs));
+      PrefetchLines(&bvh_.boxes[child], sizeof(TriangleBvh::Boxes));
+      PrefetchLines(&bvh_.slabs[child], sizeof(TriangleBvh::Slabs));
     }
   }
   static HWY_INLINE void PrefetchLines(const void* begin, std::size_t size) {
@@ -151,48 +152,49 @@ class Closest {
     for (std::size_t i = 0; i < size; i += 64) hwy::Prefetch(bytes + i);
   }
 
-  // Whether what is this far does not matter.
-  HWY_INLINE bool LeftOut(float distance_sq) {
-    if (!(distance_sq > limit_sq_)) return false;
-    left_out_sq_ = std::min(left_out_sq_, distance_sq);
+  // Whether a part of the surface with this lower bound need not be visited.
+  HWY_INLINE bool Prune(float distance_sq) {
+    if (!(distance_sq > prune_bound_sq_)) return false;
+    least_pruned_sq_ = std::min(least_pruned_sq_, distance_sq);
     return true;
   }
 
-  void Tighten() {
-    double limit = std::sqrt(best_sq_) + rounding_;
-    if (result_.distance_sq <= best_sq_) limit = std::max(limit - slack_, rounding_);
-    limit_sq_ = static_cast<float>(std::min(1.00001 * limit * limit, 1e30));
+  void UpdatePruneBound() {
+    double bound = std::sqrt(best_sq_) + rounding_;
+    if (result_.distance_sq <= best_sq_) bound = std::max(bound - tolerance_, rounding_);
+    prune_bound_sq_ = static_cast<float>(std::min(1.00001 * bound * bound, 1e30));
   }
 
-  // What is seen from p lies at least as far as it is along any direction: triangles aside of the
-  // nearest one are told by that, though their boxes reach as near.
-  void Aim(const Eigen::Vector3d& toward) {
-    for (int axis = 0; axis < 3; ++axis) toward_[axis] = static_cast<float>(toward[axis]);
-    height_ = toward_[0] * p_float_[0] + toward_[1] * p_float_[1] + toward_[2] * p_float_[2];
+  // A second lower bound: a part of the surface is at least as far from p as its supporting plane
+  // perpendicular to `outward` is. It prunes triangles beside the closest one, whose boxes may be
+  // as near as that.
+  void SetOutward(const Eigen::Vector3d& outward) {
+    for (int axis = 0; axis < 3; ++axis) outward_[axis] = static_cast<float>(outward[axis]);
+    height_ = outward_[0] * p_float_[0] + outward_[1] * p_float_[1] + outward_[2] * p_float_[2];
   }
 
-  // Whether all triangles of a leaf are too far along that direction.
-  HWY_INLINE bool IsBeyond(const TriangleBvh::Leaf& leaf) {
-    const TriangleTag d;
-    auto reach = hn::Set(d, std::numeric_limits<float>::lowest());
-    for (std::size_t k = 0; k < kTriangleWidth; k += hn::Lanes(d)) {
+  // Whether the supporting plane of a leaf's triangles is too far.
+  HWY_INLINE bool PruneByPlane(const TriangleBvh::Leaf& leaf) {
+    const FloatTag d;
+    auto support = hn::Set(d, std::numeric_limits<float>::lowest());
+    for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
       const auto along = [&](int row) {
         return hn::MulAdd(
-            hn::Set(d, toward_[0]), hn::Load(d, leaf.corner[row] + k),
-            hn::MulAdd(hn::Set(d, toward_[1]), hn::Load(d, leaf.corner[row + 1] + k),
-                       hn::Mul(hn::Set(d, toward_[2]), hn::Load(d, leaf.corner[row + 2] + k))));
+            hn::Set(d, outward_[0]), hn::Load(d, leaf.corner[row] + k),
+            hn::MulAdd(hn::Set(d, outward_[1]), hn::Load(d, leaf.corner[row + 1] + k),
+                       hn::Mul(hn::Set(d, outward_[2]), hn::Load(d, leaf.corner[row + 2] + k))));
       };
-      reach = hn::Max(reach, hn::Max(along(0), hn::Max(along(3), along(6))));
+      support = hn::Max(support, hn::Max(along(0), hn::Max(along(3), along(6))));
     }
-    const float ahead = height_ - hn::GetLane(hn::MaxOfLanes(d, reach));
-    return ahead > 0.0F && LeftOut(ahead * ahead);
+    const float above_plane = height_ - hn::GetLane(hn::MaxOfLanes(d, support));
+    return above_plane > 0.0F && Prune(above_plane * above_plane);
   }
 
-  // As far as boxes and slabs tell.
+  // Lower bounds [m^2] from boxes and supporting planes.
   HWY_INLINE void ChildDistancesSq(const TriangleBvh::Boxes& boxes, const TriangleBvh::Slabs& slabs,
                                    float* out) const {
-    const TriangleTag d;
-    for (std::size_t k = 0; k < kTriangleWidth; k += hn::Lanes(d)) {
+    const FloatTag d;
+    for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
       auto sum = hn::Zero(d);
       for (int axis = 0; axis < 3; ++axis) {
         const auto p = hn::Set(d, p_float_[axis]);
@@ -201,29 +203,29 @@ class Closest {
         const auto gap = hn::Max(hn::Max(low, high), hn::Zero(d));
         sum = hn::MulAdd(gap, gap, sum);
       }
-      const auto along = hn::Sub(hn::Set(d, height_), Reach(boxes, slabs, toward_, k));
-      const auto ahead = hn::Max(along, hn::Zero(d));
-      hn::Store(hn::Max(sum, hn::Mul(ahead, ahead)), d, out + k);
+      const auto support = triangle_bvh::ChildSupport(boxes, slabs, outward_, k);
+      const auto above_plane = hn::Max(hn::Sub(hn::Set(d, height_), support), hn::Zero(d));
+      hn::Store(hn::Max(sum, hn::Mul(above_plane, above_plane)), d, out + k);
     }
   }
 
   // Float decides which triangles can be nearest, double which one is.
-  void Visit(const TriangleBvh::Leaf& leaf) {
-    if (IsBeyond(leaf)) return;
-    alignas(32) float distance_sq[kTriangleWidth];
+  void VisitLeaf(const TriangleBvh::Leaf& leaf) {
+    if (PruneByPlane(leaf)) return;
+    alignas(32) float distance_sq[kWidth];
     TriangleDistancesSq(leaf, p_float_, distance_sq);
     std::uint32_t nearest = 0;
     for (std::uint32_t k = 1; k < leaf.count; ++k) {
       if (distance_sq[k] < distance_sq[nearest]) nearest = k;
     }
-    if (LeftOut(distance_sq[nearest])) return;
-    Measure(tree_.triangles[leaf.first + nearest]);
+    if (Prune(distance_sq[nearest])) return;
+    VisitTriangle(bvh_.triangles[leaf.first + nearest]);
     for (std::uint32_t k = 0; k < leaf.count; ++k) {
-      if (k != nearest && !LeftOut(distance_sq[k])) Measure(tree_.triangles[leaf.first + k]);
+      if (k != nearest && !Prune(distance_sq[k])) VisitTriangle(bvh_.triangles[leaf.first + k]);
     }
   }
 
-  void Measure(const TriangleBvh::Triangle& triangle) {
+  void VisitTriangle(const TriangleBvh::Triangle& triangle) {
     const Eigen::Vector3d q = closest_point_on_triangle(p_, triangle.a, triangle.b, triangle.c);
     const double exact_sq = (q - p_).squaredNorm();
     const bool is_first = result_.distance_sq == std::numeric_limits<double>::infinity();
@@ -232,27 +234,31 @@ class Closest {
     result_.point = q;
     result_.distance_sq = exact_sq;
     result_.triangle = triangle.index;
-    Tighten();
-    if (exact_sq > 0.0) Aim((p_ - q) / std::sqrt(exact_sq));
+    UpdatePruneBound();
+    if (exact_sq > 0.0) SetOutward((p_ - q) / std::sqrt(exact_sq));
   }
 
-  const TriangleBvh::View& tree_;
+  const TriangleBvh::View& bvh_;
   const Eigen::Vector3d& p_;
-  float p_float_[3];
-  double best_sq_;
-  double enough_sq_, slack_;
+  float p_float_[3];  // [m] from the centre of the mesh's bounding box
+  double best_sq_;    // [m^2] upper bound
+  double early_out_sq_, tolerance_;
   double rounding_;
-  float limit_sq_ = 0.0F;
-  float left_out_sq_ = std::numeric_limits<float>::max();  // least of all that was
-  float toward_[3];
-  float height_;  // of p along that
+  float prune_bound_sq_ = 0.0F;
+  float least_pruned_sq_ = std::numeric_limits<float>::max();
+  float outward_[3];  // unit, or zero
+  float height_;      // [m] of p along it
   ClosestPoint& result_;
 };
 
-void FindClosest(const TriangleBvh::View& tree, const Eigen::Vector3d& p, double max_distance_sq,
-                 const Eigen::Vector3d& toward, double enough_sq, double slack,
+}  // namespace closest_point
+
+void FindClosest(const TriangleBvh::View& bvh, const Eigen::Vector3d& p, double max_distance_sq,
+                 const Eigen::Vector3d& outward_hint, double early_out_sq, double tolerance,
                  ClosestPoint* closest) {
-  Closest(tree, p, max_distance_sq, toward, enough_sq, slack, closest).Run();
+  closest_point::ClosestPointSearch(bvh, p, max_distance_sq, outward_hint, early_out_sq, tolerance,
+                                    closest)
+      .Run();
 }
 
 }  // namespace HWY_NAMESPACE
@@ -264,11 +270,11 @@ namespace ist {
 
 HWY_EXPORT(FindClosest);
 
-void find_closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, double max_distance_sq,
-                  const Eigen::Vector3d& toward_M, double enough_sq, double slack,
+void find_closest(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, double max_distance_sq,
+                  const Eigen::Vector3d& outward_hint_M, double early_out_sq, double tolerance,
                   ClosestPoint* closest) {
   HWY_DYNAMIC_DISPATCH(FindClosest)
-  (tree, p_M, max_distance_sq, toward_M, enough_sq, slack, closest);
+  (bvh, p_M, max_distance_sq, outward_hint_M, early_out_sq, tolerance, closest);
 }
 
 }  // namespace ist

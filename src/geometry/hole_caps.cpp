@@ -9,31 +9,32 @@
 namespace ist {
 namespace {
 
-using Loop = std::vector<std::uint32_t>;  // vertices in turn; an edge leads from each to the next
+// Vertices in order; an edge leads from each one to the next.
+using Loop = std::vector<std::uint32_t>;
 
-// Walks along open edges; whenever a vertex comes up again, what lies between is a loop.
-std::vector<Loop> loops_of(const std::vector<OpenEdge>& open) {
+// Follows open edges; whenever the path returns to one of its vertices, it closes a loop.
+std::vector<Loop> find_loops(const std::vector<OpenEdge>& open) {
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> next;
   for (const OpenEdge& edge : open) {
     for (int i = 0; i < edge.count; ++i) next[edge.from].push_back(edge.to);
   }
   std::vector<Loop> loops;
-  std::unordered_map<std::uint32_t, std::size_t> place;  // in the path
+  std::unordered_map<std::uint32_t, std::size_t> index_in_path;
   for (const OpenEdge& edge : open) {
     Loop path = {edge.from};
-    place = {{edge.from, 0}};
-    for (auto* ways = &next[edge.from]; !ways->empty(); ways = &next[path.back()]) {
-      const std::uint32_t vertex = ways->back();
-      ways->pop_back();
-      const auto known = place.find(vertex);
-      if (known == place.end()) {
-        place[vertex] = path.size();
+    index_in_path = {{edge.from, 0}};
+    for (auto* edges = &next[edge.from]; !edges->empty(); edges = &next[path.back()]) {
+      const std::uint32_t vertex = edges->back();
+      edges->pop_back();
+      const auto known = index_in_path.find(vertex);
+      if (known == index_in_path.end()) {
+        index_in_path[vertex] = path.size();
         path.push_back(vertex);
         continue;
       }
       const auto first = path.begin() + static_cast<std::ptrdiff_t>(known->second);
       loops.emplace_back(first, path.end());
-      for (auto v = first + 1; v != path.end(); ++v) place.erase(*v);
+      for (auto v = first + 1; v != path.end(); ++v) index_in_path.erase(*v);
       path.erase(first + 1, path.end());
     }
   }
@@ -42,7 +43,7 @@ std::vector<Loop> loops_of(const std::vector<OpenEdge>& open) {
 
 struct Diagonal {
   double length_sq;
-  std::uint32_t cut_off;  // place in the loop
+  std::uint32_t cut_off;  // index in the loop
   std::uint32_t before, after;
 
   bool operator<(const Diagonal& other) const {
@@ -50,6 +51,7 @@ struct Diagonal {
   }
 };
 
+// Triangulates a loop, shortest diagonal first.
 void close(const Loop& loop, TriangleMesh* caps) {
   const auto n = static_cast<std::uint32_t>(loop.size());
   std::vector<std::uint32_t> before(n), after(n);
@@ -64,18 +66,18 @@ void close(const Loop& loop, TriangleMesh* caps) {
     after[i] = (i + 1) % n;
   }
   for (std::uint32_t i = 0; i < n; ++i) push(i);
-  constexpr auto kGone = static_cast<std::uint32_t>(-1);
-  for (std::uint32_t left = n; left >= 3;) {
+  constexpr auto kRemoved = static_cast<std::uint32_t>(-1);
+  for (std::uint32_t remaining = n; remaining >= 3;) {
     const Diagonal cut = shortest.top();
     shortest.pop();
     const std::uint32_t i = cut.cut_off;
-    if (before[i] != cut.before || after[i] != cut.after) continue;  // has changed since
-    // Against the loop's direction.
+    if (before[i] != cut.before || after[i] != cut.after) continue;  // outdated
+    // The cap passes its edges against the loop's direction.
     caps->triangles.push_back({loop[cut.after], loop[i], loop[cut.before]});
     after[cut.before] = cut.after;
     before[cut.after] = cut.before;
-    before[i] = after[i] = kGone;
-    --left;
+    before[i] = after[i] = kRemoved;
+    --remaining;
     push(cut.before);
     push(cut.after);
   }
@@ -86,7 +88,7 @@ void close(const Loop& loop, TriangleMesh* caps) {
 TriangleMesh hole_caps(const TriangleMesh& mesh, const std::vector<OpenEdge>& open) {
   TriangleMesh caps;
   caps.vertices = mesh.vertices;
-  for (const Loop& loop : loops_of(open)) close(loop, &caps);
+  for (const Loop& loop : find_loops(open)) close(loop, &caps);
   return caps;
 }
 

@@ -75,7 +75,7 @@ std::string read_bytes(std::ifstream* file, std::uint64_t begin, std::uint64_t c
   return bytes;
 }
 
-// Whether the last thing that a text of STL tells is a solid's end.
+// Whether the last statement of a piece of STL text ends a solid.
 bool ends_solid(std::string text) {
   std::replace(text.begin(), text.end(), '\r', '\n');
   bool ends = false;
@@ -89,7 +89,7 @@ bool ends_solid(std::string text) {
   return ends;
 }
 
-// Assimp takes the first half of a text for a mesh; half a link would be an unsafe link.
+// Assimp accepts a truncated text file as a mesh, but half a link would be an unsafe link.
 void check_end_of_stl(const std::string& path) {
   constexpr std::uint64_t kBinaryHead = 84, kBinaryFacet = 50, kTail = 4096;
   if (lower_case(fs::path(path).extension().string()) != ".stl") return;
@@ -97,7 +97,7 @@ void check_end_of_stl(const std::string& path) {
   const auto size = static_cast<std::uint64_t>(file.tellg());
   const std::string head = read_bytes(&file, 0, kBinaryHead);
   if (head.compare(0, 5, "solid") != 0) return;
-  if (head.size() == kBinaryHead) {  // binary files may begin so, too
+  if (head.size() == kBinaryHead) {  // binary files may begin with "solid", too
     std::uint32_t facets = 0;
     std::memcpy(&facets, &head[kBinaryHead - sizeof facets], sizeof facets);
     if (size == kBinaryHead + kBinaryFacet * facets) return;
@@ -109,11 +109,11 @@ void check_end_of_stl(const std::string& path) {
        "download it again");
 }
 
-// Metres per unit of a Collada file. Read here, as rviz does, and the root node into which assimp
-// puts unit and up-axis is skipped: what it does there has changed from version to version.
+// Metres per unit of a Collada file. It is read here, as in rviz. Assimp's root node, which holds
+// its own conversion of unit and up-axis, is skipped, because that differs from version to version.
 double collada_unit(const std::string& path) {
   tinyxml2::XMLDocument document;
-  if (document.LoadFile(path.c_str()) != tinyxml2::XML_SUCCESS) return 1.0;  // assimp will tell
+  if (document.LoadFile(path.c_str()) != tinyxml2::XML_SUCCESS) return 1.0;  // assimp reports it
   const tinyxml2::XMLElement* root = document.FirstChildElement("COLLADA");
   const tinyxml2::XMLElement* asset = root != nullptr ? root->FirstChildElement("asset") : nullptr;
   const tinyxml2::XMLElement* unit = asset != nullptr ? asset->FirstChildElement("unit") : nullptr;
@@ -180,7 +180,7 @@ class MeshBuilder {
   };
 
   void add_mesh(const aiMesh& mesh, const Eigen::Affine3d& X_MN) {
-    // A mirror turns the corners' order round; outside stays outside if they are turned back.
+    // A mirror reverses the corners' order; swapping two of them keeps outside outside.
     const bool mirrored = (scale_.prod() < 0.0) != (X_MN.linear().determinant() < 0.0);
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
@@ -202,7 +202,7 @@ class MeshBuilder {
            << scale_.transpose() << "); repair the mesh: coordinates must be finite";
       fail(path_, text.str());
     }
-    // + 0.0 makes one of the two zeros.
+    // + 0.0 turns -0.0 into 0.0.
     const auto [entry, is_new] =
         vertices_.insert({{p.x() + 0.0, p.y() + 0.0, p.z() + 0.0},
                           static_cast<std::uint32_t>(mesh_.vertices.size())});
@@ -227,7 +227,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
   const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
   TriangleMesh mesh;
   if (is_collada(path)) {
-    // The root holds nothing but assimp's idea of unit and up-axis.
+    // The root holds nothing but assimp's conversion of unit and up-axis.
     MeshBuilder builder(path, collada_unit(path) * scale);
     builder.add_children(scene, *scene.mRootNode, X_MR);
     mesh = builder.take();
@@ -239,7 +239,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
   if (mesh.triangles.empty()) {
     fail(path, "holds no triangle; export the surface as triangles or polygons");
   }
-  turn_outward(&mesh);  // some exporters write meshes inside out
+  orient_outward(&mesh);  // some exporters write meshes inside out
   return mesh;
 }
 

@@ -9,19 +9,20 @@
 #include <utility>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
 namespace ist {
 namespace {
 
-// Directed areas of closed surfaces cancel (an open box: 0.2 of its area is left; the worst of the
-// Panda's meshes, with all their holes: 0.08).
+// The largest sum of directed areas, as a share of the area, of a surface that counts as closed.
+// The sum is 0 for closed surfaces, 0.2 for an open box, and 0.08 for the worst of the Panda's
+// meshes, with all their holes.
 constexpr double kMaxOpening = 0.1;
-// Less volume than this share of area^1.5 is a sheet's: neither side is outside.
+// Surfaces with less volume than this share of area^1.5 are sheets: neither side is outside.
 constexpr double kMinVolume = 1e-9;
 
-// Pairs of shells that are looked at: about a second. Meshes of many thousand shells of which many
-// are inside out are left as they are.
+// Pairs of shells to test for nesting, at most: about a second. Meshes with more pairs, of many
+// thousand shells of which many are inside out, stay as they are.
 constexpr std::size_t kMaxPairs = 200000000;
 
 using Triangles = std::vector<std::size_t>;
@@ -38,15 +39,16 @@ bool is_inside_out(const TriangleMesh& mesh, const Triangles& triangles) {
     volume += a.dot(n);
   }
   if (!(area > 0.0) || directed_area.norm() > kMaxOpening * area) return false;
-  volume -= directed_area.dot(moment / area);  // about the centroid, or holes count by their place
+  volume -=
+      directed_area.dot(moment / area);  // about the centroid, or the holes' place would matter
   return volume < -kMinVolume * area * std::sqrt(area);
 }
 
-void turn(TriangleMesh* mesh, const Triangles& triangles) {
+void flip(TriangleMesh* mesh, const Triangles& triangles) {
   for (const std::size_t t : triangles) std::swap(mesh->triangles[t][1], mesh->triangles[t][2]);
 }
 
-// Triangles that hang together by vertices, in the order of their first ones.
+// Connected components of triangles that share vertices, in the order of their first triangles.
 std::vector<Triangles> find_shells(const TriangleMesh& mesh) {
   std::vector<std::uint32_t> parent(mesh.vertices.size());
   std::iota(parent.begin(), parent.end(), 0U);
@@ -71,7 +73,7 @@ std::vector<Triangles> find_shells(const TriangleMesh& mesh) {
   return shells;
 }
 
-// Which shells lie within which others.
+// Decides which shells lie within which others.
 class Nesting {
  public:
   Nesting(const TriangleMesh& mesh, const std::vector<Triangles>& shells)
@@ -109,31 +111,31 @@ class Nesting {
 
 }  // namespace
 
-void turn_outward(TriangleMesh* mesh) {
+void orient_outward(TriangleMesh* mesh) {
   Triangles all(mesh->triangles.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  if (is_inside_out(*mesh, all)) turn(mesh, all);
+  if (is_inside_out(*mesh, all)) flip(mesh, all);
   const std::vector<Triangles> shells = find_shells(*mesh);
   if (shells.size() < 2) return;
-  std::vector<std::size_t> turned;
+  std::vector<std::size_t> inside_out;
   for (std::size_t s = 0; s < shells.size(); ++s) {
-    if (is_inside_out(*mesh, shells[s])) turned.push_back(s);
+    if (is_inside_out(*mesh, shells[s])) inside_out.push_back(s);
   }
-  if (turned.empty() || turned.size() > kMaxPairs / shells.size()) return;
+  if (inside_out.empty() || inside_out.size() > kMaxPairs / shells.size()) return;
   Nesting nesting(*mesh, shells);
-  std::vector<bool> turns(shells.size(), false);
-  for (const std::size_t s : turned) {
+  std::vector<bool> flips(shells.size(), false);
+  for (const std::size_t s : inside_out) {
     bool is_outermost = true;
     for (std::size_t other = 0; other < shells.size() && is_outermost; ++other) {
       is_outermost = !nesting.is_within(s, other);
     }
     if (!is_outermost) continue;
     for (std::size_t other = 0; other < shells.size(); ++other) {
-      if (other == s || nesting.is_within(other, s)) turns[other] = true;
+      if (other == s || nesting.is_within(other, s)) flips[other] = true;
     }
   }
   for (std::size_t s = 0; s < shells.size(); ++s) {
-    if (turns[s]) turn(mesh, shells[s]);
+    if (flips[s]) flip(mesh, shells[s]);
   }
 }
 

@@ -1,17 +1,17 @@
 #pragma once
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
 
-/// Turns what is closed and inside out, so that outside is outside: taken at its word, it would
-/// have no inside.
+/// Flips the triangles of closed surfaces that are inside out, which would have no inside
+/// otherwise.
 ///
-/// First the mesh as a whole, then each shell (triangles that share vertices) that lies in no other
-/// one; what lies within a shell is turned with it, so that cavities stay cavities. Open meshes and
-/// shells, where outside cannot be told like this, are left alone, as are those whose faces are
-/// turned here and there. (So are the shells of meshes that have many thousands of them.)
+/// The mesh as a whole is flipped first, then each shell (triangles that share vertices) that lies
+/// in no other shell. Shells within a flipped shell are flipped too, so that cavities stay
+/// cavities. Open meshes and shells, whose volume has no certain sign, stay as they are, and so do
+/// shells with inconsistent orientation and meshes of many thousand shells.
 /// @param mesh  vertices at the same place are one vertex, as load_mesh makes them
-void turn_outward(TriangleMesh* mesh);
+void orient_outward(TriangleMesh* mesh);
 
 }  // namespace ist

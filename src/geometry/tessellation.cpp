@@ -13,10 +13,10 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kMinSides = 8, kMaxSides = 512;
 constexpr int kMaxSubdivisions = 5;
-// Lateral quads are at most this many times as high as wide.
+// The largest ratio of height to width of lateral quads.
 constexpr double kMaxAspect = 4.0;
-// Vertices stay this much (relative) inside the curved surface, so that rounding cannot put one
-// outside; the deviation below accounts for it.
+// Vertices lie inside the curved surface by this share of its radius, so that rounding cannot put
+// one outside; the deviation accounts for it.
 constexpr double kInset = 1e-14;
 
 std::uint32_t index_of(std::size_t i) { return static_cast<std::uint32_t>(i); }
@@ -55,7 +55,7 @@ void append_cap(int sides, std::uint32_t first, const Eigen::Vector3d& center, b
   }
 }
 
-// On the unit sphere.
+// The vertices lie on the unit sphere.
 TriangleMesh icosahedron() {
   const double golden = 0.5 * (1.0 + std::sqrt(5.0));
   TriangleMesh mesh;
@@ -70,7 +70,7 @@ TriangleMesh icosahedron() {
   return mesh;
 }
 
-// Each triangle of a mesh on the unit sphere into four, new vertices on the sphere.
+// Divides each triangle of a mesh on the unit sphere into four, with new vertices on the sphere.
 TriangleMesh subdivide(const TriangleMesh& coarse) {
   TriangleMesh fine;
   fine.vertices = coarse.vertices;
@@ -89,9 +89,9 @@ TriangleMesh subdivide(const TriangleMesh& coarse) {
   return fine;
 }
 
-// How far the unit sphere leaves a mesh inscribed in it. A point of the sphere reaches the plane of
-// the face below it along its own radius, inside the face, after at most 1 minus the plane's
-// distance from the centre.
+// The largest distance from a point of the unit sphere to a mesh inscribed in it. The radius to the
+// point meets the face below it, at a distance of at most 1 minus that of the face's plane from the
+// centre.
 double unit_deviation(const TriangleMesh& mesh) {
   double nearest_plane = 1.0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {

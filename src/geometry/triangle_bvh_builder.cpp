@@ -31,7 +31,7 @@ void TriangleBvhBuilder::run() {
   add_node({0, static_cast<std::uint32_t>(bvh_.triangles_.size())});
 }
 
-// Median along the longest axis of the centroids.
+// Splits at the median along the longest axis of the centroids' box.
 std::uint32_t TriangleBvhBuilder::split(const Range& range) {
   std::vector<TriangleBvh::Triangle>& triangles = bvh_.triangles_;
   Eigen::AlignedBox3d box;
@@ -77,7 +77,7 @@ std::int32_t TriangleBvhBuilder::add_node(const Range& range) {
   boxes.count = static_cast<std::int32_t>(groups.size());
   for (std::size_t slot = 0; slot < kWidth; ++slot) {
     if (slot >= groups.size()) {
-      // Far from everything: never nearest, and adds nothing to a winding number.
+      // Unused slots are so far away that they are never nearest and have no winding number.
       for (int axis = 0; axis < 3; ++axis) boxes.min[axis][slot] = boxes.max[axis][slot] = kFar;
       moments.x[slot] = moments.y[slot] = moments.z[slot] = kFar;
       continue;
@@ -99,7 +99,7 @@ std::int32_t TriangleBvhBuilder::add_leaf(const Range& range) {
   leaf.first = range.first;
   leaf.count = range.second - range.first;
   for (std::uint32_t slot = 0; slot < TriangleBvh::kWidth; ++slot) {
-    // Unused slots: three times the same corner of the last triangle, which has no solid angle.
+    // Unused slots repeat one corner of the last triangle three times, which has no solid angle.
     const bool used = slot < leaf.count;
     const TriangleBvh::Triangle& t = bvh_.triangles_[range.first + std::min(slot, leaf.count - 1)];
     const Eigen::Vector3d corners[3] = {t.a, used ? t.b : t.a, used ? t.c : t.a};
@@ -129,7 +129,7 @@ void TriangleBvhBuilder::set_box(const Range& range, TriangleBvh::Boxes* boxes,
 
 void TriangleBvhBuilder::set_slab(const Range& range, TriangleBvh::Slabs* slabs,
                                   std::size_t slot) const {
-  constexpr double kLength = 127.0;  // as std::int8_t holds
+  constexpr double kLength = 127.0;  // the largest std::int8_t
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (std::uint32_t t = range.first; t < range.second; ++t)
     mean += area_normal(bvh_.triangles_[t]);
@@ -152,7 +152,7 @@ void TriangleBvhBuilder::set_slab(const Range& range, TriangleBvh::Slabs* slabs,
   slabs->high[slot] = round_up(high);
 }
 
-// About the area-weighted centroid (Barill et al. 2018, section 3.2).
+// The expansion is about the area-weighted centroid (Barill et al. 2018, section 3.2).
 void TriangleBvhBuilder::set_moments(const Range& range, TriangleBvh::Moments* moments,
                                      std::size_t slot) const {
   double area = 0.0;

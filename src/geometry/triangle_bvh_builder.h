@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
 namespace ist {
 
-/// Sorts a mesh's triangles into an 8-wide tree: three median splits a level.
+/// Builds an 8-wide hierarchy from the root down, by three levels of median splits per node.
 class TriangleBvhBuilder {
  public:
   TriangleBvhBuilder(const TriangleMesh& mesh, TriangleBvh* bvh) : mesh_(mesh), bvh_(*bvh) {}

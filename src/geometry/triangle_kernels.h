@@ -1,20 +1,21 @@
 #pragma once
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
+/// The SIMD kernels of TriangleBvh. The hierarchy must not be empty.
 namespace ist {
 
-/// Winding number at p_M; `beta` as in TriangleBvh. The tree must not be empty.
-double sum_winding(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, float beta);
+/// The winding number at p_M.
+/// @param beta  a node's expansion is used where the point is at least beta radii of the node away
+double sum_winding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta);
 
-/// Nearest point within max_distance_sq, or any within enough_sq, or not more than `slack` farther
-/// than the nearest. The tree must not be empty.
-void find_closest(const TriangleBvh::View& tree, const Eigen::Vector3d& p_M, double max_distance_sq,
-                  const Eigen::Vector3d& toward_M, double enough_sq, double slack,
+/// The kernel of TriangleBvh::closest.
+void find_closest(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, double max_distance_sq,
+                  const Eigen::Vector3d& outward_hint_M, double early_out_sq, double tolerance,
                   ClosestPoint* closest);
 
-/// As TriangleBvh::support. The tree must not be empty.
-double find_farthest(const TriangleBvh::View& tree, const Eigen::Vector3d& n_M, double slack,
-                     double reached);
+/// The kernel of TriangleBvh::support.
+double find_support(const TriangleBvh::View& bvh, const Eigen::Vector3d& n_M, double tolerance,
+                    double at_least);
 
 }  // namespace ist

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "internal/geometry/triangle_bvh.h"
+#include "ist_proximity/geometry/shapes.h"
 #include "sphere_search.h"
 
 namespace ist {

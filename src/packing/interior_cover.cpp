@@ -148,7 +148,7 @@ class InteriorCover {
     const Eigen::Vector3d n = way.stableNormalized();
     if (!(n.squaredNorm() > 0.5)) return false;  // no way at all
     const double width = n.cwiseAbs().dot(half), limit = (1.0 - kLeastCut) * width + target_;
-    const double highest = bvh_.support_within(center, reach, n, limit);
+    const double highest = bvh_.support_in_sphere(center, reach, n, limit);
     if (!(highest <= limit) || highest < -reach) return false;
     if (bvh_.is_inside(center + 0.5 * (highest + reach) * n)) return false;
     std::array<Eigen::Vector3d, kMaxCorners> corners;

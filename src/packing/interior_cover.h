@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/packing/packing.h"
 #include "medial_sphere.h"
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "hole_guard.h"
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "sphere_search.h"
 
 namespace ist {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "internal/geometry/solid_queries.h"
 #include "sphere_search.h"
 
 namespace ist {
@@ -36,7 +37,7 @@ double bulge(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3
   for (int i = 0; i < kMarchSteps; ++i) {
     const Eigen::Vector3d p = sphere.center + way * ray;
     const double distance =
-        std::abs(solid.distance_outside(p, std::numeric_limits<double>::infinity()).distance);
+        std::abs(distance_outside(solid, p, std::numeric_limits<double>::infinity()).distance);
     const double nearer = sphere.radius + distance - way;
     // Along a ray this does not grow.
     if (nearer <= kTouch) return 0.0;
@@ -49,7 +50,7 @@ double bulge(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3
 double protrusion(const Solid& solid, const InnerSphere& sphere) {
   const double depth = -solid.signed_distance(sphere.center).distance;
   double farthest = std::max(0.0, sphere.radius - depth);
-  if (!solid.has_holes()) return farthest;
+  if (solid.is_closed()) return farthest;
   for (int i = 0; i < kDirections; ++i) {
     farthest = std::max(farthest, bulge(solid, sphere, direction(i)));
   }

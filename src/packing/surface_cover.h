@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/packing/packing.h"
 #include "medial_sphere.h"
 #include "sphere_search.h"

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/packing/packing.h"
 #include "medial_sphere.h"
 #include "sphere_search.h"

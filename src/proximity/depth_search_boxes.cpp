@@ -93,8 +93,7 @@ class BoxDepthSearch {
     if (cover > outside_distance() + radius_of(box)) return;
     ++search_.statistics->exact_evaluations;
     const Solid& solid = link_.context.solid();
-    const BoxDistance found = solid.distance_to_box(
-        box, obstacles_.X_OL, std::max(search_.closest.exact.distance, kContact));
+    const BoxDistance found = distance_to_box(solid, box, obstacles_.X_OL, std::max(search_.closest.exact.distance, kContact));
     if (found.distance > 0.0 && (cover > outside_distance() || !solid.is_inside(center_L))) {
       return refinement_.take_outside(found, id);
     }
@@ -109,7 +108,7 @@ class BoxDepthSearch {
     ++search_.statistics->exact_evaluations;
     const SignedDistance measured = link_.context.solid().signed_distance(p_LQ);
     search_.offer(measured, p_OQ, obstacles_, id);
-    return {box, link_.context.solid().distance_floor(p_LQ, measured) - radius_of(box)};
+    return {box, distance_floor(link_.context.solid(), p_LQ, measured) - radius_of(box)};
   }
 
   // Best first: the part that may be deepest is halved across its longest edge, until no part can

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "internal/geometry/solid_queries.h"
 #include "proximity/link_query_state.h"
 
 namespace ist {

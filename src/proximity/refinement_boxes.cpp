@@ -35,7 +35,7 @@ void BoxRefinement::measure_outside(ObstacleId id) {
   ++search.statistics->exact_evaluations;
   const double limit = std::min(search.closest.exact.distance, search.range() + search.rounding);
   const BoxDistance found =
-      link_.context.solid().distance_to_box(box_O(*obstacles_.bvh, id), obstacles_.X_OL, limit);
+      distance_to_box(link_.context.solid(), box_O(*obstacles_.bvh, id), obstacles_.X_OL, limit);
   if (found.distance > 0.0) {
     take_outside(found, id);
   } else {
@@ -46,7 +46,7 @@ void BoxRefinement::measure_outside(ObstacleId id) {
 void BoxRefinement::measure(ObstacleId id) {
   ++link_.search.statistics->exact_evaluations;
   const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
-  const BoxDistance found = link_.context.solid().distance_to_box(box, obstacles_.X_OL, kInfinity);
+  const BoxDistance found = distance_to_box(link_.context.solid(), box, obstacles_.X_OL, kInfinity);
   if (!(found.distance > 0.0)) return take_overlap(found, id);
   const InnerSphereTree& tree = link_.context.tree();
   const Eigen::Vector3d center_O = box.center();  // as a whole it may be inside

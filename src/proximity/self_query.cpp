@@ -4,6 +4,8 @@
 #include <cassert>
 #include <limits>
 
+#include "internal/geometry/solid_queries.h"
+
 namespace ist {
 namespace {
 
@@ -26,7 +28,7 @@ class PairSearch {
         X_BA_(X_BA),
         X_AB_(X_BA.inverse()),
         config_(config),
-        has_holes_(a.solid.has_holes() || b.solid.has_holes()),
+        has_holes_(!a.solid.is_closed() || !b.solid.is_closed()),
         queue_(*queue) {}
 
   void run() {
@@ -86,7 +88,7 @@ class PairSearch {
     const Eigen::Vector3d p_B = X_BA_ * p_A;
     double bound = far_bound(p_B, radius);
     if (bound == -kInf) {
-      bound = b_.solid.distance_floor(p_B, b_.solid.signed_distance(p_B)) - radius;
+      bound = distance_floor(b_.solid, p_B, b_.solid.signed_distance(p_B)) - radius;
     }
     if (bound >= enough()) return skip(bound);
     queue_.push_back({bound, child});
@@ -105,7 +107,7 @@ class PairSearch {
         continue;
       }
       const SignedDistance measured = b_.solid.signed_distance(p_B);
-      const double near = b_.solid.distance_floor(p_B, measured) - leaf.cover_radius[k];
+      const double near = distance_floor(b_.solid, p_B, measured) - leaf.cover_radius[k];
       lower_ = std::min(lower_, std::max(near, far));
       if (measured.distance < std::max(leaf.inner_radius[k], 0.0F)) {
         go_deeper(p_A, measured, leaf.inner_radius[k]);

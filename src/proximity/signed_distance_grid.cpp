@@ -18,8 +18,8 @@ constexpr double kRounding = 1e-12;
 
 SignedDistanceGrid::SignedDistanceGrid(const LinkModel& link)
     : solid_(&link.solid),
-      is_one_mesh_(link.solid.is_one_mesh()),
-      has_holes_(link.solid.has_holes()) {
+      is_one_mesh_(is_one_mesh(link.solid)),
+      has_holes_(!link.solid.is_closed()) {
   const Eigen::AlignedBox3d box = bounding_box(link);
   const Eigen::Vector3d sizes = box.sizes();
   const auto cells = [&](int axis) {
@@ -75,7 +75,7 @@ bool SignedDistanceGrid::find(const Eigen::Vector3d& p_LQ, Sample* out) const {
 SignedDistanceGrid::Sample SignedDistanceGrid::measure(const Eigen::Vector3d& p_LQ) {
   const Cell cell = this->cell(p_LQ);
   float& value = values_[cell.index];
-  if (!(value < kUnknown)) value = round_down(solid_->depth(cell.center, -1.0).floor);
+  if (!(value < kUnknown)) value = round_down(point_depth(*solid_, cell.center, -1.0).floor);
   return sample(p_LQ, cell);
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "internal/geometry/solid_queries.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist {

@@ -10,9 +10,10 @@ namespace {
 
 constexpr std::size_t kMostPrototypes = static_cast<std::size_t>(kSphereWidth);
 constexpr int kSteps = 20;
-// Neighbourhoods shrink from half the prototypes to, in effect, the nearest one alone.
-constexpr double kLastReach = 0.01;
-// Groups come out unequal: aiming at full leaves would leave many a sphere too many.
+// The neighbourhood range lambda shrinks from half the prototypes to the nearest one alone, in
+// effect.
+constexpr double kLastRange = 0.01;
+// Groups come out unequal: prototypes for full leaves would give many groups too large for one.
 constexpr std::uint32_t kSpheresPerLeaf = 6;
 
 using Prototypes = std::array<Eigen::Vector3d, kMostPrototypes>;
@@ -24,7 +25,7 @@ Distances distances_sq(const Prototypes& prototypes, std::size_t count, const Ei
   return distances;
 }
 
-// How many prototypes are nearer than each; among equals the first counts as nearer.
+// For each prototype, the number of prototypes that are nearer; among equals the first is nearer.
 std::array<std::size_t, kMostPrototypes> ranks(const Distances& distances, std::size_t count) {
   std::array<std::size_t, kMostPrototypes> rank{};
   for (std::size_t k = 1; k < count; ++k) {
@@ -37,15 +38,15 @@ std::array<std::size_t, kMostPrototypes> ranks(const Distances& distances, std::
   return rank;
 }
 
-// A sphere counts by a power of its volume; of the cover sphere's, for that is what nodes enclose.
+// A sphere is weighted by a power of the volume of its cover sphere, which is what nodes enclose.
 double weight(const InnerSphere& sphere, double magnification) {
   if (magnification == 0.0) return 1.0;
   return std::max(std::pow(sphere.cover_radius, 3.0 * magnification), 1e-30);
 }
 
-// The prototypes start at the middles of parts between medians, so no chance is involved.
-Prototypes first_places(const SphereRange& range, std::size_t count, SphereOrder* order,
-                        std::size_t* found) {
+// The prototypes start at the mean centres of groups split at medians: no random numbers.
+Prototypes first_prototypes(const SphereRange& range, std::size_t count, SphereOrder* order,
+                            std::size_t* found) {
   Prototypes prototypes;
   *found = 0;
   for (const SphereRange& part : split_at_medians(range, count, order)) {
@@ -56,12 +57,12 @@ Prototypes first_places(const SphereRange& range, std::size_t count, SphereOrder
   return prototypes;
 }
 
-// One step of the batch: each prototype moves to the mean of all spheres, weighted by how many
-// other prototypes are nearer to them, and by `weights`.
+// One batch step: each prototype moves to the weighted mean of all spheres. The weight of a sphere
+// decays with the number of other prototypes that are nearer to it; `weights` are factors.
 void move(const SphereRange& range, const SphereOrder& order, const std::vector<double>& weights,
-          std::size_t count, double reach, Prototypes* prototypes) {
+          std::size_t count, double lambda, Prototypes* prototypes) {
   std::array<double, kMostPrototypes> share{}, total{};
-  for (std::size_t k = 0; k < count; ++k) share[k] = std::exp(-static_cast<double>(k) / reach);
+  for (std::size_t k = 0; k < count; ++k) share[k] = std::exp(-static_cast<double>(k) / lambda);
   Prototypes sum;
   sum.fill(Eigen::Vector3d::Zero());
   for (std::uint32_t i = range.first; i < range.second; ++i) {
@@ -86,16 +87,16 @@ std::vector<SphereRange> split_by_neural_gas(const SphereRange& range, double ma
   const std::size_t wanted =
       std::min<std::size_t>(kMostPrototypes, (size(range) + kSpheresPerLeaf - 1) / kSpheresPerLeaf);
   std::size_t count = 0;
-  Prototypes prototypes = first_places(range, wanted, order, &count);
+  Prototypes prototypes = first_prototypes(range, wanted, order, &count);
   std::vector<double> weights;
   weights.reserve(size(range));
   for (std::uint32_t i = range.first; i < range.second; ++i) {
     weights.push_back(weight((*order)[i], magnification));
   }
-  const double first_reach = 0.5 * static_cast<double>(count);
+  const double first_range = 0.5 * static_cast<double>(count);
   for (int step = 0; step < kSteps; ++step) {
-    const double reach = first_reach * std::pow(kLastReach / first_reach, step / (kSteps - 1.0));
-    move(range, *order, weights, count, reach, &prototypes);
+    const double lambda = first_range * std::pow(kLastRange / first_range, step / (kSteps - 1.0));
+    move(range, *order, weights, count, lambda, &prototypes);
   }
   std::vector<std::pair<std::size_t, std::uint32_t>> of_prototype;
   of_prototype.reserve(size(range));

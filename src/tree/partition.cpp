@@ -9,7 +9,7 @@ namespace {
 
 constexpr auto kWidth = static_cast<std::uint32_t>(kSphereWidth);
 
-// Median along the longest axis of the centres.
+// Splits at the median along the longest axis of the centres' box.
 std::uint32_t halve(const SphereRange& range, SphereOrder* order) {
   Eigen::AlignedBox3d box;
   for (std::uint32_t i = range.first; i < range.second; ++i) box.extend((*order)[i].center);
@@ -34,7 +34,7 @@ int median_levels(std::uint32_t count) {
   return levels;
 }
 
-// The one with the most spheres is halved until there are enough.
+// The group with the most spheres is halved until there are enough groups.
 std::vector<SphereRange> split_at_medians(const SphereRange& range, std::size_t most,
                                           SphereOrder* order) {
   std::vector<SphereRange> groups{range};
@@ -60,7 +60,7 @@ std::vector<SphereRange> partition(const TreeConfig& config, const SphereRange& 
   }
   std::uint32_t largest = 0;
   for (const SphereRange& group : groups) largest = std::max(largest, size(group));
-  // Uneven groups make a deep tree; from the medians' it can still be completed.
+  // Uneven groups make a deep tree. They are accepted as long as median splits could complete it.
   const bool fits = groups.size() > 1 && median_levels(largest) <= levels_left;
   return fits ? groups : split_at_medians(range, kWidth, order);
 }

@@ -32,8 +32,8 @@ void sort_along(int axis, const SphereRange& range, SphereOrder* order) {
   });
 }
 
-// The cheapest of all places along all axes.
-std::uint32_t best_place(const SphereRange& range, SphereOrder* order) {
+// Finds the cheapest of all splits along all axes and sorts the range by its axis.
+std::uint32_t best_split(const SphereRange& range, SphereOrder* order) {
   double least = std::numeric_limits<double>::infinity();
   int best_axis = 0;
   std::uint32_t best = range.first + size(range) / 2;
@@ -61,7 +61,8 @@ std::uint32_t best_place(const SphereRange& range, SphereOrder* order) {
 
 }  // namespace
 
-// What is met most often, and is no leaf yet, is divided first.
+// The group with the largest surface area that is no leaf yet is divided first: queries meet it
+// most often.
 std::vector<SphereRange> split_by_surface(const SphereRange& range, SphereOrder* order) {
   const auto weight = [order](const SphereRange& group) {
     if (size(group) <= kWidth) return -1.0;
@@ -75,7 +76,7 @@ std::vector<SphereRange> split_by_surface(const SphereRange& range, SphereOrder*
         groups.begin(), groups.end(),
         [&](const SphereRange& a, const SphereRange& b) { return weight(a) < weight(b); });
     if (size(*next) <= kWidth) break;
-    const std::uint32_t middle = best_place(*next, order);
+    const std::uint32_t middle = best_split(*next, order);
     const SphereRange upper{middle, next->second};
     next->second = middle;
     groups.insert(next + 1, upper);

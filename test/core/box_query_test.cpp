@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "internal/cloud/box_bvh.h"
-#include "ist_proximity/geometry/box_distance.h"
+#include "internal/geometry/box_distance.h"
+#include "internal/geometry/solid_queries.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/allocations.h"
 #include "support/box_oracle.h"
@@ -114,7 +115,7 @@ TEST(BoxDistance, Primitives) {
     for (const Shape& shape :
          {Shape(Sphere{0.1}), Shape(Cylinder{0.05, 0.2}), Shape(Box{{0.2, 0.1, 0.05}})}) {
       const Solid solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
-      const BoxDistance found = solid.distance_to_box(box, X_OL, kInfinity);
+      const BoxDistance found = distance_to_box(solid, box, X_OL, kInfinity);
       const double truth = minimum_over_box(solid, X_OL.inverse(), box);
       if (truth > 1e-6) {
         ASSERT_NEAR(found.distance, truth, 2e-6) << i << " shape " << shape.index();
@@ -320,7 +321,7 @@ TEST(Boxes, EveryKindOfLink) {
         // number of some of its points says otherwise.
         const bool is_outside =
             !solids[i].is_closed() &&
-            solids[i].distance_to_box(box, X_LM.inverse(), kInfinity).distance > 0.0 &&
+            distance_to_box(solids[i], box, X_LM.inverse(), kInfinity).distance > 0.0 &&
             !solids[i].is_inside(X_LM * box.center());
         for (int k = 0; k < 60; ++k) {
           Eigen::Vector3d t = 0.5 * (test::random_vector(&rng, 1.0).array() + 1.0);

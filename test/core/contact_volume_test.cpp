@@ -151,7 +151,7 @@ TEST(ContactVolume, IsZeroUnlessPointsAreInside) {
   std::vector<LinkProximity> results;
   int outside = 0;
   for (const ContactLink& link : some_links()) {
-    if (link.link().solid.has_holes()) continue;
+    if (!link.link().solid.is_closed()) continue;
     ProximityQuery query(link.model, {});
     for (int i = 0; i < test::scaled(60); ++i) {
       const CloudSnapshot cloud =

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "ist_proximity/geometry/solid.h"
+#include "internal/geometry/solid_queries.h"
 #include "support/meshes.h"
 #include "support/scene.h"
 
@@ -50,7 +50,7 @@ TEST(DistanceCache, AreNeverAboveTheTruth) {
     Eigen::Vector3d& p = points[i];
     p += test::random_vector(&rng, std::pow(10.0, test::uniform(&rng, -6, -2)));
     const double floor = cache.find(1, Quantity::kSigned, i, p);
-    const PointDepth depth = solid.depth(p, -1.0);
+    const PointDepth depth = point_depth(solid, p, -1.0);
     ASSERT_LE(floor, depth.exact.distance + 1e-12);
     found += std::isfinite(floor) ? 1 : 0;
     if (step % 3 == 0) cache.store(1, Quantity::kSigned, i, p, depth.floor);

@@ -1,12 +1,12 @@
-// Slivers, needles and triangles without area: the exact geometry under the query, against brute
-// force.
+// Exact distances of slivers, needles and triangles without area, against brute force.
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/closest_point_on_triangle.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
@@ -18,8 +18,7 @@ namespace {
 
 using Point = Eigen::Vector3d;
 
-// A triangle as bad as can be: two long sides, a short one, in any order, down to a line or a
-// point.
+// A degenerate triangle: two long sides and a short one, in any order, down to a line or a point.
 std::array<Point, 3> random_sliver(test::Rng* rng) {
   const Point a = test::random_vector(rng, 0.5), along = test::random_vector(rng, 0.5);
   const double width = std::pow(10.0, test::uniform(rng, -18, 0));
@@ -80,7 +79,7 @@ Point near_surface(const TriangleMesh& mesh, test::Rng* rng) {
          test::random_vector(rng, std::pow(10.0, test::uniform(rng, -8, -1)));
 }
 
-// The float tests may let through more than needed, never less.
+// Pruning in float may be too weak, never too strong.
 TEST(HardGeometry, ClosestPointOnThinMeshes) {
   test::Rng rng(32);
   for (const TriangleMesh& mesh : thin_meshes()) {
@@ -96,14 +95,14 @@ TEST(HardGeometry, ClosestPointOnThinMeshes) {
   }
 }
 
-// Regression: a sliver's solid angle, seen from nearer than its width, is a small difference of
-// large float products; its sign was chance, and points up to 4e-6 m outside a needle 0.3 m long
-// and 1e-5 m thick were told to be inside.
+// Regression: the solid angle of a sliver, seen from nearer than its width, is a small difference
+// of large float products. Its sign was random, so that points up to 4e-6 m outside a needle 0.3 m
+// long and 1e-5 m thick counted as inside.
 TEST(HardGeometry, InsideOfThinMeshes) {
   test::Rng rng(33);
   for (const TriangleMesh& mesh : thin_meshes()) {
     const TriangleBvh bvh(mesh);
-    // Single precision of the coordinates is all that may be lost.
+    // The error may be that of single precision coordinates.
     const double rounding = 2e-7 * test::bounds(mesh).sizes().norm();
     const int count = test::scaled(mesh.triangles.size() > 1000 ? 1000 : 5000);
     for (int i = 0; i < count; ++i) {

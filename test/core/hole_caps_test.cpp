@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "support/hostile_meshes.h"
 #include "support/scene.h"
 
@@ -37,7 +37,7 @@ TEST(HoleCaps, CloseEveryMesh) {
 }
 
 TEST(HoleCaps, CracksAreClosedAcross) {
-  // Two halves of a square, a crack of 1 mm between them: no cap is as large as a half.
+  // Two halves of a square with a crack of 1 mm between them: no cap is as large as a half.
   TriangleMesh mesh;
   for (const double x : {-0.1, -0.0005, 0.0005, 0.1}) {
     for (int j = 0; j <= 20; ++j) mesh.vertices.emplace_back(x, -0.1 + 0.01 * j, 0.0);
@@ -49,7 +49,7 @@ TEST(HoleCaps, CracksAreClosedAcross) {
       mesh.triangles.push_back({a + 1, b, b + 1});
     }
   }
-  // Joined at both ends.
+  // The halves are joined at both ends.
   mesh.triangles.push_back({21, 42, 22});
   mesh.triangles.push_back({40, 61, 41});
   mesh.triangles.push_back({41, 61, 62});

@@ -33,7 +33,7 @@ struct NamedPacking {
   Packing packing;
 };
 
-// Spheres as packings have them, and as none has.
+// Spheres like those of packings, and unusual ones.
 std::vector<NamedPacking> hard_spheres() {
   test::Rng rng(11);
   std::vector<NamedPacking> all;
@@ -98,7 +98,7 @@ struct LeafSphere {
   double inner_radius, cover_radius;
 };
 
-// All spheres below a child, by walking the tree; with what is wrong on the way.
+// Collects all spheres below a child and checks the nodes on the way.
 class Walk {
  public:
   explicit Walk(const InnerSphereTree& tree) : tree_(tree) {}
@@ -144,12 +144,12 @@ class Walk {
     }
   }
 
-  // The node's own numbers about its leaves' own numbers: float has no part in it.
+  // A node's stored numbers enclose its leaves' stored numbers, evaluated in double.
   void check_enclosed(const SphereNode& node, int k, std::size_t first) const {
     const Eigen::Vector3d center(node.x[k], node.y[k], node.z[k]);
     for (std::size_t i = first; i < spheres_.size(); ++i) {
-      const double reach = (spheres_[i].center - center).norm() + spheres_[i].cover_radius;
-      ASSERT_LE(reach, node.radius[k] * (1.0 + 1e-14));
+      const double extent = (spheres_[i].center - center).norm() + spheres_[i].cover_radius;
+      ASSERT_LE(extent, node.radius[k] * (1.0 + 1e-14));
       ASSERT_LE(spheres_[i].inner_radius, node.max_inner[k]);
     }
   }
@@ -159,20 +159,21 @@ class Walk {
   int deepest_ = 0;
 };
 
-// By place, so that the tree's order does not matter.
+// Sorted by position, because the tree's order does not matter.
 bool before(const LeafSphere& a, const LeafSphere& b) {
   return std::make_tuple(a.center.x(), a.center.y(), a.center.z(), a.inner_radius, a.cover_radius) <
          std::make_tuple(b.center.x(), b.center.y(), b.center.z(), b.inner_radius, b.cover_radius);
 }
 
-// Volatile: GCC 12, vectorizing, takes two conversions to float and back for none at all.
+// Volatile, because GCC 12 vectorizes two conversions, to float and back, into none at all.
 Eigen::Vector3d in_float(const Eigen::Vector3d& p) {
   volatile float x = static_cast<float>(p.x()), y = static_cast<float>(p.y());
   volatile float z = static_cast<float>(p.z());
   return {x, y, z};
 }
 
-// Every sphere once: its inner sphere about the leaf's, its cover sphere within the leaf's.
+// Every sphere is in one leaf: its inner sphere holds the leaf's, its cover sphere lies in the
+// leaf's.
 void expect_every_sphere(const Packing& packing, std::vector<LeafSphere> found) {
   ASSERT_EQ(found.size(), packing.spheres.size());
   std::vector<LeafSphere> given;
@@ -227,7 +228,7 @@ TEST(InnerSphereTree, EveryNodeEnclosesItsLeavesHoweverItIsSplit) {
   }
 }
 
-// Without the padding behind the last member.
+// Bytes that are compared: all but the padding behind the last member.
 constexpr std::size_t kNodeBytes = offsetof(SphereNode, count) + sizeof(SphereNode::count);
 constexpr std::size_t kLeafBytes = offsetof(SphereLeaf, count) + sizeof(SphereLeaf::count);
 

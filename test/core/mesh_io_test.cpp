@@ -24,7 +24,7 @@ using test::obj;
 using test::open_edges;
 using test::signed_volume;
 
-// A box off the origin, so that rotations, mirrors and scales about it all show.
+// A box off the origin, so that rotations, mirrors and scales all have an effect.
 const Eigen::Vector3d kMin(0.1, -0.2, 0.3), kMax(0.2, 0.1, 0.7);
 const double kVolume = (kMax - kMin).prod();
 
@@ -119,8 +119,8 @@ TEST_F(MeshIo, saysWhatIsWrongWithAColladaUnit) {
   }
 }
 
-// assimp turns Z_UP and X_UP files to Y_UP at the root node: every link would be off by 90 degrees
-// from what rviz shows.
+// Assimp rotates Z_UP and X_UP files to Y_UP at the root node, which would put every link at 90
+// degrees to its appearance in rviz.
 TEST_F(MeshIo, ignoresTheColladaUpAxis) {
   for (const char* axis : {"X_UP", "Y_UP", "Z_UP"}) {
     ColladaOptions options;
@@ -148,7 +148,7 @@ TEST_F(MeshIo, scales) {
              kMax.cwiseProduct(Eigen::Vector3d(0.001, 0.002, 0.003)));
 }
 
-// An open mesh, whose winding nothing but the mirror's sign can set right.
+// An open mesh: only the sign of the mirroring scale can correct its orientation.
 TEST_F(MeshIo, keepsOutsideOutsideUnderMirrors) {
   const TriangleMesh open = test::open_box({0.3, 0.2, 0.1});
   const double volume = signed_volume(open);
@@ -166,10 +166,10 @@ TEST_F(MeshIo, keepsOutsideOutsideUnderMirrors) {
 
 TEST_F(MeshIo, turnsClosedMeshesThatAreInsideOut) {
   expect_box(load("mesh.stl", binary_stl(test::inside_out(sample_box()))), kMin, kMax);
-  // Of an open one nobody knows.
+  // An open mesh has no certain outside.
   const TriangleMesh open = test::inside_out(test::open_box({0.3, 0.2, 0.1}));
   EXPECT_LT(signed_volume(load("mesh.stl", binary_stl(open))), 0.0);
-  // Parts that are inside out are a hole, as long as the whole is not.
+  // A shell that is inside out within another shell is a cavity.
   const TriangleMesh hollow =
       test::joined(test::box({0.3, 0.3, 0.3}), test::inside_out(test::box({0.1, 0.1, 0.1})));
   EXPECT_NEAR(signed_volume(load("mesh.stl", binary_stl(hollow))), 0.027 - 0.001, 1e-8);
@@ -193,7 +193,8 @@ TEST_F(MeshIo, saysWhatIsWrongWithAFile) {
               "cannot be read as a mesh");
 }
 
-// What is left of a download or a full disk is no mesh: the rest of the link would be missing.
+// A truncated file, after a broken download or on a full disk, is rejected: a part of the link
+// would be missing.
 TEST_F(MeshIo, refusesAnAsciiStlThatIsCutOff) {
   const std::string whole = ascii_stl(sample_box());
   for (std::size_t size = 80; size < whole.size() - std::string("endsolid test\n").size(); ++size) {

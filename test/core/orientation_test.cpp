@@ -17,46 +17,47 @@ using test::joined;
 using test::scaled;
 using test::shifted;
 
-TriangleMesh turned(TriangleMesh mesh) {
-  turn_outward(&mesh);
+TriangleMesh oriented(TriangleMesh mesh) {
+  orient_outward(&mesh);
   return mesh;
 }
 
 // [m^3]
 double volume(const TriangleMesh& mesh) { return test::signed_volume(mesh); }
 
-TEST(TurnOutward, TurnsWhatIsInsideOut) {
+TEST(OrientOutward, FlipsWhatIsInsideOut) {
   const TriangleMesh sphere = test::icosphere(0.1, 2), cube = test::box({0.1, 0.1, 0.1});
   const double v = volume(sphere);
-  EXPECT_NEAR(volume(turned(inside_out(sphere))), v, 1e-12);
-  EXPECT_NEAR(volume(turned(shifted(inside_out(sphere), {10, -20, 30}))), v, 1e-9);
-  // Parts apart from one another, whichever is the larger.
+  EXPECT_NEAR(volume(oriented(inside_out(sphere))), v, 1e-12);
+  EXPECT_NEAR(volume(oriented(shifted(inside_out(sphere), {10, -20, 30}))), v, 1e-9);
+  // Two disjoint shells, whichever is the larger.
   for (const TriangleMesh& other : {scaled(sphere, 0.5), scaled(sphere, 2.0)}) {
     const TriangleMesh apart = shifted(other, {0.5, 0, 0});
     const double both = v + volume(other);
-    EXPECT_NEAR(volume(turned(joined(inside_out(sphere), apart))), both, 1e-12);
-    EXPECT_NEAR(volume(turned(joined(sphere, inside_out(apart)))), both, 1e-12);
-    EXPECT_NEAR(volume(turned(inside_out(joined(sphere, apart)))), both, 1e-12);
+    EXPECT_NEAR(volume(oriented(joined(inside_out(sphere), apart))), both, 1e-12);
+    EXPECT_NEAR(volume(oriented(joined(sphere, inside_out(apart)))), both, 1e-12);
+    EXPECT_NEAR(volume(oriented(inside_out(joined(sphere, apart)))), both, 1e-12);
   }
-  // That touch or cross.
-  EXPECT_NEAR(volume(turned(joined(cube, shifted(inside_out(cube), {0.1, 0, 0})))), 0.002, 1e-12);
-  EXPECT_NEAR(volume(turned(joined(inside_out(cube), shifted(cube, {0.05, 0, 0})))), 0.002, 1e-12);
+  // Two shells that touch or intersect.
+  EXPECT_NEAR(volume(oriented(joined(cube, shifted(inside_out(cube), {0.1, 0, 0})))), 0.002, 1e-12);
+  EXPECT_NEAR(volume(oriented(joined(inside_out(cube), shifted(cube, {0.05, 0, 0})))), 0.002,
+              1e-12);
 }
 
-TEST(TurnOutward, KeepsCavities) {
+TEST(OrientOutward, KeepsCavities) {
   const TriangleMesh sphere = test::icosphere(0.1, 2);
   const TriangleMesh hollow = joined(sphere, inside_out(scaled(sphere, 0.5)));
   const TriangleMesh nested = joined(hollow, scaled(sphere, 0.2));
-  EXPECT_NEAR(volume(turned(hollow)), volume(hollow), 1e-12);
-  EXPECT_NEAR(volume(turned(inside_out(hollow))), volume(hollow), 1e-12);
-  EXPECT_NEAR(volume(turned(nested)), volume(nested), 1e-12);
-  EXPECT_NEAR(volume(turned(inside_out(nested))), volume(nested), 1e-12);
-  // One of two is inside out, with its cavity.
+  EXPECT_NEAR(volume(oriented(hollow)), volume(hollow), 1e-12);
+  EXPECT_NEAR(volume(oriented(inside_out(hollow))), volume(hollow), 1e-12);
+  EXPECT_NEAR(volume(oriented(nested)), volume(nested), 1e-12);
+  EXPECT_NEAR(volume(oriented(inside_out(nested))), volume(nested), 1e-12);
+  // One of two solids is inside out, together with its cavity.
   const TriangleMesh two = joined(shifted(inside_out(nested), {0.5, 0, 0}), scaled(hollow, 2.0));
-  EXPECT_NEAR(volume(turned(two)), volume(nested) + volume(scaled(hollow, 2.0)), 1e-12);
+  EXPECT_NEAR(volume(oriented(two)), volume(nested) + volume(scaled(hollow, 2.0)), 1e-12);
 }
 
-TEST(TurnOutward, LeavesAloneWhatNobodyKnows) {
+TEST(OrientOutward, KeepsWhatHasNoCertainOutside) {
   const TriangleMesh sphere = test::icosphere(0.1, 2);
   const std::vector<std::pair<std::string, TriangleMesh>> meshes = {
       {"nothing", {}},
@@ -70,7 +71,7 @@ TEST(TurnOutward, LeavesAloneWhatNobodyKnows) {
       {"a sphere with an open sheet", joined(sphere, shifted(test::sheet(0.1), {0.2, 0, 0}))},
       {"some faces flipped", test::partly_flipped(sphere, 7)}};
   for (const auto& [name, mesh] : meshes) {
-    EXPECT_EQ(turned(mesh).triangles, mesh.triangles) << name;
+    EXPECT_EQ(oriented(mesh).triangles, mesh.triangles) << name;
   }
 }
 

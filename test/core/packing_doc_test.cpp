@@ -75,7 +75,7 @@ TriangleMesh as_loaded(TriangleMesh mesh) {
   }
   const TriangleMesh before = test::merged(mesh);
   TriangleMesh after = before;
-  turn_outward(&after);
+  orient_outward(&after);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (after.triangles[t] != before.triangles[t]) {
       std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);

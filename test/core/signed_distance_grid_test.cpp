@@ -41,11 +41,11 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
       SignedDistanceGrid::Sample found;
       known += grid.find(p, &found) ? 1 : 0;
       found = grid.measure(p);
-      const PointDepth truth = link.solid.depth(p, -1.0);
+      const PointDepth truth = point_depth(link.solid, p, -1.0);
       ASSERT_LE(found.lower_bound, truth.floor + 1e-12);
       ASSERT_LE(found.lower_bound, truth.exact.distance + 1e-12);
       close += found.lower_bound > truth.floor - 0.02 ? 1 : 0;
-      if (!link.solid.is_one_mesh()) continue;
+      if (!is_one_mesh(link.solid)) continue;
       ASSERT_GE(found.near.within, std::abs(truth.exact.distance) - 1e-12);
       const bool is_inside = truth.exact.distance < 0.0;
       if (found.near.side != NearSurface::Side::kUnknown) {
@@ -53,13 +53,13 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
         ++sides;
       }
       // What is known of a place makes its depth no other.
-      const PointDepth hinted = link.solid.depth(p, -1.0, found.near);
+      const PointDepth hinted = point_depth(link.solid, p, -1.0, found.near);
       ASSERT_EQ(hinted.exact.distance, truth.exact.distance);
       ASSERT_EQ(hinted.floor, truth.floor);
     }
     EXPECT_GT(known, 300);
     EXPECT_GT(close, 1000);
-    if (link.solid.is_one_mesh()) EXPECT_EQ(sides > 0, !link.solid.has_holes());
+    if (is_one_mesh(link.solid)) EXPECT_EQ(sides > 0, link.solid.is_closed());
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "internal/geometry/solid_queries.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
@@ -81,7 +82,8 @@ TEST(Solid, UnionTakesTheNearestOutsideAndTheDeepestInside) {
   EXPECT_NEAR(solid.signed_distance({0.15, 0, 0}).distance, -0.1, 1e-15);
 }
 
-// With and without holes, alone and together: the depth where it may matter, a bound elsewhere.
+// Solids with and without holes, of one element and of several: the exact depth where it is asked
+// for, a bound elsewhere.
 TEST(Solid, DepthEqualsTheSignedDistanceWhereItIsAsked) {
   test::Rng rng(8);
   const GeometryElement closed{test::box({0.2, 0.2, 0.4}), Eigen::Isometry3d::Identity(), "box"};
@@ -94,7 +96,7 @@ TEST(Solid, DepthEqualsTheSignedDistanceWhereItIsAsked) {
       const Eigen::Vector3d p = test::random_vector(&rng, 0.2);
       const double enough = test::uniform(&rng, -0.1, 0.1);
       const double expected = solid.signed_distance(p).distance;
-      const PointDepth depth = solid.depth(p, enough);
+      const PointDepth depth = point_depth(solid, p, enough);
       if (std::isfinite(depth.exact.distance)) {
         ASSERT_NEAR(depth.exact.distance, expected, 1e-12);
         expect_consistent(depth.exact, p);
@@ -120,8 +122,8 @@ TEST(Solid, MeshEqualsBruteForceInsideAndOut) {
       ASSERT_NEAR(result.distance, test::oracle_signed_distance(mesh, p), 1e-12);
       expect_consistent(result, p);
       if (result.distance > 0.0) {
-        EXPECT_EQ(solid.distance_outside(p, 2.0 * result.distance).distance, result.distance);
-        EXPECT_TRUE(std::isinf(solid.distance_outside(p, 0.9 * result.distance).distance));
+        EXPECT_EQ(distance_outside(solid, p, 2.0 * result.distance).distance, result.distance);
+        EXPECT_TRUE(std::isinf(distance_outside(solid, p, 0.9 * result.distance).distance));
       }
     }
   }

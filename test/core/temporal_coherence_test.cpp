@@ -114,7 +114,7 @@ TEST(LinkBound, HoldsAmongTheSameCloudsOnly) {
 
 TEST(LinkBound, WithHolesOnlyFarFromTheSpheres) {
   const LinkModel& link = links().model().links[4];
-  ASSERT_TRUE(link.solid.has_holes());
+  ASSERT_FALSE(link.solid.is_closed());
   const double gap = link.tree.interior_gap();
   LinkBound kept(link);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Longest edge over the height above it, of the worst triangle; 1.15 when equilateral.
+// The largest ratio of longest edge to height of any triangle; 1.15 for equilateral ones.
 double worst_aspect(const TriangleMesh& mesh, std::size_t first, std::size_t last) {
   double worst = 0.0;
   for (std::size_t t = first; t < last; ++t) {
@@ -54,7 +54,7 @@ TEST(Tessellation, cylinderIsInscribedAndClosed) {
   }
 }
 
-// The deviation is where the prism's side is nearest to the axis: measured, not taken on trust.
+// Measures the deviation where the prism's side is nearest to the axis.
 TEST(Tessellation, cylinderDeviationIsWhatIsMeasured) {
   const Cylinder cylinder{0.05, 0.3};
   const Tessellation result = tessellate(cylinder, 1e-3);
@@ -72,12 +72,12 @@ TEST(Tessellation, cylinderDeviationIsWhatIsMeasured) {
 }
 
 TEST(Tessellation, cylinderSidesStayInRange) {
-  // 8 sides at least (64 lateral + 8 + 8 for one ring), 512 at most.
+  // At least 8 sides, each with two lateral triangles and one in each cap; at most 512.
   EXPECT_EQ(tessellate(Cylinder{1.0, 0.1}, 10.0).mesh.triangles.size(), 8U * 2 + 16);
   const Tessellation finest = tessellate(Cylinder{1.0, 0.001}, 0.0);
   EXPECT_EQ(finest.mesh.triangles.size(), 512U * 2 + 1024);
   EXPECT_GT(finest.deviation, 0.0);
-  // A thin rod does not explode.
+  // A thin rod has no excessive number of triangles.
   EXPECT_LE(tessellate(Cylinder{0.001, 100.0}, 1e-9).mesh.triangles.size(), 512U * 512 * 2 + 1024);
 }
 

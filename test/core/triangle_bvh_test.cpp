@@ -1,4 +1,4 @@
-#include "ist_proximity/geometry/triangle_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ TEST(TriangleBvh, ClosestPointKeepsToItsRange) {
   EXPECT_TRUE(std::isinf(TriangleBvh().closest({0, 0, 0}).distance_sq));
 }
 
-// Calls check(bvh, place, direction, distance) for places about all meshes.
+// Calls check(bvh, point, direction, distance) for points about all meshes.
 template <typename Check>
 void for_each_place(test::Rng* rng, const Check& check) {
   for (const TriangleMesh& mesh : meshes()) {
@@ -137,7 +137,7 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
       const Eigen::Vector3d center = test::random_vector(&rng, 0.2);
       const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
       const double radius = test::uniform(&rng, 0.005, 0.2);
-      const double reach = bvh.support_within(center, radius, n, kInfinity);
+      const double support = bvh.support_in_sphere(center, radius, n, kInfinity);
       double sampled = -kInfinity;
       for (int sample = 0; sample < 4000; ++sample) {
         const auto t = static_cast<std::size_t>(sample) % mesh.triangles.size();
@@ -146,45 +146,14 @@ TEST(TriangleBvh, SupportWithinASphereIsNoLessThanAnyPointThere) {
                                   mesh.corner(t, 2) * v - center;
         if (x.norm() <= radius) sampled = std::max(sampled, n.dot(x));
       }
-      ASSERT_GE(reach, sampled - 1e-12);
-      ASSERT_LE(reach, radius + 1e-12);
-      ASSERT_EQ(bvh.support_within(center, radius, n, reach - 1e-6),
-                reach == -kInfinity ? -kInfinity : kInfinity);
-      ASSERT_EQ(bvh.support_within(center, radius, n, reach), reach);
+      ASSERT_GE(support, sampled - 1e-12);
+      ASSERT_LE(support, radius + 1e-12);
+      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, support - 1e-6),
+                support == -kInfinity ? -kInfinity : kInfinity);
+      ASSERT_EQ(bvh.support_in_sphere(center, radius, n, support), support);
     }
   }
-  EXPECT_EQ(TriangleBvh().support_within({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
-}
-
-TEST(TriangleBvh, EndsAreNoWiderThanTold) {
-  test::Rng rng(6);
-  for (const TriangleMesh& mesh : meshes()) {
-    const TriangleBvh bvh(mesh);
-    for (int i = 0; i < 30; ++i) {
-      const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
-      const Eigen::Vector3d on_line = test::random_vector(&rng, 0.1);
-      const double highest = bvh.support(n), deepest = test::uniform(&rng, 0.001, 0.1);
-      const TriangleBvh::EndDepths depths = {deepest / 64, deepest / 16, deepest / 4, deepest};
-      TriangleBvh::EndDepths widths = {};
-      int budget = 1000000;
-      ASSERT_TRUE(bvh.end_widths(n, on_line, highest, depths, &budget, &widths));
-      for (int sample = 0; sample < 2000; ++sample) {
-        const auto t = static_cast<std::size_t>(sample) % mesh.triangles.size();
-        const double u = test::uniform(&rng, 0, 1), v = test::uniform(&rng, 0, 1 - u);
-        const Eigen::Vector3d x =
-            mesh.corner(t, 0) * (1 - u - v) + mesh.corner(t, 1) * u + mesh.corner(t, 2) * v;
-        const Eigen::Vector3d from_line = x - on_line;
-        const double aside = (from_line - n.dot(from_line) * n).norm();
-        for (std::size_t k = 0; k < depths.size(); ++k) {
-          if (highest - n.dot(x) > depths[k]) continue;
-          ASSERT_LE(aside, widths[k] + 1e-9);
-        }
-      }
-      ASSERT_LE(widths.front(), widths.back());
-      budget = 0;
-      ASSERT_FALSE(bvh.end_widths(n, on_line, highest, depths, &budget, &widths));
-    }
-  }
+  EXPECT_EQ(TriangleBvh().support_in_sphere({0, 0, 0}, 1.0, {1, 0, 0}, 0.0), -kInfinity);
 }
 
 TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {

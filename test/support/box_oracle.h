@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
 

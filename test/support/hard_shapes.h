@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 /// Meshes that geometry code stumbles over.
 namespace ist::test {

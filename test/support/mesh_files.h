@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 /// The content of mesh files, for tests that write their own.
 namespace ist::test {

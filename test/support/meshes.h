@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "internal/geometry/tessellation.h"
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 /// Meshes whose distances are known. Counter-clockwise from outside, closed unless said.
 namespace ist::test {

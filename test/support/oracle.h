@@ -7,9 +7,9 @@
 #include <limits>
 #include <vector>
 
+#include "internal/geometry/triangle_bvh.h"
+#include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/geometry/solid.h"
-#include "ist_proximity/geometry/triangle_bvh.h"
-#include "ist_proximity/geometry/triangle_mesh.h"
 
 /// Brute force in double precision: every triangle, every point, no tree and no bound. What every
 /// accelerated path is measured against.

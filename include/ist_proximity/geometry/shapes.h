@@ -2,13 +2,28 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
-
 namespace ist {
+
+/// Indexed triangles in the frame M of the mesh, in metres. Corners are counter-clockwise as seen
+/// from outside. The mesh need not be closed, manifold or consistently oriented: its inside is
+/// where its generalized winding number exceeds 0.5.
+struct TriangleMesh {
+  using Triangle = std::array<std::uint32_t, 3>;
+
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Triangle> triangles;
+
+  const Eigen::Vector3d& corner(std::size_t triangle, int k) const {
+    return vertices[triangles[triangle][static_cast<std::size_t>(k)]];
+  }
+};
 
 /// Axis-aligned box about the origin of its frame.
 struct Box {
@@ -21,15 +36,15 @@ struct Cylinder {
   double length;  ///< [m] > 0
 };
 
-/// InnerSphere about the origin of its frame.
+/// Sphere about the origin of its frame.
 struct Sphere {
   double radius;  ///< [m] > 0
 };
 
 using Shape = std::variant<Box, Cylinder, Sphere, TriangleMesh>;
 
-/// One collision (or visual) element of a link: the shape is exactly what the URDF states, a
-/// cylinder is a cylinder and not its tessellation.
+/// One collision (or visual) element of a link. The shape is exactly what the URDF states: a
+/// cylinder is a cylinder, not its tessellation.
 struct GeometryElement {
   Shape shape;
   Eigen::Isometry3d X_LE = Eigen::Isometry3d::Identity();  ///< element frame E -> link frame L

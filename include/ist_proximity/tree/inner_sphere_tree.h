@@ -6,22 +6,42 @@
 #include <vector>
 
 #include "ist_proximity/packing/packing.h"
-#include "ist_proximity/tree/tree_config.h"
 
 namespace ist {
 
+/// How the spheres of a node are divided among its children.
+enum class TreeSplit {
+  /// The group with the most spheres is halved at the median along its longest axis until there
+  /// are enough groups.
+  kMedian,
+  /// A group is halved where the boxes of the two halves have the least surface area, weighted by
+  /// their numbers of leaves (surface area heuristic, Goldsmith and Salmon 1987).
+  kSurfaceArea,
+  /// Batch neural gas: prototypes settle among the spheres, and each sphere joins the nearest
+  /// prototype (Weller 2013, section 5.2.1; Hammer, Hasenfuss and Villmann 2007).
+  kNeuralGas,
+};
+
+/// How an Inner Sphere Tree is built. It changes the cost of a query, never its answer.
+struct TreeConfig {
+  TreeSplit split = TreeSplit::kNeuralGas;
+  /// Magnification control of neural gas, 0 to 1: a sphere is weighted by this power of its volume.
+  /// 1 draws prototypes to large spheres, as in the book; 0 weights all spheres alike, which serves
+  /// distances better (doc/packing.md).
+  double magnification = 0.0;
+};
+
 /// Children of an inner node, or spheres of a leaf, side by side for SIMD.
 constexpr int kSphereWidth = 8;
-/// No tree is deeper, for up to 2^31 spheres: what descends needs a stack of no more than
-/// kSphereWidth * kMaxTreeLevels entries.
+/// Levels of a tree of up to 2^31 spheres, at most, leaves included.
 constexpr int kMaxTreeLevels = 16;
 
-/// An inner node of the tree: the bounding spheres of its children. Unused slots have a radius so
-/// negative that they are farther than anything.
+/// An inner node of the tree: the bounding spheres of its children. Unused slots have so negative a
+/// radius that they are farther than anything.
 struct alignas(32) SphereNode {
   float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres, link frame
-  float radius[kSphereWidth];     ///< [m] encloses all cover spheres below (wrapped hierarchy)
-  float max_inner[kSphereWidth];  ///< [m] largest inner radius below: no sphere is entered deeper
+  float radius[kSphereWidth];        ///< [m] encloses all cover spheres below (wrapped hierarchy)
+  float max_inner[kSphereWidth];     ///< [m] largest inner radius below: bounds penetration depths
   std::int32_t child[kSphereWidth];  ///< >= 0: inner node; < 0: leaf ~child
   std::int32_t count;                ///< used slots
 };
@@ -34,11 +54,13 @@ struct alignas(32) SphereLeaf {
   std::int32_t count;                                       ///< used slots
 };
 
-/// The Inner Sphere Tree of one link: flat, wide, float, in the link's frame.
+/// The Inner Sphere Tree (IST) of one link: a flat array of wide nodes, in float, in the link's
+/// frame.
 ///
-/// A wrapped hierarchy (Weller 2013, section 5.2): the sphere of a node encloses the cover spheres
-/// of all its leaves, not its child spheres. Deterministic. Radii are rounded so that bounds
-/// survive float: the cover spheres cover what the double spheres covered. Immutable, thread safe.
+/// It is a wrapped hierarchy (Weller 2013, section 5.2): the bounding sphere of a node encloses the
+/// cover spheres of all leaves below it, not the bounding spheres of its children. The construction
+/// is deterministic. Radii are rounded so that bounds hold in float: a cover sphere holds the cover
+/// sphere that it was made from, an inner sphere lies inside its own. Immutable, thread safe.
 class InnerSphereTree {
  public:
   InnerSphereTree() = default;
@@ -51,19 +73,24 @@ class InnerSphereTree {
   const Eigen::Vector3d& center() const { return center_; }  ///< [m] root sphere, link frame
   double radius() const { return radius_; }                  ///< [m] of the root sphere
   std::size_t sphere_count() const { return sphere_count_; }
-  /// [m] no interior point is farther than this from the cover spheres.
+  /// [m] No point inside the link is farther than this from the cover spheres.
   double interior_gap() const { return interior_gap_; }
 
-  /// min over spheres of |p - c| - radius [m]; the brute-force meaning of the inner distance.
+  /// Minimum over the spheres of |p - center| - inner radius [m], by brute force: the definition of
+  /// the distance to the inner spheres.
   double inner_distance(const Eigen::Vector3d& p_L) const;
-  /// min over spheres of |p - c| - cover_radius [m], rounded down: a lower bound of the distance
-  /// from an outside p_L to the solid. A value above interior_gap() proves that p_L is outside.
-  /// Stops early, with any value below `stop_below`, once it cannot exceed that.
+  /// Minimum over the spheres of |p - center| - cover radius [m], rounded down: a lower bound of
+  /// the distance of a point outside to the solid. A value above interior_gap() proves that p_L is
+  /// outside.
+  /// @param p_L         [m] link frame
+  /// @param stop_below  [m] the search ends, with any value below this, once the minimum is smaller
   double cover_distance(const Eigen::Vector3d& p_L, double stop_below = -1e30) const;
-  /// cover_distance(p_L) > distance, found sooner.
+  /// cover_distance(p_L) > distance [m], found sooner.
   bool cover_distance_exceeds(const Eigen::Vector3d& p_L, double distance) const;
 
  private:
+  double rounding(const Eigen::Vector3d& p_L) const;
+
   std::vector<SphereNode> nodes_;
   std::vector<SphereLeaf> leaves_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();

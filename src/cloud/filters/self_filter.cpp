@@ -6,6 +6,7 @@
 
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/relative_pose.h"
+#include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -142,7 +143,7 @@ SelfFilter::Verdict SelfFilter::test_spheres(const Link& link, const Eigen::Vect
 
 bool SelfFilter::test_geometry(const Link& link, const Eigen::Vector3d& p_L) const {
   const double max_distance = padding_ + kRounding;
-  if (link.solid->distance_outside(p_L, max_distance).distance <= padding_) return true;
+  if (distance_outside(*link.solid, p_L, max_distance).distance <= padding_) return true;
   // The point is farther from the surface than the padding: outside, which the tree may prove, or
   // deep inside.
   const double gap = link.tree->interior_gap();

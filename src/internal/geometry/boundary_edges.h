@@ -4,24 +4,24 @@
 #include <cstdint>
 #include <vector>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
 
-/// Whether every edge of the mesh has its partner, a triangle's edge passed in the other direction
-/// (vertices at the same place count as one).
+/// Whether the mesh is closed: every edge of a triangle has a partner, the same edge of another
+/// triangle in the opposite direction. Vertices at the same place count as one.
 bool is_closed_mesh(const TriangleMesh& mesh);
 
-/// How many edges of the mesh lack their partner.
+/// The number of edges without a partner.
 std::size_t count_boundary_edges(const TriangleMesh& mesh);
 
-/// An edge whose triangles do not cancel out, in the direction that most of them pass it.
+/// A boundary edge, in the direction in which more triangles use it than in the other one.
 struct OpenEdge {
-  std::uint32_t from, to;  ///< vertices; of several at the same place always the same one
-  int count;               ///< partners that it lacks, > 0
+  std::uint32_t from, to;  ///< vertices; one vertex represents all at the same place
+  int count;               ///< missing partners, > 0
 };
 
-/// All open edges, sorted. At each place as many begin as end: they form closed loops.
+/// All boundary edges, sorted. As many begin as end at each vertex, so that they form closed loops.
 std::vector<OpenEdge> open_edges(const TriangleMesh& mesh);
 
 }  // namespace ist

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "ist_proximity/geometry/triangle_mesh.h"
+#include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
 
@@ -12,7 +12,8 @@ namespace ist {
 /// Node transforms and the file's unit are applied; Collada's up-axis is ignored, as rviz does;
 /// lines and points are dropped; vertices with the same coordinates are merged; triangles with a
 /// NaN or infinite corner are an error. `scale` multiplies each axis; a mirroring scale flips the
-/// triangles so that outside stays outside; what is closed and inside out is turned (turn_outward).
+/// triangles so that outside stays outside. Closed surfaces that are inside out are flipped
+/// (orient_outward).
 /// @param path   a file on disk
 /// @param scale  dimensionless, finite and not 0 in any axis
 /// @throws ModelError naming the file and what is wrong: missing, empty, unreadable, no triangle,

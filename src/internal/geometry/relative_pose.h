@@ -4,8 +4,8 @@
 
 namespace ist {
 
-/// X_AB from two poses in a frame F. Translations are subtracted before they are turned, so that
-/// nothing is lost where both are far from F's origin.
+/// X_AB from two poses in a frame F. Translations are subtracted before they are rotated, so that
+/// no precision is lost where both are far from F's origin.
 inline Eigen::Isometry3d relative_pose(const Eigen::Isometry3d& X_FA,
                                        const Eigen::Isometry3d& X_FB) {
   Eigen::Isometry3d X_AB;

@@ -4,7 +4,7 @@
 
 namespace ist {
 
-/// A closed mesh inside a primitive, with how far the primitive's surface leaves it.
+/// A closed mesh inscribed in a primitive, and the distance between the two.
 struct Tessellation {
   TriangleMesh mesh;       ///< every triangle lies inside or on the primitive
   double deviation = 0.0;  ///< [m] largest distance from a point of the primitive to the mesh

@@ -11,7 +11,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 LinkBound::LinkBound(const LinkModel& link)
     : displacement_(link),
-      least_cover_distance_(link.solid.has_holes() ? link.tree.interior_gap() : -kInfinity) {}
+      least_cover_distance_(!link.solid.is_closed() ? link.tree.interior_gap() : -kInfinity) {}
 
 void LinkBound::prove(SceneId scene, const Eigen::Isometry3d& X_FL, double bound,
                       double cover_distance, double max_coordinate) {

@@ -8,16 +8,16 @@
 
 namespace ist {
 
-/// The nearest pair of points of something and a solid box that is axis-aligned in its frame O.
+/// The closest pair of points of a shape S and a solid box B that is axis-aligned in frame O.
 struct BoxDistance {
-  /// [m] the distance of the two points; 0 where they touch or overlap, inf: none in range.
+  /// [m] distance of the two points; 0: they touch or overlap; inf: no pair is in range
   double distance = std::numeric_limits<double>::infinity();
   double lower_bound = std::numeric_limits<double>::infinity();  ///< [m] proven, <= distance
-  Eigen::Vector3d p_OS = Eigen::Vector3d::Zero();                ///< [m] on the other one, frame O
-  Eigen::Vector3d p_OB = Eigen::Vector3d::Zero();                ///< [m] on or in the box, frame O
+  Eigen::Vector3d p_OS = Eigen::Vector3d::Zero();                ///< [m] witness point on the shape
+  Eigen::Vector3d p_OB = Eigen::Vector3d::Zero();  ///< [m] witness point on or in the box
 };
 
-/// Point of the box nearest to p.
+/// The point of the box closest to p.
 inline Eigen::Vector3d clamp_to(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p) {
   return p.cwiseMax(box.min()).cwiseMin(box.max());
 }
@@ -26,12 +26,13 @@ inline Eigen::Vector3d clamp_to(const Eigen::AlignedBox3d& box, const Eigen::Vec
 BoxDistance segment_to_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                            const Eigen::AlignedBox3d& box);
 
-/// Triangle abc and a box: exact, also for triangles of zero area. Either an edge of the triangle
-/// is nearest, or a corner of the box is nearest to the triangle's inside, or the box pierces it.
+/// Triangle abc and a box: exact, also for triangles of zero area. There are three cases: an edge
+/// of the triangle is closest, a corner of the box is closest to the triangle's inside, or the box
+/// pierces the triangle.
 BoxDistance triangle_to_box(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c, const Eigen::AlignedBox3d& box);
 
-/// InnerSphere and a box: exact.
+/// Sphere and a box: exact.
 BoxDistance sphere_to_box(const Sphere& sphere, const Eigen::Vector3d& center_O,
                           const Eigen::AlignedBox3d& box);
 

@@ -1,0 +1,137 @@
+// Cylinder and box by GJK (Gilbert, Johnson, Keerthi 1988).
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "internal/geometry/box_distance.h"
+
+namespace ist {
+namespace {
+
+// A point w of the Minkowski difference, cylinder minus box, and the two points it comes from.
+struct Vertex {
+  Eigen::Vector3d w, on_cylinder, on_box;
+};
+
+struct Simplex {
+  std::array<Vertex, 4> vertex;
+  std::array<double, 4> weight{};
+  std::size_t size = 0;
+
+  Eigen::Vector3d nearest() const {
+    Eigen::Vector3d v = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < size; ++i) v += weight[i] * vertex[i].w;
+    return v;
+  }
+};
+
+// Finds the weights of the vertices at the point of their affine hull that is nearest to the
+// origin; false if that point lies outside their convex hull.
+template <int kOthers>
+bool solve(const Simplex& face, std::array<double, 4>* weight) {
+  Eigen::Matrix<double, 3, kOthers> edges;
+  for (int j = 0; j < kOthers; ++j) {
+    edges.col(j) = face.vertex[static_cast<std::size_t>(j) + 1].w - face.vertex[0].w;
+  }
+  const Eigen::Matrix<double, kOthers, 1> solution =
+      edges.colPivHouseholderQr().solve(-face.vertex[0].w);
+  double first = 1.0;
+  for (int j = 0; j < kOthers; ++j) {
+    if (!(solution[j] >= 0.0)) return false;
+    (*weight)[static_cast<std::size_t>(j) + 1] = solution[j];
+    first -= solution[j];
+  }
+  (*weight)[0] = first;
+  return first >= 0.0;
+}
+
+bool solve(Simplex* face) {
+  switch (face->size) {
+    case 1:
+      face->weight[0] = 1.0;
+      return true;
+    case 2:
+      return solve<1>(*face, &face->weight);
+    case 3:
+      return solve<2>(*face, &face->weight);
+    default:
+      return solve<3>(*face, &face->weight);
+  }
+}
+
+// The face of the simplex that holds its point nearest to the origin. All fifteen faces are tried:
+// that is robust where vertices nearly coincide, unlike a selection by Voronoi regions.
+Simplex nearest_face(const Simplex& simplex) {
+  Simplex best;
+  double best_sq = std::numeric_limits<double>::infinity();
+  for (unsigned set = 1; set < 1U << simplex.size; ++set) {
+    Simplex face;
+    for (std::size_t i = 0; i < simplex.size; ++i) {
+      if ((set >> i & 1U) != 0) face.vertex[face.size++] = simplex.vertex[i];
+    }
+    if (!solve(&face)) continue;
+    const double distance_sq = face.nearest().squaredNorm();
+    if (distance_sq < best_sq) {
+      best_sq = distance_sq;
+      best = face;
+    }
+  }
+  return best;
+}
+
+Eigen::Vector3d support_point(const Cylinder& cylinder, const Eigen::Isometry3d& X_OE,
+                              const Eigen::Vector3d& direction_O) {
+  const Eigen::Vector3d d = X_OE.linear().transpose() * direction_O;
+  const double radial = std::hypot(d.x(), d.y());
+  Eigen::Vector3d p(0.0, 0.0, std::copysign(0.5 * cylinder.length, d.z()));
+  if (radial > 0.0) p.head<2>() = cylinder.radius / radial * d.head<2>();
+  return X_OE * p;
+}
+
+}  // namespace
+
+BoxDistance cylinder_to_box(const Cylinder& cylinder, const Eigen::Isometry3d& X_OE,
+                            const Eigen::AlignedBox3d& box) {
+  constexpr int kMaxSteps = 100;
+  constexpr double kTouch = 1e-12;     // [m]
+  constexpr double kResolved = 1e-13;  // of the squared distance
+  Simplex simplex;
+  simplex.size = 1;
+  simplex.weight[0] = 1.0;
+  const Eigen::Vector3d center = X_OE.translation();
+  simplex.vertex[0] = {center - clamp_to(box, center), center, clamp_to(box, center)};
+  Eigen::Vector3d v = simplex.nearest();
+  double lower_bound = 0.0;
+  for (int step = 0; step < kMaxSteps && v.norm() > kTouch; ++step) {
+    const Eigen::Vector3d on_cylinder = support_point(cylinder, X_OE, -v);
+    const Eigen::Vector3d on_box = (v.array() > 0.0).select(box.max(), box.min());
+    const Eigen::Vector3d w = on_cylinder - on_box;
+    lower_bound = std::max(lower_bound, v.dot(w) / v.norm());
+    if (v.squaredNorm() - v.dot(w) <= kResolved * v.squaredNorm()) break;
+    Simplex larger = simplex;
+    larger.vertex[larger.size++] = {w, on_cylinder, on_box};
+    const Simplex face = nearest_face(larger);
+    const Eigen::Vector3d nearer = face.nearest();
+    if (!(nearer.squaredNorm() < v.squaredNorm())) break;  // by rounding alone
+    simplex = face;
+    v = nearer;
+    if (simplex.size == 4) break;  // the origin is inside
+  }
+  BoxDistance result;
+  result.p_OS.setZero();
+  for (std::size_t i = 0; i < simplex.size; ++i) {
+    result.p_OS += simplex.weight[i] * simplex.vertex[i].on_cylinder;
+  }
+  result.p_OB = clamp_to(box, result.p_OS);  // at least as near as the weighted point of the box
+  result.distance = (result.p_OS - result.p_OB).norm();
+  if (result.distance <= kTouch || simplex.size == 4) {
+    result.p_OS = result.p_OB;
+    result.distance = 0.0;
+  }
+  result.lower_bound = std::min(lower_bound, result.distance);
+  return result;
+}
+
+}  // namespace ist

@@ -1,0 +1,81 @@
+#include "internal/geometry/solid_queries.h"
+
+#include <algorithm>
+
+#include "geometry/primitive_distance.h"
+#include "geometry/solid_element.h"
+
+namespace ist {
+
+SignedDistance distance_outside(const Solid& solid, const Eigen::Vector3d& p_L, double max_distance,
+                                const Eigen::Vector3d& outward_hint_L, double tolerance,
+                                double* lower_bound) {
+  SignedDistance best;
+  if (lower_bound != nullptr) *lower_bound = std::max(max_distance, 0.0);
+  if (!(max_distance > 0.0)) return best;
+  double upper_bound = max_distance;
+  for (const SolidElement& element : elements_of(solid)) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    SignedDistance candidate;
+    double element_bound;
+    if (element.is_mesh()) {
+      const ClosestPoint closest = element.bvh.closest(
+          p_E, upper_bound * upper_bound, element.X_EL.linear() * outward_hint_L, 0.0, tolerance);
+      candidate = element.signed_distance(p_E, closest, false);
+      element_bound = closest.lower_bound;
+    } else {
+      candidate = primitive_distance(element.primitive, p_E);
+      element_bound = candidate.distance;
+    }
+    if (lower_bound != nullptr) *lower_bound = std::min(*lower_bound, element_bound);
+    if (candidate.distance < upper_bound) {
+      upper_bound = candidate.distance;
+      best = to_link_frame(element, candidate);
+    }
+  }
+  return best;
+}
+
+double support(const Solid& solid, const Eigen::Vector3d& n_L, double tolerance, double at_least) {
+  double largest = at_least;
+  for (const SolidElement& element : elements_of(solid)) {
+    const Eigen::Vector3d n_E = element.X_EL.linear() * n_L;
+    const double offset = n_L.dot(element.X_LE.translation());
+    const double in_E = element.is_mesh() ? element.bvh.support(n_E, tolerance, largest - offset)
+                                          : primitive_support(element.primitive, n_E);
+    largest = std::max(largest, in_E + offset);
+  }
+  return largest;
+}
+
+BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O,
+                            const Eigen::Isometry3d& X_OL, double max_distance) {
+  BoxDistance best;
+  double limit = max_distance, lower_bound = max_distance;
+  for (const SolidElement& element : elements_of(solid)) {
+    const Eigen::Isometry3d X_OE = X_OL * element.X_LE;
+    BoxDistance candidate;
+    if (element.is_mesh()) {
+      candidate = element.bvh.closest_to_box(box_O, X_OE, limit);
+    } else if (const auto* sphere = std::get_if<Sphere>(&element.primitive)) {
+      candidate = sphere_to_box(*sphere, X_OE.translation(), box_O);
+    } else if (const auto* cylinder = std::get_if<Cylinder>(&element.primitive)) {
+      candidate = cylinder_to_box(*cylinder, X_OE, box_O);
+    } else {
+      candidate = element.box_sides.closest_to_box(box_O, X_OE, limit);
+    }
+    lower_bound = std::min(lower_bound, candidate.lower_bound);
+    if (candidate.distance >= limit) continue;
+    best = candidate;
+    limit = candidate.distance;
+  }
+  best.lower_bound = lower_bound;
+  return best;
+}
+
+bool is_one_mesh(const Solid& solid) {
+  const std::vector<SolidElement>& elements = elements_of(solid);
+  return elements.size() == 1 && elements[0].is_mesh();
+}
+
+}  // namespace ist

@@ -1,0 +1,152 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "internal/bvh/traversal_stack.h"
+#include "internal/geometry/box_distance.h"
+#include "ist_proximity/geometry/shapes.h"
+
+namespace ist {
+
+/// The closest point of a surface to a query point.
+struct ClosestPoint {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< [m] in the frame of the query point
+  double distance_sq = std::numeric_limits<double>::infinity();  ///< [m^2] inf: none in range
+  std::uint32_t triangle = 0;  ///< index into the mesh, valid when distance_sq is finite
+  /// [m] lower bound of the distance to the surface; 0 where the search ended early
+  double lower_bound = 0.0;
+};
+
+/// Bounding volume hierarchy over the triangles of one mesh, in the mesh's frame M: exact closest
+/// point, support function and generalized winding number. Eight children or triangles are tested
+/// at a time in float; the candidates that remain are evaluated in double. Immutable; const members
+/// are thread safe and allocate nothing.
+class TriangleBvh {
+ public:
+  TriangleBvh() = default;
+  /// Copies the corners. Triangles without area are kept: the edge of a flap is surface too.
+  explicit TriangleBvh(const TriangleMesh& mesh);
+
+  /// The closest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
+  /// @param outward_hint_M  unit vector, roughly the direction from the closest point to p_M; it
+  ///                        affects the speed alone. Zero: none
+  /// @param early_out_sq    [m^2] the first point found that is no farther than this is returned
+  /// @param tolerance       [m] a point farther than the closest one by no more than this may be
+  ///                        returned, which is found sooner
+  /// @returns distance_sq = inf when there is none
+  ClosestPoint closest(const Eigen::Vector3d& p_M,
+                       double max_distance_sq = std::numeric_limits<double>::infinity(),
+                       const Eigen::Vector3d& outward_hint_M = Eigen::Vector3d::Zero(),
+                       double early_out_sq = 0.0, double tolerance = 0.0) const;
+
+  /// The closest pair of points of the surface and a solid box, exact in double, if nearer than
+  /// `max_distance` [m]. The distance is 0 where the surface touches or crosses the box; a box
+  /// that lies within a closed surface has a positive distance to it.
+  /// @param box_O  axis-aligned in a frame O
+  /// @param X_OM   the mesh's frame -> O
+  BoxDistance closest_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OM,
+                             double max_distance) const;
+
+  /// [m] The support function: the largest n.x of the surface's points; -inf without triangles.
+  /// @param tolerance  [m] the result may be this much too large, which is found sooner
+  /// @param at_least   [m] a known lower bound of the support; nothing smaller is returned
+  double support(const Eigen::Vector3d& n_M, double tolerance = 0.0,
+                 double at_least = -std::numeric_limits<double>::infinity()) const;
+
+  /// [m] An upper bound of the support of the surface within a sphere, measured from the sphere's
+  /// centre: no point x of the surface in the sphere has a larger n.(x - center). A triangle counts
+  /// as no more than the disc that its plane cuts out of the sphere.
+  /// @param n_M    unit
+  /// @param limit  [m] larger results are returned as inf, which is found sooner
+  /// @returns -inf where no surface is in the sphere
+  double support_in_sphere(const Eigen::Vector3d& center_M, double radius,
+                           const Eigen::Vector3d& n_M, double limit) const;
+
+  /// The generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
+  /// between near holes. It is computed by a hierarchical expansion of second order (Barill et al.
+  /// 2018) with an error below 0.01.
+  double winding_number(const Eigen::Vector3d& p_M) const;
+
+  /// The same, several times faster, with an error below kQuickWindingError.
+  double quick_winding_number(const Eigen::Vector3d& p_M) const;
+  static constexpr double kQuickWindingError = 0.06;
+
+  /// winding_number(p_M) > 0.5. The quick winding number decides where its error allows it.
+  bool is_inside(const Eigen::Vector3d& p_M) const;
+
+  std::size_t size() const { return triangles_.size(); }
+  const Eigen::AlignedBox3d& bounds() const { return bounds_; }
+
+  /// Children of a node and triangles of a leaf, at most.
+  static constexpr std::size_t kWidth = 8;
+  /// Levels of inner nodes, at most: each level divides its triangles by eight, and a mesh has no
+  /// more than 2^32 of them.
+  static constexpr std::size_t kMaxLevels = 10;
+  template <typename Entry>
+  using Stack = TraversalStack<Entry, stack_capacity(kMaxLevels, kWidth)>;
+
+  /// Boxes of up to eight children, rounded outward; unused slots are far away.
+  struct alignas(32) Boxes {
+    float min[3][kWidth], max[3][kWidth];  ///< [m] from the centre of the mesh's bounding box
+    std::int32_t child[kWidth];            ///< >= 0: node; < 0: leaf ~child
+    std::int32_t count;                    ///< used slots, at the front
+  };
+
+  /// Slabs that hold the same children. A slab is much tighter than the box about a patch of
+  /// surface that is oblique to the axes.
+  struct alignas(32) Slabs {
+    float low[kWidth], high[kWidth];   ///< of direction.x, x from the centre of the bounding box
+    std::int8_t direction[3][kWidth];  ///< about the mean normal, any length; zero: no slab
+  };
+
+  /// Expansions of the same children's winding numbers about their own centres.
+  struct alignas(32) Moments {
+    float x[kWidth], y[kWidth], z[kWidth];     ///< [m] centre
+    float radius_sq[kWidth];                   ///< [m^2] of the triangles about the centre
+    float nx[kWidth], ny[kWidth], nz[kWidth];  ///< [m^2] sum of area-weighted normals
+    /// [m^3] symmetric part of the sum of (centroid - centre) normal^T
+    float qxx[kWidth], qyy[kWidth], qzz[kWidth], qxy[kWidth], qxz[kWidth], qyz[kWidth];
+  };
+
+  /// Corners of up to eight triangles in float; unused slots repeat a corner.
+  struct alignas(32) Leaf {
+    float corner[9][kWidth];  ///< [m] ax ay az bx by bz cx cy cz, from the centre of the box
+    std::uint32_t first;      ///< triangle of slot 0; the others follow
+    std::uint32_t count;
+  };
+
+  /// The same triangles in double.
+  struct Triangle {
+    Eigen::Vector3d a, b, c;
+    std::uint32_t index;  ///< in the mesh
+  };
+
+  /// The arrays that the SIMD kernels read.
+  struct View {
+    const Boxes* boxes;      ///< by node; node 0 is the root
+    const Slabs* slabs;      ///< by node
+    const Moments* moments;  ///< by node
+    const Leaf* leaves;
+    const Triangle* triangles;
+    Eigen::Vector3d origin;  ///< [m] centre of the mesh's bounding box
+    double radius;           ///< [m] half its diagonal
+  };
+
+ private:
+  friend class TriangleBvhBuilder;
+  View view() const;
+
+  std::vector<Boxes> boxes_;      // by node; node 0 is the root
+  std::vector<Slabs> slabs_;      // by node
+  std::vector<Moments> moments_;  // by node
+  std::vector<Leaf> leaves_;
+  std::vector<Triangle> triangles_;
+  Eigen::AlignedBox3d bounds_;
+};
+
+}  // namespace ist
