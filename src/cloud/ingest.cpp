@@ -6,9 +6,9 @@
 #include <string>
 
 #include "cloud/filters/self_filter.h"
-#include "cloud/filters/thinning.h"
-#include "cloud/index/image_tiles.h"
-#include "cloud/index/list_tiles.h"
+#include "cloud/filters/voxel_thinning.h"
+#include "cloud/index/organized_cloud.h"
+#include "cloud/index/unorganized_cloud.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/scene_axes.h"
 
@@ -39,7 +39,7 @@ struct Ingest::Impl {
   RegionOfInterest region;
   PointBvhBuilder builder;
   SelfFilter self_filter;
-  Thinning thinning;
+  VoxelThinning thinning;
 };
 
 Ingest::Ingest(const IngestConfig& config) : impl_(std::make_unique<Impl>()) {
@@ -67,10 +67,10 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
   }
   const IngestConfig& config = impl_->config;
-  CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
+  CropParameters pose = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
 
   limit(impl_->region, X_FS, &pose);
-  const bool image = is_image(cloud, pose);
+  const bool image = is_organized(cloud, pose);
   turn(scene_axes(cloud, X_FS.linear(), image), &pose);
 
   const SelfFilter* on_robot = nullptr;
@@ -83,9 +83,9 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   if (image) {
     RawCloud pixels = cloud;
     if (config.thin) pixels.owner.reset();  // all will be read: best while they are in the cache
-    kept = index_image(pixels, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept = index_organized(pixels, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
-    kept = index_list(cloud, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept = index_unorganized(cloud, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -

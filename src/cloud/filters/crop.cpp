@@ -13,8 +13,8 @@
 namespace ist {
 namespace {
 
-CropRange range_of(const CropPose& pose) {
-  CropRange range;
+CropKernelParameters range_of(const CropParameters& pose) {
+  CropKernelParameters range;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       range.R[3 * row + column] = pose.X_OS.linear()(row, column);
@@ -31,7 +31,7 @@ CropRange range_of(const CropPose& pose) {
 // A block as it is read: in the sensor frame [m].
 template <typename Scalar>
 struct alignas(64) SensorBlock {
-  Scalar x[kCropBlock], y[kCropBlock], z[kCropBlock];
+  Scalar x[kCropBatch], y[kCropBatch], z[kCropBatch];
 };
 
 // Four floats a point, as most drivers write them.
@@ -81,8 +81,8 @@ struct Window {
 };
 
 template <typename Scalar, bool kSwap>
-std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropPose& pose,
-                    CropBlock* out, IngestCounts* counts) {
+std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropParameters& pose,
+                    CropBatch* out, IngestCounts* counts) {
   SensorBlock<Scalar> block;
   const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
   for (std::size_t row = 0; row < window.rows; ++row) {
@@ -104,8 +104,8 @@ std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropPose&
   return tally.kept;
 }
 
-std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropPose& pose,
-                        CropBlock* block, IngestCounts* counts) {
+std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropParameters& pose,
+                        CropBatch* block, IngestCounts* counts) {
   const auto crop = cloud.is_double
                         ? cloud.swap_bytes ? &crop_as<double, true> : &crop_as<double, false>
                     : cloud.swap_bytes ? &crop_as<float, true>
@@ -127,11 +127,11 @@ const float* floats(const std::uint8_t* bytes) { return reinterpret_cast<const f
 }  // namespace
 
 std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
-                        std::size_t count, const CropPose& pose, CropBlock* block,
+                        std::size_t count, const CropParameters& pose, CropBatch* block,
                         IngestCounts* counts) {
   const std::uint8_t* bytes = bytes_of(cloud, row, column);
-  if (is_four_floats(cloud) && count % kCropRow == 0) {
-    const CropTally tally = crop_rows(range_of(pose), floats(bytes), count / kCropRow, block);
+  if (is_four_floats(cloud) && count % kXyzwStep == 0) {
+    const CropTally tally = crop_xyzw(range_of(pose), floats(bytes), count / kXyzwStep, block);
     const std::ptrdiff_t kept = take(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }
@@ -139,13 +139,13 @@ std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t colu
 }
 
 std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
-                      const CropPose& pose, CropBlock* block, IngestCounts* counts) {
+                      const CropParameters& pose, CropBatch* block, IngestCounts* counts) {
   constexpr std::size_t kSlots = kTileSide * kTileSide;
   const Window window = {bytes_of(cloud, row, column), std::min(kTileSide, cloud.height - row),
                          std::min(kTileSide, cloud.width - column)};
   if (is_four_floats(cloud) && window.rows == kTileSide && window.columns == kTileSide) {
     const CropTally tally =
-        crop_square(range_of(pose), floats(window.bytes), cloud.row_step / sizeof(float), block);
+        crop_xyzw_tile(range_of(pose), floats(window.bytes), cloud.row_step / sizeof(float), block);
     const std::ptrdiff_t kept = take(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }

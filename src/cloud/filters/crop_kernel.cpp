@@ -27,7 +27,7 @@ HWY_INLINE hn::Vec<DoubleTag> LoadAsDouble(DoubleTag d, const float* from) {
 template <bool kHasRegion>
 class Cropper {
  public:
-  Cropper(const CropRange& range, CropBlock* block) : range_(range), block_(*block) {}
+  Cropper(const CropKernelParameters& range, CropBatch* block) : range_(range), block_(*block) {}
 
   // Takes as many points as a vector holds, to slots from k on.
   template <class V>
@@ -81,17 +81,17 @@ class Cropper {
     return hn::Add(sum, hn::Set(d, range_.t[row]));
   }
 
-  const CropRange range_;
-  CropBlock& block_;
+  const CropKernelParameters range_;
+  CropBatch& block_;
 };
 
-bool HasRegion(const CropRange& range) {
+bool HasRegion(const CropKernelParameters& range) {
   return range.region_radius_sq < std::numeric_limits<double>::infinity();
 }
 
 template <bool kHasRegion, typename Scalar>
-HWY_INLINE CropTally Crop(const CropRange& range, const Scalar* x_S, const Scalar* y_S,
-                          const Scalar* z_S, std::size_t count, CropBlock* block) {
+HWY_INLINE CropTally Crop(const CropKernelParameters& range, const Scalar* x_S, const Scalar* y_S,
+                          const Scalar* z_S, std::size_t count, CropBatch* block) {
   const DoubleTag d;
   Cropper<kHasRegion> cropper(range, block);
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
@@ -102,21 +102,21 @@ HWY_INLINE CropTally Crop(const CropRange& range, const Scalar* x_S, const Scala
   return cropper.tally;
 }
 
-CropTally CropFloats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
-                     std::size_t count, CropBlock* block) {
+CropTally CropFloats(const CropKernelParameters& range, const float* x_S, const float* y_S, const float* z_S,
+                     std::size_t count, CropBatch* block) {
   return HasRegion(range) ? Crop<true>(range, x_S, y_S, z_S, count, block)
                           : Crop<false>(range, x_S, y_S, z_S, count, block);
 }
 
-CropTally CropDoubles(const CropRange& range, const double* x_S, const double* y_S,
-                      const double* z_S, std::size_t count, CropBlock* block) {
+CropTally CropDoubles(const CropKernelParameters& range, const double* x_S, const double* y_S,
+                      const double* z_S, std::size_t count, CropBatch* block) {
   return HasRegion(range) ? Crop<true>(range, x_S, y_S, z_S, count, block)
                           : Crop<false>(range, x_S, y_S, z_S, count, block);
 }
 
 template <bool kHasRegion>
-HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std::size_t count,
-                               CropBlock* block) {
+HWY_INLINE CropTally CropXyzwAs(const CropKernelParameters& range, const float* points, std::size_t count,
+                               CropBatch* block) {
   const DoubleTag d;
   const FloatTag f;
   Cropper<kHasRegion> cropper(range, block);
@@ -128,15 +128,15 @@ HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std:
   return cropper.tally;
 }
 
-CropTally CropRows(const CropRange& range, const float* points, std::size_t rows,
-                   CropBlock* block) {
-  const std::size_t count = rows * kCropRow;
-  return HasRegion(range) ? CropQuads<true>(range, points, count, block)
-                          : CropQuads<false>(range, points, count, block);
+CropTally CropXyzw(const CropKernelParameters& range, const float* points, std::size_t rows,
+                   CropBatch* block) {
+  const std::size_t count = rows * kXyzwStep;
+  return HasRegion(range) ? CropXyzwAs<true>(range, points, count, block)
+                          : CropXyzwAs<false>(range, points, count, block);
 }
 
-CropTally CropSquare(const CropRange& range, const float* points, std::size_t stride,
-                     CropBlock* block) {
+CropTally CropXyzwTile(const CropKernelParameters& range, const float* points, std::size_t stride,
+                     CropBatch* block) {
   const hn::CappedTag<float, kTileSide> d;
   alignas(64) float x[kTileSide * kTileSide], y[kTileSide * kTileSide], z[kTileSide * kTileSide];
   for (std::size_t row = 0; row < kTileSide; ++row, points += stride) {
@@ -160,27 +160,27 @@ namespace ist {
 
 HWY_EXPORT(CropFloats);
 HWY_EXPORT(CropDoubles);
-HWY_EXPORT(CropRows);
-HWY_EXPORT(CropSquare);
+HWY_EXPORT(CropXyzw);
+HWY_EXPORT(CropXyzwTile);
 
-CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
-                      std::size_t count, CropBlock* block) {
+CropTally crop_floats(const CropKernelParameters& range, const float* x_S, const float* y_S, const float* z_S,
+                      std::size_t count, CropBatch* block) {
   return HWY_DYNAMIC_DISPATCH(CropFloats)(range, x_S, y_S, z_S, count, block);
 }
 
-CropTally crop_doubles(const CropRange& range, const double* x_S, const double* y_S,
-                       const double* z_S, std::size_t count, CropBlock* block) {
+CropTally crop_doubles(const CropKernelParameters& range, const double* x_S, const double* y_S,
+                       const double* z_S, std::size_t count, CropBatch* block) {
   return HWY_DYNAMIC_DISPATCH(CropDoubles)(range, x_S, y_S, z_S, count, block);
 }
 
-CropTally crop_rows(const CropRange& range, const float* points, std::size_t rows,
-                    CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropRows)(range, points, rows, block);
+CropTally crop_xyzw(const CropKernelParameters& range, const float* points, std::size_t rows,
+                    CropBatch* block) {
+  return HWY_DYNAMIC_DISPATCH(CropXyzw)(range, points, rows, block);
 }
 
-CropTally crop_square(const CropRange& range, const float* points, std::size_t stride,
-                      CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropSquare)(range, points, stride, block);
+CropTally crop_xyzw_tile(const CropKernelParameters& range, const float* points, std::size_t stride,
+                      CropBatch* block) {
+  return HWY_DYNAMIC_DISPATCH(CropXyzwTile)(range, points, stride, block);
 }
 
 }  // namespace ist

@@ -7,7 +7,7 @@
 namespace ist {
 
 /// What crop_points does to a block that has been read.
-struct CropRange {
+struct CropKernelParameters {
   double R[9];                        ///< rotation of X_OS, row-major
   double t[3];                        ///< [m] its translation
   double min_range_sq, max_range_sq;  ///< [m^2]
@@ -27,23 +27,23 @@ struct CropTally {
 /// sums are rounded one by one.
 /// @param x_S,y_S,z_S  sensor frame [m], `count` of them and then whatever fills up a multiple of
 ///                     eight, NaN
-CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
-                      std::size_t count, CropBlock* block);
-CropTally crop_doubles(const CropRange& range, const double* x_S, const double* y_S,
-                       const double* z_S, std::size_t count, CropBlock* block);
+CropTally crop_floats(const CropKernelParameters& range, const float* x_S, const float* y_S, const float* z_S,
+                      std::size_t count, CropBatch* block);
+CropTally crop_doubles(const CropKernelParameters& range, const double* x_S, const double* y_S,
+                       const double* z_S, std::size_t count, CropBatch* block);
 
-/// Points that crop_rows() takes at a time.
-constexpr std::size_t kCropRow = 16;
+/// Points that crop_xyzw() takes at a time.
+constexpr std::size_t kXyzwStep = 16;
 
 /// The same for points of four floats each (x, y, z and padding), one after the other.
 /// @param points  aligned as floats are
-/// @param rows    of kCropRow points; at most kCropBlock in all
-CropTally crop_rows(const CropRange& range, const float* points, std::size_t rows,
-                    CropBlock* block);
+/// @param rows    of kXyzwStep points; at most kCropBatch in all
+CropTally crop_xyzw(const CropKernelParameters& range, const float* points, std::size_t rows,
+                    CropBatch* block);
 
 /// The same for a square of kTileSide x kTileSide points.
 /// @param stride  [floats] from row to row
-CropTally crop_square(const CropRange& range, const float* points, std::size_t stride,
-                      CropBlock* block);
+CropTally crop_xyzw_tile(const CropKernelParameters& range, const float* points, std::size_t stride,
+                      CropBatch* block);
 
 }  // namespace ist

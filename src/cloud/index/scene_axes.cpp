@@ -194,14 +194,14 @@ Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Matrix3d& axes) {
 
 }  // namespace
 
-Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_image) {
-  const Normals normals = is_image ? sample_image(cloud, R_FS) : sample_list(cloud, R_FS);
+Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_organized) {
+  const Normals normals = is_organized ? sample_image(cloud, R_FS) : sample_list(cloud, R_FS);
   const Eigen::Index enough = std::max<Eigen::Index>(8, normals.size() / 8);
   const Eigen::Vector3f first = normals.most_common(Eigen::Vector3f::Zero(), enough);
   if (first.isZero()) return Eigen::Matrix3d::Identity();
   const Eigen::Vector3d n = first.cast<double>().normalized();
   Eigen::Vector3d other = normals.most_common(first, enough).cast<double>();
-  if (other.isZero()) other = across(n, is_image ? R_FS : Eigen::Matrix3d::Identity());
+  if (other.isZero()) other = across(n, is_organized ? R_FS : Eigen::Matrix3d::Identity());
   return axes_of(n, (other - other.dot(n) * n).normalized());
 }
 

@@ -13,9 +13,9 @@ namespace ist {
 /// it that most of the others do, as in rooms and on tables; a matter of speed.
 /// @param cloud  checked by check_layout
 /// @param R_FS   sensor frame -> fixed frame
-/// @param is_image  neighbours in the image are neighbours in space; else any order
+/// @param is_organized  neighbours in the image are neighbours in space; else any order
 /// @returns R_FO, a rotation: the axes as columns, in the order in which they come nearest to the
 ///          fixed frame's; those of the fixed frame, where surfaces share no direction
-Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_image);
+Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_organized);
 
 }  // namespace ist

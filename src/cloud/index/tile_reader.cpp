@@ -4,7 +4,7 @@
 #include <cassert>
 #include <limits>
 
-#include "cloud/index/tile_kernel.h"
+#include "cloud/index/tile_split_kernel.h"
 
 namespace ist {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
 static_assert(kTileSide * kTileSide == kSlots, "a square of pixels fills a tile");
 
-void copy_all(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
+void copy_all(const CropBatch& block, std::size_t width, std::uint32_t first_pixel,
               PointTile* tile) {
   std::copy_n(block.x, kSlots, tile->x);
   std::copy_n(block.y, kSlots, tile->y);
@@ -27,10 +27,10 @@ void copy_all(const CropBlock& block, std::size_t width, std::uint32_t first_pix
 
 void read_tile(const RawCloud& image, const Eigen::Isometry3d& X_OS, std::uint32_t first_pixel,
                PointTile* tile) {
-  CropPose pose;
+  CropParameters pose;
   pose.X_OS = X_OS;
   pose.max_range_sq = std::numeric_limits<double>::max();
-  CropBlock block;
+  CropBatch block;
   IngestCounts unused;
   const std::size_t kept =
       crop_tile(image, first_pixel / image.width, first_pixel % image.width, pose, &block, &unused);
@@ -39,7 +39,7 @@ void read_tile(const RawCloud& image, const Eigen::Isometry3d& X_OS, std::uint32
   copy_all(block, image.width, first_pixel, tile);
 }
 
-void copy_kept(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
+void copy_kept(const CropBatch& block, std::size_t width, std::uint32_t first_pixel,
                PointTile* tile) {
   PointTile all;
   copy_all(block, width, first_pixel, &all);

@@ -15,7 +15,7 @@ void read_tile(const RawCloud& image, const Eigen::Isometry3d& X_OS, std::uint32
                PointTile* tile);
 
 /// The same for what crop_tile has left of a tile; unused slots get no meaning.
-void copy_kept(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
+void copy_kept(const CropBatch& block, std::size_t width, std::uint32_t first_pixel,
                PointTile* tile);
 
 }  // namespace ist

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "cloud/filters/crop_pose.h"
+#include "cloud/filters/crop_parameters.h"
 #include "cloud/filters/self_filter.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "ist_proximity/cloud/cloud_layout.h"
@@ -16,7 +16,8 @@ namespace ist {
 /// Counts `not_a_number`, `infinite` and `outside_region`.
 /// @param on_robot  may be null: nothing is dropped for it
 /// @returns how many points are kept, before `on_robot` drops some
-std::size_t index_list(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                       PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts);
+std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& pose,
+                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* index,
+                              IngestCounts* counts);
 
 }  // namespace ist

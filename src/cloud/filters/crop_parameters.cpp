@@ -1,4 +1,4 @@
-#include "cloud/filters/crop_pose.h"
+#include "cloud/filters/crop_parameters.h"
 
 #include <algorithm>
 #include <array>
@@ -41,10 +41,10 @@ Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max
 
 }  // namespace
 
-CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
+CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
                    double max_range) {
   const double largest = std::min(max_range, kLargestRange);
-  CropPose pose;
+  CropParameters pose;
   pose.min_range_sq = min_range * min_range;
   pose.max_range_sq = largest * largest;
   Eigen::Vector3d near_S = Eigen::Vector3d::Zero();
@@ -54,12 +54,12 @@ CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double 
   return pose;
 }
 
-void limit(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS, CropPose* pose) {
+void limit(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS, CropParameters* pose) {
   pose->region_center = X_FS.inverse() * region.center_F;
   pose->region_radius_sq = region.radius * region.radius;
 }
 
-void turn(const Eigen::Matrix3d& R_FO, CropPose* pose) {
+void turn(const Eigen::Matrix3d& R_FO, CropParameters* pose) {
   const Eigen::Matrix3d R_NO = R_FO.transpose() * pose->X_FO.linear();
   pose->X_FO.linear() = R_FO;
   pose->X_OS = Eigen::Isometry3d(R_NO) * pose->X_OS;

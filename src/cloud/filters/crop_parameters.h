@@ -14,7 +14,7 @@ namespace ist {
 constexpr double kLargestRange = 1e9;  // [m]
 
 /// Which points of a cloud to keep, and where they go: to the frame O of the index.
-struct CropPose {
+struct CropParameters {
   Eigen::Isometry3d X_FO = Eigen::Isometry3d::Identity();  ///< frame O -> fixed frame
   Eigen::Isometry3d X_OS = Eigen::Isometry3d::Identity();  ///< sensor frame -> O
   double min_range_sq = 0.0, max_range_sq = 0.0;  ///< [m^2] of the points kept, bounds included
@@ -29,14 +29,14 @@ struct CropPose {
 /// @param cloud      checked by check_layout
 /// @param X_FS       sensor frame -> fixed frame, rigid and finite
 /// @param min_range, max_range  [m] of the points kept, bounds included
-CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
+CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
                    double max_range);
 
 /// Only points within a region are kept.
 /// @param X_FS  sensor frame -> fixed frame
-void limit(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS, CropPose* pose);
+void limit(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS, CropParameters* pose);
 
 /// Gives O other axes.
-void turn(const Eigen::Matrix3d& R_FO, CropPose* pose);
+void turn(const Eigen::Matrix3d& R_FO, CropParameters* pose);
 
 }  // namespace ist

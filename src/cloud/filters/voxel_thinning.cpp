@@ -1,10 +1,10 @@
-#include "cloud/filters/thinning.h"
+#include "cloud/filters/voxel_thinning.h"
 
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
-#include "cloud/filters/thinning_kernel.h"
+#include "cloud/filters/voxel_kernel.h"
 
 namespace ist {
 namespace {
@@ -25,8 +25,8 @@ double fitting(double cell, const PointBvh& all) {
   return std::max(cell, static_cast<double>(reach) / kMostCells);
 }
 
-CellGrid make_grid(const Eigen::Matrix3d& R_FO, const Eigen::Vector3d& origin, double edge) {
-  CellGrid grid;
+VoxelGrid make_grid(const Eigen::Matrix3d& R_FO, const Eigen::Vector3d& origin, double edge) {
+  VoxelGrid grid;
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) grid.turn[3 * i + k] = static_cast<float>(R_FO(i, k) / edge);
     grid.offset[i] = offset_in_cell(origin[i], edge);
@@ -36,12 +36,12 @@ CellGrid make_grid(const Eigen::Matrix3d& R_FO, const Eigen::Vector3d& origin, d
 
 }  // namespace
 
-bool Thinning::Entry::better_than(const Entry& other) const {
-  if (off_centre != other.off_centre) return off_centre < other.off_centre;
+bool VoxelThinning::Entry::better_than(const Entry& other) const {
+  if (offset_sq != other.offset_sq) return offset_sq < other.offset_sq;
   return std::tie(x, y, z, id) < std::tie(other.x, other.y, other.z, other.id);
 }
 
-void Thinning::run(const PointBvh& all, double cell_size, PointBvhBuilder* builder,
+void VoxelThinning::run(const PointBvh& all, double cell_size, PointBvhBuilder* builder,
                    PointBvh* thin) {
   // As many cells as last time; a third of the table stays empty even then.
   std::size_t table_size = kSmallestTable;
@@ -51,18 +51,18 @@ void Thinning::run(const PointBvh& all, double cell_size, PointBvhBuilder* build
   recent_.fill(0);
   const Eigen::Matrix3d& R_FO = all.X_FO().linear();
   const Eigen::Vector3d& origin = all.X_FO().translation();
-  const CellGrid grid = make_grid(R_FO, origin, fitting(cell_size, all));
-  TileCells cells;
+  const VoxelGrid grid = make_grid(R_FO, origin, fitting(cell_size, all));
+  TileVoxels cells;
   PointTile room;
   for (std::size_t number = 0; number < all.tile_count(); ++number) {
     const PointTile& tile = all.tile(number, &room);
-    const std::size_t count = find_cells(grid, tile, &cells);
+    const std::size_t count = find_voxels(grid, tile, &cells);
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t k = cells.nearest[i];
-      const Cell cell{static_cast<std::int32_t>(cells.x[k]), static_cast<std::int32_t>(cells.y[k]),
+      const Voxel cell{static_cast<std::int32_t>(cells.x[k]), static_cast<std::int32_t>(cells.y[k]),
                       static_cast<std::int32_t>(cells.z[k])};
-      if (is_beaten(cell, cells.off_centre[k])) continue;
-      add({cell, cells.off_centre[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
+      if (is_beaten(cell, cells.offset_sq[k])) continue;
+      add({cell, cells.offset_sq[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
     }
   }
 
@@ -77,14 +77,14 @@ void Thinning::run(const PointBvh& all, double cell_size, PointBvhBuilder* build
 }
 
 // The usual case, on its own for speed: a cell seen a moment ago has a better point already.
-inline bool Thinning::is_beaten(const Cell& cell, float off_centre) const {
+inline bool VoxelThinning::is_beaten(const Voxel& cell, float offset_sq) const {
   const std::uint32_t recent = recent_[cell.place()];
   return recent < entries_.size() && entries_[recent].cell == cell &&
-         entries_[recent].off_centre < off_centre;
+         entries_[recent].offset_sq < offset_sq;
 }
 
-void Thinning::add(const Entry& entry) {
-  const Cell& cell = entry.cell;
+void VoxelThinning::add(const Entry& entry) {
+  const Voxel& cell = entry.cell;
   std::uint32_t& recent = recent_[cell.place()];
   if (recent >= entries_.size() || !(entries_[recent].cell == cell)) {
     std::uint32_t* slot = find(cell);
@@ -101,7 +101,7 @@ void Thinning::add(const Entry& entry) {
 }
 
 // Cells of a cube of 4 x 4 x 4 are neighbours in the table: what is near in space is in the cache.
-std::size_t Thinning::hash(const Cell& cell) {
+std::size_t VoxelThinning::hash(const Voxel& cell) {
   constexpr std::uint32_t kBits = 2;
   const auto x = static_cast<std::uint32_t>(cell.x), y = static_cast<std::uint32_t>(cell.y),
              z = static_cast<std::uint32_t>(cell.z);
@@ -114,14 +114,14 @@ std::size_t Thinning::hash(const Cell& cell) {
 }
 
 // The slot that holds a cell, or the empty one where it belongs.
-std::uint32_t* Thinning::find(const Cell& cell) {
+std::uint32_t* VoxelThinning::find(const Voxel& cell) {
   const std::size_t mask = table_.size() - 1;
   std::size_t i = hash(cell) & mask;
   while (table_[i] != 0 && !(entries_[table_[i] - 1].cell == cell)) i = (i + 1) & mask;
   return &table_[i];
 }
 
-void Thinning::grow() {
+void VoxelThinning::grow() {
   table_.assign(2 * table_.size(), 0U);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     *find(entries_[i].cell) = static_cast<std::uint32_t>(i + 1);

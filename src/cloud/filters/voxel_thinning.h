@@ -13,7 +13,7 @@ namespace ist {
 /// Keeps one point of each occupied cell of a cubic grid that is aligned to the fixed frame: the
 /// one nearest to the cell's centre, so that which one it is does not depend on the points' order
 /// and changes little as they move. Keeps its memory. Not thread safe.
-class Thinning {
+class VoxelThinning {
  public:
   /// @param all   what to thin
   /// @param cell_size  [m] > 0, edge of a cell
@@ -22,9 +22,9 @@ class Thinning {
 
  private:
   /// Number of a cell along each axis, from the origin.
-  struct Cell {
+  struct Voxel {
     std::int32_t x, y, z;
-    bool operator==(const Cell& other) const {
+    bool operator==(const Voxel& other) const {
       return x == other.x && y == other.y && z == other.z;
     }
     /// In a cube of 8 x 8 x 8 that is repeated all over space.
@@ -35,18 +35,18 @@ class Thinning {
 
   /// The best point of a cell so far.
   struct Entry {
-    Cell cell;
-    float off_centre;  ///< squared distance to the cell's centre, in cells
+    Voxel cell;
+    float offset_sq;  ///< squared distance to the cell's centre, in cells
     float x, y, z;     ///< [m] in the frame of the index
     std::uint32_t id;
 
     bool better_than(const Entry& other) const;
   };
 
-  static std::size_t hash(const Cell& cell);
-  bool is_beaten(const Cell& cell, float off_centre) const;
+  static std::size_t hash(const Voxel& cell);
+  bool is_beaten(const Voxel& cell, float offset_sq) const;
   void add(const Entry& entry);
-  std::uint32_t* find(const Cell& cell);
+  std::uint32_t* find(const Voxel& cell);
   void grow();
 
   std::vector<Entry> entries_;

@@ -1,4 +1,4 @@
-#include "cloud/index/list_tiles.h"
+#include "cloud/index/unorganized_cloud.h"
 
 #include <algorithm>
 #include <array>
@@ -25,7 +25,7 @@ RawCloud flattened(RawCloud cloud) {
 }
 
 // Some of the points that are kept. @returns how many
-std::size_t take_sample(const RawCloud& cloud, const CropPose& pose, Sample* sample) {
+std::size_t take_sample(const RawCloud& cloud, const CropParameters& pose, Sample* sample) {
   // Odd: rows of a scanner have even lengths, and are not to be met at the same place each time.
   const std::size_t stride = cloud.size() / sample->size() | 1U;
   std::size_t count = 0;
@@ -42,18 +42,19 @@ std::size_t take_sample(const RawCloud& cloud, const CropPose& pose, Sample* sam
 
 }  // namespace
 
-std::size_t index_list(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                       PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts) {
+std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& pose,
+                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* index,
+                              IngestCounts* counts) {
   const RawCloud list = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();
   cells.start(sample.data(), take_sample(list, pose, &sample), list.size());
-  CropBlock block;
+  CropBatch block;
   std::uint32_t id = 0;
   std::size_t kept = 0;
   for (std::size_t row = 0; row < list.height; ++row) {
-    for (std::size_t column = 0; column < list.width; column += kCropBlock) {
-      const std::size_t count = std::min(kCropBlock, list.width - column);
+    for (std::size_t column = 0; column < list.width; column += kCropBatch) {
+      const std::size_t count = std::min(kCropBatch, list.width - column);
       const std::size_t here = crop_points(list, row, column, count, pose, &block, counts);
       if (here > 0) cells.add(block, count, id);
       kept += here;

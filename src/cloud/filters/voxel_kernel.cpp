@@ -1,7 +1,7 @@
 // Compiled once per instruction set; the best one there is gets chosen at run time.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "cloud/filters/thinning_kernel.cpp"
-#include "cloud/filters/thinning_kernel.h"
+#define HWY_TARGET_INCLUDE "cloud/filters/voxel_kernel.cpp"
+#include "cloud/filters/voxel_kernel.h"
 
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
@@ -13,20 +13,20 @@ namespace ist {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using CellTag = hn::CappedTag<float, kPointWidth>;
+using VoxelTag = hn::CappedTag<float, kPointWidth>;
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
 constexpr float kUnusedCell = 1.5e9F;  // of unused slots: fits an integer, beyond all others
 
 template <class M>
 HWY_INLINE std::uint32_t MaskBits(const M& mask) {
   std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(CellTag(), mask, bits);
+  hn::StoreMaskBits(VoxelTag(), mask, bits);
   return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8;
 }
 
-HWY_INLINE hn::Vec<CellTag> Divide(const CellGrid& grid, int axis, const PointTile& tile,
+HWY_INLINE hn::Vec<VoxelTag> Divide(const VoxelGrid& grid, int axis, const PointTile& tile,
                                    std::size_t first, float* cell) {
-  const CellTag d;
+  const VoxelTag d;
   const float* turn = grid.turn + 3 * axis;
   const auto x = hn::Load(d, tile.x + first), y = hn::Load(d, tile.y + first),
              z = hn::Load(d, tile.z + first);
@@ -43,42 +43,42 @@ HWY_INLINE hn::Vec<CellTag> Divide(const CellGrid& grid, int axis, const PointTi
 }
 
 // The slots of those in the same cell as slot k, and among them the nearest to its centre.
-struct Cell {
+struct Voxel {
   std::uint32_t slots, nearest;
 };
 
-HWY_INLINE Cell CellOf(const TileCells& cells, std::size_t k) {
-  const CellTag d;
+HWY_INLINE Voxel VoxelOf(const TileVoxels& cells, std::size_t k) {
+  const VoxelTag d;
   const auto x = hn::Set(d, cells.x[k]), y = hn::Set(d, cells.y[k]), z = hn::Set(d, cells.z[k]);
   const auto far = hn::Set(d, std::numeric_limits<float>::infinity());
   auto least = far;
-  Cell cell = {0, 0};
+  Voxel cell = {0, 0};
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
     const auto same = hn::And(hn::And(hn::Eq(hn::Load(d, cells.x + i), x),  //
                                       hn::Eq(hn::Load(d, cells.y + i), y)),
                               hn::Eq(hn::Load(d, cells.z + i), z));
     cell.slots |= MaskBits(same) << i;
-    least = hn::Min(least, hn::IfThenElse(same, hn::Load(d, cells.off_centre + i), far));
+    least = hn::Min(least, hn::IfThenElse(same, hn::Load(d, cells.offset_sq + i), far));
   }
   least = hn::MinOfLanes(d, least);
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
-    cell.nearest |= MaskBits(hn::Eq(hn::Load(d, cells.off_centre + i), least)) << i;
+    cell.nearest |= MaskBits(hn::Eq(hn::Load(d, cells.offset_sq + i), least)) << i;
   }
   cell.nearest &= cell.slots;
   return cell;
 }
 
-std::size_t FindCells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
-  const CellTag d;
+std::size_t FindVoxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels* cells) {
+  const VoxelTag d;
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
     const auto x = Divide(grid, 0, tile, i, cells->x + i);
     const auto y = Divide(grid, 1, tile, i, cells->y + i);
     const auto z = Divide(grid, 2, tile, i, cells->z + i);
-    hn::Store(hn::Add(hn::Add(x, y), z), d, cells->off_centre + i);
+    hn::Store(hn::Add(hn::Add(x, y), z), d, cells->offset_sq + i);
   }
   std::size_t count = 0;
   for (std::uint32_t left = (1U << static_cast<std::uint32_t>(tile.count)) - 1U; left != 0;) {
-    const Cell cell = CellOf(*cells, hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
+    const Voxel cell = VoxelOf(*cells, hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
     for (std::uint32_t best = cell.nearest; best != 0; best &= best - 1) {
       const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(best);
       cells->nearest[count++] = static_cast<std::uint8_t>(k);
@@ -95,10 +95,10 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(FindCells);
+HWY_EXPORT(FindVoxels);
 
-std::size_t find_cells(const CellGrid& grid, const PointTile& tile, TileCells* cells) {
-  return HWY_DYNAMIC_DISPATCH(FindCells)(grid, tile, cells);
+std::size_t find_voxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels* cells) {
+  return HWY_DYNAMIC_DISPATCH(FindVoxels)(grid, tile, cells);
 }
 
 }  // namespace ist
