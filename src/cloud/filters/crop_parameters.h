@@ -9,34 +9,39 @@
 
 namespace ist {
 
-/// No sensor sees farther; what claims to be beyond is out of range whatever the configuration.
-/// Keeps coordinates far below kFarAway.
-constexpr double kLargestRange = 1e9;  // [m]
+/// Farther points are out of range whatever the configuration: no sensor sees as far. Keeps
+/// coordinates far below kFarAway. [m]
+constexpr double kLargestRange = 1e9;
 
-/// Which points of a cloud to keep, and where they go: to the frame O of the index.
+/// The choice of the points of a cloud that are kept, and the frame O of the index that they are
+/// moved to.
 struct CropParameters {
   Eigen::Isometry3d X_FO = Eigen::Isometry3d::Identity();  ///< frame O -> fixed frame
   Eigen::Isometry3d X_OS = Eigen::Isometry3d::Identity();  ///< sensor frame -> O
   double min_range_sq = 0.0, max_range_sq = 0.0;  ///< [m^2] of the points kept, bounds included
-  Eigen::Vector3d region_center = Eigen::Vector3d::Zero();            ///< [m] in the sensor frame
-  double region_radius_sq = std::numeric_limits<double>::infinity();  ///< [m^2] of the points kept
+  Eigen::Vector3d region_center = Eigen::Vector3d::Zero();  ///< [m] in the sensor frame
+  /// [m^2] Points outside this sphere are discarded.
+  double region_radius_sq = std::numeric_limits<double>::infinity();
 };
 
-/// O has the fixed frame's axes. Its origin, on whole metres, is the sensor's own position, unless
-/// most points are more than a kilometre from it (a cloud that comes in a map's coordinates with a
-/// sensor frame to match); then it is their middle. Either way it is subtracted before double
-/// becomes float, so that what is within 100 m of the origin is off by less than 0.01 mm.
+/// Parameters without a region of interest. O has the fixed frame's axes. Its origin, on whole
+/// metres, is the sensor's position, or the middle of the points when most are more than a
+/// kilometre from the sensor (a cloud in a map's coordinates, with a sensor frame to match). It is
+/// subtracted before double becomes float, so that points within 100 m of the origin are off by
+/// less than 0.01 mm.
 /// @param cloud      checked by check_layout
 /// @param X_FS       sensor frame -> fixed frame, rigid and finite
 /// @param min_range, max_range  [m] of the points kept, bounds included
-CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
-                   double max_range);
+CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
+                               double min_range, double max_range);
 
-/// Only points within a region are kept.
+/// Discards points outside a region of interest, too.
 /// @param X_FS  sensor frame -> fixed frame
-void limit(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS, CropParameters* pose);
+void limit_to_region(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS,
+                     CropParameters* crop);
 
-/// Gives O other axes.
-void turn(const Eigen::Matrix3d& R_FO, CropParameters* pose);
+/// Gives the frame O other axes, with the same origin.
+/// @param R_FO  the new axes in the fixed frame, as columns
+void set_axes(const Eigen::Matrix3d& R_FO, CropParameters* crop);
 
 }  // namespace ist

@@ -3,27 +3,27 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "internal/cloud/point_bvh.h"
+#include "internal/cloud/point_tile.h"
 
 namespace ist {
 
-/// A cubic grid along the fixed frame's axes, as seen from a frame O that lies anywhere in it.
-/// Float is enough: cells come out no less exact than the coordinates are.
+/// A grid of cubic voxels along the fixed frame's axes, as seen from a frame O that lies anywhere
+/// in it. Float is enough: voxels are no less exact than the coordinates.
 struct VoxelGrid {
-  float turn[9];    ///< [1/m] rotation from O to the grid's axes over a cell's edge, row-major
-  float offset[3];  ///< of O's origin, in cells
+  float R[9];       ///< [1/m] rotation from O to the fixed frame over a voxel's edge, row-major
+  float offset[3];  ///< O's origin, in voxels
 };
 
-/// The cells that a tile's points are in.
+/// The voxels of a tile's points.
 struct alignas(64) TileVoxels {
-  float x[kPointWidth], y[kPointWidth], z[kPointWidth];  ///< numbers of the cells, whole
-  float offset_sq[kPointWidth];  ///< squared distance to the cell's centre, in cells
-  /// Slots of the points than which none of the tile is nearer to the centre of its cell: one for
-  /// each cell, or all that are as near.
+  float x[kPointWidth], y[kPointWidth], z[kPointWidth];  ///< whole numbers of the voxels
+  float offset_sq[kPointWidth];  ///< squared distance to the voxel's centre, in voxels
+  /// Slots of the points that are nearest to the centre of their voxel among the tile's points: one
+  /// for each voxel, or all that are equally near.
   std::uint8_t nearest[kPointWidth];
 };
 
-/// Fills in `cells`. @returns how many of `nearest` count
-std::size_t find_voxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels* cells);
+/// Finds the voxels of a tile's points. @returns how many entries of `nearest` are used
+std::size_t find_voxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels* voxels);
 
 }  // namespace ist

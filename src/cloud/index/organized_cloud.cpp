@@ -16,7 +16,7 @@
 namespace ist {
 namespace {
 
-// Whether pixels can be read in blocks of four floats, the coordinates first, where they are.
+// Whether pixels can be read from the message as four floats each, the coordinates first.
 bool holds_floats(const RawCloud& cloud) {
   const auto is_aligned = [](std::size_t bytes) { return bytes % sizeof(float) == 0; };
   return !cloud.is_double && !cloud.swap_bytes && cloud.y == cloud.x + sizeof(float) &&
@@ -26,7 +26,7 @@ bool holds_floats(const RawCloud& cloud) {
          is_aligned(reinterpret_cast<std::uintptr_t>(cloud.data) + cloud.x);
 }
 
-// Where a box lies with respect to the region of interest.
+// The place of a box with respect to the region of interest.
 enum class RegionSide { kInside, kOutside, kCrossing };
 
 // The region of interest in the frame O.

@@ -113,8 +113,8 @@ class PointBvhBuilder {
   std::size_t group_begin_ = 0;            ///< first of them since the last end_group()
   BoxHierarchy hierarchy_;
   PointBvh* bvh_ = nullptr;         ///< being built
-  std::vector<TileRun> lazy_runs_;  ///< its tiles that are not loaded
-  std::size_t used_ = 0;  ///< its tiles that are complete; later ones are of the last build
+  std::vector<TileRun> lazy_runs_;  ///< tiles that are not loaded
+  std::size_t used_ = 0;            ///< complete tiles; later ones date from the last build
 };
 
 }  // namespace ist

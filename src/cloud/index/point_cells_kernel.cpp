@@ -40,7 +40,7 @@ HWY_INLINE std::size_t Append(const PointGrid& grid, hn::Vec<PointTag> x, hn::Ve
                            hn::ShiftLeft<2>(Spread(grid, 2, z)));
   const auto entry =
       hn::Or(hn::BitCast(du, hn::ShiftLeft<8>(cell)), hn::Iota(du, static_cast<std::uint32_t>(k)));
-  hn::StoreU(Compressor<PointTag>(keep)(du, entry), du, cells);
+  hn::StoreU(compress::Compressor<PointTag>(keep)(du, entry), du, cells);
   return hn::CountTrue(PointTag(), keep);
 }
 

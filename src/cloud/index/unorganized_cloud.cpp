@@ -11,8 +11,8 @@ namespace {
 
 using Sample = std::array<CloudPoint, PointCells::kSample>;
 
-// One row of points where the rows follow each other without gaps, and a column is a row as well:
-// blocks are to be full.
+// The same cloud as a single row, where its rows follow each other without padding or it is a
+// single column: full batches are read faster.
 RawCloud flattened(RawCloud cloud) {
   if (cloud.width == 1) {
     cloud.point_step = cloud.row_step;
@@ -24,17 +24,17 @@ RawCloud flattened(RawCloud cloud) {
   return cloud;
 }
 
-// Some of the points that are kept. @returns how many
-std::size_t take_sample(const RawCloud& cloud, const CropParameters& pose, Sample* sample) {
-  // Odd: rows of a scanner have even lengths, and are not to be met at the same place each time.
+// Takes some of the points that are kept. @returns how many
+std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sample* sample) {
+  // An odd stride: rows of a scanner have even lengths, and samples are to spread over the columns.
   const std::size_t stride = cloud.size() / sample->size() | 1U;
   std::size_t count = 0;
   for (std::size_t i = 0; i < cloud.size() && count < sample->size(); i += stride) {
     const Eigen::Vector3d p_S = point_at(cloud, i / cloud.width, i % cloud.width);
     const double range_sq = p_S.squaredNorm();
-    if (!(range_sq >= pose.min_range_sq && range_sq <= pose.max_range_sq)) continue;
-    if (!((p_S - pose.region_center).squaredNorm() <= pose.region_radius_sq)) continue;
-    const Eigen::Vector3f p = (pose.X_OS * p_S).cast<float>();
+    if (!(range_sq >= crop.min_range_sq && range_sq <= crop.max_range_sq)) continue;
+    if (!((p_S - crop.region_center).squaredNorm() <= crop.region_radius_sq)) continue;
+    const Eigen::Vector3f p = (crop.X_OS * p_S).cast<float>();
     (*sample)[count++] = {p.x(), p.y(), p.z(), 0};
   }
   return count;
@@ -42,31 +42,31 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& pose, Sampl
 
 }  // namespace
 
-std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& pose,
-                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* index,
+std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
+                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
                               IngestCounts* counts) {
-  const RawCloud list = flattened(cloud);
+  const RawCloud points = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();
-  cells.start(sample.data(), take_sample(list, pose, &sample), list.size());
-  CropBatch block;
+  cells.start(sample.data(), take_sample(points, crop, &sample), points.size());
+  CropBatch batch;
   std::uint32_t id = 0;
   std::size_t kept = 0;
-  for (std::size_t row = 0; row < list.height; ++row) {
-    for (std::size_t column = 0; column < list.width; column += kCropBatch) {
-      const std::size_t count = std::min(kCropBatch, list.width - column);
-      const std::size_t here = crop_points(list, row, column, count, pose, &block, counts);
-      if (here > 0) cells.add(block, count, id);
+  for (std::size_t row = 0; row < points.height; ++row) {
+    for (std::size_t column = 0; column < points.width; column += kCropBatch) {
+      const std::size_t count = std::min(kCropBatch, points.width - column);
+      const std::size_t here = crop_points(points, row, column, count, crop, &batch, counts);
+      if (here > 0) cells.add(batch, count, id);
       kept += here;
       id += static_cast<std::uint32_t>(count);
     }
   }
   if (on_robot == nullptr) {
-    builder->build(pose.X_FO, {}, {}, index);
+    builder->build(crop.X_FO, {}, {}, bvh);
   } else {
     builder->build(
-        pose.X_FO, on_robot->as_filter(),
-        [on_robot](const PaddedBox& box) { return on_robot->may_drop(box); }, index);
+        crop.X_FO, on_robot->as_filter(),
+        [on_robot](const PaddedBox& box) { return on_robot->may_drop(box); }, bvh);
   }
   return kept;
 }

@@ -10,14 +10,14 @@
 
 namespace ist {
 
-/// Indexes a cloud whose points come in any order: reads a message's bytes once, drops what is not
-/// finite or not in range, and puts each point where its neighbours are.
-///
-/// Counts `not_a_number`, `infinite` and `outside_region`.
-/// @param on_robot  may be null: nothing is dropped for it
+/// Reads an unorganized cloud once, whose points come in any order, and builds its index: drops
+/// points that are not finite or not in range and sorts the others into the cells of a grid. Counts
+/// `not_a_number`, `infinite` and `outside_region`.
+/// @param on_robot  null: no self-filter
+/// @param bvh  overwritten, its buffers reused
 /// @returns how many points are kept, before `on_robot` drops some
-std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& pose,
-                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* index,
+std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
+                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
                               IngestCounts* counts);
 
 }  // namespace ist
