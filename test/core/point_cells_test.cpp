@@ -172,8 +172,8 @@ TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
       }
       EXPECT_EQ(ids.size(), n);
       ASSERT_LE(slicer.dense_end(), n);
-      const std::size_t crowd = slicer.dense_end() - slicer.dense_begin();
-      EXPECT_TRUE(slicer.dense_end() == 0 || (crowd > n / 4 && crowd < n));
+      const std::size_t dense = slicer.dense_end() - slicer.dense_begin();
+      EXPECT_TRUE(slicer.dense_end() == 0 || (dense > n / 4 && dense < n));
     }
   });
 }
