@@ -11,9 +11,9 @@
 #include <set>
 #include <vector>
 
-#include "cloud/index/slice_kernel.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/point_slicer.h"
+#include "cloud/index/slice_kernel.h"
 #include "support/instruction_sets.h"
 #include "support/tiles.h"
 
