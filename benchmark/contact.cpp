@@ -10,7 +10,7 @@
 #include <memory>
 #include <vector>
 
-#include "cloud/filters/thinning.h"
+#include "cloud/filters/voxel_thinning.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
 #include "truth_scenes.h"
@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
     ist::CloudSnapshot& cloud = *scene.cloud;
     ist::PointBvhBuilder builder;
     if (cloud.coarse.empty()) {
-      ist::Thinning().run(cloud.index.bvh(), cloud.thinning, &builder, &cloud.coarse.bvh());
+      ist::VoxelThinning().run(cloud.index.bvh(), cloud.thinning, &builder, &cloud.coarse.bvh());
     }
     ist::ProximityQuery query(model, {});
     std::vector<ist::LinkProximity> results;

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "cloud/filters/self_filter.h"
-#include "cloud/filters/thinning.h"
-#include "cloud/index/image_tiles.h"
-#include "cloud/index/list_tiles.h"
+#include "cloud/filters/voxel_thinning.h"
+#include "cloud/index/organized_cloud.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/scene_axes.h"
+#include "cloud/index/unorganized_cloud.h"
 
 namespace ist {
 namespace {
@@ -39,7 +39,7 @@ struct Ingest::Impl {
   RegionOfInterest region;
   PointBvhBuilder builder;
   SelfFilter self_filter;
-  Thinning thinning;
+  VoxelThinning thinning;
 };
 
 Ingest::Ingest(const IngestConfig& config) : impl_(std::make_unique<Impl>()) {
@@ -67,25 +67,27 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
   }
   const IngestConfig& config = impl_->config;
-  CropPose pose = crop_pose(cloud, X_FS, config.min_range, config.max_range);
-
-  limit(impl_->region, X_FS, &pose);
-  const bool image = is_image(cloud, pose);
-  turn(scene_axes(cloud, X_FS.linear(), image), &pose);
+  CropParameters crop = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
+  limit_to_region(impl_->region, X_FS, &crop);
+  const bool organized = is_organized(cloud, crop);
+  set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
 
   const SelfFilter* on_robot = nullptr;
   if (config.self_filter && !robot.empty()) {
-    impl_->self_filter.set_poses(robot, pose.X_FO, config.self_filter_padding);
+    impl_->self_filter.set_poses(robot, crop.X_FO, config.self_filter_padding);
     on_robot = &impl_->self_filter;
   }
   IngestCounts counts;
   std::size_t kept = 0;
-  if (image) {
+  if (organized) {
     RawCloud pixels = cloud;
-    if (config.thin) pixels.owner.reset();  // all will be read: best while they are in the cache
-    kept = index_image(pixels, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    // Thinning reads all tiles: they are loaded now, while the pixels are in the cache.
+    if (config.thin) pixels.owner.reset();
+    kept =
+        index_organized(pixels, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
-    kept = index_list(cloud, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept =
+        index_unorganized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -
@@ -98,7 +100,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
     impl_->thinning.run(snapshot->index.bvh(), config.thinning, &impl_->builder,
                         &snapshot->coarse.bvh());
   } else {
-    impl_->builder.start(pose.X_FO, &snapshot->coarse.bvh());
+    impl_->builder.start(crop.X_FO, &snapshot->coarse.bvh());
     impl_->builder.finish();
   }
 

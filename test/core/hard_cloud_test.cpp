@@ -78,7 +78,8 @@ TEST(HardCloud, OrderAndDuplicatesDoNotMatter) {
     std::sort(orders[1].begin(), orders[1].end(), by_x);
     std::reverse_copy(orders[1].begin(), orders[1].end(), orders[2].begin());
     std::shuffle(orders[3].begin(), orders[3].end(), rng);
-    // From end to end and back: neighbours in the message are as far apart as can be.
+    // The order goes from end to end and back: neighbours in the message are as far apart as can
+    // be.
     for (std::size_t i = 0; i < points.size(); ++i) {
       orders[4][i] = orders[1][i % 2 == 0 ? i / 2 : points.size() - 1 - i / 2];
     }

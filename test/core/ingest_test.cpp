@@ -295,8 +295,8 @@ void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F) {
   std::vector<Eigen::AlignedBox3f> boxes(tiles + index.nodes().size());
   std::vector<int> parents(boxes.size(), 0);
   for (std::size_t i = 0; i < tiles; ++i) {
-    PointTile room;
-    const PointTile& tile = index.tile(i, &room);
+    PointTile scratch;
+    const PointTile& tile = index.tile(i, &scratch);
     for (int k = 0; k < kPointWidth; ++k) {
       const Eigen::Vector3f p(tile.x[k], tile.y[k], tile.z[k]);
       if (k < tile.count) boxes[i].extend(p);
@@ -345,7 +345,7 @@ void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
   }
 }
 
-// What a depth camera sees: a wall and a board before it, and nothing at some pixels.
+// A depth camera's view: a wall and a board before it, and nothing at some pixels.
 // @param blind  one pixel of so many sees nothing; 0: none
 Points depth_image(std::size_t width, std::size_t height, unsigned blind = 10) {
   std::mt19937 random(8);
@@ -363,20 +363,21 @@ Points depth_image(std::size_t width, std::size_t height, unsigned blind = 10) {
   return points;
 }
 
-// An image goes another way than a list of points; sizes that are no multiple of anything as well.
+// Organized clouds are read by other code than unorganized ones, and so are sizes that are no
+// multiple of a block.
 void check_images(const Format& format, unsigned blind) {
   for (const auto& [width, height] :
        {std::pair<std::size_t, std::size_t>{160, 120}, {163, 41}, {300, 5}, {17, 90}, {257, 64}}) {
     SCOPED_TRACE(std::to_string(width) + " x " + std::to_string(height));
-    Format image = format;
-    image.width = width;
+    Format organized = format;
+    organized.width = width;
     Points points = depth_image(width, height, blind);
     points[5 * width / 2].y() = kInf;
     IngestConfig config;
     config.max_range = 1.7;
     config.thin = !format.owned;  // else all is read at once
     const CloudSnapshot a = ingest(points, config, {}, pose(0.5, 0.2, 1.0));
-    const CloudSnapshot b = ingest(points, config, image, pose(0.5, 0.2, 1.0));
+    const CloudSnapshot b = ingest(points, config, organized, pose(0.5, 0.2, 1.0));
     EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
     EXPECT_EQ(a.counts.infinite, b.counts.infinite);
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
@@ -393,7 +394,7 @@ void check_images(const Format& format, unsigned blind) {
   }
 }
 
-// Whether tiles are written at once or when somebody looks.
+// Tiles are loaded at once, or when a query first looks at them.
 void check_images_both_ways(Format format) {
   for (const bool owned : {false, true}) {
     format.owned = owned;
@@ -405,7 +406,7 @@ void check_images_both_ways(Format format) {
 
 TEST(Ingest, imageHoldsTheSamePointsAsAList) { check_images_both_ways({}); }
 
-// As drivers write it: sixteen or more bytes a point, read by another way.
+// Layouts that drivers write, of sixteen or more bytes a point, are read by other code.
 TEST(Ingest, imageOfFourFloatsHoldsTheSamePointsAsAList) {
   Format four_floats;
   four_floats.point_step = 16;
@@ -447,13 +448,13 @@ TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
         points.emplace_back(p.cast<double>());
       }
     }
-    Format image = float64();
-    image.width = 128;
+    Format organized = float64();
+    organized.width = 128;
     Format floats;
     floats.width = 128;
     floats.point_step = 16;
     floats.misaligned = 0;
-    for (const Format& format : {image, floats}) {
+    for (const Format& format : {organized, floats}) {
       SCOPED_TRACE(format.point_step);
       const CloudSnapshot a = ingest(points, config), b = ingest(points, config, format);
       EXPECT_GT(a.counts.used, points.size() / 8);
@@ -464,28 +465,28 @@ TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
   }
 }
 
-// Several threads look at tiles that nobody has written yet.
+// Several threads read tiles that are not loaded yet.
 TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
   const Points points = depth_image(320, 240, 1000);
-  Format image;
-  image.width = 320;
-  image.point_step = 16;
-  image.misaligned = 0;
-  const PointIndex at_once = ingest(points, {}, image).index;
-  image.owned = true;
+  Format organized;
+  organized.width = 320;
+  organized.point_step = 16;
+  organized.misaligned = 0;
+  const PointIndex at_once = ingest(points, {}, organized).index;
+  organized.owned = true;
   IngestConfig config;
   config.thin = false;
   for (int round = 0; round < 5; ++round) {
-    const PointIndex index = ingest(points, config, image).index;
+    const PointIndex index = ingest(points, config, organized).index;
     ASSERT_EQ(index.bvh().tile_count(), at_once.bvh().tile_count());
     std::array<std::size_t, 4> same{};
     std::vector<std::thread> threads;
     for (std::size_t& count : same) {
       threads.emplace_back([&index, &at_once, &count] {
-        PointTile room, other_room;
+        PointTile scratch, other_scratch;
         for (std::size_t i = 0; i < index.bvh().tile_count(); ++i) {
-          count += static_cast<std::size_t>(
-              test::same_points(index.bvh().tile(i, &room), at_once.bvh().tile(i, &other_room)));
+          count += static_cast<std::size_t>(test::same_points(
+              index.bvh().tile(i, &scratch), at_once.bvh().tile(i, &other_scratch)));
         }
       });
     }
@@ -498,9 +499,9 @@ TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
 TEST(Ingest, shuffledImageIsIndexedAsAList) {
   Points points = depth_image(160, 120);
   std::shuffle(points.begin(), points.end(), std::mt19937(9));
-  Format image;
-  image.width = 160;
-  const CloudSnapshot a = ingest(points), b = ingest(points, {}, image);
+  Format organized;
+  organized.width = 160;
+  const CloudSnapshot a = ingest(points), b = ingest(points, {}, organized);
   EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
   EXPECT_EQ(a.index.bvh().tile_count(), b.index.bvh().tile_count());
 }
@@ -558,31 +559,31 @@ TEST(Ingest, originIsOnWholeMetres) {
   EXPECT_EQ(snapshot.coarse.X_FO().translation(), snapshot.index.X_FO().translation());
 }
 
-// Every way that points are read: float or double, image or list, four floats or not.
+// All code that reads points: float or double, organized or unorganized, four floats or not.
 TEST(Ingest, whatIsBeyondTheRegionIsLeftOut) {
   const Points points = depth_image(160, 120);
   const Eigen::Isometry3d X_FS = pose(0.5, 0.2, 1.0);
   RegionOfInterest region;
   region.center_F << 0.3, -0.4, 0.9;
   region.radius = 1.5;
-  Format image, four_floats;
-  image.width = four_floats.width = 160;
+  Format organized, four_floats;
+  organized.width = four_floats.width = 160;
   four_floats.point_step = 16;
   four_floats.misaligned = 0;
   Format owned = four_floats;
   owned.owned = true;
-  for (const Format& format : {Format(), image, four_floats, owned, float64()}) {
+  for (const Format& format : {Format(), organized, four_floats, owned, float64()}) {
     const Message message(points, format);
     IngestConfig config = without_limits();
     config.thin = !format.owned;
     Ingest ingest(config);
-    CloudSnapshot all, cut;
+    CloudSnapshot all, inside;
     ingest.run(message.raw, X_FS, {}, 0.0, &all);
     ingest.set_region_of_interest(region);
-    ingest.run(message.raw, X_FS, {}, 0.0, &cut);
+    ingest.run(message.raw, X_FS, {}, 0.0, &inside);
     EXPECT_EQ(all.region.radius, kInf);
-    EXPECT_EQ(cut.region.radius, 1.5);
-    const auto kept = points_by_id(cut.index);
+    EXPECT_EQ(inside.region.radius, 1.5);
+    const auto kept = points_by_id(inside.index);
     std::size_t expected = 0;
     for (const auto& [id, p] : points_by_id(all.index)) {
       const double from_center = (p - region.center_F).norm();
@@ -591,9 +592,9 @@ TEST(Ingest, whatIsBeyondTheRegionIsLeftOut) {
       expected += from_center < 1.5;
     }
     EXPECT_GT(expected, 1000U);
-    EXPECT_EQ(cut.counts.used, expected);
-    EXPECT_EQ(cut.counts.outside_region, all.counts.used - expected);
-    EXPECT_EQ(cut.counts.out_of_range, 0U);
+    EXPECT_EQ(inside.counts.used, expected);
+    EXPECT_EQ(inside.counts.outside_region, all.counts.used - expected);
+    EXPECT_EQ(inside.counts.out_of_range, 0U);
   }
 }
 
@@ -647,13 +648,13 @@ TEST(Ingest, buffersAreReused) {
   Ingest ingest({});
   CloudSnapshot snapshot;
   ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  PointTile room;
-  const PointTile* tiles = &snapshot.index.bvh().tile(0, &room);
-  const PointTile* coarse = &snapshot.coarse.bvh().tile(0, &room);
+  PointTile scratch;
+  const PointTile* tiles = &snapshot.index.bvh().tile(0, &scratch);
+  const PointTile* coarse = &snapshot.coarse.bvh().tile(0, &scratch);
   const auto expected = points_by_id(snapshot.index);
   for (int i = 0; i < 3; ++i) ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  EXPECT_EQ(&snapshot.index.bvh().tile(0, &room), tiles);
-  EXPECT_EQ(&snapshot.coarse.bvh().tile(0, &room), coarse);
+  EXPECT_EQ(&snapshot.index.bvh().tile(0, &scratch), tiles);
+  EXPECT_EQ(&snapshot.coarse.bvh().tile(0, &scratch), coarse);
   EXPECT_EQ(points_by_id(snapshot.index), expected);
 }
 

@@ -104,7 +104,7 @@ TEST(LaserScan, EachBeamAtItsOwnTime) {
     scan.time_increment = 1e-4;
     const auto points = by_beam(ingested(scan, 0.0, 5.0, X_start, X_end), kBeams);
     for (std::size_t i = 0; i < kBeams; ++i) ASSERT_LT((points[i] - truth[i]).norm(), 1e-6);
-    // Without a time between the beams there is one pose for all.
+    // The pose is the same for all beams when there is no time between them.
     scan.time_increment = 0.0;
     const auto still = by_beam(ingested(scan, 0.0, 5.0, X_start, X_end), kBeams);
     const double angle = 1.5, r = static_cast<double>(ranges.back());

@@ -53,7 +53,7 @@ void expect_same(const Octree& octree, const octomap::OcTree& tree) {
   std::vector<Leaf> found;
   for (const Eigen::AlignedBox3d& box : octree.occupied) {
     const Eigen::Vector3d c = box.center();
-    // What octomap rounds to float.
+    // The rounding of octomap, which computes in float.
     const auto rounded = [](double v) { return static_cast<double>(static_cast<float>(v)); };
     found.emplace_back(rounded(c.x()), rounded(c.y()), rounded(c.z()), box.sizes().x());
   }

@@ -11,9 +11,9 @@
 #include <set>
 #include <vector>
 
-#include "cloud/index/divide_kernel.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/point_slicer.h"
+#include "cloud/index/slice_kernel.h"
 #include "support/instruction_sets.h"
 #include "support/tiles.h"
 
@@ -171,9 +171,9 @@ TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
         reached = std::max(reached, along);
       }
       EXPECT_EQ(ids.size(), n);
-      ASSERT_LE(slicer.crowd_end(), n);
-      const std::size_t crowd = slicer.crowd_end() - slicer.crowd_begin();
-      EXPECT_TRUE(slicer.crowd_end() == 0 || (crowd > n / 4 && crowd < n));
+      ASSERT_LE(slicer.dense_end(), n);
+      const std::size_t dense = slicer.dense_end() - slicer.dense_begin();
+      EXPECT_TRUE(slicer.dense_end() == 0 || (dense > n / 4 && dense < n));
     }
   });
 }

@@ -49,7 +49,7 @@ Points in_a_box(std::size_t n, float size, unsigned seed) {
   return points;
 }
 
-// What a depth camera sees: a wavy wall 1.5 m away and, before its right half, a board.
+// A depth camera's view: a wavy wall 1.5 m away and, before its right half, a board.
 Points depth_image(int width, int height) {
   Points points;
   for (int v = 0; v < height; ++v) {
@@ -122,8 +122,8 @@ class Checker {
   }
 
   Eigen::AlignedBox3f tile(std::int32_t i) {
-    PointTile room;
-    const PointTile& tile_i = index_.tile(static_cast<std::size_t>(i), &room);
+    PointTile scratch;
+    const PointTile& tile_i = index_.tile(static_cast<std::size_t>(i), &scratch);
     ++tile_seen_[static_cast<std::size_t>(i)];
     EXPECT_GE(tile_i.count, 1);
     EXPECT_LE(tile_i.count, kPointWidth);
@@ -177,8 +177,8 @@ struct Nearest {
         continue;
       }
       ++tiles;
-      PointTile room;
-      const PointTile& tile = index.tile(static_cast<std::size_t>(~child), &room);
+      PointTile scratch;
+      const PointTile& tile = index.tile(static_cast<std::size_t>(~child), &scratch);
       for (int k = 0; k < tile.count; ++k) {
         squared = std::min(squared, (point_of(tile, k) - query).squaredNorm());
       }
@@ -246,9 +246,10 @@ TEST(PointIndex, outliersDoNotSpoilTheTiles) {
   EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.8F);
 }
 
-// Morton runs of 16 leap: across depth edges and from cell to cell. Uncut, one tile in a hundred
-// of this image is longer than 0.2 m and the longest is 1.05 m; the median is 33 mm.
-TEST(PointIndex, tilesDoNotSpanLeaps) {
+// Sixteen consecutive points of an order may be apart: across depth discontinuities and from cell
+// to cell. Without splits, one tile in a hundred of this image is longer than 0.2 m and the longest
+// is 1.05 m; the median is 33 mm.
+TEST(PointIndex, tilesDoNotSpanDiscontinuities) {
   const PointBvh index = build(depth_image(320, 240));
   std::vector<float> diagonals;
   for (const PointTile& tile : test::tiles_of(index)) {
@@ -317,12 +318,12 @@ TEST(PointIndex, buffersAreReused) {
     builder.build(kFrame, list.data(), list.size(), {}, &index);
   };
   run(large);
-  PointTile room;
-  const PointTile* tiles = &index.tile(0, &room);
+  PointTile scratch;
+  const PointTile* tiles = &index.tile(0, &scratch);
   const auto* nodes = index.nodes().data();
   run(small);
   run(large);
-  EXPECT_EQ(&index.tile(0, &room), tiles);
+  EXPECT_EQ(&index.tile(0, &scratch), tiles);
   EXPECT_EQ(index.nodes().data(), nodes);
   Checker(large, index).run();
 }

@@ -1,4 +1,4 @@
-// Where clouds end: the robot's reach, and what queries do not know from beyond it.
+// The region of interest: points outside are discarded, and answers say what is not known there.
 
 #include "ist_proximity/robot/robot_region.h"
 

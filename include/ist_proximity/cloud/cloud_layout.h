@@ -41,13 +41,12 @@ struct RawCloud {
   std::size_t size() const { return width * height; }
 };
 
-/// Checks a layout: x, y, z there once, all float32 or all float64, one value each, inside the
-/// point and not on top of each other; sizes that agree with each other and with the data. Other
-/// fields are not looked at. Nothing overflows, whatever the sizes.
+/// Checks a layout: x, y and z are there once, all float32 or all float64, with one value each,
+/// inside the point and without overlap; the sizes agree with each other and with the data. Other
+/// fields are ignored. Nothing overflows, whatever the sizes.
 ///
-/// Tolerated: an empty cloud (width or height 0), whatever the rest says; a row_step of 0 in a
-/// cloud of one row, where it cannot mean anything but width * point_step; bytes beyond the last
-/// row.
+/// Tolerated are an empty cloud (width or height 0), whatever the rest says; a row_step of 0 in a
+/// cloud of one row, where it can only mean width * point_step; bytes after the last row.
 /// @param cloud  filled when the layout is valid; an empty cloud has width and height 0
 /// @returns an empty string, or one sentence with the faulty field and its values. Thread safe.
 std::string check_layout(const CloudLayout& layout, RawCloud* cloud);

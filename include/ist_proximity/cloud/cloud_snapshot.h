@@ -39,7 +39,7 @@ class PointIndex {
   bool empty() const;
   std::size_t size() const;               ///< points
   const Eigen::Isometry3d& X_FO() const;  ///< index's -> fixed frame
-  Eigen::AlignedBox3f bounds() const;     ///< [m] of the points, in O, at least
+  Eigen::AlignedBox3f bounds() const;     ///< [m] in O; holds all points
   /// Identifies one build: another number after every build of any index; 0 before the first.
   std::uint64_t build_id() const;
 
@@ -66,7 +66,7 @@ class BoxIndex {
   bool empty() const;
   std::size_t size() const;               ///< boxes
   const Eigen::Vector3d& origin() const;  ///< [m] in M
-  /// As PointIndex::build_id(), and different from that of any PointIndex.
+  /// Identifies one build, like PointIndex::build_id(); never equal to that of a PointIndex.
   std::uint64_t build_id() const;
 
   const BoxBvh& bvh() const { return *bvh_; }  ///< for the library's own use
@@ -75,33 +75,33 @@ class BoxIndex {
   std::shared_ptr<const BoxBvh> bvh_;  ///< never null; copies share it
 };
 
-/// What became of the points of one cloud.
+/// Numbers of points of one cloud, by what was done with them.
 struct IngestCounts {
   std::uint32_t received = 0;        ///< points in the message
   std::uint32_t not_a_number = 0;    ///< dropped: a coordinate is NaN
   std::uint32_t infinite = 0;        ///< dropped: a coordinate is infinite, and none is NaN
-  std::uint32_t out_of_range = 0;    ///< dropped: nearer than min_range or beyond max_range
-  std::uint32_t outside_region = 0;  ///< dropped: in range, but no link gets near
+  std::uint32_t out_of_range = 0;    ///< dropped: nearer than min_range or farther than max_range
+  std::uint32_t outside_region = 0;  ///< dropped: in range, but outside the region of interest
   std::uint32_t noise = 0;           ///< dropped by a noise filter that ran before
   std::uint32_t on_robot = 0;        ///< dropped by the self-filter
-  std::uint32_t used = 0;            ///< what queries see
+  std::uint32_t used = 0;            ///< in the index
 
-  /// Every point of a cloud that holds some is NaN (or noise): the sensor saw nothing at all.
+  /// Whether the sensor saw nothing: the cloud has points, and every one is NaN or noise.
   bool saw_nothing() const { return received > 0 && not_a_number + noise == received; }
 };
 
-/// One cloud or map, as queries see it: immutable. A cloud is points in the fixed frame; a map is
-/// solid boxes in a frame of its own.
+/// One cloud or map as queries take it, immutable. A cloud consists of points in the fixed frame, a
+/// map of solid boxes in a frame of its own.
 struct CloudSnapshot {
-  PointIndex index;         ///< all points used
-  PointIndex coarse;        ///< the same, thinned to one point per cell; empty where not asked for
-  double thinning = 0.01;   ///< [m] edge of such a cell
-  RegionOfInterest region;  ///< where the points end
-  std::shared_ptr<const BoxIndex> boxes;                   ///< of a map; null: none
+  PointIndex index;   ///< all points used
+  PointIndex coarse;  ///< thinned: one point per voxel; empty where IngestConfig::thin is false
+  double thinning = 0.01;                                  ///< [m] edge of a voxel
+  RegionOfInterest region;                                 ///< points outside were discarded
+  std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
   IngestCounts counts;
-  double stamp = 0.0;        ///< [s] acquisition
-  double ingest_time = 0.0;  ///< [s] it took
+  double stamp = 0.0;        ///< [s] time of acquisition
+  double ingest_time = 0.0;  ///< [s] duration of Ingest::run()
 };
 
 /// The clouds and maps of one query, in the order of their sources.

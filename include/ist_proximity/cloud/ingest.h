@@ -11,15 +11,15 @@
 
 namespace ist {
 
-/// What is kept of a cloud.
+/// The choice of the points of a cloud that are kept.
 struct IngestConfig {
   double min_range = 0.05;            ///< [m] from the sensor; >= 0
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
-  double self_filter_padding = 0.02;  ///< [m] >= 0: a point at most this far from a link is its own
-  bool thin =
-      true;  ///< make the thinned cloud; without it repulsion and contact volumes see nothing
-  double thinning = 0.01;  ///< [m] > 0: cell of the thinned cloud that repulsion sums over
+  double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
+  /// Make the thinned cloud; without it repulsion and contact volumes see no points.
+  bool thin = true;
+  double thinning = 0.01;  ///< [m] > 0: edge of a voxel of the thinned cloud
 };
 
 /// Turns raw clouds into snapshots. Keeps its working memory, so a steady stream does not
@@ -32,7 +32,7 @@ class Ingest {
   Ingest(Ingest&&) noexcept;
   Ingest& operator=(Ingest&&) noexcept;
 
-  /// Where to end from the next cloud on; nowhere at first.
+  /// Sets the region of interest from the next cloud on; at first there is none.
   /// @throws std::invalid_argument when it is not a sphere; the last one stays then
   void set_region_of_interest(const RegionOfInterest& region);
 

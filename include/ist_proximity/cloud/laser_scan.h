@@ -25,7 +25,7 @@ struct LaserScan {
   }
 };
 
-/// A scan that takes longer than this is not believed. [s]
+/// A scan that takes longer than this is rejected as malformed. [s]
 constexpr double kLongestScan = 10.0;
 
 /// @returns an empty string, or one sentence with the faulty member and its value: no beams; an
@@ -42,11 +42,11 @@ struct ScanPoints {
 /// Places each beam's end where it was measured: in the sensor's pose at the beam's own time,
 /// interpolated between the first beam's and the last one's.
 ///
-/// REP 117: +inf, and whatever is beyond range_max, is a measurement of nothing there and becomes
-/// an infinite point. NaN, -inf (too near to be measured) and what is below range_min (with some
-/// drivers 0 means "no echo") tells nothing and becomes a NaN point. What min_range and max_range
-/// exclude becomes a point that Ingest counts as out of range; so Ingest is to be given no limits
-/// of its own: distances from where the sensor was at the first beam are not ranges.
+/// REP 117: +inf and ranges above range_max mean that nothing was there, and become infinite
+/// points. NaN, -inf (too near to be measured) and ranges below range_min (with some drivers 0
+/// means "no echo") mean nothing, and become NaN points. Ranges outside min_range and max_range
+/// become points that Ingest counts as out of range. Ingest must be given no range limits of its
+/// own: it would measure distances from the sensor's place at the first beam, which are not ranges.
 /// @param scan  checked by check_scan
 /// @param min_range, max_range  [m] of the points to keep, bounds included
 /// @param X_SE  sensor's frame at the last beam -> at the first, rigid

@@ -18,27 +18,27 @@ struct OctreeData {
   std::size_t size = 0;                ///< [bytes]; 0: an empty map
 };
 
-/// What a tree holds.
+/// The contents of a tree.
 struct Octree {
   std::vector<Eigen::AlignedBox3d> occupied;  ///< [m] leaves of all sizes, in the map's frame
   std::size_t free = 0;                       ///< number of leaves known to be free
-  std::size_t nodes = 0;                      ///< of the tree, inner ones too
+  std::size_t nodes = 0;                      ///< number of nodes, inner ones too
 };
 
-/// Reads the occupied leaves: those of a binary tree that it says are, those of a full tree with a
-/// probability of at least 0.5 (log-odds >= 0), as octomap does by itself. Unknown space holds no
-/// obstacle.
+/// Reads the occupied leaves. In a binary tree each leaf says whether it is occupied; in a full
+/// tree it is when its probability is at least 0.5 (log-odds >= 0), octomap's default. Unknown
+/// space holds no obstacle.
 ///
-/// The format (Hornung et al. 2013) is two bits a child, or a float and eight bits a node, so it is
-/// read here: liboctomap's own reader does not look for the end of its input, and recurses without
-/// end on what is cut off or something else.
-/// @param octree  overwritten; without meaning when there is a fault
-/// @returns an empty string, or one sentence: another type of tree, a resolution that cannot be,
-/// data that ends too early, goes on too long, or is no tree. Thread safe.
+/// The format (Hornung et al. 2013) has two bits a child, or a float and eight bits a node. It is
+/// read here because liboctomap's reader does not check for the end of its input, and recurses
+/// without end on data that is cut off or is no tree.
+/// @param octree  overwritten; undefined when there is a fault
+/// @returns an empty string, or one sentence: another type of tree, an impossible resolution, data
+/// that ends too early, goes on after the tree, or is no tree. Thread safe.
 std::string read_octree(const OctreeData& data, Octree* octree);
 
-/// Reads a map file, `.bt` (binary) or `.ot` (full); its header tells which.
-/// @returns an empty string, or one sentence with what is wrong
+/// Reads a map file, `.bt` (binary) or `.ot` (full); its header says which.
+/// @returns an empty string, or one sentence that names the fault
 std::string read_octree_file(const std::string& path, Octree* octree);
 
 }  // namespace ist

@@ -7,26 +7,27 @@
 
 namespace ist {
 
-/// Hands the newest value from one writer thread to one reader thread without locks: three slots,
-/// of which the writer owns one, the reader one, and the third waits in between. Neither side ever
-/// waits, nor allocates or frees (values are overwritten in place, by the writer only).
+/// Hands the newest value from one writer thread to one reader thread without locks (triple
+/// buffering): the writer owns one slot, the reader another, and the third is exchanged between
+/// them. Neither side ever waits, allocates or frees; values are overwritten in place, by the
+/// writer only.
 template <typename T>
 class SnapshotChannel {
  public:
-  /// Writer: the slot to fill next. Its content is an old value, for reuse of its buffers.
+  /// Writer: the slot to fill next. It holds an old value, so that its buffers can be reused.
   T& back() { return slots_[back_]; }
 
   /// Writer: makes back() the newest value.
   void publish() {
-    // Releases what was written to the slot, and acquires the slot that comes back: the reader is
-    // done with it.
+    // Releases the writes to the slot, and acquires the slot that comes back, which the reader has
+    // given up.
     const std::uint8_t fresh = back_ | kFresh;
     back_ = waiting_.exchange(fresh, std::memory_order_acq_rel) & kIndex;
   }
 
-  /// Reader: takes the newest value, if one came since the last call.
+  /// Reader: takes the newest value. @returns false when none was published since the last call
   bool update() {
-    // Relaxed: a value that comes right now is taken next time, and the exchange below orders all.
+    // Relaxed: a value published right now is taken next time, and the exchange below orders all.
     if ((waiting_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
     front_ = waiting_.exchange(front_, std::memory_order_acq_rel) & kIndex;
     return true;
@@ -40,7 +41,7 @@ class SnapshotChannel {
   static constexpr std::uint8_t kIndex = 3, kFresh = 4;
   static_assert(std::atomic<std::uint8_t>::is_always_lock_free, "neither side may wait");
 
-  // A cache line each, so that the threads do not slow each other down.
+  // One cache line each, so that the threads do not slow each other down.
   static constexpr std::size_t kCacheLine = 64;
 
   std::array<T, 3> slots_{};

@@ -15,11 +15,13 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
+namespace compress {
 
-/// Moves the numbers of some lanes to the front; the others have no meaning then.
+/// Moves the numbers of some lanes to the front; the other lanes are undefined.
 ///
-/// As hwy::Compress where the processor can do it. Elsewhere Highway 1.0, built by GCC, copies its
-/// table at each call; here it stays where it is, and serves several vectors.
+/// This is hwy::Compress where the processor has such an instruction. Elsewhere Highway 1.0, built
+/// by GCC, copies its table at each call; this one reads the table in place, once for several
+/// vectors.
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_SSE4 || HWY_TARGET == HWY_SSSE3
 
 template <std::size_t kLanes>
@@ -71,6 +73,7 @@ class Compressor {
 
 #endif
 
+}  // namespace compress
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
 HWY_AFTER_NAMESPACE();

@@ -13,28 +13,28 @@
 namespace ist {
 namespace {
 
-CropRange range_of(const CropPose& pose) {
-  CropRange range;
+CropKernelParameters kernel_parameters(const CropParameters& crop) {
+  CropKernelParameters parameters;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
-      range.R[3 * row + column] = pose.X_OS.linear()(row, column);
+      parameters.R[3 * row + column] = crop.X_OS.linear()(row, column);
     }
-    range.t[row] = pose.X_OS.translation()[row];
+    parameters.t[row] = crop.X_OS.translation()[row];
   }
-  range.min_range_sq = pose.min_range_sq;
-  range.max_range_sq = pose.max_range_sq;
-  for (int axis = 0; axis < 3; ++axis) range.center[axis] = pose.region_center[axis];
-  range.region_radius_sq = pose.region_radius_sq;
-  return range;
+  parameters.min_range_sq = crop.min_range_sq;
+  parameters.max_range_sq = crop.max_range_sq;
+  for (int axis = 0; axis < 3; ++axis) parameters.region_center[axis] = crop.region_center[axis];
+  parameters.region_radius_sq = crop.region_radius_sq;
+  return parameters;
 }
 
-// A block as it is read: in the sensor frame [m].
+// Coordinates of a batch as they are read, in the sensor frame [m].
 template <typename Scalar>
-struct alignas(64) SensorBlock {
-  Scalar x[kCropBlock], y[kCropBlock], z[kCropBlock];
+struct alignas(64) SensorBatch {
+  Scalar x[kCropBatch], y[kCropBatch], z[kCropBatch];
 };
 
-// Four floats a point, as most drivers write them.
+// Whether points are four floats each, as most drivers write them.
 bool is_four_floats(const RawCloud& cloud) {
   return !cloud.is_double && !cloud.swap_bytes && cloud.point_step == 4 * sizeof(float) &&
          cloud.x == 0 && cloud.y == sizeof(float) && cloud.z == 2 * sizeof(float) &&
@@ -42,83 +42,85 @@ bool is_four_floats(const RawCloud& cloud) {
          cloud.row_step % sizeof(float) == 0;
 }
 
-// Some points of a row, as they are in the message.
+// Reads some points of a row into slots from `slot` on.
 template <typename Scalar, bool kSwap>
 void load(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t count, std::size_t slot,
-          SensorBlock<Scalar>* block) {
+          SensorBatch<Scalar>* batch) {
   for (std::size_t i = slot; i < slot + count; ++i, bytes += cloud.point_step) {
-    block->x[i] = read<Scalar, kSwap>(bytes + cloud.x);
-    block->y[i] = read<Scalar, kSwap>(bytes + cloud.y);
-    block->z[i] = read<Scalar, kSwap>(bytes + cloud.z);
+    batch->x[i] = read<Scalar, kSwap>(bytes + cloud.x);
+    batch->y[i] = read<Scalar, kSwap>(bytes + cloud.y);
+    batch->z[i] = read<Scalar, kSwap>(bytes + cloud.z);
   }
 }
 
-// What fills up a block: nothing measured.
+// Fills slots with NaN, as if nothing was measured.
 template <typename Scalar>
-void fill(std::size_t first, std::size_t last, SensorBlock<Scalar>* block) {
+void fill(std::size_t first, std::size_t last, SensorBatch<Scalar>* batch) {
   for (std::size_t i = first; i < last; ++i) {
-    block->x[i] = block->y[i] = block->z[i] = std::numeric_limits<Scalar>::quiet_NaN();
+    batch->x[i] = batch->y[i] = batch->z[i] = std::numeric_limits<Scalar>::quiet_NaN();
   }
 }
 
-// Not merely so large that its square is.
+// Points with an infinite coordinate and none that is NaN; not those of which only the squared
+// range is infinite.
 template <typename Scalar>
-std::uint32_t count_infinite(const SensorBlock<Scalar>& block, std::size_t count) {
+std::uint32_t count_infinite(const SensorBatch<Scalar>& batch, std::size_t count) {
   std::uint32_t infinite = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const bool is_nan = std::isnan(block.x[i]) || std::isnan(block.y[i]) || std::isnan(block.z[i]);
+    const bool is_nan = std::isnan(batch.x[i]) || std::isnan(batch.y[i]) || std::isnan(batch.z[i]);
     const bool is_infinite =
-        std::isinf(block.x[i]) || std::isinf(block.y[i]) || std::isinf(block.z[i]);
+        std::isinf(batch.x[i]) || std::isinf(batch.y[i]) || std::isinf(batch.z[i]);
     infinite += static_cast<std::uint32_t>(is_infinite && !is_nan);
   }
   return infinite;
 }
 
-// A rectangle of a cloud. Where there are more rows than one, each takes kTileSide slots.
+// A rectangle of a cloud. Where it has several rows, each takes kTileSide slots.
 struct Window {
   const std::uint8_t* bytes;
   std::size_t rows, columns;
 };
 
 template <typename Scalar, bool kSwap>
-std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropPose& pose,
-                    CropBlock* out, IngestCounts* counts) {
-  SensorBlock<Scalar> block;
+std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropParameters& crop,
+                    CropBatch* out, IngestCounts* counts) {
+  SensorBatch<Scalar> batch;
   const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
   for (std::size_t row = 0; row < window.rows; ++row) {
     const std::size_t slot = row * kTileSide;
-    load<Scalar, kSwap>(cloud, window.bytes + row * cloud.row_step, window.columns, slot, &block);
-    if (row + 1 < window.rows) fill(slot + window.columns, slot + kTileSide, &block);
+    load<Scalar, kSwap>(cloud, window.bytes + row * cloud.row_step, window.columns, slot, &batch);
+    if (row + 1 < window.rows) fill(slot + window.columns, slot + kTileSide, &batch);
   }
-  fill(used, (used + 7) / 8 * 8, &block);
+  fill(used, (used + 7) / 8 * 8, &batch);
   CropTally tally;
   if constexpr (std::is_same_v<Scalar, float>) {
-    tally = crop_floats(range_of(pose), block.x, block.y, block.z, used, out);
+    tally = crop_floats(kernel_parameters(crop), batch.x, batch.y, batch.z, used, out);
   } else {
-    tally = crop_doubles(range_of(pose), block.x, block.y, block.z, used, out);
+    tally = crop_doubles(kernel_parameters(crop), batch.x, batch.y, batch.z, used, out);
   }
   const std::size_t never_received = used - window.rows * window.columns;
   counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number - never_received);
-  if (tally.endless > 0) counts->infinite += count_infinite(block, used);
-  counts->outside_region += static_cast<std::uint32_t>(tally.beyond);
+  if (tally.infinite_square > 0) counts->infinite += count_infinite(batch, used);
+  counts->outside_region += static_cast<std::uint32_t>(tally.outside_region);
   return tally.kept;
 }
 
-std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropPose& pose,
-                        CropBlock* block, IngestCounts* counts) {
-  const auto crop = cloud.is_double
-                        ? cloud.swap_bytes ? &crop_as<double, true> : &crop_as<double, false>
-                    : cloud.swap_bytes ? &crop_as<float, true>
-                                       : &crop_as<float, false>;
-  return crop(cloud, window, pose, block, counts);
+std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropParameters& crop,
+                        CropBatch* batch, IngestCounts* counts) {
+  const auto function = cloud.is_double
+                            ? cloud.swap_bytes ? &crop_as<double, true> : &crop_as<double, false>
+                        : cloud.swap_bytes ? &crop_as<float, true>
+                                           : &crop_as<float, false>;
+  return function(cloud, window, crop, batch, counts);
 }
 
-// What became of points of four floats.
-// @returns how many are kept; a negative number: to be done the other way
-std::ptrdiff_t take(const CropTally& tally, IngestCounts* counts) {
-  if (tally.endless > 0) return -1;  // rare; they have to be looked at
+// Counts the points of a batch of four floats each.
+// @returns how many are kept; negative: some squared range is infinite (rare), nothing is counted,
+// and the points have to be read one by one
+std::ptrdiff_t add_counts(const CropTally& tally, IngestCounts* counts) {
+  if (tally.infinite_square > 0) return -1;
   counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
-  counts->outside_region += static_cast<std::uint32_t>(tally.beyond);
+  counts->outside_region += static_cast<std::uint32_t>(tally.outside_region);
   return static_cast<std::ptrdiff_t>(tally.kept);
 }
 
@@ -127,31 +129,32 @@ const float* floats(const std::uint8_t* bytes) { return reinterpret_cast<const f
 }  // namespace
 
 std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
-                        std::size_t count, const CropPose& pose, CropBlock* block,
+                        std::size_t count, const CropParameters& crop, CropBatch* batch,
                         IngestCounts* counts) {
   const std::uint8_t* bytes = bytes_of(cloud, row, column);
-  if (is_four_floats(cloud) && count % kCropRow == 0) {
-    const CropTally tally = crop_rows(range_of(pose), floats(bytes), count / kCropRow, block);
-    const std::ptrdiff_t kept = take(tally, counts);
+  if (is_four_floats(cloud) && count % kXyzwStep == 0) {
+    const CropTally tally =
+        crop_xyzw(kernel_parameters(crop), floats(bytes), count / kXyzwStep, batch);
+    const std::ptrdiff_t kept = add_counts(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }
-  return crop_window(cloud, {bytes, 1, count}, pose, block, counts);
+  return crop_window(cloud, {bytes, 1, count}, crop, batch, counts);
 }
 
 std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
-                      const CropPose& pose, CropBlock* block, IngestCounts* counts) {
+                      const CropParameters& crop, CropBatch* batch, IngestCounts* counts) {
   constexpr std::size_t kSlots = kTileSide * kTileSide;
   const Window window = {bytes_of(cloud, row, column), std::min(kTileSide, cloud.height - row),
                          std::min(kTileSide, cloud.width - column)};
   if (is_four_floats(cloud) && window.rows == kTileSide && window.columns == kTileSide) {
-    const CropTally tally =
-        crop_square(range_of(pose), floats(window.bytes), cloud.row_step / sizeof(float), block);
-    const std::ptrdiff_t kept = take(tally, counts);
+    const CropTally tally = crop_xyzw_tile(kernel_parameters(crop), floats(window.bytes),
+                                           cloud.row_step / sizeof(float), batch);
+    const std::ptrdiff_t kept = add_counts(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }
-  const std::size_t kept = crop_window(cloud, window, pose, block, counts);
+  const std::size_t kept = crop_window(cloud, window, crop, batch, counts);
   const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
-  std::fill(block->x + used, block->x + kSlots, std::numeric_limits<float>::quiet_NaN());
+  std::fill(batch->x + used, batch->x + kSlots, std::numeric_limits<float>::quiet_NaN());
   return kept;
 }
 

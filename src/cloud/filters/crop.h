@@ -3,35 +3,37 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "cloud/filters/crop_pose.h"
+#include "cloud/filters/crop_parameters.h"
 #include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
 
 namespace ist {
 
 /// Points that are read at a time: they fit the first-level cache.
-constexpr std::size_t kCropBlock = 256;
+constexpr std::size_t kCropBatch = 256;
 
-/// Coordinates of a block [m] in the frame O. Where `x` is NaN, the point is to be dropped; its y
-/// and z have no meaning.
-struct alignas(64) CropBlock {
-  float x[kCropBlock], y[kCropBlock], z[kCropBlock];
+/// Coordinates of some points [m] in the frame O. Where `x` is NaN, the point is dropped, and its y
+/// and z are undefined.
+struct alignas(64) CropBatch {
+  float x[kCropBatch], y[kCropBatch], z[kCropBatch];
 };
 
-/// Reads some points of one row from the message's bytes, moves them to O in double, and counts
-/// `not_a_number` and `infinite`.
-/// @param count  at most kCropBlock
+/// Reads some points of one row from the message's bytes, decides in double which are kept, and
+/// moves those to O. Counts `not_a_number`, `infinite` and `outside_region`.
+/// @param row, column  of the first point
+/// @param count  at most kCropBatch
 /// @returns how many are kept
 std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t column,
-                        std::size_t count, const CropPose& pose, CropBlock* block,
+                        std::size_t count, const CropParameters& crop, CropBatch* batch,
                         IngestCounts* counts);
 
-constexpr std::size_t kTileSide = 4;  ///< pixels; a tile of an image is a square of them
+/// Pixels along each side of a tile of an organized cloud.
+constexpr std::size_t kTileSide = 4;
 
-/// The same for a square of an image: the pixel in row r and column c of it goes to slot 4 r + c.
-/// Pixels beyond the image's edges are dropped, and count for nothing.
+/// The same for a tile: the pixel in row r and column c of the tile goes to slot 4 r + c. Pixels
+/// outside the cloud are dropped and not counted.
 /// @param row, column  of the first pixel
 std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
-                      const CropPose& pose, CropBlock* block, IngestCounts* counts);
+                      const CropParameters& crop, CropBatch* batch, IngestCounts* counts);
 
 }  // namespace ist

@@ -11,6 +11,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
+namespace crop {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using DoubleTag = hn::CappedTag<double, 8>;
@@ -23,40 +24,41 @@ HWY_INLINE hn::Vec<DoubleTag> LoadAsDouble(DoubleTag d, const float* from) {
   return hn::PromoteTo(d, hn::Load(FloatTag(), from));
 }
 
-// What is asked of every point, and where it goes, in registers.
+// Crops vector by vector; the parameters stay in registers.
 template <bool kHasRegion>
 class Cropper {
  public:
-  Cropper(const CropRange& range, CropBlock* block) : range_(range), block_(*block) {}
+  Cropper(const CropKernelParameters& parameters, CropBatch* batch)
+      : parameters_(parameters), batch_(*batch) {}
 
-  // Takes as many points as a vector holds, to slots from k on.
+  // Crops the points of a vector into slots from k on.
   template <class V>
   HWY_INLINE void Take(V x, V y, V z, std::size_t k) {
     const DoubleTag d;
     const FloatTag f;
     const auto sq = hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z));
-    // False for NaN, and for what overflows.
-    auto keep = hn::And(hn::Ge(sq, hn::Set(d, range_.min_range_sq)),
-                        hn::Le(sq, hn::Set(d, range_.max_range_sq)));
+    // False for NaN and for squares that overflow.
+    auto keep = hn::And(hn::Ge(sq, hn::Set(d, parameters_.min_range_sq)),
+                        hn::Le(sq, hn::Set(d, parameters_.max_range_sq)));
     if constexpr (kHasRegion) {
       const std::size_t in_range = hn::CountTrue(d, keep);
       keep = hn::And(keep, IsNear(x, y, z));
-      tally.beyond += in_range - hn::CountTrue(d, keep);
+      tally.outside_region += in_range - hn::CountTrue(d, keep);
     }
     const auto nan = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
     const std::size_t kept = hn::CountTrue(d, keep);
     auto to_x = nan;
     if (kept > 0) {
       to_x = hn::IfThenElse(keep, Moved(0, x, y, z), nan);
-      hn::Store(hn::DemoteTo(f, Moved(1, x, y, z)), f, block_.y + k);
-      hn::Store(hn::DemoteTo(f, Moved(2, x, y, z)), f, block_.z + k);
+      hn::Store(hn::DemoteTo(f, Moved(1, x, y, z)), f, batch_.y + k);
+      hn::Store(hn::DemoteTo(f, Moved(2, x, y, z)), f, batch_.z + k);
       tally.kept += kept;
     }
-    hn::Store(hn::DemoteTo(f, to_x), f, block_.x + k);
+    hn::Store(hn::DemoteTo(f, to_x), f, batch_.x + k);
     if (kept == hn::Lanes(d)) return;
-    const auto endless = hn::Set(d, std::numeric_limits<double>::infinity());
+    const auto infinity = hn::Set(d, std::numeric_limits<double>::infinity());
     tally.not_a_number += hn::CountTrue(d, hn::Not(hn::Eq(sq, sq)));
-    tally.endless += hn::CountTrue(d, hn::Eq(sq, endless));
+    tally.infinite_square += hn::CountTrue(d, hn::Eq(sq, infinity));
   }
 
   CropTally tally;
@@ -65,61 +67,62 @@ class Cropper {
   template <class V>
   HWY_INLINE auto IsNear(V x, V y, V z) const {
     const DoubleTag d;
-    const auto dx = hn::Sub(x, hn::Set(d, range_.center[0])),
-               dy = hn::Sub(y, hn::Set(d, range_.center[1])),
-               dz = hn::Sub(z, hn::Set(d, range_.center[2]));
+    const auto dx = hn::Sub(x, hn::Set(d, parameters_.region_center[0])),
+               dy = hn::Sub(y, hn::Set(d, parameters_.region_center[1])),
+               dz = hn::Sub(z, hn::Set(d, parameters_.region_center[2]));
     const auto sq = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
-    return hn::Le(sq, hn::Set(d, range_.region_radius_sq));
+    return hn::Le(sq, hn::Set(d, parameters_.region_radius_sq));
   }
 
   template <class V>
   HWY_INLINE V Moved(int row, V x, V y, V z) const {
     const DoubleTag d;
-    const double* r = range_.R + 3 * row;
+    const double* r = parameters_.R + 3 * row;
     const auto sum = hn::Add(hn::Add(hn::Mul(hn::Set(d, r[0]), x), hn::Mul(hn::Set(d, r[1]), y)),
                              hn::Mul(hn::Set(d, r[2]), z));
-    return hn::Add(sum, hn::Set(d, range_.t[row]));
+    return hn::Add(sum, hn::Set(d, parameters_.t[row]));
   }
 
-  const CropRange range_;
-  CropBlock& block_;
+  const CropKernelParameters parameters_;
+  CropBatch& batch_;
 };
 
-bool HasRegion(const CropRange& range) {
-  return range.region_radius_sq < std::numeric_limits<double>::infinity();
+bool HasRegion(const CropKernelParameters& parameters) {
+  return parameters.region_radius_sq < std::numeric_limits<double>::infinity();
 }
 
 template <bool kHasRegion, typename Scalar>
-HWY_INLINE CropTally Crop(const CropRange& range, const Scalar* x_S, const Scalar* y_S,
-                          const Scalar* z_S, std::size_t count, CropBlock* block) {
+HWY_INLINE CropTally Crop(const CropKernelParameters& parameters, const Scalar* x_S,
+                          const Scalar* y_S, const Scalar* z_S, std::size_t count,
+                          CropBatch* batch) {
   const DoubleTag d;
-  Cropper<kHasRegion> cropper(range, block);
+  Cropper<kHasRegion> cropper(parameters, batch);
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
     cropper.Take(LoadAsDouble(d, x_S + k), LoadAsDouble(d, y_S + k), LoadAsDouble(d, z_S + k), k);
   }
-  // What fills up the last vector was never received.
+  // The NaN that fill up the last vector were never received.
   cropper.tally.not_a_number -= (hn::Lanes(d) - count % hn::Lanes(d)) % hn::Lanes(d);
   return cropper.tally;
 }
 
-CropTally CropFloats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
-                     std::size_t count, CropBlock* block) {
-  return HasRegion(range) ? Crop<true>(range, x_S, y_S, z_S, count, block)
-                          : Crop<false>(range, x_S, y_S, z_S, count, block);
+CropTally CropFloats(const CropKernelParameters& parameters, const float* x_S, const float* y_S,
+                     const float* z_S, std::size_t count, CropBatch* batch) {
+  return HasRegion(parameters) ? Crop<true>(parameters, x_S, y_S, z_S, count, batch)
+                               : Crop<false>(parameters, x_S, y_S, z_S, count, batch);
 }
 
-CropTally CropDoubles(const CropRange& range, const double* x_S, const double* y_S,
-                      const double* z_S, std::size_t count, CropBlock* block) {
-  return HasRegion(range) ? Crop<true>(range, x_S, y_S, z_S, count, block)
-                          : Crop<false>(range, x_S, y_S, z_S, count, block);
+CropTally CropDoubles(const CropKernelParameters& parameters, const double* x_S, const double* y_S,
+                      const double* z_S, std::size_t count, CropBatch* batch) {
+  return HasRegion(parameters) ? Crop<true>(parameters, x_S, y_S, z_S, count, batch)
+                               : Crop<false>(parameters, x_S, y_S, z_S, count, batch);
 }
 
 template <bool kHasRegion>
-HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std::size_t count,
-                               CropBlock* block) {
+HWY_INLINE CropTally CropXyzwAs(const CropKernelParameters& parameters, const float* points,
+                                std::size_t count, CropBatch* batch) {
   const DoubleTag d;
   const FloatTag f;
-  Cropper<kHasRegion> cropper(range, block);
+  Cropper<kHasRegion> cropper(parameters, batch);
   for (std::size_t k = 0; k < count; k += hn::Lanes(f)) {
     hn::Vec<FloatTag> x, y, z, unused;
     hn::LoadInterleaved4(f, points + 4 * k, x, y, z, unused);
@@ -128,15 +131,15 @@ HWY_INLINE CropTally CropQuads(const CropRange& range, const float* points, std:
   return cropper.tally;
 }
 
-CropTally CropRows(const CropRange& range, const float* points, std::size_t rows,
-                   CropBlock* block) {
-  const std::size_t count = rows * kCropRow;
-  return HasRegion(range) ? CropQuads<true>(range, points, count, block)
-                          : CropQuads<false>(range, points, count, block);
+CropTally CropXyzw(const CropKernelParameters& parameters, const float* points, std::size_t steps,
+                   CropBatch* batch) {
+  const std::size_t count = steps * kXyzwStep;
+  return HasRegion(parameters) ? CropXyzwAs<true>(parameters, points, count, batch)
+                               : CropXyzwAs<false>(parameters, points, count, batch);
 }
 
-CropTally CropSquare(const CropRange& range, const float* points, std::size_t stride,
-                     CropBlock* block) {
+CropTally CropXyzwTile(const CropKernelParameters& parameters, const float* points,
+                       std::size_t stride, CropBatch* batch) {
   const hn::CappedTag<float, kTileSide> d;
   alignas(64) float x[kTileSide * kTileSide], y[kTileSide * kTileSide], z[kTileSide * kTileSide];
   for (std::size_t row = 0; row < kTileSide; ++row, points += stride) {
@@ -148,8 +151,15 @@ CropTally CropSquare(const CropRange& range, const float* points, std::size_t st
       hn::Store(vz, d, z + kTileSide * row + k);
     }
   }
-  return CropFloats(range, x, y, z, kTileSide * kTileSide, block);
+  return CropFloats(parameters, x, y, z, kTileSide * kTileSide, batch);
 }
+
+}  // namespace crop
+
+using crop::CropDoubles;
+using crop::CropFloats;
+using crop::CropXyzw;
+using crop::CropXyzwTile;
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
@@ -160,27 +170,27 @@ namespace ist {
 
 HWY_EXPORT(CropFloats);
 HWY_EXPORT(CropDoubles);
-HWY_EXPORT(CropRows);
-HWY_EXPORT(CropSquare);
+HWY_EXPORT(CropXyzw);
+HWY_EXPORT(CropXyzwTile);
 
-CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
-                      std::size_t count, CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropFloats)(range, x_S, y_S, z_S, count, block);
+CropTally crop_floats(const CropKernelParameters& parameters, const float* x_S, const float* y_S,
+                      const float* z_S, std::size_t count, CropBatch* batch) {
+  return HWY_DYNAMIC_DISPATCH(CropFloats)(parameters, x_S, y_S, z_S, count, batch);
 }
 
-CropTally crop_doubles(const CropRange& range, const double* x_S, const double* y_S,
-                       const double* z_S, std::size_t count, CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropDoubles)(range, x_S, y_S, z_S, count, block);
+CropTally crop_doubles(const CropKernelParameters& parameters, const double* x_S, const double* y_S,
+                       const double* z_S, std::size_t count, CropBatch* batch) {
+  return HWY_DYNAMIC_DISPATCH(CropDoubles)(parameters, x_S, y_S, z_S, count, batch);
 }
 
-CropTally crop_rows(const CropRange& range, const float* points, std::size_t rows,
-                    CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropRows)(range, points, rows, block);
+CropTally crop_xyzw(const CropKernelParameters& parameters, const float* points, std::size_t steps,
+                    CropBatch* batch) {
+  return HWY_DYNAMIC_DISPATCH(CropXyzw)(parameters, points, steps, batch);
 }
 
-CropTally crop_square(const CropRange& range, const float* points, std::size_t stride,
-                      CropBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(CropSquare)(range, points, stride, block);
+CropTally crop_xyzw_tile(const CropKernelParameters& parameters, const float* points,
+                         std::size_t stride, CropBatch* batch) {
+  return HWY_DYNAMIC_DISPATCH(CropXyzwTile)(parameters, points, stride, batch);
 }
 
 }  // namespace ist

@@ -6,44 +6,43 @@
 
 namespace ist {
 
-/// What crop_points does to a block that has been read.
-struct CropRange {
+/// CropParameters as plain numbers.
+struct CropKernelParameters {
   double R[9];                        ///< rotation of X_OS, row-major
   double t[3];                        ///< [m] its translation
   double min_range_sq, max_range_sq;  ///< [m^2]
-  double center[3];                   ///< [m] of the region, in the sensor frame
+  double region_center[3];            ///< [m] in the sensor frame
   double region_radius_sq;            ///< [m^2] may be inf
 };
 
-/// What became of a block.
+/// Numbers of points of a batch.
 struct CropTally {
   std::size_t kept = 0;
-  std::size_t beyond = 0;        ///< in range, but beyond the region
-  std::size_t not_a_number = 0;  ///< a coordinate is NaN
-  std::size_t endless = 0;       ///< the squared range is infinite
+  std::size_t outside_region = 0;   ///< in range, but outside the region of interest
+  std::size_t not_a_number = 0;     ///< a coordinate is NaN
+  std::size_t infinite_square = 0;  ///< the squared range is infinite
 };
 
-/// Moves points; those out of range get NaN for x. The same bits on every machine: products and
-/// sums are rounded one by one.
-/// @param x_S,y_S,z_S  sensor frame [m], `count` of them and then whatever fills up a multiple of
-///                     eight, NaN
-CropTally crop_floats(const CropRange& range, const float* x_S, const float* y_S, const float* z_S,
-                      std::size_t count, CropBlock* block);
-CropTally crop_doubles(const CropRange& range, const double* x_S, const double* y_S,
-                       const double* z_S, std::size_t count, CropBlock* block);
+/// Moves the points that are kept to O; the others get NaN for x. The same bits on every machine:
+/// products and sums are rounded one by one.
+/// @param x_S,y_S,z_S  [m] in the sensor frame: `count` numbers, and NaN up to a multiple of eight
+CropTally crop_floats(const CropKernelParameters& parameters, const float* x_S, const float* y_S,
+                      const float* z_S, std::size_t count, CropBatch* batch);
+CropTally crop_doubles(const CropKernelParameters& parameters, const double* x_S, const double* y_S,
+                       const double* z_S, std::size_t count, CropBatch* batch);
 
-/// Points that crop_rows() takes at a time.
-constexpr std::size_t kCropRow = 16;
+/// Points that crop_xyzw() takes at a time.
+constexpr std::size_t kXyzwStep = 16;
 
-/// The same for points of four floats each (x, y, z and padding), one after the other.
+/// The same for consecutive points of four floats each (x, y, z and padding).
 /// @param points  aligned as floats are
-/// @param rows    of kCropRow points; at most kCropBlock in all
-CropTally crop_rows(const CropRange& range, const float* points, std::size_t rows,
-                    CropBlock* block);
+/// @param steps   of kXyzwStep points; at most kCropBatch points in all
+CropTally crop_xyzw(const CropKernelParameters& parameters, const float* points, std::size_t steps,
+                    CropBatch* batch);
 
-/// The same for a square of kTileSide x kTileSide points.
+/// The same for a tile of kTileSide x kTileSide such points.
 /// @param stride  [floats] from row to row
-CropTally crop_square(const CropRange& range, const float* points, std::size_t stride,
-                      CropBlock* block);
+CropTally crop_xyzw_tile(const CropKernelParameters& parameters, const float* points,
+                         std::size_t stride, CropBatch* batch);
 
 }  // namespace ist

@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-// Covers the rounding of float coordinates and radii, as a share of the numbers involved.
+// Bound of the rounding of float coordinates and radii, as a share of the numbers involved.
 constexpr double kRounding = 1e-6;
 
 std::uint32_t all_of(const PointTile& tile) {

@@ -26,7 +26,7 @@ std::string datatype_name(std::uint8_t datatype) {
 
 std::uint32_t size_of(const RawField& field) { return field.datatype == kFloat64 ? 8 : 4; }
 
-// Finds one coordinate and checks all that can be said about it alone.
+// Finds the field of one coordinate and checks it by itself.
 std::string find_coordinate(const CloudLayout& layout, const char* name, const RawField** found) {
   const auto matches = [name](const RawField& field) { return field.name == name; };
   const std::vector<RawField>& fields = layout.fields;
@@ -41,7 +41,7 @@ std::string find_coordinate(const CloudLayout& layout, const char* name, const R
     return field_name + " has datatype " + datatype_name(field.datatype) +
            ", it must be float32 (7) or float64 (8).";
   }
-  // 0 is what drivers leave that know of no other count; PCL takes it for 1, too.
+  // Some drivers leave the count 0; PCL takes it for 1, too.
   if (field.count > 1) return field_name + " has count " + text(field.count) + ", it must be 1.";
   const std::uint64_t end = std::uint64_t{field.offset} + size_of(field);
   if (end > layout.point_step) {
@@ -66,7 +66,7 @@ std::string check_pair(const RawField& a, const RawField& b) {
   return {};
 }
 
-// 64-bit: the product of two 32-bit numbers always fits.
+// Checks sizes in 64 bits, which hold the product of two 32-bit numbers.
 std::string check_sizes(const CloudLayout& layout, std::uint64_t row_step) {
   const std::uint64_t width = layout.width, height = layout.height;
   const std::uint64_t row = width * layout.point_step;
@@ -104,9 +104,9 @@ std::string check_layout(const CloudLayout& layout, RawCloud* cloud) {
   if (fault.empty()) fault = check_pair(*y, *z);
   if (!fault.empty()) return fault;
 
-  const bool row_step_left_out = layout.row_step == 0 && layout.height == 1;
-  const std::uint64_t row_step = row_step_left_out ? std::uint64_t{layout.width} * layout.point_step
-                                                   : std::uint64_t{layout.row_step};
+  const bool row_step_omitted = layout.row_step == 0 && layout.height == 1;
+  const std::uint64_t row_step = row_step_omitted ? std::uint64_t{layout.width} * layout.point_step
+                                                  : std::uint64_t{layout.row_step};
   fault = check_sizes(layout, row_step);
   if (!fault.empty()) return fault;
 

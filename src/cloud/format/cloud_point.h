@@ -4,7 +4,7 @@
 
 namespace ist {
 
-/// A point on its way into an index; it fits one SIMD register.
+/// A point while an index is built; it fits one SIMD register.
 struct alignas(16) CloudPoint {
   float x, y, z;     ///< [m] from the index's origin
   std::uint32_t id;  ///< carried through to the answers

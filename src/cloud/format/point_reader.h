@@ -8,7 +8,7 @@
 
 #include "ist_proximity/cloud/cloud_layout.h"
 
-/// Points out of a message's bytes, of a layout that check_layout has passed.
+/// Reads points from a message's bytes, whose layout check_layout has passed.
 namespace ist {
 
 template <typename Bits>
@@ -21,7 +21,7 @@ Bits swapped(Bits bits) {
   return result;
 }
 
-/// Coordinates in a message are not aligned to anything.
+/// Reads a number, which need not be aligned.
 template <typename Scalar, bool kSwap>
 Scalar read(const std::uint8_t* bytes) {
   std::conditional_t<sizeof(Scalar) == 4, std::uint32_t, std::uint64_t> bits;
@@ -44,7 +44,7 @@ Eigen::Vector3d read_point(const RawCloud& cloud, const std::uint8_t* bytes) {
           static_cast<double>(read<Scalar, kSwap>(bytes + cloud.z))};
 }
 
-/// As it is in the message, in the sensor frame [m]; not finite where nothing was measured.
+/// A point as it is in the message, in the sensor frame [m]; not finite where nothing was measured.
 inline Eigen::Vector3d point_at(const RawCloud& cloud, std::size_t row, std::size_t column) {
   const std::uint8_t* bytes = bytes_of(cloud, row, column);
   if (cloud.is_double) {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "cloud/index/tile_box.h"
+#include "cloud/index/split_rule.h"
+#include "cloud/index/tile_bounds.h"
 #include "cloud/index/tile_reader.h"
 #include "internal/bvh/build_id.h"
 
@@ -11,7 +12,7 @@ namespace {
 
 constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
 
-// Leaves out the points whose bit is set.
+// Removes the points whose bit is set.
 void remove(std::uint32_t dropped, PointTile* tile) {
   std::uint32_t kept = 0;
   for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(tile->count); ++k) {
@@ -33,133 +34,133 @@ void put_unused_far_away(PointTile* tile) {
   }
 }
 
-// Whether tiles that are neighbours shall be a node: most of it is used, and they lie side by side.
-bool make_a_node(const HierarchyChild* tiles, std::size_t count) {
+// Whether neighbouring tiles are to be a node: they fill most of it and are close together.
+bool is_node_worthwhile(const HierarchyChild* tiles, std::size_t count) {
   if (count < kWidth / 2 || count > kWidth) return false;
-  PaddedBox around = tiles[0].box;
+  PaddedBox bounds = tiles[0].box;
   float sum = 0.0F;
   for (std::size_t i = 0; i < count; ++i) {
-    around.extend(tiles[i].box);
+    bounds.extend(tiles[i].box);
     sum += tiles[i].box.diagonal();
   }
-  return lie_close_together(around.diagonal(), sum, count);
+  return are_close_together(bounds.diagonal(), sum, count);
 }
 
 }  // namespace
 
-void PointBvhBuilder::start(const Eigen::Isometry3d& X_FO, PointBvh* index) {
-  index_ = index;
+void PointBvhBuilder::start(const Eigen::Isometry3d& X_FO, PointBvh* bvh) {
+  bvh_ = bvh;
   used_ = 0;
-  index->build_id_ = next_build_id();
-  index->X_FO_ = X_FO;
-  index->size_ = 0;
-  index->nodes_.clear();
-  index->cloud_ = RawCloud();
-  unread_.clear();
-  loose_.clear();
-  neighbours_ = 0;
+  bvh->build_id_ = next_build_id();
+  bvh->X_FO_ = X_FO;
+  bvh->size_ = 0;
+  bvh->nodes_.clear();
+  bvh->cloud_ = RawCloud();
+  lazy_runs_.clear();
+  ungrouped_.clear();
+  group_begin_ = 0;
 }
 
-PointTile* PointBvhBuilder::room(std::size_t count) {
-  std::vector<PointTile>& tiles = index_->tiles_;
+PointTile* PointBvhBuilder::next_tiles(std::size_t count) {
+  std::vector<PointTile>& tiles = bvh_->tiles_;
   if (used_ + count > tiles.size()) {
     tiles.resize(used_ + count);
-    index_->first_pixel_.resize(used_ + count);
+    bvh_->first_pixel_.resize(used_ + count);
   }
   return &tiles[used_];
 }
 
-void PointBvhBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
-  PointTile& tile = index_->tiles_[used_];
-  PaddedBox left = box;
+void PointBvhBuilder::add_tile(const PaddedBox& box, const PointFilter& drop) {
+  PointTile& tile = bvh_->tiles_[used_];
+  PaddedBox kept_box = box;
   if (drop) {
     const std::uint32_t dropped = drop(tile, box);
     if (dropped != 0) {
       remove(dropped, &tile);
       if (tile.count == 0) return;
-      left = box_of(tile);
+      kept_box = box_of(tile);
     }
   }
   put_unused_far_away(&tile);
-  index_->size_ += static_cast<std::size_t>(tile.count);
-  loose_.push_back({left, ~static_cast<std::int32_t>(used_)});
+  bvh_->size_ += static_cast<std::size_t>(tile.count);
+  ungrouped_.push_back({kept_box, ~static_cast<std::int32_t>(used_)});
   ++used_;
 }
 
-void PointBvhBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) {
+void PointBvhBuilder::add_loaded_tiles(const BoxNode& boxes, std::uint32_t which) {
   for (int k = 0; which >> k != 0; ++k) {
     if ((which >> k & 1U) == 0) continue;
-    index_->size_ += static_cast<std::size_t>(index_->tiles_[used_].count);
-    loose_.push_back({box_in(boxes, k), ~static_cast<std::int32_t>(used_)});
+    bvh_->size_ += static_cast<std::size_t>(bvh_->tiles_[used_].count);
+    ungrouped_.push_back({box_in(boxes, k), ~static_cast<std::int32_t>(used_)});
     ++used_;
   }
 }
 
-void PointBvhBuilder::start_image(const Eigen::Isometry3d& X_FO, const RawCloud& image,
-                                  const Eigen::Isometry3d& X_OS, PointBvh* index) {
-  start(X_FO, index);
-  index->cloud_ = image;
-  index->X_OS_ = X_OS;
+void PointBvhBuilder::start_organized(const Eigen::Isometry3d& X_FO, const RawCloud& cloud,
+                                      const Eigen::Isometry3d& X_OS, PointBvh* bvh) {
+  start(X_FO, bvh);
+  bvh->cloud_ = cloud;
+  bvh->X_OS_ = X_OS;
 }
 
-void PointBvhBuilder::add_unread(const std::uint32_t* first_pixels, std::size_t count) {
-  PointTile* tiles = room(count);
-  if (index_->cloud_.owner == nullptr) {
+void PointBvhBuilder::append_lazy(const std::uint32_t* first_pixels, std::size_t count) {
+  PointTile* tiles = next_tiles(count);
+  if (bvh_->cloud_.owner == nullptr) {
     for (std::size_t i = 0; i < count; ++i) {
-      read_tile(index_->cloud_, index_->X_OS_, first_pixels[i], &tiles[i]);
+      read_tile(bvh_->cloud_, bvh_->X_OS_, first_pixels[i], &tiles[i]);
     }
   } else {
-    std::copy_n(first_pixels, count, &index_->first_pixel_[used_]);
-    if (unread_.empty() || unread_.back().first + unread_.back().count != used_) {
-      unread_.push_back({used_, 0});
+    std::copy_n(first_pixels, count, &bvh_->first_pixel_[used_]);
+    if (lazy_runs_.empty() || lazy_runs_.back().first + lazy_runs_.back().count != used_) {
+      lazy_runs_.push_back({used_, 0});
     }
-    unread_.back().count += count;
+    lazy_runs_.back().count += count;
   }
   used_ += count;
-  index_->size_ += count * static_cast<std::size_t>(kPointWidth);
+  bvh_->size_ += count * static_cast<std::size_t>(kPointWidth);
 }
 
-void PointBvhBuilder::keep_unread(const PaddedBox& box, std::uint32_t first_pixel) {
-  loose_.push_back({box, ~static_cast<std::int32_t>(used_)});
-  add_unread(&first_pixel, 1);
+void PointBvhBuilder::add_lazy_tile(const PaddedBox& box, std::uint32_t first_pixel) {
+  ungrouped_.push_back({box, ~static_cast<std::int32_t>(used_)});
+  append_lazy(&first_pixel, 1);
 }
 
-void PointBvhBuilder::keep_unread_node(const BoxNode& boxes, const std::uint32_t* first_pixels) {
-  index_->nodes_.push_back(boxes);
-  BoxNode& node = index_->nodes_.back();
+void PointBvhBuilder::add_lazy_node(const BoxNode& boxes, const std::uint32_t* first_pixels) {
+  bvh_->nodes_.push_back(boxes);
+  BoxNode& node = bvh_->nodes_.back();
   node.count = kPointWidth;
   for (int k = 0; k < kPointWidth; ++k) node.child[k] = ~(static_cast<std::int32_t>(used_) + k);
-  add_unread(first_pixels, kWidth);
+  append_lazy(first_pixels, kWidth);
 }
 
-void PointBvhBuilder::end_neighbours() {
-  const std::size_t count = loose_.size() - neighbours_;
-  if (make_a_node(loose_.data() + neighbours_, count)) {
-    index_->nodes_.emplace_back();
-    BoxNode& node = index_->nodes_.back();
+void PointBvhBuilder::end_group() {
+  const std::size_t count = ungrouped_.size() - group_begin_;
+  if (is_node_worthwhile(ungrouped_.data() + group_begin_, count)) {
+    bvh_->nodes_.emplace_back();
+    BoxNode& node = bvh_->nodes_.back();
     clear_boxes(&node);
-    for (std::size_t i = neighbours_; i < loose_.size(); ++i) {
-      node.child[append_box(loose_[i].box, &node)] = loose_[i].child;
+    for (std::size_t i = group_begin_; i < ungrouped_.size(); ++i) {
+      node.child[append_box(ungrouped_[i].box, &node)] = ungrouped_[i].child;
     }
-    loose_.resize(neighbours_);
+    ungrouped_.resize(group_begin_);
   }
-  neighbours_ = loose_.size();
+  group_begin_ = ungrouped_.size();
 }
 
 void PointBvhBuilder::finish() {
-  index_->tiles_.resize(used_);
-  index_->first_pixel_.resize(used_);
-  index_->flags_.reset(used_);
-  for (const Run& run : unread_) index_->flags_.mark_not_loaded(run.first, run.count);
-  std::vector<BoxNode>& nodes = index_->nodes_;
-  hierarchy_.append_nodes(loose_, &nodes);
+  bvh_->tiles_.resize(used_);
+  bvh_->first_pixel_.resize(used_);
+  bvh_->flags_.reset(used_);
+  for (const TileRun& run : lazy_runs_) bvh_->flags_.mark_not_loaded(run.first, run.count);
+  std::vector<BoxNode>& nodes = bvh_->nodes_;
+  hierarchy_.append_nodes(ungrouped_, &nodes);
   hierarchy_.append_levels(&nodes);
-  if (index_->cloud_.owner == nullptr) index_->cloud_ = RawCloud();  // its bytes may go
-  index_->root_ = static_cast<std::int32_t>(nodes.size()) - 1;
-  index_->bounds_.setEmpty();
+  if (bvh_->cloud_.owner == nullptr) bvh_->cloud_ = RawCloud();  // not valid after the call
+  bvh_->root_ = static_cast<std::int32_t>(nodes.size()) - 1;
+  bvh_->bounds_.setEmpty();
   if (nodes.empty()) return;
   const PaddedBox box = bounds_of(nodes.back());
-  index_->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
+  bvh_->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
 }
 
 }  // namespace ist

@@ -1,4 +1,4 @@
-// Points that are brought together before they become tiles: lists, of any order or in order.
+// The builder for unorganized clouds: points in any order, or in an order that is mostly spatial.
 
 #include <algorithm>
 #include <array>
@@ -6,22 +6,23 @@
 #include <limits>
 
 #include "cloud/index/point_bvh_builder.h"
-#include "cloud/index/tile_box.h"
+#include "cloud/index/split_rule.h"
+#include "cloud/index/tile_bounds.h"
 
 namespace ist {
 namespace {
 
 constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
-constexpr std::size_t kEnough = 4 * kWidth;  // tiles, to make nodes of them
+constexpr std::size_t kEnough = 4 * kWidth;  // tiles for well filled nodes
 
-// The box of the slots that `mask` leaves: -inf where a slot belongs, inf where not.
+// The box of the slots where the mask is -inf; it is inf for the others.
 PaddedBox box_of(const PointTile& tile, const Lanes& mask) {
   const LaneMap x(tile.x), y(tile.y), z(tile.z);
   return {{x.max(mask).minCoeff(), y.max(mask).minCoeff(), z.max(mask).minCoeff(), 0.0F},
           {x.min(-mask).maxCoeff(), y.min(-mask).maxCoeff(), z.min(-mask).maxCoeff(), 0.0F}};
 }
 
-// The mask of the first `count` slots; negated, of the others.
+// The mask of the first `count` slots; negated, the mask of the others.
 Lanes mask_of_first(std::int32_t count) {
   constexpr float kIn = -std::numeric_limits<float>::infinity(), kOut = -kIn;
   static constexpr float kMasks[2 * kPointWidth] = {kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,
@@ -31,13 +32,13 @@ Lanes mask_of_first(std::int32_t count) {
   return LaneMap(kMasks + kPointWidth - count);
 }
 
-// The longest step between neighbours.
-struct Leap {
-  std::int32_t to;  // the point after it
+// The longest step between consecutive points.
+struct Step {
+  std::int32_t to;  // slot of the point after it
   float length_sq;  // [m^2]
 };
 
-Leap longest_leap(const PointTile& tile) {
+Step longest_step(const PointTile& tile) {
   // Fifteen steps, in two overlapping halves.
   constexpr int kHalf = kPointWidth / 2;
   using Half = Eigen::Array<float, kHalf, 1>;
@@ -58,18 +59,17 @@ Leap longest_leap(const PointTile& tile) {
   return {k + (in_front ? 1 : kHalf), longest};
 }
 
-// Shortens a tile until no leap is worth a cut; gives its box.
-PaddedBox cut(PointTile* tile) {
+// Splits a tile at its longest step and keeps the points before it, as long as that is worthwhile.
+// @returns the box of those
+PaddedBox shorten(PointTile* tile) {
   PaddedBox box = box_of(*tile);
   while (tile->count > 1) {
-    // The whole is no longer than both parts and the leap together: a short leap is not worth it.
-    constexpr float kShort = 0.99F * (1.0F - kCutBelow);
-    const Leap leap = longest_leap(*tile);
-    if (leap.length_sq < kShort * kShort * box.diagonal_sq()) break;
-    const Lanes mask = mask_of_first(leap.to);
+    const Step step = longest_step(*tile);
+    if (!may_split_at_step(step.length_sq, box.diagonal_sq())) break;
+    const Lanes mask = mask_of_first(step.to);
     const PaddedBox front_box = box_of(*tile, mask), back_box = box_of(*tile, -mask);
-    if (!is_worth_a_cut(front_box, back_box, box)) break;
-    tile->count = leap.to;
+    if (!is_split_worthwhile(front_box, back_box, box)) break;
+    tile->count = step.to;
     repeat_last(tile);
     box = front_box;
   }
@@ -78,10 +78,11 @@ PaddedBox cut(PointTile* tile) {
 
 }  // namespace
 
-// Runs of sixteen, cut where the order leaps.
-void PointBvhBuilder::add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop) {
+// Adds tiles of up to sixteen consecutive points, split where those are apart.
+void PointBvhBuilder::add_in_order(const CloudPoint* points, std::size_t n,
+                                   const PointFilter& drop) {
   while (n > 0) {
-    PointTile& tile = *room(1);
+    PointTile& tile = *next_tiles(1);
     const std::size_t count = std::min(kWidth, n);
     for (std::size_t k = 0; k < count; ++k) {
       tile.x[k] = points[k].x;
@@ -91,30 +92,31 @@ void PointBvhBuilder::add_runs(const CloudPoint* points, std::size_t n, const Po
     }
     tile.count = static_cast<std::int32_t>(count);
     repeat_last(&tile);
-    const PaddedBox box = cut(&tile);
+    const PaddedBox box = shorten(&tile);
     points += tile.count;
     n -= static_cast<std::size_t>(tile.count);
-    keep(box, drop);
+    add_tile(box, drop);
   }
 }
 
-// Nodes over the tiles that have none yet, when there are enough to fill them.
+// Groups the tiles that are in no node yet, when there are enough to fill nodes.
 void PointBvhBuilder::end_cell() {
-  if (loose_.size() < kEnough) return;
-  hierarchy_.append_nodes(loose_, &index_->nodes_);
-  loose_.clear();
-  neighbours_ = 0;
+  if (ungrouped_.size() < kEnough) return;
+  hierarchy_.append_nodes(ungrouped_, &bvh_->nodes_);
+  ungrouped_.clear();
+  group_begin_ = 0;
 }
 
-// The slices that the last sort is good for: as many as the square root of the number of parts,
-// each of whole parts; around points that it does not order, those before, they, and those after.
+// Visits the slices into which the last sort divides the points: as many as the square root of the
+// number of parts, each of whole parts. Where the sort has a dense slice, whose points it does not
+// order, there are three: the points before it, its own, and those after it.
 template <typename Visit>
 void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visit& visit) const {
-  const std::size_t crowd = slicer_.crowd_begin(), crowd_end = slicer_.crowd_end();
-  if (crowd_end > 0) {
-    if (crowd > 0) visit(std::size_t{0}, crowd);
-    visit(crowd, crowd_end);
-    if (crowd_end < n) visit(crowd_end, n);
+  const std::size_t dense_begin = slicer_.dense_begin(), dense_end = slicer_.dense_end();
+  if (dense_end > 0) {
+    if (dense_begin > 0) visit(std::size_t{0}, dense_begin);
+    visit(dense_begin, dense_end);
+    if (dense_end < n) visit(dense_end, n);
     return;
   }
   constexpr std::size_t kAllAtOnce = 4;
@@ -126,14 +128,15 @@ void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visi
   }
 }
 
-// Points of a cell: sliced until the parts are what is worked on at a time.
+// Adds the points of a cell: slices them until the parts fit a batch.
+// @param spare  buffer for n points
 void PointBvhBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::size_t n,
                                  const Filters& filters) {
   if (n <= TileBatch::kMost) {
-    batch_.tiles = room(n);
+    batch_.tiles = next_tiles(n);
     batch_.count = 0;
-    if (n > 0) add_part(points, spare, n);
-    keep_batch(filters);
+    if (n > 0) slice_into_tiles(points, spare, n);
+    add_batch(filters);
     return;
   }
   if (!slicer_.sort(points, n, spare)) std::copy_n(points, n, spare);
@@ -142,29 +145,30 @@ void PointBvhBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::siz
   });
 }
 
-// Sliced until runs of sixteen are tiles.
-void PointBvhBuilder::add_part(CloudPoint* points, CloudPoint* spare, std::size_t n) {
+// Slices the points of a batch until sixteen consecutive ones are a tile.
+void PointBvhBuilder::slice_into_tiles(CloudPoint* points, CloudPoint* spare, std::size_t n) {
   if (n <= kWidth || !slicer_.sort(points, n, spare)) {
     make_tiles(points, n, &batch_);
     return;
   }
-  // Runs of sixteen are as long as they are wide, or half as long: no need to slice the other way.
+  // Sixteen consecutive points are at least half as long as they are wide: a slice across the other
+  // side is not needed.
   constexpr std::size_t kFewTiles = 4;
   constexpr float kWidest = 2.0F;
   const BoxShape& shape = slicer_.shape();
   const float width = shape.second * static_cast<float>(n) / static_cast<float>(kWidth);
   const bool is_narrow = n <= kFewTiles * kWidth || width <= kWidest * shape.longest;
-  if (is_narrow && slicer_.crowd_end() == 0) {
+  if (is_narrow && slicer_.dense_end() == 0) {
     make_tiles(spare, n, &batch_);
   } else {
     for_each_slice(n, kWidth, [&](std::size_t begin, std::size_t end) {
-      add_part(spare + begin, points + begin, end - begin);
+      slice_into_tiles(spare + begin, points + begin, end - begin);
     });
   }
 }
 
-// What make_tiles has made becomes part of the index.
-void PointBvhBuilder::keep_batch(const Filters& filters) {
+// Adds the tiles of the batch, filtered where a filter may drop points.
+void PointBvhBuilder::add_batch(const Filters& filters) {
   const std::size_t count = batch_.count;
   const PointTile* tiles = batch_.tiles;
   bool is_clear = true;
@@ -177,54 +181,56 @@ void PointBvhBuilder::keep_batch(const Filters& filters) {
     filtered_.reserve(TileBatch::kMost);
     filtered_.assign(tiles, tiles + count);
   }
-  // Gaps have made more tiles than fit a node: as many nodes as it takes, alike in size.
+  // Splits may have made more tiles than fit whole nodes: groups of about equal size.
   const std::size_t nodes = (count + kWidth - 1) / kWidth, each = (count + nodes - 1) / nodes;
   for (std::size_t begin = 0; begin < count; begin += each) {
     const std::size_t end = std::min(begin + each, count);
     if (is_clear) {
-      keep_made(begin, end);
+      add_clear_tiles(begin, end);
     } else {
-      keep_filtered(begin, end, filters.drop);
+      add_filtered_tiles(begin, end, filters.drop);
     }
-    end_neighbours();
+    end_group();
   }
 }
 
-void PointBvhBuilder::keep_made(std::size_t begin, std::size_t end) {
+void PointBvhBuilder::add_clear_tiles(std::size_t begin, std::size_t end) {
   for (std::size_t i = begin; i < end;) {
     const std::size_t slot = i % kWidth, here = std::min(kWidth - slot, end - i);
     const auto which = static_cast<std::uint32_t>(((std::size_t{1} << here) - 1) << slot);
-    keep_written(batch_.boxes[i / kWidth], which);
+    add_loaded_tiles(batch_.boxes[i / kWidth], which);
     i += here;
   }
 }
 
-// What the filter drops moves all that follow.
-void PointBvhBuilder::keep_filtered(std::size_t begin, std::size_t end, const PointFilter& drop) {
+// Tiles that the filter empties move all that follow.
+void PointBvhBuilder::add_filtered_tiles(std::size_t begin, std::size_t end,
+                                         const PointFilter& drop) {
   for (std::size_t i = begin; i < end; ++i) {
-    *room(1) = filtered_[i];
-    keep(box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth)), drop);
+    *next_tiles(1) = filtered_[i];
+    add_tile(box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth)), drop);
   }
 }
 
 void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,
-                            const PointFilter& drop, PointBvh* index) {
+                            const PointFilter& drop, PointBvh* bvh) {
   std::array<CloudPoint, PointCells::kSample> sample;
   const std::size_t stride = n / sample.size() | 1U;
   std::size_t count = 0;
   for (std::size_t i = 0; i < n && count < sample.size(); i += stride) sample[count++] = points[i];
   cells_.start(sample.data(), count, n);
   cells_.add(points, n);
-  build(X_FO, drop, {}, index);
+  build(X_FO, drop, {}, bvh);
 }
 
 void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
-                            const BoxFilter& may_drop, PointBvh* index) {
-  start(X_FO, index);
-  // More than there will be, by far: how many it takes differs from cloud to cloud of a stream.
+                            const BoxFilter& may_drop, PointBvh* bvh) {
+  start(X_FO, bvh);
+  // Far more than needed: the number of nodes differs from cloud to cloud of a stream, and memory
+  // is to be allocated once.
   const std::size_t enough = cells_.size() / (4 * kWidth) + kWidth;
-  if (index->nodes_.capacity() < enough) index->nodes_.reserve(2 * enough);
-  loose_.reserve(kEnough + TileBatch::kMost);
+  if (bvh->nodes_.capacity() < enough) bvh->nodes_.reserve(2 * enough);
+  ungrouped_.reserve(kEnough + TileBatch::kMost);
   for (auto cell = cells_.next(); cell.size > 0; cell = cells_.next()) {
     if (spare_.size() < cell.size + kPointSlack) spare_.resize(2 * (cell.size + kPointSlack));
     add_points(cell.points, spare_.data(), cell.size, {drop, may_drop});
@@ -234,9 +240,9 @@ void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& dr
 }
 
 void PointBvhBuilder::build_in_order(const Eigen::Isometry3d& X_FO,
-                                     const std::vector<CloudPoint>& points, PointBvh* index) {
-  start(X_FO, index);
-  add_runs(points.data(), points.size(), {});
+                                     const std::vector<CloudPoint>& points, PointBvh* bvh) {
+  start(X_FO, bvh);
+  add_in_order(points.data(), points.size(), {});
   finish();
 }
 

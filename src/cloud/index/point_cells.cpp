@@ -5,25 +5,26 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cloud/index/divide_kernel.h"
+#include "cloud/index/slice_kernel.h"
 
 namespace ist {
 namespace {
 
-// Points on a surface: so many of them share a cell.
+// Points in a cell, on average, where they lie on a surface.
 constexpr double kPointsPerCell = 400.0;
 
 // The bounds of most of a sample along an axis.
-template <typename Of>
-void find_bounds(CloudPoint* sample, std::size_t count, const Of& of, float* min, float* max) {
+template <typename Coordinate>
+void find_bounds(CloudPoint* sample, std::size_t count, const Coordinate& of, float* min,
+                 float* max) {
   const auto nth = [&](std::size_t n) {
     std::nth_element(sample, sample + n, sample + count,
                      [&of](const CloudPoint& a, const CloudPoint& b) { return of(a) < of(b); });
     return of(sample[n]);
   };
-  constexpr std::size_t kLeftOut = 32;  // one of so many at either end
-  *min = nth(count / kLeftOut);
-  *max = nth(count - 1 - count / kLeftOut);
+  constexpr std::size_t kOutliers = 32;  // one of so many at either end is ignored
+  *min = nth(count / kOutliers);
+  *max = nth(count - 1 - count / kOutliers);
 }
 
 }  // namespace
@@ -48,22 +49,22 @@ void PointCells::start(CloudPoint* sample, std::size_t count, std::size_t n) {
   const double side = std::floor(std::sqrt(static_cast<double>(n) / kPointsPerCell));
   const auto cells = static_cast<float>(std::clamp(side, 1.0, kMost));
   const float per_metre = cells / extent;
-  if (!std::isfinite(per_metre) || !(per_metre > 0.0F)) return;  // as good as one point
+  if (!std::isfinite(per_metre) || !(per_metre > 0.0F)) return;  // the points coincide, or nearly
   grid_.per_metre = per_metre;
   for (int i = 0; i < 3; ++i) {
     grid_.last[i] = std::min(std::floor((max[i] - grid_.min[i]) * per_metre), cells - 1.0F);
   }
 }
 
-void PointCells::add(const CropBlock& block, std::size_t count, std::uint32_t first_id) {
-  scatter(find_cells(grid_, block, count, first_id, &block_));
+void PointCells::add(const CropBatch& batch, std::size_t count, std::uint32_t first_id) {
+  scatter(find_cells(grid_, batch, count, first_id, &batch_));
 }
 
 void PointCells::add(const CloudPoint* points, std::size_t n) {
   while (n > 0) {
-    const std::size_t count = std::min(n, kCropBlock);
-    std::copy_n(points, count, block_.points);
-    scatter(find_cells(grid_, count, &block_));
+    const std::size_t count = std::min(n, kCropBatch);
+    std::copy_n(points, count, batch_.points);
+    scatter(find_cells(grid_, count, &batch_));
     points += count;
     n -= count;
   }
@@ -73,14 +74,14 @@ void PointCells::scatter(std::size_t count) {
   size_ += count;
   CloudPoint* pool = pool_.data();
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t cell = block_.cells[i] >> 8;
+    const std::size_t cell = batch_.cells[i] >> 8;
     std::uint32_t end = end_[cell];
     if (end % kChunk == 0) {
       end = next_chunk(cell, end);
       pool = pool_.data();
     }
     hwy::Prefetch(pool + end + 4);  // the next line of four
-    pool[end] = block_.points[block_.cells[i] & 0xFFU];
+    pool[end] = batch_.points[batch_.cells[i] & 0xFFU];
     end_[cell] = end + 1;
   }
 }
@@ -102,7 +103,7 @@ std::uint32_t PointCells::next_chunk(std::size_t cell, std::uint32_t end) {
   return begin;
 }
 
-// To the next cell that is not empty, of which the first points are fetched.
+// Advances to the next cell that is not empty and prefetches its first points.
 void PointCells::skip_empty() {
   while (taken_ < end_.size() && end_[taken_] == 0) ++taken_;
   if (taken_ == end_.size()) return;

@@ -10,39 +10,39 @@
 
 namespace ist {
 
-/// Brings together, in one pass, points that come in any order: by the cells of a coarse grid.
-/// Keeps its memory. Not thread safe.
+/// Sorts points that come in any order into the cells of a coarse grid, in one pass. Keeps its
+/// memory. Not thread safe.
 ///
 /// Each cell has a list of chunks, so that nothing is counted beforehand and each point is written
-/// once. The grid is laid over a sample: what lies beyond comes into the cells at its sides, which
-/// costs time but never an answer.
+/// once. The grid is laid over a sample of the points; points outside of it belong to the cells at
+/// its sides, which costs time but changes no answer.
 class PointCells {
  public:
-  /// Points that a sample has at most.
+  /// Largest sample.
   static constexpr std::size_t kSample = 256;
 
-  /// Forgets all points.
+  /// Removes all points and lays a new grid.
   /// @param sample  some of the points to come, `count` of them at most kSample; overwritten
   /// @param n       about how many are to come
   void start(CloudPoint* sample, std::size_t count, std::size_t n);
 
-  /// @param count     used slots of the block
+  /// @param count     used slots of the batch
   /// @param first_id  of its first point; the others' follow
-  void add(const CropBlock& block, std::size_t count, std::uint32_t first_id);
+  void add(const CropBatch& batch, std::size_t count, std::uint32_t first_id);
   void add(const CloudPoint* points, std::size_t n);
 
-  /// Points that were added.
+  /// Number of points added.
   std::size_t size() const { return size_; }
 
-  /// Points of one cell, in the order in which they were added.
+  /// The points of one cell, in the order in which they were added.
   struct Cell {
     CloudPoint* points;
     std::size_t size;
   };
-  /// Hands out cell after cell; neighbours in this order are mostly neighbours in space (Morton
-  /// order). A cell is good until the next call; it may be overwritten, and kPointSlack points more
-  /// may be read.
-  /// @returns the next cell that is not empty; an empty one when there is none left
+  /// The next cell that is not empty, in Morton order: neighbours in this order are mostly
+  /// neighbours in space. Valid until the next call; may be overwritten, and kPointSlack points
+  /// after it may be read.
+  /// @returns an empty cell after the last one
   Cell next();
 
  private:
@@ -53,13 +53,13 @@ class PointCells {
   void skip_empty();
 
   PointGrid grid_;
-  CellBlock block_;
+  CellBatch batch_;
   std::array<std::uint32_t, PointGrid::kMostCells> first_{}, end_{};  ///< points in pool_, or 0
   std::vector<CloudPoint> pool_;
-  std::vector<std::uint32_t> next_;  ///< chunk after a chunk
-  std::vector<CloudPoint> cell_;     ///< of more than one chunk
+  std::vector<std::uint32_t> next_;  ///< by chunk: the next one of its cell
+  std::vector<CloudPoint> cell_;     ///< buffer for a cell of more than one chunk
   std::size_t size_ = 0;
-  std::size_t taken_ = 0;   ///< cells that next() is done with
+  std::size_t taken_ = 0;   ///< cells that next() has returned or skipped
   std::size_t chunks_ = 1;  ///< in use; the first one stays empty
 };
 

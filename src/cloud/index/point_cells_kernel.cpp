@@ -11,16 +11,17 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
+namespace point_cells {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using ListTag = hn::CappedTag<float, 16>;
-using IdTag = hn::RebindToUnsigned<ListTag>;
-using CellTag = hn::RebindToSigned<ListTag>;
+using PointTag = hn::CappedTag<float, 16>;
+using IdTag = hn::RebindToUnsigned<PointTag>;
+using CellTag = hn::RebindToSigned<PointTag>;
 
 // The four bits of a cell's number, each followed by two zeros.
 static_assert(PointGrid::kBits == 4, "masks");
-HWY_INLINE hn::Vec<CellTag> Spread(const PointGrid& grid, int axis, hn::Vec<ListTag> v) {
-  const ListTag d;
+HWY_INLINE hn::Vec<CellTag> Spread(const PointGrid& grid, int axis, hn::Vec<PointTag> v) {
+  const PointTag d;
   const CellTag di;
   const auto cells = hn::Mul(hn::Sub(v, hn::Set(d, grid.min[axis])), hn::Set(d, grid.per_metre));
   const auto bounded = hn::Min(hn::Max(cells, hn::Zero(d)), hn::Set(d, grid.last[axis]));
@@ -29,46 +30,51 @@ HWY_INLINE hn::Vec<CellTag> Spread(const PointGrid& grid, int axis, hn::Vec<List
   return hn::And(hn::Or(bits, hn::ShiftLeft<2>(bits)), hn::Set(di, 0x249));
 }
 
-// Appends the cells of the points in slots from k on. @returns how many
+// Appends the cells of the points in slots from k on that are to be kept. @returns how many
 template <class M>
-HWY_INLINE std::size_t Append(const PointGrid& grid, hn::Vec<ListTag> x, hn::Vec<ListTag> y,
-                              hn::Vec<ListTag> z, const M& keep, std::size_t k,
+HWY_INLINE std::size_t Append(const PointGrid& grid, hn::Vec<PointTag> x, hn::Vec<PointTag> y,
+                              hn::Vec<PointTag> z, const M& keep, std::size_t k,
                               std::uint32_t* cells) {
   const IdTag du;
   const auto cell = hn::Or(hn::Or(Spread(grid, 0, x), hn::ShiftLeft<1>(Spread(grid, 1, y))),
                            hn::ShiftLeft<2>(Spread(grid, 2, z)));
   const auto entry =
       hn::Or(hn::BitCast(du, hn::ShiftLeft<8>(cell)), hn::Iota(du, static_cast<std::uint32_t>(k)));
-  hn::StoreU(Compressor<ListTag>(keep)(du, entry), du, cells);
-  return hn::CountTrue(ListTag(), keep);
+  hn::StoreU(compress::Compressor<PointTag>(keep)(du, entry), du, cells);
+  return hn::CountTrue(PointTag(), keep);
 }
 
-std::size_t FindCellsOfCrop(const PointGrid& grid, const CropBlock& crop, std::size_t count,
-                            std::uint32_t first_id, CellBlock* block) {
-  const ListTag d;
+std::size_t FindCellsOfCrop(const PointGrid& grid, const CropBatch& crop, std::size_t count,
+                            std::uint32_t first_id, CellBatch* batch) {
+  const PointTag d;
   const IdTag du;
   std::size_t kept = 0;
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
     const auto x = hn::Load(d, crop.x + k), y = hn::Load(d, crop.y + k),
                z = hn::Load(d, crop.z + k);
     const auto id = hn::Iota(du, first_id + static_cast<std::uint32_t>(k));
-    hn::StoreInterleaved4(x, y, z, hn::BitCast(d, id), d, &block->points[k].x);
+    hn::StoreInterleaved4(x, y, z, hn::BitCast(d, id), d, &batch->points[k].x);
     const auto keep = hn::And(hn::Eq(x, x), hn::FirstN(d, count - k));
-    kept += Append(grid, x, y, z, keep, k, block->cells + kept);
+    kept += Append(grid, x, y, z, keep, k, batch->cells + kept);
   }
   return kept;
 }
 
-std::size_t FindCellsOfPoints(const PointGrid& grid, std::size_t count, CellBlock* block) {
-  const ListTag d;
+std::size_t FindCellsOfPoints(const PointGrid& grid, std::size_t count, CellBatch* batch) {
+  const PointTag d;
   std::size_t kept = 0;
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
-    hn::Vec<ListTag> x, y, z, id;
-    hn::LoadInterleaved4(d, &block->points[k].x, x, y, z, id);
-    kept += Append(grid, x, y, z, hn::FirstN(d, count - k), k, block->cells + kept);
+    hn::Vec<PointTag> x, y, z, id;
+    hn::LoadInterleaved4(d, &batch->points[k].x, x, y, z, id);
+    kept += Append(grid, x, y, z, hn::FirstN(d, count - k), k, batch->cells + kept);
   }
   return kept;
 }
+
+}  // namespace point_cells
+
+using point_cells::FindCellsOfCrop;
+using point_cells::FindCellsOfPoints;
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
@@ -80,13 +86,13 @@ namespace ist {
 HWY_EXPORT(FindCellsOfCrop);
 HWY_EXPORT(FindCellsOfPoints);
 
-std::size_t find_cells(const PointGrid& grid, const CropBlock& crop, std::size_t count,
-                       std::uint32_t first_id, CellBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(FindCellsOfCrop)(grid, crop, count, first_id, block);
+std::size_t find_cells(const PointGrid& grid, const CropBatch& crop, std::size_t count,
+                       std::uint32_t first_id, CellBatch* batch) {
+  return HWY_DYNAMIC_DISPATCH(FindCellsOfCrop)(grid, crop, count, first_id, batch);
 }
 
-std::size_t find_cells(const PointGrid& grid, std::size_t count, CellBlock* block) {
-  return HWY_DYNAMIC_DISPATCH(FindCellsOfPoints)(grid, count, block);
+std::size_t find_cells(const PointGrid& grid, std::size_t count, CellBatch* batch) {
+  return HWY_DYNAMIC_DISPATCH(FindCellsOfPoints)(grid, count, batch);
 }
 
 }  // namespace ist

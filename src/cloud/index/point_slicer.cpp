@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <numeric>
 
-#include "cloud/index/divide_kernel.h"
+#include "cloud/index/slice_kernel.h"
 
 namespace ist {
 
 bool PointSlicer::sort(const CloudPoint* from, std::size_t n, CloudPoint* to) {
   constexpr std::size_t kFew = 128, kFewSlices = 32;
   const std::size_t count = n <= kFew ? kFewSlices : kMostSlices;
-  crowd_begin_ = crowd_end_ = 0;
+  dense_begin_ = dense_end_ = 0;
   if (slices_.size() < n + kPointSlack) slices_.resize(2 * (n + kPointSlack));
   if (!find_slices(from, n, static_cast<std::int32_t>(count), slices_.data(), &shape_))
     return false;
@@ -23,9 +23,9 @@ bool PointSlicer::sort(const CloudPoint* from, std::size_t n, CloudPoint* to) {
                                  .maxCoeff();
   constexpr std::size_t kTile = 16;
   if (most > kTile && 4 * most > n) {
-    const auto crowd = std::find(at_.begin(), at_.end(), most);
-    crowd_begin_ = std::accumulate(at_.begin(), crowd, std::size_t{0});
-    crowd_end_ = crowd_begin_ + most;
+    const auto dense = std::find(at_.begin(), at_.end(), most);
+    dense_begin_ = std::accumulate(at_.begin(), dense, std::size_t{0});
+    dense_end_ = dense_begin_ + most;
   }
   std::uint32_t begin = 0;
   for (std::size_t k = 0; k < count; ++k) {

@@ -13,24 +13,25 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kRows = 12, kColumns = 16;     // of an image's samples
-constexpr std::size_t kSteps = 32;                   // of their size along an image's side
-constexpr std::size_t kListed = 1024;                // points of a list that are looked at
-constexpr std::size_t kSeeds = 96, kNeighbours = 8;  // of them that planes are laid through
+constexpr std::size_t kRows = 12, kColumns = 16;     // samples of an organized cloud
+constexpr std::size_t kSteps = 32;                   // sizes of a sample along the cloud's side
+constexpr std::size_t kPoints = 1024;                // samples of an unorganized cloud
+constexpr std::size_t kSeeds = 96, kNeighbours = 8;  // planes, and the points of each
 constexpr std::size_t kMostNormals = kRows * kColumns;
-constexpr float kFlat = 0.1F;     // what is off the plane, as a share of what is along it
-constexpr float kSame = 0.9962F;  // cosine, of normals of one surface: 5 degrees
-constexpr float kAcross = 0.1F;   // cosine, of normals across each other
-static_assert(kSeeds <= kMostNormals, "room");
+constexpr float kFlat = 0.1F;     // extent off a plane, as a share of the extent along it
+constexpr float kSame = 0.9962F;  // cosine between normals of one surface: 5 degrees
+constexpr float kAcross = 0.1F;   // cosine between perpendicular normals, at most
+static_assert(kSeeds <= kMostNormals, "the normals' storage is fixed");
 
-// Of samples, in the fixed frame.
+// Normals of samples, in the fixed frame.
 class Normals {
  public:
   void add(const Eigen::Vector3f& normal) { normals_.col(size_++) = normal; }
   Eigen::Index size() const { return size_; }
 
-  // The direction that most of them share, whatever their sign; zero: too few do.
-  // @param across  they are to be across this one; zero: any
+  // The direction that most of them share, whatever their sign.
+  // @param across  only normals perpendicular to this one count; zero: all
+  // @param enough  the direction is zero where fewer share it
   Eigen::Vector3f most_common(const Eigen::Vector3f& across, Eigen::Index enough) const {
     Eigen::Index best = 0, most = 0;
     for (Eigen::Index i = 0; i < size_; i += 2) {
@@ -68,8 +69,8 @@ class Normals {
   Eigen::Index size_ = 0;
 };
 
-// Of squares here and there.
-Normals sample_image(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
+// Normals of squares of pixels, spread over an organized cloud.
+Normals sample_organized(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
   Normals normals;
   const std::size_t side = std::max<std::size_t>(2, std::min(cloud.width, cloud.height) / kSteps);
   if (cloud.width <= side || cloud.height <= side) return normals;
@@ -89,22 +90,23 @@ Normals sample_image(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
   return normals;
 }
 
-// Some points of a list, as they come.
+// Some points of an unorganized cloud, in the message's order.
 struct Samples {
   static constexpr std::size_t kBlock = 16;
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  static_assert(kListed % kBlock == 0, "whole blocks");
+  static_assert(kPoints % kBlock == 0, "whole blocks");
   using Block = Eigen::Array<float, kBlock, 1>;
   using BlockMap = Eigen::Map<const Block>;
 
-  std::array<float, kListed> x, y, z;
+  std::array<float, kPoints> x, y, z;
   std::size_t size = 0;
 
   Samples(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
-    // Odd: rows of a scanner have even lengths, and are not to be met at the same place each time.
-    const std::size_t stride = std::max<std::size_t>(1, cloud.size() / kListed) | 1U;
+    // An odd stride: rows of a scanner have even lengths, and samples are to spread over the
+    // columns.
+    const std::size_t stride = std::max<std::size_t>(1, cloud.size() / kPoints) | 1U;
     Eigen::Vector3d first;
-    for (std::size_t i = 0; i < cloud.size() && size < kListed; i += stride) {
+    for (std::size_t i = 0; i < cloud.size() && size < kPoints; i += stride) {
       const Eigen::Vector3d p_S = point_at(cloud, i / cloud.width, i % cloud.width);
       if (!p_S.allFinite()) continue;
       if (size == 0) first = p_S;
@@ -118,8 +120,8 @@ struct Samples {
   }
   Eigen::Vector3f point(std::size_t i) const { return {x[i], y[i], z[i]}; }
 
-  // The nearest points to one of them, itself among them.
-  std::array<std::size_t, kNeighbours> around(std::size_t seed) const {
+  // The points nearest to one of them, itself among them.
+  std::array<std::size_t, kNeighbours> neighbours_of(std::size_t seed) const {
     std::array<std::size_t, kNeighbours> nearest;
     std::array<float, kNeighbours> distance_sq;
     distance_sq.fill(kInfinity);
@@ -146,15 +148,15 @@ struct Samples {
   }
 };
 
-// Of planes through neighbours among some of a list's points.
-Normals sample_list(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
+// Normals of planes through neighbouring points of an unorganized cloud.
+Normals sample_unorganized(const RawCloud& cloud, const Eigen::Matrix3d& R_FS) {
   Normals normals;
   const Samples samples(cloud, R_FS);
   if (samples.size < 8 * kNeighbours) return normals;
   for (std::size_t i = 0; i < kSeeds; ++i) {
     Eigen::Matrix<float, 3, static_cast<int>(kNeighbours)> points;
     Eigen::Index column = 0;
-    for (const std::size_t k : samples.around(i * samples.size / kSeeds)) {
+    for (const std::size_t k : samples.neighbours_of(i * samples.size / kSeeds)) {
       points.col(column++) = samples.point(k);
     }
     points.colwise() -= points.rowwise().mean().eval();
@@ -184,9 +186,9 @@ Eigen::Matrix3d axes_of(const Eigen::Vector3d& first, const Eigen::Vector3d& sec
   return R;
 }
 
-// The axis of a frame that is most nearly across a direction. In an image's own frame: squares of
-// pixels lie along it.
-Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Matrix3d& axes) {
+// The axis of a frame that is most nearly perpendicular to a direction. For an organized cloud the
+// frame is the sensor's: squares of pixels lie along its axes.
+Eigen::Vector3d most_perpendicular(const Eigen::Vector3d& n, const Eigen::Matrix3d& axes) {
   Eigen::Index least;
   (axes.transpose() * n).cwiseAbs().minCoeff(&least);
   return axes.col(least);
@@ -194,14 +196,16 @@ Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Matrix3d& axes) {
 
 }  // namespace
 
-Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_image) {
-  const Normals normals = is_image ? sample_image(cloud, R_FS) : sample_list(cloud, R_FS);
+Eigen::Matrix3d scene_axes(const RawCloud& cloud, const Eigen::Matrix3d& R_FS, bool is_organized) {
+  const Normals normals =
+      is_organized ? sample_organized(cloud, R_FS) : sample_unorganized(cloud, R_FS);
   const Eigen::Index enough = std::max<Eigen::Index>(8, normals.size() / 8);
   const Eigen::Vector3f first = normals.most_common(Eigen::Vector3f::Zero(), enough);
   if (first.isZero()) return Eigen::Matrix3d::Identity();
   const Eigen::Vector3d n = first.cast<double>().normalized();
   Eigen::Vector3d other = normals.most_common(first, enough).cast<double>();
-  if (other.isZero()) other = across(n, is_image ? R_FS : Eigen::Matrix3d::Identity());
+  if (other.isZero())
+    other = most_perpendicular(n, is_organized ? R_FS : Eigen::Matrix3d::Identity());
   return axes_of(n, (other - other.dot(n) * n).normalized());
 }
 

@@ -4,7 +4,7 @@
 #include <cassert>
 #include <limits>
 
-#include "cloud/index/tile_kernel.h"
+#include "cloud/index/tile_split_kernel.h"
 
 namespace ist {
 namespace {
@@ -12,11 +12,11 @@ namespace {
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
 static_assert(kTileSide * kTileSide == kSlots, "a square of pixels fills a tile");
 
-void copy_all(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
+void copy_all(const CropBatch& batch, std::size_t width, std::uint32_t first_pixel,
               PointTile* tile) {
-  std::copy_n(block.x, kSlots, tile->x);
-  std::copy_n(block.y, kSlots, tile->y);
-  std::copy_n(block.z, kSlots, tile->z);
+  std::copy_n(batch.x, kSlots, tile->x);
+  std::copy_n(batch.y, kSlots, tile->y);
+  std::copy_n(batch.z, kSlots, tile->z);
   for (std::size_t k = 0; k < kSlots; ++k) {
     tile->id[k] = first_pixel + static_cast<std::uint32_t>(k / kTileSide * width + k % kTileSide);
   }
@@ -25,27 +25,27 @@ void copy_all(const CropBlock& block, std::size_t width, std::uint32_t first_pix
 
 }  // namespace
 
-void read_tile(const RawCloud& image, const Eigen::Isometry3d& X_OS, std::uint32_t first_pixel,
+void read_tile(const RawCloud& cloud, const Eigen::Isometry3d& X_OS, std::uint32_t first_pixel,
                PointTile* tile) {
-  CropPose pose;
-  pose.X_OS = X_OS;
-  pose.max_range_sq = std::numeric_limits<double>::max();
-  CropBlock block;
+  CropParameters crop;
+  crop.X_OS = X_OS;
+  crop.max_range_sq = std::numeric_limits<double>::max();
+  CropBatch batch;
   IngestCounts unused;
   const std::size_t kept =
-      crop_tile(image, first_pixel / image.width, first_pixel % image.width, pose, &block, &unused);
+      crop_tile(cloud, first_pixel / cloud.width, first_pixel % cloud.width, crop, &batch, &unused);
   assert(kept == kSlots);
   static_cast<void>(kept);
-  copy_all(block, image.width, first_pixel, tile);
+  copy_all(batch, cloud.width, first_pixel, tile);
 }
 
-void copy_kept(const CropBlock& block, std::size_t width, std::uint32_t first_pixel,
+void copy_kept(const CropBatch& batch, std::size_t width, std::uint32_t first_pixel,
                PointTile* tile) {
   PointTile all;
-  copy_all(block, width, first_pixel, &all);
+  copy_all(batch, width, first_pixel, &all);
   std::uint32_t kept = 0;
   for (std::size_t k = 0; k < kSlots; ++k) {
-    kept |= static_cast<std::uint32_t>(block.x[k] == block.x[k]) << k;
+    kept |= static_cast<std::uint32_t>(batch.x[k] == batch.x[k]) << k;
   }
   pick_points(all, kept, tile);
 }

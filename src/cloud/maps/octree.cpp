@@ -11,9 +11,9 @@
 namespace ist {
 namespace {
 
-constexpr int kDepth = 16;                          // of every OcTree
+constexpr int kDepth = 16;                          // levels of every OcTree
 constexpr std::int32_t kHalf = 1 << (kDepth - 1);   // smallest leaves from the middle to a side
-constexpr std::size_t kMostLeaves = 50000000;       // what an index may sensibly hold
+constexpr std::size_t kMostLeaves = 50000000;       // that an index may sensibly hold
 constexpr double kSmallest = 1e-6, kLargest = 1e3;  // [m] resolutions
 
 class Reader {
@@ -24,7 +24,7 @@ class Reader {
         resolution_(data.resolution),
         out_(*octree) {}
 
-  // Recursion ends at the tree's full depth.
+  // Reads a node and its descendants. The recursion ends at the tree's full depth.
   bool binary_node(const Eigen::Vector3i& low, int depth) {
     ++out_.nodes;
     if (end_ - next_ < 2) return fail("ends in the middle of the tree");
@@ -69,8 +69,7 @@ class Reader {
     return true;
   }
 
-  bool is_at_end() const { return next_ == end_; }
-  std::size_t left() const { return static_cast<std::size_t>(end_ - next_); }
+  std::size_t remaining() const { return static_cast<std::size_t>(end_ - next_); }
   const std::string& fault() const { return fault_; }
 
  private:
@@ -86,7 +85,8 @@ class Reader {
     return low + size * Eigen::Vector3i(child & 1, child >> 1 & 1, child >> 2 & 1);
   }
 
-  // Whole numbers times the resolution: neighbours meet exactly.
+  // Adds an occupied leaf. Its corners are whole numbers times the resolution, so that neighbours
+  // meet exactly.
   bool add(const Eigen::Vector3i& low, int depth) {
     if (out_.occupied.size() >= kMostLeaves)
       return fail("has more than 50 million occupied leaves");
@@ -101,10 +101,10 @@ class Reader {
   std::string fault_;
 };
 
-// The tree itself; what follows it is left over.
-std::string read(const OctreeData& data, Octree* octree, std::size_t* left) {
+// Reads the tree; `remaining` bytes follow it.
+std::string read(const OctreeData& data, Octree* octree, std::size_t* remaining) {
   *octree = Octree();
-  *left = 0;
+  *remaining = 0;
   if (data.id != "OcTree") {
     return "the tree's type is '" + data.id + "', it must be 'OcTree'.";
   }
@@ -120,7 +120,7 @@ std::string read(const OctreeData& data, Octree* octree, std::size_t* left) {
   if (!whole) {
     return "the tree's data of " + std::to_string(data.size) + " bytes " + reader.fault() + ".";
   }
-  *left = reader.left();
+  *remaining = reader.remaining();
   return {};
 }
 
@@ -131,7 +131,7 @@ struct Header {
   double resolution = 0.0;
 };
 
-// Words in lines, until the one that says where the data begins.
+// Reads lines of a key and a value, up to the one after which the data begins.
 std::string read_header(std::istream& file, Header* header) {
   std::string line;
   std::getline(file, line);
@@ -158,10 +158,10 @@ std::string read_header(std::istream& file, Header* header) {
 }  // namespace
 
 std::string read_octree(const OctreeData& data, Octree* octree) {
-  std::size_t left = 0;
-  std::string fault = read(data, octree, &left);
-  if (!fault.empty() || left == 0) return fault;
-  return "the tree ends " + std::to_string(left) + " bytes before its data of " +
+  std::size_t remaining = 0;
+  std::string fault = read(data, octree, &remaining);
+  if (!fault.empty() || remaining == 0) return fault;
+  return "the tree ends " + std::to_string(remaining) + " bytes before its data of " +
          std::to_string(data.size) + " bytes does.";
 }
 
@@ -182,8 +182,8 @@ std::string read_octree_file(const std::string& path, Octree* octree) {
   data.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
   data.size = header.nodes > 0 ? bytes.size() : 0;
   if (header.nodes > 0 && bytes.empty()) return name + "is cut off: it holds no data.";
-  std::size_t left = 0;
-  const std::string damage = read(data, octree, &left);
+  std::size_t remaining = 0;
+  const std::string damage = read(data, octree, &remaining);
   if (!damage.empty()) return name + "cannot be used: " + damage;
   if (octree->nodes != header.nodes) {
     return name + "is damaged: its header says " + std::to_string(header.nodes) +

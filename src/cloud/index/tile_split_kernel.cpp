@@ -1,16 +1,19 @@
 // Compiled once per instruction set; the best one there is gets chosen at run time.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "cloud/index/tile_kernel.cpp"
-#include "cloud/index/tile_kernel.h"
+#define HWY_TARGET_INCLUDE "cloud/index/tile_split_kernel.cpp"
+#include "cloud/index/tile_split_kernel.h"
 
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 #include <limits>
 
+#include "cloud/index/split_rule.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
+namespace tile_split {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using SlotTag = hn::CappedTag<float, static_cast<std::size_t>(kPointWidth)>;
@@ -57,8 +60,8 @@ HWY_INLINE PaddedBox BoxOf(const PointTile& tile, std::uint32_t slots) {
 
 void HalveTile(const PointTile& tile, std::uint32_t points, const PaddedBox& box,
                TileHalves* halves) {
-  const float size[3] = {box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]};
-  const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
+  const int axis =
+      longest_axis(box.max[0] - box.min[0], box.max[1] - box.min[1], box.max[2] - box.min[2]);
   const float middle = 0.5F * (box.min[axis] + box.max[axis]);
   const float* along = axis == 0 ? tile.x : axis == 1 ? tile.y : tile.z;
   halves->low = Below(along, middle) & points;
@@ -66,6 +69,10 @@ void HalveTile(const PointTile& tile, std::uint32_t points, const PaddedBox& box
   halves->low_box = BoxOf(tile, halves->low);
   halves->high_box = BoxOf(tile, halves->high);
 }
+
+}  // namespace tile_split
+
+using tile_split::HalveTile;
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ist

@@ -1,7 +1,7 @@
 // Compiled once per instruction set; the best one there is gets chosen at run time.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "cloud/index/divide_kernel.cpp"
-#include "cloud/index/divide_kernel.h"
+#define HWY_TARGET_INCLUDE "cloud/index/slice_kernel.cpp"
+#include "cloud/index/slice_kernel.h"
 
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
@@ -9,12 +9,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cloud/index/tile_box.h"
+#include "cloud/index/split_rule.h"
 #include "internal/bvh/traversal_stack.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
+namespace slice {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using PointTag = hn::CappedTag<float, 16>;
@@ -25,10 +26,7 @@ constexpr auto kTilePoints = static_cast<std::size_t>(kPointWidth);
 struct PointBox {
   float min[3], max[3];
 
-  int Longest() const {
-    const float x = Size(0), y = Size(1), z = Size(2);
-    return x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
-  }
+  int Longest() const { return longest_axis(Size(0), Size(1), Size(2)); }
   float Size(int axis) const { return max[axis] - min[axis]; }
 };
 
@@ -92,7 +90,7 @@ bool FindSlices(const CloudPoint* points, std::size_t n, std::int32_t count, std
     const PointVectors v = LoadPoints(points + k);
     const auto along = axis == 0 ? v.p[0] : axis == 1 ? v.p[1] : v.p[2];
     const auto slice = hn::Mul(hn::Sub(along, min), scale);
-    // Behind the last point there may be anything.
+    // Numbers after the last point may be anything.
     hn::StoreU(hn::ConvertTo(di, hn::Min(hn::Max(slice, zero), last)), di, slices + k);
   }
   return true;
@@ -124,12 +122,13 @@ HWY_INLINE void WriteTile(const CloudPoint* points, std::size_t n, const PointBo
   ++batch->count;
 }
 
-// Whether no point lies in the middle quarter of the longest side: seldom, and quickly seen.
-HWY_INLINE bool MayHaveAGap(const CloudPoint* points, std::size_t n, const PointBox& box) {
+// Whether no point lies in the middle of the longest side: rare, and cheap to find out.
+HWY_INLINE bool MaySplit(const CloudPoint* points, std::size_t n, const PointBox& box) {
   const PointTag d;
   const int axis = box.Longest();
   const float size = box.Size(axis), min = box.min[axis];
-  const auto low = hn::Set(d, min + 0.375F * size), high = hn::Set(d, min + 0.625F * size);
+  const auto low = hn::Set(d, min + kMiddleBegin * size),
+             high = hn::Set(d, min + kMiddleEnd * size);
   for (std::size_t k = 0; k < n; k += hn::Lanes(d)) {
     const PointVectors v = LoadPoints(points + k);
     const auto along = axis == 0 ? v.p[0] : axis == 1 ? v.p[1] : v.p[2];
@@ -143,10 +142,10 @@ float Along(const CloudPoint& point, int axis) {
   return axis == 0 ? point.x : axis == 1 ? point.y : point.z;
 }
 
-// Those in the lower half across the longest side to the front, if the halves are worth a tile
-// each.
-// @returns how many; 0: they are not
-std::size_t Cut(CloudPoint* points, std::size_t n, const PointBox& box) {
+// Splits points in the middle of their box's longest side, if that is worthwhile: those of the
+// lower half come to the front.
+// @returns how many they are; 0: no split
+std::size_t Split(CloudPoint* points, std::size_t n, const PointBox& box) {
   const int axis = box.Longest();
   const float middle = box.min[axis] + 0.5F * box.Size(axis);
   const auto low = static_cast<std::size_t>(
@@ -155,7 +154,7 @@ std::size_t Cut(CloudPoint* points, std::size_t n, const PointBox& box) {
       points);
   if (low == 0 || low == n) return 0;
   const PointBox front = BoxOf(points, low), back = BoxOf(points + low, n - low);
-  return is_worth_a_cut(Padded(front), Padded(back), Padded(box)) ? low : 0;
+  return is_split_worthwhile(Padded(front), Padded(back), Padded(box)) ? low : 0;
 }
 
 void MakeTiles(CloudPoint* points, std::size_t n, TileBatch* batch) {
@@ -170,7 +169,7 @@ void MakeTiles(CloudPoint* points, std::size_t n, TileBatch* batch) {
       const Part part = stack.pop();
       CloudPoint* const p = points + part.first;
       const PointBox box = BoxOf(p, part.n);
-      const std::size_t low = MayHaveAGap(p, part.n, box) ? Cut(p, part.n, box) : 0;
+      const std::size_t low = MaySplit(p, part.n, box) ? Split(p, part.n, box) : 0;
       if (low == 0) {
         WriteTile(p, part.n, box, batch);
       } else {
@@ -180,6 +179,11 @@ void MakeTiles(CloudPoint* points, std::size_t n, TileBatch* batch) {
     }
   }
 }
+
+}  // namespace slice
+
+using slice::FindSlices;
+using slice::MakeTiles;
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ist

@@ -1,4 +1,4 @@
-// Queries among images of which no point has been read when the first query comes; by several
+// Queries among organized clouds of which no tile is loaded when the first query comes; by several
 // threads, too.
 
 #include <gtest/gtest.h>
@@ -86,7 +86,7 @@ struct Scene {
   std::vector<Eigen::Isometry3d> X_FL;
 };
 
-TEST(UnreadTiles, AnswersAgainstBruteForce) {
+TEST(LazyTiles, AnswersAgainstBruteForce) {
   test::Rng rng(71);
   std::shared_ptr<RobotModel> model;
   Ingest ingest(test::whole_cloud(false));
@@ -107,7 +107,7 @@ TEST(UnreadTiles, AnswersAgainstBruteForce) {
   }
 }
 
-TEST(UnreadTiles, ReadingThemAllocatesNothing) {
+TEST(LazyTiles, LoadingAllocatesNothing) {
   test::Rng rng(72);
   const Scene scene(&rng);
   const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
@@ -126,7 +126,7 @@ TEST(UnreadTiles, ReadingThemAllocatesNothing) {
 }
 
 // All start at tiles that nobody has read.
-TEST(UnreadTiles, ThreadsGetTheSameAnswers) {
+TEST(LazyTiles, ThreadsGetTheSameAnswers) {
   test::Rng rng(73);
   const Scene scene(&rng);
   const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
@@ -151,7 +151,7 @@ TEST(UnreadTiles, ThreadsGetTheSameAnswers) {
 }
 
 // A copy needs no message.
-TEST(UnreadTiles, CopyHoldsAllPoints) {
+TEST(LazyTiles, CopyHoldsAllPoints) {
   test::Rng rng(75);
   const Scene scene(&rng);
   Ingest ingest(test::whole_cloud(false));
@@ -163,12 +163,12 @@ TEST(UnreadTiles, CopyHoldsAllPoints) {
   EXPECT_EQ(copy.index.size(), cloud.index.size());
   scene.pixels->assign(scene.pixels->size(), 0.0F);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
-    PointTile room;
-    ASSERT_TRUE(test::same_points(copy.index.bvh().tile(i, &room), tiles[i]));
+    PointTile scratch;
+    ASSERT_TRUE(test::same_points(copy.index.bvh().tile(i, &scratch), tiles[i]));
   }
 }
 
-TEST(UnreadTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
+TEST(LazyTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
   test::Rng rng(74);
   std::weak_ptr<std::vector<float>> message;
   Ingest ingest(test::whole_cloud(false));

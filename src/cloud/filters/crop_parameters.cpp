@@ -1,4 +1,4 @@
-#include "cloud/filters/crop_pose.h"
+#include "cloud/filters/crop_parameters.h"
 
 #include <algorithm>
 #include <array>
@@ -10,10 +10,10 @@ namespace ist {
 namespace {
 
 constexpr double kFarFromSensor = 1000.0;  // [m]
-constexpr std::size_t kSamples = 256;      // points that the middle of a cloud is made of
+constexpr std::size_t kSamples = 256;      // points that the middle of a cloud is computed from
 
-// Where a cloud is that does not lie about its sensor: the median, axis by axis, of some of its
-// points. In the sensor frame [m]; zero where the cloud is about its sensor.
+// The middle of a cloud that is far from its sensor: the median, axis by axis, of some of its
+// points in the sensor frame [m]. Zero for other clouds.
 Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max_range_sq) {
   std::array<std::array<double, kSamples>, 3> samples;
   std::size_t count = 0;
@@ -41,28 +41,29 @@ Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max
 
 }  // namespace
 
-CropPose crop_pose(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, double min_range,
-                   double max_range) {
+CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
+                               double min_range, double max_range) {
   const double largest = std::min(max_range, kLargestRange);
-  CropPose pose;
-  pose.min_range_sq = min_range * min_range;
-  pose.max_range_sq = largest * largest;
+  CropParameters crop;
+  crop.min_range_sq = min_range * min_range;
+  crop.max_range_sq = largest * largest;
   Eigen::Vector3d near_S = Eigen::Vector3d::Zero();
-  if (max_range > kFarFromSensor) near_S = middle_of(cloud, pose.min_range_sq, pose.max_range_sq);
-  pose.X_FO.translation() = (X_FS * near_S).array().round();
-  pose.X_OS = relative_pose(pose.X_FO, X_FS);
-  return pose;
+  if (max_range > kFarFromSensor) near_S = middle_of(cloud, crop.min_range_sq, crop.max_range_sq);
+  crop.X_FO.translation() = (X_FS * near_S).array().round();
+  crop.X_OS = relative_pose(crop.X_FO, X_FS);
+  return crop;
 }
 
-void limit(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS, CropPose* pose) {
-  pose->region_center = X_FS.inverse() * region.center_F;
-  pose->region_radius_sq = region.radius * region.radius;
+void limit_to_region(const RegionOfInterest& region, const Eigen::Isometry3d& X_FS,
+                     CropParameters* crop) {
+  crop->region_center = X_FS.inverse() * region.center_F;
+  crop->region_radius_sq = region.radius * region.radius;
 }
 
-void turn(const Eigen::Matrix3d& R_FO, CropPose* pose) {
-  const Eigen::Matrix3d R_NO = R_FO.transpose() * pose->X_FO.linear();
-  pose->X_FO.linear() = R_FO;
-  pose->X_OS = Eigen::Isometry3d(R_NO) * pose->X_OS;
+void set_axes(const Eigen::Matrix3d& R_FO, CropParameters* crop) {
+  const Eigen::Matrix3d R_NO = R_FO.transpose() * crop->X_FO.linear();  // from old to new axes
+  crop->X_FO.linear() = R_FO;
+  crop->X_OS = Eigen::Isometry3d(R_NO) * crop->X_OS;
 }
 
 }  // namespace ist

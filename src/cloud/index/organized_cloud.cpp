@@ -1,0 +1,298 @@
+#include "cloud/index/organized_cloud.h"
+
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "cloud/format/point_reader.h"
+#include "cloud/index/block_bounds.h"
+#include "cloud/index/split_rule.h"
+#include "cloud/index/tile_reader.h"
+#include "cloud/index/tile_split_kernel.h"
+
+namespace ist {
+namespace {
+
+// Whether pixels can be read from the message as four floats each, the coordinates first.
+bool holds_floats(const RawCloud& cloud) {
+  const auto is_aligned = [](std::size_t bytes) { return bytes % sizeof(float) == 0; };
+  return !cloud.is_double && !cloud.swap_bytes && cloud.y == cloud.x + sizeof(float) &&
+         cloud.z == cloud.x + 2 * sizeof(float) &&
+         cloud.x + 4 * sizeof(float) <= cloud.point_step && is_aligned(cloud.point_step) &&
+         is_aligned(cloud.row_step) &&
+         is_aligned(reinterpret_cast<std::uintptr_t>(cloud.data) + cloud.x);
+}
+
+// The place of a box with respect to the region of interest.
+enum class RegionSide { kInside, kOutside, kCrossing };
+
+// The region of interest in the frame O.
+class RegionTest {
+ public:
+  explicit RegionTest(const CropParameters& crop)
+      : center_O_(crop.X_OS * crop.region_center), radius_sq_(crop.region_radius_sq) {}
+
+  RegionSide side_of(const BlockBounds& block) const {
+    if (radius_sq_ == std::numeric_limits<double>::infinity()) return RegionSide::kInside;
+    double nearest_sq = 0.0, farthest_sq = 0.0;
+    for (int i = 0; i < 3; ++i) {
+      const double below = static_cast<double>(block.min[i]) - center_O_[i],
+                   above = static_cast<double>(block.max[i]) - center_O_[i];
+      const double farthest = std::max(-below, above), nearest = std::max({below, -above, 0.0});
+      farthest_sq += farthest * farthest;
+      nearest_sq += nearest * nearest;
+    }
+    constexpr double kSlack = 1e-6;  // far more than the rounding of double
+    if (farthest_sq * (1.0 + kSlack) <= radius_sq_) return RegionSide::kInside;
+    return nearest_sq * (1.0 - kSlack) > radius_sq_ ? RegionSide::kOutside : RegionSide::kCrossing;
+  }
+
+ private:
+  Eigen::Vector3d center_O_;
+  double radius_sq_;
+};
+
+// Reads an organized cloud block by block and hands its tiles to the builder.
+class OrganizedReader {
+ public:
+  OrganizedReader(const RawCloud& cloud, const CropParameters& crop, const SelfFilter* on_robot,
+                  PointBvhBuilder* builder, IngestCounts* counts)
+      : cloud_(cloud),
+        crop_(crop),
+        transform_(crop),
+        without_limits_(transform_.without_limits()),
+        region_(crop),
+        holds_floats_(holds_floats(cloud)),
+        on_robot_(on_robot),
+        builder_(*builder),
+        counts_(*counts) {
+    if (on_robot != nullptr) drop_ = on_robot->as_filter();
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      offset_[slot] = static_cast<std::uint32_t>(tile_row(slot) * cloud.width + tile_column(slot));
+    }
+  }
+
+  std::size_t run() {
+    for (row_ = 0; row_ < cloud_.height; row_ += kBlockSide) {
+      for (column_ = 0; column_ < cloud_.width; column_ += kBlockSide) read_block();
+    }
+    return kept_;
+  }
+
+ private:
+  static constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
+  static constexpr std::uint32_t kWhole = 0xFFFFU;  // all pixels of a tile are kept
+
+  void read_block() {
+    BlockState state = bound_block(transform_, pixels(), &block_);
+    if (state == BlockState::kNone) {
+      counts_.not_a_number += static_cast<std::uint32_t>(received());
+      return;
+    }
+    if (state != BlockState::kUnclear) {
+      const RegionSide side = region_.side_of(block_);
+      if (side == RegionSide::kCrossing) state = BlockState::kUnclear;
+      if (side == RegionSide::kOutside) {
+        counts_.outside_region += static_cast<std::uint32_t>(count_kept(state));
+        return;
+      }
+    }
+    if (state == BlockState::kAll) std::fill_n(block_.kept, kSlots, kWhole);
+    const std::size_t kept = state == BlockState::kUnclear ? crop_in_double() : count_kept(state);
+    if (kept == 0) return;
+    kept_ += kept;
+    const std::uint32_t candidates = split_candidates();
+    if (state == BlockState::kAll && candidates == 0 && add_as_node()) return;
+    add_tiles(candidates);
+  }
+
+  std::size_t rows() const { return std::min(kBlockSide, cloud_.height - row_); }
+  std::size_t columns() const { return std::min(kBlockSide, cloud_.width - column_); }
+  std::size_t received() const { return rows() * columns(); }
+  std::uint32_t first_pixel(std::size_t slot) const {
+    return static_cast<std::uint32_t>(row_ * cloud_.width + column_) + offset_[slot];
+  }
+
+  // The pixels where they are in the message, if they can be read there.
+  BlockPixels pixels() {
+    if (!holds_floats_ || received() < kBlockSide * kBlockSide) return copied();
+    const std::uint8_t* first = bytes_of(cloud_, row_, column_) + cloud_.x;
+    return {reinterpret_cast<const float*>(first), cloud_.point_step / sizeof(float),
+            cloud_.row_step / sizeof(float)};
+  }
+
+  // The pixels copied as floats; NaN outside the cloud.
+  BlockPixels copied() {
+    std::fill_n(copy_, 4 * kBlockSide * kBlockSide, std::numeric_limits<float>::quiet_NaN());
+    for (std::size_t row = 0; row < rows(); ++row) {
+      for (std::size_t column = 0; column < columns(); ++column) {
+        const Eigen::Vector3d p = point_at(cloud_, row_ + row, column_ + column);
+        float* to = copied_pixel(row, column);
+        for (int i = 0; i < 3; ++i) to[i] = static_cast<float>(p[i]);
+      }
+    }
+    return {copy_, 4, 4 * kBlockSide};
+  }
+  float* copied_pixel(std::size_t row, std::size_t column) {
+    return copy_ + 4 * (kBlockSide * row + column);
+  }
+
+  // The pixels kept, after bound_block(); counts those that are NaN.
+  std::size_t count_kept(BlockState state) {
+    if (state == BlockState::kAll) return kBlockSide * kBlockSide;
+    counts_.not_a_number +=
+        block_.not_a_number - static_cast<std::uint32_t>(kBlockSide * kBlockSide - received());
+    std::size_t count = 0;
+    for (const std::uint32_t kept : block_.kept) count += std::bitset<kSlots>(kept).count();
+    return count;
+  }
+
+  // Decides in double, pixel by pixel, which are kept. @returns how many are
+  std::size_t crop_in_double() {
+    CropBatch block;
+    std::size_t kept = 0;
+    copied();
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::size_t row = tile_row(slot), column = tile_column(slot);
+      if (row >= rows() || column >= columns()) continue;
+      kept += crop_tile(cloud_, row_ + row, column_ + column, crop_, &block, &counts_);
+      for (std::size_t k = 0; k < kSlots; ++k) {
+        if (block.x[k] == block.x[k]) continue;
+        copied_pixel(row + k / kTileSide, column + k % kTileSide)[0] =
+            std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+    if (bound_block(without_limits_, {copy_, 4, 4 * kBlockSide}, &block_) == BlockState::kAll) {
+      std::fill_n(block_.kept, kSlots, kWhole);
+    }
+    return kept;
+  }
+
+  // Adds all sixteen tiles as a node, not loaded: the usual case where a camera sees well. @returns
+  // false, and adds nothing, where the tiles have to be looked at one by one.
+  bool add_as_node() {
+    const PaddedBox bounds = block_box();
+    if (!are_close_together(bounds.diagonal(), block_.diagonals, kPointWidth)) return false;
+    if (on_robot_ != nullptr && on_robot_->may_drop(bounds)) return false;
+    std::array<std::uint32_t, kSlots> first;
+    for (std::size_t slot = 0; slot < kSlots; ++slot) first[slot] = first_pixel(slot);
+    builder_.add_lazy_node(block_.boxes, first.data());
+    return true;
+  }
+
+  PaddedBox block_box() const {
+    return {{block_.min[0], block_.min[1], block_.min[2], 0.0F},
+            {block_.max[0], block_.max[1], block_.max[2], 0.0F}};
+  }
+
+  // Adds the tiles one by one.
+  // @param candidates  bit k: the tile in slot k may have to be split
+  void add_tiles(std::uint32_t candidates) {
+    const bool is_near_robot = on_robot_ != nullptr && on_robot_->may_drop(block_box());
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::uint32_t kept = block_.kept[slot];
+      if (kept == 0) continue;
+      const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
+      const bool may_split = (candidates >> slot & 1U) != 0;
+      const bool may_be_robot = is_near_robot && on_robot_->may_drop(box);
+      if (kept == kWhole && !may_split && !may_be_robot) {
+        builder_.add_lazy_tile(box, first_pixel(slot));
+        continue;
+      }
+      if (may_split) {
+        PointTile tile;
+        read_kept(slot, &tile);
+        add_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box);
+      } else {
+        read_kept(slot, builder_.next_tiles(1));
+        builder_.add_tile(box, drop_);
+      }
+    }
+    builder_.end_group();
+  }
+
+  void read_kept(std::size_t slot, PointTile* tile) const {
+    if (block_.kept[slot] == kWhole) {
+      return read_tile(cloud_, crop_.X_OS, first_pixel(slot), tile);
+    }
+    CropBatch block;
+    IngestCounts counted_before;
+    crop_tile(cloud_, row_ + tile_row(slot), column_ + tile_column(slot), crop_, &block,
+              &counted_before);
+    copy_kept(block, cloud_.width, first_pixel(slot), tile);
+  }
+
+  // Bit k: the tile in slot k may have to be split. Whole tiles without a depth discontinuity need
+  // no split; nor do others that are about as long as those.
+  std::uint32_t split_candidates() const {
+    if (block_.may_have_edge == 0 && std::all_of(block_.kept, block_.kept + kSlots,
+                                                 [](std::uint32_t k) { return k == kWhole; })) {
+      return 0;
+    }
+    std::uint32_t undecided = 0;
+    float sum = 0.0F, count = 0.0F;
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::uint32_t bit = 1U << slot;
+      if (block_.kept[slot] == 0) continue;
+      if (block_.kept[slot] != kWhole || (block_.may_have_edge & bit) != 0) {
+        undecided |= bit;
+      } else {
+        sum += block_.diagonal_sq[slot];
+        count += 1.0F;
+      }
+    }
+    std::uint32_t candidates = 0;
+    for (std::size_t slot = 0; undecided >> slot != 0; ++slot) {
+      if ((undecided >> slot & 1U) == 0) continue;
+      if (!is_as_long_as(block_.diagonal_sq[slot], sum, count)) candidates |= 1U << slot;
+    }
+    return candidates;
+  }
+
+  // Splits points in the middle of their box's longest side as long as that is worthwhile, and adds
+  // the parts. Each
+  // split takes one point at least, so the recursion is at most fifteen calls deep.
+  // @param points  bit k: the point in slot k belongs
+  void add_parts(const PointTile& whole, std::uint32_t points, const PaddedBox& box) {
+    const TileHalves halves = halve_tile(whole, points, box);
+    if (halves.low != 0 && halves.high != 0 &&
+        is_split_worthwhile(halves.low_box, halves.high_box, box)) {
+      add_parts(whole, halves.high, halves.high_box);
+      add_parts(whole, halves.low, halves.low_box);
+      return;
+    }
+    pick_points(whole, points, builder_.next_tiles(1));
+    builder_.add_tile(box, drop_);
+  }
+
+  const RawCloud& cloud_;
+  const CropParameters& crop_;
+  const BlockTransform transform_, without_limits_;
+  const RegionTest region_;
+  const bool holds_floats_;
+  const SelfFilter* on_robot_;
+  PointFilter drop_;
+  PointBvhBuilder& builder_;
+  IngestCounts& counts_;
+  std::array<std::uint32_t, kSlots> offset_;  // [pixels] by slot
+  std::size_t row_ = 0, column_ = 0;          // of the current block
+  BlockBounds block_;
+  alignas(64) float copy_[4 * kBlockSide * kBlockSide];
+  std::size_t kept_ = 0;
+};
+
+}  // namespace
+
+std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop,
+                            const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
+                            IngestCounts* counts) {
+  builder->start_organized(crop.X_FO, cloud, crop.X_OS, bvh);
+  const std::size_t kept = OrganizedReader(cloud, crop, on_robot, builder, counts).run();
+  builder->finish();
+  return kept;
+}
+
+}  // namespace ist
