@@ -190,7 +190,7 @@ bool run(const Options& options) {
         std::filesystem::read_symlink("/proc/self/exe"), "--receive", "__name:=latency_receiver"});
   } else {
     const ros::NodeHandle nh, private_nh("latency_node");
-    server = std::make_unique<ProximityServer>(nh, private_nh, read_parameters(private_nh));
+    server = std::make_unique<ProximityServer>(nh, private_nh);
     relay = std::make_unique<Relay>(true);
   }
   const Traffic traffic(

@@ -172,8 +172,8 @@ class JointStatesTest(unittest.TestCase):
         self.assertEqual(values["topic"], self.namespace + "/joint_states")
         self.assertGreater(int(values["joint states used"]), 100)
 
-    def test_out_of_reach(self):
-        """What no link gets near is dropped, and missed by a joint that leaves its limits."""
+    def test_outside_region_of_interest(self):
+        """Points that no link can come near are dropped; a joint outside its limits misses them."""
         node = self.start(max_range=9.0, self_filter=False)
         seen = np.array([[0.6, 0.6, 0.6], [4.9, 0.0, 0.5]])  # in base, from which the box gets 2.8 m
 
@@ -184,14 +184,14 @@ class JointStatesTest(unittest.TestCase):
 
         def dropped():
             values = node.diagnostics["input cloud"].values if node.diagnostics else []
-            return {v.key: v.value for v in values}.get("points out of reach")
+            return {v.key: v.value for v in values}.get("points outside the region of interest")
 
         stand(0.5)
         self.world.repeat(50, lambda: self.send("turn", "slide"))
         self.world.start_clouds()
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual(message.sources[0].points_used, 2)
-        node.wait_until(lambda: dropped() == "1", "a point out of reach")
+        node.wait_until(lambda: dropped() == "1", "a point outside the region of interest")
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
 
         stand(3.4)  # at the far point, but for 1.4 m
@@ -303,7 +303,7 @@ class JointStatesTest(unittest.TestCase):
         node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
         node.wait_until(lambda: received and received[-1].status != ProximityArray.OK, "a reason")
         self.assertEqual(received[-1].status, ProximityArray.NO_POSE)
-        self.assertIn("where link 'column' is is not known", received[-1].status_text)
+        self.assertIn("the pose of link 'column' is not known", received[-1].status_text)
         self.assertTrue(np.isnan(received[-1].effort).all())
 
         self.world.poses["column"] = ("base", pt.transform((0, 0, 0.5), angle=still["turn"]))

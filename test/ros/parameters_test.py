@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Wrong parameters: the node does not start, and says which, why, and what is allowed."""
 
+import glob
 import os
 import re
 import sys
@@ -149,8 +150,10 @@ class ParametersTest(unittest.TestCase):
         package = os.path.join(os.path.dirname(__file__), "..", "..")
         with open(os.path.join(package, "config", "proximity.yaml")) as f:
             text = f.read()
-        with open(os.path.join(package, "src", "ros", "parameters.cpp")) as f:
-            read = re.findall(r'read(?:_choice)?\((?:prefix \+ )?"([a-z_/]+)"', f.read())
+        read = []
+        for path in glob.glob(os.path.join(package, "src", "ros", "parameters", "*.cpp")):
+            with open(path) as f:
+                read += re.findall(r'read(?:_choice)?\((?:prefix \+ )?"([a-z_/]+)"', f.read())
         self.assertGreater(len(read), 30)
         for name in read:
             self.assertRegex(text, r"\b%s:" % name.split("/")[-1], name)

@@ -43,9 +43,9 @@ sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros:
 
   std::uint8_t* out = message->data.data();
   const Eigen::Isometry3d& X_FO = snapshot.index.X_FO();
-  PointTile room;
+  PointTile scratch;
   for (std::size_t number = 0; number < snapshot.index.tile_count(); ++number) {
-    const PointTile& tile = snapshot.index.tile(number, &room);
+    const PointTile& tile = snapshot.index.tile(number, &scratch);
     for (int i = 0; i < tile.count; ++i) {
       const Eigen::Vector3f p_F = (X_FO * tile.point(i)).cast<float>();
       std::memcpy(out, p_F.data(), 3 * sizeof(float));

@@ -22,7 +22,7 @@ const LinkDescription* find_link(const RobotDescription& description, const std:
   return found != description.links.end() ? &*found : nullptr;
 }
 
-/// A link that has no body, and why.
+/// Stands for a link without a volume; the note says why.
 std::shared_ptr<const ContactBody> no_body(const std::string& note) {
   auto body = std::make_shared<ContactBody>();
   body->note = note;
@@ -65,7 +65,7 @@ void ContactLoader::run() {
     const auto contacts = this->contacts();
     try {
       if (state->robot && (!contacts || contacts->robot != state->robot)) load(state);
-    } catch (const std::exception& error) {  // no memory; tried again
+    } catch (const std::exception& error) {  // no memory; the next round tries again
       ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be had: " << error.what());
     }
     std::unique_lock<std::mutex> lock(mutex_);

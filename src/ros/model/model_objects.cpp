@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ist_proximity/geometry/error.h"
+#include "ros/common/text.h"
 #include "ros/model/model_loader.h"
 
 namespace ist {
@@ -36,10 +37,10 @@ std::string ModelLoader::detach(const std::string& name) {
   const auto found = std::find_if(objects.begin(), objects.end(),
                                   [&](const AttachedObject& other) { return other.name == name; });
   if (found == objects.end()) {
-    std::string names;
-    for (const AttachedObject& other : objects) names += (names.empty() ? "" : ", ") + other.name;
+    std::vector<std::string> names;
+    for (const AttachedObject& other : objects) names.push_back(other.name);
     return "no object '" + name + "' is attached; there is " +
-           (names.empty() ? "none at all" : names);
+           (names.empty() ? "none at all" : join(names, ", "));
   }
   const std::string link = found->link;
   objects.erase(found);
