@@ -4,15 +4,16 @@
 #include <tf2/buffer_core.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/make_shared.hpp>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <mutex>
 #include <thread>
 
 #include "ist_proximity/robot/robot_region.h"
 #include "ros/common/frame_name.h"
+#include "ros/common/stop_signal.h"
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
@@ -36,7 +37,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// With pose_source joint_states, a cycle runs at least this often.
+// A cycle runs at least this often with pose_source joint_states.
 constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
 
 }  // namespace
@@ -57,7 +58,6 @@ class ProximityServer::Impl {
  private:
   void run_cycles();
   bool wait_for_joint_states();
-  bool sleep_until(Clock::time_point time);
   void run_cycle();
   void notice_clock_jump(const ros::Time& now);
   void take_model();
@@ -78,11 +78,9 @@ class ProximityServer::Impl {
   LiveParameters live_;
   ContactLoader contact_loader_;
 
-  std::mutex stop_mutex_;
-  std::condition_variable stop_signal_;   ///< it is time to stop
-  std::condition_variable state_signal_;  ///< it is time to stop, or a joint state has come
-  bool stop_ = false;
-  std::uint64_t joint_states_received_ = 0;
+  StopSignal cycle_signal_;  ///< joint states are its events
+  StopSignal diagnostics_signal_;
+  std::atomic<std::uint64_t> joint_states_received_{0};
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   std::mutex report_mutex_;
@@ -119,11 +117,8 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   }
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
-      {
-        const std::lock_guard<std::mutex> lock(stop_mutex_);
-        ++joint_states_received_;
-      }
-      state_signal_.notify_one();
+      ++joint_states_received_;
+      cycle_signal_.notify();
     });
   }
   const auto live = [this] { return live_config(); };
@@ -137,12 +132,8 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
 }
 
 ProximityServer::Impl::~Impl() {
-  {
-    const std::lock_guard<std::mutex> lock(stop_mutex_);
-    stop_ = true;
-  }
-  stop_signal_.notify_all();
-  state_signal_.notify_all();
+  cycle_signal_.stop();
+  diagnostics_signal_.stop();
   cycle_thread_.join();
   diagnostics_thread_.join();
   query_service_.reset();
@@ -151,21 +142,14 @@ ProximityServer::Impl::~Impl() {
   joint_states_.reset();  // the listener's thread uses members that are destroyed before it
 }
 
-/// @returns false when it is time to stop
-bool ProximityServer::Impl::sleep_until(Clock::time_point time) {
-  std::unique_lock<std::mutex> lock(stop_mutex_);
-  return !stop_signal_.wait_until(lock, time, [this] { return stop_; });
-}
-
 /// Waits until a joint state comes, but not for ever. Joint states that came during the last cycle
 /// are taken at once, one after the other.
 /// @returns false when it is time to stop
 bool ProximityServer::Impl::wait_for_joint_states() {
-  std::unique_lock<std::mutex> lock(stop_mutex_);
-  state_signal_.wait_for(lock, kMaxWaitForJointStates,
-                         [this] { return stop_ || joint_states_->is_waiting(); });
+  const bool goes_on = cycle_signal_.sleep_until(Clock::now() + kMaxWaitForJointStates,
+                                                 [this] { return joint_states_->is_waiting(); });
   joint_states_->take_next();
-  return !stop_;
+  return goes_on;
 }
 
 void ProximityServer::Impl::run_cycles() {
@@ -182,7 +166,7 @@ void ProximityServer::Impl::run_cycles() {
   do {
     run_cycle();
     next = std::max(next + period, Clock::now());  // no burst follows a cycle that took too long
-  } while (sleep_until(next));
+  } while (cycle_signal_.sleep_until(next));
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -265,7 +249,7 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
 void ProximityServer::Impl::run_diagnostics() {
   name_thread("ist diagnostics");
   Clock::time_point last = Clock::now();
-  while (sleep_until(last + std::chrono::seconds(1))) {
+  while (diagnostics_signal_.sleep_until(last + std::chrono::seconds(1))) {
     last = Clock::now();
     live_.read_again();
     CycleReport report;
@@ -273,13 +257,9 @@ void ProximityServer::Impl::run_diagnostics() {
       const std::lock_guard<std::mutex> lock(report_mutex_);
       report = report_;
     }
-    std::uint64_t received = 0;
-    if (joint_states_) {
-      report.joint_states = joint_states_->report();
-      const std::lock_guard<std::mutex> lock(stop_mutex_);
-      received = joint_states_received_;
-    }
-    diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(), received);
+    if (joint_states_) report.joint_states = joint_states_->report();
+    diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
+                         joint_states_received_);
   }
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""/diagnostics: what is counted, what is doubted, and that idle topics are not computed."""
+"""/diagnostics: counts and doubts; topics without subscribers are not computed."""
 
 import sys
 import unittest
@@ -48,7 +48,7 @@ class DiagnosticsTest(unittest.TestCase):
         self.node.wait_until(said, words)
 
     def test_idle_topics(self):
-        """With nobody on ~markers and ~filtered_cloud they are not computed."""
+        """~markers and ~filtered_cloud are not computed without subscribers."""
         self.start(ON_BALL + BESIDE)
         markers = lambda: self.count("query", "markers drawn")  # noqa: E731
         clouds = lambda: self.count("input cloud", "shown on ~filtered_cloud")  # noqa: E731

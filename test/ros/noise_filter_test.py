@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The noise filter: lone points go, surfaces stay, and a cloud of noise is no clear view."""
+"""The noise filter drops lone points and keeps surfaces; a cloud of noise is no clear view."""
 
 import sys
 import unittest
@@ -53,11 +53,11 @@ class NoiseFilterTest(unittest.TestCase):
             == "1",
             "the count",
         )
-        # As many points as it takes are no noise.
+        # Points with enough neighbors are no noise.
         self.world.points = LONE + 0.002 * np.arange(5)[:, None]
         message = self.node.wait_for(lambda m: m.sources[0].points_used == 5, "five points")
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
-        # Nothing but noise: nothing is known.
+        # A cloud of noise alone: nothing is known.
         self.world.points = np.vstack([LONE, nan])
         message = self.node.wait_for_status(ProximityArray.NO_CLOUD)
         self.assertTrue(pt.all_unknown(message))

@@ -15,8 +15,8 @@
 
 namespace ist {
 
-/// What a source's clouds are made for. Clouds are transformed to the fixed frame, filtered with
-/// the robot's model and cropped to the region of interest.
+/// The robot and the frame that a source's clouds are made for. Clouds are transformed to the fixed
+/// frame, filtered with the robot's model and cropped to the region of interest.
 struct SourceTarget {
   std::shared_ptr<const RobotModel> model;  ///< null: clouds cannot be used
   std::string fixed_frame;

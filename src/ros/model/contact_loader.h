@@ -1,7 +1,5 @@
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <thread>
 
 #include "ist_proximity/contact/contact_model.h"
+#include "ros/common/stop_signal.h"
 #include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 
@@ -40,9 +39,8 @@ class ContactLoader {
 
   const ServerConfig config_;
   const ModelLoader& loader_;
+  StopSignal stop_signal_;
   mutable std::mutex mutex_;
-  std::condition_variable stop_signal_;
-  std::atomic<bool> stop_{false};
   std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
   /// The bodies of the last model by key, for the next one; the thread's own.
   std::map<std::string, std::shared_ptr<const ContactBody>> known_;

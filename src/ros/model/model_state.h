@@ -30,10 +30,11 @@ struct ModelState {
   /// Known when ready. It holds every link with geometry, because the self-filter needs them all,
   /// not only the monitored ones.
   std::shared_ptr<const RobotModel> robot;
-  std::vector<std::size_t> monitored;            ///< known when ready: indices into robot->links
-  std::shared_ptr<const Kinematics> kinematics;  ///< from kPacking on; null where it is faulty
-  std::string kinematics_problem;                ///< why `kinematics` is null
-  std::shared_ptr<const RobotDescription> description;  ///< the parsed URDF; from kPacking on
+  std::vector<std::size_t> monitored;  ///< known when ready: indices into robot->links
+  std::shared_ptr<const Kinematics>
+      kinematics;                  ///< known from kPacking on; null where it is faulty
+  std::string kinematics_problem;  ///< why `kinematics` is null
+  std::shared_ptr<const RobotDescription> description;  ///< the parsed URDF; known from kPacking on
   std::vector<AttachedObject> objects;                  ///< known when ready: parts of `robot`
 };
 

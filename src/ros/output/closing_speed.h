@@ -17,8 +17,8 @@ struct ClosingRates {
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
   double total = kNaN;            ///< robot + obstacles, or from two distances where one is NaN
-  double robot = kNaN;            ///< from the motion of the link's witness
-  double obstacles = kNaN;        ///< from the change of the nearest source's cloud
+  double robot = kNaN;            ///< part by the motion of the link's witness
+  double obstacles = kNaN;        ///< part by the change of the nearest source's cloud
   double time_to_contact = kNaN;  ///< [s] at this rate; +inf when not closing, 0 in contact
 };
 

@@ -17,7 +17,7 @@ struct Range {
   static Range positive(const char* unit, double max, bool infinite = false) {
     return {unit, 0.0, max, true, infinite};
   }
-  /// From 0 up to max.
+  /// Not less than 0, up to max.
   static Range non_negative(const char* unit, double max) { return {unit, 0.0, max, false, false}; }
 
   /// NaN is never inside.

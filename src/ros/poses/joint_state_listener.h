@@ -92,7 +92,7 @@ class JointStateListener {
 
   std::mutex mutex_;  // guards the members below; held for copies and one message only
   std::shared_ptr<const Kinematics> kinematics_;
-  std::unordered_map<std::string, std::size_t> index_;  ///< of a joint, by name
+  std::unordered_map<std::string, std::size_t> index_;  ///< index of a joint by its name
   std::vector<std::vector<std::size_t>> moved_by_;      ///< by joint: the joints that it moves
   JointPositionQueue positions_;
   JointStateReport report_;

@@ -28,11 +28,7 @@ SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_
 }
 
 SelfProximity::~SelfProximity() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    stop_ = true;
-  }
-  stop_signal_.notify_all();
+  stop_signal_.stop();
   thread_.join();
 }
 
@@ -48,10 +44,7 @@ void SelfProximity::run() {
   Clock::time_point next = Clock::now();
   while (true) {
     next = std::max(next + period, Clock::now());
-    {
-      std::unique_lock<std::mutex> lock(mutex_);
-      if (stop_signal_.wait_until(lock, next, [this] { return stop_; })) return;
-    }
+    if (!stop_signal_.sleep_until(next)) return;
     take_model();
     if (model_) publish_once();
   }

@@ -5,7 +5,6 @@
 #include <ros/publisher.h>
 #include <tf2/buffer_core.h>
 
-#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -15,6 +14,7 @@
 
 #include "ist_proximity/proximity/self_collision_pairs.h"
 #include "ist_proximity/proximity/self_query.h"
+#include "ros/common/stop_signal.h"
 #include "ros/model/model_state.h"
 #include "ros/output/closing_speed.h"
 #include "ros/parameters/parameters.h"
@@ -61,9 +61,8 @@ class SelfProximity {
   const std::function<LiveConfig()> live_;
   ros::Publisher publisher_;
 
-  std::mutex mutex_;
-  std::condition_variable stop_signal_;
-  bool stop_ = false;
+  StopSignal stop_signal_;
+  std::mutex mutex_;  // guards the next member
   std::shared_ptr<const ModelState> newest_model_;
 
   // Used by the thread alone.

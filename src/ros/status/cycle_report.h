@@ -25,14 +25,14 @@ class CycleTimes {
   std::size_t total_ = 0;
 };
 
-/// What the cycle thread hands to the diagnostics thread.
+/// Results of the last cycle, for the diagnostics thread.
 struct CycleReport {
   Status status{0, ""};
   std::vector<SourceReport> sources;
   std::vector<Status> source_statuses;  ///< by source
   std::vector<std::string> pose_problems;
-  std::string transform_problem;                 ///< what the tf listener rejected
-  std::optional<JointStateReport> joint_states;  ///< with pose_source joint_states
+  std::string transform_problem;                 ///< a transform that the tf listener rejected
+  std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;
   double pose_age = 0.0;             ///< [s] of the poses' common instant, when any link is known
   std::size_t cycles = 0;            ///< since the start, with or without a model
