@@ -81,11 +81,7 @@ class AttachedTest(unittest.TestCase):
         for m in node.messages[begin:]:
             self.assertIn(m.status, (ProximityArray.OK, ProximityArray.NO_CLOUD))
         node.wait_until(
-            lambda: "model" in node.diagnostics
-            and any(
-                v.key == "attached object" and "'tool' on 'ball_link'" in v.value
-                for v in node.diagnostics["model"].values
-            ),
+            lambda: "'tool' on 'ball_link'" in node.diagnostic("model", "attached object"),
             "the tool in diagnostics",
         )
 

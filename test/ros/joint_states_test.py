@@ -167,10 +167,8 @@ class JointStatesTest(unittest.TestCase):
         self.assertEqual(node.messages[-1].status, ProximityArray.NO_POSE)
         turn.paused = slide.paused = False
         node.wait_for_status(ProximityArray.OK)
-        pose = node.diagnostics["pose"]
-        values = {v.key: v.value for v in pose.values}
-        self.assertEqual(values["topic"], self.namespace + "/joint_states")
-        self.assertGreater(int(values["joint states used"]), 100)
+        self.assertEqual(node.diagnostic("pose", "topic"), self.namespace + "/joint_states")
+        self.assertGreater(int(node.diagnostic("pose", "joint states used")), 100)
 
     def test_outside_region_of_interest(self):
         """Points that no link can come near are dropped; a joint outside its limits misses them."""
@@ -183,8 +181,7 @@ class JointStatesTest(unittest.TestCase):
             self.world.points = pt.apply(pt.inverse(X["camera"]), seen)
 
         def dropped():
-            values = node.diagnostics["input cloud"].values if node.diagnostics else []
-            return {v.key: v.value for v in values}.get("points outside the region of interest")
+            return node.diagnostic("input cloud", "points outside the region of interest")
 
         stand(0.5)
         self.world.repeat(50, lambda: self.send("turn", "slide"))

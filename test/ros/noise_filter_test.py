@@ -46,11 +46,7 @@ class NoiseFilterTest(unittest.TestCase):
         self.start(**parameters)
         self.check(0.4, len(PATCH))
         self.node.wait_until(
-            lambda: "input cloud" in self.node.diagnostics
-            and {v.key: v.value for v in self.node.diagnostics["input cloud"].values}.get(
-                "points taken for noise"
-            )
-            == "1",
+            lambda: self.node.diagnostic("input cloud", "points taken for noise") == "1",
             "the count",
         )
         # Points with enough neighbors are no noise.

@@ -279,6 +279,12 @@ class ProximityNode:
             **kwargs
         )
 
+    def diagnostic(self, status, key, default=""):
+        """Returns a value of the newest diagnostics; `default` where there is none."""
+        if status not in self.diagnostics:
+            return default
+        return {v.key: v.value for v in self.diagnostics[status].values}.get(key, default)
+
     def wait_until(self, condition, what, timeout=TIMEOUT):
         """Waits for a condition on anything but a ProximityArray."""
         wait_until(condition, what, timeout, self._condition)

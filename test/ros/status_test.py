@@ -105,13 +105,7 @@ class StatusTest(unittest.TestCase):
         self.world.cloud_publisher.publish(unstamped)
         other = self.world.repeat(20, lambda: send(-0.3))
         node.wait_until(
-            lambda: any(
-                int(value.value) > 5
-                for value in node.diagnostics["input cloud"].values
-                if value.key == "dropped: out of order"
-            )
-            if "input cloud" in node.diagnostics
-            else False,
+            lambda: int(node.diagnostic("input cloud", "dropped: out of order", 0)) > 5,
             "clouds out of order in the diagnostics",
         )
         message = node.wait_for_status(ProximityArray.OK)

@@ -26,7 +26,7 @@ struct Range {
   std::string text() const;
 };
 
-/// The shortest text of a number that tells it apart in six digits.
+/// The text of a number with six significant digits.
 std::string number_text(double value);
 /// A value and its unit, where there is one: "0.5 m".
 std::string with_unit(const std::string& value, const Range& range);

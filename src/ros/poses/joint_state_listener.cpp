@@ -10,7 +10,6 @@
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
-#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
@@ -25,21 +24,14 @@ JointStateListener::JointStateListener(tf2::BufferCore* buffer, ros::NodeHandle 
                                        std::function<void()> on_state)
     : buffer_(*buffer), on_state_(std::move(on_state)) {
   report_.topic = nh.resolveName("joint_states");
-  nh.setCallbackQueue(&queue_);
+  nh.setCallbackQueue(thread_.queue());
   subscriber_ = nh.subscribe("joint_states", 100, &JointStateListener::receive, this,
                              ros::TransportHints().tcpNoDelay());
-  thread_ = std::thread([this] {
-    name_thread("ist joints");
-    while (running_) {
-      queue_.callAvailable(ros::WallDuration(0.05));
-      count_publishers();
-    }
-  });
+  thread_.start("ist joints", [this] { count_publishers(); });
 }
 
 JointStateListener::~JointStateListener() {
-  running_ = false;
-  thread_.join();
+  thread_.stop();
   subscriber_.shutdown();
 }
 

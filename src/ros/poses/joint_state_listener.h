@@ -1,22 +1,20 @@
 #pragma once
 
-#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
 #include <tf2/buffer_core.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <unordered_map>
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "ros/common/callback_thread.h"
 #include "ros/common/publisher_count.h"
 #include "ros/poses/joint_position_queue.h"
 
@@ -87,7 +85,7 @@ class JointStateListener {
 
   tf2::BufferCore& buffer_;
   const std::function<void()> on_state_;
-  ros::CallbackQueue queue_;
+  CallbackThread thread_;
   ros::Subscriber subscriber_;
 
   std::mutex mutex_;  // guards the members below; held for copies and one message only
@@ -100,8 +98,6 @@ class JointStateListener {
   ros::Time last_now_;
 
   PublisherCount publisher_count_;  // used by the listener's thread alone
-  std::atomic<bool> running_{true};
-  std::thread thread_;
 };
 
 /// The frames whose poses come from joint states, so that tf's are not needed: the child links of

@@ -8,7 +8,6 @@
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
-#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
@@ -20,7 +19,7 @@ constexpr std::chrono::seconds kProblemAge(1);
 
 TransformListener::TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh)
     : buffer_(*buffer) {
-  nh.setCallbackQueue(&queue_);
+  nh.setCallbackQueue(thread_.queue());
   const auto hints = ros::TransportHints().tcpNoDelay();
   using Callback = boost::function<void(const tf2_msgs::TFMessageConstPtr&)>;
   const Callback receive_moving = [this](const tf2_msgs::TFMessageConstPtr& message) {
@@ -31,15 +30,11 @@ TransformListener::TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh
   };
   moving_ = nh.subscribe<tf2_msgs::TFMessage>("/tf", 100, receive_moving, {}, hints);
   static_ = nh.subscribe<tf2_msgs::TFMessage>("/tf_static", 100, receive_static, {}, hints);
-  thread_ = std::thread([this] {
-    name_thread("ist tf");
-    while (running_) queue_.callAvailable(ros::WallDuration(0.05));
-  });
+  thread_.start("ist tf");
 }
 
 TransformListener::~TransformListener() {
-  running_ = false;
-  thread_.join();
+  thread_.stop();
   moving_.shutdown();
   static_.shutdown();
 }

@@ -1,17 +1,16 @@
 #pragma once
 
-#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <atomic>
 #include <chrono>
 #include <mutex>
 #include <set>
 #include <string>
-#include <thread>
 #include <vector>
+
+#include "ros/common/callback_thread.h"
 
 namespace ist {
 
@@ -46,7 +45,7 @@ class TransformListener {
   void reject(const geometry_msgs::TransformStamped& transform, double ahead);
 
   tf2::BufferCore& buffer_;
-  ros::CallbackQueue queue_;
+  CallbackThread thread_;
   ros::Subscriber moving_, static_;
 
   mutable std::mutex mutex_;
@@ -54,9 +53,6 @@ class TransformListener {
   std::string problem_;
   std::chrono::steady_clock::time_point problem_time_;
   std::set<std::string> ignored_;
-
-  std::atomic<bool> running_{true};
-  std::thread thread_;
 };
 
 }  // namespace ist

@@ -5,8 +5,6 @@
 #include <exception>
 #include <limits>
 
-#include "ros/common/thread_name.h"
-
 namespace ist {
 
 using ist_proximity::ProximityArray;
@@ -38,17 +36,13 @@ QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& confi
                            const CloudSources& sources, const tf2::BufferCore& buffer,
                            std::function<LiveConfig()> live)
     : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
-  private_nh.setCallbackQueue(&queue_);
+  private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
-  thread_ = std::thread([this] {
-    name_thread("ist query");
-    while (running_) queue_.callAvailable(ros::WallDuration(0.05));
-  });
+  thread_.start("ist query");
 }
 
 QueryService::~QueryService() {
-  running_ = false;
-  thread_.join();
+  thread_.stop();
   service_.shutdown();
 }
 
@@ -143,7 +137,7 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
-    if (!running_) return "the node ends";
+    if (!thread_.is_running()) return "the node ends";
   }
   if (request.times.empty()) return "";
   impacts_->set_config(live.query);
@@ -182,7 +176,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
         wanted[i] = false;
       }
     }
-    if (!running_) return "the node ends";
+    if (!thread_.is_running()) return "the node ends";
   }
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     if (!chosen_[i]) continue;

@@ -1,19 +1,17 @@
 #pragma once
 
 #include <ist_proximity/QueryProximity.h>
-#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <tf2/buffer_core.h>
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "ist_proximity/proximity/time_of_impact.h"
+#include "ros/common/callback_thread.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
 #include "ros/model/model_state.h"
@@ -52,7 +50,7 @@ class QueryService {
   const CloudSources& sources_;
   const tf2::BufferCore& buffer_;
   const std::function<LiveConfig()> live_;
-  ros::CallbackQueue queue_;
+  CallbackThread thread_;
   ros::ServiceServer service_;
 
   std::mutex mutex_;
@@ -64,8 +62,6 @@ class QueryService {
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
   std::vector<bool> chosen_;  ///< by monitored link
-  std::atomic<bool> running_{true};
-  std::thread thread_;
 };
 
 }  // namespace ist
