@@ -62,7 +62,7 @@ void ContactLoader::run() {
     try {
       if (state->robot && (!contacts || contacts->robot != state->robot)) load(state);
     } catch (const std::exception& error) {  // no memory; the next round tries again
-      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be had: " << error.what());
+      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << error.what());
     }
   } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
 }

@@ -43,8 +43,7 @@ void warn_of_visual_fallback(const RobotDescription& description) {
 ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
     : config_(config), nh_(nh) {
   ModelState waiting;
-  waiting.problem = "waiting for the parameter '" + nh_.resolveName(config.robot_description) +
-                    "' with the robot's URDF";
+  waiting.problem = waiting_for_description();
   set_state(std::move(waiting));
   thread_ = std::thread(&ModelLoader::run, this);
 }
@@ -110,6 +109,11 @@ void ModelLoader::run() {
   }
 }
 
+std::string ModelLoader::waiting_for_description() const {
+  return "waiting for the parameter '" + nh_.resolveName(config_.robot_description) +
+         "' with the robot's URDF";
+}
+
 /// Searches the parameter upwards from the node's namespace, as robot_state_publisher does.
 bool ModelLoader::fetch_urdf(std::string* urdf, std::string* problem) const {
   const std::string& name = config_.robot_description;
@@ -117,7 +121,7 @@ bool ModelLoader::fetch_urdf(std::string* urdf, std::string* problem) const {
   nh_.searchParam(name, key);
   XmlRpc::XmlRpcValue value;
   if (!nh_.getParam(key, value)) {
-    *problem = "waiting for the parameter '" + nh_.resolveName(name) + "' with the robot's URDF";
+    *problem = waiting_for_description();
     return false;
   }
   if (value.getType() != XmlRpc::XmlRpcValue::TypeString) {
@@ -145,7 +149,7 @@ void ModelLoader::load_once() {
     state.phase = ModelState::Phase::kFailed;
     state.problem = std::string("the robot's URDF in '") + config_.robot_description +
                     "' cannot be used: " + error.what() +
-                    "; set it anew, it is read again when it changes";
+                    "; set it again, it is read whenever it changes";
     ROS_ERROR_STREAM(state.problem);
     set_state(std::move(state));
   }

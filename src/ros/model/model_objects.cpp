@@ -10,7 +10,7 @@ namespace ist {
 namespace {
 
 std::string not_ready(const ModelState& state) {
-  return "the robot's model is not there yet: " + state.problem;
+  return "the robot's model is not ready yet: " + state.problem;
 }
 
 }  // namespace

@@ -91,8 +91,8 @@ ConfigDescription describe(const std::string& group, const std::vector<Tunable>&
 }
 
 void warn_of_refusal(const std::string& reason) {
-  ROS_WARN_STREAM_THROTTLE(5.0,
-                           "the last valid ~query, ~repulsion and ~penetration go on: " << reason);
+  ROS_WARN_STREAM_THROTTLE(
+      5.0, "the last valid ~query, ~repulsion and ~penetration stay in use: " << reason);
 }
 
 bool same(const Config& a, const Config& b) {

@@ -101,8 +101,8 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   read_query(&reader, &config.query);
   if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {
     warnings->push_back(
-        "~repulsion/influence_distance is more than ~max_distance, where measuring "
-        "ends; ~max_distance is used");
+        "~repulsion/influence_distance is more than ~max_distance, and nothing farther "
+        "away is measured; ~max_distance is used");
   }
   read_contacts(&reader, &config);
   config.sources = read_sources(&reader);

@@ -177,8 +177,7 @@ bool JointStateListener::read_joint(const std::string& name, double q, const ros
   if (!joint.is_free()) {
     // Many publishers state mimic joints too, which follow theirs; a fixed joint stays in place.
     if (joint.has_unstated_pose()) {
-      drop("joint '" + name + "' is planar or floating, which one position cannot tell: tf must",
-           1);
+      drop("joint '" + name + "' is planar or floating, so its pose must come from tf", 1);
     }
     return false;
   }

@@ -29,7 +29,7 @@ std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration
     const auto joint = kinematics_->find_joint(configuration.name[i]);
     if (!joint) return title + " is not in the URDF";
     if (kinematics_->joints()[*joint].has_unstated_pose()) {
-      return title + " is planar or floating, which one position cannot tell; leave it out";
+      return title + " is planar or floating, so one position cannot give its pose; leave it out";
     }
     if (!std::isfinite(configuration.position[i])) {
       return "the position of " + title + " is NaN or infinite";
@@ -41,7 +41,7 @@ std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration
 }
 
 std::string StatedPoseSource::hint() const {
-  return "state its position, or see that tf or joint states tell it";
+  return "state its position, or provide it on tf or joint_states";
 }
 
 void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {

@@ -84,7 +84,7 @@ std::string QueryService::take_model() {
     model = newest_model_;
   }
   if (!model || model->phase != ModelState::Phase::kReady) {
-    return model ? model->problem : "the robot's model is not there yet";
+    return model ? model->problem : "the robot's model is not ready yet";
   }
   if (!model->kinematics) return no_kinematics(*model);
   if (model == model_) return "";

@@ -29,7 +29,7 @@ std::string doubt_of_self_filter(const SourceReport& source) {
   // A laser scanner may never see the robot, so this concerns clouds only.
   if (counts.on_robot == 0 && source.noun == "cloud") {
     return "no point of the cloud is on the robot: if the sensor sees the robot, its transform or "
-           "the URDF is wrong; if it does not, self_filter: false says so";
+           "the URDF is wrong; if it does not, set self_filter: false";
   }
   return "";
 }
