@@ -7,6 +7,7 @@
 // message is copied. With --tcp, the node and a node that only receives are processes of their own.
 // Prints rows of tables in Markdown; with --update-doc FILE they are put there too.
 
+#include <ist_proximity/ProximityArray.h>
 #include <ros/ros.h>
 #include <sys/wait.h>
 #include <unistd.h>
