@@ -64,7 +64,7 @@ const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel
 
 std::shared_ptr<const SourceSnapshot> CloudSource::share(
     const std::shared_ptr<const RobotModel>& model, const ros::Time& time, double max_age) {
-  const std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
+  std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
   if (!state_.is_current(snapshot.get(), model)) return nullptr;
   if (!is_map_) return snapshot;
   const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
@@ -211,7 +211,7 @@ void CloudSource::use_map() {
 /// @returns empty on success, else a sentence
 std::string CloudSource::ingest(const Measurement& measurement) {
   Placement placement;
-  const std::string problem = placer_.place(measurement, target_, &placement);
+  std::string problem = placer_.place(measurement, target_, &placement);
   if (!problem.empty()) return problem;
   SourceSnapshot& snapshot = exchange_.writable();
   // The published cloud is not cropped at the region of interest.

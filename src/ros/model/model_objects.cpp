@@ -38,6 +38,7 @@ std::string ModelLoader::detach(const std::string& name) {
                                   [&](const AttachedObject& other) { return other.name == name; });
   if (found == objects.end()) {
     std::vector<std::string> names;
+    names.reserve(objects.size());
     for (const AttachedObject& other : objects) names.push_back(other.name);
     return "no object '" + name + "' is attached; there is " +
            (names.empty() ? "none at all" : join(names, ", "));

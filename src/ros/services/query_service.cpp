@@ -156,6 +156,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
     wanted[link] = wanted[link] && chosen_[i];
   }
   std::vector<double> first;
+  first.reserve(wanted.size());
   for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
