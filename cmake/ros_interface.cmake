@@ -1,4 +1,4 @@
-# What other ROS packages see of this one: its dependencies, messages and exports.
+# The interface for other ROS packages: dependencies, messages and exports.
 
 find_package(catkin REQUIRED COMPONENTS
   diagnostic_msgs

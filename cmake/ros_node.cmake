@@ -1,4 +1,4 @@
-# The ROS side: library, node, nodelet, and the files a robot's launch file refers to.
+# The ROS library, node and nodelet, and the files to which a robot's launch file refers.
 
 file(GLOB ros_sources CONFIGURE_DEPENDS src/ros/*.cpp src/ros/*/*.cpp)
 add_library(ist_proximity_ros ${ros_sources})
@@ -6,7 +6,7 @@ target_include_directories(ist_proximity_ros PRIVATE src)
 add_dependencies(ist_proximity_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
 target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRARIES})
 
-# The noise filter is PCL's, and off unless a parameter asks for it: without PCL all else is there.
+# The noise filter is PCL's and off by default, so PCL is optional.
 find_package(PCL QUIET COMPONENTS common filters)
 if(PCL_FOUND)
   target_compile_definitions(ist_proximity_ros PRIVATE IST_PROXIMITY_WITH_PCL)
@@ -24,11 +24,11 @@ target_link_libraries(ist_proximity_nodelet PRIVATE ist_proximity_ros)
 
 foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
   target_include_directories(${target} PRIVATE src)
-  # System headers: their warnings are not ours to mend.
+  # Warnings in system headers are not ours to mend.
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
 endforeach()
 
-# The demonstration of a controller: simulated robot, example controller.
+# The demonstration of a controller: a simulated robot and an example controller.
 add_executable(simulator_node simulator/nodes/simulator_node.cpp)
 target_link_libraries(simulator_node PRIVATE ist_proximity_simulator ${catkin_LIBRARIES})
 add_executable(dodge_node examples/dodge_node.cpp)
@@ -57,6 +57,6 @@ install(FILES nodelet_plugins.xml DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION
 install(DIRECTORY config demo examples launch DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}
   USE_SOURCE_PERMISSIONS
   PATTERN __pycache__ EXCLUDE)
-# Not executable where it stands: rosrun would find two of the name, and ask which.
+# The script in the repository is not executable: rosrun would find two programs of that name.
 catkin_install_python(PROGRAMS scripts/proximity_table
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

@@ -7,6 +7,7 @@
 // message is copied. With --tcp, the node and a node that only receives are processes of their own.
 // Prints rows of tables in Markdown; with --update-doc FILE they are put there too.
 
+#include <ist_proximity/ProximityArray.h>
 #include <ros/ros.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -190,7 +191,7 @@ bool run(const Options& options) {
         std::filesystem::read_symlink("/proc/self/exe"), "--receive", "__name:=latency_receiver"});
   } else {
     const ros::NodeHandle nh, private_nh("latency_node");
-    server = std::make_unique<ProximityServer>(nh, private_nh, read_parameters(private_nh));
+    server = std::make_unique<ProximityServer>(nh, private_nh);
     relay = std::make_unique<Relay>(true);
   }
   const Traffic traffic(

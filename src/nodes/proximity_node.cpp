@@ -6,7 +6,7 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "proximity");
   ros::NodeHandle nh, private_nh("~");
   try {
-    ist::ProximityServer server(nh, private_nh, ist::read_parameters(private_nh));
+    ist::ProximityServer server(nh, private_nh);
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM("proximity_node cannot start:\n" << error.what());

@@ -7,13 +7,11 @@
 
 namespace ist {
 
-/// The node's server inside a nodelet manager: clouds arrive without being copied.
+/// Runs the server inside a nodelet manager, so that clouds arrive without being copied.
 class ProximityNodelet : public nodelet::Nodelet {
   void onInit() override {
-    const ros::NodeHandle private_nh = getMTPrivateNodeHandle();
     try {
-      server_ = std::make_unique<ProximityServer>(getMTNodeHandle(), private_nh,
-                                                  read_parameters(private_nh));
+      server_ = std::make_unique<ProximityServer>(getMTNodeHandle(), getMTPrivateNodeHandle());
     } catch (const std::exception& error) {
       NODELET_FATAL_STREAM("ist_proximity/Proximity cannot start:\n" << error.what());
       throw;

@@ -1,62 +1,124 @@
 #include "ist_proximity/ros/proximity_server.h"
 
-#include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>
-#include <std_msgs/Float64.h>
+#include <tf2/buffer_core.h>
 
 #include <algorithm>
+#include <atomic>
 #include <boost/make_shared.hpp>
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <thread>
 
-#include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_region.h"
-#include "ros/model/object_conversion.h"
-#include "ros/output/message_conversion.h"
-#include "ros/status/status_log.h"
-#include "ros/thread_name.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/stop_signal.h"
+#include "ros/common/thread_name.h"
+#include "ros/cycle/cycle_message.h"
+#include "ros/cycle/proximity_cycle.h"
+#include "ros/input/cloud_source.h"
+#include "ros/model/contact_loader.h"
+#include "ros/model/model_loader.h"
+#include "ros/output/result_publisher.h"
+#include "ros/output/sphere_publisher.h"
+#include "ros/parameters/live_parameters.h"
+#include "ros/parameters/parameters.h"
+#include "ros/poses/joint_state_listener.h"
+#include "ros/poses/make_pose_source.h"
+#include "ros/poses/transform_listener.h"
+#include "ros/services/model_services.h"
+#include "ros/services/query_service.h"
+#include "ros/services/self_proximity.h"
+#include "ros/status/diagnostics_publisher.h"
 
 namespace ist {
 namespace {
 
-using ist_proximity::ProximityArray;
+using Clock = std::chrono::steady_clock;
 
-// rviz draws no faster
-constexpr std::chrono::milliseconds kMarkerPeriod(40);
-// Without joint states.
-constexpr std::chrono::milliseconds kStatePatience(100);
-// After a clock jump.
-constexpr std::chrono::seconds kFirstSpheresDelay(1), kLastSpheresDelay(4);
-// One marker each.
-constexpr std::size_t kMaxSpheresPerLink = 250;
-
-std::string without_leading_slash(const std::string& name) {
-  return !name.empty() && name[0] == '/' ? name.substr(1) : name;
-}
+// A cycle runs at least this often with pose_source joint_states.
+constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
 
 }  // namespace
 
-ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
-                                 const ServerConfig& config)
+/// Owns all parts and runs two threads: the cycle and the diagnostics.
+///
+/// The cycle takes the newest poses and clouds, queries and publishes, and waits for nothing. It
+/// runs at ~rate of the wall clock, so that a paused /clock does not silence it, or with
+/// pose_source joint_states once for each joint state, and ten times a second while none come. The
+/// diagnostics thread runs once a second and reads the live parameters again. The parts have
+/// threads of their own: one per source, ~query, ~self_proximity, the model and contact loaders,
+/// the listeners of tf and joint_states.
+class ProximityServer::Impl {
+ public:
+  Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const ServerConfig& config);
+  ~Impl();
+
+ private:
+  void run_cycles();
+  bool wait_for_joint_states();
+  void run_cycle();
+  void notice_clock_jump(const ros::Time& now);
+  void take_model();
+  void set_source_targets(const QueryConfig& query);
+  void run_diagnostics();
+  LiveConfig live_config() const;
+
+  const ServerConfig config_;
+  ros::NodeHandle nh_, private_nh_;
+  ResultPublisher results_;
+  SpherePublisher spheres_;
+  DiagnosticsPublisher diagnostics_;
+  tf2::BufferCore buffer_;
+  TransformListener listener_;
+  CloudSources sources_;
+  ModelLoader loader_;
+  ModelServices model_services_;
+  LiveParameters live_;
+  ContactLoader contact_loader_;
+
+  StopSignal cycle_signal_;  ///< joint states are its events
+  StopSignal diagnostics_signal_;
+  std::atomic<std::uint64_t> joint_states_received_{0};
+  std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
+
+  std::mutex report_mutex_;
+  CycleReport report_;  ///< shared by both threads
+
+  // Used by the cycle thread alone.
+  std::shared_ptr<const ModelState> model_;
+  std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
+  double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
+  ros::Time last_now_;
+
+  std::unique_ptr<QueryService> query_service_;
+  std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
+  std::thread cycle_thread_, diagnostics_thread_;
+};
+
+ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
+                            const ServerConfig& config)
     : config_(config),
       nh_(nh),
       private_nh_(private_nh),
-      name_(without_leading_slash(private_nh.getNamespace())),
+      results_(private_nh, config),
+      spheres_(private_nh),
+      diagnostics_(nh, without_slash(private_nh.getNamespace()), config),
       buffer_(ros::Duration(10.0)),
       listener_(&buffer_, nh_),
       loader_(config, nh),
+      model_services_(private_nh, &loader_),
       live_(private_nh, config),
-      contact_loader_(config, loader_),
-      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
-  advertise();
+      contact_loader_(config, loader_) {
+  const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
-    sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud_));
+    sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud));
   }
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
-      {
-        const std::lock_guard<std::mutex> lock(stop_mutex_);
-        ++states_come_;
-      }
-      state_signal_.notify_one();
+      ++joint_states_received_;
+      cycle_signal_.notify();
     });
   }
   const auto live = [this] { return live_config(); };
@@ -65,57 +127,32 @@ ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandl
     self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
                                                       joint_states_.get(), live);
   }
-  cycle_thread_ = std::thread(&ProximityServer::run_cycles, this);
-  diagnostics_thread_ = std::thread(&ProximityServer::run_diagnostics, this);
+  cycle_thread_ = std::thread(&Impl::run_cycles, this);
+  diagnostics_thread_ = std::thread(&Impl::run_diagnostics, this);
 }
 
-ProximityServer::~ProximityServer() {
-  {
-    const std::lock_guard<std::mutex> lock(stop_mutex_);
-    stop_ = true;
-  }
-  stop_signal_.notify_all();
-  state_signal_.notify_all();
+ProximityServer::Impl::~Impl() {
+  cycle_signal_.stop();
+  diagnostics_signal_.stop();
   cycle_thread_.join();
   diagnostics_thread_.join();
   query_service_.reset();
   self_proximity_.reset();
   cycle_.reset();
-  joint_states_.reset();  // its thread uses members that end before it
+  joint_states_.reset();  // the listener's thread uses members that are destroyed before it
 }
 
-void ProximityServer::advertise() {
-  proximity_ = private_nh_.advertise<ProximityArray>("proximity", 10);
-  joint_repulsion_ = private_nh_.advertise<ist_proximity::JointRepulsion>("joint_repulsion", 10);
-  min_distance_ = private_nh_.advertise<std_msgs::Float64>("min_distance", 10);
-  markers_ = private_nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
-  spheres_ = private_nh_.advertise<visualization_msgs::MarkerArray>("spheres", 1, true);
-  filtered_cloud_ = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
-  diagnostics_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
-  reload_service_ =
-      private_nh_.advertiseService("reload_model", &ProximityServer::reload_model, this);
-  attach_service_ =
-      private_nh_.advertiseService("attach_object", &ProximityServer::attach_object, this);
-  detach_service_ =
-      private_nh_.advertiseService("detach_object", &ProximityServer::detach_object, this);
-}
-
-bool ProximityServer::sleep_until(Clock::time_point time) {
-  std::unique_lock<std::mutex> lock(stop_mutex_);
-  return !stop_signal_.wait_until(lock, time, [this] { return stop_; });
-}
-
-/// With pose_source joint_states: until one comes; after a while without, all the same. What came
-/// during the last cycle is taken at once, one after the other.
-bool ProximityServer::wait_for_joint_states() {
-  std::unique_lock<std::mutex> lock(stop_mutex_);
-  state_signal_.wait_for(lock, kStatePatience,
-                         [this] { return stop_ || joint_states_->is_waiting(); });
+/// Waits until a joint state comes, but not for ever. Joint states that came during the last cycle
+/// are taken at once, one after the other.
+/// @returns false when it is time to stop
+bool ProximityServer::Impl::wait_for_joint_states() {
+  const bool goes_on = cycle_signal_.sleep_until(Clock::now() + kMaxWaitForJointStates,
+                                                 [this] { return joint_states_->is_waiting(); });
   joint_states_->take_next();
-  return !stop_;
+  return goes_on;
 }
 
-void ProximityServer::run_cycles() {
+void ProximityServer::Impl::run_cycles() {
   name_thread("ist cycle");
   if (joint_states_) {
     do {
@@ -128,61 +165,50 @@ void ProximityServer::run_cycles() {
   Clock::time_point next = Clock::now();
   do {
     run_cycle();
-    // A cycle that took too long is not made up for by a burst.
-    next = std::max(next + period, Clock::now());
-  } while (sleep_until(next));
+    next = std::max(next + period, Clock::now());  // no burst follows a cycle that took too long
+  } while (cycle_signal_.sleep_until(next));
 }
 
-LiveConfig ProximityServer::live_config() const {
-  LiveConfig live = live_.get();
-  live.contacts = contact_loader_.contacts();
-  return live;
-}
-
-void ProximityServer::run_cycle() {
+void ProximityServer::Impl::run_cycle() {
   const ros::Time now = ros::Time::now();
   notice_clock_jump(now);
   take_model();
-  publish_spheres_again();
-  const auto message = boost::make_shared<ProximityArray>();
+  spheres_.repeat_when_due();
+  const auto message = boost::make_shared<ist_proximity::ProximityArray>();
   const std::string transform_problem = listener_.problem();
   const LiveConfig live = live_config();
-  if (live.query.margin != margin_) aim_sources(live.query);
+  if (live.query.margin != margin_) set_source_targets(live.query);
   {
-    const std::lock_guard<std::mutex> lock(shared_mutex_);
+    const std::lock_guard<std::mutex> lock(report_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
       cycle_->run(now, sources_, live, message.get(), &report_);
     } else {
-      say_no_model(*model_, config_.fixed_frame, now, sources_, message.get(), &report_);
+      fill_without_model(*model_, config_, now, sources_, message.get(), &report_);
     }
     ++report_.cycles;
   }
-  publish(message);
+  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
+    if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
+  };
+  if (results_.publish(message, fill_joint_repulsion)) {
+    const std::lock_guard<std::mutex> lock(report_mutex_);
+    ++report_.markers_drawn;
+  }
 }
 
-/// The sources look after themselves.
-void ProximityServer::notice_clock_jump(const ros::Time& now) {
+/// Tells the parts that do not notice a backward jump of the clock themselves.
+void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
   listener_.notice_clock_jump();
   if (now < last_now_) {
     if (cycle_) cycle_->forget();
-    spheres_delay_ = kFirstSpheresDelay;
-    spheres_again_ = Clock::now() + spheres_delay_;
+    spheres_.repeat_after_clock_jump();
   }
   last_now_ = now;
 }
 
-/// When the clock jumps back, rviz forgets all markers, some time later and however they were
-/// latched.
-void ProximityServer::publish_spheres_again() {
-  if (Clock::now() < spheres_again_) return;
-  spheres_.publish(shown_spheres_);
-  spheres_delay_ *= 2;
-  spheres_again_ = spheres_delay_ <= kLastSpheresDelay ? Clock::now() + spheres_delay_
-                                                       : Clock::time_point::max();
-}
-
-void ProximityServer::take_model() {
+/// Hands a new model to all parts.
+void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
   model_ = std::move(model);
@@ -191,26 +217,27 @@ void ProximityServer::take_model() {
         model_, config_,
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),
                          JointPoseSource::Which::kTaken),
-        ProximityCycle::Reader::kOnly);
+        CloudSelection::Reader::kOnly);
   } else {
     cycle_.reset();
   }
   if (joint_states_) {
-    listener_.leave_out(model_->kinematics ? computed_frames(*model_->kinematics)
-                                           : std::vector<std::string>());
+    listener_.ignore(model_->kinematics ? computed_frames(*model_->kinematics)
+                                        : std::vector<std::string>());
     joint_states_->set_kinematics(model_->kinematics);
   }
   query_service_->set_model(model_);
   if (self_proximity_) self_proximity_->set_model(model_);
-  publish_spheres();
-  aim_sources(live_.get().query);
+  spheres_.show(*model_);
+  set_source_targets(live_.get().query);
 }
 
-void ProximityServer::aim_sources(const QueryConfig& query) {
+/// Tells the sources the model, the fixed frame and the region of interest.
+void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
   margin_ = query.margin;
   RegionOfInterest region;
-  // tf may know better than the URDF where links are.
+  // The region follows from the joint limits of the URDF, which poses from tf need not respect.
   const bool computes_poses = config_.pose_source == PoseSourceKind::kJointStates;
   if (computes_poses && model_->robot && model_->kinematics) {
     region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
@@ -219,116 +246,32 @@ void ProximityServer::aim_sources(const QueryConfig& query) {
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
 
-void ProximityServer::publish(const ist_proximity::ProximityArrayConstPtr& message) {
-  proximity_.publish(message);
-  publish_joint_repulsion(*message);
-  std_msgs::Float64 smallest;
-  smallest.data = min_distance(*message);
-  min_distance_.publish(smallest);
-  if (markers_.getNumSubscribers() > 0 && Clock::now() >= next_markers_) {
-    next_markers_ = Clock::now() + kMarkerPeriod;
-    markers_.publish(marker_drawer_.draw(*message));
-    const std::lock_guard<std::mutex> lock(shared_mutex_);
-    ++report_.markers_drawn;
-  }
-}
-
-/// The Jacobians are worth computing only while somebody listens.
-void ProximityServer::publish_joint_repulsion(const ProximityArray& proximity) {
-  if (joint_repulsion_.getNumSubscribers() == 0) return;
-  ist_proximity::JointRepulsion message;
-  message.header.stamp = proximity.header.stamp;
-  message.status = proximity.status;
-  message.status_text = proximity.status_text;
-  if (cycle_) cycle_->fill_joint_repulsion(proximity, &message);
-  joint_repulsion_.publish(message);
-}
-
-void ProximityServer::publish_spheres() {
-  if (!shown_spheres_.markers.empty()) spheres_.publish(deleted(shown_spheres_));
-  shown_spheres_.markers.clear();
-  if (!model_->robot) return;
-  shown_spheres_ = sphere_markers(*model_->robot, model_->monitored, kMaxSpheresPerLink);
-  spheres_.publish(shown_spheres_);
-}
-
-void ProximityServer::run_diagnostics() {
+void ProximityServer::Impl::run_diagnostics() {
   name_thread("ist diagnostics");
-  StatusLog status_log;
-  std::size_t cycles_before = 0;
-  std::uint64_t states_before = 0;
-  std::vector<std::uint64_t> messages_before;
-  Clock::time_point before = Clock::now();
-  while (sleep_until(before + std::chrono::seconds(1))) {
+  Clock::time_point last = Clock::now();
+  while (diagnostics_signal_.sleep_until(last + std::chrono::seconds(1))) {
+    last = Clock::now();
     live_.read_again();
     CycleReport report;
     {
-      const std::lock_guard<std::mutex> lock(shared_mutex_);
+      const std::lock_guard<std::mutex> lock(report_mutex_);
       report = report_;
     }
-    // Before, the loader tells how far it is.
-    if (loader_.state()->phase == ModelState::Phase::kReady) {
-      status_log.update(report.status, report.text);
-    }
-    const std::chrono::duration<double> interval = Clock::now() - before;
-    before = Clock::now();
-    const double rate = static_cast<double>(report.cycles - cycles_before) / interval.count();
-    cycles_before = report.cycles;
-    double wanted_rate = config_.rate;
-    if (joint_states_) {
-      report.joint_states = joint_states_->facts();
-      const std::lock_guard<std::mutex> lock(stop_mutex_);
-      wanted_rate = static_cast<double>(states_come_ - states_before) / interval.count();
-      states_before = states_come_;
-    }
-
-    diagnostic_msgs::DiagnosticArray message;
-    message.header.stamp = ros::Time::now();
-    messages_before.resize(report.sources.size());
-    for (std::size_t i = 0; i < report.sources.size(); ++i) {
-      const SourceFacts& source = report.sources[i];
-      const auto come = static_cast<double>(source.messages - messages_before[i]);
-      messages_before[i] = source.messages;
-      message.status.push_back(input_diagnostics(name_, source, report.verdicts[i],
-                                                 come / interval.count(),
-                                                 message.header.stamp.toSec()));
-    }
-    message.status.push_back(pose_diagnostics(name_, report));
-    message.status.push_back(query_diagnostics(name_, report, rate, wanted_rate));
-    message.status.push_back(model_diagnostics(
-        name_, *loader_.state(), contact_loader_.contacts().get(), config_.contacts_wanted));
-    diagnostics_.publish(message);
+    if (joint_states_) report.joint_states = joint_states_->report();
+    diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
+                         joint_states_received_);
   }
 }
 
-bool ProximityServer::reload_model(std_srvs::Trigger::Request&,
-                                   std_srvs::Trigger::Response& response) {
-  bool found = false;
-  response.message = loader_.reload(&found);
-  response.success = found;
-  return true;
+LiveConfig ProximityServer::Impl::live_config() const {
+  LiveConfig live = live_.get();
+  live.contacts = contact_loader_.contacts();
+  return live;
 }
 
-bool ProximityServer::attach_object(ist_proximity::AttachObject::Request& request,
-                                    ist_proximity::AttachObject::Response& response) {
-  try {
-    response.message = loader_.attach(to_object(request, environment_package_finder()));
-  } catch (const std::exception& error) {  // ModelError, or no memory
-    response.message = error.what();
-  }
-  response.success = response.message.empty();
-  if (response.success) {
-    response.message = "'" + request.name + "' is now part of link '" + request.link + "'";
-  }
-  return true;
-}
+ProximityServer::ProximityServer(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
+    : impl_(std::make_unique<Impl>(nh, private_nh, read_parameters(private_nh))) {}
 
-bool ProximityServer::detach_object(ist_proximity::DetachObject::Request& request,
-                                    ist_proximity::DetachObject::Response& response) {
-  response.message = loader_.detach(request.name);
-  response.success = response.message.empty();
-  if (response.success) response.message = "'" + request.name + "' is detached";
-  return true;
-}
+ProximityServer::~ProximityServer() = default;
 
 }  // namespace ist

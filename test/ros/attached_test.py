@@ -20,7 +20,7 @@ class AttachedTest(unittest.TestCase):
     def start(self, **parameters):
         self.namespace = "/" + self._testMethodName
         self.world = pt.World(self.namespace).stand(box=pt.transform((0, 1.5, 0)))
-        # The tool as the camera sees it, and an obstacle beside it.
+        # Points on the tool, as the camera sees it, and an obstacle beside it.
         shell = np.random.default_rng(1).normal(size=(200, 3))
         shell *= TOOL_RADIUS / np.linalg.norm(shell, axis=1)[:, None]
         self.world.points = np.vstack([shell + TOOL, [[0.5, 0.0, 0.2]]])
@@ -77,26 +77,22 @@ class AttachedTest(unittest.TestCase):
         np.testing.assert_allclose(
             pt.vector(pt.link(message, "ball_link").point_on_link), [0.5, 0, TOOL_RADIUS], atol=1e-5
         )
-        # Nothing but the tool's own changes on the way, and the time until the next cloud.
+        # The status is OK all the time, or NO_CLOUD until the next cloud.
         for m in node.messages[begin:]:
             self.assertIn(m.status, (ProximityArray.OK, ProximityArray.NO_CLOUD))
         node.wait_until(
-            lambda: "model" in node.diagnostics
-            and any(
-                v.key == "attached object" and "'tool' on 'ball_link'" in v.value
-                for v in node.diagnostics["model"].values
-            ),
+            lambda: "'tool' on 'ball_link'" in node.diagnostic("model", "attached object"),
             "the tool in diagnostics",
         )
 
-        # It survives that the model is loaded again.
+        # The tool stays attached when the model is loaded again.
         self.assertTrue(node.reload().success)
         node.wait_for_status(ProximityArray.MODEL_ERROR, start=0)
         self.wait_for_ball(0.2 - TOOL_RADIUS, 200)
         self.detach_well("tool")
         self.wait_for_ball(without, 0)
 
-        # A link without geometry has some while it carries.
+        # A link without geometry has the tool's while it carries it.
         self.attach_well(link="base", name="on_base")
         message = node.wait_for(
             lambda m: m.status == 0 and len(m.links) == 3 and m.sources[0].points_on_robot == 200,

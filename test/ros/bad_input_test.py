@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Bad clouds, bad meshes, bad URDFs: never a crash, never a made-up value, and a way back."""
+"""Bad clouds, meshes and URDFs: no crash, no made-up value, and the node recovers."""
 
 import contextlib
 import os
@@ -61,7 +61,7 @@ def empty_frame():
     return pt.cloud(POINT, frame="")
 
 
-# What each cloud makes, and a word of the text that says what is wrong.
+# Functions that make a malformed cloud, and a word of the text that says what is wrong.
 UNUSABLE = [
     (without_z, "z"),
     (integer_x, "x"),
@@ -133,7 +133,7 @@ class BadCloudTest(unittest.TestCase):
             self.assertLess(len(wrong), 10, wrong[-1].status_text if wrong else "")
 
     def test_all_nan(self):
-        """A sensor that saw nothing at all: UNKNOWN, also when there was a good cloud just now."""
+        """A sensor that sees nothing at all makes links UNKNOWN, even right after a good cloud."""
         self.check_recovery()
         with self.stream(lambda: pt.cloud(np.full((5, 3), np.nan))):
             message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "NaN")
@@ -143,7 +143,7 @@ class BadCloudTest(unittest.TestCase):
         self.check_recovery()
 
     def test_nothing_in_range(self):
-        """Measured, and nothing there: CLEAR, with +inf."""
+        """A cloud without points in range makes links CLEAR, with +inf."""
         nothing = {
             "empty": np.zeros((0, 3)),
             "too near": np.array([[0.0, 0.0, 0.01]]),
@@ -200,7 +200,7 @@ class BadModelTest(unittest.TestCase):
         return self.node
 
     def check_one_bad_link(self, geometry, words):
-        """box_link cannot be had; ball_link is measured all the same."""
+        """box_link has no usable geometry; ball_link is measured all the same."""
         node = self.start(pt.urdf(box=geometry))
         message = node.wait_for(
             lambda m: m.links and pt.link(m, "ball_link").state == LinkProximity.NEAR, "the ball"
@@ -239,7 +239,7 @@ class BadModelTest(unittest.TestCase):
         self.check_one_bad_link('<mesh filename="file://%s" scale="1 0 1"/>' % path, ["scale"])
 
     def test_mesh_that_appears(self):
-        """A mesh that is missing, then there: ~reload_model takes it."""
+        """A mesh is missing at first; ~reload_model reads it once it is there."""
         path = os.path.join(self.folder, "late.stl")
         self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["late.stl"])
         corners = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)]
@@ -273,11 +273,11 @@ class BadModelTest(unittest.TestCase):
         node = self.start("<robot name='broken'><link name='a'>")
         message = node.wait_for_status(ProximityArray.MODEL_ERROR, "URDF")
         self.assertFalse(message.links)
-        # A changed parameter is taken without being told.
+        # A changed parameter is read without a request.
         rospy.set_param(self.namespace + "/robot_description", pt.urdf())
         node.wait_for_status(ProximityArray.OK)
 
-        # From good to bad: the old model is no answer any more.
+        # After a change from good to bad the old model no longer answers.
         for bad in ("", "no XML", "<robot name='r'/>", 42):
             rospy.set_param(self.namespace + "/robot_description", bad)
             self.assertTrue(node.reload().message)
@@ -287,7 +287,7 @@ class BadModelTest(unittest.TestCase):
         self.assertFalse(node.reload().success)
         node.wait_for_status(ProximityArray.MODEL_ERROR, "waiting for the parameter")
 
-        # And back, with another link.
+        # The model comes back, with another link.
         more = """<link name="hat"><collision><geometry><box size="0.1 0.1 0.1"/></geometry>
             </collision></link><joint name="to_hat" type="fixed"><parent link="base"/>
             <child link="hat"/></joint>"""

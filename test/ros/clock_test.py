@@ -129,7 +129,7 @@ class ClockTest(unittest.TestCase):
             )
             for m in self.count_messages(node, 60):
                 self.assertEqual(m.status, ProximityArray.OK, m.status_text)
-        # Nothing else: said, and not used.
+        # Future transforms alone are reported and not used.
         world.poses = {"box_link": world.poses["box_link"]}
         future = world.repeat(
             50,

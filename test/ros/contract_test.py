@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What other programs rely on by name: fields, constants, topics, services, and parameters' effects."""
+"""Names that other programs rely on: fields, constants, topics, services, and effects of parameters."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ from visualization_msgs.msg import MarkerArray
 
 POINTS = [[0.0, 0.0, 0.3], [0.0, 0.0, 0.1]]  # 0.2 m from the ball, and on it
 
-# More fields may stand beside these.
+# Messages may have more fields than these.
 FIELDS = {
     LinkProximity: """string link; uint8 state; float64 distance; float64 lower_bound;
         geometry_msgs/Point point_on_link; geometry_msgs/Point point_on_link_local;
@@ -35,7 +35,7 @@ CONSTANTS = {
     LinkProximity: ["UNKNOWN", "CLEAR", "NEAR", "CONTACT"],
     ProximityArray: ["OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR"],
 }
-# Below the node's name: type, and whether it is latched.
+# Topics below the node's name: type, and whether it is latched.
 TOPICS = {
     "proximity": (ProximityArray, False),
     "self_proximity": (ProximityArray, False),
@@ -118,7 +118,7 @@ class ContractTest(unittest.TestCase):
         node.wait_for_status(ProximityArray.OK)
 
     def test_links(self):
-        """Only those named are told, but points on the others are no obstacles either."""
+        """The answer has the named links only; points on the other links are no obstacles either."""
         node = self.start(pt.urdf(), links=["box_link"])
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual([one.link for one in message.links], ["box_link"])
@@ -127,7 +127,7 @@ class ContractTest(unittest.TestCase):
         self.assertAlmostEqual(message.links[0].distance, truth, delta=0.0011)
 
     def test_geometry(self):
-        """The visual geometry is taken where it is asked for, or the only one."""
+        """The visual geometry is used on request, or where there is no other."""
         visual = '<visual><geometry><sphere radius="%g"/></geometry></visual></link>'
         both = pt.urdf().replace("</collision></link>", "</collision>" + visual % 0.15, 1)
         only = '<link name="hat">' + visual % 0.05

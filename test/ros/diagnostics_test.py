@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""/diagnostics: what is counted, what is doubted, and that idle topics are not computed."""
+"""/diagnostics: counts and doubts; topics without subscribers are not computed."""
 
 import sys
 import unittest
@@ -14,6 +14,7 @@ from visualization_msgs.msg import MarkerArray
 ON_BALL = [[0.0, 0.0, 0.1]]
 BESIDE = [[0.0, 0.0, 0.3]]
 OK, WARN = 0, 1
+SKIN = "blind skin about the robot"
 
 
 class DiagnosticsTest(unittest.TestCase):
@@ -32,13 +33,8 @@ class DiagnosticsTest(unittest.TestCase):
         self.world.start_clouds()
         self.node.wait_for_status(status)
 
-    def value(self, status, key):
-        if status not in self.node.diagnostics:
-            return None
-        return {v.key: v.value for v in self.node.diagnostics[status].values}.get(key)
-
     def count(self, status, key):
-        return int(self.value(status, key) or 0)
+        return int(self.node.diagnostic(status, key, 0))
 
     def wait_for_input(self, level, words):
         def said():
@@ -48,7 +44,7 @@ class DiagnosticsTest(unittest.TestCase):
         self.node.wait_until(said, words)
 
     def test_idle_topics(self):
-        """With nobody on ~markers and ~filtered_cloud they are not computed."""
+        """~markers and ~filtered_cloud are not computed without subscribers."""
         self.start(ON_BALL + BESIDE)
         markers = lambda: self.count("query", "markers drawn")  # noqa: E731
         clouds = lambda: self.count("input cloud", "shown on ~filtered_cloud")  # noqa: E731
@@ -79,9 +75,9 @@ class DiagnosticsTest(unittest.TestCase):
         short = {"query/deadline": 1e-9, "query/tolerance": 0.0}
         self.start(ON_BALL + BESIDE, ProximityArray.DEGRADED, **short)
         self.node.wait_until(lambda: self.count("query", "deadlines missed") > 10, "deadlines")
-        self.assertEqual(self.value("input cloud", "blind skin about the robot"), "20.00 mm")
+        self.assertEqual(self.node.diagnostic("input cloud", SKIN), "20.00 mm")
         self.node.wait_until(
-            lambda: (self.value("input cloud", "rate") or "0").split()[0] > "0", "a rate"
+            lambda: self.node.diagnostic("input cloud", "rate", "0").split()[0] > "0", "a rate"
         )
 
     def test_doubts_of_the_self_filter(self):
@@ -101,7 +97,7 @@ class DiagnosticsTest(unittest.TestCase):
     def test_without_self_filter(self):
         self.start(BESIDE, self_filter=False)
         self.wait_for_input(OK, "OK")
-        self.assertIsNone(self.value("input cloud", "blind skin about the robot"))
+        self.assertIsNone(self.node.diagnostic("input cloud", SKIN, None))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pose_source joint_states: truth by forward kinematics, publishers of a part, late and wrong ones."""
+"""pose_source joint_states: truth by forward kinematics; partial, late and wrong messages."""
 
 import os
 import subprocess
@@ -34,7 +34,7 @@ ARM = """<robot name="arm">
 
 
 def arm_poses(turn, slide):
-    """X_BL by link."""
+    """Returns X_BL by link."""
     column = pt.transform((0, 0, 0.5), angle=turn)
     ball = column @ pt.transform((slide, 0, 0))
     return {
@@ -45,7 +45,7 @@ def arm_poses(turn, slide):
 
 
 def arm_jacobians(turn, slide):
-    """Of the links' origins in base, by link; columns turn, slide."""
+    """Returns the Jacobians of the links' origins in base, by link; columns turn, slide."""
     out = np.array([np.cos(turn), np.sin(turn), 0.0])  # the way that the slide goes
     left = np.array([-np.sin(turn), np.cos(turn), 0.0])
 
@@ -93,14 +93,14 @@ class JointStatesTest(unittest.TestCase):
         return self.node
 
     def send(self, *joints):
-        """A publisher of some joints, with their motion or standing still at `self.still`."""
+        """Publishes some joints, in motion or standing still at `self.still`."""
         stamp = rospy.Time.now()
         q = self.still or motion(stamp.to_sec())
         self.publisher.publish(joint_state({name: q[name] for name in joints}, stamp))
         return stamp
 
     def test_parts(self):
-        """Several publishers; one is missing, late, wrong; all stop, and come back."""
+        """Several publishers, of which one is missing, late or wrong; all stop and come back."""
         node = self.start(pose_timeout=0.4, max_distance=2.0)
         still = {"turn": 0.3, "slide": 0.5}
         X, points = arm_poses(**still), np.array([[0.6, 0.6, 0.6]])  # in base
@@ -131,7 +131,7 @@ class JointStatesTest(unittest.TestCase):
 
         truth_of_ball = pt.link(message, "ball_link").distance
 
-        # What is wrong costs nothing that is known, and is said.
+        # Wrong messages are reported and change nothing that is known.
         wrong = {
             "1 names and 2 positions": lambda: JointState(name=["turn"], position=[1.0, 2.0]),
             "'turn' is NaN": lambda: joint_state({"turn": np.nan}),
@@ -153,10 +153,10 @@ class JointStatesTest(unittest.TestCase):
                 if "limits" not in words:  # that one is used all the same
                     self.assertAlmostEqual(pt.link(m, "ball_link").distance, truth_of_ball, 5)
 
-        # Efforts alone are no positions.
+        # A message with efforts alone holds no positions.
         self.publisher.publish(JointState(name=["turn"], effort=[1.0]))
 
-        # One stops: its links are UNKNOWN, at the rate of the others.
+        # One publisher stops: its links are UNKNOWN, at the rate of the others.
         slide.paused = True
         message = node.wait_for_status(ProximityArray.NO_POSE, "the newest position of joint 'slide'")
         self.assertTrue(pt.all_unknown(message))
@@ -167,13 +167,11 @@ class JointStatesTest(unittest.TestCase):
         self.assertEqual(node.messages[-1].status, ProximityArray.NO_POSE)
         turn.paused = slide.paused = False
         node.wait_for_status(ProximityArray.OK)
-        pose = node.diagnostics["pose"]
-        values = {v.key: v.value for v in pose.values}
-        self.assertEqual(values["topic"], self.namespace + "/joint_states")
-        self.assertGreater(int(values["joint states used"]), 100)
+        self.assertEqual(node.diagnostic("pose", "topic"), self.namespace + "/joint_states")
+        self.assertGreater(int(node.diagnostic("pose", "joint states used")), 100)
 
-    def test_out_of_reach(self):
-        """What no link gets near is dropped, and missed by a joint that leaves its limits."""
+    def test_outside_region_of_interest(self):
+        """Points that no link can come near are dropped; a joint outside its limits misses them."""
         node = self.start(max_range=9.0, self_filter=False)
         seen = np.array([[0.6, 0.6, 0.6], [4.9, 0.0, 0.5]])  # in base, from which the box gets 2.8 m
 
@@ -183,22 +181,21 @@ class JointStatesTest(unittest.TestCase):
             self.world.points = pt.apply(pt.inverse(X["camera"]), seen)
 
         def dropped():
-            values = node.diagnostics["input cloud"].values if node.diagnostics else []
-            return {v.key: v.value for v in values}.get("points out of reach")
+            return node.diagnostic("input cloud", "points outside the region of interest")
 
         stand(0.5)
         self.world.repeat(50, lambda: self.send("turn", "slide"))
         self.world.start_clouds()
         message = node.wait_for_status(ProximityArray.OK)
         self.assertEqual(message.sources[0].points_used, 2)
-        node.wait_until(lambda: dropped() == "1", "a point out of reach")
+        node.wait_until(lambda: dropped() == "1", "a point outside the region of interest")
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
 
         stand(3.4)  # at the far point, but for 1.4 m
         message = node.wait_for_status(ProximityArray.DEGRADED, "farther out than the limits")
         node.wait_for(lambda m: pt.all_unknown(m), "nothing known")
 
-        # Who looks at the cloud sees it whole, and so do the links.
+        # While somebody subscribes to the cloud, neither it nor the links' view is cropped.
         clouds = []
         node.subscribe("filtered_cloud", PointCloud2, clouds.append)
         message = node.wait_for_status(ProximityArray.OK)
@@ -226,7 +223,7 @@ class JointStatesTest(unittest.TestCase):
 
         node = self.start(fixed_frame="world", max_distance=3.0, min_range=0.0)
         self.world.poses["base"] = ("world", lambda t: X_WB(t))
-        # Somebody else's idea of a frame that is computed here is not listened to.
+        # Transforms from elsewhere of a frame that is computed here are ignored.
         self.world.poses["ball_link"] = ("column", pt.transform((7, 7, 7)))
         self.world.start_tf(40)
         self.world.repeat(100, lambda: self.send("turn", "slide"))
@@ -268,7 +265,7 @@ class JointStatesTest(unittest.TestCase):
         self.assertEqual(stamps, sorted(stamps))
 
     def test_joint_repulsion(self):
-        """Efforts of moving joints, a mimic among them; what is not known is NaN, with a reason."""
+        """Efforts of moving joints, a mimic among them; unknown efforts are NaN, with a reason."""
         node = self.start(max_distance=2.0)
         node.wait_for_status(ProximityArray.NO_CLOUD)
         publisher = self.world.cloud_publisher
@@ -279,7 +276,7 @@ class JointStatesTest(unittest.TestCase):
         check = pt.check_joint_repulsion(self, node, lambda t: arm_jacobians(**motion(t)))
         self.assertEqual(check.joints, ["turn", "slide"])
 
-        # Links that are not known leave nothing to say of the joints that move them.
+        # The efforts of joints that move unknown links are unknown.
         received = []
         node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
         joints.stop()
@@ -288,7 +285,7 @@ class JointStatesTest(unittest.TestCase):
         self.assertNotEqual(received[-1].status_text, "")
 
     def test_joint_repulsion_from_tf(self):
-        """The same from link poses alone; a joint whose axis tf does not tell is NaN."""
+        """The same from link poses alone; the effort of a joint whose axis is not in tf is NaN."""
         node = self.start(max_distance=2.0, pose_source="tf")
         still = {"turn": 0.3, "slide": 0.5}
         X = arm_poses(**still)
@@ -303,7 +300,7 @@ class JointStatesTest(unittest.TestCase):
         node.subscribe("joint_repulsion", pt.JointRepulsion, received.append)
         node.wait_until(lambda: received and received[-1].status != ProximityArray.OK, "a reason")
         self.assertEqual(received[-1].status, ProximityArray.NO_POSE)
-        self.assertIn("where link 'column' is is not known", received[-1].status_text)
+        self.assertIn("the pose of link 'column' is not known", received[-1].status_text)
         self.assertTrue(np.isnan(received[-1].effort).all())
 
         self.world.poses["column"] = ("base", pt.transform((0, 0, 0.5), angle=still["turn"]))
@@ -311,7 +308,7 @@ class JointStatesTest(unittest.TestCase):
         pt.check_joint_repulsion(self, node, lambda t: arm_jacobians(**still))
 
     def test_floating(self):
-        """A floating joint's pose comes from tf, and is said to be missing where it is not there."""
+        """A floating joint's pose comes from tf, and is reported when it is missing."""
         node = self.start(pt.urdf())
         self.world.points = np.array([[0.0, 0.0, 0.3]])
         self.world.start_clouds()
@@ -321,7 +318,7 @@ class JointStatesTest(unittest.TestCase):
         self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
 
     def test_faulty_mimic(self):
-        """Kinematics that cannot be: said, nothing is known."""
+        """Impossible kinematics are reported, and nothing is known."""
         node = self.start(ARM.replace('mimic joint="slide"', 'mimic joint="silde"'))
         self.world.points = np.array([[0.6, 0.6, 0.6]])
         self.world.start_clouds()

@@ -29,7 +29,7 @@ def scan(ranges, stamp=None, frame="camera", **members):
 
 
 def endpoints(message):
-    """Of the beams, in the laser's frame."""
+    """Returns the beams' end points in the laser's frame."""
     angles = message.angle_min + message.angle_increment * np.arange(len(message.ranges))
     ranges = np.array(message.ranges)
     return np.stack([ranges * np.cos(angles), ranges * np.sin(angles), 0 * angles], axis=1)
@@ -43,7 +43,7 @@ def wall():
     return ranges
 
 
-# What makes a scan malformed, and a word of the message.
+# Changes that make a scan malformed, and a word of the message.
 MALFORMED = [
     ({"angle_increment": 0.0}, "angle_increment is 0"),
     ({"angle_increment": float("nan")}, "angle_increment is nan"),
@@ -100,7 +100,7 @@ class LaserScanTest(unittest.TestCase):
             self.assertEqual(pt.link(answer, name).source, "laser")
 
     def test_distances_and_silence(self):
-        # Which of two it says depends on whether it has met this test's publisher yet.
+        # There are two texts, before and after the node has connected to this test's publisher.
         words = re.compile("'laser'.*(sensor_msgs/LaserScan|there is a publisher)")
         message = self.node.wait_for(
             lambda m: m.status == ProximityArray.NO_CLOUD and words.search(m.status_text),
@@ -114,7 +114,7 @@ class LaserScanTest(unittest.TestCase):
 
     def test_what_scans_see(self):
         self.check_wall()
-        # NaN, too near, and what drivers write where nothing came back: nothing is known.
+        # NaN, too near, and the values that drivers write where nothing came back: nothing is known.
         for blind in (float("nan"), -float("inf"), 0.0):
             with self.subTest(blind), self.stream(lambda blind=blind: scan([blind] * 5)):
                 message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "newest scan is NaN")
@@ -145,7 +145,7 @@ class LaserScanTest(unittest.TestCase):
         self.check_wall()
 
     def test_moving_sensor(self):
-        """Each beam counts from where the sensor was at the beam's own time."""
+        """Each beam starts at the sensor's pose at the beam's own time."""
 
         # To and fro at an even 0.3 m/s. Between the turning points, what tf interpolates is exact,
         # however far apart the transforms are that reach it.
@@ -155,7 +155,7 @@ class LaserScanTest(unittest.TestCase):
             phase = t % (2 * turn)
             return pt.transform((-0.9 + speed * min(phase, 2 * turn - phase), 0.0, 0.0))
 
-        # Its transforms come in late and only up to now: the scan has to wait for its last beam.
+        # The transforms come in late and up to now at most, so the scan has to wait for its last beam.
         self.world.poses["moving"] = ("base", X_base_moving)
         point = 0.35  # [m] on the x axis: 0.25 m from the ball
 

@@ -45,7 +45,7 @@ class NodeletTest(unittest.TestCase):
         nodelet.wait_for_status(ProximityArray.OK)
         nodelet.wait_until(lambda: len(nodelet.diagnostics) >= 4, "diagnostics")
 
-        # Another one, wrongly configured, does not get in, and harms nobody.
+        # A second nodelet with wrong parameters is refused and does no harm.
         wrong = ProximityNodelet("/wrong", {"rate": "fast"}, pt.urdf(), listen=False)
         self.assertNotEqual(wrong.process.wait(pt.TIMEOUT), 0)
         wrong.stop()

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The noise filter: lone points go, surfaces stay, and a cloud of noise is no clear view."""
+"""The noise filter drops lone points and keeps surfaces; a cloud of noise is no clear view."""
 
 import sys
 import unittest
@@ -46,18 +46,14 @@ class NoiseFilterTest(unittest.TestCase):
         self.start(**parameters)
         self.check(0.4, len(PATCH))
         self.node.wait_until(
-            lambda: "input cloud" in self.node.diagnostics
-            and {v.key: v.value for v in self.node.diagnostics["input cloud"].values}.get(
-                "points taken for noise"
-            )
-            == "1",
+            lambda: self.node.diagnostic("input cloud", "points taken for noise") == "1",
             "the count",
         )
-        # As many points as it takes are no noise.
+        # Points with enough neighbors are no noise.
         self.world.points = LONE + 0.002 * np.arange(5)[:, None]
         message = self.node.wait_for(lambda m: m.sources[0].points_used == 5, "five points")
         self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.NEAR)
-        # Nothing but noise: nothing is known.
+        # A cloud of noise alone: nothing is known.
         self.world.points = np.vstack([LONE, nan])
         message = self.node.wait_for_status(ProximityArray.NO_CLOUD)
         self.assertTrue(pt.all_unknown(message))

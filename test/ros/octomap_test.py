@@ -124,7 +124,7 @@ def ball_truth(boxes, X_map_ball):
 
 
 def box_truth(boxes, p_map_box):
-    """Of box_link, when its axes are the map's."""
+    """Returns the distance of box_link from the leaves when its axes are the map's."""
     low, high = (p_map_box + pt.BOX_OFFSET + s * pt.BOX_SIZE / 2 for s in (-1, 1))
     away = np.maximum(0, np.maximum(boxes[:, 0] - high, low - boxes[:, 1]))
     return np.linalg.norm(away, axis=1).min()
@@ -224,7 +224,7 @@ class OctomapTest(unittest.TestCase):
         self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map, model reloaded")
 
     def test_driving(self):
-        """The map is where tf says it is at the instant of each answer, not when it was sent."""
+        """The map's pose is that in tf at the instant of each answer, not at its own stamp."""
 
         def X_base_map(t):  # turns evenly: what tf interpolates is exact, however rarely it comes
             return pt.transform((0.1, 0.2, 0), (0, 0, 1), 0.5 * t)
@@ -244,13 +244,13 @@ class OctomapTest(unittest.TestCase):
         print("driving: largest error %.3f mm" % (1e3 * np.abs(errors).max()))
         self.assertLess(np.abs(errors).max(), 1e-4)
 
-        # Lost: the map is somewhere, but not known where.
+        # The transform is lost, so the map's pose is not known.
         del self.world.poses["map"]
         m = node.wait_for_status(ProximityArray.NO_CLOUD, "from 'map' to 'base'")
         self.assertTrue(pt.all_unknown(m))
 
     def test_timeout(self):
-        """As every source, a map is stale after half a second unless told otherwise."""
+        """Like every source, a map is stale after half a second by default."""
         node = self.start({"room": self.topic()})
         self.publisher.publish(message(Tree()))
         m = node.wait_for_status(ProximityArray.STALE_CLOUD, "its timeout should be .inf")
@@ -317,7 +317,7 @@ class OctomapTest(unittest.TestCase):
                 self.node = None
 
     def test_damaged_files(self):
-        """A file that is no map: said, and what is not required does not keep the others back."""
+        """A file that is no map is reported; a source that is not required does not hold back others."""
         whole = Tree().file(True)
         sources = {"camera": {"topic": "cloud", "type": "sensor_msgs/PointCloud2"}}
         damaged = {
@@ -361,7 +361,7 @@ class OctomapTest(unittest.TestCase):
         self.assertIn("cut.bt", m.status_text)
 
     def test_map_and_cloud(self):
-        """The nearest of both, and each by its name."""
+        """Each answer names the nearer of two sources."""
         sources = {"camera": {"topic": "cloud"}, "room": self.topic(timeout=float("inf"))}
         node = self.start(sources)
         tree = Tree()

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Wrong parameters: the node does not start, and says which, why, and what is allowed."""
+"""Wrong parameters: the node does not start, and names each one, the reason and the range."""
 
+import glob
 import os
 import re
 import sys
@@ -11,7 +12,7 @@ import rospy
 import rosparam
 import yaml
 
-# Parameters, and words of the message. Several mistakes in one start are all told.
+# Parameters, and words of the message. All mistakes of one start are reported.
 WRONG = [
     (
         {
@@ -115,7 +116,7 @@ class ParametersTest(unittest.TestCase):
                     self.assertIn(word, log)
 
     def test_unknown(self):
-        """A misspelt name is told, with the nearest one; the node runs."""
+        """A misspelt name is reported with the nearest one, and the node runs."""
         parameters = {
             "max_distence": 0.5,
             "query/tolerence": 0.1,
@@ -133,7 +134,7 @@ class ParametersTest(unittest.TestCase):
         self.assertEqual(node.stop(), 0)
 
     def test_config_files(self):
-        """The files of the package are valid, and name nothing unknown."""
+        """The package's files are valid and hold no unknown names."""
         folder = os.path.join(os.path.dirname(__file__), "..", "..", "config")
         for name in ("proximity.yaml", "demo.yaml", "camera_and_laser.yaml"):
             with self.subTest(name):
@@ -145,12 +146,14 @@ class ParametersTest(unittest.TestCase):
                 self.assertEqual(node.stop(), 0)
 
     def test_every_parameter_is_explained(self):
-        """In config/proximity.yaml, whose example of sources is valid as it stands."""
+        """config/proximity.yaml explains every parameter, and its example of sources is valid."""
         package = os.path.join(os.path.dirname(__file__), "..", "..")
         with open(os.path.join(package, "config", "proximity.yaml")) as f:
             text = f.read()
-        with open(os.path.join(package, "src", "ros", "parameters.cpp")) as f:
-            read = re.findall(r'read(?:_choice)?\((?:prefix \+ )?"([a-z_/]+)"', f.read())
+        read = []
+        for path in glob.glob(os.path.join(package, "src", "ros", "parameters", "*.cpp")):
+            with open(path) as f:
+                read += re.findall(r'read(?:_choice)?\((?:prefix \+ )?"([a-z_/]+)"', f.read())
         self.assertGreater(len(read), 30)
         for name in read:
             self.assertRegex(text, r"\b%s:" % name.split("/")[-1], name)

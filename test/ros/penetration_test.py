@@ -88,11 +88,7 @@ class PenetrationTest(unittest.TestCase):
         )
         self.assertAlmostEqual(wrench(message)[:3] @ out / forces[-1], 3.0, 1)
         node.wait_until(
-            lambda: "model" in node.diagnostics
-            and any(
-                v.key == "contact volumes" and v.value == "ready"
-                for v in node.diagnostics["model"].values
-            ),
+            lambda: node.diagnostic("model", "contact volumes") == "ready",
             "the volumes in the diagnostics",
         )
 
@@ -102,11 +98,7 @@ class PenetrationTest(unittest.TestCase):
         message = self.move(0.03, known=False)
         self.assertTrue(np.isnan(wrench(message)).all())
         node.wait_until(
-            lambda: "model" in node.diagnostics
-            and any(
-                v.key == "contact volumes" and "penetration/enabled" in v.value
-                for v in node.diagnostics["model"].values
-            ),
+            lambda: "penetration/enabled" in node.diagnostic("model", "contact volumes"),
             "why, in the diagnostics",
         )
 

@@ -135,7 +135,7 @@ class Repeater:
 
 
 class World:
-    """What is around a node: moving links in its /tf, a static camera, and a cloud."""
+    """The surroundings of a node: moving links in its /tf, a static camera, and a cloud."""
 
     def __init__(self, namespace, X_BC=np.eye(4), static=True):
         self.namespace = namespace
@@ -194,9 +194,9 @@ def find_program(package, name):
 
 
 class ProximityNode:
-    """proximity_node in a namespace, as a process of the test, and what it publishes."""
+    """Runs proximity_node in a namespace as a process of the test, and collects its messages."""
 
-    # What to run instead of the node, e.g. to load the nodelet.
+    # Command to run instead of the node, e.g. to load the nodelet.
     command = None
 
     def __init__(self, namespace, parameters=None, urdf_text=None, listen=True):
@@ -229,7 +229,7 @@ class ProximityNode:
             stdout=self._log,
             stderr=subprocess.STDOUT,
         )
-        atexit.register(self.process.kill)  # a test that fails leaves nothing behind
+        atexit.register(self.process.kill)  # no process stays when a test fails
 
     def subscribe(self, topic, kind, callback):
         subscriber = rospy.Subscriber(self.name + "/" + topic, kind, callback, queue_size=200)
@@ -242,7 +242,7 @@ class ProximityNode:
             self._condition.notify_all()
 
     def _on_diagnostics(self, raw):
-        # Not every distribution has diagnostic_msgs for Python; the connection tells its definition.
+        # Not every distribution has diagnostic_msgs for Python; the connection header has its definition.
         header = raw._connection_header
         kinds = genpy.dynamic.generate_dynamic(header["type"], header["message_definition"])
         message = kinds[header["type"]]().deserialize(raw._buff)
@@ -253,7 +253,7 @@ class ProximityNode:
             self._condition.notify_all()
 
     def wait_for(self, condition, what, timeout=TIMEOUT, start=None):
-        """The first message, from now (or from index `start`) on, for which condition holds."""
+        """Returns the first message, from now or index `start` on, for which the condition holds."""
         deadline = time.monotonic() + timeout
         with self._condition:
             i = len(self.messages) if start is None else start
@@ -279,8 +279,14 @@ class ProximityNode:
             **kwargs
         )
 
+    def diagnostic(self, status, key, default=""):
+        """Returns a value of the newest diagnostics; `default` where there is none."""
+        if status not in self.diagnostics:
+            return default
+        return {v.key: v.value for v in self.diagnostics[status].values}.get(key, default)
+
     def wait_until(self, condition, what, timeout=TIMEOUT):
-        """Waits for anything that is not in a ProximityArray."""
+        """Waits for a condition on anything but a ProximityArray."""
         wait_until(condition, what, timeout, self._condition)
 
     def reload(self):
@@ -310,7 +316,7 @@ class ProximityNode:
 
 
 def repeated_tf(line):
-    """What tf2 says for each transform while the clock stands still."""
+    """Whether a line is the warning that tf2 repeats while the clock stands still."""
     return "TF_REPEATED_DATA" in line or "tf2/src/buffer_core.cpp" in line
 
 
@@ -338,12 +344,12 @@ def vector(v):
 
 
 def closing_rates(one):
-    """The parts of the closing speed and what they lead to."""
+    """The parts of the closing speed, and the time to contact."""
     return np.array([one.closing_speed_robot, one.closing_speed_obstacles, one.time_to_contact])
 
 
 def check_joint_repulsion(test, node, jacobians, count=20):
-    """~joint_repulsion against J^T of what ~proximity says at the same stamp.
+    """Checks ~joint_repulsion against J^T times the repulsion in ~proximity with the same stamp.
 
     jacobians(stamp): by link the 6 x n Jacobian of its origin, columns as the message's joints.
     """
@@ -384,7 +390,7 @@ def all_unknown(message):
 
 
 def check_invariants(test, message, max_distance=1.0):
-    """What holds for every ProximityArray whatever is missing."""
+    """Checks what holds for every ProximityArray, whatever is missing."""
     for one in message.links:
         p_link, p_obstacle = vector(one.point_on_link), vector(one.point_on_obstacle)
         direction, local = vector(one.direction), vector(one.point_on_link_local)
@@ -420,7 +426,7 @@ def check_invariants(test, message, max_distance=1.0):
             test.assertNotEqual(one.source, "")
             if one.state == LinkProximity.NEAR:
                 test.assertGreaterEqual(one.distance, 0.0)
-                # Not known where the query left open whether they overlap.
+                # The wrench is unknown where the query left open whether they overlap.
                 left_open = one.lower_bound < 0 and np.isnan(wrench).all()
                 test.assertTrue(left_open or not wrench.any())
             else:  # all or nothing is known

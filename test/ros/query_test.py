@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""~query: truth for stated configurations, what is left out, what is wrong, and the cycle beside it."""
+"""~query: truth for stated configurations, omitted joints, wrong requests, and the cycle beside it."""
 
 import sys
 import time
@@ -68,7 +68,7 @@ class QueryTest(unittest.TestCase):
             self.assertTrue(np.isnan(one.closing_speed))
 
     def check_all(self):
-        """What holds with both sources of poses."""
+        """Checks what holds with both sources of poses."""
         rng = np.random.default_rng(4)
         asked = [
             {"turn": turn, "slide": slide}
@@ -83,16 +83,16 @@ class QueryTest(unittest.TestCase):
             self.assertEqual(result.header.frame_id, "base")
             self.assertEqual(result.sources[0].stamp, result.cloud_stamp)
 
-        # A joint that is left out is where it is now.
+        # A joint that is left out keeps its present position.
         self.check(self.ask({"turn": 1.0}).results[0], {"turn": 1.0, "slide": NOW["slide"]})
         self.check(self.ask({}).results[0], NOW)
-        # A position of a mimic joint is not listened to, as with joint states.
+        # The position of a mimic joint is ignored, as with joint states.
         result = self.ask({"turn": 1.0, "slide": 0.1, "follow": 3.0}).results[0]
         self.check(result, {"turn": 1.0, "slide": 0.1})
         # Some links.
         answer = self.ask(NOW, links=["box_link"])
         self.check(answer.results[0], NOW, ["box_link"])
-        # Nothing asked, nothing answered.
+        # An empty request gets an empty answer.
         answer = self.ask()
         self.assertTrue(answer.success)
         self.assertEqual(answer.results, [])
@@ -175,7 +175,7 @@ class QueryTest(unittest.TestCase):
         self.assertGreater(answered, 0.5 * 100 * took)
         self.assertEqual({m.status for m in self.node.messages[begin:]}, {ProximityArray.OK})
 
-        # No obstacles: said in each result, and nothing looks free.
+        # Without obstacles each result says so, and nothing looks free.
         self.clouds.paused = True
         self.node.wait_for_status(ProximityArray.STALE_CLOUD)
         answer = self.ask(NOW)
@@ -191,7 +191,7 @@ class QueryTest(unittest.TestCase):
         self.node.wait_for(
             lambda m: m.status == ProximityArray.NO_POSE and m.sources[0].status == 0, "the cloud"
         )
-        # Nothing is known now, but all that is needed is stated.
+        # Nothing is known now, but the request states everything that is needed.
         self.check(self.ask(NOW).results[0], NOW)
         answer = self.ask({"slide": 0.2})
         self.assertEqual(answer.results[0].status, ProximityArray.NO_POSE)

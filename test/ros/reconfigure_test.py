@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""dynamic_reconfigure: what may change while the node runs, at once and within its ranges."""
+"""dynamic_reconfigure: live parameters change at once and stay within their ranges."""
 
 import sys
 import unittest
@@ -36,7 +36,7 @@ class ReconfigureTest(unittest.TestCase):
 
     def test_groups(self):
         query, repulsion = self.client("query"), self.client("repulsion")
-        # What was set at the start, and the defaults.
+        # The values are those set at the start, and the defaults.
         pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
         self.assertAlmostEqual(query.get_configuration()["margin"], 0.02)
         self.assertAlmostEqual(query.get_configuration()["tolerance"], 0.001)
@@ -53,7 +53,7 @@ class ReconfigureTest(unittest.TestCase):
         answer = repulsion.update_configuration({"gain": 0.0})
         self.ball("no gain", lambda ball: not pt.vector(ball.repulsion).any())
 
-        # Somebody else's change is shown, and not written over.
+        # A change by another program is shown and not overwritten.
         rospy.set_param(self.node.name + "/query/margin", 0.1)
         pt.wait_until(lambda: query.get_configuration()["margin"] == 0.1, "the update")
         query.update_configuration({"deadline": 0.5})
@@ -61,7 +61,7 @@ class ReconfigureTest(unittest.TestCase):
         self.ball("the other margin", lambda ball: abs(ball.lower_bound - 0.1) < 1e-4)
 
     def test_refusals(self):
-        """All of a request or nothing of it, and the answer says what holds."""
+        """A request takes effect entirely or not at all, and the response holds the values in use."""
         query = self.client("query")
         pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
         service = query._set_service  # the client itself would leave these out

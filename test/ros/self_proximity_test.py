@@ -64,7 +64,7 @@ class SelfProximityTest(unittest.TestCase):
                 self.assertLessEqual(one.lower_bound, truth + 1e-6)
                 self.assertGreater(one.lower_bound, truth - 0.007)
                 self.check_vectors(one)
-            # The ball should go along the slide.
+            # The direction of the ball is along the slide.
             expected = [np.cos(0.7), np.sin(0.7), 0.0]
             one = pt.link(message, "ball_link")
             np.testing.assert_allclose(pt.vector(one.direction), expected, atol=1e-3)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What is said when clouds or poses are missing, late, or come back: status, text, states."""
+"""Status, text and states when clouds or poses are missing, late, or come back."""
 
 import sys
 import unittest
@@ -58,7 +58,7 @@ class StatusTest(unittest.TestCase):
         self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
         node.wait_until(lambda: not np.isnan(smallest[-1]), "a value on ~min_distance")
 
-        # Until the timeout the last cloud is used, not a moment longer.
+        # The last cloud is used until the timeout, not a moment longer.
         clouds.paused = True
         begin = len(node.messages)
         message = node.wait_for_status(ProximityArray.STALE_CLOUD, "'cloud'")
@@ -100,18 +100,12 @@ class StatusTest(unittest.TestCase):
         # A cloud of the far future does not shut out those of now.
         repeater = self.world.repeat(20, lambda: send(0))
         node.wait_for_status(ProximityArray.OK)
-        # Nor does one without a stamp, nor one that is overtaken.
+        # A cloud without a stamp does not either, and neither does one that is overtaken.
         unstamped = pt.cloud([[0, 0, 0.15]], stamp=rospy.Time(0))
         self.world.cloud_publisher.publish(unstamped)
         other = self.world.repeat(20, lambda: send(-0.3))
         node.wait_until(
-            lambda: any(
-                int(value.value) > 5
-                for value in node.diagnostics["input cloud"].values
-                if value.key == "dropped: out of order"
-            )
-            if "input cloud" in node.diagnostics
-            else False,
+            lambda: int(node.diagnostic("input cloud", "dropped: out of order", 0)) > 5,
             "clouds out of order in the diagnostics",
         )
         message = node.wait_for_status(ProximityArray.OK)
@@ -178,7 +172,7 @@ class StatusTest(unittest.TestCase):
         self.assertIn("tf has 'left/ball_link'", message.status_text)
 
     def test_links_with_slashes(self):
-        """In front of a link's name it is not part of its frame, elsewhere it is."""
+        """A slash before a link's name is not part of its frame; a slash elsewhere is."""
         urdf = pt.urdf().replace("ball_link", "/ball_link").replace("box_link", "box/link")
         urdf = urdf.replace('"base"', '"/base"')
         self.world.poses["box/link"] = self.world.poses.pop("box_link")
@@ -219,7 +213,7 @@ class StatusTest(unittest.TestCase):
         node.wait_for(lambda m: len(node.messages) > begin + 150, "150 messages")
         late = [m for m in node.messages[begin:] if m.status != ProximityArray.OK]
         self.assertLess(len(late), 15, late[-1].status_text if late else "")
-        # Nor is it anything to warn of.
+        # The wait is no reason for a warning.
         node.diagnostics.pop("input cloud", None)
         node.wait_until(
             lambda: "input cloud" in node.diagnostics
@@ -228,7 +222,7 @@ class StatusTest(unittest.TestCase):
         )
 
     def test_rate(self):
-        """Each cycle is published, with nothing at all as with everything."""
+        """Every cycle is published, whatever is missing."""
         node = self.start(rate=50)
         first = node.wait_for(lambda m: True, "the first message", start=0)
         self.assertEqual(first.status, ProximityArray.MODEL_ERROR)
@@ -240,7 +234,7 @@ class StatusTest(unittest.TestCase):
             self.assertLess(rospy.get_time() - started, 4.0)
 
     def test_optional_and_required_sources(self):
-        """A required source without clouds: nothing is known. An optional one: left out."""
+        """A required source without clouds makes links UNKNOWN; an optional one is left out."""
         sources = {
             "front": {"topic": "front/points"},
             "rear": {"topic": "rear/points", "timeout": 0.3},

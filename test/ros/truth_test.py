@@ -18,7 +18,7 @@ BOX = pt.transform((-0.5, 0.3, 0.1), axis=(1.0, 0.0, 0.0), angle=-0.4)
 
 
 def cloud_around(rng, n=3000):
-    """Points in base that leave a little room around ball and box."""
+    """Points in base with a small gap around ball and box."""
     points = rng.uniform(-1.5, 1.5, (n, 3))
     free = np.ones(n, bool)
     for name, X in (("ball_link", BALL), ("box_link", BOX)):
@@ -49,7 +49,7 @@ class TruthTest(unittest.TestCase):
         return self.node
 
     def check_distances(self, message, points, X, tolerance=0.001):
-        """Against brute force over points in the message's frame; X: link poses in it."""
+        """Checks against brute force over points in the message's frame; X: link poses in it."""
         for name, X_FL in X.items():
             one = pt.link(message, name)
             every = pt.DISTANCE[name](pt.apply(pt.inverse(X_FL), points))
@@ -59,12 +59,12 @@ class TruthTest(unittest.TestCase):
             self.assertLessEqual(one.distance, truth + tolerance + 1e-5)
             self.assertLessEqual(one.lower_bound, truth + 1e-5)
             self.assertLessEqual(one.distance - one.lower_bound, tolerance + 1e-5)
-            # The witness on the obstacle is a point of the cloud, at that distance.
+            # The witness point on the obstacle is a point of the cloud, at that distance.
             witness = pt.vector(one.point_on_obstacle)
             nearest = np.linalg.norm(points - witness, axis=1).argmin()
             np.testing.assert_allclose(points[nearest], witness, atol=1e-5)
             self.assertAlmostEqual(every[nearest], one.distance, 5)
-            # The one on the link lies on its surface, and is the same in the link's frame.
+            # The witness point on the link lies on its surface, and is the same in the link's frame.
             local = pt.vector(one.point_on_link_local)
             self.assertAlmostEqual(pt.DISTANCE[name](local)[0], 0.0, 5)
             np.testing.assert_allclose(
@@ -99,7 +99,7 @@ class TruthTest(unittest.TestCase):
         )
 
     def test_deadline(self):
-        """Too short a deadline: said so, and the bounds hold all the same."""
+        """A deadline that is too short is reported, and the bounds hold all the same."""
         points = cloud_around(np.random.default_rng(4))
         node = self.start(points, **{"query/deadline": 1e-9, "query/tolerance": 0.0})
         message = node.wait_for_status(ProximityArray.DEGRADED, "deadline")
@@ -121,7 +121,7 @@ class TruthTest(unittest.TestCase):
         self.assertAlmostEqual(box.distance, -0.06, 5)
         # The nearest way out for the deepest point is -x of the link; the link goes the other way.
         np.testing.assert_allclose(pt.vector(box.direction), BOX[:3, 0], atol=1e-4)
-        # Its disjoint packing is made while the node answers: NaN until then.
+        # The disjoint packing is made while the node answers; the wrench is NaN until then.
         message = node.wait_for(
             lambda m: np.isfinite(pt.vector(pt.link(m, "box_link").penetration.force)).all(),
             "a contact force",
@@ -132,7 +132,7 @@ class TruthTest(unittest.TestCase):
         self.assertAlmostEqual(ball.distance, 0.15, 5)
         np.testing.assert_allclose(pt.vector(ball.direction), -BALL[:3, 0], atol=1e-4)
 
-        # Repulsion: along the direction, as long as configured, and changed while running.
+        # The repulsion is along the direction, has the configured length, and changes while running.
         expected = 1.0 - 0.15 / 0.3
         np.testing.assert_allclose(
             pt.vector(ball.repulsion), -expected * BALL[:3, 0], atol=0.02 * expected
@@ -142,7 +142,7 @@ class TruthTest(unittest.TestCase):
             lambda m: np.linalg.norm(pt.vector(pt.link(m, "ball_link").repulsion)) > 2.5 * expected,
             "three times the repulsion",
         )
-        # The query's, too; what is out of range is refused, and the last valid ones go on.
+        # Query parameters change too; values out of range are refused, and the last valid ones stay.
         rospy.set_param(node.name + "/query/margin", 0.07)
         node.wait_for(
             lambda m: abs(pt.link(m, "ball_link").lower_bound - 0.08) < 0.0011, "the margin"
@@ -232,7 +232,7 @@ class TruthTest(unittest.TestCase):
         self.assertEqual(pt.link(message, "box_link").state, LinkProximity.CLEAR)
 
     def test_moving_obstacle(self):
-        """What the cloud's change adds to the closing speed, from the clouds' own stamps."""
+        """The cloud's change adds to the closing speed, measured with the clouds' own stamps."""
         speed, turn = 0.1, 4.0
 
         def send():  # to and fro along y, 0.1 m/s
@@ -251,7 +251,7 @@ class TruthTest(unittest.TestCase):
             message = self.node.wait_for_status(ProximityArray.OK)
             one = pt.link(message, "ball_link")
             phase = message.cloud_stamp.to_sec() % turn
-            # From the cloud before, which may be late, to this one: within one way.
+            # The rate is measured from the cloud before, which may be late, within one pass of the motion.
             if not 1.0 < phase % (turn / 2) or np.isnan(one.closing_speed_obstacles):
                 continue
             checked += 1
@@ -268,7 +268,7 @@ class TruthTest(unittest.TestCase):
         box = rng.uniform(-0.5, 0.5, (500, 3)) * pt.BOX_SIZE + pt.BOX_OFFSET
         seen = pt.apply(BALL, [[0.0, 0.0, 0.2], [0.0, 0.25, 0.0]])
         points = np.vstack([pt.apply(BALL, shell), pt.apply(BOX, box), seen])
-        # Only the ball is monitored; the box is on the robot all the same.
+        # The ball alone is monitored; the box is part of the robot all the same.
         clouds = []
         node = self.start(points, links=["ball_link"], self_filter_padding=0.03, min_range=0.0)
         node.subscribe("filtered_cloud", PointCloud2, clouds.append)
@@ -333,7 +333,7 @@ class TruthTest(unittest.TestCase):
         node.wait_until(lambda: deleted == set(markers), "DELETE for every marker")
 
     def test_formats(self):
-        """float64, the other byte order, a frame with a slash give the same distances."""
+        """float64, the other byte order and a frame with a slash give the same distances."""
         points = np.random.default_rng(3).uniform(-1, 1, (200, 3)) + [0, 0, 3]
         points[0] = pt.apply(BALL, [[0.2, 0, 0]])[0]
         node = self.start(points, max_range=10.0)

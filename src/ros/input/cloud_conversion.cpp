@@ -45,8 +45,8 @@ sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros:
 
   std::uint8_t* out = message->data.data();
   const Eigen::Isometry3d& X_FO = snapshot.index.X_FO();
-  const PointBvh& points = snapshot.index.bvh();
   PointTile scratch;
+  const PointBvh& points = snapshot.index.bvh();
   for (std::size_t number = 0; number < points.tile_count(); ++number) {
     const PointTile& tile = points.tile(number, &scratch);
     for (int i = 0; i < tile.count; ++i) {

@@ -9,11 +9,11 @@
 
 namespace ist {
 
-/// Looks at a message's points without copying them; `raw` is valid as long as the message.
+/// Views a message's points without copying them; `raw` is valid as long as the message.
 /// @returns empty, or one sentence with the faulty field and values
 std::string view_cloud(const sensor_msgs::PointCloud2& message, RawCloud* raw);
 
-/// What queries see of a cloud, as x, y, z in float32 [m] in the fixed frame.
+/// Makes a message of the points that queries see: x, y, z in float32 [m] in the fixed frame.
 sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros::Time& stamp,
                                        const std::string& fixed_frame);
 

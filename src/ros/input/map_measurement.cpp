@@ -13,7 +13,7 @@ namespace {
 
 namespace ser = ros::serialization;
 
-// A map stays in a frame of its own, so it waits for no transform: the query asks where it is.
+// A map stays in its own frame, so it waits for no transform; queries look its pose up.
 class MapMeasurement : public Measurement {
  public:
   MapMeasurement(const std_msgs::Header& header, const Octree& octree,
@@ -44,13 +44,13 @@ class MapMeasurement : public Measurement {
   double took_;
 };
 
-Received made(const std_msgs::Header& header, const Octree& octree,
-              std::chrono::steady_clock::time_point begin) {
+Received make_received(const std_msgs::Header& header, const Octree& octree,
+                       std::chrono::steady_clock::time_point begin) {
   return {header, "", std::make_shared<MapMeasurement>(header, octree, begin)};
 }
 
-// Header header, bool binary, string id, float64 resolution, int8[] data. Throws where the bytes
-// end too early.
+// Reads Header header, bool binary, string id, float64 resolution, int8[] data. Throws where the
+// bytes end too early.
 void parse(ser::IStream* stream, std_msgs::Header* header, OctreeData* data) {
   std::uint8_t is_binary = 0;
   std::uint32_t size = 0;
@@ -70,7 +70,7 @@ Received read_map(const topic_tools::ShapeShifter& message) {
   const auto begin = std::chrono::steady_clock::now();
   Received received;
   if (message.getDataType() != message_type(SourceType::kMap)) {
-    // Without a header to tell the stamp.
+    // The header of an unknown type cannot be read.
     received.header.stamp = ros::Time::now();
     received.header.frame_id = "?";
     received.fault =
@@ -86,8 +86,8 @@ Received read_map(const topic_tools::ShapeShifter& message) {
     ser::IStream in(bytes.data(), message.size());
     parse(&in, &received.header, &data);
     received.fault = read_octree(data, &octree);
-    if (received.fault.empty()) return made(received.header, octree, begin);
-  } catch (const std::exception& error) {  // a stream that ends, or memory
+    if (received.fault.empty()) return make_received(received.header, octree, begin);
+  } catch (const std::exception& error) {  // the stream ends too early, or there is no memory
     received.fault = error.what();
   }
   received.fault = "malformed map: " + received.fault;
@@ -101,7 +101,7 @@ Received read_map_file(const std::string& path, const std::string& frame_id) {
   Octree octree;
   try {
     received.fault = read_octree_file(path, &octree);
-    if (received.fault.empty()) return made(received.header, octree, begin);
+    if (received.fault.empty()) return make_received(received.header, octree, begin);
   } catch (const std::exception& error) {
     received.fault = "map file '" + path + "' cannot be read: " + error.what() + ".";
   }

@@ -8,10 +8,10 @@
 
 namespace ist {
 
-/// An octomap_msgs/Octomap, read from its bytes: that package is not needed.
+/// Reads an octomap_msgs/Octomap from its bytes, so that octomap_msgs is not needed.
 Received read_map(const topic_tools::ShapeShifter& message);
 
-/// A map file. Its header has no stamp.
+/// Reads a map file. The header of the result has no stamp.
 Received read_map_file(const std::string& path, const std::string& frame_id);
 
 }  // namespace ist

@@ -14,12 +14,12 @@
 namespace ist {
 namespace {
 
-// A short queue: while one cloud is ingested, only the newest of the others is worth keeping.
-constexpr std::uint32_t kQueue = 2;
+// The queue is short: while one cloud is ingested, only the newest other one is worth keeping.
+constexpr std::uint32_t kQueueSize = 2;
 
 class CloudMeasurement : public Measurement {
  public:
-  /// @param noise  null: none
+  /// @param noise  null: no noise filter
   CloudMeasurement(const sensor_msgs::PointCloud2ConstPtr& message, const RawCloud& raw,
                    std::shared_ptr<NoiseFilter> noise)
       : Measurement(message->header), raw_(raw), noise_(std::move(noise)) {
@@ -38,7 +38,7 @@ class CloudMeasurement : public Measurement {
   }
 
  private:
-  RawCloud raw_;  ///< views the message, and keeps it
+  RawCloud raw_;  ///< views the message and keeps it alive
   std::shared_ptr<NoiseFilter> noise_;
 };
 
@@ -55,7 +55,7 @@ ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
                              const Receiver& receive, const Read& read) {
   const boost::function<void(const boost::shared_ptr<const Message>&)> callback =
       [receive, read](const boost::shared_ptr<const Message>& message) { receive(read(message)); };
-  return nh->subscribe<Message>(config.topic, kQueue, callback, {},
+  return nh->subscribe<Message>(config.topic, kQueueSize, callback, {},
                                 ros::TransportHints().tcpNoDelay());
 }
 
@@ -63,7 +63,7 @@ ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
 
 IngestConfig ingest_config(const SourceConfig& config) {
   IngestConfig ingest = config.ingest;
-  if (config.type == SourceType::kScan) {  // each beam knows its own range
+  if (config.type == SourceType::kScan) {  // read_scan() applies the limits to each beam
     ingest.min_range = 0.0;
     ingest.max_range = std::numeric_limits<double>::infinity();
   }

@@ -12,20 +12,21 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/tree/posed_solid.h"
-#include "ros/parameters/parameters.h"
+#include "ros/parameters/source_config.h"
 
 namespace ist {
 
-/// Where sensor and robot were while something was measured.
+/// The poses of sensor and robot while something was measured.
 struct Placement {
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();      ///< sensor at the first instant
-  Eigen::Isometry3d X_FS_end = Eigen::Isometry3d::Identity();  ///< and at the last one
-  std::vector<PosedSolid> robot;  ///< links of known pose at all instants, for the self-filter
-  std::vector<bool> known;        ///< by link: at every instant; empty: no self-filter
+  Eigen::Isometry3d X_FS_end = Eigen::Isometry3d::Identity();  ///< sensor at the last instant
+  /// For the self-filter: links whose poses are known at all instants, at each of the instants.
+  std::vector<PosedSolid> robot;
+  std::vector<bool> known;  ///< by link: at every instant; empty: no self-filter
 };
 
-/// One message, checked, whatever its type: what a source has to know to wait for its transforms,
-/// and how it becomes a snapshot. Immutable; keeps the message alive.
+/// One checked message, whatever its type: it knows the instants whose transforms are needed, and
+/// turns itself into a snapshot. Immutable; it keeps the message alive.
 class Measurement {
  public:
   explicit Measurement(const std_msgs::Header& header) : header_(header) {}
@@ -35,10 +36,13 @@ class Measurement {
 
   const std_msgs::Header& header() const { return header_; }
 
-  /// The instants, in order, at which sensor and robot have to be known: the stamp first. More than
-  /// one for what takes its time to measure, none for what stays in its own frame.
+  /// The instants, in order, at which the poses of sensor and robot must be known, the stamp first:
+  /// several for a scan, which takes its time, and none for a map, which stays in its own frame.
   virtual std::vector<ros::Time> instants() const { return {header_.stamp}; }
 
+  /// Makes the snapshot.
+  /// @param placement  the poses at instants()
+  /// @param snapshot   overwritten, its buffers reused
   /// @throws std::exception when there is not enough memory
   virtual void ingest(const Placement& placement, Ingest* ingest,
                       CloudSnapshot* snapshot) const = 0;
@@ -47,7 +51,7 @@ class Measurement {
   std_msgs::Header header_;
 };
 
-/// What comes in: a header, and either a sentence with what is wrong or a measurement.
+/// A received message: its header, and either a sentence about its fault or a measurement.
 struct Received {
   std_msgs::Header header;
   std::string fault;
@@ -55,11 +59,11 @@ struct Received {
 };
 using Receiver = std::function<void(const Received&)>;
 
-/// What the source's Ingest is to look for: range limits only where the points know no better.
+/// The configuration of a source's Ingest. The range limits of scans apply to beams instead.
 IngestConfig ingest_config(const SourceConfig& config);
 
-/// Subscribes to the source's topic with its type.
-/// @param receive  called from the queue of the node handle
+/// Subscribes to the source's topic with its message type.
+/// @param receive  called from the callback queue of the node handle
 ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh, const Receiver& receive);
 
 }  // namespace ist

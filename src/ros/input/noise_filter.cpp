@@ -19,7 +19,8 @@ namespace ist {
 
 namespace {
 
-using Point = std::array<double, 3>;  // float64 as it came: NaN or not, ingest shall see the same
+// Coordinates stay float64, so that ingest sees the same values as without the filter.
+using Point = std::array<double, 3>;
 
 template <typename Number>
 double read_number(const std::uint8_t* from, bool swap_bytes) {
@@ -61,12 +62,10 @@ RawCloud view(const std::vector<Point>& points, const RawCloud& like) {
 struct NoiseFilter::Impl {
   pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter{true};
   pcl::PointCloud<pcl::PointXYZ>::Ptr finite{new pcl::PointCloud<pcl::PointXYZ>};
-  std::vector<std::size_t> place;  ///< in `points`, by index in `finite`
+  std::vector<std::size_t> original;  ///< by index in `finite`: index in `points`
   std::vector<Point> points;
-  std::vector<int> kept;  ///< as PCL 1.10 has its indices, and later versions still
+  std::vector<int> kept;  ///< `int` is the index type of PCL 1.10, and later versions accept it
 };
-
-bool has_noise_filter() { return true; }
 
 NoiseFilter::NoiseFilter(const NoiseFilterConfig& config) : impl_(std::make_unique<Impl>()) {
   impl_->filter.setRadiusSearch(config.radius);
@@ -76,13 +75,13 @@ NoiseFilter::NoiseFilter(const NoiseFilterConfig& config) : impl_(std::make_uniq
 RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t* dropped) {
   Impl& my = *impl_;
   my.points.clear();
-  my.place.clear();
-  my.finite->clear();  // not organized, so that PCL does not guess at a camera
+  my.original.clear();
+  my.finite->clear();  // an unorganized cloud, so that PCL does not search it as an image
   for (std::size_t row = 0; row < cloud.height; ++row) {
     for (std::size_t column = 0; column < cloud.width; ++column) {
       const Point p = point_at(cloud, row, column);
       if (is_within(p, max_range)) {
-        my.place.push_back(my.points.size());
+        my.original.push_back(my.points.size());
         my.finite->emplace_back(static_cast<float>(p[0]), static_cast<float>(p[1]),
                                 static_cast<float>(p[2]));
       }
@@ -90,11 +89,11 @@ RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t
     }
   }
   *dropped = 0;
-  if (my.place.empty()) return view(my.points, cloud);
+  if (my.original.empty()) return view(my.points, cloud);
   my.filter.setInputCloud(my.finite);
   my.filter.filter(my.kept);
   for (const int index : *my.filter.getRemovedIndices()) {
-    my.points[my.place[static_cast<std::size_t>(index)]].fill(
+    my.points[my.original[static_cast<std::size_t>(index)]].fill(
         std::numeric_limits<double>::quiet_NaN());
     ++*dropped;
   }
@@ -104,8 +103,6 @@ RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t
 #else
 
 struct NoiseFilter::Impl {};
-
-bool has_noise_filter() { return false; }
 
 NoiseFilter::NoiseFilter(const NoiseFilterConfig&) {
   throw std::logic_error("NoiseFilter: built without PCL");

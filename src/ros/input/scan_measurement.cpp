@@ -8,11 +8,11 @@
 namespace ist {
 namespace {
 
-// The robot is posed this often during a scan: a link at 1 m/s is never farther from one of the
-// poses than half the self-filter's usual padding.
+// The robot's pose is looked up this often during a scan: a link that moves at 1 m/s is never
+// farther from one of the poses than half the self-filter's usual padding.
 constexpr double kBetweenPoses = 0.025;  // [s]
 
-// Simulated time begins at 0, and stamps cannot be before.
+// Simulated time begins at 0, and no stamp can be earlier.
 ros::Time shifted(const ros::Time& stamp, double seconds) {
   return stamp.toSec() + seconds > 0.0 ? stamp + ros::Duration(seconds) : ros::Time(0, 1);
 }

@@ -6,9 +6,9 @@
 
 namespace ist {
 
-/// A LaserScan: each beam is placed where the sensor was at the beam's own time, and the
-/// self-filter knows the robot at several instants of the scan.
-/// @param min_range, max_range  [m] of the points to keep
+/// Reads a LaserScan. Each beam is placed with the sensor's pose at the beam's own time, and the
+/// self-filter uses the robot's poses at several instants of the scan.
+/// @param min_range, max_range  [m] points outside these limits are dropped
 Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_range,
                    double max_range);
 

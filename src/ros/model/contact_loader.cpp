@@ -22,7 +22,7 @@ const LinkDescription* find_link(const RobotDescription& description, const std:
   return found != description.links.end() ? &*found : nullptr;
 }
 
-/// A link that has no body, and why.
+/// Stands for a link without a volume; the note says why.
 std::shared_ptr<const ContactBody> no_body(const std::string& note) {
   auto body = std::make_shared<ContactBody>();
   body->note = note;
@@ -37,11 +37,7 @@ ContactLoader::ContactLoader(const ServerConfig& config, const ModelLoader& load
 }
 
 ContactLoader::~ContactLoader() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    stop_ = true;
-  }
-  stop_signal_.notify_all();
+  stop_signal_.stop();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -56,21 +52,19 @@ void ContactLoader::set(std::shared_ptr<const ContactModel> contacts) {
 }
 
 bool ContactLoader::is_current(const ModelState& state) const {
-  return !stop_ && loader_.state()->robot == state.robot;
+  return !stop_signal_.stopped() && loader_.state()->robot == state.robot;
 }
 
 void ContactLoader::run() {
-  while (!stop_) {
+  do {
     const auto state = loader_.state();
     const auto contacts = this->contacts();
     try {
       if (state->robot && (!contacts || contacts->robot != state->robot)) load(state);
-    } catch (const std::exception& error) {  // no memory; tried again
-      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be had: " << error.what());
+    } catch (const std::exception& error) {  // no memory; the next round tries again
+      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << error.what());
     }
-    std::unique_lock<std::mutex> lock(mutex_);
-    stop_signal_.wait_for(lock, kPoll, [this] { return stop_.load(); });
-  }
+  } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
 }
 
 void ContactLoader::load(const std::shared_ptr<const ModelState>& state) {

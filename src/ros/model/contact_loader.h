@@ -1,7 +1,5 @@
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
@@ -10,15 +8,15 @@
 #include <thread>
 
 #include "ist_proximity/contact/contact_model.h"
+#include "ros/common/stop_signal.h"
 #include "ros/model/model_loader.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
 
-/// Makes what contact volumes need, in a thread of its own, after the node answers already: packs
-/// one monitored link after the other disjointly, or takes them from the cache. Whatever becomes of
-/// the robot's model, it follows; links that stay as they are keep what they have. All members are
-/// thread safe.
+/// Makes the contact bodies in a thread of its own, while the node answers already: it packs one
+/// monitored link after the other disjointly, or takes it from the cache. It follows every change
+/// of the robot's model; links that do not change keep their bodies. All members are thread safe.
 class ContactLoader {
  public:
   /// @param loader  outlives this
@@ -28,7 +26,7 @@ class ContactLoader {
   ContactLoader(const ContactLoader&) = delete;
   ContactLoader& operator=(const ContactLoader&) = delete;
 
-  /// As far as they are; null until a model is ready, and where they are not wanted.
+  /// The bodies made so far; null until a model is ready, and where they are not wanted.
   std::shared_ptr<const ContactModel> contacts() const;
 
  private:
@@ -41,13 +39,12 @@ class ContactLoader {
 
   const ServerConfig config_;
   const ModelLoader& loader_;
+  StopSignal stop_signal_;
   mutable std::mutex mutex_;
-  std::condition_variable stop_signal_;
-  std::atomic<bool> stop_{false};
   std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
-  /// Of the last model by key, for the next one; the thread's own.
+  /// The bodies of the last model by key, for the next one; the thread's own.
   std::map<std::string, std::shared_ptr<const ContactBody>> known_;
-  std::thread thread_;  ///< none where they are not wanted
+  std::thread thread_;  ///< not running where contact volumes are not wanted
 };
 
 }  // namespace ist

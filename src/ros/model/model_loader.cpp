@@ -10,33 +10,14 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
+#include "ros/common/text.h"
+#include "ros/common/thread_name.h"
 #include "ros/model/progress_report.h"
-#include "ros/thread_name.h"
 
 namespace ist {
 namespace {
 
 constexpr std::chrono::milliseconds kPoll(500);
-
-/// Monitored links in the order in which the model has them.
-std::vector<std::string> monitored_links(const RobotDescription& description,
-                                         const std::vector<std::string>& wanted) {
-  std::vector<std::string> names;
-  const auto is_wanted = [&](const std::string& name) {
-    return wanted.empty() || std::find(wanted.begin(), wanted.end(), name) != wanted.end();
-  };
-  const auto has_geometry = [&](const std::string& name) {
-    return std::any_of(description.links.begin(), description.links.end(),
-                       [&](const LinkDescription& link) { return link.name == name; });
-  };
-  for (const std::string& name : description.link_order) {
-    if (is_wanted(name) && (!wanted.empty() || has_geometry(name))) names.push_back(name);
-  }
-  for (const std::string& name : wanted) {  // not in the URDF
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
-  return names;
-}
 
 void add_name(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
@@ -48,12 +29,12 @@ bool any_self_filter(const std::vector<SourceConfig>& sources) {
 }
 
 void warn_of_visual_fallback(const RobotDescription& description) {
-  std::string names;
+  std::vector<std::string> names;
   for (const LinkDescription& link : description.links) {
-    if (link.used_visual_fallback) names += (names.empty() ? "" : ", ") + link.name;
+    if (link.used_visual_fallback) names.push_back(link.name);
   }
   if (!names.empty()) {
-    ROS_WARN_STREAM("no collision geometry, the visual one is used: " << names);
+    ROS_WARN_STREAM("no collision geometry, the visual one is used: " << join(names, ", "));
   }
 }
 
@@ -62,8 +43,7 @@ void warn_of_visual_fallback(const RobotDescription& description) {
 ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
     : config_(config), nh_(nh) {
   ModelState waiting;
-  waiting.problem = "waiting for the parameter '" + nh_.resolveName(config.robot_description) +
-                    "' with the robot's URDF";
+  waiting.problem = waiting_for_description();
   set_state(std::move(waiting));
   thread_ = std::thread(&ModelLoader::run, this);
 }
@@ -85,13 +65,13 @@ std::shared_ptr<const ModelState> ModelLoader::state() const {
 void ModelLoader::set_state(ModelState state) {
   auto shared = std::make_shared<const ModelState>(std::move(state));
   const std::lock_guard<std::mutex> lock(mutex_);
-  // After reload() only its own state may be seen, not the rest of what it interrupted.
+  // After reload() the states of the interrupted load must not appear.
   if (!reload_) state_ = std::move(shared);
 }
 
 std::string ModelLoader::reload(bool* found) {
   std::string urdf, problem;
-  *found = fetch(&urdf, &problem);
+  *found = fetch_urdf(&urdf, &problem);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     auto state = std::make_shared<ModelState>(*state_);
@@ -129,14 +109,19 @@ void ModelLoader::run() {
   }
 }
 
-/// Searched upwards from the node's namespace, as robot_state_publisher does.
-bool ModelLoader::fetch(std::string* urdf, std::string* problem) const {
+std::string ModelLoader::waiting_for_description() const {
+  return "waiting for the parameter '" + nh_.resolveName(config_.robot_description) +
+         "' with the robot's URDF";
+}
+
+/// Searches the parameter upwards from the node's namespace, as robot_state_publisher does.
+bool ModelLoader::fetch_urdf(std::string* urdf, std::string* problem) const {
   const std::string& name = config_.robot_description;
   std::string key = nh_.resolveName(name);
   nh_.searchParam(name, key);
   XmlRpc::XmlRpcValue value;
   if (!nh_.getParam(key, value)) {
-    *problem = "waiting for the parameter '" + nh_.resolveName(name) + "' with the robot's URDF";
+    *problem = waiting_for_description();
     return false;
   }
   if (value.getType() != XmlRpc::XmlRpcValue::TypeString) {
@@ -150,7 +135,7 @@ bool ModelLoader::fetch(std::string* urdf, std::string* problem) const {
 void ModelLoader::load_once() {
   std::string urdf;
   ModelState state;
-  if (!fetch(&urdf, &state.problem)) {
+  if (!fetch_urdf(&urdf, &state.problem)) {
     ROS_WARN_STREAM_THROTTLE(5.0, state.problem);
     rejected_.clear();
     set_state(std::move(state));
@@ -164,13 +149,13 @@ void ModelLoader::load_once() {
     state.phase = ModelState::Phase::kFailed;
     state.problem = std::string("the robot's URDF in '") + config_.robot_description +
                     "' cannot be used: " + error.what() +
-                    "; set it anew, it is read again when it changes";
+                    "; set it again, it is read whenever it changes";
     ROS_ERROR_STREAM(state.problem);
     set_state(std::move(state));
   }
 }
 
-/// The self-filter drops points on the whole robot, whatever part of it is monitored.
+/// Adds the links that only the self-filter needs: it drops points on the whole robot.
 RobotModelConfig ModelLoader::model_config(const RobotDescription& description,
                                            const std::vector<AttachedObject>& objects) const {
   RobotModelConfig config = config_.model;
@@ -183,7 +168,7 @@ RobotModelConfig ModelLoader::model_config(const RobotDescription& description,
   return config;
 }
 
-/// The rest of a state whose robot is built.
+/// Completes a state whose robot is built.
 void ModelLoader::finish(const RobotDescription& description, ModelState* state) const {
   std::vector<std::string> wanted = config_.model.links;
   if (!wanted.empty()) {
@@ -206,8 +191,8 @@ void ModelLoader::finish(const RobotDescription& description, ModelState* state)
   state->fraction = 1.0;
 }
 
-/// The description with what is attached to links that are still there.
-RobotDescription ModelLoader::carry_objects(ModelState* state) {
+/// Adds the attached objects to the description; objects whose link is gone are dropped.
+RobotDescription ModelLoader::carry_over_objects(ModelState* state) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     state->objects = objects_;
@@ -233,7 +218,7 @@ void ModelLoader::load(const std::string& urdf) {
   state.description = std::make_shared<const RobotDescription>(
       parse_urdf(urdf, config_.geometry, environment_package_finder()));
   warn_of_visual_fallback(*state.description);
-  const RobotDescription description = carry_objects(&state);
+  const RobotDescription description = carry_over_objects(&state);
 
   state.phase = ModelState::Phase::kPacking;
   state.problem = "packing of the robot '" + description.name + "' begins";
@@ -249,33 +234,39 @@ void ModelLoader::load(const std::string& urdf) {
   }
   set_state(state);
 
-  ProgressReport report;
-  std::mutex report_mutex;  // several packing threads
-  RobotModelCallbacks callbacks;
-  callbacks.cancelled = [this] { return cancelled(); };
-  callbacks.warning = [&](const std::string& warning) {
-    const std::lock_guard<std::mutex> lock(report_mutex);
-    ROS_WARN_STREAM(warning);
-    state.warnings.push_back(warning);
-  };
-  callbacks.progress = [&](const ModelProgress& progress) {
-    const std::lock_guard<std::mutex> lock(report_mutex);
-    report.update(progress);
-    state.problem = ProgressReport::sentence(progress);
-    state.fraction = progress.fraction;
-    set_state(state);
-  };
   const auto begin = std::chrono::steady_clock::now();
-  state.robot = build_robot_model(description, model_config(description, state.objects), callbacks);
-  report.finish();
-  if (!state.robot) return;  // cancelled
-
+  if (!build(description, &state)) return;  // cancelled
   finish(description, &state);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   ROS_INFO("model of '%s' ready after %.1f s: %zu links monitored, %zu packed",
            description.name.c_str(), took.count(), state.monitored.size(),
            state.robot->links.size());
   set_state(std::move(state));
+}
+
+/// Packs the links, or takes them from the cache, and reports the progress.
+/// @returns false when cancelled
+bool ModelLoader::build(const RobotDescription& description, ModelState* state) {
+  ProgressReport report;
+  std::mutex report_mutex;  // several threads pack
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = [this] { return cancelled(); };
+  callbacks.warning = [&](const std::string& warning) {
+    const std::lock_guard<std::mutex> lock(report_mutex);
+    ROS_WARN_STREAM(warning);
+    state->warnings.push_back(warning);
+  };
+  callbacks.progress = [&](const ModelProgress& progress) {
+    const std::lock_guard<std::mutex> lock(report_mutex);
+    report.update(progress);
+    state->problem = ProgressReport::sentence(progress);
+    state->fraction = progress.fraction;
+    set_state(*state);
+  };
+  state->robot =
+      build_robot_model(description, model_config(description, state->objects), callbacks);
+  report.finish();
+  return state->robot != nullptr;
 }
 
 }  // namespace ist

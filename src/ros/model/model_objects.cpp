@@ -3,13 +3,14 @@
 #include <algorithm>
 
 #include "ist_proximity/geometry/error.h"
+#include "ros/common/text.h"
 #include "ros/model/model_loader.h"
 
 namespace ist {
 namespace {
 
 std::string not_ready(const ModelState& state) {
-  return "the robot's model is not there yet: " + state.problem;
+  return "the robot's model is not ready yet: " + state.problem;
 }
 
 }  // namespace
@@ -36,10 +37,11 @@ std::string ModelLoader::detach(const std::string& name) {
   const auto found = std::find_if(objects.begin(), objects.end(),
                                   [&](const AttachedObject& other) { return other.name == name; });
   if (found == objects.end()) {
-    std::string names;
-    for (const AttachedObject& other : objects) names += (names.empty() ? "" : ", ") + other.name;
+    std::vector<std::string> names;
+    names.reserve(objects.size());
+    for (const AttachedObject& other : objects) names.push_back(other.name);
     return "no object '" + name + "' is attached; there is " +
-           (names.empty() ? "none at all" : names);
+           (names.empty() ? "none at all" : join(names, ", "));
   }
   const std::string link = found->link;
   objects.erase(found);

@@ -18,7 +18,7 @@ int percent(double fraction) { return static_cast<int>(100 * std::clamp(fraction
 
 ProgressReport::ProgressReport()
     : is_terminal_(isatty(STDERR_FILENO) == 1),
-      // What comes from the cache is done before the first line would appear.
+      // Links from the cache are done before the first line would appear.
       next_(std::chrono::steady_clock::now() + (is_terminal_ ? kRedraw : kNextLine)) {}
 
 std::string ProgressReport::sentence(const ModelProgress& progress) {

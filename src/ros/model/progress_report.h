@@ -7,8 +7,8 @@
 
 namespace ist {
 
-/// Tells a person how far packing is: a bar that is drawn over itself where stderr is a terminal,
-/// else a line in the log every few seconds. One thread at a time.
+/// Shows how far packing is: as a bar that is drawn over itself where stderr is a terminal, else as
+/// a line in the log every few seconds. One thread at a time.
 class ProgressReport {
  public:
   ProgressReport();

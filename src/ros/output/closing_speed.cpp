@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ros/ros_time.h"
+#include "ros/common/ros_time.h"
 
 namespace ist {
 namespace {
@@ -11,7 +11,8 @@ namespace {
 constexpr double kMaxInterval = 0.2;       // [s]
 constexpr double kMaxCloudInterval = 2.0;  // [s]
 
-// [m] How much farther from a standing obstacle the link's witness is than it was at another pose.
+/// The increase [m] of the distance from a standing obstacle to the link's witness since another
+/// pose.
 double retreat(const LinkProximity& result, const Eigen::Isometry3d& X_FL,
                const Eigen::Isometry3d& X_FL_before) {
   return result.direction.dot(X_FL * result.p_LCl - X_FL_before * result.p_LCl);
@@ -33,8 +34,8 @@ ClosingRates ClosingSpeed::update(const ros::Time& stamp, const LinkProximity& r
     return {};
   }
   const Sample now{stamp, result.distance, X_FL, nearest};
-  look_at_obstacles(result, now);
-  // Asked more often than poses come: the answer before stays the one to compare with.
+  update_obstacles(result, now);
+  // Several answers for one instant are compared with the same earlier instant.
   if (stamp != latest_.stamp) previous_ = latest_;
   latest_ = now;
 
@@ -50,7 +51,7 @@ ClosingRates ClosingSpeed::update(const ros::Time& stamp, const LinkProximity& r
   return rates;
 }
 
-void ClosingSpeed::look_at_obstacles(const LinkProximity& result, const Sample& now) {
+void ClosingSpeed::update_obstacles(const LinkProximity& result, const Sample& now) {
   if (latest_.nearest.source != now.nearest.source) {
     obstacles_ = ClosingRates::kNaN;
   } else if (latest_.nearest.generation != now.nearest.generation) {

@@ -5,13 +5,13 @@
 namespace ist {
 
 JointRepulsion::JointRepulsion(const ModelState& model)
-    : kinematics_(model.kinematics), problem_(model.kinematics_problem) {
+    : kinematics_(model.kinematics), problem_(no_kinematics(model)) {
   if (!kinematics_) return;
   for (const std::size_t i : model.monitored) {
-    const auto place = kinematics_->find_link(model.robot->links[i].name);
-    if (!place) continue;  // a configured link that the URDF lacks: nothing moves it
+    const auto found = kinematics_->find_link(model.robot->links[i].name);
+    if (!found) continue;  // the URDF lacks this configured link, so nothing moves it
     monitored_.push_back(i);
-    places_.push_back(*place);
+    index_.push_back(*found);
   }
 }
 
@@ -25,14 +25,14 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
   message->effort.clear();
   if (!kinematics_ || source == nullptr) {
     message->status = ist_proximity::ProximityArray::MODEL_ERROR;
-    message->status_text = "of the URDF, " + problem_;
+    message->status_text = problem_;
     return;
   }
   source->look_up_all(*kinematics_, proximity.header.stamp, &X_FL_, &known_);
   const auto& joints = kinematics_->joints();
   effort_.setZero(static_cast<Eigen::Index>(joints.size()));
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    const std::string why = add(places_[i], pushes[monitored_[i]]);
+  for (std::size_t i = 0; i < index_.size(); ++i) {
+    const std::string why = add(index_[i], pushes[monitored_[i]]);
     if (why.empty() || message->status != ist_proximity::ProximityArray::OK) continue;
     message->status = ist_proximity::ProximityArray::NO_POSE;
     message->status_text = why;
@@ -44,30 +44,31 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
   }
 }
 
-std::string JointRepulsion::add(std::size_t place, const Push& push) {
+std::string JointRepulsion::add(std::size_t link, const Push& push) {
   if (push.force.isZero(0.0) && push.torque.isZero(0.0)) return "";
-  if (!push.force.allFinite()) {  // UNKNOWN: the status of the proximity message says why
-    blame(place);
+  if (!push.force.allFinite()) {  // the link is UNKNOWN, and the status of ~proximity says why
+    set_unknown(link);
     return "";
   }
-  const auto missing = first_link_needed(*kinematics_, known_, place);
+  const auto missing = first_link_needed(*kinematics_, known_, link);
   if (missing) {
-    blame(place);
-    return "the joints' efforts from link '" + kinematics_->links()[place] +
-           "' are not known: where link '" + kinematics_->links()[*missing] + "' is is not known";
+    set_unknown(link);
+    return "the joints' efforts from link '" + kinematics_->links()[link] +
+           "' are not known: the pose of link '" + kinematics_->links()[*missing] +
+           "' is not known";
   }
-  point_jacobian(*kinematics_, X_FL_, place, X_FL_[place].translation(), &J_);
+  point_jacobian(*kinematics_, X_FL_, link, X_FL_[link].translation(), &J_);
   Eigen::Matrix<double, 6, 1> wrench;
   wrench << push.force, push.torque;
   effort_ += J_.transpose() * wrench;
   return "";
 }
 
-/// The efforts of all joints that move the link are not known.
-void JointRepulsion::blame(std::size_t place) {
+/// Makes the efforts of all joints that move the link NaN.
+void JointRepulsion::set_unknown(std::size_t link) {
   const auto& joints = kinematics_->joints();
-  for (; place > 0; place = joints[place - 1].parent) {
-    effort_[static_cast<Eigen::Index>(joints[place - 1].source)] =
+  for (; link > 0; link = joints[link - 1].parent) {
+    effort_[static_cast<Eigen::Index>(joints[link - 1].source)] =
         std::numeric_limits<double>::quiet_NaN();
   }
 }

@@ -11,36 +11,38 @@
 
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/jacobian.h"
-#include "ros/model/model_loader.h"
+#include "ros/model/model_state.h"
 #include "ros/poses/pose_source.h"
 
 namespace ist {
 
-/// Sums the repulsion of all monitored links in the robot's joints. One thread.
+/// Sums the repulsion of all monitored links as efforts of the robot's joints: J^T (force; torque).
+/// One thread.
 class JointRepulsion {
  public:
   /// @param model  ready
   explicit JointRepulsion(const ModelState& model);
 
-  /// @param source     (null: there is none, the kinematics is faulty) whose last look_up() gave
-  /// the poses that the pushes belong to
-  /// @param pushes     by link of the robot
-  /// @param proximity  with the same poses: header and status
+  /// @param source     its last look_up() gave the poses of the repulsion; null where the
+  ///                   kinematics is faulty
+  /// @param pushes     repulsion by link of the robot
+  /// @param proximity  message for the same poses, for the header and the status
   /// @param message    overwritten
   void fill(PoseSource* source, const std::vector<Push>& pushes,
             const ist_proximity::ProximityArray& proximity, ist_proximity::JointRepulsion* message);
 
  private:
-  /// Empty, or why the Jacobian cannot be known.
-  std::string add(std::size_t place, const Push& push);
-  void blame(std::size_t place);
+  /// Adds the efforts of one link, an index of the kinematics.
+  /// @returns empty, or why the Jacobian cannot be known
+  std::string add(std::size_t link, const Push& push);
+  void set_unknown(std::size_t link);
 
   std::shared_ptr<const Kinematics> kinematics_;  ///< null where the URDF's is faulty
-  std::string problem_;                           ///< of the kinematics
-  std::vector<std::size_t> monitored_;            ///< links of the robot
-  std::vector<std::size_t> places_;               ///< of those, where the kinematics has them
+  std::string problem_;                           ///< the sentence where kinematics_ is null
+  std::vector<std::size_t> monitored_;            ///< indices of links of the robot
+  std::vector<std::size_t> index_;                ///< the same links in the kinematics
 
-  // Of this call, by link and by joint of the kinematics.
+  // Valid for one call, by link and by joint of the kinematics.
   std::vector<Eigen::Isometry3d> X_FL_;
   std::vector<bool> known_;
   Eigen::VectorXd effort_;

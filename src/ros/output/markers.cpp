@@ -3,9 +3,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
-#include "ros/poses/transforms.h"
+#include "ros/common/eigen_conversion.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/text.h"
 
 namespace ist {
 namespace {
@@ -33,7 +34,7 @@ std_msgs::ColorRGBA color_of(double distance, double max_distance) {
   return color(std::min(1.0, 2.0 * (1.0 - far)), std::min(1.0, 2.0 * far), 0.1, 1.0);
 }
 
-/// Colours that differ for neighbours: the golden ratio around the circle of hues.
+/// Gives neighbours different colours, by the golden ratio on the circle of hues.
 std_msgs::ColorRGBA color_of_link(std::size_t index) {
   const double hue = std::fmod(0.61803398875 * static_cast<double>(index), 1.0) * 2.0 * M_PI;
   const auto channel = [hue](double phase) { return 0.55 + 0.4 * std::cos(hue - phase); };
@@ -70,28 +71,25 @@ void ProximityMarkers::draw_link(const LinkMessage& link, int id,
   line.points = {link.point_on_obstacle, link.point_on_link};
   markers->push_back(line);
 
-  Marker on_link = marker("point_on_link", id, Marker::SPHERE);
-  scale(kPointSize, kPointSize, kPointSize, &on_link);
-  on_link.color = shade;
-  on_link.pose.position = link.point_on_link;
-  markers->push_back(on_link);
+  const auto add_point = [&](const char* ns, const geometry_msgs::Point& position,
+                             const std_msgs::ColorRGBA& point_color) {
+    Marker point = marker(ns, id, Marker::SPHERE);
+    scale(kPointSize, kPointSize, kPointSize, &point);
+    point.color = point_color;
+    point.pose.position = position;
+    markers->push_back(point);
+  };
+  add_point("point_on_link", link.point_on_link, shade);
+  add_point("point_on_obstacle", link.point_on_obstacle, color(0.2, 0.4, 1.0, 1.0));
 
-  Marker on_obstacle = marker("point_on_obstacle", id, Marker::SPHERE);
-  scale(kPointSize, kPointSize, kPointSize, &on_obstacle);
-  on_obstacle.color = color(0.2, 0.4, 1.0, 1.0);
-  on_obstacle.pose.position = link.point_on_obstacle;
-  markers->push_back(on_obstacle);
-
-  const auto& f = link.repulsion;
-  const double length = Eigen::Vector3d(f.x, f.y, f.z).norm() * kArrowPerRepulsion;
+  const Eigen::Vector3d repulsion = to_vector(link.repulsion);
+  const double length = repulsion.norm() * kArrowPerRepulsion;
   if (length > 1e-3 && std::isfinite(length)) {
     Marker arrow = marker("repulsion", id, Marker::ARROW);
     scale(2 * kLineWidth, 4 * kLineWidth, std::min(0.3 * length, 6 * kLineWidth), &arrow);
     arrow.color = color(1.0, 0.5, 0.0, 0.9);
     geometry_msgs::Point tip = link.point_on_link;
-    tip.x += f.x * kArrowPerRepulsion;
-    tip.y += f.y * kArrowPerRepulsion;
-    tip.z += f.z * kArrowPerRepulsion;
+    assign(to_vector(tip) + repulsion * kArrowPerRepulsion, &tip);
     arrow.points = {link.point_on_link, tip};
     markers->push_back(arrow);
   }
@@ -99,12 +97,9 @@ void ProximityMarkers::draw_link(const LinkMessage& link, int id,
   Marker text = marker("text", id, Marker::TEXT_VIEW_FACING);
   scale(0, 0, kTextHeight, &text);
   text.color = color(1, 1, 1, 1);
-  text.pose.position.x = (link.point_on_link.x + link.point_on_obstacle.x) / 2;
-  text.pose.position.y = (link.point_on_link.y + link.point_on_obstacle.y) / 2;
-  text.pose.position.z = (link.point_on_link.z + link.point_on_obstacle.z) / 2;
-  char number[32];
-  std::snprintf(number, sizeof number, " %.3f m", link.distance);
-  text.text = link.link + number;
+  assign((to_vector(link.point_on_link) + to_vector(link.point_on_obstacle)) / 2,
+         &text.pose.position);
+  text.text = link.link + format_text(" %.3f m", link.distance);
   markers->push_back(text);
 }
 
@@ -121,12 +116,12 @@ MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximit
   for (const Marker& drawn : result.markers) shown[{drawn.ns, drawn.id}] = drawn.header;
   for (const auto& [key, header] : shown_) {
     if (shown.count(key) > 0) continue;
-    Marker gone;
-    gone.header = header;
-    gone.ns = key.first;
-    gone.id = key.second;
-    gone.action = Marker::DELETE;
-    result.markers.push_back(gone);
+    Marker removed;
+    removed.header = header;
+    removed.ns = key.first;
+    removed.id = key.second;
+    removed.action = Marker::DELETE;
+    result.markers.push_back(removed);
   }
   shown_ = std::move(shown);
   return result;
@@ -143,17 +138,14 @@ MarkerArray sphere_markers(const RobotModel& model, const std::vector<std::size_
         [](const InnerSphere& a, const InnerSphere& b) { return a.radius > b.radius; });
     if (spheres.size() > max_per_link) spheres.resize(max_per_link);
     for (std::size_t k = 0; k < spheres.size() && spheres[k].radius > 0.0; ++k) {
-      Marker marker;
-      marker.header.frame_id =
-          without_slash(link.name);  // stamp 0: rviz takes the newest transform
+      Marker marker;  // its stamp is 0, so rviz takes the newest transform
+      marker.header.frame_id = without_slash(link.name);
       marker.ns = link.name;
       marker.id = static_cast<int>(k);
       marker.type = Marker::SPHERE;
       marker.action = Marker::ADD;
       marker.frame_locked = true;
-      marker.pose.position.x = spheres[k].center.x();
-      marker.pose.position.y = spheres[k].center.y();
-      marker.pose.position.z = spheres[k].center.z();
+      assign(spheres[k].center, &marker.pose.position);
       marker.pose.orientation.w = 1.0;
       scale(2 * spheres[k].radius, 2 * spheres[k].radius, 2 * spheres[k].radius, &marker);
       marker.color = color_of_link(i);

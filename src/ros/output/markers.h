@@ -18,13 +18,13 @@ namespace ist {
 /// (arrow), "text"; the id is the link's place in the array. Not thread safe.
 class ProximityMarkers {
  public:
-  /// @param max_distance  [m] that is drawn green
-  /// @param lifetime      [s] after which rviz drops a marker that nobody has renewed: a node that
-  ///                      died leaves no distances behind
+  /// @param max_distance  [m] distance that is drawn green
+  /// @param lifetime      [s] time after which rviz drops a marker that is not renewed, so that no
+  ///                      distances stay when the node dies
   ProximityMarkers(double max_distance, double lifetime)
       : max_distance_(max_distance), lifetime_(lifetime) {}
 
-  /// Markers of every link NEAR or CONTACT, and DELETE for those of the last call that are gone.
+  /// Draws every link that is NEAR or CONTACT, and deletes the other markers of the last call.
   visualization_msgs::MarkerArray draw(const ist_proximity::ProximityArray& proximity);
 
  private:
@@ -39,15 +39,15 @@ class ProximityMarkers {
   std::map<Key, std_msgs::Header> shown_;
 };
 
-/// The inner spheres of some links, in the links' own frames (rviz moves them along): one namespace
-/// per link, the largest spheres first.
+/// Draws the largest inner spheres of some links in the links' own frames, so that rviz moves them
+/// along. Each link has a namespace of its own.
 /// @param links         indices into the model
-/// @param max_per_link  how many spheres of each
+/// @param max_per_link  largest number of spheres of one link
 visualization_msgs::MarkerArray sphere_markers(const RobotModel& model,
                                                const std::vector<std::size_t>& links,
                                                std::size_t max_per_link);
 
-/// DELETE for every marker of an array.
+/// Makes an array that deletes every marker of another.
 visualization_msgs::MarkerArray deleted(const visualization_msgs::MarkerArray& markers);
 
 }  // namespace ist

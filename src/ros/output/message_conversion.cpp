@@ -4,7 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "ros/ros_time.h"
+#include "ros/common/eigen_conversion.h"
+#include "ros/common/ros_time.h"
 
 namespace ist {
 namespace {
@@ -14,19 +15,12 @@ using ist_proximity::ProximityArray;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-template <typename Message>
-void assign(const Eigen::Vector3d& v, Message* message) {
-  message->x = v.x();
-  message->y = v.y();
-  message->z = v.z();
-}
-
-void assign(const Wrench& from, geometry_msgs::Wrench* wrench) {
+void assign_wrench(const Wrench& from, geometry_msgs::Wrench* wrench) {
   assign(from.force, &wrench->force);
   assign(from.torque, &wrench->torque);
 }
 
-void assign(const ClosingRates& closing, LinkMessage* message) {
+void assign_closing(const ClosingRates& closing, LinkMessage* message) {
   message->closing_speed = closing.total;
   message->closing_speed_robot = closing.robot;
   message->closing_speed_obstacles = closing.obstacles;
@@ -55,17 +49,17 @@ LinkMessage to_message(const std::string& name, const LinkProximity& result, con
   assign(result.direction, &message.direction);
   assign(repulsion.force, &message.repulsion);
   assign(repulsion.torque, &message.repulsion_torque);
-  assign(penetration, &message.penetration);
-  assign(closing, &message);
+  assign_wrench(penetration, &message.penetration);
+  assign_closing(closing, &message);
   if (result.state >= LinkState::kNear) message.source = source;
   return message;
 }
 
-ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict& verdict,
+ist_proximity::SourceStatus to_message(const SourceReport& source, const Status& status,
                                        const ros::Time& stamp) {
   ist_proximity::SourceStatus message;
   message.name = source.name;
-  message.status = verdict.status;
+  message.status = status.code;
   message.age = kNaN;
   if (!source.has_snapshot) return message;
   message.stamp = source.stamp;

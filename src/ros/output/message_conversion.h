@@ -10,29 +10,30 @@
 #include "ist_proximity/contact/contact_wrench.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ros/input/source_report.h"
 #include "ros/output/closing_speed.h"
 #include "ros/status/status.h"
 
 namespace ist {
 
-/// A link of which nothing is known: NaN everywhere, lower bound -inf.
+/// Makes the message of an UNKNOWN link: NaN everywhere, lower bound -inf.
 ist_proximity::LinkProximity unknown_link(const std::string& name);
 
-/// @param result         in the fixed frame
-/// @param repulsion      of the same link
-/// @param penetration    of the same link, in the fixed frame
-/// @param closing        of the same link
-/// @param source         name of the source of the nearest point; ignored unless NEAR or CONTACT
+/// Makes the message of a link.
+/// @param result       in the fixed frame
+/// @param penetration  in the fixed frame, about the link's origin
+/// @param source       name of the source of the nearest point; ignored unless NEAR or CONTACT
 ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
                                         const Push& repulsion, const Wrench& penetration,
                                         const ClosingRates& closing, const std::string& source);
 
-/// @param stamp  of the ProximityArray, which `age` counts from
-ist_proximity::SourceStatus to_message(const SourceFacts& source, const Verdict& verdict,
+/// Makes the message of a source.
+/// @param stamp  of the ProximityArray, from which `age` counts
+ist_proximity::SourceStatus to_message(const SourceReport& source, const Status& status,
                                        const ros::Time& stamp);
 
-/// The smallest lower bound [m]; NaN when a link is UNKNOWN, when there is no link, or when the
-/// status is neither OK nor DEGRADED. All CLEAR gives ~max_distance.
+/// Gives the smallest lower bound [m]; NaN when a link is UNKNOWN, when there is no link, or when
+/// the status is neither OK nor DEGRADED. All CLEAR gives ~max_distance.
 double min_distance(const ist_proximity::ProximityArray& message);
 
 }  // namespace ist

@@ -13,7 +13,7 @@ using dynamic_reconfigure::Reconfigure;
 
 constexpr char kOnlyGroup[] = "Default";
 
-/// The part of a tunable's name behind "GROUP/"; empty where it is of another group.
+/// Gives the part of a tunable's name after "GROUP/"; empty for a tunable of another group.
 std::string name_within(const std::string& group, const Tunable& tunable) {
   const std::string prefix = group + "/";
   return tunable.name.compare(0, prefix.size(), prefix) == 0 ? tunable.name.substr(prefix.size())
@@ -51,7 +51,7 @@ const char* type_name(Tunable::Kind kind) {
   return "double";
 }
 
-/// What all parameters of a group are, by one of their numbers.
+/// Describes all parameters of a group by one of their numbers: value, default, minimum, maximum.
 template <class Number>
 Config config_of(const std::string& group, const std::vector<Tunable>& tunables, Number number) {
   Config config;
@@ -74,7 +74,7 @@ ConfigDescription describe(const std::string& group, const std::vector<Tunable>&
   ConfigDescription description;
   description.min = config_of(group, tunables, [](const Tunable& t) { return t.range.min; });
   description.max = config_of(group, tunables, [](const Tunable& t) { return t.range.max; });
-  description.dflt = config_of(group, tunables, [](const Tunable& t) { return t.standard; });
+  description.dflt = config_of(group, tunables, [](const Tunable& t) { return t.default_value; });
   dynamic_reconfigure::Group only;
   only.name = kOnlyGroup;
   for (const Tunable& tunable : tunables) {
@@ -88,6 +88,11 @@ ConfigDescription describe(const std::string& group, const std::vector<Tunable>&
   }
   description.groups.push_back(only);
   return description;
+}
+
+void warn_of_refusal(const std::string& reason) {
+  ROS_WARN_STREAM_THROTTLE(
+      5.0, "the last valid ~query, ~repulsion and ~penetration stay in use: " << reason);
 }
 
 bool same(const Config& a, const Config& b) {
@@ -105,9 +110,9 @@ LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerCo
       max_distance_(config.query.max_distance),
       live_{config.query, config.repulsion, config.penetration, nullptr} {
   const std::lock_guard<std::mutex> lock(change_mutex_);
-  parse_live(XmlRpc::XmlRpcValue(), max_distance_, &tunables_);  // which there are
+  parse_live(XmlRpc::XmlRpcValue(), max_distance_, &tunables_);  // names and ranges
   for (const char* name : {"query", "repulsion", "penetration"}) advertise(name);
-  take({});
+  apply({});
 }
 
 void LiveParameters::advertise(const std::string& name) {
@@ -132,7 +137,7 @@ LiveConfig LiveParameters::get() const {
 
 void LiveParameters::read_again() {
   const std::lock_guard<std::mutex> lock(change_mutex_);
-  take({});
+  apply({});
 }
 
 bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
@@ -146,14 +151,14 @@ bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
     change[prefix + one.name] = XmlRpc::XmlRpcValue(static_cast<bool>(one.value));
   }
   for (const auto& one : request.config.strs) change[prefix + one.name] = one.value;
-  take(change);
-  response.config = group->shown;
+  apply(change);
+  response.config = group->published;
   return true;
 }
 
-/// Change and what the parameter server holds, together: all of it, or nothing. With change_mutex_
-/// held.
-void LiveParameters::take(const Change& change) {
+/// Applies the change on top of the parameter server's values, entirely or not at all. The caller
+/// holds change_mutex_.
+void LiveParameters::apply(const Change& change) {
   std::vector<Tunable> tunables;
   try {
     XmlRpc::XmlRpcValue tree = fetch_parameters(private_nh_);
@@ -166,23 +171,19 @@ void LiveParameters::take(const Change& change) {
     const std::lock_guard<std::mutex> lock(live_mutex_);
     live_ = live;
   } catch (const ParameterError& error) {
-    ROS_WARN_STREAM_THROTTLE(
-        5.0, "the last valid ~query, ~repulsion and ~penetration go on: " << error.what());
-    return;
+    return warn_of_refusal(error.what());
   } catch (const XmlRpc::XmlRpcException& error) {
-    ROS_WARN_STREAM_THROTTLE(
-        5.0, "the last valid ~query, ~repulsion and ~penetration go on: " << error.getMessage());
-    return;
+    return warn_of_refusal(error.getMessage());
   }
   tunables_ = std::move(tunables);
-  show();
+  publish_updates();
 }
 
-void LiveParameters::show() {
+void LiveParameters::publish_updates() {
   for (const auto& group : groups_) {
     const Config now = values_of(group->name, tunables_);
-    if (same(now, group->shown)) continue;
-    group->shown = now;
+    if (same(now, group->published)) continue;
+    group->published = now;
     group->updates.publish(now);
   }
 }

@@ -15,14 +15,15 @@
 
 namespace ist {
 
-/// What may change while the node runs: ~query/*, ~repulsion/* and ~penetration/stiffness. Two ways
-/// lead here: the parameter server, read again whenever the owner asks, and dynamic_reconfigure, in
-/// one group for each of the three names (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set
-/// ~query ...`). What is wrong is refused with a warning, and the last valid values go on.
+/// Parameters that may change while the node runs: ~query/*, ~repulsion/* and
+/// ~penetration/stiffness. They change on the parameter server, which is read again whenever the
+/// owner asks, or through dynamic_reconfigure, in one group for each of the three names
+/// (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`). A wrong value is
+/// refused with a warning, and the last valid values stay in use.
 ///
-/// Speaks dynamic_reconfigure's messages without its generated server: a .cfg file would state
-/// defaults and ranges a second time, and that server writes a whole group back at each change,
-/// over what somebody else may just have set.
+/// This class speaks dynamic_reconfigure's messages without its generated server: a .cfg file would
+/// state defaults and ranges a second time, and that server writes a whole group back at each
+/// change, over a value that somebody else may just have set.
 ///
 /// Thread safe.
 class LiveParameters {
@@ -32,28 +33,28 @@ class LiveParameters {
 
   LiveConfig get() const;
 
-  /// Asks the parameter server.
+  /// Reads the parameter server again.
   void read_again();
 
  private:
-  /// One of dynamic_reconfigure's servers.
+  /// The topics and the service of one dynamic_reconfigure server.
   struct Group {
     std::string name;
     ros::Publisher descriptions, updates;
     ros::ServiceServer service;
-    dynamic_reconfigure::Config shown;
+    dynamic_reconfigure::Config published;
   };
-  using Change = std::map<std::string, XmlRpc::XmlRpcValue>;  ///< by name below `~`
+  using Change = std::map<std::string, XmlRpc::XmlRpcValue>;  ///< new values by name below `~`
 
   void advertise(const std::string& name);
   bool set(Group* group, const dynamic_reconfigure::Reconfigure::Request& request,
            dynamic_reconfigure::Reconfigure::Response& response);
-  void take(const Change& change);
-  void show();
+  void apply(const Change& change);
+  void publish_updates();
 
   ros::NodeHandle private_nh_;
   const double max_distance_;
-  std::mutex change_mutex_;  ///< from asking the parameter server to the end of the change
+  std::mutex change_mutex_;  ///< held from reading the parameter server to the end of the change
   std::vector<std::unique_ptr<Group>> groups_;
   std::vector<Tunable> tunables_;
   mutable std::mutex live_mutex_;

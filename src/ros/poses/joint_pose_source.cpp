@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
 #include "ros/poses/transforms.h"
-#include "ros/ros_time.h"
 
 namespace ist {
 
@@ -19,45 +19,40 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
       which_(which),
       buffer_(buffer),
       fixed_frame_(fixed_frame),
+      placer_(kinematics_, links),
       wanted_(wanted),
       timeout_(timeout),
-      behind_(buffer, fixed_frame, links, wanted, timeout) {
-  const std::size_t none = kinematics_->links().size();
-  for (const std::string& name : links) {
-    places_.push_back(kinematics_->find_link(name).value_or(none));
-  }
-}
+      tf_source_(buffer, fixed_frame, links, wanted, timeout) {}
 
 std::string JointPoseSource::hint() const {
-  return "does everything that moves joints publish on '" + listener_.facts().topic + "'?";
+  return "does everything that moves joints publish on '" + listener_.report().topic + "'?";
 }
 
-/// Positions that are fresh, problems of those that are not.
-/// @returns the newest stamp; `now` when nothing is fresh
+/// Reads the fresh positions, and notes why the others are not known.
+/// @returns the newest stamp of a fresh position; `now` when there is none
 ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   const auto& joints = kinematics_->joints();
   if (which_ == Which::kTaken) {
-    listener_.taken(*kinematics_, &newest_);
+    listener_.taken(*kinematics_, &positions_);
   } else {
-    listener_.newest(*kinematics_, &newest_);
+    listener_.newest(*kinematics_, &positions_);
   }
-  newest_.resize(joints.size());
+  positions_.resize(joints.size());
   q_.assign(joints.size(), std::nan(""));
   joint_problems_.assign(joints.size(), std::string());
   ros::Time instant;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].is_free()) continue;
-    const JointStateListener::Position& position = newest_[j];
+    const JointPosition& position = positions_[j];
     if (position.stamp.isZero()) {
       joint_problems_[j] = "joint '" + joints[j].name + "' has not come in any joint state";
       continue;
     }
     const double age = seconds_between(position.stamp, now);
     if (age > timeout_) {
-      char text[96];
-      std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
-                    timeout_);
-      joint_problems_[j] = "the newest position of joint '" + joints[j].name + text;
+      joint_problems_[j] =
+          "the newest position of joint '" + joints[j].name +
+          format_text("' is %.2f s old, allowed is %.2f s (~pose_timeout)", age, timeout_);
       continue;
     }
     q_[j] = position.q;
@@ -66,11 +61,11 @@ ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   return instant.isZero() ? now : instant;
 }
 
-/// Where one frame is in another at the instant; notes when tf has it, fresh, for an earlier one
-/// only.
-bool JointPoseSource::ask_tf(const std::string& parent, const std::string& child,
-                             const ros::Time& now, const ros::Time& instant, Eigen::Isometry3d* X,
-                             std::string* problem) {
+/// Looks up the pose of a child frame in its parent at the instant. Notes that tf is behind when it
+/// has a fresh pose for an earlier instant only.
+bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string& child,
+                                    const ros::Time& now, const ros::Time& instant,
+                                    Eigen::Isometry3d* X, std::string* problem) {
   if (is_known(buffer_, parent, child, instant, problem)) {
     *problem = ist::look_up(buffer_, parent, child, instant, X);
     return problem->empty();
@@ -87,11 +82,10 @@ bool JointPoseSource::ask_tf(const std::string& parent, const std::string& child
 }
 
 void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
-  poses->reset(now, places_.size());
+  poses->reset(now, placer_.size());
   tf_is_behind_ = false;
-  X_FL_.assign(kinematics_->links().size(), Eigen::Isometry3d::Identity());
-  known_.assign(X_FL_.size(), false);
-  if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
+  placer_.reset();
+  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
 
   const ros::Time instant = read_positions(now);
   kinematics_->place_joints(q_, &joints_);
@@ -99,37 +93,29 @@ void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].has_unstated_pose()) continue;
     joints_.known[j] =
-        ask_tf(kinematics_->links()[joints[j].parent], kinematics_->links()[joints[j].child], now,
-               instant, &joints_.X_PC[j], &joint_problems_[j]);
+        look_up_in_tf(kinematics_->links()[joints[j].parent], kinematics_->links()[joints[j].child],
+                      now, instant, &joints_.X_PC[j], &joint_problems_[j]);
   }
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();
   std::string root_problem;
   const bool root_known =
-      ask_tf(fixed_frame_, kinematics_->links()[0], now, instant, &X_FR, &root_problem);
-  if (tf_is_behind_) return behind_.look_up(now, poses);
-  if (!root_known) return poses->blame(wanted_, root_problem);
+      look_up_in_tf(fixed_frame_, kinematics_->links()[0], now, instant, &X_FR, &root_problem);
+  if (tf_is_behind_) return tf_source_.look_up(now, poses);
+  if (!root_known) return poses->set_problem(wanted_, root_problem);
 
-  poses->stamp = instant;
-  kinematics_->place_links(joints_, X_FR, &X_FL_, &known_);
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    if (!wanted_[i]) continue;
-    if (places_[i] == X_FL_.size()) {
-      poses->problems[i] = "it is not in the URDF";
-    } else if (known_[places_[i]]) {
-      poses->X_FL[i] = X_FL_[places_[i]];
-      poses->known[i] = true;
-    } else {
-      const std::size_t joint = *kinematics_->first_unknown(joints_, places_[i]);
-      poses->problems[i] = joint_problems_[joints[joint].source];
-    }
+  // A mimic joint is unknown for the same reason as the joint that it follows.
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].source != j) joint_problems_[j] = joint_problems_[joints[j].source];
   }
+  poses->stamp = instant;
+  placer_.place(joints_, X_FR, wanted_, joint_problems_, poses);
 }
 
 void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  if (tf_is_behind_) return behind_.look_up_all(kinematics, instant, X_FL, known);
-  *X_FL = X_FL_;
-  *known = known_;
+  if (tf_is_behind_) return tf_source_.look_up_all(kinematics, instant, X_FL, known);
+  *X_FL = placer_.X_FL();
+  *known = placer_.known();
 }
 
 }  // namespace ist

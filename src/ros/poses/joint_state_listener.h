@@ -1,81 +1,75 @@
 #pragma once
 
-#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
 #include <tf2/buffer_core.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <unordered_map>
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
-#include "ros/output/publisher_count.h"
+#include "ros/common/callback_thread.h"
+#include "ros/common/publisher_count.h"
+#include "ros/poses/joint_position_queue.h"
 
 namespace ist {
 
-/// What came in, for diagnostics; counted since the kinematics was set.
-struct JointStateFacts {
+/// Counts of joint states for the diagnostics, since the kinematics was set.
+struct JointStateReport {
   std::string topic;             ///< resolved
-  std::uint32_t publishers = 0;  ///< that are connected
-  std::uint64_t messages = 0;    ///< received
-  std::uint64_t used = 0;        ///< messages that told something new
+  std::uint32_t publishers = 0;  ///< connected publishers
+  std::uint64_t messages = 0;    ///< received messages
+  std::uint64_t used = 0;        ///< messages with at least one new position
   std::uint64_t dropped = 0;     ///< positions that could not be used
-  std::uint64_t skipped = 0;     ///< used, but not answered: more came than could be
-  std::string problem;           ///< during the last second; empty when there was none
+  std::uint64_t skipped = 0;     ///< used messages without an answer: too many came
+  std::string problem;           ///< the last one of the last second; empty when there was none
 };
 
-/// Receives joint_states, in a thread of its own, and keeps each joint's newest position. Messages
-/// may hold some of the joints only, from any number of publishers. What is wrong with one (sizes
-/// that differ, NaN, a joint that the URDF lacks, a stamp of 0 or of the future) costs nothing that
-/// is known already. A position outside the joint's limits is used, and said: the robot is there.
+/// Receives joint_states in a thread of its own and keeps each joint's newest position.
 ///
-/// Every joint's pose goes into a tf buffer too, where it is found again at the stamps of clouds,
-/// interpolated, with all that tf knows besides: cameras on links, the frame the robot stands in.
+/// Messages may hold some of the joints only, from any number of publishers. A faulty message or
+/// position (sizes that differ, NaN, a joint that the URDF lacks, a stamp of 0 or of the future) is
+/// dropped; positions that are known already stay. A position outside the joint's limits is used
+/// and reported, because the robot is there.
 ///
-/// Every message that told something new waits for its turn, take_next(), so that what follows the
-/// robot answers each of them, also after a moment without a processor. When ten wait, the robot
-/// has gone on too far: they are skipped for the next one.
+/// Every joint's pose also goes into a tf buffer, which interpolates it at the stamps of clouds and
+/// combines it with all other frames: cameras on links, the frame in which the robot stands.
+///
+/// Every message with a new position waits until take_next() takes it, so that results answer each
+/// of them, also after a moment without a processor (see JointPositionQueue).
 ///
 /// When the ROS clock jumps back, all positions are forgotten. Thread safe.
 class JointStateListener {
  public:
   /// @param buffer   outlives this
   /// @param nh       in the namespace that `joint_states` is relative to
-  /// @param on_state called from the listener's thread after each message that told something new
+  /// @param on_state called from the listener's thread after each message with a new position
   JointStateListener(tf2::BufferCore* buffer, ros::NodeHandle nh, std::function<void()> on_state);
   ~JointStateListener();
   JointStateListener(const JointStateListener&) = delete;
   JointStateListener& operator=(const JointStateListener&) = delete;
 
-  /// Null: messages are ignored. Another one than before: positions are forgotten.
+  /// Sets the joints that messages are read for. Null: messages are ignored. A change makes the
+  /// listener forget all positions.
   void set_kinematics(std::shared_ptr<const Kinematics> kinematics);
 
-  struct Position {
-    double q = std::numeric_limits<double>::quiet_NaN();  ///< [rad, m] NaN: never told
-    ros::Time stamp;
-  };
-  /// By joint of `kinematics`; empty when that is not what messages are read with.
-  void newest(const Kinematics& kinematics, std::vector<Position>* positions);
+  /// The newest positions by joint; empty when messages are read for another kinematics.
+  void newest(const Kinematics& kinematics, JointPositions* positions);
 
-  /// Whether a message waits for its turn.
+  /// Whether a message waits for take_next().
   bool is_waiting();
-  /// To the oldest message that waits; to the newest positions when none does.
+  /// Takes the oldest message that waits, or the newest positions when none does.
   void take_next();
-  /// As newest(), just after the message that take_next() has come to. What came before it counts,
-  /// what came after it does not.
-  void taken(const Kinematics& kinematics, std::vector<Position>* positions);
+  /// The positions just after the message that take_next() took last; otherwise as newest().
+  void taken(const Kinematics& kinematics, JointPositions* positions);
 
-  JointStateFacts facts();
+  JointStateReport report();
 
  private:
   void receive(const sensor_msgs::JointStateConstPtr& message);
@@ -85,35 +79,29 @@ class JointStateListener {
   void put_into_tf(std::size_t joint, const ros::Time& stamp, bool is_static);
   void notice_clock_jump();
   void forget();
-  void enqueue();
-  void copy(const std::vector<Position>& from, const Kinematics& kinematics,
-            std::vector<Position>* positions);
+  void copy(const JointPositions& from, const Kinematics& kinematics, JointPositions* positions);
   void count_publishers();
   void drop(const std::string& problem, std::size_t count);
 
   tf2::BufferCore& buffer_;
   const std::function<void()> on_state_;
-  ros::CallbackQueue queue_;
+  CallbackThread thread_;
   ros::Subscriber subscriber_;
 
-  std::mutex mutex_;  // for all that follows, held for copies and one message only
+  std::mutex mutex_;  // guards the members below; held for copies and one message only
   std::shared_ptr<const Kinematics> kinematics_;
-  std::unordered_map<std::string, std::size_t> index_;  ///< of a joint, by name
-  std::vector<std::vector<std::size_t>> moved_by_;      ///< by joint: those that it moves
-  std::vector<Position> positions_;                     ///< by joint
-  std::vector<Position> taken_;                         ///< the same, at the turn of a message
-  std::deque<std::vector<Position>> waiting_;           ///< the same, after each that waits
-  JointStateFacts facts_;
+  std::unordered_map<std::string, std::size_t> index_;  ///< index of a joint by its name
+  std::vector<std::vector<std::size_t>> moved_by_;      ///< by joint: the joints that it moves
+  JointPositionQueue positions_;
+  JointStateReport report_;
   std::chrono::steady_clock::time_point problem_time_;
   ros::Time last_now_;
 
-  PublisherCount publisher_count_;  // the listener's thread alone
-  std::atomic<bool> running_{true};
-  std::thread thread_;
+  PublisherCount publisher_count_;  // used by the listener's thread alone
 };
 
-/// Frames whose poses come from joint states, so that tf's are not needed: the child links of all
-/// joints but planar and floating ones.
+/// The frames whose poses come from joint states, so that tf's are not needed: the child links of
+/// all joints but planar and floating ones.
 std::vector<std::string> computed_frames(const Kinematics& kinematics);
 
 }  // namespace ist

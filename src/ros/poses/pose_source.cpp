@@ -11,7 +11,7 @@ void LinkPoses::reset(const ros::Time& now, std::size_t links) {
   problems.assign(links, std::string());
 }
 
-void LinkPoses::blame(const std::vector<bool>& wanted, const std::string& problem) {
+void LinkPoses::set_problem(const std::vector<bool>& wanted, const std::string& problem) {
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (wanted[i]) problems[i] = problem;
   }

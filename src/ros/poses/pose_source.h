@@ -11,38 +11,38 @@
 
 namespace ist {
 
-/// Where the links are at one common instant.
+/// The poses of the links at one common instant.
 struct LinkPoses {
-  ros::Time stamp;                      ///< that instant; the present one when no link is known
+  ros::Time stamp;                      ///< that instant; now when no link is known
   std::vector<Eigen::Isometry3d> X_FL;  ///< by link: link frame -> fixed frame; valid where known
   std::vector<bool> known;              ///< by link
-  std::vector<std::string> problems;    ///< by link: why not; empty where known or not wanted
+  std::vector<std::string> problems;    ///< by link: why it is not known; else empty
 
-  /// Every one of `links` unknown, without a problem.
+  /// Makes every link unknown, without a problem.
   void reset(const ros::Time& now, std::size_t links);
-  /// Says why no link can be known.
-  void blame(const std::vector<bool>& wanted, const std::string& problem);
+  /// Gives every wanted link the same problem.
+  void set_problem(const std::vector<bool>& wanted, const std::string& problem);
   std::size_t count_known() const;
 };
 
-/// Where the robot's links come from: tf, or the node's own kinematics. Not thread safe; never
-/// waits.
+/// A source of link poses: tf, or the node's own kinematics. Not thread safe; never waits.
 class PoseSource {
  public:
   virtual ~PoseSource() = default;
 
-  /// @param now  of the ROS clock; 0 (no clock yet) makes every link unknown
+  /// Looks up the poses of all wanted links.
+  /// @param now  the ROS clock's time; 0 (no clock yet) makes every link unknown
   virtual void look_up(const ros::Time& now, LinkPoses* poses) = 0;
 
-  /// Where all links of the robot are, those without geometry too, at the instant of the last
-  /// look_up(): what a Jacobian needs.
+  /// Looks up the poses of all links at the instant of the last look_up(), links without geometry
+  /// too. Jacobians need them.
   /// @param instant  the stamp that look_up() gave
   /// @param X_FL     by link of the kinematics: link frame -> fixed frame; valid where known
   /// @param known    by link of the kinematics
   virtual void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                            std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) = 0;
 
-  /// For a person whose links have no pose: what may be missing.
+  /// Names a likely cause for the user whose links have no pose.
   virtual std::string hint() const = 0;
 };
 

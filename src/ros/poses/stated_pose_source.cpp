@@ -12,14 +12,10 @@ StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
     : kinematics_(std::move(kinematics)),
       buffer_(buffer),
       fixed_frame_(fixed_frame),
+      placer_(kinematics_, links),
       wanted_(links.size(), true),
       timeout_(timeout),
-      q_(kinematics_->joints().size(), std::nan("")) {
-  const std::size_t none = kinematics_->links().size();
-  for (const std::string& name : links) {
-    places_.push_back(kinematics_->find_link(name).value_or(none));
-  }
-}
+      q_(kinematics_->joints().size(), std::nan("")) {}
 
 std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration) {
   const std::size_t count = configuration.name.size();
@@ -33,7 +29,7 @@ std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration
     const auto joint = kinematics_->find_joint(configuration.name[i]);
     if (!joint) return title + " is not in the URDF";
     if (kinematics_->joints()[*joint].has_unstated_pose()) {
-      return title + " is planar or floating, which one position cannot tell; leave it out";
+      return title + " is planar or floating, so one position cannot give its pose; leave it out";
     }
     if (!std::isfinite(configuration.position[i])) {
       return "the position of " + title + " is NaN or infinite";
@@ -45,17 +41,16 @@ std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration
 }
 
 std::string StatedPoseSource::hint() const {
-  return "state its position, or see that tf or joint states tell it";
+  return "state its position, or provide it on tf or joint_states";
 }
 
 void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
-  poses->reset(now, places_.size());
-  X_FL_.assign(kinematics_->links().size(), Eigen::Isometry3d::Identity());
-  known_.assign(X_FL_.size(), false);
-  if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
+  poses->reset(now, placer_.size());
+  placer_.reset();
+  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
   const std::string problem =
       look_up_newest(buffer_, fixed_frame_, kinematics_->links()[0], now, timeout_, &X_FR_);
-  if (!problem.empty()) return poses->blame(wanted_, problem);
+  if (!problem.empty()) return poses->set_problem(wanted_, problem);
 
   kinematics_->place_joints(q_, &joints_);
   const auto& joints = kinematics_->joints();
@@ -70,24 +65,13 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
       joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
     }
   }
-  kinematics_->place_links(joints_, X_FR_, &X_FL_, &known_);
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    if (!wanted_[i]) continue;
-    if (places_[i] == X_FL_.size()) {
-      poses->problems[i] = "it is not in the URDF";
-    } else if (known_[places_[i]]) {
-      poses->X_FL[i] = X_FL_[places_[i]];
-      poses->known[i] = true;
-    } else {
-      poses->problems[i] = joint_problems[*kinematics_->first_unknown(joints_, places_[i])];
-    }
-  }
+  placer_.place(joints_, X_FR_, wanted_, joint_problems, poses);
 }
 
 void StatedPoseSource::look_up_all(const Kinematics& /*kinematics*/, const ros::Time& /*instant*/,
                                    std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  *X_FL = X_FL_;
-  *known = known_;
+  *X_FL = placer_.X_FL();
+  *known = placer_.known();
 }
 
 }  // namespace ist

@@ -8,35 +8,36 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "ros/poses/link_placer.h"
 #include "ros/poses/pose_source.h"
 
 namespace ist {
 
-/// Link poses of a configuration that somebody states, and the robot need not be in. Joints that
-/// are left out, planar and floating ones, and where the root is in the fixed frame, are as tf has
-/// them now.
+/// Link poses of a configuration that a request states; the robot need not be in it. Joints that
+/// the request leaves out, planar and floating joints, and the pose of the root link in the fixed
+/// frame come from tf as they are now.
 class StatedPoseSource : public PoseSource {
  public:
   /// @param buffer       outlives this
   /// @param fixed_frame  frame F
   /// @param links        names
-  /// @param timeout      [s] of what tf tells
+  /// @param timeout      [s] allowed age of transforms
   StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const tf2::BufferCore& buffer,
                    const std::string& fixed_frame, const std::vector<std::string>& links,
                    double timeout);
 
-  /// @param wanted  by link: false leaves it unknown and out of everything
+  /// @param wanted  by link: false leaves it unknown, without a problem
   void set_wanted(const std::vector<bool>& wanted) { wanted_ = wanted; }
 
-  /// The configuration that look_up() places the robot in; its stamp is not read.
-  /// @returns empty on success, else a sentence; then the configuration before goes on
+  /// Sets the configuration that look_up() places the robot in; its stamp is not read.
+  /// @returns empty on success, else a sentence; then the configuration before stays
   std::string state(const sensor_msgs::JointState& configuration);
 
-  /// Of the configuration stated: by joint, NaN where it is left out.
+  /// The stated positions by joint; NaN for joints that are left out.
   const std::vector<double>& positions() const { return q_; }
-  /// Of the last look_up(): all joints, and the root link -> fixed frame.
+  // Results of the last look_up().
   const JointPoses& joints() const { return joints_; }
-  const Eigen::Isometry3d& root() const { return X_FR_; }
+  const Eigen::Isometry3d& X_FR() const { return X_FR_; }  ///< root link -> fixed frame
 
   void look_up(const ros::Time& now, LinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
@@ -47,14 +48,12 @@ class StatedPoseSource : public PoseSource {
   std::shared_ptr<const Kinematics> kinematics_;
   const tf2::BufferCore& buffer_;
   std::string fixed_frame_;
-  std::vector<std::size_t> places_;  ///< by link: where the kinematics has it; none: its size
+  LinkPlacer placer_;
   std::vector<bool> wanted_;
   double timeout_;
-  std::vector<double> q_;  ///< by joint; NaN: left out
+  std::vector<double> q_;  ///< by joint; NaN where it is left out
   JointPoses joints_;
   Eigen::Isometry3d X_FR_ = Eigen::Isometry3d::Identity();
-  std::vector<Eigen::Isometry3d> X_FL_;  ///< by link of the kinematics, of the last look_up()
-  std::vector<bool> known_;
 };
 
 }  // namespace ist

@@ -1,10 +1,10 @@
 #include "ros/poses/tf_pose_source.h"
 
 #include <algorithm>
-#include <cstdio>
 
+#include "ros/common/frame_name.h"
+#include "ros/common/ros_time.h"
 #include "ros/poses/transforms.h"
-#include "ros/ros_time.h"
 
 namespace ist {
 
@@ -25,19 +25,16 @@ bool TfPoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* sta
   if (stamp->isZero()) return true;
   const double age = seconds_between(*stamp, now);
   if (age <= timeout_) return true;
-  char text[96];
-  std::snprintf(text, sizeof text, "' is %.2f s old, allowed is %.2f s (~pose_timeout)", age,
-                timeout_);
-  *problem = "the newest transform from '" + frames_[link] + "' to '" + fixed_frame_ + text;
+  *problem = too_old(fixed_frame_, frames_[link], age, timeout_);
   return false;
 }
 
 void TfPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   const std::size_t n = frames_.size();
   poses->reset(now, n);
-  if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
+  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
 
-  // Not later than now: a transform stamped ahead of the clock must not push the instant there.
+  // The instant is never later than now, even if transforms are stamped ahead of the clock.
   for (std::size_t i = 0; i < n; ++i) {
     if (!wanted_[i]) continue;
     ros::Time stamp;
@@ -62,8 +59,8 @@ void TfPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& in
   }
 }
 
-/// A frame of tf that ends in a link's name.
-std::string TfPoseSource::with_prefix() const {
+/// Finds a frame of tf that ends in a link's name, as with a tf_prefix; empty when there is none.
+std::string TfPoseSource::find_prefixed_frame() const {
   std::vector<std::string> known;
   buffer_._getFrameStrings(known);
   for (std::size_t i = 0; i < frames_.size(); ++i) {
@@ -79,7 +76,7 @@ std::string TfPoseSource::with_prefix() const {
 }
 
 std::string TfPoseSource::hint() const {
-  const std::string other = with_prefix();
+  const std::string other = find_prefixed_frame();
   if (!other.empty()) {
     return "tf has '" + other +
            "': is a tf_prefix set? Frames have to have the names of the URDF's links";

@@ -11,16 +11,16 @@ namespace ist {
 
 /// Reads link poses from tf.
 ///
-/// All poses belong to one instant, the newest at which every fresh link is known; mixing instants
-/// would tear a moving arm apart. A link that has not moved on for longer than the timeout is not
-/// known and does not hold back the others. Static links are known at any instant.
-/// The buffer may be fed meanwhile.
+/// All poses belong to one instant, the newest at which every fresh link is known; mixed instants
+/// would tear a moving arm apart. A link whose newest transform is older than the timeout is
+/// unknown and does not hold back the others. Static links are known at any instant. The buffer may
+/// be fed at the same time.
 class TfPoseSource : public PoseSource {
  public:
   /// @param buffer        outlives this
   /// @param fixed_frame   frame F
   /// @param link_frames   by link
-  /// @param wanted        by link: false leaves it unknown and out of everything
+  /// @param wanted        by link: false leaves it unknown, without a problem
   /// @param timeout       [s]
   TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
                std::vector<std::string> link_frames, std::vector<bool> wanted, double timeout);
@@ -31,8 +31,8 @@ class TfPoseSource : public PoseSource {
   std::string hint() const override;
 
  private:
-  std::string with_prefix() const;
-  /// Newest instant of one link; false and a sentence when there is none or it is too old.
+  std::string find_prefixed_frame() const;
+  /// Finds the newest instant of one link; false and a sentence when there is none that is fresh.
   bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, std::string* problem);
 
   const tf2::BufferCore& buffer_;

@@ -3,25 +3,23 @@
 #include <ros/console.h>
 
 #include <boost/function.hpp>
-#include <cstdio>
 #include <exception>
 
-#include "ros/poses/transforms.h"
-#include "ros/ros_time.h"
-#include "ros/thread_name.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
 
 namespace ist {
 namespace {
 
-// Some publishers stamp fixed joints half a second ahead.
-constexpr double kMaxAhead = 1.0;  // [s]
+constexpr double kMaxAhead = 1.0;  // [s] some publishers stamp fixed joints half a second ahead
 constexpr std::chrono::seconds kProblemAge(1);
 
 }  // namespace
 
 TransformListener::TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh)
     : buffer_(*buffer) {
-  nh.setCallbackQueue(&queue_);
+  nh.setCallbackQueue(thread_.queue());
   const auto hints = ros::TransportHints().tcpNoDelay();
   using Callback = boost::function<void(const tf2_msgs::TFMessageConstPtr&)>;
   const Callback receive_moving = [this](const tf2_msgs::TFMessageConstPtr& message) {
@@ -32,15 +30,11 @@ TransformListener::TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh
   };
   moving_ = nh.subscribe<tf2_msgs::TFMessage>("/tf", 100, receive_moving, {}, hints);
   static_ = nh.subscribe<tf2_msgs::TFMessage>("/tf_static", 100, receive_static, {}, hints);
-  thread_ = std::thread([this] {
-    name_thread("ist tf");
-    while (running_) queue_.callAvailable(ros::WallDuration(0.05));
-  });
+  thread_.start("ist tf");
 }
 
 TransformListener::~TransformListener() {
-  running_ = false;
-  thread_.join();
+  thread_.stop();
   moving_.shutdown();
   static_.shutdown();
 }
@@ -60,13 +54,13 @@ void TransformListener::receive(const tf2_msgs::TFMessage& message, bool is_stat
   notice_clock_jump();
   const ros::Time now = ros::Time::now();
   for (const auto& transform : message.transforms) {
-    if (is_left_out(transform.child_frame_id)) continue;
+    if (is_ignored(transform.child_frame_id)) continue;
     const double ahead = seconds_between(now, transform.header.stamp);
     if (!is_static && ahead > kMaxAhead) {
-      keep_out(transform, ahead);
+      reject(transform, ahead);
       continue;
     }
-    try {  // what is wrong with the numbers, tf2 says itself
+    try {  // tf2 itself logs what is wrong with the numbers
       buffer_.setTransform(transform, is_static ? "/tf_static" : "/tf", is_static);
     } catch (const std::exception& error) {
       ROS_WARN_STREAM_THROTTLE(5.0, "the transform of '" << transform.child_frame_id
@@ -75,23 +69,22 @@ void TransformListener::receive(const tf2_msgs::TFMessage& message, bool is_stat
   }
 }
 
-void TransformListener::keep_out(const geometry_msgs::TransformStamped& transform, double ahead) {
-  char text[96];
-  std::snprintf(text, sizeof text, "' is stamped %.2f s in the future and not used", ahead);
+void TransformListener::reject(const geometry_msgs::TransformStamped& transform, double ahead) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  problem_ = "the transform from '" + transform.child_frame_id + "' to '" +
-             transform.header.frame_id + text + ": compare the clocks";
+  problem_ =
+      "the transform from '" + transform.child_frame_id + "' to '" + transform.header.frame_id +
+      format_text("' is stamped %.2f s in the future and not used: compare the clocks", ahead);
   problem_time_ = std::chrono::steady_clock::now();
 }
 
-void TransformListener::leave_out(const std::vector<std::string>& child_frames) {
+void TransformListener::ignore(const std::vector<std::string>& child_frames) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  left_out_ = {child_frames.begin(), child_frames.end()};
+  ignored_ = {child_frames.begin(), child_frames.end()};
 }
 
-bool TransformListener::is_left_out(const std::string& child_frame) const {
+bool TransformListener::is_ignored(const std::string& child_frame) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return !left_out_.empty() && left_out_.count(without_slash(child_frame)) > 0;
+  return !ignored_.empty() && ignored_.count(without_slash(child_frame)) > 0;
 }
 
 std::string TransformListener::problem() const {

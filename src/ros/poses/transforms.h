@@ -1,6 +1,5 @@
 #pragma once
 
-#include <geometry_msgs/TransformStamped.h>
 #include <ros/time.h>
 #include <tf2/buffer_core.h>
 
@@ -9,11 +8,13 @@
 
 namespace ist {
 
-/// Where a frame is at one instant, or why that cannot be known. Never an identity in place of a
-/// transform that is missing. Thread safe, never waits.
+// Lookups in tf that never wait and never throw. An absent transform gives a sentence, never an
+// identity. Frame names may begin with a slash. Thread safe.
+
+/// Looks up the pose of a frame at one instant.
 /// @param fixed   frame F
-/// @param frame   frame T; equal to F needs no tf at all
-/// @param time    0: the newest instant at which it is known
+/// @param frame   frame T; tf is not needed where it is F itself
+/// @param time    0: the newest instant at which the pose is known
 /// @param X_FT    T -> F, rigid; untouched on failure
 /// @param stamp   may be null; the instant, 0 where every transform on the way is static
 /// @returns empty on success, else a sentence with both frames
@@ -21,24 +22,17 @@ std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
                     const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
                     ros::Time* stamp = nullptr);
 
-/// Whether look_up() would find the frame; cheaper than its failure. `problem` is set where not.
+/// Whether look_up() would succeed. It costs less than a look_up() that fails.
+/// @param problem  set where the answer is false
 bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem);
 
-/// The newest transform, as look_up() at time 0, unless it is more than `max_age` [s] older than
-/// `now`.
+/// Looks up the newest pose, which must not be more than `max_age` [s] older than `now`.
 std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
                            Eigen::Isometry3d* X_FT);
 
-/// A message's transform; its quaternion may be off unit length by rounding (1e-3).
-/// @returns empty on success, else what is wrong with the numbers
-std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isometry3d* X);
-
-/// A sentence of tf2's without the full stop and space at its end, so that others can follow.
-std::string trimmed(std::string tf_error);
-
-/// tf2 knows frames without the slash that older programs put in front.
-std::string without_slash(const std::string& frame);
+/// The sentence about a transform that is older than ~pose_timeout. Ages in seconds.
+std::string too_old(const std::string& fixed, const std::string& frame, double age, double max_age);
 
 }  // namespace ist

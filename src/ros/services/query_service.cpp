@@ -5,8 +5,6 @@
 #include <exception>
 #include <limits>
 
-#include "ros/thread_name.h"
-
 namespace ist {
 
 using ist_proximity::ProximityArray;
@@ -15,7 +13,8 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// Empty, or what is wrong with the times of a motion.
+/// Checks the times of a motion.
+/// @returns empty, or what is wrong with them
 std::string check_times(const std::vector<double>& times, std::size_t states) {
   if (times.empty()) return "";
   if (times.size() != states || states < 2) {
@@ -37,17 +36,13 @@ QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& confi
                            const CloudSources& sources, const tf2::BufferCore& buffer,
                            std::function<LiveConfig()> live)
     : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
-  private_nh.setCallbackQueue(&queue_);
+  private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
-  thread_ = std::thread([this] {
-    name_thread("ist query");
-    while (running_) queue_.callAvailable(ros::WallDuration(0.05));
-  });
+  thread_.start("ist query");
 }
 
 QueryService::~QueryService() {
-  running_ = false;
-  thread_.join();
+  thread_.stop();
   service_.shutdown();
 }
 
@@ -60,7 +55,7 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   try {
     response.message = run(request, &response);
     response.success = response.message.empty();
-  } catch (const std::exception& error) {  // no memory for a monstrous request
+  } catch (const std::exception& error) {  // no memory for a huge request
     response.success = false;
     response.message = error.what();
   }
@@ -80,7 +75,8 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   return true;
 }
 
-/// Empty, or why there is nothing to query with.
+/// Takes the newest model.
+/// @returns empty, or why there is none
 std::string QueryService::take_model() {
   std::shared_ptr<const ModelState> model;
   {
@@ -88,9 +84,9 @@ std::string QueryService::take_model() {
     model = newest_model_;
   }
   if (!model || model->phase != ModelState::Phase::kReady) {
-    return model ? model->problem : "the robot's model is not there yet";
+    return model ? model->problem : "the robot's model is not ready yet";
   }
-  if (!model->kinematics) return "of the URDF, " + model->kinematics_problem;
+  if (!model->kinematics) return no_kinematics(*model);
   if (model == model_) return "";
   model_ = std::move(model);
   auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
@@ -98,12 +94,13 @@ std::string QueryService::take_model() {
                                                   link_names(*model_->robot), config_.pose_timeout);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            ProximityCycle::Reader::kOther);
+                                            CloudSelection::Reader::kOther);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }
 
-/// Empty, or which of them is none that is monitored.
+/// Chooses the links to answer for.
+/// @returns empty, or the name that is not a monitored link
 std::string QueryService::choose_links(const std::vector<std::string>& links) {
   chosen_.assign(model_->links.size(), links.empty());
   for (const std::string& name : links) {
@@ -135,22 +132,23 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     positions.push_back(poses_->positions());
     response->results.emplace_back();
     ProximityArray& result = response->results.back();
-    cycle_->forget();  // one configuration after the other is no motion
+    cycle_->forget();  // the configurations are no motion, so there is no speed between them
     cycle_->run(ros::Time::now(), sources_, live, &result, &ignored);
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
-    if (!running_) return "the node ends";
+    if (!thread_.is_running()) return "the node ends";
   }
   if (request.times.empty()) return "";
   impacts_->set_config(live.query);
-  return find_impacts(request, positions, response);
+  return find_impact_times(request, positions, response);
 }
 
-/// Against the obstacles of the last result, straight from state to state.
-std::string QueryService::find_impacts(const Service::Request& request,
-                                       const std::vector<std::vector<double>>& positions,
-                                       Service::Response* response) {
+/// Finds the times of impact with the obstacles of the last result, straight from state to state.
+/// @returns empty, or why the motion cannot be answered
+std::string QueryService::find_impact_times(const Service::Request& request,
+                                            const std::vector<std::vector<double>>& positions,
+                                            Service::Response* response) {
   const auto& joints = model_->kinematics->joints();
   std::vector<bool> wanted = cycle_->measurable();
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -158,6 +156,7 @@ std::string QueryService::find_impacts(const Service::Request& request,
     wanted[link] = wanted[link] && chosen_[i];
   }
   std::vector<double> first;
+  first.reserve(wanted.size());
   for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
@@ -168,17 +167,17 @@ std::string QueryService::find_impacts(const Service::Request& request,
       return "joint '" + joints[j].name + "' is stated in one of states[" + std::to_string(k) +
              "] and states[" + std::to_string(k + 1) + "] only: a motion has to state it in all";
     }
-    impacts_->run(motion, poses_->joints(), poses_->root(), wanted, cycle_->clouds(), &impacts);
+    impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(), &impacts);
     for (std::size_t i = 0; i < wanted.size(); ++i) {
       if (std::isfinite(impacts[i].time)) {
         first[i] = request.times[k] + impacts[i].time;
-        wanted[i] = false;  // the first contact is what is asked for
+        wanted[i] = false;  // the request asks for the first contact only
       } else if (std::isnan(impacts[i].time) && first[i] == kInf) {
         first[i] = impacts[i].time;
         wanted[i] = false;
       }
     }
-    if (!running_) return "the node ends";
+    if (!thread_.is_running()) return "the node ends";
   }
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     if (!chosen_[i]) continue;

@@ -1,31 +1,31 @@
 #pragma once
 
 #include <ist_proximity/QueryProximity.h>
-#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <tf2/buffer_core.h>
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "ist_proximity/proximity/time_of_impact.h"
+#include "ros/common/callback_thread.h"
+#include "ros/cycle/proximity_cycle.h"
+#include "ros/input/cloud_source.h"
+#include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/stated_pose_source.h"
-#include "ros/proximity_cycle.h"
 
 namespace ist {
 
-/// Answers ~query in a thread of its own, with a query of its own: whatever is asked, the cycle
-/// goes on. ~query/deadline is the cycle's and does not hold here.
+/// Answers ~query in a thread of its own with a query of its own, so that requests never delay the
+/// cycle. ~query/deadline does not apply here.
 class QueryService {
  public:
   /// @param sources, buffer  outlive this
-  /// @param live             what is configured now; called from the service's thread
+  /// @param live             gives the present configuration; called from the service's thread
   QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
                const tf2::BufferCore& buffer, std::function<LiveConfig()> live);
   ~QueryService();
@@ -40,9 +40,9 @@ class QueryService {
 
   bool answer(Service::Request& request, Service::Response& response);
   std::string run(const Service::Request& request, Service::Response* response);
-  std::string find_impacts(const Service::Request& request,
-                           const std::vector<std::vector<double>>& positions,
-                           Service::Response* response);
+  std::string find_impact_times(const Service::Request& request,
+                                const std::vector<std::vector<double>>& positions,
+                                Service::Response* response);
   std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
 
@@ -50,20 +50,18 @@ class QueryService {
   const CloudSources& sources_;
   const tf2::BufferCore& buffer_;
   const std::function<LiveConfig()> live_;
-  ros::CallbackQueue queue_;
+  CallbackThread thread_;
   ros::ServiceServer service_;
 
   std::mutex mutex_;
   std::shared_ptr<const ModelState> newest_model_;
 
-  // The service's thread alone.
+  // Used by the service's thread alone.
   std::shared_ptr<const ModelState> model_;
-  StatedPoseSource* poses_ = nullptr;  ///< the cycle's
+  StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
   std::vector<bool> chosen_;  ///< by monitored link
-  std::atomic<bool> running_{true};
-  std::thread thread_;
 };
 
 }  // namespace ist

@@ -8,10 +8,11 @@
 #include <cmath>
 
 #include "ist_proximity/geometry/error.h"
+#include "ros/common/text.h"
+#include "ros/common/thread_name.h"
 #include "ros/output/message_conversion.h"
-#include "ros/proximity_cycle.h"
+#include "ros/poses/make_pose_source.h"
 #include "ros/status/status.h"
-#include "ros/thread_name.h"
 
 namespace ist {
 
@@ -27,11 +28,7 @@ SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_
 }
 
 SelfProximity::~SelfProximity() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    stop_ = true;
-  }
-  stop_signal_.notify_all();
+  stop_signal_.stop();
   thread_.join();
 }
 
@@ -47,12 +44,9 @@ void SelfProximity::run() {
   Clock::time_point next = Clock::now();
   while (true) {
     next = std::max(next + period, Clock::now());
-    {
-      std::unique_lock<std::mutex> lock(mutex_);
-      if (stop_signal_.wait_until(lock, next, [this] { return stop_; })) return;
-    }
+    if (!stop_signal_.sleep_until(next)) return;
     take_model();
-    if (model_) run_once();
+    if (model_) publish_once();
   }
 }
 
@@ -95,11 +89,10 @@ std::vector<LinkPair> SelfProximity::choose_pairs() const {
   const RobotModel& robot = *model_->robot;
   std::vector<LinkPair> pairs =
       self_collision_pairs(robot, *model_->kinematics, wanted_links(*model_), ignored_pairs());
-  std::string at_rest;
+  std::vector<std::string> at_rest;
   if (config_.self_collision.ignore_contact_at_rest) {
     for (const LinkPair& found : in_contact_at_rest(model_->robot, *model_->kinematics, pairs)) {
-      at_rest += (at_rest.empty() ? "; in contact at rest, and left out: " : ", ") +
-                 robot.links[found.first].name + " and " + robot.links[found.second].name;
+      at_rest.push_back(robot.links[found.first].name + " and " + robot.links[found.second].name);
       pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
                                  [&](const LinkPair& pair) {
                                    return pair.first == found.first && pair.second == found.second;
@@ -107,11 +100,14 @@ std::vector<LinkPair> SelfProximity::choose_pairs() const {
                   pairs.end());
     }
   }
-  ROS_INFO_STREAM("self-collision: " << pairs.size() << " pairs of links are watched" << at_rest);
+  ROS_INFO_STREAM("self-collision: "
+                  << pairs.size() << " pairs of links are watched"
+                  << (at_rest.empty() ? "" : "; in contact at rest, and left out: ")
+                  << join(at_rest, ", "));
   return pairs;
 }
 
-/// What the nearest other link is to one; UNKNOWN if any of its pairs is.
+/// Finds the nearest other link; the answer is UNKNOWN if that of any pair is.
 LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const {
   LinkProximity answer;
   if (!poses_.known[link]) return answer;
@@ -139,7 +135,7 @@ LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const
   return answer;
 }
 
-void SelfProximity::find_wrenches(const LiveConfig& live) {
+void SelfProximity::compute_wrenches(const LiveConfig& live) {
   const RobotModel& robot = *model_->robot;
   wrenches_.assign(results_.size(), Wrench::zero());
   for (std::size_t i = 0; i < results_.size(); ++i) {
@@ -156,7 +152,7 @@ void SelfProximity::find_wrenches(const LiveConfig& live) {
   }
 }
 
-/// Of all links that touch this one.
+/// Sums the wrenches of all links that touch this one.
 Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer) const {
   if (answer.state == LinkState::kUnknown) return Wrench::unknown();
   Wrench all = Wrench::zero();
@@ -171,15 +167,15 @@ Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer)
   return all;
 }
 
-void SelfProximity::run_once() {
+void SelfProximity::publish_once() {
   const ros::Time now = ros::Time::now();
   if (now < last_now_) speeds_.assign(speeds_.size(), ClosingSpeed());
   last_now_ = now;
   const auto message = boost::make_shared<ProximityArray>();
-  Situation situation;
-  situation.clock_runs = !now.isZero();
-  situation.model_problem =
-      model_->problem.empty() && !model_->kinematics ? model_->kinematics_problem : model_->problem;
+  StatusInput input;
+  input.clock_runs = !now.isZero();
+  input.model_problem =
+      model_->problem.empty() && !model_->kinematics ? no_kinematics(*model_) : model_->problem;
   message->header.frame_id = fixed_frame_of(*model_, config_);
   message->header.stamp = now;
   if (query_) {
@@ -188,33 +184,38 @@ void SelfProximity::run_once() {
     const LiveConfig live = live_();
     query_->set_config(live.query);
     query_->run(poses_.X_FL, poses_.known, &results_);
-    find_wrenches(live);
+    compute_wrenches(live);
     message->header.stamp = poses_.stamp;
     for (const std::size_t i : model_->monitored) {
       const LinkModel& link = model_->robot->links[i];
-      if (!link.usable()) situation.link_errors.push_back(link.error);
+      if (!link.usable()) input.link_errors.push_back(link.error);
       if (!poses_.problems[i].empty()) {
-        situation.pose_problems.push_back("link '" + link.name +
-                                          "' has no pose: " + poses_.problems[i]);
+        input.pose_problems.push_back("link '" + link.name +
+                                      "' has no pose: " + poses_.problems[i]);
       }
-      std::size_t other = i;
-      const LinkProximity answer = nearest(i, &other);
-      const std::string& name = model_->robot->links[other].name;
-      ClosingRates closing =
-          speeds_[i].update(poses_.stamp, answer, poses_.X_FL[i], {name, 0, 0.0});
-      closing.robot = ClosingRates::kNaN;  // both links move: it has no parts
-      message->links.push_back(
-          to_message(link.name, answer, Push::unknown(), penetration(i, answer), closing, name));
+      add_link(i, message.get());
     }
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();
   } else {
     for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
   }
-  const Verdict verdict = judge(situation, now.toSec());
-  message->status = verdict.status;
-  message->status_text = verdict.text;
+  const Status status = overall_status(input, now.toSec());
+  message->status = status.code;
+  message->status_text = status.text;
   publisher_.publish(message);
+}
+
+void SelfProximity::add_link(std::size_t link, ProximityArray* message) {
+  std::size_t other = link;
+  const LinkProximity answer = nearest(link, &other);
+  const RobotModel& robot = *model_->robot;
+  const std::string& other_name = robot.links[other].name;
+  ClosingRates closing =
+      speeds_[link].update(poses_.stamp, answer, poses_.X_FL[link], {other_name, 0, 0.0});
+  closing.robot = ClosingRates::kNaN;  // both links move, so the speed has no parts
+  message->links.push_back(to_message(robot.links[link].name, answer, Push::unknown(),
+                                      penetration(link, answer), closing, other_name));
 }
 
 }  // namespace ist

@@ -1,10 +1,10 @@
 #pragma once
 
+#include <ist_proximity/ProximityArray.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <tf2/buffer_core.h>
 
-#include <condition_variable>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -14,7 +14,8 @@
 
 #include "ist_proximity/proximity/self_collision_pairs.h"
 #include "ist_proximity/proximity/self_query.h"
-#include "ros/model/model_loader.h"
+#include "ros/common/stop_signal.h"
+#include "ros/model/model_state.h"
 #include "ros/output/closing_speed.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
@@ -22,16 +23,16 @@
 
 namespace ist {
 
-/// Link against link: ~self_proximity at ~self_collision/rate of the wall clock, in a thread of its
-/// own. Pairs that are left out: those that joints connect directly or fixed joints alone,
-/// ~self_collision/ignore, the SRDF's <disable_collisions> where robot_description_semantic holds
-/// one, and those that are in contact at rest.
+/// Measures link against link: publishes ~self_proximity at ~self_collision/rate of the wall clock,
+/// from a thread of its own. Pairs are left out when one joint or fixed joints alone connect them,
+/// when ~self_collision/ignore names them, when the SRDF in robot_description_semantic disables
+/// them (<disable_collisions>), and when they are in contact at rest.
 class SelfProximity {
  public:
-  /// @param nh       where `robot_description_semantic` is searched, and above
+  /// @param nh       namespace in which, and above which, `robot_description_semantic` is searched
   /// @param buffer   outlives this
   /// @param joints   outlives this; null: link poses come from the buffer
-  /// @param live     what is configured now; called from the thread
+  /// @param live     gives the present configuration; called from the thread
   SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
                 const tf2::BufferCore& buffer, JointStateListener* joints,
                 std::function<LiveConfig()> live);
@@ -44,12 +45,13 @@ class SelfProximity {
 
  private:
   void run();
-  void run_once();
+  void publish_once();
   void take_model();
   std::vector<LinkPair> choose_pairs() const;
   NamePairs ignored_pairs() const;
   LinkProximity nearest(std::size_t link, std::size_t* other) const;
-  void find_wrenches(const LiveConfig& live);
+  void add_link(std::size_t link, ist_proximity::ProximityArray* message);
+  void compute_wrenches(const LiveConfig& live);
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
   const ServerConfig config_;
@@ -59,20 +61,19 @@ class SelfProximity {
   const std::function<LiveConfig()> live_;
   ros::Publisher publisher_;
 
-  std::mutex mutex_;
-  std::condition_variable stop_signal_;
-  bool stop_ = false;
+  StopSignal stop_signal_;
+  std::mutex mutex_;  // guards the next member
   std::shared_ptr<const ModelState> newest_model_;
 
-  // The thread's own.
+  // Used by the thread alone.
   std::shared_ptr<const ModelState> model_;
-  std::unique_ptr<SelfQuery> query_;  ///< null without a model, or its kinematics
+  std::unique_ptr<SelfQuery> query_;  ///< null without a model or its kinematics
   std::unique_ptr<PoseSource> pose_source_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
   ros::Time last_now_;
   LinkPoses poses_;
   std::vector<PairProximity> results_;
-  std::vector<Wrench> wrenches_;  ///< by pair, on its first link
+  std::vector<Wrench> wrenches_;  ///< by pair: the wrench on its first link
   std::thread thread_;
 };
 

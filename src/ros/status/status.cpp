@@ -3,165 +3,129 @@
 #include <ist_proximity/ProximityArray.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
+
+#include "ros/common/text.h"
 
 namespace ist {
 namespace {
 
 using ist_proximity::ProximityArray;
 
-constexpr std::size_t kMaxSentences = 6;  // a status_text is to be read
+constexpr std::size_t kMaxSentences = 6;  // a status_text is meant to be read
 
-std::string seconds(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, std::abs(value) < 100 ? "%.2f s" : "%.0f s", value);
-  return text;
+/// The sentences that apply, the deciding one first.
+class Sentences {
+ public:
+  void add(std::uint8_t code, const std::string& text) {
+    if (texts_.empty()) code_ = code;
+    texts_.push_back(text);
+  }
+  void add(const Status& status) { add(status.code, status.text); }
+  void add(std::uint8_t code, const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) add(code, text);
+  }
+
+  bool empty() const { return texts_.empty(); }
+
+  Status status() const {
+    const std::size_t shown = std::min(texts_.size(), kMaxSentences);
+    std::string text =
+        join({texts_.begin(), texts_.begin() + static_cast<std::ptrdiff_t>(shown)}, "; ");
+    if (texts_.size() > shown) {
+      text += "; and " + std::to_string(texts_.size() - shown) + " more";
+    }
+    return {code_, text};
+  }
+
+ private:
+  std::uint8_t code_ = ProximityArray::OK;
+  std::vector<std::string> texts_;
+};
+
+/// By source: whether its status decides over the whole. Where no source is required, at least one
+/// is needed all the same.
+std::vector<bool> deciding_sources(const StatusInput& input) {
+  const bool any_required = std::any_of(input.sources.begin(), input.sources.end(),
+                                        [](const SourceReport& source) { return source.required; });
+  const bool any_ok = std::any_of(input.source_statuses.begin(), input.source_statuses.end(),
+                                  [](const Status& status) { return status.ok(); });
+  std::vector<bool> deciding(input.sources.size());
+  for (std::size_t i = 0; i < deciding.size(); ++i) {
+    deciding[i] =
+        !input.source_statuses[i].ok() && (input.sources[i].required || (!any_required && !any_ok));
+  }
+  return deciding;
 }
 
-std::string title(const SourceFacts& source) {
-  return "source '" + source.name + "' on " + source.topic;
+bool arrives_fresh(const SourceReport& source, double now) {
+  return source.is_file || (source.messages > 0 && now - source.newest <= source.timeout);
 }
 
-std::string allowed(const SourceFacts& source) {
-  return seconds(source.timeout) + " (~" + source.timeout_parameter + ")";
+/// Adds the sources that send nothing, and those that are stale.
+void add_silent_sources(const StatusInput& input, double now, Sentences* sentences) {
+  const std::vector<bool> deciding = deciding_sources(input);
+  const auto& sources = input.sources;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (deciding[i] && sources[i].messages == 0 && !sources[i].is_file) {
+      sentences->add(ProximityArray::NO_CLOUD, input.source_statuses[i].text);
+    }
+  }
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (deciding[i] && sources[i].messages > 0 && !arrives_fresh(sources[i], now)) {
+      sentences->add(ProximityArray::STALE_CLOUD, input.source_statuses[i].text);
+    }
+  }
 }
 
-std::string because(const std::string& problem) {
-  return problem.empty() ? std::string() : ": " + problem;
+/// Adds the sources whose fresh messages cannot be used.
+void add_unusable_sources(const StatusInput& input, double now, Sentences* sentences) {
+  if (!input.model_problem.empty()) return;  // no cloud can be used without a model
+  const std::vector<bool> deciding = deciding_sources(input);
+  for (std::size_t i = 0; i < input.sources.size(); ++i) {
+    if (deciding[i] && arrives_fresh(input.sources[i], now)) {
+      sentences->add(input.source_statuses[i]);
+    }
+  }
 }
 
 }  // namespace
 
-double future_tolerance(double timeout) { return std::min(timeout, 1.0); }
-
-Verdict judge_source(const SourceFacts& source, double now) {
-  if (source.is_file) {
-    if (source.has_snapshot) return {ProximityArray::OK, ""};
-    return {ProximityArray::NO_CLOUD,
-            "source '" + source.name + "'" +
-                because(source.problem.empty() ? "its file is being read" : source.problem)};
-  }
-  if (source.messages == 0) {
-    return {ProximityArray::NO_CLOUD,
-            title(source) + ": nothing received yet" +
-                (source.publishers == 0
-                     ? ", nobody publishes a " + source.type +
-                           " there; start the sensor's driver, or set or remap the topic"
-                     : ", although there is a publisher")};
-  }
-  if (std::isnan(source.newest)) {  // nothing but stamps that are not of this time
-    return {ProximityArray::STALE_CLOUD, title(source) + because(source.problem)};
-  }
-  const double newest_age = now - source.newest;
-  if (newest_age > source.timeout) {
-    return {ProximityArray::STALE_CLOUD,
-            title(source) + ": the newest " + source.noun + " is " + seconds(newest_age) +
-                " old, allowed is " + allowed(source) +
-                (source.problem.empty() ? source.noun == "map"
-                                              ? "; is it latched, and sent once? Then its timeout "
-                                                "should be .inf"
-                                              : "; has its driver stopped, or do the clocks of "
-                                                "sensor and node differ?"
-                                        : because(source.problem))};
-  }
-  if (!source.has_snapshot) {
-    return {ProximityArray::NO_CLOUD,
-            title(source) + ": no " + source.noun + " could be used yet" + because(source.problem)};
-  }
-  const double age = now - source.stamp.toSec();
-  if (age > source.timeout) {
-    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
-                                             " is " + seconds(age) + " old, allowed is " +
-                                             allowed(source) + because(source.problem)};
-  }
-  if (source.counts.saw_nothing()) {
-    return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
-                                          " is NaN, the sensor sees nothing at all"};
-  }
-  return {ProximityArray::OK, ""};
-}
-
-bool clouds_usable(const Situation& situation) {
+bool clouds_usable(const StatusInput& input) {
   bool any = false;
-  for (std::size_t i = 0; i < situation.sources.size(); ++i) {
-    if (situation.verdicts[i].ok()) {
+  for (std::size_t i = 0; i < input.sources.size(); ++i) {
+    if (input.source_statuses[i].ok()) {
       any = true;
-    } else if (situation.sources[i].required) {
+    } else if (input.sources[i].required) {
       return false;
     }
   }
   return any;
 }
 
-Verdict judge(const Situation& situation, double now) {
-  std::vector<Verdict> found;
-  const auto add = [&found](std::uint8_t status, const std::string& text) {
-    found.push_back({status, text});
-  };
-
-  if (!situation.model_problem.empty()) {
-    add(ProximityArray::MODEL_ERROR, situation.model_problem);
+Status overall_status(const StatusInput& input, double now) {
+  Sentences sentences;
+  if (!input.model_problem.empty()) sentences.add(ProximityArray::MODEL_ERROR, input.model_problem);
+  sentences.add(ProximityArray::MODEL_ERROR, input.link_errors);
+  add_silent_sources(input, now, &sentences);
+  sentences.add(ProximityArray::NO_POSE, input.pose_problems);
+  add_unusable_sources(input, now, &sentences);
+  if (input.deadline_passed) {
+    sentences.add(ProximityArray::DEGRADED,
+                  "~query/deadline passed before every link met ~query/tolerance: bounds hold but "
+                  "are wider; raise either, or ~packing/max_error");
   }
-  for (const std::string& error : situation.link_errors) add(ProximityArray::MODEL_ERROR, error);
-
-  // Where nothing is required, one of them is needed all the same.
-  const auto& sources = situation.sources;
-  const bool one_is_enough = std::none_of(
-      sources.begin(), sources.end(), [](const SourceFacts& source) { return source.required; });
-  const bool none_is_usable = std::none_of(situation.verdicts.begin(), situation.verdicts.end(),
-                                           [](const Verdict& verdict) { return verdict.ok(); });
-  const auto matters = [&](std::size_t i) {
-    return !situation.verdicts[i].ok() &&
-           (sources[i].required || (one_is_enough && none_is_usable));
-  };
-  const auto arrives_fresh = [&](const SourceFacts& source) {
-    return source.is_file || (source.messages > 0 && now - source.newest <= source.timeout);
-  };
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (matters(i) && sources[i].messages == 0 && !sources[i].is_file) {
-      add(ProximityArray::NO_CLOUD, situation.verdicts[i].text);
-    }
+  if (input.outside_region) {
+    sentences.add(ProximityArray::DEGRADED,
+                  "a link is farther out than the limits of prismatic joints allow and is near "
+                  "places where points were dropped as outside the region of interest: obstacles "
+                  "there are not known; state the true limits in the URDF");
   }
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (matters(i) && sources[i].messages > 0 && !arrives_fresh(sources[i])) {
-      add(ProximityArray::STALE_CLOUD, situation.verdicts[i].text);
-    }
+  if (sentences.empty()) return {ProximityArray::OK, ""};
+  Status status = sentences.status();
+  if (!input.clock_runs) {
+    status.text = "/use_sim_time is set and nothing has come on /clock; " + status.text;
   }
-  for (const std::string& problem : situation.pose_problems) {
-    add(ProximityArray::NO_POSE, problem);
-  }
-  // Without a model no cloud can be used: that is no fault of the sources.
-  for (std::size_t i = 0; i < sources.size() && situation.model_problem.empty(); ++i) {
-    if (matters(i) && arrives_fresh(sources[i])) {
-      add(situation.verdicts[i].status, situation.verdicts[i].text);
-    }
-  }
-  if (situation.deadline_passed) {
-    add(ProximityArray::DEGRADED,
-        "~query/deadline passed before every link met ~query/tolerance: bounds hold but are wider; "
-        "raise either, or ~packing/max_error");
-  }
-  if (situation.outside_region) {
-    add(ProximityArray::DEGRADED,
-        "a link is farther out than the limits of prismatic joints allow, and looks where points "
-        "were "
-        "dropped as out of reach: what it would have to know from there is not known; state these "
-        "limits in the URDF as they are");
-  }
-  if (found.empty()) return {ProximityArray::OK, ""};
-
-  Verdict verdict{found[0].status, ""};
-  for (std::size_t i = 0; i < std::min(found.size(), kMaxSentences); ++i) {
-    verdict.text += (i ? "; " : "") + found[i].text;
-  }
-  if (found.size() > kMaxSentences) {
-    verdict.text += "; and " + std::to_string(found.size() - kMaxSentences) + " more";
-  }
-  if (!situation.clock_runs) {
-    verdict.text = "/use_sim_time is set and nothing has come on /clock; " + verdict.text;
-  }
-  return verdict;
+  return status;
 }
 
 }  // namespace ist

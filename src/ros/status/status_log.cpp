@@ -6,7 +6,7 @@
 namespace ist {
 namespace {
 
-// [s] What passes by itself is not worth a line; nor is the same every second.
+// [s] A status is logged once it has lasted this long, and again after the second time.
 constexpr int kPatience = 3, kRepeat = 30;
 
 }  // namespace
@@ -14,18 +14,18 @@ constexpr int kPatience = 3, kRepeat = 30;
 void StatusLog::update(std::uint8_t status, const std::string& text) {
   constexpr std::uint8_t kOk = ist_proximity::ProximityArray::OK;
   if (status == kOk) {
-    if (told_ != kOk) ROS_INFO("the status is OK again");
+    if (logged_ != kOk) ROS_INFO("the status is OK again");
     *this = StatusLog();
     return;
   }
   ++bad_;
-  ++since_told_;
-  const bool is_due =
-      told_ == kOk ? bad_ >= kPatience : since_told_ >= (status == told_ ? kRepeat : kPatience);
+  ++since_logged_;
+  const bool is_due = logged_ == kOk ? bad_ >= kPatience
+                                     : since_logged_ >= (status == logged_ ? kRepeat : kPatience);
   if (!is_due) return;
   ROS_WARN_STREAM(text);
-  told_ = status;
-  since_told_ = 0;
+  logged_ = status;
+  since_logged_ = 0;
 }
 
 }  // namespace ist

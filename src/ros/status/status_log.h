@@ -5,17 +5,17 @@
 
 namespace ist {
 
-/// Tells the log why the status is not OK, once that has lasted, and when it is OK again: whoever
-/// looks at the terminal first finds it there. One thread.
+/// Logs why the status is not OK, once that has lasted a while, and when it is OK again, so that
+/// the reason stands on the terminal too. One thread.
 class StatusLog {
  public:
-  /// To be called once a second.
+  /// Must be called once a second.
   void update(std::uint8_t status, const std::string& text);
 
  private:
-  std::uint8_t told_ = 0;  ///< status
-  int bad_ = 0;            ///< [s]
-  int since_told_ = 0;     ///< [s]
+  std::uint8_t logged_ = 0;  ///< the status that was logged last
+  int bad_ = 0;              ///< [s] for which the status has not been OK
+  int since_logged_ = 0;     ///< [s]
 };
 
 }  // namespace ist

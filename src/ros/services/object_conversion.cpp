@@ -1,4 +1,4 @@
-#include "ros/model/object_conversion.h"
+#include "ros/services/object_conversion.h"
 
 #include <cmath>
 #include <sstream>
@@ -7,7 +7,7 @@
 
 #include "internal/geometry/mesh_io.h"
 #include "ist_proximity/geometry/error.h"
-#include "ros/poses/transforms.h"
+#include "ros/common/eigen_conversion.h"
 
 namespace ist {
 namespace {
@@ -63,9 +63,7 @@ AttachedObject to_object(const Request& request, const PackageFinder& find_packa
   object.name = request.name;
   object.link = request.link;
   geometry_msgs::Transform X_LE;
-  X_LE.translation.x = request.pose.position.x;
-  X_LE.translation.y = request.pose.position.y;
-  X_LE.translation.z = request.pose.position.z;
+  assign(to_vector(request.pose.position), &X_LE.translation);
   X_LE.rotation = request.pose.orientation;
   const std::string fault = to_isometry(X_LE, &object.element.X_LE);
   if (!fault.empty()) throw ModelError("pose: " + fault);

@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// What a request describes; its mesh is read.
+/// Makes the object that a request describes, and reads its mesh.
 /// @throws ModelError naming the field that is wrong, its value and what is allowed
 AttachedObject to_object(const ist_proximity::AttachObject::Request& request,
                          const PackageFinder& find_package);

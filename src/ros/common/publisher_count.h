@@ -8,11 +8,11 @@
 
 namespace ist {
 
-/// How many publishers a subscriber has, asked now and then: roscpp's answer can wait for the
-/// master, so no lock should be held. Not thread safe.
+/// Counts the publishers of a subscribed topic twice a second. The call to roscpp may wait for the
+/// master, so no lock should be held around ask(). Not thread safe.
 class PublisherCount {
  public:
-  /// The number, where it is time to ask again.
+  /// Returns the number when it is due, else nothing.
   std::optional<std::uint32_t> ask(const ros::Subscriber& subscriber) {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_) return std::nullopt;

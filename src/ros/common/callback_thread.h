@@ -1,0 +1,53 @@
+#pragma once
+
+#include <ros/callback_queue.h>
+
+#include <atomic>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "ros/common/thread_name.h"
+
+namespace ist {
+
+/// A callback queue with a thread of its own. Subscribers and services that use the queue must be
+/// shut down after stop().
+class CallbackThread {
+ public:
+  CallbackThread() = default;
+  ~CallbackThread() { stop(); }
+  CallbackThread(const CallbackThread&) = delete;
+  CallbackThread& operator=(const CallbackThread&) = delete;
+
+  ros::CallbackQueue* queue() { return &queue_; }
+
+  /// Starts the thread.
+  /// @param after_callbacks  called after each round of callbacks, 20 times a second or more often
+  void start(
+      const std::string& name, std::function<void()> after_callbacks = [] {}) {
+    thread_ = std::thread([this, name, after_callbacks = std::move(after_callbacks)] {
+      name_thread(name);
+      while (running_) {
+        queue_.callAvailable(ros::WallDuration(0.05));
+        after_callbacks();
+      }
+    });
+  }
+
+  /// Waits for the present callback and ends the thread.
+  void stop() {
+    running_ = false;
+    if (thread_.joinable()) thread_.join();
+  }
+
+  /// False once stop() is called; long callbacks look at it.
+  bool is_running() const { return running_; }
+
+ private:
+  ros::CallbackQueue queue_;
+  std::atomic<bool> running_{true};
+  std::thread thread_;
+};
+
+}  // namespace ist

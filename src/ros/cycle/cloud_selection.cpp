@@ -1,0 +1,70 @@
+#include "ros/cycle/cloud_selection.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "ist_proximity/repulsion/repulsion_filter.h"
+
+namespace ist {
+
+void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
+                            const std::shared_ptr<const RobotModel>& model,
+                            const ros::Time& poses_stamp, double pose_timeout,
+                            StatusInput* status) {
+  status->sources.clear();
+  status->source_statuses.clear();
+  selected_.clear();
+  held_.clear();
+  for (const auto& source : sources) {
+    const SourceSnapshot* snapshot = newest(source.get(), model, poses_stamp, pose_timeout);
+    SourceReport report = source->report();
+    if (snapshot) {
+      report.has_snapshot = true;
+      report.stamp = snapshot->stamp;
+      report.counts = snapshot->cloud.counts;
+      report.ingest_time = snapshot->cloud.ingest_time;
+    }
+    status->source_statuses.push_back(source_status(report, now.toSec()));
+    status->sources.push_back(std::move(report));
+    selected_.push_back(snapshot);
+  }
+
+  clouds_.clear();
+  cloud_names_.clear();
+  oldest_stamp_ = ros::Time();
+  const bool usable = clouds_usable(*status);
+  for (std::size_t i = 0; i < selected_.size(); ++i) {
+    if (!usable || !status->source_statuses[i].ok()) selected_[i] = nullptr;
+    if (!selected_[i]) continue;
+    clouds_.push_back(&selected_[i]->cloud);
+    cloud_names_.push_back(status->sources[i].name);
+    const ros::Time& stamp = selected_[i]->stamp;
+    if (status->sources[i].is_file) continue;
+    if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
+  }
+}
+
+const SourceSnapshot* CloudSelection::newest(CloudSource* source,
+                                             const std::shared_ptr<const RobotModel>& model,
+                                             const ros::Time& poses_stamp, double pose_timeout) {
+  if (reader_ == Reader::kOnly) return source->newest(model, poses_stamp, pose_timeout);
+  held_.push_back(source->share(model, poses_stamp, pose_timeout));
+  return held_.back().get();
+}
+
+ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
+  const auto cloud = static_cast<std::size_t>(answer.source);
+  if (answer.source < 0 || cloud >= clouds_.size()) return {};
+  return {cloud_names_[cloud], obstacles_key({clouds_[cloud]}), clouds_[cloud]->stamp};
+}
+
+void CloudSelection::exclude_unfiltered(std::vector<bool>* links) const {
+  for (const SourceSnapshot* snapshot : selected_) {
+    if (!snapshot || snapshot->filtered.empty()) continue;
+    for (std::size_t i = 0; i < links->size(); ++i) {
+      (*links)[i] = (*links)[i] && snapshot->filtered[i];
+    }
+  }
+}
+
+}  // namespace ist

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ros/input/cloud_source.h"
+#include "ros/output/closing_speed.h"
+#include "ros/status/status.h"
+
+namespace ist {
+
+/// Takes the newest snapshot of each source and selects those that queries may use. One thread.
+class CloudSelection {
+ public:
+  /// kOnly: the one thread that calls CloudSource::newest(); kOther: shares the snapshots with it.
+  enum class Reader { kOnly, kOther };
+
+  explicit CloudSelection(Reader reader) : reader_(reader) {}
+
+  /// @param model         that snapshots must be made with
+  /// @param poses_stamp   of the link poses; maps are placed at that time
+  /// @param pose_timeout  [s] allowed age of a map's pose
+  /// @param status        receives the sources and their statuses
+  void update(const ros::Time& now, const CloudSources& sources,
+              const std::shared_ptr<const RobotModel>& model, const ros::Time& poses_stamp,
+              double pose_timeout, StatusInput* status);
+
+  // Results of the last update(), valid until the next one.
+
+  /// The clouds that queries may use; empty while a required source is not usable.
+  SnapshotSpan clouds() const { return clouds_; }
+  /// By source: its snapshot where that is selected, else null.
+  const std::vector<const SourceSnapshot*>& selected() const { return selected_; }
+  /// The stamp of the oldest selected cloud, map files aside; zero when there is none.
+  ros::Time oldest_stamp() const { return oldest_stamp_; }
+  /// The selected cloud that holds the nearest point of an answer.
+  ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
+  /// Makes links false whose own points the self-filter left in a selected cloud: they would be
+  /// found touching themselves.
+  void exclude_unfiltered(std::vector<bool>* links) const;
+
+ private:
+  const SourceSnapshot* newest(CloudSource* source, const std::shared_ptr<const RobotModel>& model,
+                               const ros::Time& poses_stamp, double pose_timeout);
+
+  const Reader reader_;
+  std::vector<const SourceSnapshot*> selected_;
+  std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< used with Reader::kOther
+  std::vector<const CloudSnapshot*> clouds_;
+  std::vector<std::string> cloud_names_;  ///< by cloud: the name of its source
+  ros::Time oldest_stamp_;
+};
+
+}  // namespace ist

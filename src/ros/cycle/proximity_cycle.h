@@ -1,0 +1,81 @@
+#pragma once
+
+#include <ist_proximity/JointRepulsion.h>
+#include <ist_proximity/ProximityArray.h>
+#include <ros/time.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/repulsion/repulsion_filter.h"
+#include "ros/cycle/cloud_selection.h"
+#include "ros/input/cloud_source.h"
+#include "ros/model/model_state.h"
+#include "ros/output/closing_speed.h"
+#include "ros/output/joint_repulsion.h"
+#include "ros/parameters/parameters.h"
+#include "ros/poses/pose_source.h"
+#include "ros/status/cycle_report.h"
+#include "ros/status/status.h"
+
+namespace ist {
+
+/// Turns link poses and clouds into one ProximityArray per cycle, for one robot model. It uses the
+/// newest data and never waits. One thread.
+class ProximityCycle {
+ public:
+  /// @param model  ready
+  /// @param poses  of model->robot->links; null where the kinematics that it needs is faulty
+  ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
+                 std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader);
+
+  /// @param now      the ROS clock's time
+  /// @param message  overwritten
+  /// @param report   its transform_problem is read; sources, poses and status are overwritten, and
+  ///                 the computation time is added
+  void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
+           ist_proximity::ProximityArray* message, CycleReport* report);
+
+  /// Forgets the last cycles after a jump of the clock: no speed is computed across it, and the
+  /// repulsion's filter starts again.
+  void forget();
+
+  /// The clouds of the last run(); valid until the next one.
+  SnapshotSpan clouds() const { return selection_.clouds(); }
+  /// By link of the robot: whether the last run() could measure it if it had a pose.
+  std::vector<bool> measurable() const;
+
+  /// Gives the repulsion of the last run() as joint efforts.
+  /// @param proximity  the message of that run()
+  void fill_joint_repulsion(const ist_proximity::ProximityArray& proximity,
+                            ist_proximity::JointRepulsion* message);
+
+ private:
+  void look_up_poses(const ros::Time& now);
+  void describe_pose_problems(const std::string& transform_problem);
+  void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
+  Wrench penetration(std::size_t link, const LiveConfig& config) const;
+
+  std::shared_ptr<const ModelState> model_;
+  const RobotModel& robot_;
+  std::string fixed_frame_;
+  std::unique_ptr<PoseSource> pose_source_;
+  const double pose_timeout_;  ///< [s]
+  CloudSelection selection_;
+  ProximityQuery query_;
+  Repulsion repulsion_;
+  std::vector<RepulsionFilter> filters_;  ///< by link of the robot
+  std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
+  JointRepulsion joint_repulsion_;
+
+  // Valid for one cycle.
+  LinkPoses poses_;
+  StatusInput status_input_;
+  std::vector<LinkProximity> results_;  ///< by link of the robot
+  std::vector<Push> pushes_;            ///< by link of the robot, filtered
+};
+
+}  // namespace ist

@@ -1,0 +1,107 @@
+#include "ros/input/placer.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "ist_proximity/robot/posed_solids.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/ros_time.h"
+#include "ros/poses/transforms.h"
+
+namespace ist {
+namespace {
+
+constexpr std::chrono::milliseconds kGrace(500);
+
+}  // namespace
+
+// A cloud is worth more without one link's self-filter than after its timeout, so the wait ends
+// before that.
+Placer::Placer(const SourceConfig& config, const tf2::BufferCore& buffer)
+    : self_filter_(config.ingest.self_filter),
+      patience_(0.8 * std::min(config.timeout, 1.0)),
+      buffer_(buffer) {}
+
+void Placer::begin_target() { target_since_ = std::chrono::steady_clock::now(); }
+
+std::string Placer::missing_transform(const Measurement& measurement,
+                                      const SourceTarget& target) const {
+  const std::string sensor = without_slash(measurement.header().frame_id);
+  const std::vector<ros::Time> instants = measurement.instants();
+  std::string problem;
+  for (const ros::Time& time : {instants.front(), instants.back()}) {
+    if (!is_known(buffer_, target.fixed_frame, sensor, time, &problem)) return problem;
+  }
+  if (!self_filter_) return "";
+  for (const ros::Time& time : {instants.front(), instants.back()}) {
+    for (const LinkModel& link : target.model->links) {
+      if (link.usable() && !is_known(buffer_, target.fixed_frame, link.name, time, &problem) &&
+          is_worth_waiting_for(link.name, target.fixed_frame, time)) {
+        return "the self-filter waits: " + problem;
+      }
+    }
+  }
+  return "";
+}
+
+/// The wait does not even begin for a link whose transforms have stopped. At the start all links
+/// get time to appear.
+bool Placer::is_worth_waiting_for(const std::string& link, const std::string& fixed_frame,
+                                  const ros::Time& stamp) const {
+  const ros::Time now = ros::Time::now();
+  if (seconds_between(stamp, now) > patience_) return false;
+  if (std::chrono::steady_clock::now() - target_since_ < kGrace) return true;
+  Eigen::Isometry3d ignored;
+  ros::Time newest;
+  return look_up(buffer_, fixed_frame, link, ros::Time(), &ignored, &newest).empty() &&
+         seconds_between(newest, now) < patience_;
+}
+
+/// Adds the links whose poses are known at an instant.
+void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp,
+                        Placement* placement) const {
+  const auto& links = target.model->links;
+  std::vector<Eigen::Isometry3d> X_FL(links.size(), Eigen::Isometry3d::Identity());
+  std::vector<bool> known(links.size(), false);
+  std::string ignored;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    // An exception per missing link and cloud would cost more than is_known().
+    known[i] = links[i].usable() &&
+               is_known(buffer_, target.fixed_frame, links[i].name, stamp, &ignored) &&
+               look_up(buffer_, target.fixed_frame, links[i].name, stamp, &X_FL[i]).empty();
+    // A link whose pose is unknown at any instant is not filtered for certain.
+    placement->known[i] = placement->known[i] && known[i];
+  }
+  append_posed_solids(*target.model, X_FL, known, &placement->robot);
+}
+
+std::string Placer::place(const Measurement& measurement, const SourceTarget& target,
+                          Placement* placement) const {
+  const std::string sensor = without_slash(measurement.header().frame_id);
+  const std::vector<ros::Time> instants = measurement.instants();
+  if (instants.empty()) return "";
+  std::string problem =
+      look_up(buffer_, target.fixed_frame, sensor, instants.front(), &placement->X_FS);
+  placement->X_FS_end = placement->X_FS;
+  if (problem.empty() && instants.size() > 1) {
+    problem = look_up(buffer_, target.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
+  }
+  if (!problem.empty() || !self_filter_) return problem;
+  placement->known.assign(target.model->links.size(), true);
+  for (const ros::Time& instant : instants) pose_robot(target, instant, placement);
+  return "";
+}
+
+std::string place_map(const tf2::BufferCore& buffer, const ros::Time& time, double max_age,
+                      SourceSnapshot* snapshot) {
+  const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
+  Eigen::Isometry3d& X_FM = snapshot->cloud.X_FM;
+  std::string ignored;
+  // An exception in every cycle would cost more than is_known().
+  if (is_known(buffer, fixed, frame, time, &ignored)) {
+    return look_up(buffer, fixed, frame, time, &X_FM);
+  }
+  return look_up_newest(buffer, fixed, frame, time, max_age, &X_FM);
+}
+
+}  // namespace ist

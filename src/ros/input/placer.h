@@ -1,0 +1,57 @@
+#pragma once
+
+#include <ros/time.h>
+#include <tf2/buffer_core.h>
+
+#include <chrono>
+#include <string>
+
+#include "ros/input/measurement.h"
+#include "ros/input/source_snapshot.h"
+#include "ros/input/source_state.h"
+
+namespace ist {
+
+/// Finds the poses of sensor and robot at the instants of a measurement. It never waits itself: the
+/// source keeps a measurement until missing_transform() is empty. This takes the place of
+/// tf2_ros::MessageFilter, which can neither give up on a single frame (setTargetFrames() needs
+/// clear(), which races with the tf listener's thread) nor name the transform that it waits for.
+/// Not thread safe.
+class Placer {
+ public:
+  /// @param buffer  outlives this
+  Placer(const SourceConfig& config, const tf2::BufferCore& buffer);
+
+  /// Tells that the target's model or generation is new: all links get time to appear in tf.
+  void begin_target();
+
+  /// @param target  its model is not null
+  /// @returns empty when all poses are known that are worth waiting for, else a sentence
+  std::string missing_transform(const Measurement& measurement, const SourceTarget& target) const;
+
+  /// Looks up the poses.
+  /// @param target  its model is not null
+  /// @returns empty on success, else a sentence
+  std::string place(const Measurement& measurement, const SourceTarget& target,
+                    Placement* placement) const;
+
+ private:
+  bool is_worth_waiting_for(const std::string& link, const std::string& fixed_frame,
+                            const ros::Time& stamp) const;
+  void pose_robot(const SourceTarget& target, const ros::Time& stamp, Placement* placement) const;
+
+  const bool self_filter_;
+  const double patience_;  ///< [s] a cloud waits this long at most for one link's pose
+  const tf2::BufferCore& buffer_;
+  std::chrono::steady_clock::time_point target_since_;
+};
+
+/// Looks up where a map's frame is in the fixed frame at an instant, or else at the newest instant
+/// that tf knows.
+/// @param max_age   [s] allowed age of the newest instant
+/// @param snapshot  its frames are read, cloud.X_FM is set
+/// @returns empty on success, else a sentence
+std::string place_map(const tf2::BufferCore& buffer, const ros::Time& time, double max_age,
+                      SourceSnapshot* snapshot);
+
+}  // namespace ist

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+
+namespace ist {
+
+/// All that the status of a source depends on. Times are seconds of the ROS clock; counts begin at
+/// the start, the number of messages also when the clock jumps back.
+struct SourceReport {
+  std::string name;
+  std::string topic;  ///< resolved; the path where is_file
+  std::string type = "sensor_msgs/PointCloud2";
+  std::string noun = "cloud";                       ///< the word for one message
+  bool is_file = false;                             ///< a map file: read once and never stale
+  double timeout = 0.5;                             ///< [s]
+  std::string timeout_parameter = "cloud_timeout";  ///< its name
+  bool required = true;
+  /// [m] Points this near to a link are taken for the robot, so obstacles in this skin are not
+  /// seen. NaN without self-filter.
+  double blind_skin = std::numeric_limits<double>::quiet_NaN();
+  std::uint64_t messages = 0;      ///< received
+  std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use
+  std::uint64_t overtaken = 0;     ///< dropped: a newer one was ready first
+  std::uint64_t shown = 0;         ///< published on ~filtered_cloud, while it has subscribers
+  std::uint64_t unusable = 0;      ///< dropped: malformed, in the future, or without transform
+  std::uint32_t publishers = 0;
+  /// Newest stamp received, except for stamps far in the future; NaN: none.
+  double newest = std::numeric_limits<double>::quiet_NaN();
+  std::string problem;  ///< why the last message is not in use (yet); empty when it is
+
+  bool has_snapshot = false;  ///< whether a cloud is in use; the members below describe it
+  ros::Time stamp;
+  double ingest_time = 0.0;  ///< [s]
+  IngestCounts counts;
+};
+
+}  // namespace ist

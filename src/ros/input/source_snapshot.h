@@ -1,0 +1,27 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// A cloud as queries see it, and the model and frames that it was made with.
+struct SourceSnapshot {
+  CloudSnapshot cloud;
+  ros::Time stamp;
+  std::shared_ptr<const RobotModel> model;
+  /// By link: false where the self-filter had no pose at the cloud's stamp, so that points on that
+  /// link are still among the obstacles. Empty: the source does not filter.
+  std::vector<bool> filtered;
+  std::uint64_t generation = 0;        ///< see SourceTarget; 0: not filled yet
+  std::string fixed_frame, map_frame;  ///< the frames between which a map is placed
+};
+
+}  // namespace ist

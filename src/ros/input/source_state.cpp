@@ -1,0 +1,82 @@
+#include "ros/input/source_state.h"
+
+#include <limits>
+
+namespace ist {
+
+SourceState::SourceState(const SourceConfig& config, const std::string& topic)
+    : is_permanent_(config.is_permanent()) {
+  report_.name = config.name;
+  report_.is_file = !config.file.empty();
+  report_.topic = topic;
+  report_.type = message_type(config.type);
+  report_.noun = noun(config.type);
+  report_.timeout = config.timeout;
+  report_.timeout_parameter = config.timeout_parameter;
+  report_.required = config.required;
+  if (config.ingest.self_filter) report_.blind_skin = config.ingest.self_filter_padding;
+}
+
+void SourceState::set_target(std::shared_ptr<const RobotModel> model,
+                             const std::string& fixed_frame, const RegionOfInterest& region) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  target_.model = std::move(model);
+  target_.fixed_frame = fixed_frame;
+  target_.region = region;
+}
+
+SourceTarget SourceState::target() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  return target_;
+}
+
+bool SourceState::is_current(const SourceSnapshot* snapshot,
+                             const std::shared_ptr<const RobotModel>& model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  return snapshot && model && snapshot->model == model &&
+         (snapshot->generation == target_.generation ||
+          (snapshot->generation != 0 && is_permanent_));
+}
+
+SourceReport SourceState::report() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  notice_clock_jump();
+  SourceReport report = report_;
+  if (!placing_problem_.empty()) report.problem = placing_problem_;
+  if (!file_problem_.empty()) report.problem = file_problem_;
+  return report;
+}
+
+void SourceState::set_problem(const std::string& problem, bool dropped) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  report_.problem = problem;
+  if (dropped) ++report_.unusable;
+}
+
+void SourceState::set_file_problem(const std::string& problem) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  file_problem_ = problem;
+}
+
+void SourceState::set_placing_problem(const std::string& problem) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  placing_problem_ = problem;
+}
+
+/// The caller holds mutex_.
+void SourceState::notice_clock_jump() {
+  const ros::Time now = ros::Time::now();
+  if (now < last_now_) {
+    ++target_.generation;
+    if (!is_permanent_) {
+      report_.messages = 0;
+      report_.newest = std::numeric_limits<double>::quiet_NaN();
+      report_.problem.clear();
+    }
+  }
+  last_now_ = now;
+}
+
+}  // namespace ist

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/robot/attached_object.h"
+#include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/robot/robot_description.h"
+#include "ist_proximity/robot/robot_model.h"
+#include "ros/parameters/parameters.h"
+
+namespace ist {
+
+/// The robot's model, or how far its loading is. Immutable once it is shared.
+struct ModelState {
+  enum class Phase {
+    kWaiting,  ///< robot_description is not set
+    kFailed,   ///< robot_description is set and holds no URDF
+    kPacking,
+    kReady,
+  };
+  Phase phase = Phase::kWaiting;
+  std::string problem;                ///< a sentence that says what to do; empty when ready
+  double fraction = 0.0;              ///< 0 to 1 while packing
+  std::string root_link;              ///< empty until the URDF is known
+  std::vector<std::string> links;     ///< monitored, in URDF order; known from kPacking on
+  std::vector<std::string> warnings;  ///< given by packing
+  /// Known when ready. It holds every link with geometry, because the self-filter needs them all,
+  /// not only the monitored ones.
+  std::shared_ptr<const RobotModel> robot;
+  std::vector<std::size_t> monitored;  ///< known when ready: indices into robot->links
+  std::shared_ptr<const Kinematics>
+      kinematics;                  ///< known from kPacking on; null where it is faulty
+  std::string kinematics_problem;  ///< why `kinematics` is null
+  std::shared_ptr<const RobotDescription> description;  ///< the parsed URDF; known from kPacking on
+  std::vector<AttachedObject> objects;                  ///< known when ready: parts of `robot`
+};
+
+/// The sentence about a URDF whose kinematics is faulty.
+std::string no_kinematics(const ModelState& model);
+
+/// The frame F of all results: ~fixed_frame, or else the root link.
+std::string fixed_frame_of(const ModelState& model, const ServerConfig& config);
+
+/// Names by link of the robot.
+std::vector<std::string> link_names(const RobotModel& robot);
+
+/// By link of model.robot: true for monitored links with usable geometry, whose poses are needed.
+std::vector<bool> wanted_links(const ModelState& model);
+
+/// Chooses the monitored links, in the order in which the model has them.
+/// @param wanted  empty: every link with geometry. Names that the URDF lacks go to the end
+std::vector<std::string> monitored_links(const RobotDescription& description,
+                                         const std::vector<std::string>& wanted);
+
+}  // namespace ist

@@ -1,0 +1,47 @@
+#include "ros/output/result_publisher.h"
+
+#include <std_msgs/Float64.h>
+
+#include <algorithm>
+
+#include "ros/output/message_conversion.h"
+
+namespace ist {
+namespace {
+
+constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
+
+}  // namespace
+
+ResultPublisher::ResultPublisher(ros::NodeHandle private_nh, const ServerConfig& config)
+    : marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
+  proximity_ = private_nh.advertise<ist_proximity::ProximityArray>("proximity", 10);
+  joint_repulsion_ = private_nh.advertise<ist_proximity::JointRepulsion>("joint_repulsion", 10);
+  min_distance_ = private_nh.advertise<std_msgs::Float64>("min_distance", 10);
+  markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("markers", 2);
+}
+
+bool ResultPublisher::publish(
+    const ist_proximity::ProximityArrayConstPtr& result,
+    const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion) {
+  proximity_.publish(result);
+  if (joint_repulsion_.getNumSubscribers() > 0) {
+    ist_proximity::JointRepulsion message;
+    message.header.stamp = result->header.stamp;
+    message.status = result->status;
+    message.status_text = result->status_text;
+    fill_joint_repulsion(&message);
+    joint_repulsion_.publish(message);
+  }
+  std_msgs::Float64 smallest;
+  smallest.data = min_distance(*result);
+  min_distance_.publish(smallest);
+
+  const auto now = std::chrono::steady_clock::now();
+  if (markers_.getNumSubscribers() == 0 || now < next_markers_) return false;
+  next_markers_ = now + kMarkerPeriod;
+  markers_.publish(marker_drawer_.draw(*result));
+  return true;
+}
+
+}  // namespace ist

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <ist_proximity/JointRepulsion.h>
+#include <ist_proximity/ProximityArray.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+
+#include <chrono>
+#include <functional>
+
+#include "ros/output/markers.h"
+#include "ros/parameters/parameters.h"
+
+namespace ist {
+
+/// Publishes the results of a cycle: ~proximity, ~joint_repulsion, ~min_distance and ~markers. One
+/// thread.
+class ResultPublisher {
+ public:
+  ResultPublisher(ros::NodeHandle private_nh, const ServerConfig& config);
+
+  /// @param fill_joint_repulsion  fills the message for the same result; called only while the
+  /// topic
+  ///                              has subscribers, because Jacobians cost time
+  /// @returns whether markers were drawn
+  bool publish(const ist_proximity::ProximityArrayConstPtr& result,
+               const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion);
+
+ private:
+  ros::Publisher proximity_, joint_repulsion_, min_distance_, markers_;
+  ProximityMarkers marker_drawer_;
+  std::chrono::steady_clock::time_point next_markers_;
+};
+
+}  // namespace ist

@@ -1,0 +1,39 @@
+#include "ros/output/sphere_publisher.h"
+
+#include <cstddef>
+
+#include "ros/output/markers.h"
+
+namespace ist {
+namespace {
+
+constexpr std::size_t kMaxSpheresPerLink = 250;  // each sphere is a marker
+constexpr std::chrono::seconds kFirstDelay(1), kLastDelay(4);
+
+}  // namespace
+
+SpherePublisher::SpherePublisher(ros::NodeHandle private_nh)
+    : publisher_(private_nh.advertise<visualization_msgs::MarkerArray>("spheres", 1, true)) {}
+
+void SpherePublisher::show(const ModelState& model) {
+  if (!shown_.markers.empty()) publisher_.publish(deleted(shown_));
+  shown_.markers.clear();
+  if (!model.robot) return;
+  shown_ = sphere_markers(*model.robot, model.monitored, kMaxSpheresPerLink);
+  publisher_.publish(shown_);
+}
+
+void SpherePublisher::repeat_after_clock_jump() {
+  repeat_delay_ = kFirstDelay;
+  next_repeat_ = Clock::now() + repeat_delay_;
+}
+
+void SpherePublisher::repeat_when_due() {
+  if (Clock::now() < next_repeat_) return;
+  publisher_.publish(shown_);
+  repeat_delay_ *= 2;
+  next_repeat_ =
+      repeat_delay_ <= kLastDelay ? Clock::now() + repeat_delay_ : Clock::time_point::max();
+}
+
+}  // namespace ist

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include <chrono>
+
+#include "ros/model/model_state.h"
+
+namespace ist {
+
+/// Publishes the packing's spheres on ~spheres, latched. One thread.
+class SpherePublisher {
+ public:
+  explicit SpherePublisher(ros::NodeHandle private_nh);
+
+  /// Shows the monitored links of a model; none while it is not ready.
+  void show(const ModelState& model);
+
+  /// Must be called when the ROS clock has jumped back. rviz then forgets all markers some time
+  /// later, latched or not, so they are published again after 1, 3 and 7 seconds.
+  void repeat_after_clock_jump();
+  /// Must be called regularly; repeats the markers when it is time.
+  void repeat_when_due();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  ros::Publisher publisher_;
+  visualization_msgs::MarkerArray shown_;
+  Clock::time_point next_repeat_ = Clock::time_point::max();
+  std::chrono::seconds repeat_delay_{0};
+};
+
+}  // namespace ist

@@ -1,0 +1,43 @@
+#include "ros/parameters/source_config.h"
+
+#include <cmath>
+
+namespace ist {
+
+const char* message_type(SourceType type) {
+  switch (type) {
+    case SourceType::kScan:
+      return "sensor_msgs/LaserScan";
+    case SourceType::kMap:
+      return "octomap_msgs/Octomap";
+    case SourceType::kCloud:
+      break;
+  }
+  return "sensor_msgs/PointCloud2";
+}
+
+const char* noun(SourceType type) {
+  switch (type) {
+    case SourceType::kScan:
+      return "scan";
+    case SourceType::kMap:
+      return "map";
+    case SourceType::kCloud:
+      break;
+  }
+  return "cloud";
+}
+
+bool SourceConfig::is_permanent() const {
+  return type == SourceType::kMap && (!file.empty() || std::isinf(timeout));
+}
+
+bool has_noise_filter() {
+#ifdef IST_PROXIMITY_WITH_PCL
+  return true;
+#else
+  return false;
+#endif
+}
+
+}  // namespace ist

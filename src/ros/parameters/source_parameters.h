@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "ros/parameters/parameter_reader.h"
+#include "ros/parameters/source_config.h"
+
+namespace ist {
+
+/// Reads ~sources, or the parameters of the single source where ~sources is not set. Mistakes go to
+/// the reader's errors.
+std::vector<SourceConfig> read_sources(ParameterReader* reader);
+
+}  // namespace ist

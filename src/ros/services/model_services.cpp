@@ -1,0 +1,45 @@
+#include "ros/services/model_services.h"
+
+#include <exception>
+
+#include "ist_proximity/robot/package_resolver.h"
+#include "ros/services/object_conversion.h"
+
+namespace ist {
+
+ModelServices::ModelServices(ros::NodeHandle private_nh, ModelLoader* loader) : loader_(*loader) {
+  reload_service_ = private_nh.advertiseService("reload_model", &ModelServices::reload, this);
+  attach_service_ = private_nh.advertiseService("attach_object", &ModelServices::attach, this);
+  detach_service_ = private_nh.advertiseService("detach_object", &ModelServices::detach, this);
+}
+
+bool ModelServices::reload(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  bool found = false;
+  response.message = loader_.reload(&found);
+  response.success = found;
+  return true;
+}
+
+bool ModelServices::attach(ist_proximity::AttachObject::Request& request,
+                           ist_proximity::AttachObject::Response& response) {
+  try {
+    response.message = loader_.attach(to_object(request, environment_package_finder()));
+  } catch (const std::exception& error) {  // ModelError, or no memory
+    response.message = error.what();
+  }
+  response.success = response.message.empty();
+  if (response.success) {
+    response.message = "'" + request.name + "' is now part of link '" + request.link + "'";
+  }
+  return true;
+}
+
+bool ModelServices::detach(ist_proximity::DetachObject::Request& request,
+                           ist_proximity::DetachObject::Response& response) {
+  response.message = loader_.detach(request.name);
+  response.success = response.message.empty();
+  if (response.success) response.message = "'" + request.name + "' is detached";
+  return true;
+}
+
+}  // namespace ist

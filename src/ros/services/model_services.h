@@ -1,0 +1,31 @@
+#pragma once
+
+#include <ist_proximity/AttachObject.h>
+#include <ist_proximity/DetachObject.h>
+#include <ros/node_handle.h>
+#include <ros/service_server.h>
+#include <std_srvs/Trigger.h>
+
+#include "ros/model/model_loader.h"
+
+namespace ist {
+
+/// Answers the services that change the robot's model: ~reload_model, ~attach_object and
+/// ~detach_object. They are called from the callback queue of the node handle.
+class ModelServices {
+ public:
+  /// @param loader  outlives this
+  ModelServices(ros::NodeHandle private_nh, ModelLoader* loader);
+
+ private:
+  bool reload(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  bool attach(ist_proximity::AttachObject::Request& request,
+              ist_proximity::AttachObject::Response& response);
+  bool detach(ist_proximity::DetachObject::Request& request,
+              ist_proximity::DetachObject::Response& response);
+
+  ModelLoader& loader_;
+  ros::ServiceServer reload_service_, attach_service_, detach_service_;
+};
+
+}  // namespace ist

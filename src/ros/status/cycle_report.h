@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ros/input/source_report.h"
+#include "ros/poses/joint_state_listener.h"
+#include "ros/status/status.h"
+
+namespace ist {
+
+/// Computation times of the last thousand cycles. Not thread safe.
+class CycleTimes {
+ public:
+  void add(double seconds);
+  /// The q-quantile [s], 0.5 being the median; NaN before the first time.
+  double quantile(double q) const;
+
+ private:
+  static constexpr std::size_t kKept = 1000;
+  std::vector<double> ring_;
+  std::size_t total_ = 0;
+};
+
+/// Results of the last cycle, for the diagnostics thread.
+struct CycleReport {
+  Status status{0, ""};
+  std::vector<SourceReport> sources;
+  std::vector<Status> source_statuses;  ///< by source
+  std::vector<std::string> pose_problems;
+  std::string transform_problem;                 ///< a transform that the tf listener rejected
+  std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
+  std::size_t links_known = 0, links_monitored = 0;
+  double pose_age = 0.0;             ///< [s] of the poses' common instant, when any link is known
+  std::size_t cycles = 0;            ///< since the start, with or without a model
+  CycleTimes times;                  ///< of cycles with a model
+  std::size_t deadlines_missed = 0;  ///< cycles whose query was cut short, since the start
+  std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
+};
+
+}  // namespace ist

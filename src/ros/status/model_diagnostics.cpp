@@ -1,0 +1,97 @@
+#include "ros/common/text.h"
+#include "ros/status/diagnostic_values.h"
+#include "ros/status/diagnostics.h"
+
+namespace ist {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+std::string contact_body_text(const ContactBody& body) {
+  std::string text;
+  if (body.has_volume()) {
+    text = std::to_string(body.sphere_count) + format_text(" spheres, %.3f l", 1e3 * body.volume) +
+           format_text(", filled to %.0f %%", 100.0 * body.packed_volume / body.volume) +
+           (body.from_cache ? ", from the cache" : format_text(", packed in %.1f s", body.time));
+  }
+  if (!body.note.empty()) text += (text.empty() ? "" : "; ") + body.note;
+  return text;
+}
+
+/// Adds the contact bodies, and why `penetration` may be NaN in contact.
+void add_contacts(const ModelState& state, const ContactModel* contacts, bool wanted,
+                  DiagnosticStatus* status) {
+  if (!wanted) {
+    add_value("contact volumes",
+              "off, ~penetration/enabled is false: penetration is NaN in contact", status);
+    return;
+  }
+  if (!state.robot) return;
+  const bool is_current = contacts != nullptr && contacts->robot == state.robot;
+  std::size_t usable = 0, ready = 0;
+  for (const std::size_t i : state.monitored) {
+    if (!state.robot->links[i].usable()) continue;
+    ++usable;
+    if (!is_current || !contacts->bodies[i]) continue;
+    ++ready;
+    add_value("volume of " + state.robot->links[i].name, contact_body_text(*contacts->bodies[i]),
+              status);
+  }
+  add_value("contact volumes",
+            ready == usable ? "ready"
+                            : std::to_string(ready) + " of " + std::to_string(usable) +
+                                  " links; penetration is NaN in contact for those to come",
+            status);
+}
+
+/// Adds the packing of a link that is usable.
+void add_link(const LinkModel& link, DiagnosticStatus* status) {
+  const PackingCertificate& certificate = link.packing.certificate;
+  std::string text = std::to_string(link.packing.spheres.size()) + " spheres, largest gap " +
+                     millimetres(certificate.max_gap) + ", mean " +
+                     millimetres(certificate.mean_gap);
+  if (certificate.unreachable_area > 0) {
+    text += format_text(", %.1f cm2 of sheets", 1e4 * certificate.unreachable_area);
+  }
+  if (!certificate.reached) {
+    text += ", ~packing/max_error not reached";
+    raise(DiagnosticStatus::WARN, "link '" + link.name + "': " + text, status);
+  }
+  text +=
+      link.from_cache ? ", from the cache" : format_text(", packed in %.1f s", link.packing_time);
+  add_value(link.name, text, status);
+}
+
+}  // namespace
+
+DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
+                                   const ContactModel* contacts, bool contacts_wanted) {
+  DiagnosticStatus status = make_diagnostic(node, "model");
+  const bool ready = state.phase == ModelState::Phase::kReady;
+  if (!state.problem.empty()) {
+    const bool under_way = state.phase == ModelState::Phase::kPacking;
+    raise(under_way ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem, &status);
+  }
+  add_value("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction), &status);
+  add_value("links monitored", state.links.size(), &status);
+  for (const AttachedObject& object : state.objects) {
+    add_value("attached object", "'" + object.name + "' on '" + object.link + "'", &status);
+  }
+  for (const std::size_t i : state.monitored) {
+    const LinkModel& link = state.robot->links[i];
+    if (!link.usable()) {
+      raise(DiagnosticStatus::ERROR, link.error, &status);
+      add_value(link.name, link.error, &status);
+      continue;
+    }
+    add_link(link, &status);
+  }
+  add_contacts(state, contacts, contacts_wanted, &status);
+  for (const std::string& warning : state.warnings) {
+    raise(DiagnosticStatus::WARN, warning, &status);
+    add_value("warning", warning, &status);
+  }
+  return status;
+}
+
+}  // namespace ist

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/robot/robot_model.h"
+#include "ros/input/source_snapshot.h"
+#include "ros/poses/pose_source.h"
+
+namespace ist {
+
+/// Describes the links without a pose: one sentence with the first link's reason and the source's
+/// hint, and one that names the others. Empty when all monitored links have poses.
+/// @param source  of the poses; may be null
+std::vector<std::string> missing_poses(const RobotModel& robot,
+                                       const std::vector<std::size_t>& monitored,
+                                       const LinkPoses& poses, const PoseSource* source);
+
+/// Names the links with a pose whose own points are still in a cloud, because the self-filter had
+/// no pose for them at the cloud's stamp; empty when there are none.
+std::string unfiltered_links(const RobotModel& robot, const std::vector<std::size_t>& monitored,
+                             const LinkPoses& poses, const SourceSnapshot& snapshot,
+                             const std::string& source);
+
+}  // namespace ist
