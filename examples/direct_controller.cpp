@@ -22,6 +22,7 @@
 #include "ist_proximity/contact/contact_wrench.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace {
@@ -57,21 +58,6 @@ ist::RawCloud as_cloud(const std::vector<float>& xyz) {
   cloud.y = sizeof(float);
   cloud.z = 2 * sizeof(float);
   return cloud;
-}
-
-/// Poses of the model's links, from the joints' positions.
-std::vector<Eigen::Isometry3d> link_poses(const ist::Kinematics& kinematics,
-                                          const ist::RobotModel& model,
-                                          const std::vector<double>& q) {
-  ist::JointPoses joints;
-  std::vector<Eigen::Isometry3d> X_FL, poses;
-  std::vector<bool> known;
-  kinematics.place_joints(q, &joints);
-  kinematics.place_links(joints, Eigen::Isometry3d::Identity(), &X_FL, &known);
-  for (const ist::LinkModel& link : model.links) {
-    poses.push_back(X_FL[*kinematics.find_link(link.name)]);
-  }
-  return poses;
 }
 
 /// Once: the links' volumes, for forces in contact. 100 balls are quick to pack, and coarse.
@@ -120,7 +106,7 @@ int run(const std::string& urdf_path) {
   const ist::Repulsion repulsion(model);
   ist::CloudSnapshot snapshot;
   std::vector<ist::LinkProximity> answers;
-  const std::vector<bool> known(model->links.size(), true);
+  ist::ForwardKinematics forward(*model, std::make_shared<const ist::Kinematics>(robot));
 
   std::vector<double> q(arm.kinematics.joints().size(), 0.0);
   Eigen::VectorXd goal(6);
@@ -132,7 +118,7 @@ int run(const std::string& urdf_path) {
   double smallest = std::numeric_limits<double>::infinity(), largest_force = 0.0;
   for (int cycle = 0; cycle * kControlPeriod < kDuration; ++cycle) {
     const double now = cycle * kControlPeriod;
-    const std::vector<Eigen::Isometry3d> X_FL = link_poses(arm.kinematics, *model, q);
+    const auto& [X_FL, known] = forward.run(q);
 
     // A new cloud: what lies on the robot, where it was at the cloud's stamp, is dropped.
     if (cycle % kCyclesPerCloud == 0) {
@@ -149,8 +135,7 @@ int run(const std::string& urdf_path) {
     reading.cloud_age = now - snapshot.stamp;
     for (std::size_t i = 0; i < answers.size(); ++i) {
       const Eigen::Vector3d away = repulsion(i, X_FL[i], {&snapshot}, answers[i], repulsion_config);
-      const std::size_t link = *arm.kinematics.find_link(model->links[i].name);
-      reading.links.push_back({link, answers[i].lower_bound, answers[i].p_LCl, away});
+      reading.links.push_back({*forward.body(i), answers[i].lower_bound, answers[i].p_LCl, away});
       smallest = std::min(smallest, answers[i].lower_bound);
       largest_force = std::max(largest_force, contact_force(model->links[i], *volumes[i],
                                                             answers[i], X_FL[i], snapshot));

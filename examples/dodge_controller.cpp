@@ -108,18 +108,17 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
   if (!is_known(reading, config) || !q.allFinite()) return Eigen::VectorXd::Zero(q.size());
 
   JointPoses joint_poses;
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
+  BodyPoses bodies;
   arm.kinematics.place_joints(all_q, &joint_poses);
-  arm.kinematics.place_links(joint_poses, Eigen::Isometry3d::Identity(), &X_FL, &known);
+  arm.kinematics.place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
 
   std::vector<Constraint> constraints;
   double smallest_bound = std::numeric_limits<double>::infinity();
   Jacobian J;
   for (const LinkReading& link : reading.links) {
     const double length = link.away.norm();
-    if (!known[link.link] || !link.p_LCl.allFinite() || !(length > 0.0)) continue;
-    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LCl, &J);
+    if (!bodies.known[link.body] || !link.p_LCl.allFinite() || !(length > 0.0)) continue;
+    point_jacobian(arm.kinematics, bodies.X_FB, link.body, bodies.X_FB[link.body] * link.p_LCl, &J);
     Constraint c;
     c.a.resize(q.size());
     bool can_move = false;

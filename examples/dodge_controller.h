@@ -13,7 +13,7 @@ namespace ist::example {
 
 /// What is known of one link's surroundings: fields of ist_proximity/LinkProximity.
 struct LinkReading {
-  std::size_t link = 0;                             ///< index in the kinematics
+  std::size_t body = 0;                             ///< of the kinematics: the link
   double lower_bound = 0.0;                         ///< [m]
   Eigen::Vector3d p_LCl = Eigen::Vector3d::Zero();  ///< [m] point_on_link_local; NaN when CLEAR
   /// Which way the link should go, in the fixed frame: `repulsion`, of any length. (`direction` is

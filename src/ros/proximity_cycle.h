@@ -79,7 +79,7 @@ class ProximityCycle {
   JointRepulsion joint_repulsion_;
 
   // Of this cycle.
-  LinkPoses poses_;
+  StampedLinkPoses poses_;
   Situation situation_;
   std::vector<const SourceSnapshot*> snapshots_;             ///< by source; null: none
   std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< with Reader::kOther

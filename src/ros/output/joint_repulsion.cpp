@@ -8,7 +8,7 @@ JointRepulsion::JointRepulsion(const ModelState& model)
     : kinematics_(model.kinematics), problem_(model.kinematics_problem) {
   if (!kinematics_) return;
   for (const std::size_t i : model.monitored) {
-    const auto place = kinematics_->find_link(model.robot->links[i].name);
+    const auto place = kinematics_->find_body(model.robot->links[i].name);
     if (!place) continue;  // a configured link that the URDF lacks: nothing moves it
     monitored_.push_back(i);
     places_.push_back(*place);
@@ -28,7 +28,7 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
     message->status_text = "of the URDF, " + problem_;
     return;
   }
-  source->look_up_all(*kinematics_, proximity.header.stamp, &X_FL_, &known_);
+  source->look_up_all(*kinematics_, proximity.header.stamp, &bodies_);
   const auto& joints = kinematics_->joints();
   effort_.setZero(static_cast<Eigen::Index>(joints.size()));
   for (std::size_t i = 0; i < places_.size(); ++i) {
@@ -50,13 +50,13 @@ std::string JointRepulsion::add(std::size_t place, const Push& push) {
     blame(place);
     return "";
   }
-  const auto missing = first_link_needed(*kinematics_, known_, place);
+  const auto missing = first_body_needed(*kinematics_, bodies_.known, place);
   if (missing) {
     blame(place);
-    return "the joints' efforts from link '" + kinematics_->links()[place] +
-           "' are not known: where link '" + kinematics_->links()[*missing] + "' is is not known";
+    return "the joints' efforts from link '" + kinematics_->bodies()[place] +
+           "' are not known: where link '" + kinematics_->bodies()[*missing] + "' is is not known";
   }
-  point_jacobian(*kinematics_, X_FL_, place, X_FL_[place].translation(), &J_);
+  point_jacobian(*kinematics_, bodies_.X_FB, place, bodies_.X_FB[place].translation(), &J_);
   Eigen::Matrix<double, 6, 1> wrench;
   wrench << push.force, push.torque;
   effort_ += J_.transpose() * wrench;

@@ -38,11 +38,10 @@ class JointRepulsion {
   std::shared_ptr<const Kinematics> kinematics_;  ///< null where the URDF's is faulty
   std::string problem_;                           ///< of the kinematics
   std::vector<std::size_t> monitored_;            ///< links of the robot
-  std::vector<std::size_t> places_;               ///< of those, where the kinematics has them
+  std::vector<std::size_t> places_;               ///< of those: their bodies
 
-  // Of this call, by link and by joint of the kinematics.
-  std::vector<Eigen::Isometry3d> X_FL_;
-  std::vector<bool> known_;
+  // Of this call, by body and by joint.
+  BodyPoses bodies_;
   Eigen::VectorXd effort_;
   Jacobian J_;
 };

@@ -22,9 +22,9 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
       wanted_(wanted),
       timeout_(timeout),
       behind_(buffer, fixed_frame, links, wanted, timeout) {
-  const std::size_t none = kinematics_->links().size();
+  const std::size_t none = kinematics_->bodies().size();
   for (const std::string& name : links) {
-    places_.push_back(kinematics_->find_link(name).value_or(none));
+    places_.push_back(kinematics_->find_body(name).value_or(none));
   }
 }
 
@@ -86,11 +86,11 @@ bool JointPoseSource::ask_tf(const std::string& parent, const std::string& child
   return false;
 }
 
-void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   poses->reset(now, places_.size());
   tf_is_behind_ = false;
-  X_FL_.assign(kinematics_->links().size(), Eigen::Isometry3d::Identity());
-  known_.assign(X_FL_.size(), false);
+  bodies_.X_FB.assign(kinematics_->bodies().size(), Eigen::Isometry3d::Identity());
+  bodies_.known.assign(bodies_.X_FB.size(), false);
   if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
 
   const ros::Time instant = read_positions(now);
@@ -99,24 +99,24 @@ void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].has_unstated_pose()) continue;
     joints_.known[j] =
-        ask_tf(kinematics_->links()[joints[j].parent], kinematics_->links()[joints[j].child], now,
+        ask_tf(kinematics_->bodies()[joints[j].parent], kinematics_->bodies()[joints[j].child], now,
                instant, &joints_.X_PC[j], &joint_problems_[j]);
   }
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();
   std::string root_problem;
   const bool root_known =
-      ask_tf(fixed_frame_, kinematics_->links()[0], now, instant, &X_FR, &root_problem);
+      ask_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR, &root_problem);
   if (tf_is_behind_) return behind_.look_up(now, poses);
   if (!root_known) return poses->blame(wanted_, root_problem);
 
   poses->stamp = instant;
-  kinematics_->place_links(joints_, X_FR, &X_FL_, &known_);
+  kinematics_->place_bodies(joints_, X_FR, &bodies_);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (!wanted_[i]) continue;
-    if (places_[i] == X_FL_.size()) {
+    if (places_[i] == bodies_.X_FB.size()) {
       poses->problems[i] = "it is not in the URDF";
-    } else if (known_[places_[i]]) {
-      poses->X_FL[i] = X_FL_[places_[i]];
+    } else if (bodies_.known[places_[i]]) {
+      poses->X_FL[i] = bodies_.X_FB[places_[i]];
       poses->known[i] = true;
     } else {
       const std::size_t joint = *kinematics_->first_unknown(joints_, places_[i]);
@@ -126,10 +126,9 @@ void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
 }
 
 void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                                  std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  if (tf_is_behind_) return behind_.look_up_all(kinematics, instant, X_FL, known);
-  *X_FL = X_FL_;
-  *known = known_;
+                                  BodyPoses* bodies) {
+  if (tf_is_behind_) return behind_.look_up_all(kinematics, instant, bodies);
+  *bodies = bodies_;
 }
 
 }  // namespace ist

@@ -36,9 +36,9 @@ class JointPoseSource : public PoseSource {
                   const std::vector<std::string>& links, const std::vector<bool>& wanted,
                   double timeout);
 
-  void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
+                   BodyPoses* bodies) override;
   std::string hint() const override;
 
  private:
@@ -51,7 +51,7 @@ class JointPoseSource : public PoseSource {
   const Which which_;
   const tf2::BufferCore& buffer_;
   std::string fixed_frame_;
-  std::vector<std::size_t> places_;  ///< by link: where the kinematics has it; none: its size
+  std::vector<std::size_t> places_;  ///< by link: its body; none: the number of bodies
   std::vector<bool> wanted_;
   double timeout_;
   TfPoseSource behind_;  ///< for when tf is behind
@@ -62,8 +62,7 @@ class JointPoseSource : public PoseSource {
   std::vector<std::string> joint_problems_;  ///< by joint
   JointPoses joints_;
   bool tf_is_behind_ = false;
-  std::vector<Eigen::Isometry3d> X_FL_;  ///< by link of the kinematics
-  std::vector<bool> known_;
+  BodyPoses bodies_;
 };
 
 }  // namespace ist

@@ -242,8 +242,8 @@ void JointStateListener::put_into_tf(std::size_t joint, const ros::Time& stamp, 
   const double q = is_static ? 0.0 : at.multiplier * positions_[at.source].q + at.offset;
   geometry_msgs::TransformStamped message = to_message(kinematics_->joint_pose(joint, q));
   message.header.stamp = stamp;
-  message.header.frame_id = kinematics_->links()[at.parent];
-  message.child_frame_id = kinematics_->links()[at.child];
+  message.header.frame_id = kinematics_->bodies()[at.parent];
+  message.child_frame_id = kinematics_->bodies()[at.child];
   try {
     buffer_.setTransform(message, "joint_states", is_static);
   } catch (const std::exception& error) {
@@ -255,7 +255,7 @@ std::vector<std::string> computed_frames(const Kinematics& kinematics) {
   std::vector<std::string> frames;
   for (const Kinematics::Joint& joint : kinematics.joints()) {
     if (!joint.has_unstated_pose())
-      frames.push_back(without_slash(kinematics.links()[joint.child]));
+      frames.push_back(without_slash(kinematics.bodies()[joint.child]));
   }
   return frames;
 }

@@ -8,15 +8,14 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/robot/link_poses.h"
 
 namespace ist {
 
 /// Where the links are at one common instant.
-struct LinkPoses {
-  ros::Time stamp;                      ///< that instant; the present one when no link is known
-  std::vector<Eigen::Isometry3d> X_FL;  ///< by link: link frame -> fixed frame; valid where known
-  std::vector<bool> known;              ///< by link
-  std::vector<std::string> problems;    ///< by link: why not; empty where known or not wanted
+struct StampedLinkPoses : LinkPoses {
+  ros::Time stamp;                    ///< that instant; the present one when no link is known
+  std::vector<std::string> problems;  ///< by link: why not; empty where known or not wanted
 
   /// Every one of `links` unknown, without a problem.
   void reset(const ros::Time& now, std::size_t links);
@@ -32,15 +31,13 @@ class PoseSource {
   virtual ~PoseSource() = default;
 
   /// @param now  of the ROS clock; 0 (no clock yet) makes every link unknown
-  virtual void look_up(const ros::Time& now, LinkPoses* poses) = 0;
+  virtual void look_up(const ros::Time& now, StampedLinkPoses* poses) = 0;
 
-  /// Where all links of the robot are, those without geometry too, at the instant of the last
+  /// Where all bodies of the robot are, links without geometry too, at the instant of the last
   /// look_up(): what a Jacobian needs.
   /// @param instant  the stamp that look_up() gave
-  /// @param X_FL     by link of the kinematics: link frame -> fixed frame; valid where known
-  /// @param known    by link of the kinematics
   virtual void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                           std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) = 0;
+                           BodyPoses* bodies) = 0;
 
   /// For a person whose links have no pose: what may be missing.
   virtual std::string hint() const = 0;

@@ -15,9 +15,9 @@ StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
       wanted_(links.size(), true),
       timeout_(timeout),
       q_(kinematics_->joints().size(), std::nan("")) {
-  const std::size_t none = kinematics_->links().size();
+  const std::size_t none = kinematics_->bodies().size();
   for (const std::string& name : links) {
-    places_.push_back(kinematics_->find_link(name).value_or(none));
+    places_.push_back(kinematics_->find_body(name).value_or(none));
   }
 }
 
@@ -48,13 +48,13 @@ std::string StatedPoseSource::hint() const {
   return "state its position, or see that tf or joint states tell it";
 }
 
-void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   poses->reset(now, places_.size());
-  X_FL_.assign(kinematics_->links().size(), Eigen::Isometry3d::Identity());
-  known_.assign(X_FL_.size(), false);
+  bodies_.X_FB.assign(kinematics_->bodies().size(), Eigen::Isometry3d::Identity());
+  bodies_.known.assign(bodies_.X_FB.size(), false);
   if (now.isZero()) return poses->blame(wanted_, "the ROS clock has not started");
   const std::string problem =
-      look_up_newest(buffer_, fixed_frame_, kinematics_->links()[0], now, timeout_, &X_FR_);
+      look_up_newest(buffer_, fixed_frame_, kinematics_->bodies()[0], now, timeout_, &X_FR_);
   if (!problem.empty()) return poses->blame(wanted_, problem);
 
   kinematics_->place_joints(q_, &joints_);
@@ -63,20 +63,20 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
     const std::string why =
-        look_up_newest(buffer_, kinematics_->links()[joints[j].parent],
-                       kinematics_->links()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
+        look_up_newest(buffer_, kinematics_->bodies()[joints[j].parent],
+                       kinematics_->bodies()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
     joints_.known[j] = why.empty();
     if (!why.empty()) {
       joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
     }
   }
-  kinematics_->place_links(joints_, X_FR_, &X_FL_, &known_);
+  kinematics_->place_bodies(joints_, X_FR_, &bodies_);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (!wanted_[i]) continue;
-    if (places_[i] == X_FL_.size()) {
+    if (places_[i] == bodies_.X_FB.size()) {
       poses->problems[i] = "it is not in the URDF";
-    } else if (known_[places_[i]]) {
-      poses->X_FL[i] = X_FL_[places_[i]];
+    } else if (bodies_.known[places_[i]]) {
+      poses->X_FL[i] = bodies_.X_FB[places_[i]];
       poses->known[i] = true;
     } else {
       poses->problems[i] = joint_problems[*kinematics_->first_unknown(joints_, places_[i])];
@@ -85,9 +85,8 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
 }
 
 void StatedPoseSource::look_up_all(const Kinematics& /*kinematics*/, const ros::Time& /*instant*/,
-                                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  *X_FL = X_FL_;
-  *known = known_;
+                                   BodyPoses* bodies) {
+  *bodies = bodies_;
 }
 
 }  // namespace ist

@@ -38,23 +38,22 @@ class StatedPoseSource : public PoseSource {
   const JointPoses& joints() const { return joints_; }
   const Eigen::Isometry3d& root() const { return X_FR_; }
 
-  void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
+                   BodyPoses* bodies) override;
   std::string hint() const override;
 
  private:
   std::shared_ptr<const Kinematics> kinematics_;
   const tf2::BufferCore& buffer_;
   std::string fixed_frame_;
-  std::vector<std::size_t> places_;  ///< by link: where the kinematics has it; none: its size
+  std::vector<std::size_t> places_;  ///< by link: its body; none: the number of bodies
   std::vector<bool> wanted_;
   double timeout_;
   std::vector<double> q_;  ///< by joint; NaN: left out
   JointPoses joints_;
   Eigen::Isometry3d X_FR_ = Eigen::Isometry3d::Identity();
-  std::vector<Eigen::Isometry3d> X_FL_;  ///< by link of the kinematics, of the last look_up()
-  std::vector<bool> known_;
+  BodyPoses bodies_;  ///< of the last look_up()
 };
 
 }  // namespace ist

@@ -74,7 +74,7 @@ NamePairs SelfProximity::ignored_pairs() const {
   NamePairs ignored = config_.self_collision.ignore;
   for (const auto& pair : ignored) {
     for (const std::string& name : {pair.first, pair.second}) {
-      if (model_->kinematics->find_link(name)) continue;
+      if (model_->kinematics->find_body(name)) continue;
       ROS_WARN_STREAM("~self_collision/ignore names '" << name
                                                        << "', which is no link of the URDF");
     }
