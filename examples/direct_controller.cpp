@@ -61,21 +61,21 @@ ist::RawCloud as_cloud(const std::vector<float>& xyz) {
 }
 
 /// Once: the links' volumes, for forces in contact. 100 balls are quick to pack, and coarse.
-std::vector<std::shared_ptr<const ist::ContactBody>> link_volumes(
+std::vector<std::shared_ptr<const ist::ContactGeometry>> link_volumes(
     const ist::RobotDescription& robot, const ist::RobotModel& model) {
   ist::ContactConfig config;
   config.packing.max_spheres = 100;
-  std::vector<std::shared_ptr<const ist::ContactBody>> bodies;
+  std::vector<std::shared_ptr<const ist::ContactGeometry>> bodies;
   for (const ist::LinkModel& link : model.links) {
     const auto same = [&link](const ist::LinkDescription& one) { return one.name == link.name; };
     const auto found = std::find_if(robot.links.begin(), robot.links.end(), same);
-    bodies.push_back(ist::build_contact_body(found->geometry, 0, link, config, ""));
+    bodies.push_back(ist::build_contact_geometry(found->geometry, 0, link, config, ""));
   }
   return bodies;
 }
 
 /// [N] What presses on a link: 0 out of contact, NaN where it is not known.
-double contact_force(const ist::LinkModel& link, const ist::ContactBody& body,
+double contact_force(const ist::LinkModel& link, const ist::ContactGeometry& body,
                      const ist::LinkProximity& answer, const Eigen::Isometry3d& X_FL,
                      const ist::CloudSnapshot& cloud) {
   ist::ContactVolume volume;

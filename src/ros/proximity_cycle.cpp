@@ -245,7 +245,7 @@ void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* messag
 /// Not known in contact until the link's disjoint packing is there.
 Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) const {
   const LinkProximity& result = results_[link];
-  const ContactBody* body = find_body(config.contacts.get(), robot_, link);
+  const ContactGeometry* body = find_contact_geometry(config.contacts.get(), robot_, link);
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
   if (is_known) volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], clouds_);

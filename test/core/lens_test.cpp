@@ -1,4 +1,4 @@
-#include "internal/geometry/lens.h"
+#include "contact/lens.h"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,12 @@
 
 namespace ist {
 namespace {
+
+// Where the lens's middle lies between the centres of two spheres, 0 to 1.
+double middle_of_lens(double R, double r, double d) {
+  using One = Eigen::Array<double, 1, 1>;
+  return lens_middle<One>(One::Constant(R - r), One::Constant(d)).value();
+}
 
 // Both spheres' sections, along the line of their centres.
 double integrated(double R, double r, double d) {
@@ -50,8 +56,8 @@ TEST(Lens, HoldsAtTouchContainmentAndCommonCentres) {
         EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R - r)), sphere, 1e-8 * sphere);
         EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R + r)), 0.0, 1e-12 * R * R * R);
         EXPECT_EQ(lens_volume(R, r, (1.0 + tiny) * (R + r) * (1.0 + 1e-15)), 0.0);
-        const double place = lens_place(R, r, tiny * R);
-        EXPECT_TRUE(place >= 0.0 && place <= 1.0);
+        const double middle = middle_of_lens(R, r, tiny * R);
+        EXPECT_TRUE(middle >= 0.0 && middle <= 1.0);
       }
     }
   }
@@ -67,7 +73,7 @@ TEST(Lens, LiesInTheMiddleOfItsThickness) {
     const Eigen::Vector3d a = test::random_vector(&rng, 1.0);
     const Eigen::Vector3d b = a + d * test::random_vector(&rng, 1.0).normalized();
     const double length = (b - a).norm();
-    const Eigen::Vector3d found = a + lens_place(R, r, length) * (b - a);
+    const Eigen::Vector3d found = a + middle_of_lens(R, r, length) * (b - a);
     EXPECT_LT((found - test::oracle_lens_middle(a, R, b, r)).norm(), 1e-12);
   }
 }

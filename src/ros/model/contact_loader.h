@@ -34,8 +34,8 @@ class ContactLoader {
  private:
   void run();
   void load(const std::shared_ptr<const ModelState>& state);
-  std::shared_ptr<const ContactBody> build(const LinkDescription& link, const LinkModel& model,
-                                           const std::function<bool()>& cancelled) const;
+  std::shared_ptr<const ContactGeometry> build(const LinkDescription& link, const LinkModel& model,
+                                               const std::function<bool()>& cancelled) const;
   void set(std::shared_ptr<const ContactModel> contacts);
   bool is_current(const ModelState& state) const;
 
@@ -46,7 +46,7 @@ class ContactLoader {
   std::atomic<bool> stop_{false};
   std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
   /// Of the last model by key, for the next one; the thread's own.
-  std::map<std::string, std::shared_ptr<const ContactBody>> known_;
+  std::map<std::string, std::shared_ptr<const ContactGeometry>> known_;
   std::thread thread_;  ///< none where they are not wanted
 };
 

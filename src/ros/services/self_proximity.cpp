@@ -145,8 +145,8 @@ void SelfProximity::find_wrenches(const LiveConfig& live) {
   for (std::size_t i = 0; i < results_.size(); ++i) {
     if (results_[i].state != LinkState::kContact) continue;
     const LinkPair& pair = query_->pairs()[i];
-    const ContactBody* first = find_body(live.contacts.get(), robot, pair.first);
-    const ContactBody* second = find_body(live.contacts.get(), robot, pair.second);
+    const ContactGeometry* first = find_contact_geometry(live.contacts.get(), robot, pair.first);
+    const ContactGeometry* second = find_contact_geometry(live.contacts.get(), robot, pair.second);
     const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
     wrenches_[i] = first == nullptr || second == nullptr
                        ? Wrench::unknown()

@@ -82,9 +82,9 @@ void add_contacts(const ModelState& state, const ContactModel* contacts, bool wa
   for (const std::size_t i : state.monitored) {
     if (!state.robot->links[i].usable()) continue;
     ++usable;
-    if (!is_there || !contacts->bodies[i]) continue;
+    if (!is_there || !contacts->links[i]) continue;
     ++ready;
-    const ContactBody& body = *contacts->bodies[i];
+    const ContactGeometry& body = *contacts->links[i];
     std::string text;
     if (body.has_volume()) {
       text = std::to_string(body.sphere_count) + number(" spheres, %.3f l", 1e3 * body.volume) +
