@@ -79,7 +79,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       speeds_(robot_.links.size()),
       joint_repulsion_(*model_),
       results_(robot_.links.size()),
-      pushes_(robot_.links.size(), Push::unknown()) {
+      pushes_(robot_.links.size(), RepulsiveWrench::unknown()) {
   situation_.model_problem = model_->problem;
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
@@ -234,7 +234,7 @@ void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* messag
     const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
     const ClosingSpeed::Nearest nearest = nearest_source(result);
     pushes_[i] = filters_[i].update(message->header.stamp.toSec(), obstacles,
-                                    repulsion_.push(i, X_FL, clouds_, result, config.repulsion),
+                                    repulsion_.wrench(i, X_FL, clouds_, result, config.repulsion),
                                     result, config.repulsion);
     message->links.push_back(to_message(
         robot_.links[i].name, result, pushes_[i], penetration(i, config),

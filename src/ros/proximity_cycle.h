@@ -86,7 +86,7 @@ class ProximityCycle {
   std::vector<const CloudSnapshot*> clouds_;                 ///< what the query sees
   std::vector<std::string> cloud_names_;                     ///< of `clouds_`
   std::vector<LinkProximity> results_;                       ///< by link of the robot
-  std::vector<Push> pushes_;                                 ///< by link of the robot, filtered
+  std::vector<RepulsiveWrench> pushes_;                      ///< by link of the robot, filtered
 };
 
 /// Frame of all results.

@@ -15,7 +15,7 @@ JointRepulsion::JointRepulsion(const ModelState& model)
   }
 }
 
-void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
+void JointRepulsion::fill(PoseSource* source, const std::vector<RepulsiveWrench>& pushes,
                           const ist_proximity::ProximityArray& proximity,
                           ist_proximity::JointRepulsion* message) {
   message->header.stamp = proximity.header.stamp;
@@ -44,7 +44,7 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
   }
 }
 
-std::string JointRepulsion::add(std::size_t place, const Push& push) {
+std::string JointRepulsion::add(std::size_t place, const RepulsiveWrench& push) {
   if (push.force.isZero(0.0) && push.torque.isZero(0.0)) return "";
   if (!push.force.allFinite()) {  // UNKNOWN: the status of the proximity message says why
     blame(place);

@@ -27,12 +27,12 @@ class JointRepulsion {
   /// @param pushes     by link of the robot
   /// @param proximity  with the same poses: header and status
   /// @param message    overwritten
-  void fill(PoseSource* source, const std::vector<Push>& pushes,
+  void fill(PoseSource* source, const std::vector<RepulsiveWrench>& pushes,
             const ist_proximity::ProximityArray& proximity, ist_proximity::JointRepulsion* message);
 
  private:
   /// Empty, or why the Jacobian cannot be known.
-  std::string add(std::size_t place, const Push& push);
+  std::string add(std::size_t place, const RepulsiveWrench& push);
   void blame(std::size_t place);
 
   std::shared_ptr<const Kinematics> kinematics_;  ///< null where the URDF's is faulty

@@ -203,8 +203,8 @@ void SelfProximity::run_once() {
       ClosingRates closing =
           speeds_[i].update(poses_.stamp, answer, poses_.X_FL[i], {name, 0, 0.0});
       closing.robot = ClosingRates::kNaN;  // both links move: it has no parts
-      message->links.push_back(
-          to_message(link.name, answer, Push::unknown(), penetration(i, answer), closing, name));
+      message->links.push_back(to_message(link.name, answer, RepulsiveWrench::unknown(),
+                                          penetration(i, answer), closing, name));
     }
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();
