@@ -46,9 +46,9 @@ int main(int argc, char** argv) {
   std::vector<double> query_us, contact_us, ratios, points;
   for (const auto& scene : ist::benchmark::truth_scenes(data)) {
     ist::CloudSnapshot& cloud = *scene.cloud;
-    ist::PointIndexBuilder builder;
+    ist::PointBvhBuilder builder;
     if (cloud.coarse.empty()) {
-      ist::Thinning().run(cloud.index, cloud.thinning, &builder, &cloud.coarse);
+      ist::Thinning().run(cloud.index.bvh(), cloud.thinning, &builder, &cloud.coarse.bvh());
     }
     ist::ProximityQuery query(model, {});
     std::vector<ist::LinkProximity> results;

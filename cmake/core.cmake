@@ -1,12 +1,9 @@
 # The core library, its tools and its installation: no ROS.
 
-set(core_folders
-  geometry packing tree robot
-  cloud cloud/format cloud/filters cloud/index cloud/maps
-  proximity contact repulsion)
-list(TRANSFORM core_folders PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/src/" OUTPUT_VARIABLE core_globs)
-list(TRANSFORM core_globs APPEND "/*.cpp")
-file(GLOB core_sources CONFIGURE_DEPENDS ${core_globs})
+# A folder's sources, and those of its rooms. Relative paths: a workspace may itself be called src/ros.
+file(GLOB core_sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}
+  src/*/*.cpp src/*/*/*.cpp)
+list(FILTER core_sources EXCLUDE REGEX "^src/(nodes|ros|tools)/")
 
 add_library(ist_proximity_core ${core_sources})
 add_library(ist_proximity::ist_proximity_core ALIAS ist_proximity_core)

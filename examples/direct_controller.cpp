@@ -23,6 +23,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/link_poses.h"
+#include "ist_proximity/robot/posed_solids.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace {
@@ -124,7 +125,7 @@ int run(const std::string& urdf_path) {
     if (cycle % kCyclesPerCloud == 0) {
       const std::vector<float> points = ball_points({0.55, -1.0 + 0.25 * now, 0.30});
       const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-      ingest.run(as_cloud(points), X_FS, {model.get(), X_FL, known}, now, &snapshot);
+      ingest.run(as_cloud(points), X_FS, ist::posed_solids(*model, X_FL, known), now, &snapshot);
     }
 
     // In a controller's own thread: allocates nothing, never throws.

@@ -6,6 +6,7 @@
 
 #include "ist_proximity/proximity/self_collision_pairs.h"
 #include "ist_proximity/proximity/self_query.h"
+#include "ist_proximity/robot/posed_solids.h"
 
 namespace ist::sim {
 namespace {
@@ -86,10 +87,9 @@ bool Perception::has_seen() const {
 
 void Perception::look(Simulation* world) {
   for (const Picture& picture : world->take_pictures()) {
-    PosedRobot robot;
-    robot.model = model_.get();
-    robot.X_FL = world->link_poses(picture.stamp);
-    robot.known.assign(robot.X_FL.size(), true);
+    const std::vector<Eigen::Isometry3d> X_FL = world->link_poses(picture.stamp);
+    const std::vector<PosedSolid> robot =
+        posed_solids(*model_, X_FL, std::vector<bool>(X_FL.size(), true));
     const std::size_t c = picture.camera;
     ingest_[c].run(picture.raw(), world->cameras()[c].config().X_FC, robot, picture.stamp,
                    &snapshots_[c]);

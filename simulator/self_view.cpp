@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "internal/cloud/point_bvh.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/posed_solids.h"
 #include "scene.h"
 
 namespace ist::sim {
@@ -56,9 +58,10 @@ double smallest(const std::vector<LinkProximity>& answers) {
 std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, double stamp,
                              double noise) {
   std::uint64_t count = 0;
-  PointTile room;
-  for (std::size_t i = 0; i < index.tile_count(); ++i) {
-    const PointTile& tile = index.tile(i, &room);
+  const PointBvh& bvh = index.bvh();
+  PointTile scratch;
+  for (std::size_t i = 0; i < bvh.tile_count(); ++i) {
+    const PointTile& tile = bvh.tile(i, &scratch);
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::Vector3d p = index.X_FO() * tile.point(k);
       const bool is_ball = ball != nullptr &&
@@ -116,7 +119,8 @@ std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
     const double t = world.time();
     world.step((positions(t + Simulation::kStep) - world.arm().positions()) / Simulation::kStep);
     for (const Picture& picture : world.take_pictures()) {
-      const PosedRobot posed{model.get(), world.link_poses(picture.stamp), known};
+      const std::vector<PosedSolid> posed =
+          posed_solids(*model, world.link_poses(picture.stamp), known);
       for (Trial& trial : trials) {
         trial.ingest.run(picture.raw(), camera.X_FC, posed, picture.stamp, &trial.cloud);
         trial.result.pictures += 1;

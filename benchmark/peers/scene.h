@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/cloud/raw_cloud.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/robot/robot_model.h"
 
 /// What the methods are given.

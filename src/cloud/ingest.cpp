@@ -9,7 +9,7 @@
 #include "cloud/filters/thinning.h"
 #include "cloud/index/image_tiles.h"
 #include "cloud/index/list_tiles.h"
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/scene_axes.h"
 
 namespace ist {
@@ -37,7 +37,7 @@ void check(const IngestConfig& config) {
 struct Ingest::Impl {
   IngestConfig config;
   RegionOfInterest region;
-  PointIndexBuilder builder;
+  PointBvhBuilder builder;
   SelfFilter self_filter;
   Thinning thinning;
 };
@@ -60,8 +60,8 @@ void Ingest::set_region_of_interest(const RegionOfInterest& region) {
   impl_->region = region;
 }
 
-void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
-                 double stamp, CloudSnapshot* snapshot, const std::vector<PosedRobot>& also) {
+void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
+                 double stamp, CloudSnapshot* snapshot) {
   const auto start = std::chrono::steady_clock::now();
   if (!X_FS.matrix().allFinite()) {
     throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
@@ -74,9 +74,8 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   turn(scene_axes(cloud, X_FS.linear(), image), &pose);
 
   const SelfFilter* on_robot = nullptr;
-  if (config.self_filter && robot.model != nullptr) {
-    impl_->self_filter.pose(robot, pose.X_FO, config.self_filter_padding);
-    for (const PosedRobot& later : also) impl_->self_filter.add(later, pose.X_FO);
+  if (config.self_filter && !robot.empty()) {
+    impl_->self_filter.set_poses(robot, pose.X_FO, config.self_filter_padding);
     on_robot = &impl_->self_filter;
   }
   IngestCounts counts;
@@ -84,9 +83,9 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   if (image) {
     RawCloud pixels = cloud;
     if (config.thin) pixels.owner.reset();  // all will be read: best while they are in the cache
-    kept = index_image(pixels, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
+    kept = index_image(pixels, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
-    kept = index_list(cloud, pose, on_robot, &impl_->builder, &snapshot->index, &counts);
+    kept = index_list(cloud, pose, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -
@@ -96,9 +95,10 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const Pos
   snapshot->thinning = config.thinning;
   snapshot->region = impl_->region;
   if (config.thin) {
-    impl_->thinning.run(snapshot->index, config.thinning, &impl_->builder, &snapshot->coarse);
+    impl_->thinning.run(snapshot->index.bvh(), config.thinning, &impl_->builder,
+                        &snapshot->coarse.bvh());
   } else {
-    impl_->builder.start(pose.X_FO, &snapshot->coarse);
+    impl_->builder.start(pose.X_FO, &snapshot->coarse.bvh());
     impl_->builder.finish();
   }
 

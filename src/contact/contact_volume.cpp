@@ -8,8 +8,11 @@
 #include "contact/inner_sphere_depth.h"
 #include "contact/overlap_weight.h"
 #include "contact/sphere_contact.h"
+#include "internal/bvh/box_node.h"
 #include "internal/bvh/traversal_stack.h"
 #include "internal/cloud/bounding_sphere.h"
+#include "internal/cloud/box_bvh.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 namespace {
@@ -24,7 +27,7 @@ template <typename Index, typename MayTouch, typename Visit>
 void visit_tiles(const Index& index, const MayTouch& may_touch, const Visit& visit) {
   if (index.empty()) return;
   typename Index::Tile buffer;
-  TraversalStack<std::int32_t, stack_capacity(full_tree_levels(kPointWidth), kPointWidth)> stack;
+  TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
   stack.push(index.root());
   while (!stack.empty()) {
     const std::int32_t child = stack.pop();
@@ -49,7 +52,7 @@ class LinkContact {
     const Eigen::Isometry3d &X_FO = cloud.coarse.X_FO(), X_LO = X_LF * X_FO;
     const double radius = point_sphere_radius(cloud);
     visit_tiles(
-        cloud.coarse,
+        cloud.coarse.bvh(),
         [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const PointTile& tile) {
           for (int k = 0; k < tile.count; ++k) {
@@ -60,7 +63,7 @@ class LinkContact {
   }
 
   void add_boxes(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF) {
-    const BoxIndex& index = *cloud.boxes;
+    const BoxBvh& index = cloud.boxes->bvh();
     const Eigen::Isometry3d X_LO = X_LF * cloud.X_FM * Eigen::Translation3d(index.origin());
     const double cell = std::max(cloud.thinning, std::cbrt(geometry_.volume / kCellsPerLink));
     visit_tiles(

@@ -5,7 +5,9 @@
 #include <cstdint>
 
 #include "contact/lens.h"
+#include "internal/bvh/box_node.h"
 #include "internal/bvh/traversal_stack.h"
+#include "internal/cloud/point_bvh.h"
 #include "ist_proximity/contact/contact_volume.h"
 
 namespace ist {
@@ -35,11 +37,11 @@ float lens_sum(const PointTile& tile, const Eigen::Vector3f& p, float R, float r
 }
 
 // Adds those of all points of an index to `sum`.
-void add_lenses(const PointIndex& index, const Eigen::Vector3f& p, float R, float r, float* sum) {
+void add_lenses(const PointBvh& index, const Eigen::Vector3f& p, float R, float r, float* sum) {
   if (index.empty()) return;
   const float touch_sq = (R + r) * (R + r);
   PointTile buffer;
-  TraversalStack<std::int32_t, stack_capacity(full_tree_levels(kPointWidth), kPointWidth)> stack;
+  TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
   stack.push(index.root());
   while (!stack.empty()) {
     const std::int32_t child = stack.pop();
@@ -65,7 +67,7 @@ double overlap_weight(const Eigen::Vector3d& p_F, double radius, SnapshotSpan cl
   const auto r = static_cast<float>(radius);
   float sum = 0.0F;
   for (const CloudSnapshot* cloud : clouds) {
-    const PointIndex& index = cloud->coarse;
+    const PointBvh& index = cloud->coarse.bvh();
     const auto R = static_cast<float>(point_sphere_radius(*cloud));
     const Eigen::Vector3f p =
         (index.X_FO().linear().transpose() * (p_F - index.X_FO().translation())).cast<float>();

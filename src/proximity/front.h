@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/point_bvh.h"
 #include "proximity/carried_bound.h"
 
 namespace ist {

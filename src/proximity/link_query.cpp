@@ -87,8 +87,8 @@ double LinkQuery::to_region(const RegionOfInterest& region) const {
 }
 
 bool LinkQuery::enter(const CloudSnapshot& cloud, std::int32_t index, Part part) {
-  index_ = part == Part::kPoints ? &cloud.index : nullptr;
-  boxes_ = part == Part::kBoxes ? cloud.boxes.get() : nullptr;
+  index_ = part == Part::kPoints ? &cloud.index.bvh() : nullptr;
+  boxes_ = part == Part::kBoxes && cloud.boxes ? &cloud.boxes->bvh() : nullptr;
   if (part == Part::kPoints ? index_->empty() : boxes_ == nullptr || boxes_->empty()) return false;
   cloud_ = index;
   if (boxes_ != nullptr) {
@@ -403,8 +403,9 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   result->direction = -(X_FL_.linear() * nearest.exact.normal);
   result->source = nearest.cloud;
   PointTile room;
-  result->point = nearest.part == Part::kBoxes ? cloud.boxes->tiles()[tile].id[nearest.lane]
-                                               : cloud.index.tile(tile, &room).id[nearest.lane];
+  result->point = nearest.part == Part::kBoxes
+                      ? cloud.boxes->bvh().tiles()[tile].id[nearest.lane]
+                      : cloud.index.bvh().tile(tile, &room).id[nearest.lane];
 }
 
 }  // namespace ist

@@ -177,8 +177,8 @@ class LinkQuery {
   double proven_reach_ = 0.0;  ///< [m] `reach_` where the carried bound was proven
 
   // The index at work, in a frame O of its own.
-  const PointIndex* index_ = nullptr;
-  const BoxIndex* boxes_ = nullptr;
+  const PointBvh* index_ = nullptr;
+  const BoxBvh* boxes_ = nullptr;
   std::int32_t cloud_ = -1;
   Eigen::Isometry3d X_FO_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d X_LO_ = Eigen::Isometry3d::Identity();

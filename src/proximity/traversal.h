@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "ist_proximity/cloud/box_index.h"
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/box_bvh.h"
+#include "internal/cloud/point_bvh.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 #include "proximity/front.h"
 #include "proximity/supports.h"
@@ -21,7 +21,7 @@ struct Traversal {
   const SphereNode* sphere_nodes = nullptr;
   const SphereLeaf* sphere_leaves = nullptr;
   const BoxNode* box_nodes = nullptr;
-  const PointIndex* points = nullptr;  ///< either these
+  const PointBvh* points = nullptr;    ///< either these
   const BoxTile* box_tiles = nullptr;  ///< or these
   std::int32_t box_root = 0;
   float R_OL[9] = {};  ///< rotation, row-major

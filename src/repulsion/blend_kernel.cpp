@@ -130,7 +130,7 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, 
   alignas(64) float weights[kWidth];
   std::fill_n(weights, kWidth, 1.0F);
   VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
-    if constexpr (std::is_same_v<Index, PointIndex>) CellWeights(tile, band.grid, weights);
+    if constexpr (std::is_same_v<Index, PointBvh>) CellWeights(tile, band.grid, weights);
     for (; groups != 0; groups &= groups - 1) {
       const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
       AddTile(tile, weights, link.groups[g], band.nearest, 1.0F / band.smoothing, &sums[g]);
@@ -144,16 +144,16 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, 
 }  // namespace blend
 
 // HWY_EXPORT asks for these here.
-float NearestPointPair(const PointIndex& index, const PosedSpheres& spheres, float limit) {
+float NearestPointPair(const PointBvh& index, const PosedSpheres& spheres, float limit) {
   return blend::NearestPair(index, spheres, limit);
 }
-float NearestBoxPair(const BoxIndex& index, const PosedSpheres& spheres, float limit) {
+float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float limit) {
   return blend::NearestPair(index, spheres, limit);
 }
-PairSums BlendPointPairs(const PointIndex& index, const PosedSpheres& spheres, const Band& band) {
+PairSums BlendPointPairs(const PointBvh& index, const PosedSpheres& spheres, const Band& band) {
   return blend::BlendPairs(index, spheres, band);
 }
-PairSums BlendBoxPairs(const BoxIndex& index, const PosedSpheres& spheres, const Band& band) {
+PairSums BlendBoxPairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band) {
   return blend::BlendPairs(index, spheres, band);
 }
 
@@ -186,20 +186,20 @@ void PairSums::add(const PairSums& other) {
   }
 }
 
-float nearest_pair(const PointIndex& index, const PosedSpheres& spheres, float limit) {
+float nearest_pair(const PointBvh& index, const PosedSpheres& spheres, float limit) {
   return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestPointPair)(index, spheres, limit);
 }
 
-float nearest_pair(const BoxIndex& index, const PosedSpheres& spheres, float limit) {
+float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit) {
   return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestBoxPair)(index, spheres, limit);
 }
 
-PairSums blend_pairs(const PointIndex& index, const PosedSpheres& spheres, const Band& band) {
+PairSums blend_pairs(const PointBvh& index, const PosedSpheres& spheres, const Band& band) {
   if (index.empty()) return {};
   return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(index, spheres, band);
 }
 
-PairSums blend_pairs(const BoxIndex& index, const PosedSpheres& spheres, const Band& band) {
+PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band) {
   if (index.empty()) return {};
   return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band);
 }

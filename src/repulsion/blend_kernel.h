@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <cstddef>
 
-#include "ist_proximity/cloud/box_index.h"
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/box_bvh.h"
+#include "internal/cloud/point_bvh.h"
 #include "repulsion/coarse_spheres.h"
 
 namespace ist {
@@ -32,8 +32,8 @@ struct PairSums {
 
 /// [m] The smallest distance of a pair, negative where a point is in a sphere; `limit` where no
 /// pair is nearer than that.
-float nearest_pair(const PointIndex& index, const PosedSpheres& spheres, float limit);
-float nearest_pair(const BoxIndex& index, const PosedSpheres& spheres, float limit);
+float nearest_pair(const PointBvh& index, const PosedSpheres& spheres, float limit);
+float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit);
 
 /// The grid that a cloud was thinned to, in the frame of its index.
 struct ThinningGrid {
@@ -61,7 +61,7 @@ constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
 
 /// The sums over all pairs nearer than nearest + smoothing; w = (1 - (d - nearest) / smoothing)^2
 /// times the points' weight.
-PairSums blend_pairs(const PointIndex& index, const PosedSpheres& spheres, const Band& band);
-PairSums blend_pairs(const BoxIndex& index, const PosedSpheres& spheres, const Band& band);
+PairSums blend_pairs(const PointBvh& index, const PosedSpheres& spheres, const Band& band);
+PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band);
 
 }  // namespace ist

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/bvh/box_node.h"
 
 namespace ist {
 namespace {

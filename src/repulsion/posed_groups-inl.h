@@ -185,7 +185,7 @@ template <class Index, class Visit>
 HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const float& limit,
                            const Visit& visit) {
   typename Index::Tile buffer;
-  TraversalStack<Entry, stack_capacity(full_tree_levels(kWidth), kWidth)> stack;
+  TraversalStack<Entry, stack_capacity(kMaxBoxLevels, kWidth)> stack;
   stack.push({index.root(), (1U << link.count) - 1U, -kFarAway});
   while (!stack.empty()) {
     const Entry entry = stack.pop();

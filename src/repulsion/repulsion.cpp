@@ -37,12 +37,12 @@ void for_each_index(SnapshotSpan clouds, const std::vector<SphereGroup>& groups,
     if (cloud == nullptr) continue;
     if (!cloud->coarse.empty()) {
       const Eigen::Isometry3d& X_FO = cloud->coarse.X_FO();
-      visit(cloud->coarse, posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(),
+      visit(cloud->coarse.bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(),
             ThinningGrid(X_FO.translation(), cloud->thinning));
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     const Eigen::Isometry3d X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
-    visit(*cloud->boxes, posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
+    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
   }
 }
 

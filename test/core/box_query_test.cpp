@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/cloud/box_bvh.h"
 #include "ist_proximity/geometry/box_distance.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/allocations.h"
@@ -144,7 +145,7 @@ TEST(BoxIndex, HoldsEveryBoxOnce) {
     EXPECT_EQ(index.size(), boxes.size());
     EXPECT_EQ(index.empty(), boxes.empty());
     std::vector<int> seen(boxes.size(), 0);
-    for (const BoxTile& tile : index.tiles()) {
+    for (const BoxTile& tile : index.bvh().tiles()) {
       for (int k = 0; k < tile.count; ++k) {
         ++seen[tile.id[k]];
         const Eigen::AlignedBox3d box = tile.box(k);
@@ -164,7 +165,7 @@ struct Truth {
 Truth truth_of(const TriangleMesh& mesh, const CloudSnapshot& map, const Eigen::Isometry3d& X_FL) {
   Truth truth;
   const Eigen::Isometry3d X_LM = X_FL.inverse() * map.X_FM;
-  for (const BoxTile& tile : map.boxes->tiles()) {
+  for (const BoxTile& tile : map.boxes->bvh().tiles()) {
     for (int k = 0; k < tile.count; ++k) {
       const test::PlacedBox placed{tile.box(k), X_LM * Eigen::Translation3d(map.boxes->origin())};
       const Eigen::Vector3d center = placed.X * placed.box.center();
@@ -186,7 +187,7 @@ double sampled_depth(test::Rng* rng, const TriangleMesh& mesh, const CloudSnapsh
   double deepest = kInfinity;
   const Eigen::Isometry3d X_LO =
       X_FL.inverse() * map.X_FM * Eigen::Translation3d(map.boxes->origin());
-  for (const BoxTile& tile : map.boxes->tiles()) {
+  for (const BoxTile& tile : map.boxes->bvh().tiles()) {
     for (int k = 0; k < tile.count; ++k) {
       const Eigen::AlignedBox3d box = tile.box(k);
       for (int i = 0; i < samples; ++i) {
@@ -201,7 +202,7 @@ double sampled_depth(test::Rng* rng, const TriangleMesh& mesh, const CloudSnapsh
 
 bool in_a_box(const CloudSnapshot& map, const Eigen::Vector3d& p_F) {
   const Eigen::Vector3d p_O = map.X_FM.inverse() * p_F - map.boxes->origin();
-  for (const BoxTile& tile : map.boxes->tiles()) {
+  for (const BoxTile& tile : map.boxes->bvh().tiles()) {
     for (int k = 0; k < tile.count; ++k) {
       if (tile.box(k).exteriorDistance(p_O) < 1e-9) return true;
     }

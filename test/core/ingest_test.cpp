@@ -96,7 +96,7 @@ Format float64() {
 CloudSnapshot ingest(const Points& points, const IngestConfig& config = {},
                      const Format& format = {},
                      const Eigen::Isometry3d& X_FS = Eigen::Isometry3d::Identity(),
-                     const PosedRobot& robot = {}) {
+                     const std::vector<PosedSolid>& robot = {}) {
   const Message message(points, format);
   CloudSnapshot snapshot;
   Ingest(config).run(message.raw, X_FS, robot, 12.5, &snapshot);
@@ -289,7 +289,8 @@ TEST(Ingest, pointsAreInTheFixedFrame) {
 
 // Every tile has one parent, every box is that of the points below, unused slots are far away.
 // @param slack  [m] by how much boxes of tiles may be larger
-void expect_hierarchy(const PointIndex& index, float slack = 0.0F) {
+void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F) {
+  const PointBvh& index = point_index.bvh();
   const std::size_t tiles = index.tile_count();
   std::vector<Eigen::AlignedBox3f> boxes(tiles + index.nodes().size());
   std::vector<int> parents(boxes.size(), 0);
@@ -476,20 +477,20 @@ TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
   config.thin = false;
   for (int round = 0; round < 5; ++round) {
     const PointIndex index = ingest(points, config, image).index;
-    ASSERT_EQ(index.tile_count(), at_once.tile_count());
+    ASSERT_EQ(index.bvh().tile_count(), at_once.bvh().tile_count());
     std::array<std::size_t, 4> same{};
     std::vector<std::thread> threads;
     for (std::size_t& count : same) {
       threads.emplace_back([&index, &at_once, &count] {
         PointTile room, other_room;
-        for (std::size_t i = 0; i < index.tile_count(); ++i) {
+        for (std::size_t i = 0; i < index.bvh().tile_count(); ++i) {
           count += static_cast<std::size_t>(
-              test::same_points(index.tile(i, &room), at_once.tile(i, &other_room)));
+              test::same_points(index.bvh().tile(i, &room), at_once.bvh().tile(i, &other_room)));
         }
       });
     }
     for (std::thread& thread : threads) thread.join();
-    for (const std::size_t count : same) EXPECT_EQ(count, index.tile_count());
+    for (const std::size_t count : same) EXPECT_EQ(count, index.bvh().tile_count());
   }
 }
 
@@ -501,7 +502,7 @@ TEST(Ingest, shuffledImageIsIndexedAsAList) {
   image.width = 160;
   const CloudSnapshot a = ingest(points), b = ingest(points, {}, image);
   EXPECT_EQ(points_by_id(a.index), points_by_id(b.index));
-  EXPECT_EQ(a.index.tile_count(), b.index.tile_count());
+  EXPECT_EQ(a.index.bvh().tile_count(), b.index.bvh().tile_count());
 }
 
 TEST(Ingest, thinnedCloudCanBeLeftOut) {
@@ -647,12 +648,12 @@ TEST(Ingest, buffersAreReused) {
   CloudSnapshot snapshot;
   ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
   PointTile room;
-  const PointTile* tiles = &snapshot.index.tile(0, &room);
-  const PointTile* coarse = &snapshot.coarse.tile(0, &room);
+  const PointTile* tiles = &snapshot.index.bvh().tile(0, &room);
+  const PointTile* coarse = &snapshot.coarse.bvh().tile(0, &room);
   const auto expected = points_by_id(snapshot.index);
   for (int i = 0; i < 3; ++i) ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
-  EXPECT_EQ(&snapshot.index.tile(0, &room), tiles);
-  EXPECT_EQ(&snapshot.coarse.tile(0, &room), coarse);
+  EXPECT_EQ(&snapshot.index.bvh().tile(0, &room), tiles);
+  EXPECT_EQ(&snapshot.coarse.bvh().tile(0, &room), coarse);
   EXPECT_EQ(points_by_id(snapshot.index), expected);
 }
 

@@ -131,17 +131,17 @@ TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
   ScanPoints points;
   to_points(scan_of(ranges), 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
   const auto robot_at = [&](double x, double y) {
-    PosedRobot robot{model.get(), {Eigen::Isometry3d::Identity()}, {true}};
-    robot.X_FL[0].translation() << x, y, 0.0;
-    return robot;
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    X_FL.translation() << x, y, 0.0;
+    return PosedSolid{&model->links[0].tree, &model->links[0].solid, X_FL};
   };
   IngestConfig config = test::whole_cloud();
   config.self_filter = true;
   Ingest ingest(config);
   CloudSnapshot first, both;
   const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  ingest.run(points.raw(), X_FS, robot_at(1, 0), 0.0, &first);
-  ingest.run(points.raw(), X_FS, robot_at(1, 0), 0.0, &both, {robot_at(0, 1)});
+  ingest.run(points.raw(), X_FS, {robot_at(1, 0)}, 0.0, &first);
+  ingest.run(points.raw(), X_FS, {robot_at(1, 0), robot_at(0, 1)}, 0.0, &both);
   const auto kept = by_beam(both, ranges.size());
   std::uint32_t on_robot = 0;
   for (std::size_t i = 0; i < kept.size(); ++i) {

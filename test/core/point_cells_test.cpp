@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "cloud/index/divide_kernel.h"
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/point_slicer.h"
 #include "support/instruction_sets.h"
 #include "support/tiles.h"
@@ -178,20 +178,20 @@ TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
   });
 }
 
-PointIndex build(const Cloud& cloud) {
-  PointIndex index;
-  PointIndexBuilder().build(Eigen::Isometry3d::Identity(), cloud.data(), cloud.size(), {}, &index);
+PointBvh build(const Cloud& cloud) {
+  PointBvh index;
+  PointBvhBuilder().build(Eigen::Isometry3d::Identity(), cloud.data(), cloud.size(), {}, &index);
   return index;
 }
 
 // The same numbers whatever the processor: no answer may depend on it.
 TEST(PointCells, indexIsTheSameOnEveryInstructionSet) {
   const std::vector<Cloud> clouds = hard_clouds();
-  std::vector<PointIndex> expected;
+  std::vector<PointBvh> expected;
   test::for_each_instruction_set([&] {
     const bool is_first = expected.empty();
     for (std::size_t i = 0; i < clouds.size(); ++i) {
-      PointIndex index = build(clouds[i]);
+      PointBvh index = build(clouds[i]);
       if (is_first) {
         expected.push_back(std::move(index));
         continue;
@@ -213,13 +213,13 @@ float diagonal_of(const PointTile& tile) {
 // Tiles are full and small where points are close together, whatever there is besides.
 TEST(PointCells, tilesOfHardCloudsAreGood) {
   for (const Cloud& cloud : hard_clouds()) {
-    const PointIndex index = build(cloud);
+    const PointBvh index = build(cloud);
     ASSERT_EQ(index.size(), cloud.size());
     EXPECT_LE(index.tile_count(), cloud.size() / 8 + 1) << "half empty";
   }
   for (const Cloud& cloud : {with_outliers(in_a_box(20000, 1.0F, 5), 1e9F),
                              with_outliers(in_a_box(20000, 1.0F, 5), 1e5F)}) {
-    const PointIndex index = build(cloud);
+    const PointBvh index = build(cloud);
     std::vector<float> diagonals;
     for (const PointTile& tile : test::tiles_of(index)) diagonals.push_back(diagonal_of(tile));
     std::sort(diagonals.begin(), diagonals.end());
@@ -229,7 +229,7 @@ TEST(PointCells, tilesOfHardCloudsAreGood) {
   }
   // The scales of nested clouds do not share tiles, but for few: tiles near the corner are as small
   // as they are near to it.
-  const PointIndex index = build(nested(20000, 40));
+  const PointBvh index = build(nested(20000, 40));
   std::size_t large = 0;
   for (const PointTile& tile : test::tiles_of(index)) {
     const Eigen::Vector3f p(tile.x[0], tile.y[0], tile.z[0]);

@@ -1,4 +1,4 @@
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/point_bvh.h"
 #include "support/tiles.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
 
 namespace ist {
 namespace {
@@ -34,11 +34,11 @@ struct Points {
 
 const Eigen::Isometry3d kFrame(Eigen::Translation3d(1.0, 2.0, 3.0));
 
-PointIndex build(const Points& points) {
+PointBvh build(const Points& points) {
   PointIndex index;
   index.build({1.0, 2.0, 3.0}, points.x.data(), points.y.data(), points.z.data(), points.id.data(),
               points.size());
-  return index;
+  return index.bvh();
 }
 
 Points in_a_box(std::size_t n, float size, unsigned seed) {
@@ -73,7 +73,7 @@ Eigen::Vector3f point_of(const PointTile& tile, int k) { return {tile.x[k], tile
 // Walks down and checks every promise of the header.
 class Checker {
  public:
-  Checker(const Points& points, const PointIndex& index)
+  Checker(const Points& points, const PointBvh& index)
       : points_(points),
         index_(index),
         seen_(points.size(), 0),
@@ -148,7 +148,7 @@ class Checker {
   }
 
   const Points& points_;
-  const PointIndex& index_;
+  const PointBvh& index_;
   std::vector<int> seen_, tile_seen_;
   std::size_t nodes_ = 0;
 };
@@ -157,7 +157,7 @@ void check(const Points& points) { Checker(points, build(points)).run(); }
 
 // Distance to the nearest point, and what was visited on the way.
 struct Nearest {
-  const PointIndex& index;
+  const PointBvh& index;
   Eigen::Vector3f query;
   float squared = std::numeric_limits<float>::infinity();
   int nodes = 0, tiles = 0;
@@ -200,7 +200,7 @@ TEST(PointIndex, allPointsEqual) {
   Points points;
   for (int i = 0; i < 5000; ++i) points.add(0.1F, -0.2F, 0.3F);
   check(points);
-  const PointIndex index = build(points);
+  const PointBvh index = build(points);
   EXPECT_EQ(index.bounds().sizes(), Eigen::Vector3f::Zero());
   EXPECT_EQ(index.tile_count(), (5000U + 15U) / 16U);
 }
@@ -233,7 +233,7 @@ TEST(PointIndex, outliersDoNotSpoilTheTiles) {
   points.add(1e6F, -1e6F, 1e6F);
   points.add(1000.0F, 0.0F, 0.0F);
   check(points);
-  const PointIndex index = build(points);
+  const PointBvh index = build(points);
   std::vector<float> diagonals;
   for (const PointTile& tile : test::tiles_of(index)) {
     Eigen::AlignedBox3f box;
@@ -249,7 +249,7 @@ TEST(PointIndex, outliersDoNotSpoilTheTiles) {
 // Morton runs of 16 leap: across depth edges and from cell to cell. Uncut, one tile in a hundred
 // of this image is longer than 0.2 m and the longest is 1.05 m; the median is 33 mm.
 TEST(PointIndex, tilesDoNotSpanLeaps) {
-  const PointIndex index = build(depth_image(320, 240));
+  const PointBvh index = build(depth_image(320, 240));
   std::vector<float> diagonals;
   for (const PointTile& tile : test::tiles_of(index)) {
     Eigen::AlignedBox3f box;
@@ -265,7 +265,7 @@ TEST(PointIndex, tilesDoNotSpanLeaps) {
 
 TEST(PointIndex, nearestPointAgainstBruteForce) {
   const Points points = depth_image(160, 120);
-  const PointIndex index = build(points);
+  const PointBvh index = build(points);
   std::mt19937 random(5);
   std::uniform_real_distribution<float> u(-0.7F, 0.7F);
   double nodes = 0.0, tiles = 0.0;
@@ -287,7 +287,7 @@ TEST(PointIndex, nearestPointAgainstBruteForce) {
   EXPECT_LT(tiles / kQueries, 5.5);
 }
 
-bool same(const PointIndex& a, const PointIndex& b) {
+bool same(const PointBvh& a, const PointBvh& b) {
   const auto bytes_equal = [](const auto& u, const auto& v) {
     return u.size() == v.size() &&
            (u.empty() || std::memcmp(u.data(), v.data(), u.size() * sizeof u[0]) == 0);
@@ -298,9 +298,9 @@ bool same(const PointIndex& a, const PointIndex& b) {
 
 TEST(PointIndex, dependsOnNothingButItsArguments) {
   const Points large = in_a_box(30000, 1.0F, 1), small = depth_image(64, 48);
-  const PointIndex expected = build(small);
-  PointIndexBuilder builder;
-  PointIndex index;
+  const PointBvh expected = build(small);
+  PointBvhBuilder builder;
+  PointBvh index;
   for (const Points* points : {&small, &large, &small, &small}) {
     const std::vector<CloudPoint> list = points->list();
     builder.build(kFrame, list.data(), list.size(), {}, &index);
@@ -310,8 +310,8 @@ TEST(PointIndex, dependsOnNothingButItsArguments) {
 
 TEST(PointIndex, buffersAreReused) {
   const Points large = in_a_box(30000, 1.0F, 1), small = in_a_box(29000, 1.0F, 2);
-  PointIndexBuilder builder;
-  PointIndex index;
+  PointBvhBuilder builder;
+  PointBvh index;
   const auto run = [&](const Points& points) {
     const std::vector<CloudPoint> list = points.list();
     builder.build(kFrame, list.data(), list.size(), {}, &index);
@@ -330,10 +330,10 @@ TEST(PointIndex, buffersAreReused) {
 TEST(PointIndex, filterDropsPointsOneByOne) {
   const Points points = in_a_box(5000, 1.0F, 4);
   const auto is_dropped = [](float x, float y) { return x > 0.2F || y < -0.9F; };
-  PointIndex index;
+  PointBvh index;
   std::size_t asked = 0;
   const std::vector<CloudPoint> list = points.list();
-  PointIndexBuilder().build(
+  PointBvhBuilder().build(
       kFrame, list.data(), list.size(),
       [&](const PointTile& tile, const PaddedBox& box) {
         asked += static_cast<std::size_t>(tile.count);
@@ -369,9 +369,9 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
 
 TEST(PointIndex, filterThatDropsAll) {
   const Points points = in_a_box(500, 1.0F, 4);
-  PointIndex index;
+  PointBvh index;
   const std::vector<CloudPoint> list = points.list();
-  PointIndexBuilder().build(
+  PointBvhBuilder().build(
       kFrame, list.data(), list.size(), [](const PointTile&, const PaddedBox&) { return 0xFFFFU; },
       &index);
   EXPECT_TRUE(index.empty());
@@ -381,7 +381,7 @@ TEST(PointIndex, filterThatDropsAll) {
 
 TEST(PointIndex, fiveMillionPoints) {
   const Points points = depth_image(2500, 2000);
-  const PointIndex index = build(points);
+  const PointBvh index = build(points);
   ASSERT_EQ(index.size(), 5000000U);
   std::vector<bool> seen(points.size(), false);
   for (const PointTile& tile : test::tiles_of(index)) {

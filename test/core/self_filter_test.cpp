@@ -8,6 +8,7 @@
 
 #include "internal/packing/packer.h"
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/robot/posed_solids.h"
 #include "support/allocations.h"
 #include "support/tiles.h"
 
@@ -36,6 +37,17 @@ RobotModel coarse_robot() {
   model.links.push_back(link_of("sphere", Sphere{0.12}, 0.02));
   return model;
 }
+
+// A robot at its poses.
+struct PosedRobot {
+  const RobotModel* model = nullptr;  // null: none
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<bool> known;
+
+  std::vector<PosedSolid> solids() const {
+    return model == nullptr ? std::vector<PosedSolid>() : posed_solids(*model, X_FL, known);
+  }
+};
 
 PosedRobot posed(const RobotModel& model, const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
   PosedRobot robot;
@@ -92,7 +104,7 @@ CloudSnapshot ingest(const std::vector<Eigen::Vector3f>& points, const PosedRobo
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   X_FS.translation() = base;
   CloudSnapshot snapshot;
-  Ingest(config).run(raw_of(points), X_FS, robot, 0.0, &snapshot);
+  Ingest(config).run(raw_of(points), X_FS, robot.solids(), 0.0, &snapshot);
   const IngestCounts& counts = snapshot.counts;
   EXPECT_EQ(counts.received, counts.not_a_number + counts.infinite + counts.out_of_range +
                                  counts.on_robot + counts.used);
@@ -213,7 +225,7 @@ TEST(SelfFilter, missingPosesAreUnknown) {
 // Also in the paths that ask the exact geometry. Clouds of a stream are never quite the same.
 TEST(SelfFilter, aSteadyStreamAllocatesNothing) {
   const RobotModel model = coarse_robot();
-  const PosedRobot robot = posed(model);
+  const std::vector<PosedSolid> robot = posed(model).solids();
   const std::vector<Eigen::Vector3f> large = cloud_about_the_robot(20000);
   const std::vector<Eigen::Vector3f> small(large.begin() + 1000, large.end());
   const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();

@@ -159,12 +159,12 @@ TEST(UnreadTiles, CopyHoldsAllPoints) {
   ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
   const CloudSnapshot copy = cloud;
   const std::vector<PointTile> tiles = test::tiles_of(cloud.index);
-  ASSERT_EQ(copy.index.tile_count(), tiles.size());
+  ASSERT_EQ(copy.index.bvh().tile_count(), tiles.size());
   EXPECT_EQ(copy.index.size(), cloud.index.size());
   scene.pixels->assign(scene.pixels->size(), 0.0F);
   for (std::size_t i = 0; i < tiles.size(); ++i) {
     PointTile room;
-    ASSERT_TRUE(test::same_points(copy.index.tile(i, &room), tiles[i]));
+    ASSERT_TRUE(test::same_points(copy.index.bvh().tile(i, &room), tiles[i]));
   }
 }
 

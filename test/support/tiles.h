@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <vector>
 
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist::test {
 
 /// All tiles of an index, whether a query has looked at them or not.
-inline std::vector<PointTile> tiles_of(const PointIndex& index) {
-  std::vector<PointTile> tiles(index.tile_count());
-  PointTile room;
-  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = index.tile(i, &room);
+inline std::vector<PointTile> tiles_of(const PointBvh& bvh) {
+  std::vector<PointTile> tiles(bvh.tile_count());
+  PointTile scratch;
+  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = bvh.tile(i, &scratch);
   return tiles;
 }
+inline std::vector<PointTile> tiles_of(const PointIndex& index) { return tiles_of(index.bvh()); }
 
 inline bool same_points(const PointTile& a, const PointTile& b) {
   return a.count == b.count && std::equal(a.x, a.x + kPointWidth, b.x) &&

@@ -1,16 +1,79 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <string>
+#include <vector>
 
-#include "ist_proximity/cloud/box_index.h"
-#include "ist_proximity/cloud/point_index.h"
 #include "ist_proximity/geometry/region_of_interest.h"
 #include "ist_proximity/geometry/span.h"
 
 namespace ist {
+
+class BoxBvh;
+class PointBvh;
+
+/// Points of a cloud, indexed for queries by a bounding volume hierarchy. Coordinates are kept in a
+/// frame O of its own: its origin is near the points, so that float loses nothing far from zero,
+/// and its axes lie along the scene's surfaces where Ingest has found such, so that boxes are thin;
+/// else along the fixed frame's. Immutable once built, thread safe.
+class PointIndex {
+ public:
+  PointIndex();
+  PointIndex(const PointIndex& other);
+  PointIndex& operator=(const PointIndex& other);  ///< holds all points, independent of the message
+  PointIndex(PointIndex&&) noexcept;
+  PointIndex& operator=(PointIndex&&) noexcept;
+  ~PointIndex();
+
+  /// Builds over points given relative to `origin` (fixed frame, double) along the fixed frame's
+  /// axes, in structure-of-arrays. The result depends on nothing but the arguments. For messages
+  /// and streams use Ingest, which keeps its working memory; this allocates.
+  /// @param x,y,z  n coordinates [m] each, finite, below 1e15
+  /// @param id     n identities, carried through to the answers
+  void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
+             const std::uint32_t* id, std::size_t n);
+
+  bool empty() const;
+  std::size_t size() const;               ///< points
+  const Eigen::Isometry3d& X_FO() const;  ///< index's -> fixed frame
+  Eigen::AlignedBox3f bounds() const;     ///< [m] of the points, in O, at least
+  /// Identifies one build: another number after every build of any index; 0 before the first.
+  std::uint64_t build_id() const;
+
+  const PointBvh& bvh() const;  ///< for the library's own use
+  PointBvh& bvh();              ///< for the library's own use
+
+ private:
+  std::unique_ptr<PointBvh> bvh_;  ///< null: empty, never built
+};
+
+/// Solid boxes of any sizes, axis-aligned in a frame M of their own (a map's), indexed for queries
+/// by a bounding volume hierarchy. Boxes may overlap or touch. Coordinates are kept relative to
+/// `origin`, the middle of all boxes on whole metres, so that float loses no more than 1e-7 of the
+/// distance from there. Immutable once built, thread safe.
+class BoxIndex {
+ public:
+  BoxIndex();
+  BoxIndex(const BoxIndex&) = default;  // no move: a moved-from index would have no data
+  BoxIndex& operator=(const BoxIndex&) = default;
+
+  /// @param boxes  [m] in M, finite, none empty (an edge may be 0), coordinates below 1e15
+  void build(const std::vector<Eigen::AlignedBox3d>& boxes);
+
+  bool empty() const;
+  std::size_t size() const;               ///< boxes
+  const Eigen::Vector3d& origin() const;  ///< [m] in M
+  /// As PointIndex::build_id(), and different from that of any PointIndex.
+  std::uint64_t build_id() const;
+
+  const BoxBvh& bvh() const { return *bvh_; }  ///< for the library's own use
+
+ private:
+  std::shared_ptr<const BoxBvh> bvh_;  ///< never null; copies share it
+};
 
 /// What became of the points of one cloud.
 struct IngestCounts {

@@ -3,11 +3,11 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <memory>
-#include <vector>
 
+#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/cloud/raw_cloud.h"
-#include "ist_proximity/robot/robot_model.h"
+#include "ist_proximity/geometry/span.h"
+#include "ist_proximity/tree/posed_solid.h"
 
 namespace ist {
 
@@ -20,13 +20,6 @@ struct IngestConfig {
   bool thin =
       true;  ///< make the thinned cloud; without it repulsion and contact volumes see nothing
   double thinning = 0.01;  ///< [m] > 0: cell of the thinned cloud that repulsion sums over
-};
-
-/// The robot at a cloud's own stamp, for the self-filter.
-struct PosedRobot {
-  const RobotModel* model = nullptr;    ///< null: no self-filter
-  std::vector<Eigen::Isometry3d> X_FL;  ///< by link: link frame -> fixed frame
-  std::vector<bool> known;              ///< by link: whether the pose is known
 };
 
 /// Turns raw clouds into snapshots. Keeps its working memory, so a steady stream does not
@@ -43,23 +36,23 @@ class Ingest {
   /// @throws std::invalid_argument when it is not a sphere; the last one stays then
   void set_region_of_interest(const RegionOfInterest& region);
 
-  /// Drops what is not finite, out of range or beyond the region, moves the rest to the fixed
-  /// frame in double, removes the robot's own points and builds the index. Its origin, on whole
-  /// metres, is where the sensor is, or in the middle of a cloud that is far from its sensor's
-  /// frame (map coordinates): it is subtracted before double becomes float.
+  /// Drops points that are not finite, out of range or outside the region of interest, moves the
+  /// rest to the fixed frame in double, removes the robot's own points and builds the index. The
+  /// index's origin lies on whole metres at the sensor, or in the middle of a cloud that is far
+  /// from its sensor's frame (map coordinates); it is subtracted before double becomes float.
   ///
-  /// A point is the robot's when its exact distance to a link is at most the padding, or when it is
-  /// inside. Links whose pose is unknown claim no point.
+  /// A point is the robot's when its exact distance to one of the solids is at most the padding, or
+  /// when it is inside one.
   /// @param cloud  checked by check_layout; points in the sensor frame S
   /// @param X_FS   sensor frame -> fixed frame, rigid
-  /// @param robot  poses at the cloud's stamp
+  /// @param robot  the robot's links at the cloud's stamp, see posed_solids(); for a measurement
+  ///               that takes its time (a scan), at several instants: a point that is the robot's
+  ///               at any of them is dropped. Empty: no self-filter
   /// @param stamp  [s]
   /// @param snapshot  overwritten, its buffers reused
-  /// @param also   the robot at further instants, of a measurement that takes its time (a scan): a
-  ///               point that is the robot's at any of them is dropped
   /// @throws std::invalid_argument when X_FS is not finite; the snapshot is as before then
-  void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const PosedRobot& robot,
-           double stamp, CloudSnapshot* snapshot, const std::vector<PosedRobot>& also = {});
+  void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
+           double stamp, CloudSnapshot* snapshot);
 
   const IngestConfig& config() const;
 

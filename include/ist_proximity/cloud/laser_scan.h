@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/cloud/raw_cloud.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 
 namespace ist {
 

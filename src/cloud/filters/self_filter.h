@@ -5,59 +5,60 @@
 #include <cstdint>
 #include <vector>
 
-#include "cloud/index/point_index_builder.h"
-#include "ist_proximity/cloud/ingest.h"
+#include "cloud/index/point_bvh_builder.h"
+#include "ist_proximity/geometry/span.h"
+#include "ist_proximity/tree/posed_solid.h"
 
 namespace ist {
 
-/// Tells the robot's own points from obstacles: a point is the robot's when its exact distance to a
-/// link of known pose is at most the padding, or when it is inside.
+/// Separates the robot's own points from obstacles: a point is the robot's when its exact distance
+/// to a link is at most the padding, or when it is inside the link.
 ///
-/// The points of a tile are first asked for as one sphere: cover spheres of the tree prove it
-/// clear of the link, an inner sphere proves it the robot's. Only where both leave it open are the
-/// points asked for one by one, and only where that leaves it open, the exact geometry.
-/// Keeps its memory. Not thread safe.
+/// The points of a tile are first tested as one sphere: the tree's cover spheres prove that it is
+/// clear of the link, an inner sphere proves that it is the robot's. The points are tested one by
+/// one only where both leave it open, and against the exact geometry only where that leaves it
+/// open, too. Keeps its memory. Not thread safe.
 class SelfFilter {
  public:
-  /// @param robot    links without a known pose, without geometry or with an error claim no point
+  /// @param solids   the robot's links, at one or several instants; viewed until the next call
   /// @param X_FO     frame of the points -> fixed frame
   /// @param padding  [m] >= 0
-  void pose(const PosedRobot& robot, const Eigen::Isometry3d& X_FO, double padding);
-  /// The robot at one more instant, beside those before.
-  void add(const PosedRobot& robot, const Eigen::Isometry3d& X_FO);
+  void set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO, double padding);
 
   /// False: none of the points in this box is the robot's.
   bool may_drop(const PaddedBox& box) const;
 
   /// Bit k: the point in slot k is the robot's.
   /// @param box  of the tile's points
-  std::uint32_t on_robot(const PointTile& tile, const PaddedBox& box) const;
+  std::uint32_t points_on_robot(const PointTile& tile, const PaddedBox& box) const;
 
-  /// on_robot() of this filter, which must live as long.
+  /// points_on_robot() of this filter, which must outlive the result.
   PointFilter as_filter() const {
-    return [this](const PointTile& tile, const PaddedBox& box) { return on_robot(tile, box); };
+    return
+        [this](const PointTile& tile, const PaddedBox& box) { return points_on_robot(tile, box); };
   }
 
  private:
-  enum class Verdict { kClear, kOnLink, kOpen };
+  enum class Verdict { kClear, kOnLink, kUndecided };
 
-  struct PosedLink {
-    const LinkModel* model;
+  struct Link {
+    const InnerSphereTree* tree;
+    const Solid* solid;
     Eigen::Isometry3d X_LO;    ///< frame of the points -> link frame
     Eigen::Vector3f center_O;  ///< [m] of the link's bounding sphere
-    float reach;               ///< [m] bounding sphere and padding
-    float slack;               ///< [m] more than what float rounds off
-    float clear_beyond;        ///< [m] outer distance that proves a point clear
+    float padded_radius;       ///< [m] of the bounding sphere, and the clear distance
+    float rounding;            ///< [m] more than what float rounds off
+    float clear_distance;      ///< [m] a cover distance above it proves a point clear
   };
 
-  static bool is_near(const PosedLink& link, const Eigen::Vector3f& center_O, float radius);
-  Verdict ask_tree(const PosedLink& link, const Eigen::Vector3d& center_L, double radius) const;
-  bool ask_geometry(const PosedLink& link, const Eigen::Vector3d& p_L) const;
-  std::uint32_t on_link(const PosedLink& link, const PointTile& tile,
-                        const Eigen::Vector3d& center_O, double radius) const;
+  static bool may_touch(const Link& link, const Eigen::Vector3f& center_O, float radius);
+  Verdict test_spheres(const Link& link, const Eigen::Vector3d& center_L, double radius) const;
+  bool test_geometry(const Link& link, const Eigen::Vector3d& p_L) const;
+  std::uint32_t points_on_link(const Link& link, const PointTile& tile,
+                               const Eigen::Vector3d& center_O, double radius) const;
 
   double padding_ = 0.0;
-  std::vector<PosedLink> links_;
+  std::vector<Link> links_;
 };
 
 }  // namespace ist

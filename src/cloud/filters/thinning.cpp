@@ -19,7 +19,7 @@ float offset_in_cell(double origin, double edge) {
 }
 
 // Cells are larger where their numbers would not fit: across more than two billion of them.
-double fitting(double cell, const PointIndex& all) {
+double fitting(double cell, const PointBvh& all) {
   if (all.empty()) return cell;
   const float reach = all.bounds().min().cwiseAbs().cwiseMax(all.bounds().max().cwiseAbs()).norm();
   return std::max(cell, static_cast<double>(reach) / kMostCells);
@@ -41,8 +41,8 @@ bool Thinning::Entry::better_than(const Entry& other) const {
   return std::tie(x, y, z, id) < std::tie(other.x, other.y, other.z, other.id);
 }
 
-void Thinning::run(const PointIndex& all, double cell_size, PointIndexBuilder* builder,
-                   PointIndex* thin) {
+void Thinning::run(const PointBvh& all, double cell_size, PointBvhBuilder* builder,
+                   PointBvh* thin) {
   // As many cells as last time; a third of the table stays empty even then.
   std::size_t table_size = kSmallestTable;
   while (table_size < 3 * entries_.size()) table_size *= 2;

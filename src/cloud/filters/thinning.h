@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "cloud/index/point_index_builder.h"
-#include "ist_proximity/cloud/point_index.h"
+#include "cloud/index/point_bvh_builder.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 
@@ -18,7 +18,7 @@ class Thinning {
   /// @param all   what to thin
   /// @param cell_size  [m] > 0, edge of a cell
   /// @param thin  overwritten, with the same origin and ids, along the fixed frame's axes
-  void run(const PointIndex& all, double cell_size, PointIndexBuilder* builder, PointIndex* thin);
+  void run(const PointBvh& all, double cell_size, PointBvhBuilder* builder, PointBvh* thin);
 
  private:
   /// Number of a cell along each axis, from the origin.

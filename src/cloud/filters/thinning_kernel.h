@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "ist_proximity/cloud/raw_cloud.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 
 /// Points out of a message's bytes, of a layout that check_layout has passed.
 namespace ist {

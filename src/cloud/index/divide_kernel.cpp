@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "cloud/index/tile_box.h"
+#include "internal/bvh/traversal_stack.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
@@ -162,21 +163,19 @@ void MakeTiles(CloudPoint* points, std::size_t n, TileBatch* batch) {
     std::size_t first, n;
   };
   for (std::size_t begin = 0; begin < n; begin += kTilePoints) {
-    Part stack[kTilePoints];
-    std::size_t top = 0;
-    stack[top++] = {begin, std::min(kTilePoints, n - begin)};
-    while (top > 0) {
-      Part& part = stack[top - 1];
+    // Each split takes one point at least: fifteen levels.
+    TraversalStack<Part, stack_capacity(kTilePoints - 1, 2)> stack;
+    stack.push({begin, std::min(kTilePoints, n - begin)});
+    while (!stack.empty()) {
+      const Part part = stack.pop();
       CloudPoint* const p = points + part.first;
       const PointBox box = BoxOf(p, part.n);
       const std::size_t low = MayHaveAGap(p, part.n, box) ? Cut(p, part.n, box) : 0;
       if (low == 0) {
         WriteTile(p, part.n, box, batch);
-        --top;
       } else {
-        const Part back = {part.first + low, part.n - low};
-        part.n = low;
-        stack[top++] = back;
+        stack.push({part.first, low});
+        stack.push({part.first + low, part.n - low});
       }
     }
   }

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "cloud/filters/crop.h"
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 

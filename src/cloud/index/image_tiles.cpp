@@ -61,7 +61,7 @@ class Cut {
 class ImageReader {
  public:
   ImageReader(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-              PointIndexBuilder* builder, IngestCounts* counts)
+              PointBvhBuilder* builder, IngestCounts* counts)
       : cloud_(cloud),
         pose_(pose),
         patch_pose_(pose),
@@ -205,7 +205,7 @@ class ImageReader {
       if (may_have_gap) {
         PointTile tile;
         read_kept(slot, &tile);
-        keep_parts(tile, box);
+        keep_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box);
       } else {
         read_kept(slot, builder_.room(1));
         builder_.keep(box, drop_);
@@ -254,28 +254,19 @@ class ImageReader {
     return gaps;
   }
 
-  // Halves what has a gap in the middle of its longest side, and keeps the parts.
-  void keep_parts(const PointTile& whole, const PaddedBox& whole_box) {
-    struct Part {
-      std::uint32_t points;  // bit k: that in slot k
-      PaddedBox box;
-    };
-    std::array<Part, kPointWidth> parts;
-    std::size_t count = 0;
-    parts[count++] = {(1U << static_cast<std::uint32_t>(whole.count)) - 1U, whole_box};
-    while (count > 0) {
-      Part& part = parts[count - 1];
-      const TileHalves halves = halve_tile(whole, part.points, part.box);
-      if (halves.low != 0 && halves.high != 0 &&
-          is_worth_a_cut(halves.low_box, halves.high_box, part.box)) {
-        part = {halves.low, halves.low_box};
-        parts[count++] = {halves.high, halves.high_box};
-        continue;
-      }
-      pick_points(whole, part.points, builder_.room(1));
-      builder_.keep(part.box, drop_);
-      --count;
+  // Splits points at a gap in the middle of their box's longest side, and keeps the parts. Each
+  // split takes one point at least, so the recursion is at most fifteen calls deep.
+  // @param points  bit k: the point in slot k belongs
+  void keep_parts(const PointTile& whole, std::uint32_t points, const PaddedBox& box) {
+    const TileHalves halves = halve_tile(whole, points, box);
+    if (halves.low != 0 && halves.high != 0 &&
+        is_worth_a_cut(halves.low_box, halves.high_box, box)) {
+      keep_parts(whole, halves.high, halves.high_box);
+      keep_parts(whole, halves.low, halves.low_box);
+      return;
     }
+    pick_points(whole, points, builder_.room(1));
+    builder_.keep(box, drop_);
   }
 
   const RawCloud& cloud_;
@@ -285,7 +276,7 @@ class ImageReader {
   const bool holds_floats_;
   const SelfFilter* on_robot_;
   PointFilter drop_;
-  PointIndexBuilder& builder_;
+  PointBvhBuilder& builder_;
   IngestCounts& counts_;
   std::array<std::uint32_t, kSlots> offset_;  // [pixels] by slot
   std::size_t row_ = 0, column_ = 0;          // of the patch at work
@@ -297,7 +288,7 @@ class ImageReader {
 }  // namespace
 
 std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                        PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {
+                        PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts) {
   builder->start_image(pose.X_FO, cloud, pose.X_OS, index);
   const std::size_t kept = ImageReader(cloud, pose, on_robot, builder, counts).run();
   builder->finish();

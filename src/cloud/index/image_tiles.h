@@ -4,7 +4,7 @@
 
 #include "cloud/filters/crop.h"
 #include "cloud/filters/self_filter.h"
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
 
 namespace ist {
 
@@ -19,6 +19,6 @@ bool is_image(const RawCloud& cloud, const CropPose& pose);
 /// @param index  overwritten, its buffers reused
 /// @returns how many points were kept before the self-filter
 std::size_t index_image(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                        PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts);
+                        PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts);
 
 }  // namespace ist

@@ -43,7 +43,7 @@ std::size_t take_sample(const RawCloud& cloud, const CropPose& pose, Sample* sam
 }  // namespace
 
 std::size_t index_list(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                       PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts) {
+                       PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts) {
   const RawCloud list = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();

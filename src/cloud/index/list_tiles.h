@@ -4,9 +4,9 @@
 
 #include "cloud/filters/crop_pose.h"
 #include "cloud/filters/self_filter.h"
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/cloud/raw_cloud.h"
 
 namespace ist {
 
@@ -17,6 +17,6 @@ namespace ist {
 /// @param on_robot  may be null: nothing is dropped for it
 /// @returns how many points are kept, before `on_robot` drops some
 std::size_t index_list(const RawCloud& cloud, const CropPose& pose, const SelfFilter* on_robot,
-                       PointIndexBuilder* builder, PointIndex* index, IngestCounts* counts);
+                       PointBvhBuilder* builder, PointBvh* index, IngestCounts* counts);
 
 }  // namespace ist

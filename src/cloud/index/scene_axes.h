@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "ist_proximity/cloud/raw_cloud.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 
 namespace ist {
 

@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "cloud/index/box_hierarchy.h"
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/bvh/box_hierarchy.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "cloud/filters/crop.h"
-#include "ist_proximity/cloud/point_index.h"
-#include "ist_proximity/cloud/raw_cloud.h"
+#include "internal/cloud/point_bvh.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 
 namespace ist {
 

@@ -1,6 +1,7 @@
-#include "ist_proximity/cloud/box_index.h"
-
-#include "cloud/index/box_hierarchy.h"
+#include "internal/bvh/box_hierarchy.h"
+#include "internal/bvh/build_id.h"
+#include "internal/cloud/box_bvh.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
 
 namespace ist {
 namespace {
@@ -14,10 +15,8 @@ PaddedBox relative(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& origin
 
 }  // namespace
 
-void BoxIndex::build(const std::vector<Eigen::AlignedBox3d>& boxes) {
-  build_id_ = next_build_id();
-  size_ = boxes.size();
-  origin_.setZero();
+BoxBvh::BoxBvh(const std::vector<Eigen::AlignedBox3d>& boxes)
+    : size_(boxes.size()), build_id_(next_build_id()) {
   if (!boxes.empty()) {
     Eigen::AlignedBox3d all;
     for (const Eigen::AlignedBox3d& box : boxes) all.extend(box);
@@ -28,9 +27,8 @@ void BoxIndex::build(const std::vector<Eigen::AlignedBox3d>& boxes) {
   for (const Eigen::AlignedBox3d& box : boxes) leaves.push_back({relative(box, origin_), 0});
 
   BoxHierarchy hierarchy;
-  tiles_.clear();
   for (const std::uint32_t leaf : hierarchy.arrange(leaves)) {
-    if (tiles_.empty() || tiles_.back().count == kPointWidth) {
+    if (tiles_.empty() || tiles_.back().count == kBoxWidth) {
       tiles_.emplace_back();
       clear_boxes(&tiles_.back());
     }
@@ -39,11 +37,24 @@ void BoxIndex::build(const std::vector<Eigen::AlignedBox3d>& boxes) {
   }
   std::vector<HierarchyChild> children;
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    children.push_back({box_around(tiles_[t]), ~static_cast<std::int32_t>(t)});
+    children.push_back({bounds_of(tiles_[t]), ~static_cast<std::int32_t>(t)});
   }
-  nodes_.clear();
   hierarchy.append_nodes(children, &nodes_);
   hierarchy.append_levels(&nodes_);
 }
+
+BoxIndex::BoxIndex() {
+  static const auto kEmpty = std::make_shared<const BoxBvh>();
+  bvh_ = kEmpty;
+}
+
+void BoxIndex::build(const std::vector<Eigen::AlignedBox3d>& boxes) {
+  bvh_ = std::make_shared<const BoxBvh>(boxes);
+}
+
+bool BoxIndex::empty() const { return bvh_->empty(); }
+std::size_t BoxIndex::size() const { return bvh_->size(); }
+const Eigen::Vector3d& BoxIndex::origin() const { return bvh_->origin(); }
+std::uint64_t BoxIndex::build_id() const { return bvh_->build_id(); }
 
 }  // namespace ist

@@ -2,17 +2,17 @@
 
 #include <Eigen/Core>
 
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/bvh/box_node.h"
 
 namespace ist {
 
-/// A sphere, in the frame of an index.
+/// A sphere in the frame of an index.
 struct BoundingSphere {
   Eigen::Vector3d center;
   double radius;  ///< [m]
 };
 
-/// BoundingSphere the box of a node's child.
+/// The sphere through the corners of a child's box.
 inline BoundingSphere bounding_sphere(const BoxNode& node, int k) {
   const Eigen::Vector3d low(node.min_x[k], node.min_y[k], node.min_z[k]);
   const Eigen::Vector3d high(node.max_x[k], node.max_y[k], node.max_z[k]);

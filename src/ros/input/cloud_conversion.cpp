@@ -3,6 +3,8 @@
 #include <boost/make_shared.hpp>
 #include <cstring>
 
+#include "internal/cloud/point_bvh.h"
+
 namespace ist {
 
 std::string view_cloud(const sensor_msgs::PointCloud2& message, RawCloud* raw) {
@@ -43,9 +45,10 @@ sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros:
 
   std::uint8_t* out = message->data.data();
   const Eigen::Isometry3d& X_FO = snapshot.index.X_FO();
-  PointTile room;
-  for (std::size_t number = 0; number < snapshot.index.tile_count(); ++number) {
-    const PointTile& tile = snapshot.index.tile(number, &room);
+  const PointBvh& points = snapshot.index.bvh();
+  PointTile scratch;
+  for (std::size_t number = 0; number < points.tile_count(); ++number) {
+    const PointTile& tile = points.tile(number, &scratch);
     for (int i = 0; i < tile.count; ++i) {
       const Eigen::Vector3f p_F = (X_FO * tile.point(i)).cast<float>();
       std::memcpy(out, p_F.data(), 3 * sizeof(float));

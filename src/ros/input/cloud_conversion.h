@@ -6,7 +6,6 @@
 
 #include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
-#include "ist_proximity/cloud/raw_cloud.h"
 
 namespace ist {
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "ist_proximity/robot/posed_solids.h"
 #include "ros/input/cloud_conversion.h"
 #include "ros/input/map_measurement.h"
 #include "ros/poses/transforms.h"
@@ -325,19 +326,20 @@ bool CloudSource::worth_waiting_for(const std::string& link, const ros::Time& st
          seconds_between(newest, now) < patience;
 }
 
-void CloudSource::pose_robot(const ros::Time& stamp, PosedRobot* robot) const {
+void CloudSource::pose_robot(const ros::Time& stamp, Placement* placement) const {
   const auto& links = target_.model->links;
-  robot->model = target_.model.get();
-  robot->X_FL.resize(links.size(), Eigen::Isometry3d::Identity());
-  robot->known.assign(links.size(), false);
+  std::vector<Eigen::Isometry3d> X_FL(links.size(), Eigen::Isometry3d::Identity());
+  std::vector<bool> known(links.size(), false);
   std::string ignored;
   for (std::size_t i = 0; i < links.size(); ++i) {
     // Asked first: an exception per missing link and cloud would cost more than the answer.
-    robot->known[i] =
-        links[i].usable() &&
-        is_known(buffer_, target_.fixed_frame, links[i].name, stamp, &ignored) &&
-        look_up(buffer_, target_.fixed_frame, links[i].name, stamp, &robot->X_FL[i]).empty();
+    known[i] = links[i].usable() &&
+               is_known(buffer_, target_.fixed_frame, links[i].name, stamp, &ignored) &&
+               look_up(buffer_, target_.fixed_frame, links[i].name, stamp, &X_FL[i]).empty();
+    // A link that was missing at any instant is not filtered.
+    placement->known[i] = placement->known[i] && known[i];
   }
+  append_posed_solids(*target_.model, X_FL, known, &placement->robot);
 }
 
 std::string CloudSource::place(const Measurement& waiting, Placement* placement) const {
@@ -351,11 +353,8 @@ std::string CloudSource::place(const Measurement& waiting, Placement* placement)
     problem = look_up(buffer_, target_.fixed_frame, sensor, instants.back(), &placement->X_FS_end);
   }
   if (!problem.empty() || !config_.ingest.self_filter) return problem;
-  pose_robot(instants.front(), &placement->robot);
-  for (std::size_t i = 1; i < instants.size(); ++i) {
-    placement->later.emplace_back();
-    pose_robot(instants[i], &placement->later.back());
-  }
+  placement->known.assign(target_.model->links.size(), true);
+  for (const ros::Time& instant : instants) pose_robot(instant, placement);
   return "";
 }
 
@@ -379,13 +378,7 @@ std::string CloudSource::ingest(const Measurement& waiting) {
   snapshot.model = target_.model;
   snapshot.fixed_frame = target_.fixed_frame;
   snapshot.map_frame = without_slash(waiting.header().frame_id);
-  // A link that was missing at any instant is not filtered.
-  snapshot.filtered = placement.robot.known;
-  for (const PosedRobot& later : placement.later) {
-    for (std::size_t i = 0; i < later.known.size(); ++i) {
-      snapshot.filtered[i] = snapshot.filtered[i] && later.known[i];
-    }
-  }
+  snapshot.filtered = placement.known;
   snapshot.generation = target_.generation;
   in_use_ = stamp;
   if (show) filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));

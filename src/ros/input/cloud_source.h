@@ -105,7 +105,7 @@ class CloudSource {
   bool worth_waiting_for(const std::string& link, const ros::Time& stamp) const;
   std::string place(const Measurement& waiting, Placement* placement) const;
   std::string ingest(const Measurement& waiting);
-  void pose_robot(const ros::Time& stamp, PosedRobot* robot) const;
+  void pose_robot(const ros::Time& stamp, Placement* placement) const;
   std::shared_ptr<SourceSnapshot>& writable();
   bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
   void notice_clock_jump();  ///< with mutex_ held

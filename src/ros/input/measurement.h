@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/tree/posed_solid.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
@@ -19,8 +20,8 @@ namespace ist {
 struct Placement {
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();      ///< sensor at the first instant
   Eigen::Isometry3d X_FS_end = Eigen::Isometry3d::Identity();  ///< and at the last one
-  PosedRobot robot;               ///< at the first instant, for the self-filter
-  std::vector<PosedRobot> later;  ///< and at further ones
+  std::vector<PosedSolid> robot;  ///< links of known pose at all instants, for the self-filter
+  std::vector<bool> known;        ///< by link: at every instant; empty: no self-filter
 };
 
 /// One message, checked, whatever its type: what a source has to know to wait for its transforms,

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "ist_proximity/cloud/raw_cloud.h"
+#include "ist_proximity/cloud/cloud_layout.h"
 
 namespace ist {
 

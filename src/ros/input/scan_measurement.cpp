@@ -41,8 +41,7 @@ class ScanMeasurement : public Measurement {
     ScanPoints points;
     to_points(scan_, min_range_, max_range_, placement.X_FS.inverse() * placement.X_FS_end,
               &points);
-    ingest->run(points.raw(), placement.X_FS, placement.robot, header().stamp.toSec(), snapshot,
-                placement.later);
+    ingest->run(points.raw(), placement.X_FS, placement.robot, header().stamp.toSec(), snapshot);
   }
 
  private:

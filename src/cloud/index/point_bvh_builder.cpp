@@ -1,9 +1,10 @@
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
 
 #include <algorithm>
 
 #include "cloud/index/tile_box.h"
 #include "cloud/index/tile_reader.h"
+#include "internal/bvh/build_id.h"
 
 namespace ist {
 namespace {
@@ -46,20 +47,20 @@ bool make_a_node(const HierarchyChild* tiles, std::size_t count) {
 
 }  // namespace
 
-void PointIndexBuilder::start(const Eigen::Isometry3d& X_FO, PointIndex* index) {
+void PointBvhBuilder::start(const Eigen::Isometry3d& X_FO, PointBvh* index) {
   index_ = index;
   used_ = 0;
   index->build_id_ = next_build_id();
   index->X_FO_ = X_FO;
   index->size_ = 0;
   index->nodes_.clear();
-  index->image_ = RawCloud();
+  index->cloud_ = RawCloud();
   unread_.clear();
   loose_.clear();
   neighbours_ = 0;
 }
 
-PointTile* PointIndexBuilder::room(std::size_t count) {
+PointTile* PointBvhBuilder::room(std::size_t count) {
   std::vector<PointTile>& tiles = index_->tiles_;
   if (used_ + count > tiles.size()) {
     tiles.resize(used_ + count);
@@ -68,7 +69,7 @@ PointTile* PointIndexBuilder::room(std::size_t count) {
   return &tiles[used_];
 }
 
-void PointIndexBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
+void PointBvhBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
   PointTile& tile = index_->tiles_[used_];
   PaddedBox left = box;
   if (drop) {
@@ -85,7 +86,7 @@ void PointIndexBuilder::keep(const PaddedBox& box, const PointFilter& drop) {
   ++used_;
 }
 
-void PointIndexBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) {
+void PointBvhBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) {
   for (int k = 0; which >> k != 0; ++k) {
     if ((which >> k & 1U) == 0) continue;
     index_->size_ += static_cast<std::size_t>(index_->tiles_[used_].count);
@@ -94,18 +95,18 @@ void PointIndexBuilder::keep_written(const BoxNode& boxes, std::uint32_t which) 
   }
 }
 
-void PointIndexBuilder::start_image(const Eigen::Isometry3d& X_FO, const RawCloud& image,
-                                    const Eigen::Isometry3d& X_OS, PointIndex* index) {
+void PointBvhBuilder::start_image(const Eigen::Isometry3d& X_FO, const RawCloud& image,
+                                  const Eigen::Isometry3d& X_OS, PointBvh* index) {
   start(X_FO, index);
-  index->image_ = image;
+  index->cloud_ = image;
   index->X_OS_ = X_OS;
 }
 
-void PointIndexBuilder::add_unread(const std::uint32_t* first_pixels, std::size_t count) {
+void PointBvhBuilder::add_unread(const std::uint32_t* first_pixels, std::size_t count) {
   PointTile* tiles = room(count);
-  if (index_->image_.owner == nullptr) {
+  if (index_->cloud_.owner == nullptr) {
     for (std::size_t i = 0; i < count; ++i) {
-      read_tile(index_->image_, index_->X_OS_, first_pixels[i], &tiles[i]);
+      read_tile(index_->cloud_, index_->X_OS_, first_pixels[i], &tiles[i]);
     }
   } else {
     std::copy_n(first_pixels, count, &index_->first_pixel_[used_]);
@@ -118,12 +119,12 @@ void PointIndexBuilder::add_unread(const std::uint32_t* first_pixels, std::size_
   index_->size_ += count * static_cast<std::size_t>(kPointWidth);
 }
 
-void PointIndexBuilder::keep_unread(const PaddedBox& box, std::uint32_t first_pixel) {
+void PointBvhBuilder::keep_unread(const PaddedBox& box, std::uint32_t first_pixel) {
   loose_.push_back({box, ~static_cast<std::int32_t>(used_)});
   add_unread(&first_pixel, 1);
 }
 
-void PointIndexBuilder::keep_unread_node(const BoxNode& boxes, const std::uint32_t* first_pixels) {
+void PointBvhBuilder::keep_unread_node(const BoxNode& boxes, const std::uint32_t* first_pixels) {
   index_->nodes_.push_back(boxes);
   BoxNode& node = index_->nodes_.back();
   node.count = kPointWidth;
@@ -131,7 +132,7 @@ void PointIndexBuilder::keep_unread_node(const BoxNode& boxes, const std::uint32
   add_unread(first_pixels, kWidth);
 }
 
-void PointIndexBuilder::end_neighbours() {
+void PointBvhBuilder::end_neighbours() {
   const std::size_t count = loose_.size() - neighbours_;
   if (make_a_node(loose_.data() + neighbours_, count)) {
     index_->nodes_.emplace_back();
@@ -145,19 +146,19 @@ void PointIndexBuilder::end_neighbours() {
   neighbours_ = loose_.size();
 }
 
-void PointIndexBuilder::finish() {
+void PointBvhBuilder::finish() {
   index_->tiles_.resize(used_);
   index_->first_pixel_.resize(used_);
-  index_->written_.reset(used_);
-  for (const Run& run : unread_) index_->written_.leave_out(run.first, run.count);
+  index_->flags_.reset(used_);
+  for (const Run& run : unread_) index_->flags_.mark_not_loaded(run.first, run.count);
   std::vector<BoxNode>& nodes = index_->nodes_;
   hierarchy_.append_nodes(loose_, &nodes);
   hierarchy_.append_levels(&nodes);
-  if (index_->image_.owner == nullptr) index_->image_ = RawCloud();  // its bytes may go
+  if (index_->cloud_.owner == nullptr) index_->cloud_ = RawCloud();  // its bytes may go
   index_->root_ = static_cast<std::int32_t>(nodes.size()) - 1;
   index_->bounds_.setEmpty();
   if (nodes.empty()) return;
-  const PaddedBox box = box_around(nodes.back());
+  const PaddedBox box = bounds_of(nodes.back());
   index_->bounds_ = Eigen::AlignedBox3f(box.min.head<3>().matrix(), box.max.head<3>().matrix());
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "cloud/index/point_index_builder.h"
+#include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/tile_box.h"
 
 namespace ist {
@@ -79,7 +79,7 @@ PaddedBox cut(PointTile* tile) {
 }  // namespace
 
 // Runs of sixteen, cut where the order leaps.
-void PointIndexBuilder::add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop) {
+void PointBvhBuilder::add_runs(const CloudPoint* points, std::size_t n, const PointFilter& drop) {
   while (n > 0) {
     PointTile& tile = *room(1);
     const std::size_t count = std::min(kWidth, n);
@@ -99,7 +99,7 @@ void PointIndexBuilder::add_runs(const CloudPoint* points, std::size_t n, const 
 }
 
 // Nodes over the tiles that have none yet, when there are enough to fill them.
-void PointIndexBuilder::end_cell() {
+void PointBvhBuilder::end_cell() {
   if (loose_.size() < kEnough) return;
   hierarchy_.append_nodes(loose_, &index_->nodes_);
   loose_.clear();
@@ -109,7 +109,7 @@ void PointIndexBuilder::end_cell() {
 // The slices that the last sort is good for: as many as the square root of the number of parts,
 // each of whole parts; around points that it does not order, those before, they, and those after.
 template <typename Visit>
-void PointIndexBuilder::for_each_slice(std::size_t n, std::size_t part, const Visit& visit) const {
+void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visit& visit) const {
   const std::size_t crowd = slicer_.crowd_begin(), crowd_end = slicer_.crowd_end();
   if (crowd_end > 0) {
     if (crowd > 0) visit(std::size_t{0}, crowd);
@@ -127,8 +127,8 @@ void PointIndexBuilder::for_each_slice(std::size_t n, std::size_t part, const Vi
 }
 
 // Points of a cell: sliced until the parts are what is worked on at a time.
-void PointIndexBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::size_t n,
-                                   const Filters& filters) {
+void PointBvhBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::size_t n,
+                                 const Filters& filters) {
   if (n <= TileBatch::kMost) {
     batch_.tiles = room(n);
     batch_.count = 0;
@@ -143,7 +143,7 @@ void PointIndexBuilder::add_points(CloudPoint* points, CloudPoint* spare, std::s
 }
 
 // Sliced until runs of sixteen are tiles.
-void PointIndexBuilder::add_part(CloudPoint* points, CloudPoint* spare, std::size_t n) {
+void PointBvhBuilder::add_part(CloudPoint* points, CloudPoint* spare, std::size_t n) {
   if (n <= kWidth || !slicer_.sort(points, n, spare)) {
     make_tiles(points, n, &batch_);
     return;
@@ -164,15 +164,14 @@ void PointIndexBuilder::add_part(CloudPoint* points, CloudPoint* spare, std::siz
 }
 
 // What make_tiles has made becomes part of the index.
-void PointIndexBuilder::keep_batch(const Filters& filters) {
+void PointBvhBuilder::keep_batch(const Filters& filters) {
   const std::size_t count = batch_.count;
   const PointTile* tiles = batch_.tiles;
   bool is_clear = true;
   for (std::size_t i = 0; i < count; i += kWidth) {
     BoxNode& boxes = batch_.boxes[i / kWidth];
     boxes.count = static_cast<std::int32_t>(std::min(count - i, kWidth));
-    if (filters.drop && (!filters.may_drop || filters.may_drop(box_around(boxes))))
-      is_clear = false;
+    if (filters.drop && (!filters.may_drop || filters.may_drop(bounds_of(boxes)))) is_clear = false;
   }
   if (!is_clear) {
     filtered_.reserve(TileBatch::kMost);
@@ -191,7 +190,7 @@ void PointIndexBuilder::keep_batch(const Filters& filters) {
   }
 }
 
-void PointIndexBuilder::keep_made(std::size_t begin, std::size_t end) {
+void PointBvhBuilder::keep_made(std::size_t begin, std::size_t end) {
   for (std::size_t i = begin; i < end;) {
     const std::size_t slot = i % kWidth, here = std::min(kWidth - slot, end - i);
     const auto which = static_cast<std::uint32_t>(((std::size_t{1} << here) - 1) << slot);
@@ -201,15 +200,15 @@ void PointIndexBuilder::keep_made(std::size_t begin, std::size_t end) {
 }
 
 // What the filter drops moves all that follow.
-void PointIndexBuilder::keep_filtered(std::size_t begin, std::size_t end, const PointFilter& drop) {
+void PointBvhBuilder::keep_filtered(std::size_t begin, std::size_t end, const PointFilter& drop) {
   for (std::size_t i = begin; i < end; ++i) {
     *room(1) = filtered_[i];
     keep(box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth)), drop);
   }
 }
 
-void PointIndexBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* points,
-                              std::size_t n, const PointFilter& drop, PointIndex* index) {
+void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,
+                            const PointFilter& drop, PointBvh* index) {
   std::array<CloudPoint, PointCells::kSample> sample;
   const std::size_t stride = n / sample.size() | 1U;
   std::size_t count = 0;
@@ -219,8 +218,8 @@ void PointIndexBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* p
   build(X_FO, drop, {}, index);
 }
 
-void PointIndexBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
-                              const BoxFilter& may_drop, PointIndex* index) {
+void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
+                            const BoxFilter& may_drop, PointBvh* index) {
   start(X_FO, index);
   // More than there will be, by far: how many it takes differs from cloud to cloud of a stream.
   const std::size_t enough = cells_.size() / (4 * kWidth) + kWidth;
@@ -234,8 +233,8 @@ void PointIndexBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& 
   finish();
 }
 
-void PointIndexBuilder::build_in_order(const Eigen::Isometry3d& X_FO,
-                                       const std::vector<CloudPoint>& points, PointIndex* index) {
+void PointBvhBuilder::build_in_order(const Eigen::Isometry3d& X_FO,
+                                     const std::vector<CloudPoint>& points, PointBvh* index) {
   start(X_FO, index);
   add_runs(points.data(), points.size(), {});
   finish();

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "cloud/format/cloud_point.h"
-#include "cloud/index/box_hierarchy.h"
 #include "cloud/index/divide_kernel.h"
 #include "cloud/index/point_cells.h"
 #include "cloud/index/point_slicer.h"
-#include "ist_proximity/cloud/point_index.h"
+#include "internal/bvh/box_hierarchy.h"
+#include "internal/cloud/point_bvh.h"
 
 namespace ist {
 
@@ -30,29 +30,29 @@ using BoxFilter = std::function<bool(const PaddedBox& box)>;
 /// fits the first caches, is sliced across the longest side of its box, and the slices again, until
 /// sixteen neighbours are a tile. A tile with a gap is divided further, so that no tile has a big
 /// box. Tiles that follow each other are a node's.
-class PointIndexBuilder {
+class PointBvhBuilder {
  public:
-  /// As PointIndex::build, in any frame.
+  /// As PointBvh::build, in any frame.
   /// @param X_FO    frame of the points -> fixed frame, rigid
   /// @param drop    may be empty. Called once for each tile-to-be, before boxes are made: to filter
   ///                a tile at a time is much cheaper than a point at a time.
   /// @param index   overwritten, its buffers reused
   void build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,
-             const PointFilter& drop, PointIndex* index);
+             const PointFilter& drop, PointBvh* index);
 
   /// The same for the points in cells().
   /// @param may_drop  may be empty: a filter may drop anything
   void build(const Eigen::Isometry3d& X_FO, const PointFilter& drop, const BoxFilter& may_drop,
-             PointIndex* index);
+             PointBvh* index);
   PointCells& cells() { return cells_; }
 
   /// The same for points of which neighbours in the list are mostly neighbours in space.
   void build_in_order(const Eigen::Isometry3d& X_FO, const std::vector<CloudPoint>& points,
-                      PointIndex* index);
+                      PointBvh* index);
 
   /// The same tile by tile, for who knows which points are neighbours: start(), then room() and
   /// keep() for each tile, then finish(). Before finish(), the index is not to be read.
-  void start(const Eigen::Isometry3d& X_FO, PointIndex* index);
+  void start(const Eigen::Isometry3d& X_FO, PointBvh* index);
   /// The next tiles, to be filled: points, ids and count.
   PointTile* room(std::size_t count);
   /// Keeps the first tile of room().
@@ -66,7 +66,7 @@ class PointIndexBuilder {
   /// @param image  where its bytes have no owner, tiles are read at once
   /// @param X_OS   sensor frame -> O
   void start_image(const Eigen::Isometry3d& X_FO, const RawCloud& image,
-                   const Eigen::Isometry3d& X_OS, PointIndex* index);
+                   const Eigen::Isometry3d& X_OS, PointBvh* index);
   /// Keeps a whole tile.
   /// @param box  of its points, at least
   void keep_unread(const PaddedBox& box, std::uint32_t first_pixel);
@@ -103,7 +103,7 @@ class PointIndexBuilder {
   std::vector<HierarchyChild> loose_;  ///< tiles that no node holds yet
   std::size_t neighbours_ = 0;         ///< first of them since the last end_neighbours()
   BoxHierarchy hierarchy_;
-  PointIndex* index_ = nullptr;  ///< in work
+  PointBvh* index_ = nullptr;  ///< in work
   struct Run {
     std::size_t first, count;
   };

@@ -8,11 +8,12 @@
 
 namespace ist {
 
-/// Which tiles of an index hold their points. The others still lie in the message; whoever looks at
-/// one first may write it, and whoever looks meanwhile goes without. Nobody waits.
-class WrittenTiles {
+/// Load flags of the tiles of an index: whether a tile holds its points, or they still lie in the
+/// message. Every reader of a tile that is not loaded reads the points from the message into a
+/// buffer of its own; the first one also stores them in the tile. Nobody waits.
+class LazyTileFlags {
  public:
-  /// As many tiles, all written. Not to be called while others look.
+  /// Marks this many tiles as loaded. Not to be called while others read.
   void reset(std::size_t tiles) {
     const std::size_t words = (tiles + kTilesPerWord - 1) / kTilesPerWord;
     if (words > size_) {
@@ -21,8 +22,8 @@ class WrittenTiles {
     }
     for (std::size_t i = 0; i < words; ++i) words_[i].store(kAll, std::memory_order_relaxed);
   }
-  /// These are not. Not to be called while others look.
-  void leave_out(std::size_t first, std::size_t count) {
+  /// Marks tiles as not loaded. Not to be called while others read.
+  void mark_not_loaded(std::size_t first, std::size_t count) {
     for (const std::size_t end = first + count; first < end;) {
       const std::size_t here =
           std::min<std::size_t>(end - first, kTilesPerWord - first % kTilesPerWord);
@@ -34,10 +35,10 @@ class WrittenTiles {
     }
   }
 
-  bool is_written(std::size_t tile) const {
+  bool is_loaded(std::size_t tile) const {
     return (words_[tile / kTilesPerWord].load(std::memory_order_acquire) & bit(tile)) != 0;
   }
-  /// @returns true to one caller, who is to write the tile and then to say so by publish()
+  /// @returns true to one caller only, which is to store the points and then call publish()
   bool claim(std::size_t tile) const {
     const std::uint32_t claimed = bit(tile) << kTilesPerWord;
     return (words_[tile / kTilesPerWord].fetch_or(claimed, std::memory_order_relaxed) & claimed) ==
@@ -48,7 +49,7 @@ class WrittenTiles {
   }
 
  private:
-  static constexpr std::uint32_t kTilesPerWord = 16;  // low half: written, high half: claimed
+  static constexpr std::uint32_t kTilesPerWord = 16;  // low half: loaded, high half: claimed
   static constexpr std::uint32_t kAll = 0xFFFFFFFFU;
   static constexpr std::uint32_t bit(std::size_t tile) { return 1U << (tile % kTilesPerWord); }
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "nobody may wait");

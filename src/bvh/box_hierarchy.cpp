@@ -1,16 +1,15 @@
-#include "cloud/index/box_hierarchy.h"
+#include "internal/bvh/box_hierarchy.h"
 
 #include <algorithm>
-#include <atomic>
 
 namespace ist {
 namespace {
 
-constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
+constexpr auto kWidth = static_cast<std::size_t>(kBoxWidth);
 
 void clear(BoxNode* node) {
   clear_boxes(node);
-  std::fill_n(node->child, kPointWidth, 0);
+  std::fill_n(node->child, kBoxWidth, 0);
 }
 
 }  // namespace
@@ -71,16 +70,11 @@ void BoxHierarchy::append_levels(std::vector<BoxNode>* nodes) {
   for (std::size_t begin = 0; nodes->size() - begin > 1;) {
     level_.clear();
     for (std::size_t i = begin; i < nodes->size(); ++i) {
-      level_.push_back({box_around((*nodes)[i]), static_cast<std::int32_t>(i)});
+      level_.push_back({bounds_of((*nodes)[i]), static_cast<std::int32_t>(i)});
     }
     begin = nodes->size();
     append_nodes(level_, nodes);
   }
-}
-
-std::uint64_t next_build_id() {
-  static std::atomic<std::uint64_t> builds{0};
-  return ++builds;
 }
 
 }  // namespace ist

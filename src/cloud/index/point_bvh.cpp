@@ -1,0 +1,33 @@
+#include "internal/cloud/point_bvh.h"
+
+#include "cloud/index/tile_reader.h"
+
+namespace ist {
+
+PointBvh& PointBvh::operator=(const PointBvh& other) {
+  if (this == &other) return *this;
+  X_FO_ = other.X_FO_;
+  bounds_ = other.bounds_;
+  nodes_ = other.nodes_;
+  tiles_.resize(other.tile_count());
+  PointTile scratch;
+  for (std::size_t i = 0; i < tiles_.size(); ++i) tiles_[i] = other.tile(i, &scratch);
+  flags_.reset(tiles_.size());
+  cloud_ = RawCloud();
+  first_pixel_.assign(tiles_.size(), 0U);
+  size_ = other.size_;
+  root_ = other.root_;
+  build_id_ = other.build_id_;
+  return *this;
+}
+
+const PointTile& PointBvh::load(std::size_t i, PointTile* scratch) const {
+  read_tile(cloud_, X_OS_, first_pixel_[i], scratch);
+  if (flags_.claim(i)) {
+    tiles_[i] = *scratch;
+    flags_.publish(i);
+  }
+  return *scratch;
+}
+
+}  // namespace ist

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "internal/bvh/box_node.h"
+#include "internal/cloud/lazy_tile_flags.h"
+#include "internal/cloud/point_tile.h"
+#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
+
+namespace ist {
+
+/// The data of a PointIndex: tiles of up to sixteen neighbouring points and a bounding volume
+/// hierarchy of boxes over them. A traversal takes it once, by PointIndex::bvh(). Immutable once
+/// built, thread safe.
+///
+/// Tiles of an organized cloud whose bytes stay where they are get loaded when a query first looks
+/// at them; queries look at few.
+class PointBvh {
+ public:
+  PointBvh() = default;
+  PointBvh(const PointBvh& other) { *this = other; }
+  PointBvh& operator=(const PointBvh& other);  ///< loads all tiles
+  PointBvh(PointBvh&&) = default;
+  PointBvh& operator=(PointBvh&&) = default;
+  ~PointBvh() = default;
+
+  bool empty() const { return tiles_.empty(); }
+  std::size_t size() const { return size_; }                    ///< points
+  const Eigen::Isometry3d& X_FO() const { return X_FO_; }       ///< index's -> fixed frame
+  const std::vector<BoxNode>& nodes() const { return nodes_; }  ///< the root is nodes()[root()]
+  std::int32_t root() const { return root_; }                   ///< -1 when empty
+  using Tile = PointTile;
+  std::size_t tile_count() const { return tiles_.size(); }
+  /// Neither allocates nor waits.
+  /// @param i        below tile_count()
+  /// @param scratch  may hold the answer
+  const PointTile& tile(std::size_t i, PointTile* scratch) const {
+    return flags_.is_loaded(i) ? tiles_[i] : load(i, scratch);
+  }
+  Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
+  std::uint64_t build_id() const { return build_id_; }    ///< 0 before the first build
+
+ private:
+  friend class PointBvhBuilder;
+
+  const PointTile& load(std::size_t i, PointTile* scratch) const;
+
+  Eigen::Isometry3d X_FO_ = Eigen::Isometry3d::Identity();
+  Eigen::AlignedBox3f bounds_;
+  std::vector<BoxNode> nodes_;  ///< level by level, the root last
+  mutable std::vector<PointTile> tiles_;
+  LazyTileFlags flags_;
+  // The source of the tiles that are not loaded.
+  RawCloud cloud_;
+  Eigen::Isometry3d X_OS_ = Eigen::Isometry3d::Identity();
+  std::vector<std::uint32_t> first_pixel_;  ///< by tile
+  std::size_t size_ = 0;
+  std::int32_t root_ = -1;
+  std::uint64_t build_id_ = 0;
+};
+
+}  // namespace ist
