@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <boost/make_shared.hpp>
 
-#include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_region.h"
 #include "ros/model/object_conversion.h"
 #include "ros/output/message_conversion.h"
