@@ -1,6 +1,6 @@
 // A controller that links the library directly, without ROS: from a sensor's points to joint
-// velocities, in one loop. The sensor is made up here (a ball that flies through the arm), and so
-// is the arm (its joints move as they are told); the rest is what a real controller would do.
+// velocities, in one loop. The sensor is simulated (a sphere that flies through the arm), and so is
+// the arm (its joints follow every command); the rest is what a real controller would do.
 //
 // Usage: direct_controller demo_arm.urdf       (meshes are found by ROS_PACKAGE_PATH)
 
@@ -31,10 +31,10 @@ namespace {
 constexpr double kControlPeriod = 0.002;  // [s]
 constexpr int kCyclesPerCloud = 16;
 constexpr double kDuration = 8.0;  // [s]
-constexpr double kBallRadius = 0.08;
+constexpr double kSphereRadius = 0.08;
 
-/// What a sensor would deliver: points of a ball, float32 x, y, z, in the sensor's frame.
-std::vector<float> ball_points(const Eigen::Vector3d& center) {
+/// A sensor's data: points of a sphere, float32 x, y, z, in the sensor's frame.
+std::vector<float> sphere_points(const Eigen::Vector3d& center) {
   constexpr int kCount = 400;
   std::vector<float> points;
   for (int i = 0; i < kCount; ++i) {
@@ -42,7 +42,7 @@ std::vector<float> ball_points(const Eigen::Vector3d& center) {
     const double z = 1.0 - (2.0 * i + 1.0) / kCount, r = std::sqrt(1.0 - z * z);
     const double angle = i * M_PI * (3.0 - std::sqrt(5.0));
     const Eigen::Vector3d n(r * std::cos(angle), r * std::sin(angle), z);
-    const Eigen::Vector3d p = center + kBallRadius * n;
+    const Eigen::Vector3d p = center + kSphereRadius * n;
     for (int k = 0; k < 3; ++k) points.push_back(static_cast<float>(p[k]));
   }
   return points;
@@ -61,27 +61,28 @@ ist::RawCloud as_cloud(const std::vector<float>& xyz) {
   return cloud;
 }
 
-/// Once: the links' volumes, for forces in contact. 100 balls are quick to pack, and coarse.
+/// The links' volumes, for forces in contact; built once. 100 spheres are quick to pack, and
+/// coarse.
 std::vector<std::shared_ptr<const ist::ContactGeometry>> link_volumes(
     const ist::RobotDescription& robot, const ist::RobotModel& model) {
   ist::ContactConfig config;
   config.packing.max_spheres = 100;
-  std::vector<std::shared_ptr<const ist::ContactGeometry>> bodies;
+  std::vector<std::shared_ptr<const ist::ContactGeometry>> volumes;
   for (const ist::LinkModel& link : model.links) {
     const auto same = [&link](const ist::LinkDescription& one) { return one.name == link.name; };
     const auto found = std::find_if(robot.links.begin(), robot.links.end(), same);
-    bodies.push_back(ist::build_contact_geometry(found->geometry, 0, link, config, ""));
+    volumes.push_back(ist::build_contact_geometry(found->geometry, 0, link, config, ""));
   }
-  return bodies;
+  return volumes;
 }
 
-/// [N] What presses on a link: 0 out of contact, NaN where it is not known.
-double contact_force(const ist::LinkModel& link, const ist::ContactGeometry& body,
+/// [N] The contact force on a link: 0 out of contact, NaN where it is not known.
+double contact_force(const ist::LinkModel& link, const ist::ContactGeometry& geometry,
                      const ist::LinkProximity& answer, const Eigen::Isometry3d& X_FL,
                      const ist::CloudSnapshot& cloud) {
   ist::ContactVolume volume;
-  const bool is_known = answer.state == ist::LinkState::kContact && body.has_volume();
-  if (is_known) volume = ist::contact_volume(link, body, X_FL, {&cloud});
+  const bool is_known = answer.state == ist::LinkState::kContact && geometry.has_volume();
+  if (is_known) volume = ist::contact_volume(link, geometry, X_FL, {&cloud});
   return ist::penetration_wrench(answer, {}, is_known ? &volume : nullptr, X_FL, {}).force.norm();
 }
 
@@ -123,7 +124,7 @@ int run(const std::string& urdf_path) {
 
     // A new cloud: what lies on the robot, where it was at the cloud's stamp, is dropped.
     if (cycle % kCyclesPerCloud == 0) {
-      const std::vector<float> points = ball_points({0.55, -1.0 + 0.25 * now, 0.30});
+      const std::vector<float> points = sphere_points({0.55, -1.0 + 0.25 * now, 0.30});
       const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
       ingest.run(as_cloud(points), X_FS, ist::posed_solids(*model, X_FL, known), now, &snapshot);
     }

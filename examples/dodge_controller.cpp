@@ -20,7 +20,7 @@ Eigen::VectorXd commanded(const ControlledArm& arm, const std::vector<double>& a
   return q;
 }
 
-/// a . x >= b, which gives way a little where `softness` is not 0.
+/// The constraint a . x >= b, which yields a little where `softness_sq` is not 0.
 struct Constraint {
   Eigen::VectorXd a;
   double b = 0.0;
@@ -43,7 +43,7 @@ Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint
   return x;
 }
 
-/// Toward the goal; all joints arrive together.
+/// The velocity toward the goal; all joints arrive together.
 Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double smallest_bound,
                        const DodgeConfig& config) {
   const Eigen::VectorXd wanted = config.task_gain * (goal - q);
@@ -59,8 +59,8 @@ void add_joint_limits(const ControlledArm& arm, const Eigen::VectorXd& q, const 
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const Kinematics::Joint& joint =
         arm.kinematics.joints()[arm.joints[static_cast<std::size_t>(j)]];
-    const auto bound = [&](double room) {
-      return std::clamp(config.limit_gain * room, 0.0, config.max_joint_speed);
+    const auto bound = [&](double margin) {
+      return std::clamp(config.limit_gain * margin, 0.0, config.max_joint_speed);
     };
     Constraint c;
     c.a = Eigen::VectorXd::Unit(q.size(), j);

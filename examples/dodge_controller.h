@@ -8,20 +8,20 @@
 #include "ist_proximity/robot/kinematics.h"
 
 /// An example of a reactive controller: an arm goes to goals in joint space, slows down near
-/// obstacles and steps aside. It knows nothing but what `~proximity` and the joint states tell.
+/// obstacles and evades them. Its only inputs are `~proximity` and the joint states.
 namespace ist::example {
 
-/// What is known of one link's surroundings: fields of ist_proximity/LinkProximity.
+/// The proximity of one link: fields of ist_proximity/LinkProximity.
 struct LinkReading {
   std::size_t body = 0;                             ///< of the kinematics: the link
   double lower_bound = 0.0;                         ///< [m]
   Eigen::Vector3d p_LCl = Eigen::Vector3d::Zero();  ///< [m] point_on_link_local; NaN when CLEAR
-  /// Which way the link should go, in the fixed frame: `repulsion`, of any length. (`direction` is
-  /// one as well, but jumps.)
+  /// Direction away from obstacles, in the fixed frame: `repulsion`, of any length. (`direction`
+  /// would do as well, but jumps.)
   Eigen::Vector3d away = Eigen::Vector3d::Zero();
 };
 
-/// What is known of the surroundings.
+/// The proximity of all links at one time.
 struct Reading {
   bool is_ok = false;        ///< status OK (or DEGRADED: the bounds hold then, too)
   double message_age = 0.0;  ///< [s] now - header.stamp
@@ -38,7 +38,7 @@ struct DodgeConfig {
   double slow_distance = 0.25;  ///< [m] the task slows down from here on ...
   double stop_distance = 0.10;  ///< [m] ... and stands still here
 
-  double keep_distance = 0.18;  ///< [m] what is nearer makes the link step aside
+  double keep_distance = 0.18;  ///< [m] a nearer obstacle makes the link evade it
   double damping = 5.0;         ///< [1/s] speed away (toward) per metre nearer (farther) than that
   double escape_speed = 0.6;    ///< [m/s] largest speed away that is asked for
   double softness = 0.1;        ///< [m] of lever: links that can hardly move are not forced to
@@ -65,7 +65,7 @@ struct ControlledArm {
 /// A velocity damper (Faverjon and Tournassoud 1987) per link: with d its lower bound and n the
 /// unit vector of `away`, the witness must move along n at
 ///   n . J dq >= damping * (keep_distance - d),   at most escape_speed.
-/// Of all velocities that do so, and that respect the joints' limits, it is the one nearest to
+/// The result is the velocity that does so, respects the joints' limits, and is nearest to
 /// what the task wants; the task itself is slowed down by the smallest lower bound (speed and
 /// separation). Zero when the surroundings are not known.
 /// @param q     [rad, m] by joint of the kinematics (NaN where a joint has none)

@@ -32,8 +32,8 @@ struct Lens {
   Lanes factor;     ///< [m]
 };
 
-/// Where the lens's middle lies on the line from the centre of sphere R (0) to that of sphere r
-/// (1): the middle of its thickness, and the smaller sphere's centre where the other one contains
+/// The position of the lens's middle on the line from the centre of sphere R (0) to that of sphere
+/// r (1): the middle of its thickness, and the smaller sphere's centre where the other one contains
 /// it. As a point it is continuous in both spheres.
 template <typename Lanes>
 Lanes lens_middle(const Lanes& difference, const Lanes& distance) {

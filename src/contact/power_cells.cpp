@@ -60,7 +60,7 @@ std::vector<double> void_volumes(const std::vector<InnerSphere>& spheres,
             fraction_of_cell((p - spheres[i].center).norm() - spheres[i].radius, step);
         if (!(outside > 0.0)) continue;
         const double inside = fraction_of_cell(-solid.signed_distance(p).distance, step);
-        // Where a void is thinner than a cell, sphere and surface are about parallel.
+        // In a void thinner than a cell, sphere and surface are about parallel.
         voids[i] += steps.prod() * std::max(outside + inside - 1.0, 0.0);
       }
     }

@@ -56,7 +56,7 @@ Vectors outward_field(const ContactLeaf& leaf, const Lenses& lenses) {
   return shortened({component(0), component(1), component(2)});
 }
 
-// The other link's outward field there; the offset from its centre runs the other way.
+// The other link's outward field there; the offset from its centre has the opposite direction.
 Vectors outward_field(const FieldSphere& sphere, const Lenses& lenses) {
   const Lanes back = lenses.middle - 1.0F;
   const Lanes x = back * lenses.offset.x, y = back * lenses.offset.y, z = back * lenses.offset.z;

@@ -79,7 +79,8 @@ HWY_INLINE V Gap(V low, V high, V value) {
   return hn::Max(hn::Max(hn::Sub(low, value), hn::Sub(value, high)), hn::Zero(d));
 }
 
-// From a point, or from the nearest point of a box, to the centres of spheres k, k + 1, ...
+// The offsets from a point, or from the nearest point of a box, to the centres of spheres k, k + 1,
+// ...
 HWY_INLINE Offset ToSpheres(const PointTile& tile, int point, const PosedGroup& group,
                             std::size_t k) {
   const Tag d;
@@ -88,7 +89,7 @@ HWY_INLINE Offset ToSpheres(const PointTile& tile, int point, const PosedGroup& 
           hn::Sub(hn::Load(d, group.z + k), hn::Set(d, tile.z[point]))};
 }
 
-// From the nearest number of an interval to v.
+// The offset from the nearest number of an interval to v.
 HWY_INLINE V FromInterval(float low, float high, V v) {
   const Tag d;
   return hn::Sub(v, hn::Min(hn::Max(v, hn::Set(d, low)), hn::Set(d, high)));

@@ -12,7 +12,8 @@
 namespace ist {
 namespace {
 
-constexpr double kLeastSmoothing = 1e-3;  // [m] that float can tell from none, far away too
+// [m] A smaller smoothing would be lost in the rounding of float coordinates far from the origin.
+constexpr double kLeastSmoothing = 1e-3;
 
 PosedSpheres posed(const std::vector<SphereGroup>& groups, const Eigen::Isometry3d& X_OL) {
   PosedSpheres spheres;

@@ -91,7 +91,7 @@ class PackageIndex {
     std::map<std::string, fs::path> packages;
   };
 
-  // As rospack does: nothing is looked for inside a package, and the first of a name wins.
+  // The rules of rospack: it does not search inside a package, and the first of a name wins.
   static void crawl(const fs::path& folder, std::set<fs::path>* visited,
                     std::map<std::string, fs::path>* packages) {
     std::error_code error;
