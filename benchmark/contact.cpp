@@ -20,16 +20,16 @@ namespace {
 using ist::benchmark::quantile;
 using ist::benchmark::ThreadTimer;
 
-std::vector<std::shared_ptr<const ist::ContactBody>> bodies(const std::filesystem::path& data,
-                                                            const ist::RobotModel& model) {
-  std::vector<std::shared_ptr<const ist::ContactBody>> result;
+std::vector<std::shared_ptr<const ist::ContactGeometry>> bodies(const std::filesystem::path& data,
+                                                                const ist::RobotModel& model) {
+  std::vector<std::shared_ptr<const ist::ContactGeometry>> result;
   double seconds = 0.0;
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     const auto file = data / "robots/franka_description/meshes/visual" /
                       (std::string(ist::test::panda_mesh(i)) + ".dae");
     const ist::LinkGeometry geometry = {ist::GeometryElement{
         ist::load_mesh(file.string()), Eigen::Isometry3d::Identity(), file.string()}};
-    result.push_back(ist::build_contact_body(geometry, 0, model.links[i], {}, ""));
+    result.push_back(ist::build_contact_geometry(geometry, 0, model.links[i], {}, ""));
     seconds += result.back()->time;
   }
   std::printf("%zu links packed disjointly in %.1f s\n\n", result.size(), seconds);

@@ -12,6 +12,7 @@
 
 #include "document.h"
 #include "ist_proximity/proximity/time_of_impact.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "support.h"
 #include "support/accuracy.h"
 #include "support/data_dir.h"
@@ -102,7 +103,6 @@ class Panda {
     // The base stands at the table's edge, in contact with what is measured there.
     for (const ist::LinkModel& link : model_->links) {
       wanted_.push_back(link.name != "panda_link0" && link.name != "panda_link1");
-      places_.push_back(*kinematics_->find_link(link.name));
     }
   }
 
@@ -144,14 +144,8 @@ class Panda {
     for (std::size_t j = 0; j < motion_.from.size(); ++j) {
       q.push_back((1.0 - s) * motion_.from[j] + s * motion_.to[j]);
     }
-    ist::JointPoses poses;
-    kinematics_->place_joints(q, &poses);
-    std::vector<Eigen::Isometry3d> X_FL, X_FM;
-    std::vector<bool> known;
-    kinematics_->place_links(poses, Eigen::Isometry3d::Identity(), &X_FL, &known);
-    for (const std::size_t place : places_) X_FM.push_back(X_FL[place]);
     std::vector<ist::LinkProximity> answers;
-    query->run(X_FM, wanted_, {&cloud_}, &answers);
+    query->run(ist::link_poses(*model_, *kinematics_, q).X_FL, wanted_, {&cloud_}, &answers);
     double smallest = query->config().max_distance;
     for (const ist::LinkProximity& answer : answers) {
       if (answer.state >= ist::LinkState::kNear) smallest = std::min(smallest, answer.distance);
@@ -186,7 +180,6 @@ class Panda {
   std::shared_ptr<const ist::RobotModel> model_;
   std::shared_ptr<const ist::Kinematics> kinematics_;
   std::vector<bool> wanted_;
-  std::vector<std::size_t> places_;
   ist::JointMotion motion_;
   ist::JointPoses still_;
 };

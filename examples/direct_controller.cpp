@@ -1,6 +1,6 @@
 // A controller that links the library directly, without ROS: from a sensor's points to joint
-// velocities, in one loop. The sensor is simulated (a ball that flies through the arm), and so is
-// the arm (its joints follow their commands exactly); the rest is as in a real controller.
+// velocities, in one loop. The sensor is simulated (a sphere that flies through the arm), and so is
+// the arm (its joints follow every command); the rest is what a real controller would do.
 //
 // Usage: direct_controller demo_arm.urdf       (meshes are found by ROS_PACKAGE_PATH)
 
@@ -22,6 +22,7 @@
 #include "ist_proximity/contact/contact_wrench.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "ist_proximity/robot/posed_solids.h"
 #include "ist_proximity/robot/robot_model.h"
 
@@ -30,18 +31,18 @@ namespace {
 constexpr double kControlPeriod = 0.002;  // [s]
 constexpr int kCyclesPerCloud = 16;
 constexpr double kDuration = 8.0;  // [s]
-constexpr double kBallRadius = 0.08;
+constexpr double kSphereRadius = 0.08;
 
-/// The points of a ball as a sensor delivers them: float32 x, y, z, in the sensor's frame.
-std::vector<float> ball_points(const Eigen::Vector3d& center) {
+/// A sensor's data: points of a sphere, float32 x, y, z, in the sensor's frame.
+std::vector<float> sphere_points(const Eigen::Vector3d& center) {
   constexpr int kCount = 400;
   std::vector<float> points;
   for (int i = 0; i < kCount; ++i) {
-    // A Fibonacci lattice spreads points evenly.
+    // A Fibonacci lattice: evenly spread.
     const double z = 1.0 - (2.0 * i + 1.0) / kCount, r = std::sqrt(1.0 - z * z);
     const double angle = i * M_PI * (3.0 - std::sqrt(5.0));
     const Eigen::Vector3d n(r * std::cos(angle), r * std::sin(angle), z);
-    const Eigen::Vector3d p = center + kBallRadius * n;
+    const Eigen::Vector3d p = center + kSphereRadius * n;
     for (int k = 0; k < 3; ++k) points.push_back(static_cast<float>(p[k]));
   }
   return points;
@@ -60,42 +61,28 @@ ist::RawCloud as_cloud(const std::vector<float>& xyz) {
   return cloud;
 }
 
-/// Poses of the model's links, from the joints' positions.
-std::vector<Eigen::Isometry3d> link_poses(const ist::Kinematics& kinematics,
-                                          const ist::RobotModel& model,
-                                          const std::vector<double>& q) {
-  ist::JointPoses joints;
-  std::vector<Eigen::Isometry3d> X_FL, poses;
-  std::vector<bool> known;
-  kinematics.place_joints(q, &joints);
-  kinematics.place_links(joints, Eigen::Isometry3d::Identity(), &X_FL, &known);
-  for (const ist::LinkModel& link : model.links) {
-    poses.push_back(X_FL[*kinematics.find_link(link.name)]);
-  }
-  return poses;
-}
-
-/// The links' volumes for contact forces, packed once. 100 spheres are quick to pack, and coarse.
-std::vector<std::shared_ptr<const ist::ContactBody>> link_volumes(
+/// The links' volumes, for forces in contact; built once. 100 spheres are quick to pack, and
+/// coarse.
+std::vector<std::shared_ptr<const ist::ContactGeometry>> link_volumes(
     const ist::RobotDescription& robot, const ist::RobotModel& model) {
   ist::ContactConfig config;
   config.packing.max_spheres = 100;
-  std::vector<std::shared_ptr<const ist::ContactBody>> bodies;
+  std::vector<std::shared_ptr<const ist::ContactGeometry>> volumes;
   for (const ist::LinkModel& link : model.links) {
     const auto same = [&link](const ist::LinkDescription& one) { return one.name == link.name; };
     const auto found = std::find_if(robot.links.begin(), robot.links.end(), same);
-    bodies.push_back(ist::build_contact_body(found->geometry, 0, link, config, ""));
+    volumes.push_back(ist::build_contact_geometry(found->geometry, 0, link, config, ""));
   }
-  return bodies;
+  return volumes;
 }
 
-/// The contact force [N] on a link: 0 out of contact, NaN where it is not known.
-double contact_force(const ist::LinkModel& link, const ist::ContactBody& body,
+/// [N] The contact force on a link: 0 out of contact, NaN where it is not known.
+double contact_force(const ist::LinkModel& link, const ist::ContactGeometry& geometry,
                      const ist::LinkProximity& answer, const Eigen::Isometry3d& X_FL,
                      const ist::CloudSnapshot& cloud) {
   ist::ContactVolume volume;
-  const bool is_known = answer.state == ist::LinkState::kContact && body.has_volume();
-  if (is_known) volume = ist::contact_volume(link, body, X_FL, {&cloud});
+  const bool is_known = answer.state == ist::LinkState::kContact && geometry.has_volume();
+  if (is_known) volume = ist::contact_volume(link, geometry, X_FL, {&cloud});
   return ist::penetration_wrench(answer, {}, is_known ? &volume : nullptr, X_FL, {}).force.norm();
 }
 
@@ -104,7 +91,7 @@ int run(const std::string& urdf_path) {
   std::stringstream urdf;
   urdf << file.rdbuf();
 
-  // The robot is packed once (with RobotModelConfig::cache_directory the next start is quick).
+  // Once: the robot, packed (RobotModelConfig::cache_directory makes the next start quick).
   const ist::RobotDescription robot = ist::parse_urdf(urdf.str(), ist::GeometrySource::kCollision,
                                                       ist::environment_package_finder());
   const auto model = ist::build_robot_model(robot, {});
@@ -121,7 +108,7 @@ int run(const std::string& urdf_path) {
   const ist::Repulsion repulsion(model);
   ist::CloudSnapshot snapshot;
   std::vector<ist::LinkProximity> answers;
-  const std::vector<bool> known(model->links.size(), true);
+  ist::ForwardKinematics forward(*model, std::make_shared<const ist::Kinematics>(robot));
 
   std::vector<double> q(arm.kinematics.joints().size(), 0.0);
   Eigen::VectorXd goal(6);
@@ -133,16 +120,16 @@ int run(const std::string& urdf_path) {
   double smallest = std::numeric_limits<double>::infinity(), largest_force = 0.0;
   for (int cycle = 0; cycle * kControlPeriod < kDuration; ++cycle) {
     const double now = cycle * kControlPeriod;
-    const std::vector<Eigen::Isometry3d> X_FL = link_poses(arm.kinematics, *model, q);
+    const auto& [X_FL, known] = forward.run(q);
 
-    // A new cloud loses its points on the robot, whose poses are those at the cloud's stamp.
+    // A new cloud: what lies on the robot, where it was at the cloud's stamp, is dropped.
     if (cycle % kCyclesPerCloud == 0) {
-      const std::vector<float> points = ball_points({0.55, -1.0 + 0.25 * now, 0.30});
+      const std::vector<float> points = sphere_points({0.55, -1.0 + 0.25 * now, 0.30});
       const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
       ingest.run(as_cloud(points), X_FS, ist::posed_solids(*model, X_FL, known), now, &snapshot);
     }
 
-    // The query may run in a controller's own thread: it allocates nothing and never throws.
+    // In a controller's own thread: allocates nothing, never throws.
     query.run(X_FL, known, {&snapshot}, &answers);
 
     ist::example::Reading reading;
@@ -150,8 +137,7 @@ int run(const std::string& urdf_path) {
     reading.cloud_age = now - snapshot.stamp;
     for (std::size_t i = 0; i < answers.size(); ++i) {
       const Eigen::Vector3d away = repulsion(i, X_FL[i], {&snapshot}, answers[i], repulsion_config);
-      const std::size_t link = *arm.kinematics.find_link(model->links[i].name);
-      reading.links.push_back({link, answers[i].lower_bound, answers[i].p_LCl, away});
+      reading.links.push_back({*forward.body(i), answers[i].lower_bound, answers[i].p_LCl, away});
       smallest = std::min(smallest, answers[i].lower_bound);
       largest_force = std::max(largest_force, contact_force(model->links[i], *volumes[i],
                                                             answers[i], X_FL[i], snapshot));

@@ -20,7 +20,7 @@ Eigen::VectorXd commanded(const ControlledArm& arm, const std::vector<double>& a
   return q;
 }
 
-/// The constraint a . x >= b, which is soft where `softness` is not 0.
+/// The constraint a . x >= b, which yields a little where `softness_sq` is not 0.
 struct Constraint {
   Eigen::VectorXd a;
   double b = 0.0;
@@ -28,8 +28,7 @@ struct Constraint {
   double force = 0.0;  // Lagrange multiplier
 };
 
-/// The x nearest to `wanted` that satisfies the constraints, by Hildreth's method on the dual
-/// problem.
+/// The x nearest to `wanted` that keeps the constraints: Hildreth's method on the dual problem.
 Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint>* constraints) {
   Eigen::VectorXd x = wanted;
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
@@ -44,9 +43,9 @@ Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint
   return x;
 }
 
-/// The task's velocity: straight to the goal, so that all joints arrive together.
-Eigen::VectorXd task_velocity(const Eigen::VectorXd& q, const Eigen::VectorXd& goal,
-                              double smallest_bound, const DodgeConfig& config) {
+/// The velocity toward the goal; all joints arrive together.
+Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double smallest_bound,
+                       const DodgeConfig& config) {
   const Eigen::VectorXd wanted = config.task_gain * (goal - q);
   const double share =
       (smallest_bound - config.stop_distance) / (config.slow_distance - config.stop_distance);
@@ -60,8 +59,8 @@ void add_joint_limits(const ControlledArm& arm, const Eigen::VectorXd& q, const 
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const Kinematics::Joint& joint =
         arm.kinematics.joints()[arm.joints[static_cast<std::size_t>(j)]];
-    const auto bound = [&](double distance) {
-      return std::clamp(config.limit_gain * distance, 0.0, config.max_joint_speed);
+    const auto bound = [&](double margin) {
+      return std::clamp(config.limit_gain * margin, 0.0, config.max_joint_speed);
     };
     Constraint c;
     c.a = Eigen::VectorXd::Unit(q.size(), j);
@@ -109,18 +108,17 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
   if (!is_known(reading, config) || !q.allFinite()) return Eigen::VectorXd::Zero(q.size());
 
   JointPoses joint_poses;
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
+  BodyPoses bodies;
   arm.kinematics.place_joints(all_q, &joint_poses);
-  arm.kinematics.place_links(joint_poses, Eigen::Isometry3d::Identity(), &X_FL, &known);
+  arm.kinematics.place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
 
   std::vector<Constraint> constraints;
   double smallest_bound = std::numeric_limits<double>::infinity();
   Jacobian J;
   for (const LinkReading& link : reading.links) {
     const double length = link.away.norm();
-    if (!known[link.link] || !link.p_LCl.allFinite() || !(length > 0.0)) continue;
-    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LCl, &J);
+    if (!bodies.known[link.body] || !link.p_LCl.allFinite() || !(length > 0.0)) continue;
+    point_jacobian(arm.kinematics, bodies.X_FB, link.body, bodies.X_FB[link.body] * link.p_LCl, &J);
     Constraint c;
     c.a.resize(q.size());
     bool can_move = false;
@@ -136,7 +134,7 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
     constraints.push_back(c);
   }
   add_joint_limits(arm, q, config, &constraints);
-  return nearest_to(task_velocity(q, goal, smallest_bound, config), &constraints);
+  return nearest_to(toward(q, goal, smallest_bound, config), &constraints);
 }
 
 }  // namespace ist::example

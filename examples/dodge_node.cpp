@@ -174,10 +174,10 @@ class DodgeNode {
       problem_ = "~proximity is in frame '" + message.header.frame_id + "', not in '" + root_ + "'";
     }
     for (const ist_proximity::LinkProximity& one : message.links) {
-      const auto link = arm_.kinematics.find_link(one.link);
-      if (!link) continue;
+      const auto body = arm_.kinematics.find_body(one.link);
+      if (!body) continue;
       LinkReading reading;
-      reading.link = *link;
+      reading.body = *body;
       reading.lower_bound = one.lower_bound;
       const auto& p = one.point_on_link_local;
       const auto& r = one.repulsion;

@@ -18,10 +18,10 @@ Arm::Arm(const RobotDescription& description, const ArmConfig& config)
     joints_.push_back(*joint);
   }
   for (const LinkDescription& link : description.links) {
-    links_.push_back(*kinematics_.find_link(link.name));
+    bodies_.push_back(*kinematics_.find_body(link.name));
     bool moved = false;
-    for (std::size_t l = links_.back(); l > 0; l = kinematics_.joints()[l - 1].parent) {
-      const std::size_t source = kinematics_.joints()[l - 1].source;
+    for (std::size_t b = bodies_.back(); b > 0; b = kinematics_.joints()[b - 1].parent) {
+      const std::size_t source = kinematics_.joints()[b - 1].source;
       moved = moved || std::find(joints_.begin(), joints_.end(), source) != joints_.end();
     }
     moved_.push_back(moved);
@@ -64,12 +64,12 @@ std::vector<double> Arm::all_positions(const Eigen::VectorXd& q) const {
 std::vector<Eigen::Isometry3d> Arm::link_poses(const Eigen::VectorXd& q) const {
   JointPoses joint_poses;
   kinematics_.place_joints(all_positions(q), &joint_poses);
-  std::vector<Eigen::Isometry3d> all, poses;
-  std::vector<bool> known;
-  kinematics_.place_links(joint_poses, Eigen::Isometry3d::Identity(), &all, &known);
-  poses.reserve(links_.size());
-  for (const std::size_t link : links_) poses.push_back(all[link]);
-  return poses;
+  BodyPoses bodies;
+  kinematics_.place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
+  std::vector<Eigen::Isometry3d> X_FL;
+  X_FL.reserve(bodies_.size());
+  for (const std::size_t body : bodies_) X_FL.push_back(bodies.X_FB[body]);
+  return X_FL;
 }
 
 }  // namespace ist::sim

@@ -52,7 +52,8 @@ class Arm {
  private:
   Kinematics kinematics_;
   ArmConfig config_;
-  std::vector<std::size_t> joints_, links_;
+  std::vector<std::size_t> joints_;  ///< commanded ones
+  std::vector<std::size_t> bodies_;  ///< by link of the description
   std::vector<bool> moved_;
   Eigen::VectorXd q_, dq_, ddq_;
 };

@@ -119,7 +119,7 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
   }
   for (std::size_t i = 0; i < results_.size(); ++i) {
     example::LinkReading link;
-    link.link = *arm.kinematics.find_link(model_->links[i].name);
+    link.body = *arm.kinematics.find_body(model_->links[i].name);
     link.lower_bound = results_[i].lower_bound;
     link.p_LCl = results_[i].p_LCl;
     link.away = config_.avoidance == Avoidance::kNearest

@@ -67,13 +67,13 @@ bool moves(const MovingScene& scene, std::size_t link) {
 // The wrench's force of one link along the motion [m^3], times any stiffness.
 class Contact {
  public:
-  Contact(const LinkModel& link, const ContactBody& body, const MovingScene& scene)
+  Contact(const LinkModel& link, const ContactGeometry& body, const MovingScene& scene)
       : link_(link), body_(body), clouds_{&scene.cloud} {}
 
   void ask(const Eigen::Isometry3d& X_FL, LinkState state, bool begins, bool in_reference) {
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
     if (state == LinkState::kContact) {
-      force = X_FL.linear() * contact_volume(link_, body_, X_FL, clouds_).push;
+      force = X_FL.linear() * contact_volume(link_, body_, X_FL, clouds_).weighted_normal;
     }
     largest_ = std::max(largest_, force.norm());
     steps_.push_back({force, begins, in_reference});
@@ -101,7 +101,7 @@ class Contact {
   };
 
   const LinkModel& link_;
-  const ContactBody& body_;
+  const ContactGeometry& body_;
   std::vector<const CloudSnapshot*> clouds_;
   std::vector<Step> steps_;
   double largest_ = 0.0;
@@ -136,7 +136,7 @@ void Noise::add(const Eigen::Vector3d& before, const Eigen::Vector3d& now, bool 
 }
 
 Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model,
-                 const std::vector<std::shared_ptr<const ContactBody>>& bodies) {
+                 const std::vector<std::shared_ptr<const ContactGeometry>>& bodies) {
   Measured measured;
   const std::size_t links = model->links.size();
   Asker full(model, scene.cloud), half(model, scene.half), twice(model, scene.twice);

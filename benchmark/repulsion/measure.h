@@ -44,7 +44,7 @@ struct Measured {
 
 /// @param bodies  by link, for the wrench
 Measured measure(const MovingScene& scene, const std::shared_ptr<const RobotModel>& model,
-                 const std::vector<std::shared_ptr<const ContactBody>>& bodies);
+                 const std::vector<std::shared_ptr<const ContactGeometry>>& bodies);
 
 /// Variation of the direction [deg] along the reference steps, from exact geometry: the same blend
 /// over dense samples of the links' exact surfaces, in double, pair by pair.
@@ -53,7 +53,7 @@ double reference_variation(const MovingScene& scene, const std::vector<std::vect
 
 /// The same of the wrench's force: the way in at each thinned point inside the link, by its depth
 /// as the wrench counts points. Depths are those of the exact solids; the way in is the mean over
-/// dense samples of the exact surface, as ContactBody defines it.
+/// dense samples of the exact surface, as ContactGeometry defines it.
 double wrench_reference_variation(const MovingScene& scene, const RobotModel& model,
                                   const std::vector<std::vector<bool>>& counts);
 

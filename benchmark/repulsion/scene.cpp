@@ -258,16 +258,15 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
   return scenes;
 }
 
-std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
-                                                              const RobotModel& model,
-                                                              std::size_t spheres,
-                                                              const std::string& cache_directory) {
+std::vector<std::shared_ptr<const ContactGeometry>> pack_disjoint(
+    const RobotDescription& robot, const RobotModel& model, std::size_t spheres,
+    const std::string& cache_directory) {
   ContactConfig config;
   config.packing.max_spheres = spheres;
-  std::vector<std::shared_ptr<const ContactBody>> bodies;
+  std::vector<std::shared_ptr<const ContactGeometry>> bodies;
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
-    bodies.push_back(
-        build_contact_body(robot.links[i].geometry, 0, model.links[i], config, cache_directory));
+    bodies.push_back(build_contact_geometry(robot.links[i].geometry, 0, model.links[i], config,
+                                            cache_directory));
   }
   return bodies;
 }

@@ -33,10 +33,9 @@ std::vector<MovingScene> analytic_scenes();
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data);
 
 /// By link, for wrenches: `spheres` at most; from the cache where they are there.
-std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
-                                                              const RobotModel& model,
-                                                              std::size_t spheres,
-                                                              const std::string& cache_directory);
+std::vector<std::shared_ptr<const ContactGeometry>> pack_disjoint(
+    const RobotDescription& robot, const RobotModel& model, std::size_t spheres,
+    const std::string& cache_directory);
 
 /// Packed to `max_error` [m]; from the cache where it is there.
 std::shared_ptr<const RobotModel> pack(const RobotDescription& robot, double max_error,

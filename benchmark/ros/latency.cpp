@@ -21,7 +21,6 @@
 #include <sstream>
 
 #include "document.h"
-#include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/ros/proximity_server.h"
 #include "ros/latency/part.h"

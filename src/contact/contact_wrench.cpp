@@ -5,11 +5,12 @@
 namespace ist {
 namespace {
 
-// [m] A complete query has decided whether points are inside, but for rounding.
-constexpr double kDecided = 1e-4;
+// [m] A query that met no deadline knows whether points are inside, except for rounding.
+constexpr double kRounding = 1e-4;
 
-bool left_open(const LinkProximity& proximity, const QueryConfig& config) {
-  return proximity.state == LinkState::kNear && proximity.lower_bound + config.margin < -kDecided;
+// Whether a deadline passed before the query knew whether the link is in contact.
+bool is_undecided(const LinkProximity& proximity, const QueryConfig& config) {
+  return proximity.state == LinkState::kNear && proximity.lower_bound + config.margin < -kRounding;
 }
 
 }  // namespace
@@ -27,8 +28,8 @@ Wrench& Wrench::operator+=(const Wrench& other) {
 
 Wrench contact_wrench(const ContactVolume& contact, const Eigen::Isometry3d& X_FL,
                       const PenetrationConfig& config) {
-  return {config.stiffness * (X_FL.linear() * contact.push),
-          config.stiffness * (X_FL.linear() * contact.turn)};
+  return {config.stiffness * (X_FL.linear() * contact.weighted_normal),
+          config.stiffness * (X_FL.linear() * contact.weighted_moment)};
 }
 
 Wrench reaction(const Wrench& on_first, const Eigen::Vector3d& p_SecondFirst) {
@@ -38,7 +39,7 @@ Wrench reaction(const Wrench& on_first, const Eigen::Vector3d& p_SecondFirst) {
 Wrench penetration_wrench(const LinkProximity& proximity, const QueryConfig& query,
                           const ContactVolume* contact, const Eigen::Isometry3d& X_FL,
                           const PenetrationConfig& config) {
-  if (proximity.state == LinkState::kUnknown || left_open(proximity, query)) {
+  if (proximity.state == LinkState::kUnknown || is_undecided(proximity, query)) {
     return Wrench::unknown();
   }
   if (proximity.state != LinkState::kContact) return Wrench::zero();

@@ -10,51 +10,52 @@
 namespace ist {
 namespace {
 
-// Configurations that a thread takes at a time: enough to start from each other's answers.
-constexpr std::size_t kAtATime = 8;
+// Consecutive configurations that a thread takes at a time; all but the first start warm.
+constexpr std::size_t kChunk = 8;
 
 }  // namespace
 
 struct ProximityBatch::Impl {
-  /// What a thread works with.
+  /// The query of one thread, and its buffers for one configuration.
   struct Worker {
     ProximityQuery query;
-    std::vector<Eigen::Isometry3d> X_FL;  // of one configuration
+    std::vector<Eigen::Isometry3d> X_FL;
     std::vector<LinkProximity> results;
   };
 
-  /// Calls answer(worker, k) for each configuration k, which returns whether it was complete.
+  /// Calls answer(worker, k) for each configuration k, on all threads.
+  /// @returns whether all calls returned true: no deadline passed
   template <class Answer>
   bool run(std::size_t count, const Answer& answer) {
     std::atomic<std::size_t> next{0};
     std::atomic<bool> complete{true};
     const auto work = [&](Worker* worker) {
-      for (std::size_t k; (k = next.fetch_add(kAtATime)) < count;) {
-        const std::size_t end = std::min(k + kAtATime, count);
+      for (std::size_t k; (k = next.fetch_add(kChunk)) < count;) {
+        const std::size_t end = std::min(k + kChunk, count);
         for (; k < end; ++k) {
           if (!answer(worker, k)) complete = false;
         }
       }
     };
-    const std::size_t useful = std::min(workers.size(), (count + kAtATime - 1) / kAtATime);
+    const std::size_t useful = std::min(workers.size(), (count + kChunk - 1) / kChunk);
     std::vector<std::thread> others;
     try {
       while (others.size() + 1 < useful) others.emplace_back(work, &workers[others.size() + 1]);
     } catch (const std::system_error&) {
-      // No more threads to be had: fewer do the same.
+      // The system has no more threads; fewer do the same.
     }
     work(&workers[0]);
     for (std::thread& other : others) other.join();
     return complete;
   }
 
-  void take(const std::vector<Eigen::Isometry3d>& X_FL, std::size_t k, Worker* worker) const {
-    const auto first = X_FL.begin() + static_cast<std::ptrdiff_t>(k * links);
-    std::copy(first, first + static_cast<std::ptrdiff_t>(links), worker->X_FL.begin());
+  /// Copies the poses of configuration k.
+  void load(Span<const Eigen::Isometry3d> X_FL, std::size_t k, Worker* worker) const {
+    std::copy_n(X_FL.begin() + k * links, links, worker->X_FL.begin());
   }
 
   /// How many configurations there are.
-  std::size_t count(const std::vector<Eigen::Isometry3d>& X_FL) const {
+  std::size_t count(Span<const Eigen::Isometry3d> X_FL) const {
     assert(links == 0 ? X_FL.empty() : X_FL.size() % links == 0);
     return links == 0 ? 0 : X_FL.size() / links;
   }
@@ -79,11 +80,11 @@ ProximityBatch::~ProximityBatch() = default;
 ProximityBatch::ProximityBatch(ProximityBatch&&) noexcept = default;
 ProximityBatch& ProximityBatch::operator=(ProximityBatch&&) noexcept = default;
 
-bool ProximityBatch::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+bool ProximityBatch::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                          SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   results->resize(X_FL.size());
   return impl_->run(impl_->count(X_FL), [&](Impl::Worker* worker, std::size_t k) {
-    impl_->take(X_FL, k, worker);
+    impl_->load(X_FL, k, worker);
     const bool complete = worker->query.run(worker->X_FL, known, clouds, &worker->results);
     std::copy(worker->results.begin(), worker->results.end(),
               results->begin() + static_cast<std::ptrdiff_t>(k * impl_->links));
@@ -91,12 +92,11 @@ bool ProximityBatch::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
   });
 }
 
-bool ProximityBatch::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
-                                 const std::vector<bool>& known, SnapshotSpan clouds,
-                                 std::vector<RobotProximity>* results) {
+bool ProximityBatch::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+                                 SnapshotSpan clouds, std::vector<RobotProximity>* results) {
   results->resize(impl_->count(X_FL));
   return impl_->run(results->size(), [&](Impl::Worker* worker, std::size_t k) {
-    impl_->take(X_FL, k, worker);
+    impl_->load(X_FL, k, worker);
     return worker->query.run_minimum(worker->X_FL, known, clouds, &(*results)[k]);
   });
 }

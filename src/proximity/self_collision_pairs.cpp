@@ -6,14 +6,15 @@
 #include <optional>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/robot/link_poses.h"
 
 namespace ist {
 namespace {
 
-/// Joints between two links of the tree.
+/// Joints between two bodies of the tree.
 std::vector<std::size_t> path(const Kinematics& kinematics, std::size_t a, std::size_t b) {
   std::vector<std::size_t> joints;
-  while (a != b) {  // a link's number is above its parent's
+  while (a != b) {  // a body's number is above its parent's
     std::size_t& deeper = a > b ? a : b;
     joints.push_back(deeper - 1);
     deeper = kinematics.joints()[deeper - 1].parent;
@@ -21,22 +22,24 @@ std::vector<std::size_t> path(const Kinematics& kinematics, std::size_t a, std::
   return joints;
 }
 
+/// Whether two bodies are rigidly connected, or adjacent: one carries the other, with no body that
+/// has geometry between them.
 bool never_collide(const Kinematics& kinematics, const std::vector<bool>& has_geometry,
                    std::size_t a, std::size_t b) {
-  bool rigid = true, is_above = false;  // one carries the other, if only by links without geometry
+  bool is_rigid = true, is_ancestor = false;
   std::vector<std::size_t> between;
   for (const std::size_t j : path(kinematics, a, b)) {
     const Kinematics::Joint& joint = kinematics.joints()[j];
-    rigid = rigid && joint.type == JointType::kFixed;
-    is_above = is_above || joint.parent == std::min(a, b);
+    is_rigid = is_rigid && joint.type == JointType::kFixed;
+    is_ancestor = is_ancestor || joint.parent == std::min(a, b);
     between.push_back(joint.parent);
     between.push_back(joint.child);
   }
-  const bool adjacent =
-      is_above && std::none_of(between.begin(), between.end(), [&](std::size_t link) {
-        return link != a && link != b && has_geometry[link];
+  const bool is_adjacent =
+      is_ancestor && std::none_of(between.begin(), between.end(), [&](std::size_t body) {
+        return body != a && body != b && has_geometry[body];
       });
-  return rigid || adjacent;
+  return is_rigid || is_adjacent;
 }
 
 bool names(const NamePairs& pairs, const std::string& a, const std::string& b) {
@@ -50,19 +53,20 @@ bool names(const NamePairs& pairs, const std::string& a, const std::string& b) {
 std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinematics& kinematics,
                                            const std::vector<bool>& wanted,
                                            const NamePairs& ignored) {
-  std::vector<std::optional<std::size_t>> place;
-  std::vector<bool> has_geometry(kinematics.links().size(), false);
+  std::vector<std::optional<std::size_t>> body_of_link;
+  std::vector<bool> has_geometry(kinematics.bodies().size(), false);
   for (const LinkModel& link : model.links) {
-    place.push_back(kinematics.find_link(link.name));
-    if (place.back()) has_geometry[*place.back()] = true;
+    body_of_link.push_back(kinematics.find_body(link.name));
+    if (body_of_link.back()) has_geometry[*body_of_link.back()] = true;
   }
   const auto usable = [&](std::size_t i) {
-    return wanted[i] && model.links[i].usable() && place[i].has_value();
+    return wanted[i] && model.links[i].usable() && body_of_link[i].has_value();
   };
   std::vector<LinkPair> pairs;
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     for (std::size_t k = i + 1; usable(i) && k < model.links.size(); ++k) {
-      if (!usable(k) || never_collide(kinematics, has_geometry, *place[i], *place[k]) ||
+      if (!usable(k) ||
+          never_collide(kinematics, has_geometry, *body_of_link[i], *body_of_link[k]) ||
           names(ignored, model.links[i].name, model.links[k].name)) {
         continue;
       }
@@ -81,34 +85,30 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   for (const auto& joint : joints) q.push_back(std::clamp(0.0, joint.lower, joint.upper));
   JointPoses poses;
   kinematics.place_joints(q, &poses);
-  // What a planar or floating joint carries is anywhere: a body of its own, without a rest.
-  std::vector<std::size_t> body = {0};
+  // A planar or floating joint has no rest: the bodies that it carries are a group of their own.
+  std::vector<std::size_t> group_of_body = {0};
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    body.push_back(joints[j].has_unstated_pose() ? j + 1 : body[joints[j].parent]);
-    if (!joints[j].has_unstated_pose()) continue;
+    const bool starts_group = joints[j].has_unstated_pose();
+    group_of_body.push_back(starts_group ? j + 1 : group_of_body[joints[j].parent]);
+    if (!starts_group) continue;
     poses.X_PC[j] = joints[j].X_PJ;
     poses.known[j] = true;
   }
-  std::vector<Eigen::Isometry3d> X_RL, X_FL;
-  std::vector<std::size_t> body_of_link;
-  std::vector<bool> known;
-  kinematics.place_links(poses, Eigen::Isometry3d::Identity(), &X_RL, &known);
-  known.assign(model->links.size(), false);
-  for (std::size_t i = 0; i < model->links.size(); ++i) {
-    const auto place = kinematics.find_link(model->links[i].name);
-    X_FL.push_back(place ? X_RL[*place] : Eigen::Isometry3d::Identity());
-    body_of_link.push_back(place ? body[*place] : 0);
-    known[i] = place.has_value();
-  }
+  // The kinematics outlives this call, so the pointer does not own it.
+  ForwardKinematics forward(*model, {std::shared_ptr<const Kinematics>(), &kinematics});
+  const LinkPoses& links = forward.run(poses);
+  const auto group = [&](std::size_t link) {
+    return forward.body(link) ? group_of_body[*forward.body(link)] : 0;
+  };
   QueryConfig config;
   config.max_distance = 0.01;  // [m] nothing but contact matters
   SelfQuery query(model, pairs, config);
   std::vector<PairProximity> results;
-  query.run(X_FL, known, &results);
+  query.run(links.X_FL, links.known, &results);
   std::vector<LinkPair> found;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const bool is_rigid_at_rest = body_of_link[pairs[i].first] == body_of_link[pairs[i].second];
-    if (is_rigid_at_rest && results[i].state == LinkState::kContact) found.push_back(pairs[i]);
+    const bool have_rest = group(pairs[i].first) == group(pairs[i].second);
+    if (have_rest && results[i].state == LinkState::kContact) found.push_back(pairs[i]);
   }
   return found;
 }

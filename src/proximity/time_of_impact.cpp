@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "ist_proximity/robot/link_poses.h"
 #include "proximity/motion_bound.h"
 
 namespace ist {
@@ -11,7 +12,7 @@ namespace {
 
 constexpr double kTouch = 1e-6;  // [m] a bound below it is contact
 constexpr int kMaxSteps = 4000;
-// Of the last bound: how exact the next distance has to be; and at first [m].
+// Tolerance of the next distance: a share of the last bound, and at first in [m].
 constexpr double kRelativeTolerance = 0.1, kFirstTolerance = 0.01;
 
 }  // namespace
@@ -20,47 +21,46 @@ struct TimeOfImpact::Impl {
   Impl(std::shared_ptr<const RobotModel> robot, std::shared_ptr<const Kinematics> tree,
        const QueryConfig& query_config)
       : model(std::move(robot)),
-        kinematics(std::move(tree)),
+        forward(*model, std::move(tree)),
         config(query_config),
         query(model, config),
-        known(model->links.size(), false) {
+        moving(model->links.size(), false) {
     config.deadline = 0.0;
-    for (const LinkModel& link : model->links) {
-      places.push_back(kinematics->find_link(link.name).value_or(kinematics->links().size()));
-    }
   }
 
-  // Where all links are after `time` [s].
+  // Poses of all links after `time` [s].
   void place(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
              double time) {
-    const auto& joints = kinematics->joints();
+    const Kinematics& kinematics = forward.kinematics();
+    const auto& joints = kinematics.joints();
     const double s = std::min(time / motion.duration, 1.0);
     moved = still;
     for (std::size_t j = 0; j < joints.size(); ++j) {
       if (!(joint_speed(joints[j], motion) > 0.0)) continue;
       const std::size_t source = joints[j].source;
       const double q = (1.0 - s) * motion.from[source] + s * motion.to[source];
-      moved.X_PC[j] = kinematics->joint_pose(j, joints[j].multiplier * q + joints[j].offset);
+      moved.X_PC[j] = kinematics.joint_pose(j, joints[j].multiplier * q + joints[j].offset);
       moved.known[j] = true;
     }
-    kinematics->place_links(moved, X_FR, &X_FL, &placed);
+    forward.run(moved, X_FR);
   }
 
   const LinkProximity& measure(std::size_t link, SnapshotSpan clouds, double tolerance) {
     config.tolerance = tolerance;
     query.set_config(config);
-    X_FM[link] = X_FL[places[link]];
-    query.run(X_FM, known, clouds, &answers);
+    query.run(forward.links().X_FL, moving, clouds, &answers);
     return answers[link];
   }
 
+  // Conservative advancement of one link.
   ImpactTime find(std::size_t link, const JointMotion& motion, const JointPoses& still,
                   const Eigen::Isometry3d& X_FR, SnapshotSpan clouds) {
     ImpactTime impact;
     place(motion, still, X_FR, 0.0);
-    if (!placed[places[link]]) return impact;
+    if (!forward.links().known[link]) return impact;
     const InnerSphereTree& tree = model->links[link].tree;
-    const MotionBound bound(*kinematics, motion, still, places[link], tree.center(), tree.radius());
+    const MotionBound bound(forward.kinematics(), motion, still, *forward.body(link), tree.center(),
+                            tree.radius());
     double time = 0.0, tolerance = kFirstTolerance;
     for (; impact.steps < kMaxSteps; ++impact.steps) {
       if (impact.steps > 0) place(motion, still, X_FR, time);
@@ -69,7 +69,7 @@ struct TimeOfImpact::Impl {
       if (answer->state == LinkState::kUnknown) return impact;
       impact.time = time;
       if (answer->lower_bound <= kTouch) return impact;
-      time += bound.time_for(answer->lower_bound, X_FL);
+      time += bound.time_for(answer->lower_bound, forward.bodies().X_FB);
       if (time >= motion.duration) {
         impact.time = std::numeric_limits<double>::infinity();
         return impact;
@@ -81,17 +81,13 @@ struct TimeOfImpact::Impl {
   }
 
   std::shared_ptr<const RobotModel> model;
-  std::shared_ptr<const Kinematics> kinematics;
+  ForwardKinematics forward;
   QueryConfig config;
   ProximityQuery query;
-  std::vector<std::size_t> places;  // by link of the model: where the kinematics has it
 
-  // Of this call.
-  std::vector<bool> known;  // the link at work
+  // Scratch of one call.
+  std::vector<bool> moving;  // by link: the one that is being advanced
   JointPoses moved;
-  std::vector<Eigen::Isometry3d> X_FL;  // by link of the kinematics
-  std::vector<bool> placed;
-  std::vector<Eigen::Isometry3d> X_FM;  // by link of the model
   std::vector<LinkProximity> answers;
 };
 
@@ -112,16 +108,14 @@ void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
                        SnapshotSpan clouds, std::vector<ImpactTime>* results) {
   const std::size_t count = impl_->model->links.size();
   assert(wanted.size() == count && motion.duration > 0.0);
-  assert(motion.from.size() == impl_->kinematics->joints().size());
+  assert(motion.from.size() == impl_->forward.kinematics().joints().size());
   assert(motion.to.size() == motion.from.size() && still.X_PC.size() == motion.from.size());
   results->assign(count, ImpactTime());
-  impl_->X_FM.assign(count, Eigen::Isometry3d::Identity());
   for (std::size_t i = 0; i < count; ++i) {
-    const bool in_tree = impl_->places[i] < impl_->kinematics->links().size();
-    if (!wanted[i] || !in_tree || !impl_->model->links[i].usable()) continue;
-    impl_->known[i] = true;
+    if (!wanted[i] || !impl_->forward.body(i) || !impl_->model->links[i].usable()) continue;
+    impl_->moving[i] = true;
     (*results)[i] = impl_->find(i, motion, still, X_FR, clouds);
-    impl_->known[i] = false;
+    impl_->moving[i] = false;
   }
 }
 

@@ -1,9 +1,10 @@
+#include "repulsion/coarse_spheres.h"
+
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-#include <vector>
 
 #include "internal/bvh/box_node.h"
-#include "ist_proximity/repulsion/repulsion.h"
 
 namespace ist {
 namespace {
@@ -19,17 +20,17 @@ SphereGroup group_of(const InnerSphere* spheres, std::size_t count) {
     group.z[k] = used ? static_cast<float>(spheres[k].center.z()) : kFarAway;
     group.radius[k] = used ? static_cast<float>(spheres[k].radius) : 0.0F;
   }
-  double reach = 0.0;
+  double bound = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
-    reach = std::max(reach, (spheres[k].center - box.center()).norm() + spheres[k].radius);
+    bound = std::max(bound, (spheres[k].center - box.center()).norm() + spheres[k].radius);
   }
   constexpr double kRounding = 1e-5;  // [m] of float coordinates, and more
-  group.reach = static_cast<float>(reach + kRounding);
-  for (int i = 0; i < 3; ++i) group.center[i] = static_cast<float>(box.center()[i]);
+  group.bound_radius = static_cast<float>(bound + kRounding);
+  for (int i = 0; i < 3; ++i) group.bound_center[i] = static_cast<float>(box.center()[i]);
   return group;
 }
 
-// Halves across the longest side, whole groups to the left, until each is one group.
+// Halves across the longest side, whole groups in the first half, until each is one group.
 void split(InnerSphere* begin, InnerSphere* end, std::vector<SphereGroup>* groups) {
   const auto count = static_cast<std::size_t>(end - begin);
   constexpr auto kWidth = static_cast<std::size_t>(kSphereGroupWidth);
@@ -61,8 +62,8 @@ std::vector<InnerSphere> coarse_spheres(const Packing& packing, std::size_t coun
   const std::vector<InnerSphere>& spheres = packing.spheres;
   std::vector<InnerSphere> chosen;
   if (spheres.empty()) return chosen;
-  // How far each sphere reaches beyond the chosen ones [m]; whole spheres, in the bound's sense.
-  std::vector<double> beyond(spheres.size(), std::numeric_limits<double>::infinity());
+  // [m] Upper bounds of how far each sphere protrudes from the chosen ones.
+  std::vector<double> protrusion(spheres.size(), std::numeric_limits<double>::infinity());
   auto next = std::max_element(
       spheres.begin(), spheres.end(),
       [](const InnerSphere& a, const InnerSphere& b) { return a.radius < b.radius; });
@@ -70,14 +71,14 @@ std::vector<InnerSphere> coarse_spheres(const Packing& packing, std::size_t coun
     chosen.push_back(*next);
     double farthest = 0.0;
     for (std::size_t i = 0; i < spheres.size(); ++i) {
-      const double reach = (spheres[i].center - chosen.back().center).norm() + spheres[i].radius;
-      beyond[i] = std::min(beyond[i], reach - chosen.back().radius);
-      if (beyond[i] > farthest) {
-        farthest = beyond[i];
+      const double extent = (spheres[i].center - chosen.back().center).norm() + spheres[i].radius;
+      protrusion[i] = std::min(protrusion[i], extent - chosen.back().radius);
+      if (protrusion[i] > farthest) {
+        farthest = protrusion[i];
         next = spheres.begin() + static_cast<std::ptrdiff_t>(i);
       }
     }
-    if (farthest <= 0.0) break;  // the rest lies within
+    if (farthest <= 0.0) break;  // the chosen ones contain the rest
   }
   return chosen;
 }

@@ -3,67 +3,74 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "internal/geometry/relative_pose.h"
 #include "repulsion/blend_kernel.h"
+#include "repulsion/coarse_spheres.h"
 
 namespace ist {
 namespace {
 
-constexpr double kLeastSmoothing = 1e-3;  // [m] that float can tell from none, far away too
+// [m] A smaller smoothing would be lost in the rounding of float coordinates far from the origin.
+constexpr double kLeastSmoothing = 1e-3;
 
-// Calls visit(index, the link's spheres in its frame, R_FO, its cells) for each thinned cloud and
-// each map.
+PosedSpheres posed(const std::vector<SphereGroup>& groups, const Eigen::Isometry3d& X_OL) {
+  PosedSpheres spheres;
+  spheres.groups = groups.data();
+  spheres.count = groups.size();
+  for (int row = 0; row < 3; ++row) {
+    for (int i = 0; i < 3; ++i) {
+      spheres.R_OL[3 * row + i] = static_cast<float>(X_OL.linear()(row, i));
+    }
+    spheres.p_OL[row] = static_cast<float>(X_OL.translation()[row]);
+  }
+  return spheres;
+}
+
+// Calls visit(index, spheres, R_FO, grid) for each thinned cloud and each map: the link's spheres
+// are in the frame O of the index, and the grid is the one that the cloud was thinned to.
 template <typename Visit>
 void for_each_index(SnapshotSpan clouds, const std::vector<SphereGroup>& groups,
                     const Eigen::Isometry3d& X_FL, const Visit& visit) {
-  const auto posed = [&groups](const Eigen::Isometry3d& X_OL) {
-    PosedSpheres spheres;
-    spheres.groups = groups.data();
-    spheres.count = groups.size();
-    for (int row = 0; row < 3; ++row) {
-      for (int i = 0; i < 3; ++i) {
-        spheres.R_OL[3 * row + i] = static_cast<float>(X_OL.linear()(row, i));
-      }
-      spheres.p_OL[row] = static_cast<float>(X_OL.translation()[row]);
-    }
-    return spheres;
-  };
-  const CellGrid no_grid(Eigen::Vector3d::Zero(), 1.0);
+  const ThinningGrid no_grid(Eigen::Vector3d::Zero(), 1.0);
   for (const CloudSnapshot* cloud : clouds) {
     if (cloud == nullptr) continue;
     if (!cloud->coarse.empty()) {
       const Eigen::Isometry3d& X_FO = cloud->coarse.X_FO();
-      visit(cloud->coarse.bvh(), posed(relative_pose(X_FO, X_FL)), X_FO.linear(),
-            CellGrid(X_FO.translation(), cloud->thinning));
+      visit(cloud->coarse.bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(),
+            ThinningGrid(X_FO.translation(), cloud->thinning));
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     const Eigen::Isometry3d X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
-    visit(cloud->boxes->bvh(), posed(relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
+    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
   }
 }
 
 Eigen::Vector3d vector(const float v[3]) { return {v[0], v[1], v[2]}; }
 
-// Of all indices, in the fixed frame. A pair's line of action goes through its sphere's centre.
+// The sums over all indices, in the fixed frame. A pair's line of action goes through its sphere's
+// centre.
 struct Total {
-  Eigen::Vector3d fallback;  // direction of what has none
-  Push push;                 // times `weight`
+  Eigen::Vector3d fallback;  // direction of pairs that have none
+  RepulsiveWrench wrench;    // times `weight`
   double weight = 0.0;
 
   void add(const PairSums& sums, const Eigen::Matrix3d& R_FO) {
-    push.force += R_FO * vector(sums.force) + static_cast<double>(sums.undirected) * fallback;
-    push.torque +=
+    wrench.force += R_FO * vector(sums.force) + static_cast<double>(sums.undirected) * fallback;
+    wrench.torque +=
         R_FO * vector(sums.torque) + (R_FO * vector(sums.undirected_arm)).cross(fallback);
     weight += static_cast<double>(sums.weight);
   }
 };
 
-Push scaled(const Push& push, double factor) { return {factor * push.force, factor * push.torque}; }
+RepulsiveWrench scaled(const RepulsiveWrench& wrench, double factor) {
+  return {factor * wrench.force, factor * wrench.torque};
+}
 
 }  // namespace
 
-Push Push::unknown() {
+RepulsiveWrench RepulsiveWrench::unknown() {
   const Eigen::Vector3d nan = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
   return {nan, nan};
 }
@@ -73,20 +80,27 @@ double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig&
   return std::clamp(1.0 - proximity.distance / config.influence_distance, 0.0, 1.0);
 }
 
+struct Repulsion::Spheres {
+  std::vector<std::vector<SphereGroup>> by_link;  // of at most kCoarseSpheres spheres
+};
+
 Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
-  groups_.reserve(model->links.size());
+  const auto spheres = std::make_shared<Spheres>();
+  spheres->by_link.reserve(model->links.size());
   for (const LinkModel& link : model->links) {
-    groups_.push_back(group_spheres(coarse_spheres(link.packing, kCoarseSpheres)));
+    spheres->by_link.push_back(group_spheres(coarse_spheres(link.packing, kCoarseSpheres)));
   }
+  spheres_ = spheres;
 }
 
-Push Repulsion::push(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
-                     const LinkProximity& proximity, const RepulsionConfig& config) const {
-  if (proximity.state == LinkState::kUnknown) return Push::unknown();
+RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_FL,
+                                  SnapshotSpan clouds, const LinkProximity& proximity,
+                                  const RepulsionConfig& config) const {
+  if (proximity.state == LinkState::kUnknown) return RepulsiveWrench::unknown();
   const double strength = repulsion_strength(proximity, config);
   if (!(strength > 0.0)) return {};
 
-  const std::vector<SphereGroup>& groups = groups_[link];
+  const std::vector<SphereGroup>& groups = spheres_->by_link[link];
   float nearest = std::numeric_limits<float>::infinity();
   for_each_index(clouds, groups, X_FL,
                  [&nearest](const auto& index, const PosedSpheres& spheres, const auto&,
@@ -100,10 +114,10 @@ Push Repulsion::push(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSp
   const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
   for_each_index(clouds, groups, X_FL,
                  [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO,
-                     const CellGrid& grid) {
+                     const ThinningGrid& grid) {
                    total.add(blend_pairs(index, spheres, {nearest, smoothing, grid}), R_FO);
                  });
-  return scaled(total.push, length / total.weight);
+  return scaled(total.wrench, length / total.weight);
 }
 
 }  // namespace ist

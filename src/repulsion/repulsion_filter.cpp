@@ -6,7 +6,8 @@
 namespace ist {
 namespace {
 
-constexpr double kFade = 0.1;  // of the influence distance
+// The length fades to zero over this share of the influence distance.
+constexpr double kFade = 0.1;
 
 }  // namespace
 
@@ -18,8 +19,9 @@ void RepulsionFilter::decay(double seconds, double lag) {
   speed_ = rest * slope - offset_ / lag;
 }
 
-Push RepulsionFilter::update(double time, std::uint64_t obstacles, const Push& raw,
-                             const LinkProximity& proximity, const RepulsionConfig& config) {
+RepulsiveWrench RepulsionFilter::update(double time, std::uint64_t obstacles,
+                                        const RepulsiveWrench& raw, const LinkProximity& proximity,
+                                        const RepulsionConfig& config) {
   Vector6 now;
   now << raw.force, raw.torque;
   if (!now.allFinite() || !(config.filter_time > 0.0)) {
@@ -27,7 +29,7 @@ Push RepulsionFilter::update(double time, std::uint64_t obstacles, const Push& r
     return raw;
   }
   if (started_ && time >= time_) {
-    // The change belongs to the time since the last update, and falls over all of that.
+    // The change came at some time since the last update; it decays over all of that.
     if (obstacles != obstacles_) offset_ += raw_ - now;
     decay(time - time_, 0.5 * config.filter_time);
   } else {
@@ -41,7 +43,7 @@ Push RepulsionFilter::update(double time, std::uint64_t obstacles, const Push& r
   Vector6 filtered = now + offset_;
   const double length = filtered.head<3>().norm();
   if (length > limit) filtered *= limit / length;
-  if (limit == 0.0) {  // nothing is held for what comes next either
+  if (limit == 0.0) {  // the next update starts without an offset, too
     filtered.setZero();
     offset_.setZero();
     speed_.setZero();

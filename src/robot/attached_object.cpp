@@ -27,7 +27,7 @@ LinkDescription& link_to_carry(const AttachedObject& object, RobotDescription* r
   return robot->links.back();
 }
 
-/// Place of a link among those of the URDF; names that it lacks come last.
+/// Rank of a link among those of the URDF; names that it lacks come last.
 std::ptrdiff_t rank(const RobotDescription& robot, const std::string& link) {
   const auto& order = robot.link_order;
   return std::find(order.begin(), order.end(), link) - order.begin();

@@ -56,19 +56,19 @@ Kinematics::Kinematics(const RobotDescription& description) {
   resolve_mimics(description);
 }
 
-/// Breadth first, so that every link comes after its parent.
+/// Breadth first, so that every body comes after its parent.
 void Kinematics::add_tree(const RobotDescription& description) {
   std::multimap<std::string, const JointDescription*> below;
   for (const JointDescription& joint : description.joints) {
     below.insert({joint.parent_link, &joint});
   }
-  links_ = {description.root_link};
-  for (std::size_t i = 0; i < links_.size(); ++i) {
-    const std::string parent = links_[i];  // a copy: links_ grows
+  bodies_ = {description.root_link};
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const std::string parent = bodies_[i];  // a copy: bodies_ grows
     const auto [first, last] = below.equal_range(parent);
     for (auto entry = first; entry != last; ++entry) {
       joints_.push_back(make_joint(*entry->second, i, joints_.size()));
-      links_.push_back(entry->second->child_link);
+      bodies_.push_back(entry->second->child_link);
     }
   }
   assert(joints_.size() == description.joints.size() && "parse_urdf has checked that it is a tree");
@@ -79,11 +79,11 @@ void Kinematics::resolve_mimics(const RobotDescription& description) {
   for (const JointDescription& joint : description.joints) by_name[joint.name] = &joint;
   for (Joint& joint : joints_) {
     if (!has_position(joint.type)) continue;
-    std::set<std::string> seen;
+    std::set<std::string> visited;
     const JointDescription* at = by_name.at(joint.name);
     while (at->mimic) {
       const Mimic& mimic = *at->mimic;
-      if (!seen.insert(at->name).second) {
+      if (!visited.insert(at->name).second) {
         throw ModelError(title(joint.name) + " follows joints that mimic one another in a ring");
       }
       if (!std::isfinite(mimic.multiplier) || !std::isfinite(mimic.offset)) {
@@ -106,10 +106,10 @@ void Kinematics::resolve_mimics(const RobotDescription& description) {
   }
 }
 
-std::optional<std::size_t> Kinematics::find_link(const std::string& name) const {
-  const auto found = std::find(links_.begin(), links_.end(), name);
-  if (found == links_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - links_.begin());
+std::optional<std::size_t> Kinematics::find_body(const std::string& name) const {
+  const auto found = std::find(bodies_.begin(), bodies_.end(), name);
+  if (found == bodies_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - bodies_.begin());
 }
 
 std::optional<std::size_t> Kinematics::find_joint(const std::string& name) const {
@@ -146,25 +146,25 @@ void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) c
   }
 }
 
-void Kinematics::place_links(const JointPoses& poses, const Eigen::Isometry3d& X_FR,
-                             std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) const {
-  X_FL->resize(links_.size());
-  known->assign(links_.size(), false);
-  (*X_FL)[0] = X_FR;
-  (*known)[0] = true;
+void Kinematics::place_bodies(const JointPoses& joints, const Eigen::Isometry3d& X_FR,
+                              BodyPoses* poses) const {
+  poses->X_FB.resize(bodies_.size(), Eigen::Isometry3d::Identity());
+  poses->known.assign(bodies_.size(), false);
+  poses->X_FB[0] = X_FR;
+  poses->known[0] = true;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const std::size_t parent = joints_[j].parent;
-    if (!poses.known[j] || !(*known)[parent]) continue;
-    (*X_FL)[j + 1] = (*X_FL)[parent] * poses.X_PC[j];
-    (*known)[j + 1] = true;
+    if (!joints.known[j] || !poses->known[parent]) continue;
+    poses->X_FB[j + 1] = poses->X_FB[parent] * joints.X_PC[j];
+    poses->known[j + 1] = true;
   }
 }
 
 std::optional<std::size_t> Kinematics::first_unknown(const JointPoses& poses,
-                                                     std::size_t link) const {
+                                                     std::size_t body) const {
   std::optional<std::size_t> first;
-  for (; link > 0; link = joints_[link - 1].parent) {
-    if (!poses.known[link - 1]) first = link - 1;
+  for (; body > 0; body = joints_[body - 1].parent) {
+    if (!poses.known[body - 1]) first = body - 1;
   }
   return first;
 }

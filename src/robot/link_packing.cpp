@@ -31,7 +31,7 @@ double surface_area(const Shape& shape) {
   return area;
 }
 
-// Where a sphere stands in the order of the link: what share of its element comes before it.
+// The rank of a sphere in the order of the link: the share of its element that comes before it.
 struct Rank {
   double share;
   std::size_t element, sphere;
@@ -47,18 +47,18 @@ std::vector<PackingConfig> element_configs(const LinkGeometry& geometry,
                                            const PackingConfig& config) {
   std::vector<double> areas;
   double total_area = 0.0;
-  int left = config.max_spheres;
+  int remaining = config.max_spheres;
   for (const GeometryElement& element : geometry) {
     const bool is_sphere = std::holds_alternative<Sphere>(element.shape);
     areas.push_back(is_sphere ? 0.0 : surface_area(element.shape));
     total_area += areas.back();
-    if (is_sphere) --left;
+    if (is_sphere) --remaining;
   }
   std::vector<PackingConfig> configs(geometry.size(), config);
   if (geometry.size() == 1) return configs;
   for (std::size_t i = 0; i < configs.size(); ++i) {
     const double share = total_area > 0.0 ? areas[i] / total_area : 0.0;
-    configs[i].max_spheres = std::max(1, static_cast<int>(std::floor(share * left)));
+    configs[i].max_spheres = std::max(1, static_cast<int>(std::floor(share * remaining)));
   }
   return configs;
 }

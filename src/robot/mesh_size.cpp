@@ -8,7 +8,7 @@
 namespace ist {
 namespace {
 
-// No link of a robot is larger, or smaller. [m]
+// [m] No link of a robot is larger, or smaller.
 constexpr double kLarge = 10.0, kSmall = 0.001;
 
 Eigen::Vector3d size_of(const TriangleMesh& mesh) {

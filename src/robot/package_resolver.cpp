@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/package_resolver.h"
+#include "internal/robot/package_resolver.h"
 
 #include <tinyxml2.h>
 
@@ -56,8 +56,8 @@ std::vector<fs::path> subfolders(const fs::path& folder) {
   return found;
 }
 
-// Packages below the folders of a search path. A folder is crawled when a package is looked for
-// that no folder before it holds, and then once.
+// Packages below the folders of a search path. A folder is crawled once, the first time that a
+// package is not found in the folders before it.
 class PackageIndex {
  public:
   explicit PackageIndex(const std::string& search_path) {
@@ -91,7 +91,7 @@ class PackageIndex {
     std::map<std::string, fs::path> packages;
   };
 
-  // As rospack does: nothing is looked for inside a package, and the first of a name wins.
+  // The rules of rospack: it does not search inside a package, and the first of a name wins.
   static void crawl(const fs::path& folder, std::set<fs::path>* visited,
                     std::map<std::string, fs::path>* packages) {
     std::error_code error;
@@ -118,7 +118,7 @@ int hex_digit(char c) {
   return -1;
 }
 
-// %20 and the like; a % that starts no such code stays what it is.
+// Decodes %20 and the like; a % that starts no such code stays as it is.
 std::string percent_decoded(const std::string& text) {
   std::string decoded;
   for (std::size_t i = 0; i < text.size(); ++i) {

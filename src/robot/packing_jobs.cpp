@@ -31,7 +31,7 @@ bool PackingJobs::run(int threads) {
   try {
     while (others.size() + 1 < count) others.emplace_back([this] { work(); });
   } catch (const std::system_error&) {
-    // No more threads to be had: fewer do the same.
+    // The system has no more threads; fewer do the same.
   }
   work();
   for (std::thread& thread : others) thread.join();

@@ -13,7 +13,7 @@
 
 namespace ist {
 
-/// One distinct shape to pack, and what came of it.
+/// One distinct shape to pack, and the result.
 struct PackingJob {
   const Shape* shape = nullptr;
   PackingConfig config;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "internal/geometry/mesh_io.h"
+#include "internal/robot/package_resolver.h"
 #include "internal/robot/urdfdom_parser.h"
 #include "ist_proximity/geometry/error.h"
 
@@ -53,8 +54,8 @@ std::string link_attribute(const tinyxml2::XMLElement& joint, const char* tag) {
   return link != nullptr ? link : "";
 }
 
-// urdfdom lets pass a link with two parents and rings of joints beside the root's tree (and never
-// frees a ring). What else may be wrong with joints is its to say.
+// urdfdom accepts a link with two parents, and rings of joints beside the root's tree (which it
+// never frees). It reports all other faults of joints itself.
 void check_tree(const tinyxml2::XMLElement& robot) {
   std::map<std::string, const tinyxml2::XMLElement*> joint_above;
   const auto name = [](const tinyxml2::XMLElement* joint) {
@@ -83,7 +84,7 @@ void check_tree(const tinyxml2::XMLElement& robot) {
   }
 }
 
-// Links and joints alone: what stands inside a link is parsed element by element, so that one
+// Parses links and joints alone: the content of a link is parsed element by element, so that one
 // faulty element does not cost the others.
 urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot) {
   tinyxml2::XMLDocument skeleton;
@@ -174,7 +175,7 @@ JointType to_joint_type(int type) {
   }
 }
 
-// Numbers as they are: whoever needs the joint's motion checks them.
+// Numbers are not checked here: whoever needs the joint's motion checks them.
 JointDescription to_joint(const urdf::Joint& joint) {
   JointDescription result;
   result.name = joint.name;
@@ -194,7 +195,7 @@ JointDescription to_joint(const urdf::Joint& joint) {
   return result;
 }
 
-// A <collision> or <visual>, as urdfdom reads it, alone in a robot of one link.
+// Lets urdfdom parse a <collision> or <visual>, alone in a robot of one link.
 GeometryElement parse_element(const tinyxml2::XMLElement& xml, const PackageFinder& find_package) {
   tinyxml2::XMLDocument document;
   document.Parse("<robot name='r'><link name='l'/></robot>");

@@ -61,7 +61,7 @@ MonitoredLink monitored(const RobotDescription& robot, const std::string& name) 
   return link;
 }
 
-// In the URDF's order; names that it lacks come last.
+// The monitored links in the URDF's order; names that it lacks come last.
 std::vector<MonitoredLink> select_links(const RobotDescription& robot,
                                         const std::vector<std::string>& wanted) {
   std::vector<std::string> known = robot.link_order;
@@ -84,7 +84,7 @@ std::vector<MonitoredLink> select_links(const RobotDescription& robot,
   return links;
 }
 
-// One job per distinct shape and configuration: two equal fingers are packed once.
+// Makes one job per distinct shape and configuration: two equal fingers are packed once.
 std::vector<PackingJob> make_jobs(const PackingConfig& config, std::vector<MonitoredLink>* links) {
   std::vector<PackingJob> jobs;
   std::map<std::string, std::size_t> job_of_key;

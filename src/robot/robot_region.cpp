@@ -1,26 +1,56 @@
 #include "ist_proximity/robot/robot_region.h"
 
-#include "internal/robot/reach.h"
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
 
 namespace ist {
 namespace {
 
-constexpr double kRoom = 1e-3;  // [m] for what rounds, and for joints a little past their limits
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSlack = 1e-3;  // [m] for rounding, and for joints a little past their limits
+
+// [m] The largest distance between the origins of a joint's child and parent.
+double largest_offset(const Kinematics& kinematics, const Kinematics::Joint& joint) {
+  if (joint.has_unstated_pose()) return kInfinity;
+  const double to_joint = joint.X_PJ.translation().norm();
+  if (joint.type != JointType::kPrismatic) return to_joint;
+  const Kinematics::Joint& source = kinematics.joints()[joint.source];
+  const auto slide = [&](double q) { return std::abs(joint.multiplier * q + joint.offset); };
+  const double farthest = std::max(slide(source.lower), slide(source.upper));
+  return to_joint + (std::isnan(farthest) ? kInfinity : farthest);
+}
 
 }  // namespace
 
+double kinematic_reach(const RobotModel& model, const Kinematics& kinematics) {
+  std::vector<double> to_body(kinematics.bodies().size(), 0.0);
+  for (const Kinematics::Joint& joint : kinematics.joints()) {
+    to_body[joint.child] = to_body[joint.parent] + largest_offset(kinematics, joint);
+  }
+  double farthest = 0.0;
+  for (const LinkModel& link : model.links) {
+    if (!link.usable() || link.tree.empty()) continue;
+    const auto body = kinematics.find_body(link.name);
+    if (!body) return kInfinity;
+    farthest = std::max(farthest, to_body[*body] + link.tree.center().norm() + link.tree.radius());
+  }
+  return farthest;
+}
+
 RegionOfInterest region_of_interest(const RobotModel& model, const Kinematics& kinematics,
-                                    const std::string& fixed_frame, double beyond) {
-  const auto frame = kinematics.find_link(fixed_frame);
+                                    const std::string& fixed_frame, double range) {
+  const auto frame = kinematics.find_body(fixed_frame);
   if (!frame) return {};
   Eigen::Isometry3d X_RF = Eigen::Isometry3d::Identity();
-  for (std::size_t link = *frame; link > 0;) {
-    const Kinematics::Joint& joint = kinematics.joints()[link - 1];
+  for (std::size_t body = *frame; body > 0;) {
+    const Kinematics::Joint& joint = kinematics.joints()[body - 1];
     if (joint.type != JointType::kFixed) return {};
     X_RF = joint.X_PJ * X_RF;
-    link = joint.parent;
+    body = joint.parent;
   }
-  return {X_RF.inverse().translation(), reach(model, kinematics) + beyond + kRoom};
+  return {X_RF.inverse().translation(), kinematic_reach(model, kinematics) + range + kSlack};
 }
 
 }  // namespace ist

@@ -10,7 +10,8 @@
 namespace ist {
 namespace {
 
-// Takes urdfdom's messages while it lives; other threads' messages go on to where they went.
+// Captures urdfdom's messages during its lifetime; messages of other threads go to the previous
+// handler.
 class MessageCapture : public console_bridge::OutputHandler {
  public:
   MessageCapture()

@@ -212,10 +212,10 @@ std::vector<double> jumps(const std::function<ContactVolume(double)>& at, double
   double force = 0.0, step = 0.0, turn = 0.0, turn_step = 0.0;
   for (double s = from + kStep; s <= to; s += kStep) {
     const ContactVolume now = at(s);
-    force = std::max(force, now.push.norm());
-    turn = std::max(turn, now.turn.norm());
-    step = std::max(step, (now.push - before.push).norm());
-    turn_step = std::max(turn_step, (now.turn - before.turn).norm());
+    force = std::max(force, now.weighted_normal.norm());
+    turn = std::max(turn, now.weighted_moment.norm());
+    step = std::max(step, (now.weighted_normal - before.weighted_normal).norm());
+    turn_step = std::max(turn_step, (now.weighted_moment - before.weighted_moment).norm());
     before = now;
   }
   // Where nothing turns but rounding.

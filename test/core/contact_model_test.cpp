@@ -17,15 +17,15 @@ namespace {
 using test::ContactLink;
 using test::one;
 
-double counted(const ContactBody& body) {
+double counted(const ContactGeometry& body) {
   double volume = 0.0;
   for (const test::OracleSphere& sphere : test::spheres_of(body)) {
-    volume += sphere.share * 4.0 * M_PI / 3.0 * std::pow(sphere.radius, 3);
+    volume += sphere.cell_ratio * 4.0 * M_PI / 3.0 * std::pow(sphere.radius, 3);
   }
   return volume;
 }
 
-TEST(ContactBody, StandsForTheLinksVolume) {
+TEST(ContactGeometry, StandsForTheLinksVolume) {
   struct Case {
     LinkGeometry geometry;
     double volume;
@@ -51,33 +51,33 @@ TEST(ContactBody, StandsForTheLinksVolume) {
   }
 }
 
-TEST(ContactBody, WayOutPointsToTheNearestSide) {
+TEST(ContactGeometry, OutwardFieldPointsToTheNearestSide) {
   const ContactLink link(one(Box{{0.2, 0.15, 0.1}}));
   int near_a_side = 0;
   for (const test::OracleSphere& sphere : test::spheres_of(*link.body)) {
-    const Eigen::Vector3d way_out = sphere.way_out(sphere.center);
-    EXPECT_LT(way_out.norm(), 1.0);
+    const Eigen::Vector3d outward = sphere.outward_at(sphere.center);
+    EXPECT_LT(outward.norm(), 1.0);
     // Right under the top, all other sides farther: up.
     const double depth = 0.05 - sphere.center.z();
     const bool alone =
         depth < 0.01 && std::abs(sphere.center.x()) < 0.06 && std::abs(sphere.center.y()) < 0.04;
     if (!alone) continue;
     ++near_a_side;
-    EXPECT_GT(way_out.normalized().z(), 0.97);
-    EXPECT_GT(way_out.norm(), 0.9);
+    EXPECT_GT(outward.normalized().z(), 0.97);
+    EXPECT_GT(outward.norm(), 0.9);
   }
   EXPECT_GT(near_a_side, 0);
-  // In the middle all ways are equally long.
+  // In the middle all sides are equally near.
   const ContactLink sphere(one(Sphere{0.1}), 1);
   const auto spheres = test::spheres_of(*sphere.body);
   ASSERT_EQ(spheres.size(), 1U);
-  EXPECT_LT(spheres[0].way_out(Eigen::Vector3d::Zero()).norm(), 0.01);
+  EXPECT_LT(spheres[0].outward_at(Eigen::Vector3d::Zero()).norm(), 0.01);
   for (const Eigen::Vector3d& u : {Eigen::Vector3d(0.07, 0, 0), Eigen::Vector3d(0, -0.05, 0.05)}) {
-    EXPECT_GT(spheres[0].way_out(u).dot(u.normalized()), 0.9);
+    EXPECT_GT(spheres[0].outward_at(u).dot(u.normalized()), 0.9);
   }
 }
 
-TEST(ContactBody, OfWhatHasNoVolumeSaysSo) {
+TEST(ContactGeometry, OfWhatHasNoVolumeSaysSo) {
   const ContactLink link(one(test::sheet(0.2)));
   EXPECT_FALSE(link.body->has_volume());
   EXPECT_NE(link.body->note.find("no volume"), std::string::npos);
@@ -87,14 +87,14 @@ TEST(ContactBody, OfWhatHasNoVolumeSaysSo) {
   EXPECT_EQ(contact_volume(*link.body, *link.body, Eigen::Isometry3d::Identity()).volume, 0.0);
 }
 
-TEST(ContactBody, ComesFromTheCacheTheNextTime) {
+TEST(ContactGeometry, ComesFromTheCacheTheNextTime) {
   const test::TempDir directory;
   const LinkGeometry geometry = one(test::box({0.2, 0.1, 0.05}));
   const auto model = test::model_of({geometry}, 0.005);
   ContactConfig config;
   config.packing.max_spheres = 50;
   const auto build = [&] {
-    return build_contact_body(geometry, 0, model->links[0], config, directory.path());
+    return build_contact_geometry(geometry, 0, model->links[0], config, directory.path());
   };
   const auto first = build(), second = build();
   EXPECT_FALSE(first->from_cache);
@@ -103,26 +103,27 @@ TEST(ContactBody, ComesFromTheCacheTheNextTime) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].center, b[i].center);
-    EXPECT_EQ(a[i].share, b[i].share);
-    EXPECT_EQ(a[i].slope, b[i].slope);
+    EXPECT_EQ(a[i].cell_ratio, b[i].cell_ratio);
+    EXPECT_EQ(a[i].gradient, b[i].gradient);
   }
   config.packing.max_spheres = 51;
   EXPECT_FALSE(build()->from_cache);
 }
 
-TEST(ContactBody, IsBrokenOffWhenItIsNotWanted) {
+TEST(ContactGeometry, IsBrokenOffWhenItIsNotWanted) {
   const LinkGeometry geometry = one(test::box({0.2, 0.1, 0.05}));
   const auto model = test::model_of({geometry}, 0.005);
-  EXPECT_EQ(build_contact_body(geometry, 0, model->links[0], {}, "", [] { return true; }), nullptr);
+  EXPECT_EQ(build_contact_geometry(geometry, 0, model->links[0], {}, "", [] { return true; }),
+            nullptr);
 }
 
 // A mesh whose packing takes too long: what the packing for distances has, without overlaps.
-TEST(ContactBody, TakesTheOtherPackingWhenTimeIsUp) {
+TEST(ContactGeometry, TakesTheOtherPackingWhenTimeIsUp) {
   const LinkGeometry geometry = one(test::open_box({0.2, 0.1, 0.05}));
   const auto model = test::model_of({geometry}, 0.005);
   ContactConfig config;
   config.time_limit = 1e-6;
-  const auto body = build_contact_body(geometry, 0, model->links[0], config, "");
+  const auto body = build_contact_geometry(geometry, 0, model->links[0], config, "");
   EXPECT_FALSE(body->note.empty());
   EXPECT_NEAR(body->volume, 0.001, 0.1 * 0.001);
   const auto spheres = test::spheres_of(*body);
@@ -135,27 +136,27 @@ TEST(ContactBody, TakesTheOtherPackingWhenTimeIsUp) {
   }
 }
 
-TEST(ContactBody, HasAKeyOfAllThatMakesIt) {
+TEST(ContactGeometry, HasAKeyOfAllThatMakesIt) {
   LinkGeometry geometry = one(Box{{0.2, 0.1, 0.05}});
   ContactConfig config;
-  const std::string key = contact_body_key(geometry, 0, config);
-  EXPECT_EQ(contact_body_key(one(Box{{0.2, 0.1, 0.05}}), 0, config), key);
+  const std::string key = contact_geometry_key(geometry, 0, config);
+  EXPECT_EQ(contact_geometry_key(one(Box{{0.2, 0.1, 0.05}}), 0, config), key);
   config.packing.max_spheres = 99;
-  EXPECT_NE(contact_body_key(geometry, 0, config), key);
+  EXPECT_NE(contact_geometry_key(geometry, 0, config), key);
   config = {};
   geometry[0].X_LE.translation().x() = 1e-9;
-  EXPECT_NE(contact_body_key(geometry, 0, config), key);
-  EXPECT_NE(contact_body_key(one(Box{{0.2, 0.1, 0.06}}), 0, config), key);
+  EXPECT_NE(contact_geometry_key(geometry, 0, config), key);
+  EXPECT_NE(contact_geometry_key(one(Box{{0.2, 0.1, 0.06}}), 0, config), key);
 }
 
 TEST(ContactModel, KnowsTheRobotThatItBelongsTo) {
   const ContactLink link(one(Sphere{0.1}), 1), other(one(Sphere{0.1}), 1);
   ContactModel contacts{link.model, {nullptr}};
-  EXPECT_EQ(find_body(nullptr, *link.model, 0), nullptr);
-  EXPECT_EQ(find_body(&contacts, *link.model, 0), nullptr);
-  contacts.bodies[0] = link.body;
-  EXPECT_EQ(find_body(&contacts, *link.model, 0), link.body.get());
-  EXPECT_EQ(find_body(&contacts, *other.model, 0), nullptr);
+  EXPECT_EQ(find_contact_geometry(nullptr, *link.model, 0), nullptr);
+  EXPECT_EQ(find_contact_geometry(&contacts, *link.model, 0), nullptr);
+  contacts.links[0] = link.body;
+  EXPECT_EQ(find_contact_geometry(&contacts, *link.model, 0), link.body.get());
+  EXPECT_EQ(find_contact_geometry(&contacts, *other.model, 0), nullptr);
 }
 
 }  // namespace

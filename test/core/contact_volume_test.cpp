@@ -26,8 +26,8 @@ constexpr double kRounding = 5e-5, kSphere = 2e-6;
 void expect_same(const ContactVolume& found, const ContactVolume& truth, double size) {
   const double scale = truth.volume + kSphere;
   EXPECT_NEAR(found.volume, truth.volume, kRounding * scale);
-  EXPECT_LT((found.push - truth.push).norm(), kRounding * scale);
-  EXPECT_LT((found.turn - truth.turn).norm(), kRounding * scale * size);
+  EXPECT_LT((found.weighted_normal - truth.weighted_normal).norm(), kRounding * scale);
+  EXPECT_LT((found.weighted_moment - truth.weighted_moment).norm(), kRounding * scale * size);
 }
 
 Points wall(double half, double spacing, double z) {
@@ -96,7 +96,7 @@ TEST(ContactVolume, IsTheSameFarFromTheOrigin) {
   EXPECT_GT(here.volume, 0.0);
   // Map coordinates in double are rounded to a nanometre, and decide otherwise at cells' borders.
   EXPECT_NEAR(there.volume, here.volume, 0.02 * here.volume);
-  EXPECT_LT((there.push - here.push).norm(), 0.02 * here.volume);
+  EXPECT_LT((there.weighted_normal - here.weighted_normal).norm(), 0.02 * here.volume);
 }
 
 TEST(ContactVolume, OfTwoLinksIsThatOfBruteForce) {
@@ -110,7 +110,8 @@ TEST(ContactVolume, OfTwoLinksIsThatOfBruteForce) {
       // What one gets, the other gives.
       const ContactVolume back = contact_volume(*links[b].body, *links[a].body, X_AB.inverse());
       EXPECT_NEAR(back.volume, found.volume, kRounding * found.volume + 1e-12);
-      EXPECT_LT((X_AB.linear() * back.push + found.push).norm(), kRounding * found.volume + 1e-12);
+      EXPECT_LT((X_AB.linear() * back.weighted_normal + found.weighted_normal).norm(),
+                kRounding * found.volume + 1e-12);
     }
   }
 }
@@ -142,7 +143,9 @@ TEST(ContactVolume, DependsLittleOnTheDensityOfTheCloud) {
   for (const double spacing : {0.001, 0.0014, 0.0028, 0.004}) {
     const ContactVolume other = volume(spacing);
     EXPECT_NEAR(other.volume, base.volume, 0.05 * base.volume) << spacing;
-    EXPECT_LT((other.push - base.push).norm(), 0.05 * base.push.norm()) << spacing;
+    EXPECT_LT((other.weighted_normal - base.weighted_normal).norm(),
+              0.05 * base.weighted_normal.norm())
+        << spacing;
   }
 }
 
@@ -173,10 +176,10 @@ TEST(ContactVolume, PushesOutOfAWall) {
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     X_FL.translation().z() = 0.05 - depth;
     const ContactVolume found = contact_volume(link.link(), *link.body, X_FL, {&cloud});
-    EXPECT_GT(found.push.normalized().z(), 0.99) << depth;
-    EXPECT_LE(found.push.norm(), found.volume);
+    EXPECT_GT(found.weighted_normal.normalized().z(), 0.99) << depth;
+    EXPECT_LE(found.weighted_normal.norm(), found.volume);
     // A wall that is the same on all sides turns nothing.
-    EXPECT_LT(found.turn.norm(), 0.01 * found.volume);
+    EXPECT_LT(found.weighted_moment.norm(), 0.01 * found.volume);
   }
 }
 
@@ -189,8 +192,9 @@ TEST(ContactVolume, TurnsWhatIsHitAtAnEnd) {
   const CloudSnapshot cloud = test::thinned(points);
   const ContactVolume found =
       contact_volume(link.link(), *link.body, Eigen::Isometry3d::Identity(), {&cloud});
-  EXPECT_GT(found.push.z(), 0.0);
-  EXPECT_NEAR(found.turn.y(), -0.08 * found.push.z(), 0.02 * found.push.z());
+  EXPECT_GT(found.weighted_normal.z(), 0.0);
+  EXPECT_NEAR(found.weighted_moment.y(), -0.08 * found.weighted_normal.z(),
+              0.02 * found.weighted_normal.z());
 }
 
 // Every box of a map has the volume that it has, however it is divided.
@@ -212,7 +216,9 @@ TEST(ContactVolume, OfAMapIsThatOfItsBoxes) {
     X_FL.translation() += X_FL.linear() * Eigen::Vector3d(0.1 + low.x() + 0.5 * edge, 0, 0);
     const ContactVolume half = contact_volume(link.link(), *link.body, X_FL, {&map});
     EXPECT_NEAR(half.volume, 0.5 * full, 0.25 * full) << edge;
-    EXPECT_GT((map.X_FM.linear().transpose() * X_FL.linear() * half.push).normalized().x(), 0.75);
+    EXPECT_GT(
+        (map.X_FM.linear().transpose() * X_FL.linear() * half.weighted_normal).normalized().x(),
+        0.75);
     // Beside it.
     X_FL.translation() += X_FL.linear() * Eigen::Vector3d(edge, 0, 0);
     EXPECT_EQ(contact_volume(link.link(), *link.body, X_FL, {&map}).volume, 0.0);
@@ -238,10 +244,11 @@ TEST(ContactVolume, HasNoJumpsAlongAnyWay) {
         for (double s = -0.17; s < 0.17; s += kStep) {
           X_FL.translation() = s * u;
           const ContactVolume now = contact_volume(link->link(), *link->body, X_FL, {obstacle});
-          ASSERT_TRUE(now.push.allFinite() && now.turn.allFinite());
-          largest_step = std::max({largest_step, (now.push - before.push).norm(),
-                                   std::abs(now.volume - before.volume),
-                                   (now.turn - before.turn).norm() / 0.1});
+          ASSERT_TRUE(now.weighted_normal.allFinite() && now.weighted_moment.allFinite());
+          largest_step =
+              std::max({largest_step, (now.weighted_normal - before.weighted_normal).norm(),
+                        std::abs(now.volume - before.volume),
+                        (now.weighted_moment - before.weighted_moment).norm() / 0.1});
           largest_volume = std::max(largest_volume, now.volume);
           before = now;
         }

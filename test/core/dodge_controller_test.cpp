@@ -40,7 +40,7 @@ class DodgeController : public ::testing::Test {
   }
   LinkReading clear() const {
     LinkReading link;
-    link.link = *arm.kinematics.find_link("gripper_link");
+    link.body = *arm.kinematics.find_body("gripper_link");
     link.lower_bound = 1.0;
     link.p_LCl.setConstant(kNan);
     return link;
@@ -55,12 +55,11 @@ class DodgeController : public ::testing::Test {
   // [m/s] How fast a command moves the witness along n.
   double speed_along(const LinkReading& link, const Eigen::VectorXd& dq) const {
     JointPoses poses;
-    std::vector<Eigen::Isometry3d> X_FL;
-    std::vector<bool> known;
+    BodyPoses bodies;
     arm.kinematics.place_joints(q, &poses);
-    arm.kinematics.place_links(poses, Eigen::Isometry3d::Identity(), &X_FL, &known);
+    arm.kinematics.place_bodies(poses, Eigen::Isometry3d::Identity(), &bodies);
     Jacobian J;
-    point_jacobian(arm.kinematics, X_FL, link.link, X_FL[link.link] * link.p_LCl, &J);
+    point_jacobian(arm.kinematics, bodies.X_FB, link.body, bodies.X_FB[link.body] * link.p_LCl, &J);
     double speed = 0.0;
     for (std::size_t j = 0; j < arm.joints.size(); ++j) {
       speed +=
@@ -139,7 +138,7 @@ TEST_F(DodgeController, SlowsDownByTheSmallestBound) {
 TEST_F(DodgeController, LinksThatCannotMoveDoNotCount) {
   goal[0] += 1.0;
   LinkReading base = near(0.0, {0.0, 0.0, 1.0});
-  base.link = *arm.kinematics.find_link("base_link");
+  base.body = *arm.kinematics.find_body("base_link");
   const Eigen::VectorXd undisturbed = run();
   reading.links.push_back(base);
   EXPECT_NEAR((run() - undisturbed).norm(), 0.0, 1e-12);
@@ -159,7 +158,7 @@ TEST_F(DodgeController, KeepsLimitsAndIsContinuous) {
     goal = commanded() + Eigen::VectorXd::Random(6);
     for (const char* name : {"upper_arm_link", "forearm_link", "wrist_link", "gripper_link"}) {
       LinkReading link = near(test::uniform(&rng, -0.02, 0.4), test::random_vector(&rng, 1.0));
-      link.link = *arm.kinematics.find_link(name);
+      link.body = *arm.kinematics.find_body(name);
       link.p_LCl = test::random_vector(&rng, 0.1);
       reading.links.push_back(link);
     }

@@ -143,12 +143,12 @@ TEST_F(InstructionSets, SameRepulsion) {
     const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.3);
     for (std::size_t i = 0; i < links.size(); ++i) {
       test::choose_instruction_sets(0);
-      const Push first = repulsion.push(i, X_FL, {&cloud}, proximity, {});
+      const RepulsiveWrench first = repulsion.wrench(i, X_FL, {&cloud}, proximity, {});
       ASSERT_TRUE(first.force.allFinite());
       for (const std::int64_t target : machine_targets()) {
         SCOPED_TRACE(hwy::TargetName(target));
         test::choose_instruction_sets(target);
-        const Push push = repulsion.push(i, X_FL, {&cloud}, proximity, {});
+        const RepulsiveWrench push = repulsion.wrench(i, X_FL, {&cloud}, proximity, {});
         ASSERT_LT((push.force - first.force).norm(), 1e-4);
         ASSERT_LT((push.torque - first.torque).norm(), 1e-4);
       }

@@ -24,24 +24,23 @@ std::vector<Eigen::Isometry3d> place(const Kinematics& k, const std::vector<doub
     joints.X_PC[j] = k.joints()[j].X_PJ;
     joints.known[j] = true;
   }
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
-  k.place_links(joints, X_FR, &X_FL, &known);
-  return X_FL;
+  BodyPoses bodies;
+  k.place_bodies(joints, X_FR, &bodies);
+  return bodies.X_FB;
 }
 
-// Velocity of a link's point and of its frame, by central differences of the kinematics.
+// Velocity of a body's point and of its frame, by central differences of the kinematics.
 Eigen::Matrix<double, 6, 1> difference(const Kinematics& k, std::vector<double> q, std::size_t j,
-                                       const Eigen::Isometry3d& X_FR, std::size_t link,
-                                       const Eigen::Vector3d& p_L) {
+                                       const Eigen::Isometry3d& X_FR, std::size_t body,
+                                       const Eigen::Vector3d& p_B) {
   constexpr double kStep = 1e-5;
   q[j] += kStep;
-  const Eigen::Isometry3d after = place(k, q, X_FR)[link];
+  const Eigen::Isometry3d after = place(k, q, X_FR)[body];
   q[j] -= 2 * kStep;
-  const Eigen::Isometry3d before = place(k, q, X_FR)[link];
+  const Eigen::Isometry3d before = place(k, q, X_FR)[body];
   const Eigen::AngleAxisd turn(after.linear() * before.linear().transpose());
   Eigen::Matrix<double, 6, 1> velocity;
-  velocity << after * p_L - before * p_L, turn.angle() * turn.axis();
+  velocity << after * p_B - before * p_B, turn.angle() * turn.axis();
   return velocity / (2 * kStep);
 }
 
@@ -64,9 +63,9 @@ TEST(Jacobian, handComputedArm) {
   add("tip", JointType::kFixed, {1, 0, 0}, {0.1, 0, 0});
   const Kinematics k(robot);
   // A quarter turn: the arm reaches 0.5 + 0.2 + 0.1 along y.
-  const auto X_FL = place(k, {kPi / 2, 0.2, 0.0}, Eigen::Isometry3d::Identity());
+  const auto X_FB = place(k, {kPi / 2, 0.2, 0.0}, Eigen::Isometry3d::Identity());
   Jacobian J;
-  point_jacobian(k, X_FL, 3, X_FL[3].translation(), &J);
+  point_jacobian(k, X_FB, 3, X_FB[3].translation(), &J);
   Jacobian expected = Jacobian::Zero(6, 3);
   expected.col(0) << -0.8, 0, 0, 0, 0, 1;
   expected.col(1) << 0, 1, 0, 0, 0, 0;
@@ -87,10 +86,10 @@ TEST(Jacobian, randomRobotsAgainstFiniteDifferences) {
     std::vector<double> q;
     for (std::size_t j = 0; j < k.joints().size(); ++j) q.push_back(test::uniform(&rng, -2, 2));
     const Eigen::Isometry3d X_FR = test::random_pose(&rng, 1.0);
-    const auto X_FL = place(k, q, X_FR);
-    for (std::size_t link = 0; link < k.links().size(); ++link) {
-      const Eigen::Vector3d p_L = test::random_vector(&rng, 1.0);
-      point_jacobian(k, X_FL, link, X_FL[link] * p_L, &J);
+    const auto X_FB = place(k, q, X_FR);
+    for (std::size_t body = 0; body < k.bodies().size(); ++body) {
+      const Eigen::Vector3d p_B = test::random_vector(&rng, 1.0);
+      point_jacobian(k, X_FB, body, X_FB[body] * p_B, &J);
       ASSERT_EQ(J.cols(), static_cast<Eigen::Index>(k.joints().size()));
       for (std::size_t j = 0; j < k.joints().size(); ++j) {
         const auto column = J.col(static_cast<Eigen::Index>(j));
@@ -98,8 +97,8 @@ TEST(Jacobian, randomRobotsAgainstFiniteDifferences) {
           EXPECT_TRUE(column.isZero(0.0));
           continue;
         }
-        EXPECT_LT((column - difference(k, q, j, X_FR, link, p_L)).cwiseAbs().maxCoeff(), 1e-7)
-            << "trial " << trial << ", joint " << j << ", link " << link;
+        EXPECT_LT((column - difference(k, q, j, X_FR, body, p_B)).cwiseAbs().maxCoeff(), 1e-7)
+            << "trial " << trial << ", joint " << j << ", body " << body;
       }
     }
   }
@@ -120,22 +119,22 @@ TEST(Jacobian, tellsWhosePoseItNeeds) {
   }
   const Kinematics k(robot);
   std::vector<bool> known(5, true);
-  EXPECT_FALSE(first_link_needed(k, known, 4).has_value());
+  EXPECT_FALSE(first_body_needed(k, known, 4).has_value());
   known[0] = known[2] = false;  // the root, and the child of the floating joint: neither is read
-  EXPECT_FALSE(first_link_needed(k, known, 4).has_value());
-  EXPECT_EQ(first_link_needed(k, known, 2), 2U) << "the link itself";
+  EXPECT_FALSE(first_body_needed(k, known, 4).has_value());
+  EXPECT_EQ(first_body_needed(k, known, 2), 2U) << "the body itself";
   known[1] = false;
-  EXPECT_EQ(first_link_needed(k, known, 4), 1U);
+  EXPECT_EQ(first_body_needed(k, known, 4), 1U);
   known[3] = known[4] = false;
-  EXPECT_EQ(first_link_needed(k, known, 4), 4U);
+  EXPECT_EQ(first_body_needed(k, known, 4), 4U);
 
   // What is not needed is not read.
-  auto X_FL = place(k, {0.3, 0.0, 0.1, 0.0}, Eigen::Isometry3d::Identity());
+  auto X_FB = place(k, {0.3, 0.0, 0.1, 0.0}, Eigen::Isometry3d::Identity());
   Jacobian all, some;
-  point_jacobian(k, X_FL, 4, X_FL[4].translation(), &all);
-  X_FL[0].matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
-  X_FL[2].matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
-  point_jacobian(k, X_FL, 4, X_FL[4].translation(), &some);
+  point_jacobian(k, X_FB, 4, X_FB[4].translation(), &all);
+  X_FB[0].matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
+  X_FB[2].matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
+  point_jacobian(k, X_FB, 4, X_FB[4].translation(), &some);
   EXPECT_EQ(all, some);
 }
 

@@ -6,10 +6,13 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/robot/link_poses.h"
+#include "support/allocations.h"
 #include "support/random_robots.h"
 
 namespace ist {
@@ -59,15 +62,14 @@ std::vector<double> positions(const Kinematics& k, const std::map<std::string, d
 
 struct Placed {
   JointPoses joints;
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
+  BodyPoses bodies;
 };
 
 Placed place(const Kinematics& k, const std::map<std::string, double>& q,
              const Eigen::Isometry3d& X_FR = Eigen::Isometry3d::Identity()) {
   Placed placed;
   k.place_joints(positions(k, q), &placed.joints);
-  k.place_links(placed.joints, X_FR, &placed.X_FL, &placed.known);
+  k.place_bodies(placed.joints, X_FR, &placed.bodies);
   return placed;
 }
 
@@ -77,18 +79,18 @@ TEST(Kinematics, handComputedChain) {
       links(4) + joint("bend", "revolute", 0, 1, "<origin xyz=\"0 0 1\"/><axis xyz=\"0 2 0\"/>") +
       joint("slide", "prismatic", 1, 2, "<origin xyz=\"0.1 0 0\"/><axis xyz=\"10 0 0\"/>") +
       joint("tip", "fixed", 2, 3, "<origin xyz=\"0 0 0.2\" rpy=\"0 0 1.5707963267948966\"/>"));
-  EXPECT_EQ(k.links(), (std::vector<std::string>{"l0", "l1", "l2", "l3"}));
+  EXPECT_EQ(k.bodies(), (std::vector<std::string>{"l0", "l1", "l2", "l3"}));
   const Placed placed = place(k, {{"bend", kPi / 2}, {"slide", 0.5}});
-  ASSERT_EQ(placed.known, std::vector<bool>(4, true));
-  EXPECT_TRUE(placed.X_FL[2].translation().isApprox(Eigen::Vector3d(0, 0, 1 - 0.6), 1e-15));
-  EXPECT_TRUE(placed.X_FL[3].translation().isApprox(Eigen::Vector3d(0.2, 0, 0.4), 1e-15));
+  ASSERT_EQ(placed.bodies.known, std::vector<bool>(4, true));
+  EXPECT_TRUE(placed.bodies.X_FB[2].translation().isApprox(Eigen::Vector3d(0, 0, 1 - 0.6), 1e-15));
+  EXPECT_TRUE(placed.bodies.X_FB[3].translation().isApprox(Eigen::Vector3d(0.2, 0, 0.4), 1e-15));
   // The tip's x is the wrist's y; its y is the wrist's -x, which points up.
-  EXPECT_TRUE(placed.X_FL[3].linear().col(0).isApprox(Eigen::Vector3d::UnitY(), 1e-15));
-  EXPECT_TRUE(placed.X_FL[3].linear().col(1).isApprox(Eigen::Vector3d::UnitZ(), 1e-15));
+  EXPECT_TRUE(placed.bodies.X_FB[3].linear().col(0).isApprox(Eigen::Vector3d::UnitY(), 1e-15));
+  EXPECT_TRUE(placed.bodies.X_FB[3].linear().col(1).isApprox(Eigen::Vector3d::UnitZ(), 1e-15));
   EXPECT_EQ(k.joints()[*k.find_joint("bend")].lower, -1.0);
   EXPECT_EQ(k.joints()[*k.find_joint("bend")].upper, 2.0);
   EXPECT_FALSE(k.find_joint("l0").has_value());
-  EXPECT_FALSE(k.find_link("bend").has_value());
+  EXPECT_FALSE(k.find_body("bend").has_value());
 }
 
 TEST(Kinematics, chainsOfMimics) {
@@ -104,7 +106,7 @@ TEST(Kinematics, chainsOfMimics) {
   const double c = 0.7, b = 3 * c + 0.5, a = -2 * b + 0.1;
   // A position of a mimic's own is not listened to.
   const Placed placed = place(k, {{"c", c}, {"a", 99.0}, {"b", kNaN}});
-  const auto X = [&](const std::string& link) { return placed.X_FL[*k.find_link(link)]; };
+  const auto X = [&](const std::string& link) { return placed.bodies.X_FB[*k.find_body(link)]; };
   EXPECT_NEAR(X("l2").translation().z(), b, 1e-15);
   const Eigen::Matrix3d turned_a =
       Eigen::AngleAxisd(a, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -121,12 +123,13 @@ TEST(Kinematics, whatIsNotKnown) {
       kinematics(links(6) + joint("a", "revolute", 0, 1, "") + joint("b", "floating", 1, 2, "") +
                  joint("c", "revolute", 2, 3, "") + joint("d", "planar", 0, 4, "") +
                  joint("e", "fixed", 4, 5, ""));
-  const auto link = [&](const char* name) { return *k.find_link(name); };
+  const auto body = [&](const char* name) { return *k.find_body(name); };
   Placed placed = place(k, {{"a", 0.1}});
-  for (const char* name : {"l0", "l1"}) EXPECT_TRUE(placed.known[link(name)]) << name;
-  for (const char* name : {"l2", "l3", "l4", "l5"}) EXPECT_FALSE(placed.known[link(name)]) << name;
+  for (const char* name : {"l0", "l1"}) EXPECT_TRUE(placed.bodies.known[body(name)]) << name;
+  for (const char* name : {"l2", "l3", "l4", "l5"})
+    EXPECT_FALSE(placed.bodies.known[body(name)]) << name;
   const auto blamed = [&](const char* name) {
-    const auto joint = k.first_unknown(placed.joints, link(name));
+    const auto joint = k.first_unknown(placed.joints, body(name));
     return joint ? k.joints()[*joint].name : "";
   };
   EXPECT_EQ(blamed("l1"), "");
@@ -138,12 +141,12 @@ TEST(Kinematics, whatIsNotKnown) {
   EXPECT_TRUE(k.joints()[b].has_unstated_pose());
   placed.joints.X_PC[b] = Eigen::Isometry3d(Eigen::Translation3d(1, 2, 3));
   placed.joints.known[b] = true;
-  k.place_links(placed.joints, Eigen::Isometry3d::Identity(), &placed.X_FL, &placed.known);
-  EXPECT_TRUE(placed.known[link("l2")]);
+  k.place_bodies(placed.joints, Eigen::Isometry3d::Identity(), &placed.bodies);
+  EXPECT_TRUE(placed.bodies.known[body("l2")]);
   EXPECT_EQ(blamed("l3"), "c");
   const Eigen::Vector3d expected =
       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()) * Eigen::Vector3d(1, 2, 3);
-  EXPECT_TRUE(placed.X_FL[link("l2")].translation().isApprox(expected, 1e-15));
+  EXPECT_TRUE(placed.bodies.X_FB[body("l2")].translation().isApprox(expected, 1e-15));
 }
 
 TEST(Kinematics, faults) {
@@ -196,13 +199,65 @@ TEST(Kinematics, randomTreesAgainstNaiveProducts) {
     const Kinematics k(robot);
     const Eigen::Isometry3d X_FR = test::random_pose(&random, 1.0);
     const Placed placed = place(k, stated, X_FR);
-    ASSERT_EQ(k.links().size(), X_RL.size());
-    for (std::size_t i = 0; i < k.links().size(); ++i) {
-      ASSERT_TRUE(placed.known[i]);
-      const Eigen::Matrix4d expected = X_FR.matrix() * X_RL.at(k.links()[i]);
-      EXPECT_LT((placed.X_FL[i].matrix() - expected).cwiseAbs().maxCoeff(), 1e-13);
+    ASSERT_EQ(k.bodies().size(), X_RL.size());
+    for (std::size_t i = 0; i < k.bodies().size(); ++i) {
+      ASSERT_TRUE(placed.bodies.known[i]);
+      const Eigen::Matrix4d expected = X_FR.matrix() * X_RL.at(k.bodies()[i]);
+      EXPECT_LT((placed.bodies.X_FB[i].matrix() - expected).cwiseAbs().maxCoeff(), 1e-13);
     }
   }
+}
+
+// Links of a model, in an order of their own, one of which the URDF lacks.
+RobotModel model_with_links(const std::vector<std::string>& names) {
+  RobotModel model;
+  for (const std::string& name : names) {
+    model.links.emplace_back();
+    model.links.back().name = name;
+  }
+  return model;
+}
+
+TEST(LinkPoses, areByLinkOfTheModel) {
+  const auto k = std::make_shared<const Kinematics>(
+      kinematics(links(4) + joint("a", "revolute", 0, 1, "<origin xyz=\"1 0 0\"/>") +
+                 joint("b", "floating", 1, 2, "<origin xyz=\"0 2 0\"/>") +
+                 joint("c", "fixed", 0, 3, "<origin xyz=\"0 0 3\"/>")));
+  const RobotModel model = model_with_links({"l3", "nowhere", "l2", "l1"});
+  const Eigen::Isometry3d X_FR(Eigen::Translation3d(5, 5, 5));
+  const std::vector<double> q = positions(*k, {{"a", 0.1}});
+  const LinkPoses poses = link_poses(model, *k, q, X_FR);
+  EXPECT_EQ(poses.known, (std::vector<bool>{true, false, false, true}));
+  BodyPoses bodies;
+  JointPoses joints;
+  k->place_joints(q, &joints);
+  k->place_bodies(joints, X_FR, &bodies);
+  EXPECT_EQ(poses.X_FL[0].matrix(), bodies.X_FB[*k->find_body("l3")].matrix());
+  EXPECT_EQ(poses.X_FL[3].matrix(), bodies.X_FB[*k->find_body("l1")].matrix());
+
+  // The caller's pose for the floating joint.
+  joints.X_PC[*k->find_joint("b")] = k->joints()[*k->find_joint("b")].X_PJ;
+  joints.known[*k->find_joint("b")] = true;
+  ForwardKinematics forward(model, k);
+  EXPECT_EQ(forward.run(q, X_FR).known, poses.known);
+  EXPECT_EQ(forward.run(joints, X_FR).known, (std::vector<bool>{true, false, true, true}));
+  EXPECT_EQ(forward.links().X_FL[2].matrix(), forward.bodies().X_FB[*forward.body(2)].matrix());
+  EXPECT_FALSE(forward.body(1).has_value());
+}
+
+TEST(LinkPoses, inALoopAllocateNothing) {
+  const auto k = std::make_shared<const Kinematics>(
+      kinematics(links(3) + joint("a", "revolute", 0, 1, "") + joint("b", "prismatic", 1, 2, "")));
+  const RobotModel model = model_with_links({"l0", "l2"});
+  ForwardKinematics forward(model, k);
+  std::vector<double> q = {0.1, 0.2};
+  forward.run(q);
+  const long before = test::allocations;
+  for (int i = 0; i < 10; ++i) {
+    q[0] += 0.1;
+    forward.run(q);
+  }
+  EXPECT_EQ(test::allocations, before);
 }
 
 }  // namespace

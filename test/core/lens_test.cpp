@@ -1,4 +1,4 @@
-#include "internal/geometry/lens.h"
+#include "contact/lens.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,13 @@
 namespace ist {
 namespace {
 
-// The volume of the intersection, integrated along the line of the centres.
+// Where the lens's middle lies between the centres of two spheres, 0 to 1.
+double middle_of_lens(double R, double r, double d) {
+  using One = Eigen::Array<double, 1, 1>;
+  return lens_middle<One>(One::Constant(R - r), One::Constant(d)).value();
+}
+
+// Both spheres' sections, along the line of their centres.
 double integrated(double R, double r, double d) {
   const double low = std::max(-R, d - r), high = std::min(R, d + r);
   if (high <= low) return 0.0;
@@ -50,11 +56,26 @@ TEST(Lens, HoldsAtTouchContainmentAndCommonCentres) {
         EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R - r)), sphere, 1e-8 * sphere);
         EXPECT_NEAR(lens_volume(R, r, (1.0 - tiny) * (R + r)), 0.0, 1e-12 * R * R * R);
         EXPECT_EQ(lens_volume(R, r, (1.0 + tiny) * (R + r) * (1.0 + 1e-15)), 0.0);
+        const double middle = middle_of_lens(R, r, tiny * R);
+        EXPECT_TRUE(middle >= 0.0 && middle <= 1.0);
       }
     }
   }
   EXPECT_EQ(lens_volume(0.0, 0.0, 0.0), 0.0);
   EXPECT_EQ(lens_volume(0.1, 0.0, 0.05), 0.0);
+}
+
+TEST(Lens, LiesInTheMiddleOfItsThickness) {
+  test::Rng rng(22);
+  for (int i = 0; i < test::scaled(1000); ++i) {
+    const double R = test::uniform(&rng, 0.01, 0.2), r = test::uniform(&rng, 0.01, 0.2);
+    const double d = test::uniform(&rng, 0.0, 1.0) * (R + r);
+    const Eigen::Vector3d a = test::random_vector(&rng, 1.0);
+    const Eigen::Vector3d b = a + d * test::random_vector(&rng, 1.0).normalized();
+    const double length = (b - a).norm();
+    const Eigen::Vector3d found = a + middle_of_lens(R, r, length) * (b - a);
+    EXPECT_LT((found - test::oracle_lens_middle(a, R, b, r)).norm(), 1e-12);
+  }
 }
 
 TEST(Lens, GrowsSmoothlyFromTouchToContainment) {
@@ -63,8 +84,8 @@ TEST(Lens, GrowsSmoothlyFromTouchToContainment) {
     double slope_before = 0.0, before = 0.0;
     for (double d = R + r + kStep; d >= 0.0; d -= kStep) {
       const double now = lens_volume(R, r, d), slope = (now - before) / kStep;
-      // The slope is the area of the section between the spheres: no larger than the smaller
-      // sphere's equator, nor does it grow faster.
+      // No face between spheres is larger than the smaller sphere's equator, nor grows faster than
+      // it.
       EXPECT_LE(slope, M_PI * r * r * (1.0 + 1e-6));
       EXPECT_LE(std::abs(slope - slope_before), 4.0 * M_PI * r * kStep) << d;
       before = now;

@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/package_resolver.h"
+#include "internal/robot/package_resolver.h"
 
 #include <gtest/gtest.h>
 

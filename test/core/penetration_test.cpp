@@ -27,15 +27,15 @@ TEST(Penetration, IsTheVolumeTimesTheStiffnessInTheFixedFrame) {
   test::Rng rng(31);
   ContactVolume volume;
   volume.volume = 2e-3;
-  volume.push = Eigen::Vector3d(1e-3, -2e-4, 5e-4);
-  volume.turn = Eigen::Vector3d(-1e-5, 3e-5, 2e-5);
+  volume.weighted_normal = Eigen::Vector3d(1e-3, -2e-4, 5e-4);
+  volume.weighted_moment = Eigen::Vector3d(-1e-5, 3e-5, 2e-5);
   const Eigen::Isometry3d X_FL = test::random_pose(&rng, 1.0);
   const PenetrationConfig config{5e4};
   const Wrench wrench =
       penetration_wrench(answer(LinkState::kContact, -0.01, -0.011), {}, &volume, X_FL, config);
-  EXPECT_LT((wrench.force - 5e4 * (X_FL.linear() * volume.push)).norm(), 1e-9);
+  EXPECT_LT((wrench.force - 5e4 * (X_FL.linear() * volume.weighted_normal)).norm(), 1e-9);
   // About the link's origin, wherever that is.
-  EXPECT_LT((wrench.torque - 5e4 * (X_FL.linear() * volume.turn)).norm(), 1e-9);
+  EXPECT_LT((wrench.torque - 5e4 * (X_FL.linear() * volume.weighted_moment)).norm(), 1e-9);
 }
 
 TEST(Penetration, IsZeroApartAndNaNWhenItIsNotKnown) {

@@ -9,7 +9,6 @@
 #include <limits>
 #include <vector>
 
-#include "internal/robot/reach.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
@@ -48,7 +47,7 @@ TEST(Reach, NoLinkGetsFarther) {
   for (int k = 0; k < test::scaled(60); ++k) {
     const Arm arm(&rng, 6);
     const Kinematics kinematics(arm.description);
-    const double far = reach(*arm.model, kinematics);
+    const double far = kinematic_reach(*arm.model, kinematics);
     double farthest = 0.0;
     for (int i = 0; i < 200; ++i) {
       std::vector<double> q;
@@ -63,10 +62,9 @@ TEST(Reach, NoLinkGetsFarther) {
       }
       JointPoses poses;
       kinematics.place_joints(q, &poses);
-      std::vector<Eigen::Isometry3d> X_RL;
-      std::vector<bool> known;
-      kinematics.place_links(poses, Eigen::Isometry3d::Identity(), &X_RL, &known);
-      for (const Eigen::Isometry3d& X : X_RL) {
+      BodyPoses bodies;
+      kinematics.place_bodies(poses, Eigen::Isometry3d::Identity(), &bodies);
+      for (const Eigen::Isometry3d& X : bodies.X_FB) {
         farthest = std::max(farthest, X.translation().norm() + 0.05);
       }
     }
@@ -93,12 +91,12 @@ TEST(Reach, OfAnArmThatIsStretched) {
   arm.joints[1].lower = -0.4;
   arm.joints[1].upper = 0.2;
   const auto model = spheres(3, 0.1);
-  EXPECT_NEAR(reach(*model, Kinematics(arm)), 0.3 + 0.5 + 0.4 + 0.1, 0.02);
+  EXPECT_NEAR(kinematic_reach(*model, Kinematics(arm)), 0.3 + 0.5 + 0.4 + 0.1, 0.02);
   arm.joints[1].upper = kInfinity;
-  EXPECT_EQ(reach(*model, Kinematics(arm)), kInfinity);
+  EXPECT_EQ(kinematic_reach(*model, Kinematics(arm)), kInfinity);
   arm.joints[1].upper = 0.2;
   arm.joints[0].type = JointType::kFloating;
-  EXPECT_EQ(reach(*model, Kinematics(arm)), kInfinity);
+  EXPECT_EQ(kinematic_reach(*model, Kinematics(arm)), kInfinity);
 }
 
 // The root stands still in the frames that fixed joints hang on it, and in no others.
@@ -109,7 +107,7 @@ TEST(RegionOfInterest, OnlyInFramesThatStandStill) {
                   joint(JointType::kRevolute, "l0", "l1", Eigen::Vector3d::Zero())};
   const auto model = spheres(2, 0.1);
   const Kinematics kinematics(robot);
-  const double far = reach(*model, kinematics);
+  const double far = kinematic_reach(*model, kinematics);
   for (const char* frame : {"l1", "map", ""}) {
     EXPECT_EQ(region_of_interest(*model, kinematics, frame, 0.5).radius, kInfinity) << frame;
   }

@@ -24,13 +24,13 @@ LinkProximity near_by(double distance) {
 // Deep in the influence distance, where nothing fades.
 const LinkProximity kNear = near_by(0.1);
 
-Push push(double x) { return {Vector3d(x, 0.0, -0.5 * x), Vector3d(0.0, 2.0 * x, 0.0)}; }
+RepulsiveWrench push(double x) { return {Vector3d(x, 0.0, -0.5 * x), Vector3d(0.0, 2.0 * x, 0.0)}; }
 
 TEST(RepulsionFilter, passesWhatTheRobotsMotionChanges) {
   RepulsionFilter filter;
   for (int i = 0; i < 200; ++i) {
-    const Push raw = push(0.3 * std::sin(0.1 * i));
-    const Push out = filter.update(kStep * i, 7, raw, kNear, {});
+    const RepulsiveWrench raw = push(0.3 * std::sin(0.1 * i));
+    const RepulsiveWrench out = filter.update(kStep * i, 7, raw, kNear, {});
     EXPECT_EQ(out.force, raw.force);
     EXPECT_EQ(out.torque, raw.torque);
   }
@@ -43,7 +43,7 @@ TEST(RepulsionFilter, spreadsWhatACloudChanges) {
   filter.update(0.0, 1, push(0.0), kNear, config);
   double last = 0.0, delay = 0.0;
   for (int i = 1; i <= 1000; ++i) {
-    const Push out = filter.update(kStep * i, 2, push(0.5), kNear, config);
+    const RepulsiveWrench out = filter.update(kStep * i, 2, push(0.5), kNear, config);
     const double done = out.force.x() / 0.5;
     EXPECT_GE(done, last) << i;
     EXPECT_LE(done, 1.0) << "no overshoot";
@@ -62,7 +62,7 @@ TEST(RepulsionFilter, spreadsWhatACloudChanges) {
 TEST(RepulsionFilter, slowUpdatesAreHardlyDelayed) {
   RepulsionFilter filter;
   for (int i = 0; i < 20; ++i) {
-    const Push out =
+    const RepulsiveWrench out =
         filter.update(0.5 * i, static_cast<std::uint64_t>(i), push(0.5 * (i % 2)), kNear, {});
     EXPECT_NEAR(out.force.x(), 0.5 * (i % 2), 1e-6);
   }
@@ -73,7 +73,7 @@ TEST(RepulsionFilter, followsARampWithItsDelay) {
   RepulsionFilter filter;
   RepulsionConfig config;
   config.filter_time = 0.05;
-  Push out;
+  RepulsiveWrench out;
   for (int i = 0; i <= 1000; ++i) {  // an obstacle that nears for a second, seen anew every 2 ms
     out = filter.update(kStep * i, static_cast<std::uint64_t>(i / 2), push(0.4e-3 * (i - i % 2)),
                         kNear, config);
@@ -90,7 +90,7 @@ TEST(RepulsionFilter, whatIsBeyondTheInfluenceDistanceRepelsNothingAtOnce) {
     filter.update(0.0, 1, push(0.8), kNear, {});
     EXPECT_TRUE(filter.update(kStep, 2, {}, gone, {}).force.isZero(0.0));
     // And comes back smoothly: what is seen in one cloud and not in the next one flickers less.
-    const Push back = filter.update(2 * kStep, 3, push(0.8), kNear, {});
+    const RepulsiveWrench back = filter.update(2 * kStep, 3, push(0.8), kNear, {});
     EXPECT_GT(back.force.x(), 0.0);
     EXPECT_LT(back.force.x(), 0.01);
   }
@@ -108,16 +108,18 @@ TEST(RepulsionFilter, whatIsBeyondTheInfluenceDistanceRepelsNothingAtOnce) {
 }
 
 TEST(RepulsionFilter, startsAnew) {
-  const Push raw = push(0.5);
-  const auto fresh = [](const Push& out, const Push& expected) {
+  const RepulsiveWrench raw = push(0.5);
+  const auto fresh = [](const RepulsiveWrench& out, const RepulsiveWrench& expected) {
     EXPECT_EQ(out.force, expected.force);
     EXPECT_EQ(out.torque, expected.torque);
   };
   RepulsionFilter filter;
   fresh(filter.update(5.0, 1, raw, kNear, {}), raw);
   fresh(filter.update(4.0, 2, push(0.1), kNear, {}), push(0.1));  // the clock has jumped back
-  EXPECT_TRUE(
-      filter.update(4.1, 3, Push::unknown(), LinkProximity(), {}).force.array().isNaN().all());
+  EXPECT_TRUE(filter.update(4.1, 3, RepulsiveWrench::unknown(), LinkProximity(), {})
+                  .force.array()
+                  .isNaN()
+                  .all());
   fresh(filter.update(4.2, 4, raw, kNear, {}), raw);
   filter.reset();
   fresh(filter.update(4.3, 5, push(0.2), kNear, {}), push(0.2));

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "repulsion/coarse_spheres.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -186,7 +187,7 @@ TEST(Repulsion, agreesWithTheFormula) {
     Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
     X_FL.rotate(Eigen::AngleAxisd(5.0 * u(random), Vector3d(1, 2, 3).normalized()));
     const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
-    const Push push = repulsion.push(0, X_FL, {&cloud}, near_by(e.nearest), config);
+    const RepulsiveWrench push = repulsion.wrench(0, X_FL, {&cloud}, near_by(e.nearest), config);
     const double length = config.gain * std::min(1.0, 1.0 - e.nearest);
     ASSERT_LT((push.force - length * e.blend).norm(), 2e-4) << trial;
     ASSERT_LT((push.torque - length * e.torque).norm(), 2e-4) << trial;

@@ -20,7 +20,7 @@ struct Arm {
   std::shared_ptr<const RobotModel> model;
   std::shared_ptr<const Kinematics> kinematics;
   std::vector<LinkGeometry> links;  ///< by link of the model
-  std::vector<std::size_t> places;  ///< by link of the model: where the kinematics has it
+  std::vector<std::size_t> bodies;  ///< by link of the model: its body in the kinematics
   std::size_t size() const { return links.size(); }
 };
 
@@ -49,19 +49,19 @@ inline Arm random_arm(Rng* rng) {
   Arm arm;
   auto model = std::make_shared<RobotModel>();
   const auto kinematics = std::make_shared<Kinematics>(robot);
-  for (std::size_t i = 1; i < kinematics->links().size(); ++i) {
+  for (std::size_t i = 1; i < kinematics->bodies().size(); ++i) {
     const auto shape = static_cast<std::size_t>(uniform(rng, 0, 3.999));
     model->links.push_back(shapes->links[shape]);
-    model->links.back().name = kinematics->links()[i];
+    model->links.back().name = kinematics->bodies()[i];
     arm.links.push_back({GeometryElement{kShapes[shape], Eigen::Isometry3d::Identity(), "test"}});
-    arm.places.push_back(i);
+    arm.bodies.push_back(i);
   }
   arm.model = model;
   arm.kinematics = kinematics;
   return arm;
 }
 
-/// Where the links of the kinematics are, `time` [s] after the start.
+/// X_FB of all bodies, `time` [s] after the start.
 inline std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& motion,
                                                     double time) {
   const auto& joints = arm.kinematics->joints();
@@ -76,10 +76,9 @@ inline std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMot
     const double q = from + s * (to - from);
     poses.X_PC[j] = arm.kinematics->joint_pose(j, joints[j].multiplier * q + joints[j].offset);
   }
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
-  arm.kinematics->place_links(poses, motion.X_FR, &X_FL, &known);
-  return X_FL;
+  BodyPoses bodies;
+  arm.kinematics->place_bodies(poses, motion.X_FR, &bodies);
+  return bodies.X_FB;
 }
 
 /// For 0.5 to 2 s, each joint up to 1.5 rad or 0.5 m, or standing still; five points or fewer, some
@@ -104,20 +103,20 @@ inline ArmMotion random_motion(Rng* rng, const Arm& arm) {
   }
   const int count = 1 + static_cast<int>(uniform(rng, 0, 5));
   for (int i = 0; i < count; ++i) {
-    const std::size_t link = arm.places[static_cast<std::size_t>(uniform(rng, 0, 0.999) *
+    const std::size_t body = arm.bodies[static_cast<std::size_t>(uniform(rng, 0, 0.999) *
                                                                  static_cast<double>(arm.size()))];
     const double time = uniform(rng, 0.3, 1.2) * motion.joints.duration;
-    motion.points.push_back(sampled_poses(arm, motion, time)[link] * random_vector(rng, 0.1));
+    motion.points.push_back(sampled_poses(arm, motion, time)[body] * random_vector(rng, 0.1));
   }
   return motion;
 }
 
 /// Smallest exact distance [m] of any link to any point, `time` [s] after the start.
 inline double sampled_distance(const Arm& arm, const ArmMotion& motion, double time) {
-  const std::vector<Eigen::Isometry3d> X_FL = sampled_poses(arm, motion, time);
+  const std::vector<Eigen::Isometry3d> X_FB = sampled_poses(arm, motion, time);
   double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < arm.size(); ++i) {
-    smallest = std::min(smallest, oracle_minimum(arm.links[i], X_FL[arm.places[i]], motion.points));
+    smallest = std::min(smallest, oracle_minimum(arm.links[i], X_FB[arm.bodies[i]], motion.points));
   }
   return smallest;
 }

@@ -116,7 +116,7 @@ void Traffic::place_camera(const std::string& file) {
   message.transforms.resize(1);
   auto& transform = message.transforms[0];
   transform.header.stamp = ros::Time::now();
-  transform.header.frame_id = kinematics_.links().front();
+  transform.header.frame_id = kinematics_.bodies().front();
   transform.child_frame_id = kCameraFrame;
   transform.transform.rotation.x = q.x();
   transform.transform.rotation.y = q.y();

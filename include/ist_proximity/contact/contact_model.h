@@ -1,94 +1,76 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/packing/packing.h"
-#include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
-#include "ist_proximity/tree/inner_sphere_tree.h"
 
 namespace ist {
 
 /// How the spheres that contact volumes are summed over are made.
 struct ContactConfig {
   PackingConfig packing = {0.002, 500, PackingOrder::kDisjoint};
-  /// [s] packing of one element is broken off after it, and a disjoint part of the packing for
-  /// distances taken in its place; > 0.
+  /// [s] > 0: packing one element stops after it, and a disjoint part of the packing for distances
+  /// is used instead.
   double time_limit = 30.0;
 };
 
-/// Up to eight spheres of a disjoint packing, side by side for SIMD, in the link's frame.
-struct alignas(32) ContactLeaf {
-  float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres
-  float radius[kSphereWidth];                               ///< [m] negative in unused slots
-  /// The volume that a sphere stands for, in volumes of its own; >= 1, 0 in unused slots.
-  float share[kSphereWidth];
-  float out[3][kSphereWidth];    ///< way out at the centre, see ContactBody
-  float slope[9][kSphereWidth];  ///< [1/m] its derivative, row-major
-};
+struct ContactSpheres;  // src/contact/contact_spheres.h
 
-/// A link as its volume: a disjoint packing in a tree. Immutable; share it by pointer.
+/// A link's volume: a disjoint packing in an Inner Sphere Tree. Immutable; share it by pointer.
 ///
-/// Spheres leave voids between them. Each stands for its cell of the spheres' power diagram within
-/// the link, so that a link's spheres together have the link's volume, and no part of it twice,
-/// whether elements of the link overlap or not.
+/// Spheres leave voids between them. Each sphere stands for its cell of the spheres' power diagram
+/// within the link, so that a link's spheres together have the link's volume, and no part of it
+/// counts twice, whether elements of the link overlap or not.
 ///
-/// The way out is a smooth vector field o: of unit length near a flat surface, pointing outward,
-/// and zero where all sides are equally near, as any continuous field must be somewhere inside. At
-/// p it is the mean of the directions to all points s of the surface, weighted by area / |s - p|^4.
-/// BoundingSphere each sphere it is taken as linear.
-struct ContactBody {
-  InnerSphereTree tree;             ///< over the spheres that have a volume
-  std::vector<ContactLeaf> leaves;  ///< the same leaves as the tree's
+/// The outward field is a smooth vector field o: of unit length near a flat surface, pointing
+/// outward, and zero where all sides are equally near, as any continuous field must be somewhere
+/// inside. At p it is the mean of the directions to all points s of the surface, weighted by
+/// area / |s - p|^4. Around each sphere's centre it is taken as linear.
+struct ContactGeometry {
+  std::shared_ptr<const ContactSpheres> spheres;  ///< null: the link has no volume
   std::size_t sphere_count = 0;
   double volume = 0.0;         ///< [m^3] of the link: spheres, and voids by counting on a grid
   double packed_volume = 0.0;  ///< [m^3] of the spheres
   bool from_cache = false;
-  double time = 0.0;  ///< [s] it took
-  std::string note;   ///< what a user should know; empty: nothing
+  double time = 0.0;  ///< [s] that building it took
+  std::string note;   ///< a sentence for users; empty: nothing to say
 
-  bool has_volume() const { return !tree.empty(); }
+  bool has_volume() const { return spheres != nullptr; }
 };
 
-/// The links' bodies, as far as they are there. Immutable.
+/// Contact geometry of a robot's links, as far as it is built. Immutable.
 struct ContactModel {
-  std::shared_ptr<const RobotModel> robot;                 ///< what they belong to
-  std::vector<std::shared_ptr<const ContactBody>> bodies;  ///< by link; null: not there (yet)
+  std::shared_ptr<const RobotModel> robot;                    ///< the model that it belongs to
+  std::vector<std::shared_ptr<const ContactGeometry>> links;  ///< by link; null: not built (yet)
 };
 
-/// The body of a link, if it is there and has a volume; null otherwise.
+/// The contact geometry of a link, if it is built and has a volume; null otherwise.
 /// @param contacts  may be null, or of another robot
-const ContactBody* find_body(const ContactModel* contacts, const RobotModel& robot,
-                             std::size_t link);
+const ContactGeometry* find_contact_geometry(const ContactModel* contacts, const RobotModel& robot,
+                                             std::size_t link);
 
-/// Packs a link disjointly, or takes the packings from the cache. A link without volume (sheets)
-/// has a body without spheres and a note.
+/// Packs a link disjointly, or takes the packings from the cache. The result for a link without
+/// volume (sheets) has no spheres, and a note.
 /// @param geometry   of the link, attached objects last
 /// @param attached   number of attached objects
 /// @param link       the same link, packed for distances
 /// @param cancelled  may be empty
 /// @returns null when cancelled
 /// @throws ModelError when an element cannot be packed
-std::shared_ptr<const ContactBody> build_contact_body(const LinkGeometry& geometry,
-                                                      std::size_t attached, const LinkModel& link,
-                                                      const ContactConfig& config,
-                                                      const std::string& cache_directory,
-                                                      const std::function<bool()>& cancelled = {});
+std::shared_ptr<const ContactGeometry> build_contact_geometry(
+    const LinkGeometry& geometry, std::size_t attached, const LinkModel& link,
+    const ContactConfig& config, const std::string& cache_directory,
+    const std::function<bool()>& cancelled = {});
 
-/// Links with the same key have the same body: shapes, their places, and how they are packed.
-std::string contact_body_key(const LinkGeometry& geometry, std::size_t attached,
-                             const ContactConfig& config);
-
-/// The largest spheres of a packing that do not overlap, `count` at most, the largest first.
-Packing disjoint_part(const Packing& packing, std::size_t count);
-
-/// Of a packing that is there.
-/// @param packing  disjoint within each element
-ContactBody make_contact_body(const LinkGeometry& geometry, const Solid& solid,
-                              const Packing& packing);
+/// A key of shapes, their poses in the link, and how they are packed: links with the same key have
+/// the same contact geometry.
+std::string contact_geometry_key(const LinkGeometry& geometry, std::size_t attached,
+                                 const ContactConfig& config);
 
 }  // namespace ist

@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// The contact force.
+/// How strongly contact volumes push.
 struct PenetrationConfig {
   /// [N/m^3] force per shared volume; >= 0. With the default a litre gives 100 N.
   double stiffness = 1e5;
@@ -24,13 +24,13 @@ struct Wrench {
   Wrench& operator+=(const Wrench& other);
 };
 
-/// A contact volume as a wrench: Weller 2013, section 5.4, force k sum(V n), torque k sum(P x V n).
+/// A contact volume as a wrench: Weller 2013, section 5.4, force k sum(V n), torque k sum(p x V n).
 /// @param contact  of the link, in its frame L, about its origin
 /// @returns in the frame F, the torque about the link's origin
 Wrench contact_wrench(const ContactVolume& contact, const Eigen::Isometry3d& X_FL,
                       const PenetrationConfig& config);
 
-/// What the other link gets.
+/// The opposite wrench, on the other link.
 /// @param on_first   about the first link's origin
 /// @param p_SecondFirst  [m] from the second link's origin to the first's, in the wrench's frame
 /// @returns on the second link, about its origin
@@ -38,13 +38,12 @@ Wrench reaction(const Wrench& on_first, const Eigen::Vector3d& p_SecondFirst);
 
 /// The wrench that pushes a link out of the obstacle.
 ///
-/// Zero when CLEAR or NEAR; NaN when UNKNOWN, and when a deadline left open whether the link is in
-/// contact. In CONTACT it is continuous from touch on, and still zero where the deepest point is
-/// less deep than the gap of the link's packing there.
+/// Zero when CLEAR or NEAR; NaN when UNKNOWN, and when a deadline passed before it was known
+/// whether the link is in contact. In CONTACT it is continuous from touch on, and still zero where
+/// the deepest point is less deep than the gap of the link's packing there.
 /// @param query    that the proximity was asked with
-/// @param contact  of the link, in its frame; it matters in CONTACT only, and where it is null
-/// then,
-///                 it is not known and the wrench NaN
+/// @param contact  of the link, in its frame; read in CONTACT only. Null: it is not known, and the
+///                 wrench is NaN in CONTACT
 /// @returns in the fixed frame, the torque about the link's origin. Thread safe.
 Wrench penetration_wrench(const LinkProximity& proximity, const QueryConfig& query,
                           const ContactVolume* contact, const Eigen::Isometry3d& X_FL,

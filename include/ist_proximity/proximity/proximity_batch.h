@@ -4,37 +4,39 @@
 #include <memory>
 #include <vector>
 
+#include "ist_proximity/geometry/span.h"
 #include "ist_proximity/proximity/proximity_query.h"
 
 namespace ist {
 
-/// Many configurations of a robot at once, over threads: a planner's batch.
+/// Queries for many configurations of a robot at once, on several threads: a planner's batch.
 ///
-/// Each thread has a ProximityQuery of its own and takes configurations in order, a few at a time,
-/// so that neighbours in the batch start from each other's answers. At tolerance 0 the distances do
-/// not depend on the number of threads; else they lie within the tolerance. A deadline counts for
-/// each configuration. Queries allocate nothing; a batch starts its threads and lets them end. Not
-/// thread safe: one batch at a time.
+/// Each thread has a ProximityQuery of its own and takes chunks of consecutive configurations, so
+/// that each configuration starts warm from the answers to the one before. At tolerance 0 the
+/// distances do not depend on the number of threads; otherwise they lie within the tolerance. A
+/// deadline applies to each configuration by itself. Queries allocate nothing; each run starts its
+/// threads and joins them. Not thread safe: one run at a time.
 class ProximityBatch {
  public:
-  /// @param threads  the caller's included; 0: as many as there are cores
+  /// @param threads  including the caller's; 0: as many as there are cores
   ProximityBatch(std::shared_ptr<const RobotModel> model, const QueryConfig& config,
                  int threads = 0);
   ~ProximityBatch();
   ProximityBatch(ProximityBatch&&) noexcept;
   ProximityBatch& operator=(ProximityBatch&&) noexcept;
 
-  /// As ProximityQuery::run for each configuration.
-  /// @param X_FL     n configurations one after the other, each link frame -> fixed frame by link
+  /// Calls ProximityQuery::run for each configuration.
+  /// @param X_FL     n configurations one after the other, each with one pose per link: link frame
+  ///                 -> fixed frame
   /// @param known    by link, for all configurations
   /// @param results  n times the number of links, in the order of X_FL, overwritten
   /// @returns false when a deadline passed before every link of a configuration met its tolerance
-  bool run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-           SnapshotSpan clouds, std::vector<LinkProximity>* results);
+  bool run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known, SnapshotSpan clouds,
+           std::vector<LinkProximity>* results);
 
-  /// As ProximityQuery::run_minimum for each configuration.
+  /// Calls ProximityQuery::run_minimum for each configuration.
   /// @param results  n, overwritten
-  bool run_minimum(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+  bool run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                    SnapshotSpan clouds, std::vector<RobotProximity>* results);
 
  private:

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "ist_proximity/geometry/span.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/robot_model.h"
 
@@ -16,14 +17,14 @@ struct LinkPair {
   std::size_t first, second;
 };
 
-/// How near two links are; points and vectors in the fixed frame.
+/// The distance of two links; points and vectors in the fixed frame.
 struct PairProximity {
   LinkState state = LinkState::kUnknown;
-  double distance;        ///< [m] signed: of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
+  double distance;        ///< [m] signed, of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
   Eigen::Vector3d p_FCa;  ///< [m] witness on the first link; NaN unless NEAR or CONTACT
   Eigen::Vector3d p_FCb;  ///< [m] on the second
-  /// Unit, the way the first link should go: p_FCa - p_FCb = distance * direction.
+  /// Unit vector along which the first link moves away: p_FCa - p_FCb = distance * direction.
   Eigen::Vector3d direction;
 
   PairProximity() { reset(); }
@@ -33,23 +34,25 @@ struct PairProximity {
 /// Distances between links of one robot.
 ///
 /// The distance of two solids is the smallest signed distance of any point of either to the other:
-/// positive when they are apart, minus the depth of the deepest point when they are not. The outer
-/// spheres of a link A cover it, so a lower bound is the smallest, over spheres, of the exact
-/// signed distance of the centre to the other link B less the cover radius (signed distances change
-/// no faster than points move). It is found best first in A's tree; bounds from B's tree spare most
-/// exact evaluations. A is the link that is packed closer, and where they may touch, each in turn.
-/// `distance` is measured between two real points, found by going to and fro between the surfaces
-/// from the spheres that are nearest. It is not below the true distance. For links that are apart
-/// it is above `lower_bound` by no more than max_error of A's packing and the tolerance (where they
-/// nearly touch, its interior gap comes on top, and both gaps wherever one of the meshes has holes,
-/// because its inside shows there); in contact the two may differ by more. Where
-/// solids merely touch, NEAR with a lower bound below 0 may be said.
+/// positive when they are apart, minus the depth of the deepest point when they are not.
+///
+/// Lower bound: the cover spheres of a link A cover it, so the smallest, over spheres, of the exact
+/// signed distance of the centre to the other link B less the cover radius bounds the distance from
+/// below (signed distances change no faster than points move). Best-first branch and bound in A's
+/// tree finds it; bounds from B's tree spare most exact evaluations. A is the link with the smaller
+/// gap; where the links may touch, each takes that part in turn.
+///
+/// Upper bound: `distance` is measured between two real points, which alternating projections
+/// between the surfaces find, starting from the nearest spheres. It is not below the true distance.
+/// For links that are apart it is above `lower_bound` by no more than max_error of A's packing and
+/// the tolerance (where they nearly touch, its interior gap comes on top, and both gaps wherever
+/// one of the meshes has holes, because its inside shows there); in contact the two may differ by
+/// more. Where solids merely touch, the state may be NEAR with a lower bound below 0.
 ///
 /// run() never throws. One object per thread.
 class SelfQuery {
  public:
-  /// @param config  max_distance, tolerance (how much closer to look for `distance`) and margin are
-  ///                read
+  /// @param config  max_distance, tolerance and margin are read
   SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
             const QueryConfig& config);
   ~SelfQuery();
@@ -59,10 +62,10 @@ class SelfQuery {
   /// @param X_FL     by link: link frame -> fixed frame, rigid
   /// @param known    by link: false makes its pairs UNKNOWN
   /// @param results  one per pair, overwritten
-  void run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+  void run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
            std::vector<PairProximity>* results);
 
-  /// For the runs to come.
+  /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
 
   const std::vector<LinkPair>& pairs() const;

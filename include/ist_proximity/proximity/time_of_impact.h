@@ -25,19 +25,20 @@ struct ImpactTime {
   /// [s] from the start of the motion, never later than the first contact; 0 in contact, +inf
   /// without contact, NaN when not known.
   double time = std::numeric_limits<double>::quiet_NaN();
-  /// False: given up after many steps; the contact, if there is one, may be much later.
+  /// False: the search gave up after many steps; the contact, if any, may be much later.
   bool converged = true;
   int steps = 0;  ///< distance queries
 };
 
 /// Conservative time of impact of a robot's links with standing obstacles along a joint motion.
 ///
-/// Conservative advancement (Mirtich 1996): a link that has a proven distance d cannot touch
-/// anything before one of its points has gone as far. How fast its points can be is bounded at each
-/// step by the distances of its bounding sphere from the axes of all joints that move it, and by
-/// how fast those can grow. Distances are lower bounds of ProximityQuery: what they promise, the
-/// time promises, margin included. It ends where the bound is below 1 um: along glancing motions
-/// that may be long before a contact, or without one. One object per thread.
+/// Conservative advancement (Mirtich 1996): a link whose distance is proven to be d or more cannot
+/// touch anything before one of its points has moved by d. Each step bounds the speed of its points
+/// by the distances of its bounding sphere from the axes of all joints that move it, and by how
+/// fast those can grow. Distances are lower bounds of ProximityQuery, margin included, so no
+/// contact comes before the time that is returned. The search ends where the bound is below 1 um:
+/// along glancing motions that may be long before a contact, or without one. One object per
+/// thread.
 class TimeOfImpact {
  public:
   /// @param config  max_distance and margin are read: the time is that of a distance of `margin`
@@ -48,7 +49,7 @@ class TimeOfImpact {
   TimeOfImpact& operator=(TimeOfImpact&&) noexcept;
 
   /// @param motion   sizes as the kinematics' joints
-  /// @param still    where joints are that the motion does not move; planar and floating ones too
+  /// @param still    poses of joints that the motion does not move; planar and floating ones too
   /// @param X_FR     root link -> fixed frame
   /// @param wanted   by link of the model: false leaves it out (NaN)
   /// @param clouds   as for ProximityQuery::run; none makes every link unknown

@@ -9,22 +9,22 @@
 
 namespace ist {
 
-/// Something that a link carries, a gripped tool: while it is attached, it is a part of the link.
+/// An object that a link carries, such as a gripped tool: while attached, it is a part of the link.
 struct AttachedObject {
   std::string name;
   std::string link;
   GeometryElement element;  ///< its frame E is the object's
 };
 
-/// The robot with the objects as further elements of their links.
+/// Adds the objects to the robot as further elements of their links.
 /// @throws ModelError when a link is not in the URDF, or its own geometry is faulty
 RobotDescription with_objects(const RobotDescription& robot,
                               const std::vector<AttachedObject>& objects);
 
-/// The model with one link built anew, and the other links as they are: what build_robot_model
-/// would make of the description, without packing everything.
+/// Builds one link of the model anew and copies the others: the same result as build_robot_model
+/// for the description, without packing everything.
 /// @param model   of a description that differs in that link only, built with `config`
-/// @param link    without geometry it leaves the model, unless `config.links` asks for it
+/// @param link    without geometry it is removed from the model, unless `config.links` names it
 /// @returns null when cancelled
 std::shared_ptr<const RobotModel> rebuild_link(const RobotModel& model,
                                                const RobotDescription& description,

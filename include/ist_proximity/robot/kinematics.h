@@ -11,18 +11,27 @@
 
 namespace ist {
 
-/// Where every joint's child link is in its parent link.
+/// Poses of all joints' child bodies in their parent bodies, by joint of the kinematics.
 struct JointPoses {
-  std::vector<Eigen::Isometry3d> X_PC;  ///< by joint: child link -> parent link; valid where known
-  std::vector<bool> known;              ///< by joint
+  std::vector<Eigen::Isometry3d> X_PC;  ///< child body -> parent body; valid where known
+  std::vector<bool> known;
+};
+
+/// Poses of all bodies, by body of the kinematics. LinkPoses (link_poses.h) are by link of a model.
+struct BodyPoses {
+  std::vector<Eigen::Isometry3d> X_FB;  ///< body frame -> fixed frame; valid where known
+  std::vector<bool> known;
 };
 
 /// Forward kinematics of a URDF's tree, in double.
 ///
+/// A body is a link of the URDF, with geometry or without; "link" is kept for the links of a
+/// RobotModel, which are some of the bodies and have their own order.
+///
 /// Revolute, continuous and prismatic joints have one position [rad, m]. A mimic joint takes its
 /// position from the joint it follows, through any number of others, never a position of its own.
-/// Planar and floating joints cannot be told by one number: their poses are the caller's to fill
-/// in (from tf, say); until then nothing is known of the links below them.
+/// One number does not determine the pose of a planar or floating joint: the caller fills it in
+/// (from tf, for example); until then the bodies below such a joint are not known.
 /// Immutable; const members are thread safe.
 class Kinematics {
  public:
@@ -33,8 +42,8 @@ class Kinematics {
   struct Joint {
     std::string name;
     JointType type;
-    std::size_t parent, child;  ///< links
-    Eigen::Isometry3d X_PJ;     ///< joint frame J -> parent link
+    std::size_t parent, child;  ///< bodies
+    Eigen::Isometry3d X_PJ;     ///< joint frame J -> parent body
     Eigen::Vector3d axis;       ///< unit, in J
     double lower, upper;        ///< [rad, m] limits, may be infinite
     std::size_t source;         ///< joint whose position moves this one; itself unless it mimics
@@ -48,37 +57,36 @@ class Kinematics {
     }
   };
 
-  /// Names; the root first, every link after its parent.
-  const std::vector<std::string>& links() const { return links_; }
-  /// Joint j moves link j + 1.
+  /// Names; the root first, every body after its parent.
+  const std::vector<std::string>& bodies() const { return bodies_; }
+  /// Joint j moves body j + 1.
   const std::vector<Joint>& joints() const { return joints_; }
-  std::optional<std::size_t> find_link(const std::string& name) const;
+  std::optional<std::size_t> find_body(const std::string& name) const;
   std::optional<std::size_t> find_joint(const std::string& name) const;
 
   /// X_PC of one joint at position q [rad, m] of its own; q is ignored where the joint is fixed.
   /// Not for planar and floating joints.
   Eigen::Isometry3d joint_pose(std::size_t joint, double q) const;
 
-  /// Poses of all joints that positions can tell.
+  /// Poses of all joints that positions determine.
   /// @param q      by joint, NaN where not known; read for free joints only
   /// @param poses  overwritten; planar and floating joints are not known
   void place_joints(const std::vector<double>& q, JointPoses* poses) const;
 
-  /// Poses of all links.
-  /// @param X_FR   root link -> fixed frame
-  /// @param X_FL   by link
-  /// @param known  by link: false below a joint that is not known
-  void place_links(const JointPoses& poses, const Eigen::Isometry3d& X_FR,
-                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) const;
+  /// Poses of all bodies. A body below a joint that is not known is not known.
+  /// @param X_FR   root body -> fixed frame
+  /// @param poses  overwritten
+  void place_bodies(const JointPoses& joints, const Eigen::Isometry3d& X_FR,
+                    BodyPoses* poses) const;
 
-  /// The joint nearest to the root, on the way to `link`, whose pose is not known.
-  std::optional<std::size_t> first_unknown(const JointPoses& poses, std::size_t link) const;
+  /// The joint nearest to the root, between root and `body`, whose pose is not known.
+  std::optional<std::size_t> first_unknown(const JointPoses& poses, std::size_t body) const;
 
  private:
   void add_tree(const RobotDescription& description);
   void resolve_mimics(const RobotDescription& description);
 
-  std::vector<std::string> links_;
+  std::vector<std::string> bodies_;
   std::vector<Joint> joints_;
 };
 

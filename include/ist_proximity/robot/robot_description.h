@@ -1,14 +1,39 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
+#include <functional>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "ist_proximity/geometry/shapes.h"
-#include "ist_proximity/robot/joint_description.h"
-#include "ist_proximity/robot/package_resolver.h"
 
 namespace ist {
+
+enum class JointType { kFixed, kRevolute, kContinuous, kPrismatic, kPlanar, kFloating };
+
+/// A joint that follows another: its position is multiplier * (that one's) + offset.
+struct Mimic {
+  std::string joint;
+  double multiplier = 1.0;
+  double offset = 0.0;  ///< [rad, m]
+};
+
+/// A joint as the URDF states it.
+struct JointDescription {
+  std::string name;
+  JointType type = JointType::kFixed;
+  std::string parent_link, child_link;
+  Eigen::Isometry3d X_PJ = Eigen::Isometry3d::Identity();  ///< joint frame J -> parent link P
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();         ///< in J; any length but 0
+  std::optional<Mimic> mimic;
+  /// [rad, m] infinite where the joint has none
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+};
 
 enum class GeometrySource { kCollision, kVisual };
 
@@ -16,12 +41,12 @@ enum class GeometrySource { kCollision, kVisual };
 struct LinkDescription {
   std::string name;
   LinkGeometry geometry;     ///< empty when `error` is set
-  std::string error;         ///< why the geometry cannot be had: element, file, value, what to do
+  std::string error;         ///< why there is no geometry: element, file, value, what to do
   std::size_t attached = 0;  ///< how many elements, at the end of `geometry`, are attached objects
-  bool used_visual_fallback = false;  ///< collision was asked for and only visual is there
+  bool used_visual_fallback = false;  ///< collision was asked for, and there is only visual
 };
 
-/// What the node needs of a URDF: names and shapes, in the order of the document.
+/// The content of a URDF that the library uses: names and shapes, in the order of the document.
 struct RobotDescription {
   std::string name;
   std::string root_link;
@@ -31,9 +56,16 @@ struct RobotDescription {
   std::vector<JointDescription> joints;
 };
 
+/// The folder of a ROS package, or an empty string when it is not known.
+using PackageFinder = std::function<std::string(const std::string& package)>;
+
+/// Searches ROS_PACKAGE_PATH as rospack does (folders with a package.xml of that name), without
+/// ROS.
+PackageFinder environment_package_finder();
+
 /// Reads a URDF (urdfdom) and the meshes it names (assimp).
 ///
-/// A link whose geometry is faulty stays in `links` with its `error`; the others go on.
+/// A link whose geometry is faulty stays in `links` with its `error`; the others are read.
 /// @throws ModelError when the text is no URDF: empty, not XML, no <robot>, no link, joints that
 ///         form no tree.
 RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,

@@ -15,7 +15,7 @@ namespace ist {
 /// One monitored link, ready for queries.
 struct LinkModel {
   std::string name;
-  std::string error;  ///< not empty: no geometry, the link is UNKNOWN for ever
+  std::string error;  ///< not empty: no geometry, the link is always UNKNOWN
   Packing packing;    ///< of the whole link, in the link's frame
   InnerSphereTree tree;
   Solid solid;  ///< the exact geometry, for refinement
@@ -32,9 +32,9 @@ struct RobotModel {
   std::vector<LinkModel> links;
 };
 
-/// How far the model is.
+/// Progress of building the model.
 struct ModelProgress {
-  std::string link;       ///< the link at work
+  std::string link;       ///< the link that is being packed
   std::size_t index = 0;  ///< of that link
   std::size_t count = 0;  ///< how many links
   double fraction = 0.0;  ///< of the whole robot, 0 to 1
@@ -48,8 +48,8 @@ struct RobotModelConfig {
   int threads = 0;                 ///< packing threads; 0: as many as there are cores
 };
 
-/// Any may be empty. Called one at a time; `progress` and `cancelled` from packing threads too,
-/// `warning` at the end. What they throw comes out of build_robot_model.
+/// Each of them may be empty. They are called one at a time; `progress` and `cancelled` from
+/// packing threads too, `warning` at the end. Their exceptions come out of build_robot_model.
 struct RobotModelCallbacks {
   std::function<void(const ModelProgress&)> progress;
   std::function<void(const std::string&)> warning;

@@ -26,7 +26,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       speeds_(robot_.links.size()),
       joint_repulsion_(*model_),
       results_(robot_.links.size()),
-      pushes_(robot_.links.size(), Push::unknown()) {
+      pushes_(robot_.links.size(), RepulsiveWrench::unknown()) {
   status_input_.model_problem = model_->problem;
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
@@ -102,7 +102,7 @@ void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* messag
     const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
     const ClosingSpeed::Nearest nearest = selection_.nearest(result);
     pushes_[i] = filters_[i].update(message->header.stamp.toSec(), obstacles,
-                                    repulsion_.push(i, X_FL, clouds, result, config.repulsion),
+                                    repulsion_.wrench(i, X_FL, clouds, result, config.repulsion),
                                     result, config.repulsion);
     message->links.push_back(to_message(
         robot_.links[i].name, result, pushes_[i], penetration(i, config),
@@ -113,7 +113,7 @@ void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* messag
 /// The wrench is unknown in contact until the link's contact body is packed.
 Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) const {
   const LinkProximity& result = results_[link];
-  const ContactBody* body = find_body(config.contacts.get(), robot_, link);
+  const ContactGeometry* body = find_contact_geometry(config.contacts.get(), robot_, link);
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
   if (is_known) {

@@ -72,10 +72,10 @@ class ProximityCycle {
   JointRepulsion joint_repulsion_;
 
   // Valid for one cycle.
-  LinkPoses poses_;
+  StampedLinkPoses poses_;
   StatusInput status_input_;
   std::vector<LinkProximity> results_;  ///< by link of the robot
-  std::vector<Push> pushes_;            ///< by link of the robot, filtered
+  std::vector<RepulsiveWrench> pushes_;            ///< by link of the robot, filtered
 };
 
 }  // namespace ist

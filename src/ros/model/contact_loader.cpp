@@ -23,8 +23,8 @@ const LinkDescription* find_link(const RobotDescription& description, const std:
 }
 
 /// Stands for a link without a volume; the note says why.
-std::shared_ptr<const ContactBody> no_body(const std::string& note) {
-  auto body = std::make_shared<ContactBody>();
+std::shared_ptr<const ContactGeometry> no_body(const std::string& note) {
+  auto body = std::make_shared<ContactGeometry>();
   body->note = note;
   return body;
 }
@@ -71,28 +71,28 @@ void ContactLoader::load(const std::shared_ptr<const ModelState>& state) {
   const auto begin = std::chrono::steady_clock::now();
   const RobotModel& robot = *state->robot;
   const RobotDescription description = with_objects(*state->description, state->objects);
-  std::map<std::string, std::shared_ptr<const ContactBody>> bodies;
+  std::map<std::string, std::shared_ptr<const ContactGeometry>> bodies;
   std::vector<std::string> keys(robot.links.size());
   ContactModel contacts;
   contacts.robot = state->robot;
-  contacts.bodies.resize(robot.links.size());
+  contacts.links.resize(robot.links.size());
   for (const std::size_t i : state->monitored) {
     const LinkDescription* link = find_link(description, robot.links[i].name);
     if (link == nullptr || !robot.links[i].usable()) continue;
-    keys[i] = contact_body_key(link->geometry, link->attached, config_.contacts);
+    keys[i] = contact_geometry_key(link->geometry, link->attached, config_.contacts);
     const auto known = known_.find(keys[i]);
-    if (known != known_.end()) contacts.bodies[i] = bodies[keys[i]] = known->second;
+    if (known != known_.end()) contacts.links[i] = bodies[keys[i]] = known->second;
   }
   set(std::make_shared<const ContactModel>(contacts));
 
   const auto cancelled = [&] { return !is_current(*state); };
   for (const std::size_t i : state->monitored) {
-    if (keys[i].empty() || contacts.bodies[i]) continue;
-    std::shared_ptr<const ContactBody>& body = bodies[keys[i]];
+    if (keys[i].empty() || contacts.links[i]) continue;
+    std::shared_ptr<const ContactGeometry>& body = bodies[keys[i]];
     if (!body)
       body = build(*find_link(description, robot.links[i].name), robot.links[i], cancelled);
     if (!body || cancelled()) return;
-    contacts.bodies[i] = body;
+    contacts.links[i] = body;
     set(std::make_shared<const ContactModel>(contacts));
   }
   known_ = std::move(bodies);
@@ -102,12 +102,12 @@ void ContactLoader::load(const std::shared_ptr<const ModelState>& state) {
 }
 
 /// @returns null when cancelled
-std::shared_ptr<const ContactBody> ContactLoader::build(
+std::shared_ptr<const ContactGeometry> ContactLoader::build(
     const LinkDescription& link, const LinkModel& model,
     const std::function<bool()>& cancelled) const {
-  std::shared_ptr<const ContactBody> body;
+  std::shared_ptr<const ContactGeometry> body;
   try {
-    body = build_contact_body(link.geometry, link.attached, model, config_.contacts,
+    body = build_contact_geometry(link.geometry, link.attached, model, config_.contacts,
                               config_.model.cache_directory, cancelled);
   } catch (const std::exception& error) {  // ModelError, or no memory
     body = no_body(std::string("its volume cannot be packed: ") + error.what());

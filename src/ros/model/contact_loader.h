@@ -32,7 +32,7 @@ class ContactLoader {
  private:
   void run();
   void load(const std::shared_ptr<const ModelState>& state);
-  std::shared_ptr<const ContactBody> build(const LinkDescription& link, const LinkModel& model,
+  std::shared_ptr<const ContactGeometry> build(const LinkDescription& link, const LinkModel& model,
                                            const std::function<bool()>& cancelled) const;
   void set(std::shared_ptr<const ContactModel> contacts);
   bool is_current(const ModelState& state) const;
@@ -43,7 +43,7 @@ class ContactLoader {
   mutable std::mutex mutex_;
   std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
   /// The bodies of the last model by key, for the next one; the thread's own.
-  std::map<std::string, std::shared_ptr<const ContactBody>> known_;
+  std::map<std::string, std::shared_ptr<const ContactGeometry>> known_;
   std::thread thread_;  ///< not running where contact volumes are not wanted
 };
 

@@ -8,7 +8,6 @@
 
 #include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
-#include "ist_proximity/robot/package_resolver.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"

@@ -8,14 +8,14 @@ JointRepulsion::JointRepulsion(const ModelState& model)
     : kinematics_(model.kinematics), problem_(no_kinematics(model)) {
   if (!kinematics_) return;
   for (const std::size_t i : model.monitored) {
-    const auto found = kinematics_->find_link(model.robot->links[i].name);
+    const auto found = kinematics_->find_body(model.robot->links[i].name);
     if (!found) continue;  // the URDF lacks this configured link, so nothing moves it
     monitored_.push_back(i);
     index_.push_back(*found);
   }
 }
 
-void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
+void JointRepulsion::fill(PoseSource* source, const std::vector<RepulsiveWrench>& pushes,
                           const ist_proximity::ProximityArray& proximity,
                           ist_proximity::JointRepulsion* message) {
   message->header.stamp = proximity.header.stamp;
@@ -28,7 +28,7 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
     message->status_text = problem_;
     return;
   }
-  source->look_up_all(*kinematics_, proximity.header.stamp, &X_FL_, &known_);
+  source->look_up_all(*kinematics_, proximity.header.stamp, &bodies_);
   const auto& joints = kinematics_->joints();
   effort_.setZero(static_cast<Eigen::Index>(joints.size()));
   for (std::size_t i = 0; i < index_.size(); ++i) {
@@ -44,20 +44,20 @@ void JointRepulsion::fill(PoseSource* source, const std::vector<Push>& pushes,
   }
 }
 
-std::string JointRepulsion::add(std::size_t link, const Push& push) {
+std::string JointRepulsion::add(std::size_t body, const RepulsiveWrench& push) {
   if (push.force.isZero(0.0) && push.torque.isZero(0.0)) return "";
   if (!push.force.allFinite()) {  // the link is UNKNOWN, and the status of ~proximity says why
-    set_unknown(link);
+    set_unknown(body);
     return "";
   }
-  const auto missing = first_link_needed(*kinematics_, known_, link);
+  const auto missing = first_body_needed(*kinematics_, bodies_.known, body);
   if (missing) {
-    set_unknown(link);
-    return "the joints' efforts from link '" + kinematics_->links()[link] +
-           "' are not known: the pose of link '" + kinematics_->links()[*missing] +
+    set_unknown(body);
+    return "the joints' efforts from link '" + kinematics_->bodies()[body] +
+           "' are not known: the pose of link '" + kinematics_->bodies()[*missing] +
            "' is not known";
   }
-  point_jacobian(*kinematics_, X_FL_, link, X_FL_[link].translation(), &J_);
+  point_jacobian(*kinematics_, bodies_.X_FB, body, bodies_.X_FB[body].translation(), &J_);
   Eigen::Matrix<double, 6, 1> wrench;
   wrench << push.force, push.torque;
   effort_ += J_.transpose() * wrench;
@@ -65,10 +65,10 @@ std::string JointRepulsion::add(std::size_t link, const Push& push) {
 }
 
 /// Makes the efforts of all joints that move the link NaN.
-void JointRepulsion::set_unknown(std::size_t link) {
+void JointRepulsion::set_unknown(std::size_t body) {
   const auto& joints = kinematics_->joints();
-  for (; link > 0; link = joints[link - 1].parent) {
-    effort_[static_cast<Eigen::Index>(joints[link - 1].source)] =
+  for (; body > 0; body = joints[body - 1].parent) {
+    effort_[static_cast<Eigen::Index>(joints[body - 1].source)] =
         std::numeric_limits<double>::quiet_NaN();
   }
 }

@@ -28,23 +28,23 @@ class JointRepulsion {
   /// @param pushes     repulsion by link of the robot
   /// @param proximity  message for the same poses, for the header and the status
   /// @param message    overwritten
-  void fill(PoseSource* source, const std::vector<Push>& pushes,
+  void fill(PoseSource* source, const std::vector<RepulsiveWrench>& pushes,
             const ist_proximity::ProximityArray& proximity, ist_proximity::JointRepulsion* message);
 
  private:
-  /// Adds the efforts of one link, an index of the kinematics.
+  /// Adds the efforts of one link.
+  /// @param body  the link in the kinematics
   /// @returns empty, or why the Jacobian cannot be known
-  std::string add(std::size_t link, const Push& push);
-  void set_unknown(std::size_t link);
+  std::string add(std::size_t body, const RepulsiveWrench& push);
+  void set_unknown(std::size_t body);
 
   std::shared_ptr<const Kinematics> kinematics_;  ///< null where the URDF's is faulty
   std::string problem_;                           ///< the sentence where kinematics_ is null
   std::vector<std::size_t> monitored_;            ///< indices of links of the robot
-  std::vector<std::size_t> index_;                ///< the same links in the kinematics
+  std::vector<std::size_t> index_;                ///< their bodies
 
-  // Valid for one call, by link and by joint of the kinematics.
-  std::vector<Eigen::Isometry3d> X_FL_;
-  std::vector<bool> known_;
+  // Valid for one call, by body and by joint of the kinematics.
+  BodyPoses bodies_;
   Eigen::VectorXd effort_;
   Jacobian J_;
 };

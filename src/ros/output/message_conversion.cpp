@@ -32,12 +32,12 @@ void assign_closing(const ClosingRates& closing, LinkMessage* message) {
 }  // namespace
 
 LinkMessage unknown_link(const std::string& name) {
-  return to_message(name, LinkProximity(), Push::unknown(), Wrench::unknown(), {}, "");
+  return to_message(name, LinkProximity(), RepulsiveWrench::unknown(), Wrench::unknown(), {}, "");
 }
 
-LinkMessage to_message(const std::string& name, const LinkProximity& result, const Push& repulsion,
-                       const Wrench& penetration, const ClosingRates& closing,
-                       const std::string& source) {
+LinkMessage to_message(const std::string& name, const LinkProximity& result,
+                       const RepulsiveWrench& repulsion, const Wrench& penetration,
+                       const ClosingRates& closing, const std::string& source) {
   LinkMessage message;
   message.link = name;
   message.state = static_cast<std::uint8_t>(result.state);

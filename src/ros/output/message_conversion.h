@@ -24,7 +24,7 @@ ist_proximity::LinkProximity unknown_link(const std::string& name);
 /// @param penetration  in the fixed frame, about the link's origin
 /// @param source       name of the source of the nearest point; ignored unless NEAR or CONTACT
 ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
-                                        const Push& repulsion, const Wrench& penetration,
+                                        const RepulsiveWrench& repulsion, const Wrench& penetration,
                                         const ClosingRates& closing, const std::string& source);
 
 /// Makes the message of a source.

@@ -81,7 +81,7 @@ bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string
   return false;
 }
 
-void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   poses->reset(now, placer_.size());
   tf_is_behind_ = false;
   placer_.reset();
@@ -93,13 +93,13 @@ void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].has_unstated_pose()) continue;
     joints_.known[j] =
-        look_up_in_tf(kinematics_->links()[joints[j].parent], kinematics_->links()[joints[j].child],
+        look_up_in_tf(kinematics_->bodies()[joints[j].parent], kinematics_->bodies()[joints[j].child],
                       now, instant, &joints_.X_PC[j], &joint_problems_[j]);
   }
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();
   std::string root_problem;
   const bool root_known =
-      look_up_in_tf(fixed_frame_, kinematics_->links()[0], now, instant, &X_FR, &root_problem);
+      look_up_in_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR, &root_problem);
   if (tf_is_behind_) return tf_source_.look_up(now, poses);
   if (!root_known) return poses->set_problem(wanted_, root_problem);
 
@@ -112,10 +112,9 @@ void JointPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
 }
 
 void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                                  std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  if (tf_is_behind_) return tf_source_.look_up_all(kinematics, instant, X_FL, known);
-  *X_FL = placer_.X_FL();
-  *known = placer_.known();
+                                  BodyPoses* bodies) {
+  if (tf_is_behind_) return tf_source_.look_up_all(kinematics, instant, bodies);
+  *bodies = placer_.bodies();
 }
 
 }  // namespace ist

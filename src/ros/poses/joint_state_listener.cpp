@@ -203,8 +203,8 @@ void JointStateListener::put_into_tf(std::size_t joint, const ros::Time& stamp, 
   geometry_msgs::TransformStamped message;
   message.transform = to_message(kinematics_->joint_pose(joint, q));
   message.header.stamp = stamp;
-  message.header.frame_id = kinematics_->links()[at.parent];
-  message.child_frame_id = kinematics_->links()[at.child];
+  message.header.frame_id = kinematics_->bodies()[at.parent];
+  message.child_frame_id = kinematics_->bodies()[at.child];
   try {
     buffer_.setTransform(message, "joint_states", is_static);
   } catch (const std::exception& error) {
@@ -216,7 +216,7 @@ std::vector<std::string> computed_frames(const Kinematics& kinematics) {
   std::vector<std::string> frames;
   for (const Kinematics::Joint& joint : kinematics.joints()) {
     if (joint.has_unstated_pose()) continue;
-    frames.push_back(without_slash(kinematics.links()[joint.child]));
+    frames.push_back(without_slash(kinematics.bodies()[joint.child]));
   }
   return frames;
 }

@@ -14,12 +14,12 @@ namespace ist {
 /// Turns the poses of joints into the poses of the links that a query needs. Not thread safe.
 class LinkPlacer {
  public:
-  /// @param links  names, in the order of LinkPoses
+  /// @param links  names, in the order of StampedLinkPoses
   LinkPlacer(std::shared_ptr<const Kinematics> kinematics, const std::vector<std::string>& links);
 
-  std::size_t size() const { return index_.size(); }  ///< number of links in LinkPoses
+  std::size_t size() const { return index_.size(); }  ///< number of links in StampedLinkPoses
 
-  /// Makes every link of the kinematics unknown.
+  /// Makes every body unknown.
   void reset();
 
   /// @param joints          poses of all joints
@@ -29,17 +29,15 @@ class LinkPlacer {
   /// @param poses           receives the links; its stamp stays
   void place(const JointPoses& joints, const Eigen::Isometry3d& X_FR,
              const std::vector<bool>& wanted, const std::vector<std::string>& joint_problems,
-             LinkPoses* poses);
+             StampedLinkPoses* poses);
 
-  // The last place(), by link of the kinematics.
-  const std::vector<Eigen::Isometry3d>& X_FL() const { return X_FL_; }  ///< valid where known
-  const std::vector<bool>& known() const { return known_; }
+  /// The result of the last place().
+  const BodyPoses& bodies() const { return bodies_; }
 
  private:
   std::shared_ptr<const Kinematics> kinematics_;
-  std::vector<std::size_t> index_;  ///< by link: its index in the kinematics; else the link count
-  std::vector<Eigen::Isometry3d> X_FL_;
-  std::vector<bool> known_;
+  std::vector<std::size_t> index_;  ///< by link: its body; else the number of bodies
+  BodyPoses bodies_;
 };
 
 }  // namespace ist

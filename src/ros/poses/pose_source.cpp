@@ -4,20 +4,20 @@
 
 namespace ist {
 
-void LinkPoses::reset(const ros::Time& now, std::size_t links) {
+void StampedLinkPoses::reset(const ros::Time& now, std::size_t links) {
   stamp = now;
   X_FL.resize(links, Eigen::Isometry3d::Identity());
   known.assign(links, false);
   problems.assign(links, std::string());
 }
 
-void LinkPoses::set_problem(const std::vector<bool>& wanted, const std::string& problem) {
+void StampedLinkPoses::set_problem(const std::vector<bool>& wanted, const std::string& problem) {
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (wanted[i]) problems[i] = problem;
   }
 }
 
-std::size_t LinkPoses::count_known() const {
+std::size_t StampedLinkPoses::count_known() const {
   return static_cast<std::size_t>(std::count(known.begin(), known.end(), true));
 }
 

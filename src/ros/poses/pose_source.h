@@ -8,15 +8,14 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/robot/link_poses.h"
 
 namespace ist {
 
 /// The poses of the links at one common instant.
-struct LinkPoses {
-  ros::Time stamp;                      ///< that instant; now when no link is known
-  std::vector<Eigen::Isometry3d> X_FL;  ///< by link: link frame -> fixed frame; valid where known
-  std::vector<bool> known;              ///< by link
-  std::vector<std::string> problems;    ///< by link: why it is not known; else empty
+struct StampedLinkPoses : LinkPoses {
+  ros::Time stamp;                    ///< that instant; now when no link is known
+  std::vector<std::string> problems;  ///< by link: why it is not known; else empty
 
   /// Makes every link unknown, without a problem.
   void reset(const ros::Time& now, std::size_t links);
@@ -32,15 +31,13 @@ class PoseSource {
 
   /// Looks up the poses of all wanted links.
   /// @param now  the ROS clock's time; 0 (no clock yet) makes every link unknown
-  virtual void look_up(const ros::Time& now, LinkPoses* poses) = 0;
+  virtual void look_up(const ros::Time& now, StampedLinkPoses* poses) = 0;
 
-  /// Looks up the poses of all links at the instant of the last look_up(), links without geometry
-  /// too. Jacobians need them.
+  /// Looks up the poses of all bodies of the robot, links without geometry too, at the instant of
+  /// the last look_up(). Jacobians need them.
   /// @param instant  the stamp that look_up() gave
-  /// @param X_FL     by link of the kinematics: link frame -> fixed frame; valid where known
-  /// @param known    by link of the kinematics
   virtual void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                           std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) = 0;
+                           BodyPoses* bodies) = 0;
 
   /// Names a likely cause for the user whose links have no pose.
   virtual std::string hint() const = 0;

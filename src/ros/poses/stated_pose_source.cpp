@@ -44,12 +44,12 @@ std::string StatedPoseSource::hint() const {
   return "state its position, or provide it on tf or joint_states";
 }
 
-void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   poses->reset(now, placer_.size());
   placer_.reset();
   if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
   const std::string problem =
-      look_up_newest(buffer_, fixed_frame_, kinematics_->links()[0], now, timeout_, &X_FR_);
+      look_up_newest(buffer_, fixed_frame_, kinematics_->bodies()[0], now, timeout_, &X_FR_);
   if (!problem.empty()) return poses->set_problem(wanted_, problem);
 
   kinematics_->place_joints(q_, &joints_);
@@ -58,8 +58,8 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
     const std::string why =
-        look_up_newest(buffer_, kinematics_->links()[joints[j].parent],
-                       kinematics_->links()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
+        look_up_newest(buffer_, kinematics_->bodies()[joints[j].parent],
+                       kinematics_->bodies()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
     joints_.known[j] = why.empty();
     if (!why.empty()) {
       joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
@@ -69,9 +69,8 @@ void StatedPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
 }
 
 void StatedPoseSource::look_up_all(const Kinematics& /*kinematics*/, const ros::Time& /*instant*/,
-                                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  *X_FL = placer_.X_FL();
-  *known = placer_.known();
+                                   BodyPoses* bodies) {
+  *bodies = placer_.bodies();
 }
 
 }  // namespace ist

@@ -39,9 +39,9 @@ class StatedPoseSource : public PoseSource {
   const JointPoses& joints() const { return joints_; }
   const Eigen::Isometry3d& X_FR() const { return X_FR_; }  ///< root link -> fixed frame
 
-  void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
+                   BodyPoses* bodies) override;
   std::string hint() const override;
 
  private:

@@ -29,7 +29,7 @@ bool TfPoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* sta
   return false;
 }
 
-void TfPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
+void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   const std::size_t n = frames_.size();
   poses->reset(now, n);
   if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
@@ -50,12 +50,13 @@ void TfPoseSource::look_up(const ros::Time& now, LinkPoses* poses) {
 }
 
 void TfPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                               std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) {
-  const auto& links = kinematics.links();
-  X_FL->resize(links.size());
-  known->resize(links.size());
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    (*known)[i] = ist::look_up(buffer_, fixed_frame_, links[i], instant, &(*X_FL)[i]).empty();
+                               BodyPoses* bodies) {
+  const auto& names = kinematics.bodies();
+  bodies->X_FB.resize(names.size());
+  bodies->known.resize(names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    bodies->known[i] =
+        ist::look_up(buffer_, fixed_frame_, names[i], instant, &bodies->X_FB[i]).empty();
   }
 }
 

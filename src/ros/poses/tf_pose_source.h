@@ -25,9 +25,9 @@ class TfPoseSource : public PoseSource {
   TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
                std::vector<std::string> link_frames, std::vector<bool> wanted, double timeout);
 
-  void look_up(const ros::Time& now, LinkPoses* poses) override;
+  void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
-                   std::vector<Eigen::Isometry3d>* X_FL, std::vector<bool>* known) override;
+                   BodyPoses* bodies) override;
   std::string hint() const override;
 
  private:

@@ -2,7 +2,7 @@
 
 #include <exception>
 
-#include "ist_proximity/robot/package_resolver.h"
+#include "ist_proximity/robot/robot_description.h"
 #include "ros/services/object_conversion.h"
 
 namespace ist {

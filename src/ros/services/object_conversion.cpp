@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "internal/geometry/mesh_io.h"
+#include "internal/robot/package_resolver.h"
 #include "ist_proximity/geometry/error.h"
 #include "ros/common/eigen_conversion.h"
 

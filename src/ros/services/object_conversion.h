@@ -3,7 +3,7 @@
 #include <ist_proximity/AttachObject.h>
 
 #include "ist_proximity/robot/attached_object.h"
-#include "ist_proximity/robot/package_resolver.h"
+#include "ist_proximity/robot/robot_description.h"
 
 namespace ist {
 

@@ -68,7 +68,7 @@ NamePairs SelfProximity::ignored_pairs() const {
   NamePairs ignored = config_.self_collision.ignore;
   for (const auto& pair : ignored) {
     for (const std::string& name : {pair.first, pair.second}) {
-      if (model_->kinematics->find_link(name)) continue;
+      if (model_->kinematics->find_body(name)) continue;
       ROS_WARN_STREAM("~self_collision/ignore names '" << name
                                                        << "', which is no link of the URDF");
     }
@@ -141,8 +141,8 @@ void SelfProximity::compute_wrenches(const LiveConfig& live) {
   for (std::size_t i = 0; i < results_.size(); ++i) {
     if (results_[i].state != LinkState::kContact) continue;
     const LinkPair& pair = query_->pairs()[i];
-    const ContactBody* first = find_body(live.contacts.get(), robot, pair.first);
-    const ContactBody* second = find_body(live.contacts.get(), robot, pair.second);
+    const ContactGeometry* first = find_contact_geometry(live.contacts.get(), robot, pair.first);
+    const ContactGeometry* second = find_contact_geometry(live.contacts.get(), robot, pair.second);
     const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
     wrenches_[i] = first == nullptr || second == nullptr
                        ? Wrench::unknown()
@@ -214,7 +214,7 @@ void SelfProximity::add_link(std::size_t link, ProximityArray* message) {
   ClosingRates closing =
       speeds_[link].update(poses_.stamp, answer, poses_.X_FL[link], {other_name, 0, 0.0});
   closing.robot = ClosingRates::kNaN;  // both links move, so the speed has no parts
-  message->links.push_back(to_message(robot.links[link].name, answer, Push::unknown(),
+  message->links.push_back(to_message(robot.links[link].name, answer, RepulsiveWrench::unknown(),
                                       penetration(link, answer), closing, other_name));
 }
 

@@ -71,7 +71,7 @@ class SelfProximity {
   std::unique_ptr<PoseSource> pose_source_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
   ros::Time last_now_;
-  LinkPoses poses_;
+  StampedLinkPoses poses_;
   std::vector<PairProximity> results_;
   std::vector<Wrench> wrenches_;  ///< by pair: the wrench on its first link
   std::thread thread_;

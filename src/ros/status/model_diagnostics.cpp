@@ -7,7 +7,7 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-std::string contact_body_text(const ContactBody& body) {
+std::string contact_geometry_text(const ContactGeometry& body) {
   std::string text;
   if (body.has_volume()) {
     text = std::to_string(body.sphere_count) + format_text(" spheres, %.3f l", 1e3 * body.volume) +
@@ -32,9 +32,9 @@ void add_contacts(const ModelState& state, const ContactModel* contacts, bool wa
   for (const std::size_t i : state.monitored) {
     if (!state.robot->links[i].usable()) continue;
     ++usable;
-    if (!is_current || !contacts->bodies[i]) continue;
+    if (!is_current || !contacts->links[i]) continue;
     ++ready;
-    add_value("volume of " + state.robot->links[i].name, contact_body_text(*contacts->bodies[i]),
+    add_value("volume of " + state.robot->links[i].name, contact_geometry_text(*contacts->links[i]),
               status);
   }
   add_value("contact volumes",

@@ -11,7 +11,7 @@ std::string quoted(const std::string& name) { return "'" + name + "'"; }
 
 std::vector<std::string> missing_poses(const RobotModel& robot,
                                        const std::vector<std::size_t>& monitored,
-                                       const LinkPoses& poses, const PoseSource* source) {
+                                       const StampedLinkPoses& poses, const PoseSource* source) {
   std::vector<std::string> sentences, others;
   for (const std::size_t i : monitored) {
     if (poses.problems[i].empty()) continue;
@@ -28,7 +28,7 @@ std::vector<std::string> missing_poses(const RobotModel& robot,
 }
 
 std::string unfiltered_links(const RobotModel& robot, const std::vector<std::size_t>& monitored,
-                             const LinkPoses& poses, const SourceSnapshot& snapshot,
+                             const StampedLinkPoses& poses, const SourceSnapshot& snapshot,
                              const std::string& source) {
   if (snapshot.filtered.empty()) return "";
   std::vector<std::string> unfiltered;

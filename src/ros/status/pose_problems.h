@@ -15,12 +15,12 @@ namespace ist {
 /// @param source  of the poses; may be null
 std::vector<std::string> missing_poses(const RobotModel& robot,
                                        const std::vector<std::size_t>& monitored,
-                                       const LinkPoses& poses, const PoseSource* source);
+                                       const StampedLinkPoses& poses, const PoseSource* source);
 
 /// Names the links with a pose whose own points are still in a cloud, because the self-filter had
 /// no pose for them at the cloud's stamp; empty when there are none.
 std::string unfiltered_links(const RobotModel& robot, const std::vector<std::size_t>& monitored,
-                             const LinkPoses& poses, const SourceSnapshot& snapshot,
+                             const StampedLinkPoses& poses, const SourceSnapshot& snapshot,
                              const std::string& source);
 
 }  // namespace ist

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "internal/geometry/mesh_io.h"
+#include "internal/robot/package_resolver.h"
 #include "internal/robot/urdfdom_parser.h"
 #include "ist_proximity/geometry/error.h"
 

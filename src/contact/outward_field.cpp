@@ -1,4 +1,4 @@
-#include "way_out.h"
+#include "contact/outward_field.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 namespace ist {
 namespace {
 
-constexpr double kSamples = 3000.0;    // per link, about
+constexpr double kSamples = 3000.0;    // of a link, about
 constexpr int kMostHalvings = 20;      // of a triangle
 constexpr double kTessellated = 0.02;  // of a primitive's size: deviation of its samples
 // The mean over a plane, of directions at an angle to its normal, is 2/3 of unit length.
@@ -33,11 +33,11 @@ struct Sum {
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
   double area = 0.0;
 };
-// By cell, and the side that the triangle looks to, so that a thin plate keeps both.
+// By cell, and the side that the triangle faces, so that a thin plate keeps both.
 using Cells = std::map<std::tuple<std::int64_t, std::int64_t, std::int64_t, int>, Sum>;
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-// Halves the longest edge until it is no longer than a cell.
+// Adds a triangle to the cells: halves the longest edge until it is no longer than a cell.
 void gather(const Corners& corners, int side, double area, double spacing, int halvings,
             Cells* cells) {
   std::size_t longest = 0;
@@ -77,7 +77,7 @@ double area_of(const TriangleMesh& mesh) {
 
 }  // namespace
 
-WayOut::WayOut(const LinkGeometry& geometry, const Solid& solid) {
+OutwardField::OutwardField(const LinkGeometry& geometry, const Solid& solid) {
   std::vector<TriangleMesh> meshes;
   double area = 0.0;
   for (const GeometryElement& element : geometry) {
@@ -88,20 +88,20 @@ WayOut::WayOut(const LinkGeometry& geometry, const Solid& solid) {
   if (!(spacing_ > 0.0)) return;
   for (std::size_t e = 0; e < geometry.size(); ++e) add(meshes[e], geometry[e].X_LE);
   if (geometry.size() < 2) return;
-  std::size_t kept = 0;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < x_.size(); ++i) {
     const Eigen::Vector3d p(x_[i], y_[i], z_[i]);
     if (solid.signed_distance(p).distance < -spacing_) continue;
-    x_[kept] = x_[i];
-    y_[kept] = y_[i];
-    z_[kept] = z_[i];
-    area_[kept++] = area_[i];
+    x_[count] = x_[i];
+    y_[count] = y_[i];
+    z_[count] = z_[i];
+    area_[count++] = area_[i];
   }
-  for (std::vector<float>* values : {&x_, &y_, &z_, &area_}) values->resize(kept);
+  for (std::vector<float>* values : {&x_, &y_, &z_, &area_}) values->resize(count);
 }
 
-// Large triangles become many samples, small ones that look to the same side are gathered in cells.
-void WayOut::add(const TriangleMesh& mesh, const Eigen::Isometry3d& X_LE) {
+// Large triangles become many samples, small ones that face the same side are gathered in cells.
+void OutwardField::add(const TriangleMesh& mesh, const Eigen::Isometry3d& X_LE) {
   Cells cells;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Corners corners = {X_LE * mesh.corner(t, 0), X_LE * mesh.corner(t, 1),
@@ -122,9 +122,9 @@ void WayOut::add(const TriangleMesh& mesh, const Eigen::Isometry3d& X_LE) {
   }
 }
 
-Eigen::Vector3d WayOut::operator()(const Eigen::Vector3d& p_L) const {
+Eigen::Vector3d OutwardField::at(const Eigen::Vector3d& p_L) const {
   const Eigen::Vector3f p = p_L.cast<float>();
-  // Nearer than samples are to each other, single ones shall not decide.
+  // Softens the weight at distances below the spacing, so that no single sample decides.
   const auto soft = static_cast<float>(0.25 * spacing_ * spacing_);
   float sx = 0.0F, sy = 0.0F, sz = 0.0F, all = 0.0F;
   const auto scale = static_cast<float>(spacing_ * spacing_);
@@ -143,12 +143,12 @@ Eigen::Vector3d WayOut::operator()(const Eigen::Vector3d& p_L) const {
          Eigen::Vector3f(sx, sy, sz).cast<double>();
 }
 
-Eigen::Matrix3d WayOut::slope(const Eigen::Vector3d& center, double radius) const {
+Eigen::Matrix3d OutwardField::gradient(const Eigen::Vector3d& center, double radius) const {
   const double step = 0.5 * radius;
   Eigen::Matrix3d result;
   for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d to = step * Eigen::Vector3d::Unit(axis);
-    result.col(axis) = ((*this)(center + to) - (*this)(center - to)) / (2.0 * step);
+    const Eigen::Vector3d offset = step * Eigen::Vector3d::Unit(axis);
+    result.col(axis) = (at(center + offset) - at(center - offset)) / (2.0 * step);
   }
   return result;
 }

@@ -1,0 +1,80 @@
+#include "contact/overlap_weight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "contact/lens.h"
+#include "internal/bvh/box_node.h"
+#include "internal/bvh/traversal_stack.h"
+#include "internal/cloud/point_bvh.h"
+#include "ist_proximity/contact/contact_volume.h"
+
+namespace ist {
+namespace {
+
+// Sixteen numbers side by side; Eigen turns them into SIMD, square roots included.
+using Lanes = Eigen::Array<float, kPointWidth, 1>;
+using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
+
+Lanes squared_distance(const BoxNode& node, const Eigen::Vector3f& p) {
+  const auto gap = [](const float* min, const float* max, float v) {
+    return Lanes((LaneMap(min) - v).max(v - LaneMap(max)).max(0.0F));
+  };
+  const Lanes x = gap(node.min_x, node.max_x, p.x());
+  const Lanes y = gap(node.min_y, node.max_y, p.y());
+  const Lanes z = gap(node.min_z, node.max_z, p.z());
+  return x * x + y * y + z * z;
+}
+
+// The volumes of the lenses between sixteen spheres of radius R and one of radius r, summed; over
+// pi / 12. Unused slots are far away and add nothing.
+float lens_sum(const PointTile& tile, const Eigen::Vector3f& p, float R, float r) {
+  const Lanes x = p.x() - LaneMap(tile.x), y = p.y() - LaneMap(tile.y), z = p.z() - LaneMap(tile.z);
+  const Lens<Lanes> lens(Lanes::Constant(R + r), Lanes::Constant(R - r),
+                         (x * x + y * y + z * z).sqrt());
+  return (lens.thickness.square() * lens.factor).sum();
+}
+
+// Adds those of all points of an index to `sum`.
+void add_lenses(const PointBvh& index, const Eigen::Vector3f& p, float R, float r, float* sum) {
+  if (index.empty()) return;
+  const float touch_sq = (R + r) * (R + r);
+  PointTile buffer;
+  TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
+  stack.push(index.root());
+  while (!stack.empty()) {
+    const std::int32_t child = stack.pop();
+    if (child < 0) {
+      *sum += lens_sum(index.tile(static_cast<std::size_t>(~child), &buffer), p, R, r);
+      continue;
+    }
+    const BoxNode& node = index.nodes()[static_cast<std::size_t>(child)];
+    const Lanes squared = squared_distance(node, p);
+    for (int k = 0; k < node.count; ++k) {
+      if (squared[k] < touch_sq) stack.push(node.child[k]);
+    }
+  }
+}
+
+}  // namespace
+
+double point_sphere_radius(const CloudSnapshot& cloud) {
+  return kPointSphereRadius * cloud.thinning;
+}
+
+double overlap_weight(const Eigen::Vector3d& p_F, double radius, SnapshotSpan clouds) {
+  const auto r = static_cast<float>(radius);
+  float sum = 0.0F;
+  for (const CloudSnapshot* cloud : clouds) {
+    const PointBvh& index = cloud->coarse.bvh();
+    const auto R = static_cast<float>(point_sphere_radius(*cloud));
+    const Eigen::Vector3f p =
+        (index.X_FO().linear().transpose() * (p_F - index.X_FO().translation())).cast<float>();
+    add_lenses(index, p, R, r, &sum);
+  }
+  const float own = 16.0F * r * r * r;                   // the sphere's own volume, over pi / 12
+  return static_cast<double>(own / std::max(sum, own));  // rounding could make its own lens less
+}
+
+}  // namespace ist

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "ist_proximity/geometry/solid.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// The smallest signed distance of the points of a link A to a link B: best-first branch and bound
+/// in A's tree for the lower bound, alternating projections for the upper bound. See SelfQuery.
+class LinkPairSearch {
+ public:
+  /// A part of A's tree that is still to be visited.
+  struct Entry {
+    double bound;        ///< [m] lower bound of the distance of the points of A that it covers
+    std::int32_t child;  ///< >= 0: inner node; < 0: leaf ~child
+    bool operator<(const Entry& other) const { return bound > other.bound; }  ///< least on top
+  };
+
+  /// @param config  outlives the search; max_distance and tolerance are read
+  /// @param queue   scratch that is reused
+  LinkPairSearch(const LinkModel& a, const LinkModel& b, const Eigen::Isometry3d& X_BA,
+                 const QueryConfig& config, std::vector<Entry>* queue);
+
+  void run();
+
+  double lower_bound() const { return lower_bound_; }                ///< [m]
+  double distance() const { return closest_.distance; }              ///< [m] upper bound
+  const Eigen::Vector3d& p_BCa() const { return p_BCa_; }            ///< [m] witness on A
+  const Eigen::Vector3d& p_BCb() const { return closest_.witness; }  ///< [m] on B
+  const Eigen::Vector3d& normal_B() const { return closest_.normal; }
+
+ private:
+  double interior_allowance() const;
+  double prune_bound() const;
+  double cover_bound(const Eigen::Vector3d& p_B, double radius) const;
+  void push(const Eigen::Vector3d& p_A, double radius, std::int32_t child);
+  void prune(double bound);
+  void visit_leaf(const SphereLeaf& leaf);
+  void search_deeper(const Eigen::Vector3d& p_A, const SignedDistance& measured, double inner);
+  void project_alternately(Eigen::Vector3d q_B);
+  void set_closest(const Eigen::Vector3d& p_B, const SignedDistance& measured);
+
+  const LinkModel &a_, &b_;
+  const Eigen::Isometry3d X_BA_, X_AB_;
+  const QueryConfig& config_;
+  const bool has_holes_;
+  std::vector<Entry>& queue_;  // a heap
+  double lower_bound_ = std::numeric_limits<double>::infinity();
+  SignedDistance closest_;  // of p_BCa_
+  Eigen::Vector3d p_BCa_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace ist
