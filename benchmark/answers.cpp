@@ -14,6 +14,7 @@
 
 #include "answers/answer_file.h"
 #include "answers/scenes.h"
+#include "internal/geometry/mesh_io.h"
 #include "internal/packing/packer.h"
 #include "support/box_oracle.h"
 #include "support/hard_scenes.h"
@@ -29,21 +30,31 @@ constexpr double kTolerances[] = {0.0, 0.001, 0.005};  // [m]
 constexpr int kStepsPerCloud = 100;
 constexpr int kRandomRounds = 60;
 
-// Meshes of every kind in every order: closed, concave, with holes, of triangles that cross.
-void write_packings(AnswerFile* out) {
-  ist::test::Rng rng(1);
-  const std::vector<ist::LinkGeometry> links = ist::test::random_links(&rng);
+// Packs a shape in every order.
+void write_packings(const std::string& name, const ist::Shape& shape, double max_error,
+                    AnswerFile* out) {
   for (const auto order :
        {ist::PackingOrder::kMedial, ist::PackingOrder::kDisjoint, ist::PackingOrder::kVolume}) {
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      ist::PackingConfig config;
-      config.max_error = 0.003;
-      config.max_spheres = 1500;
-      config.order = order;
-      ist::benchmark::write_packing(
-          "order " + std::to_string(static_cast<int>(order)) + " shape " + std::to_string(i),
-          ist::pack_element(links[i][0].shape, config), out);
-    }
+    ist::PackingConfig config;
+    config.max_error = max_error;
+    config.max_spheres = 1500;
+    config.order = order;
+    ist::benchmark::write_packing(name + " order " + std::to_string(static_cast<int>(order)),
+                                  ist::pack_element(shape, config), out);
+  }
+}
+
+// The shapes are closed, concave, with holes, of triangles that cross, and the Panda's.
+void write_packings(const std::filesystem::path& data, AnswerFile* out) {
+  ist::test::Rng rng(1);
+  const std::vector<ist::LinkGeometry> links = ist::test::random_links(&rng);
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    write_packings("shape " + std::to_string(i), links[i][0].shape, 0.003, out);
+  }
+  for (std::size_t i = 0; i + 1 < ist::test::kPandaLinks; ++i) {
+    const std::string name = ist::test::panda_mesh(i);
+    const auto file = data / "robots/franka_description/meshes/visual" / (name + ".dae");
+    write_packings(name, ist::load_mesh(file.string()), 0.005, out);
   }
 }
 
@@ -201,7 +212,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   AnswerFile out(file);
-  write_packings(&out);
+  write_packings(data, &out);
   write_hard_scenes(&out);
   write_random_links(&out);
   const auto scenes = ist::benchmark::truth_scenes(data);
