@@ -16,9 +16,9 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr double kStep = 0.001;       // [m] that no point of the robot is moved farther in
-constexpr double kSpacing = 0.005;    // [m] about, between the points on analytic obstacles
-constexpr double kNeighbours = 0.03;  // [m] pixels nearer to each other are on one surface
+constexpr double kStep = 0.001;       // [m] largest movement of any point of the robot
+constexpr double kSpacing = 0.005;    // [m] approximate, between points on analytic obstacles
+constexpr double kNeighbours = 0.03;  // [m] nearer pixels belong to one surface
 
 CloudSnapshot ingested(const Points& points) {
   IngestConfig config;
@@ -42,7 +42,7 @@ CloudSnapshot ingested(const Points& points) {
   return cloud;
 }
 
-// Half of the points, all, and twice as many.
+// Makes the snapshots with half of the points, all, and twice as many.
 void set_clouds(const Points& twice, MovingScene* scene) {
   Points all, half;
   for (std::size_t i = 0; i < twice.size(); ++i) {
@@ -62,7 +62,7 @@ Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b
   return X;
 }
 
-// Through way points, in steps of at most kStep for every vertex.
+// Moves through waypoints in steps of at most kStep for every vertex.
 void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingScene* scene) {
   std::vector<Points> corners;
   for (const LinkDescription& link : scene->robot.links) {
@@ -81,7 +81,7 @@ void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingSce
             std::max(farthest, (way[k][i] * corners[i][c] - way[k + 1][i] * corners[i][c]).norm());
       }
     }
-    // A fifth more: along the arc a point moves a little more than along its chord.
+    // A fifth more steps: a point moves a little farther along an arc than along its chord.
     const int count = std::max(1, static_cast<int>(std::ceil(1.2 * farthest / kStep)));
     for (int s = 0; s < count; ++s) {
       std::vector<Eigen::Isometry3d> X_FL;
@@ -101,7 +101,7 @@ Eigen::Isometry3d pose(const Eigen::Vector3d& p, const Eigen::Vector3d& turn) {
   return X;
 }
 
-// Points of a surface u, v in [0, 1]^2 of the given area, at random, the same for every run.
+// Random points of a surface u, v in [0, 1]^2 with the given area, the same in every run.
 void add_surface(double area, const std::function<Eigen::Vector3d(double, double)>& surface,
                  std::mt19937_64* rng, Points* twice) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -177,7 +177,7 @@ std::vector<MovingScene> analytic_scenes() {
       analytic("bar into a corner", bar, points,
                {pose({0.45, 0.4, 0.2}, {0, 0, 0.5}), pose({0.25, 0.15, 0.1}, {0.5, 0, 0}),
                 pose({0.2, 0.4, 0.3}, {0.5, 0.7, 0.9})}));
-  // Down into the plate, along it and round, and up again.
+  // The link moves down into the plate, along it while it turns, and up again.
   points.clear();
   add_plate({0, 0, 0}, 0.6 * x, 0.6 * y, &rng, &points);
   scenes.push_back(
@@ -220,7 +220,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
           GeometryElement{load_mesh(mesh.string()), Eigen::Isometry3d::Identity(), mesh.string()}};
       scene.robot.links.push_back(std::move(link));
     }
-    // Twice the points: one more between each two neighbours of a row that are on one surface.
+    // Twice the points: one more between any two neighbours of a row on one surface.
     const auto pixels = test::read_pcd((data / "clouds" / (std::string(name) + ".pcd")).string());
     Points all, half, twice;
     for (std::size_t i = 0; i < pixels.size(); ++i) {

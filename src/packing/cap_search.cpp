@@ -21,7 +21,7 @@ constexpr std::size_t kMaxCaps = 50000;
 constexpr int kMaxSteps = 12;
 constexpr double kMinStep = 0.05;  // share of the distance to the mesh
 constexpr double kMaxLag = 0.2;    // share of a step by which the distance may fall short of it
-// Where openings are searched across a cap, as shares of its distance to the mesh.
+// Openings are searched across a cap at these shares of its distance to the mesh.
 constexpr double kOffsets[] = {0.02, 0.15, 0.4};
 constexpr int kBisections = 5;
 

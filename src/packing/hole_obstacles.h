@@ -14,10 +14,11 @@ namespace ist {
 /// A point is outside where the generalized winding number is at most 0.5. In a hole the inside
 /// therefore ends without a triangle, at its opening: the part of the isosurface 0.5 that is off
 /// the mesh. Let D(p) be the distance from p to the mesh. A sphere (c, r) comes too near to a point
-/// p outside if |p - c| - r < D(p). From p towards c the left side falls by the length moved and
-/// the right side by no more, so it is enough that no point x of an opening has |x - c| - r < D(x),
-/// and that no triangle enters the sphere. Hence the spheres (x, D(x)) about all points of the
-/// openings are obstacles to inner spheres. A few larger spheres stand for them here.
+/// p outside if |p - c| - r < D(p). On the way from p to c the
+/// first side falls by the length of the way and the second by no more, so it is enough that no
+/// point x of an opening has |x - c| - r < D(x), and that no triangle enters the sphere. Hence the
+/// spheres (x, D(x)) about all points of the openings are obstacles to inner spheres. A few larger
+/// spheres stand for them here.
 ///
 /// Openings are searched at first where triangles (caps) would close the holes. Open meshes that
 /// are not surfaces with holes (flaps, parts that overlap) have openings elsewhere, too: admits()

@@ -10,7 +10,7 @@
 namespace ist {
 namespace {
 
-// Where a hole admits no inner sphere, the cover sphere has this share of the distance to the mesh,
+// The cover sphere has this share of the distance to the mesh where a hole admits no inner sphere,
 // or of the wanted gap if that is larger.
 constexpr double kHoleCoverRadius = 0.5;
 

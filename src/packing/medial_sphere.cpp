@@ -98,7 +98,7 @@ MedialSphere MedialSphereFinder::near_surface(const Eigen::Vector3d& s,
   const double step = 1e-3 * gap;
   const bool behind = bvh_.is_inside(s - step * normal);
   const bool before = bvh_.is_inside(s + step * normal);
-  // Where s is within a hole obstacle, no sphere comes nearer to s than its depth there.
+  // No sphere comes nearer to s than the depth of s in a hole obstacle.
   const double depth = -holes_.nearest(s, 0.0).distance;
   MedialSphere best = nothing;
   // A gap larger than the part's thickness can lead to its other side; a smaller gap follows.

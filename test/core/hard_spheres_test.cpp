@@ -17,7 +17,7 @@ namespace {
 
 using Point = Eigen::Vector3d;
 
-// A link that is the union of some spheres, packed with exactly those.
+// A link that is a union of spheres, packed with exactly these spheres.
 struct SphereLink {
   std::vector<InnerSphere> spheres;
 
@@ -57,7 +57,7 @@ struct SphereLink {
   }
 };
 
-// `gap` [m] between inner and outer radius.
+// @param gap  [m] cover radius less inner radius
 double nearest_sphere(const std::vector<InnerSphere>& spheres, const Point& p, bool outer) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const InnerSphere& sphere : spheres) {

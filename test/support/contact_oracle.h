@@ -18,7 +18,7 @@
 /// Contact volumes by brute force in double: all spheres of the link against all of the obstacle.
 namespace ist::test {
 
-/// A sphere of a contact body, taken out of its leaves.
+/// A sphere of a contact body, copied from its leaves.
 struct OracleSphere {
   Eigen::Vector3d center;  ///< [m] link frame
   double radius, share;
@@ -55,7 +55,8 @@ inline Eigen::Vector3d oracle_lens_middle(const Eigen::Vector3d& a, double R,
   return a + 0.5 * (low + high) / d * (b - a);
 }
 
-/// pi s^2 (...) / 12 d with the smaller sphere where the other one holds it, as the formula stands.
+/// Volume of the lens of two spheres, pi s^2 (...) / 12 d; the smaller sphere's volume if the other
+/// one contains it.
 inline double oracle_lens(double R, double r, double d) {
   if (d >= R + r) return 0.0;
   if (d <= std::abs(R - r)) return 4.0 * M_PI / 3.0 * std::pow(std::min(R, r), 3);
@@ -88,7 +89,7 @@ inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
   return points;
 }
 
-/// How much of a sphere's weight its depth in the link leaves.
+/// The share of a point sphere's weight that counts at its depth in the link.
 inline double oracle_depth_weight(const LinkModel& link, const Eigen::Vector3d& p_L,
                                   double radius) {
   double depth = 0.0;
@@ -122,7 +123,7 @@ inline ContactVolume oracle_contact(const LinkModel& link, const ContactBody& bo
   return sum;
 }
 
-/// Of two links, all spheres against all.
+/// The contact volume of two links: all spheres against all.
 inline ContactVolume oracle_contact(const ContactBody& a, const ContactBody& b,
                                     const Eigen::Isometry3d& X_AB) {
   ContactVolume sum;
@@ -147,7 +148,7 @@ inline ContactVolume oracle_contact(const ContactBody& a, const ContactBody& b,
   return sum;
 }
 
-/// Points as a sensor at the origin would deliver them, thinned.
+/// A snapshot of points with its thinned cloud, as from a sensor at the origin.
 inline CloudSnapshot thinned(const std::vector<Eigen::Vector3d>& points, double thinning = 0.01,
                              const Eigen::Vector3d& far = Eigen::Vector3d::Zero()) {
   std::vector<double> xyz;

@@ -13,14 +13,14 @@
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 
-/// Robots of primitives that move among points, and when they first touch one, by dense sampling.
+/// Robots of primitives that move among points, and their first contact by dense sampling.
 namespace ist::test {
 
 struct Arm {
   std::shared_ptr<const RobotModel> model;
   std::shared_ptr<const Kinematics> kinematics;
   std::vector<LinkGeometry> links;  ///< by link of the model
-  std::vector<std::size_t> places;  ///< by link of the model: where the kinematics has it
+  std::vector<std::size_t> places;  ///< by link of the model: its index in the kinematics
   std::size_t size() const { return links.size(); }
 };
 
@@ -61,7 +61,7 @@ inline Arm random_arm(Rng* rng) {
   return arm;
 }
 
-/// Where the links of the kinematics are, `time` [s] after the start.
+/// The poses of the kinematics' links `time` [s] after the start.
 inline std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& motion,
                                                     double time) {
   const auto& joints = arm.kinematics->joints();
@@ -82,19 +82,19 @@ inline std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMot
   return X_FL;
 }
 
-/// For 0.5 to 2 s, each joint up to 1.5 rad or 0.5 m, or standing still; five points or fewer, some
-/// of them in the way.
+/// A motion of 0.5 to 2 s. Each joint moves by up to 1.5 rad or 0.25 m, or stands still. Up to five
+/// points, some of them in the path of a link.
 inline ArmMotion random_motion(Rng* rng, const Arm& arm) {
   ArmMotion motion;
   motion.joints.duration = uniform(rng, 0.5, 2.0);
   motion.X_FR = random_pose(rng, 0.5);
   std::vector<double> q;
   for (const Kinematics::Joint& joint : arm.kinematics->joints()) {
-    const double way = joint.type == JointType::kPrismatic ? 0.25 : 1.5;
+    const double range = joint.type == JointType::kPrismatic ? 0.25 : 1.5;
     q.push_back(uniform(rng, -1, 1));
     const bool stands = uniform(rng, 0, 1) < 0.2;
     motion.joints.from.push_back(stands ? std::nan("") : q.back());
-    motion.joints.to.push_back(stands ? std::nan("") : q.back() + uniform(rng, -way, way));
+    motion.joints.to.push_back(stands ? std::nan("") : q.back() + uniform(rng, -range, range));
   }
   arm.kinematics->place_joints(q, &motion.still);
   for (std::size_t j = 0; j < q.size(); ++j) {
@@ -122,9 +122,9 @@ inline double sampled_distance(const Arm& arm, const ArmMotion& motion, double t
   return smallest;
 }
 
-/// [s] The first contact that samples every half millisecond find, then bisection between the last
-/// sample without and the first one with contact; +inf without any. Far from all points some
-/// samples are spared: nothing here is faster than 40 m/s.
+/// The first contact [s], +inf without any. It is sampled every half millisecond, then found by
+/// bisection between the last sample without and the first one with contact. Samples far from all
+/// points are skipped: no link is faster than 40 m/s.
 inline double sampled_impact(const Arm& arm, const ArmMotion& motion) {
   constexpr double kStep = 5e-4, kFastest = 40.0;
   const auto in_contact = [&](double time) { return sampled_distance(arm, motion, time) <= 0.0; };

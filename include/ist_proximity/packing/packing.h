@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// Which spheres a packing takes, and in what order.
+/// The choice of a packing's spheres and their order.
 enum class PackingOrder {
   /// Spheres near the medial axis that may overlap, where the gap is largest first. Takes the
   /// fewest
@@ -41,7 +41,7 @@ struct InnerSphere {
   double cover_radius;  ///< [m] >= 0 and >= radius; the difference is this sphere's gap
 };
 
-/// What is certified of a packing: upper bounds that hold for every point, not for samples.
+/// Upper bounds that are proven for every point of a link, not only for samples.
 struct PackingCertificate {
   double max_gap = 0.0;       ///< [m] no surface point is farther from the inner spheres
   double mean_gap = 0.0;      ///< [m] area-weighted mean of the upper bounds of surface patches

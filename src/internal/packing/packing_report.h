@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// What is measured of a packing, for people: by samples, not certified.
+/// Measurements of a packing for people. They come from samples and are not certified.
 struct PackingReport {
   double solid_volume = 0.0;   ///< [m^3] to about 0.5 %
   double filled_volume = 0.0;  ///< [m^3] of the union of the inner spheres
