@@ -89,10 +89,10 @@ void BySpheres::query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<An
       if (max_distance <= 0.0 || !nearest(center, max_distance, &found) ||
           found.distance >= max_distance)
         continue;
-      const Eigen::Vector3d way = found.p_FCo - center;
-      const double length = way.norm();
-      const Eigen::Vector3d direction =
-          length > 0.0 ? Eigen::Vector3d(way / length) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+      const Eigen::Vector3d offset = found.p_FCo - center;
+      const double length = offset.norm();
+      const Eigen::Vector3d direction = length > 0.0 ? Eigen::Vector3d(offset / length)
+                                                     : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
       best = {found.distance - sphere.radius, center + sphere.radius * direction, found.p_FCo};
     }
   }

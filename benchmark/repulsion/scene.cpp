@@ -63,7 +63,7 @@ Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b
 }
 
 // Moves through waypoints in steps of at most kStep for every vertex.
-void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingScene* scene) {
+void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& waypoints, MovingScene* scene) {
   std::vector<Points> corners;
   for (const LinkDescription& link : scene->robot.links) {
     Points points;
@@ -73,12 +73,13 @@ void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingSce
     }
     corners.push_back(std::move(points));
   }
-  for (std::size_t k = 0; k + 1 < way.size(); ++k) {
+  for (std::size_t k = 0; k + 1 < waypoints.size(); ++k) {
     double farthest = 0.0;
     for (std::size_t i = 0; i < corners.size(); ++i) {
       for (std::size_t c = 0; c < corners[i].size(); c += 1 + corners[i].size() / 500) {
-        farthest =
-            std::max(farthest, (way[k][i] * corners[i][c] - way[k + 1][i] * corners[i][c]).norm());
+        farthest = std::max(
+            farthest,
+            (waypoints[k][i] * corners[i][c] - waypoints[k + 1][i] * corners[i][c]).norm());
       }
     }
     // A fifth more steps: a point moves a little farther along an arc than along its chord.
@@ -86,7 +87,8 @@ void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingSce
     for (int s = 0; s < count; ++s) {
       std::vector<Eigen::Isometry3d> X_FL;
       for (std::size_t i = 0; i < corners.size(); ++i) {
-        X_FL.push_back(between(way[k][i], way[k + 1][i], static_cast<double>(s) / count));
+        X_FL.push_back(
+            between(waypoints[k][i], waypoints[k + 1][i], static_cast<double>(s) / count));
       }
       scene->steps.push_back(std::move(X_FL));
       scene->begins.push_back(k == 0 && s == 0);
@@ -131,13 +133,13 @@ RobotDescription one_link(const std::string& name, const TriangleMesh& mesh) {
 }
 
 MovingScene analytic(const std::string& name, const TriangleMesh& mesh, const Points& twice,
-                     const std::vector<Eigen::Isometry3d>& way) {
+                     const std::vector<Eigen::Isometry3d>& waypoints) {
   MovingScene scene;
   scene.name = name;
   scene.robot = one_link(name, mesh);
   set_clouds(twice, &scene);
   std::vector<std::vector<Eigen::Isometry3d>> links;
-  for (const Eigen::Isometry3d& X : way) links.push_back({X});
+  for (const Eigen::Isometry3d& X : waypoints) links.push_back({X});
   set_steps(links, &scene);
   scene.reference_count = scene.steps.size();
   return scene;
@@ -190,7 +192,7 @@ std::vector<MovingScene> analytic_scenes() {
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
   const test::Npy poses = test::read_npy((data / "poses/traj.npy").string());
   constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 25, kWidth = 640;
-  std::vector<std::vector<Eigen::Isometry3d>> way(kPoses);
+  std::vector<std::vector<Eigen::Isometry3d>> waypoints(kPoses);
   for (std::size_t k = 0; k < kPoses; ++k) {
     for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
       Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
@@ -199,7 +201,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
             poses.values.at((k * test::kPandaLinks + link) * 12 + static_cast<std::size_t>(i));
       }
       X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-      way[k].push_back(X);
+      waypoints[k].push_back(X);
     }
   }
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
@@ -237,7 +239,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
     scene.half = ingested(half);
     scene.twice = ingested(twice);
     for (std::size_t k = 0; k < kStretches; ++k) {
-      const auto first = way.begin() + static_cast<std::ptrdiff_t>(k * kPoses / kStretches);
+      const auto first = waypoints.begin() + static_cast<std::ptrdiff_t>(k * kPoses / kStretches);
       set_steps({first, first + kLength}, &scene);
     }
     scene.reference_begin = scene.steps.size() / 2;

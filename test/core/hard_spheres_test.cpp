@@ -82,9 +82,10 @@ Point random_point(test::Rng* rng, const SphereLink& link) {
   const auto i =
       static_cast<std::size_t>(test::uniform(rng, 0, 1) * static_cast<double>(link.spheres.size()));
   const InnerSphere& sphere = link.spheres[i];
-  const double reach = sphere.radius * std::pow(10.0, test::uniform(rng, -3, 1));
-  return sphere.center + test::random_vector(rng, 1.0).normalized() *
-                             (test::uniform(rng, 0, 1) < 0.5 ? reach : sphere.radius + 0.1 * reach);
+  const double distance = sphere.radius * std::pow(10.0, test::uniform(rng, -3, 1));
+  return sphere.center +
+         test::random_vector(rng, 1.0).normalized() *
+             (test::uniform(rng, 0, 1) < 0.5 ? distance : sphere.radius + 0.1 * distance);
 }
 
 void expect_tree(const SphereLink& link, test::Rng* rng, int points) {

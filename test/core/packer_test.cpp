@@ -343,16 +343,16 @@ TEST(PackMesh, ReportsProgressAndStopsWhenTold) {
 }
 
 // A mesh in millimetres takes minutes. After a request to stop, no later step may start.
-TEST(PackMesh, DoesNothingMoreOnceItIsTold) {
+TEST(PackMesh, DoesNothingMoreAfterARequestToStop) {
   for (const double stop_at : {0.0, 0.3, 0.6, 0.9}) {
     int calls_after = 0;
-    bool told = false;
+    bool has_asked = false;  // to stop
     const Packing stopped = pack_mesh(test::l_shape(0.2, 0.05), {}, [&](double fraction) {
-      calls_after += told ? 1 : 0;
-      told = told || fraction >= stop_at;
-      return !told;
+      calls_after += has_asked ? 1 : 0;
+      has_asked = has_asked || fraction >= stop_at;
+      return !has_asked;
     });
-    EXPECT_TRUE(told);
+    EXPECT_TRUE(has_asked);
     EXPECT_EQ(calls_after, 0) << stop_at;
     EXPECT_GT(stopped.certificate.interior_gap, 0.1) << stop_at;
   }

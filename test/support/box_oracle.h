@@ -78,9 +78,10 @@ inline double oracle_box_distance(const TriangleMesh& mesh, const PlacedBox& pla
     const std::array<Eigen::Vector3d, 3> tri = {mesh.corner(t, 0), mesh.corner(t, 1),
                                                 mesh.corner(t, 2)};
     if (placed.contains(tri[0])) return 0.0;
-    const double reach = std::max((tri[1] - tri[0]).norm(), (tri[2] - tri[0]).norm());
+    const double longest_edge = std::max((tri[1] - tri[0]).norm(), (tri[2] - tri[0]).norm());
     const Eigen::Vector3d middle = placed.X * placed.box.center();
-    if ((tri[0] - middle).norm() - reach - 0.5 * placed.box.sizes().norm() > nearest) continue;
+    if ((tri[0] - middle).norm() - longest_edge - 0.5 * placed.box.sizes().norm() > nearest)
+      continue;
     for (const auto& side : sides) {
       for (std::size_t i = 0; i < 3; ++i) {
         nearest = std::min(nearest, oracle_triangle(tri[i], side[0], side[1], side[2]));

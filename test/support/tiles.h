@@ -7,11 +7,11 @@
 
 namespace ist::test {
 
-/// All tiles of an index, whether they have been loaded or not.
+/// All tiles of an index, whether a query has looked at them or not.
 inline std::vector<PointTile> tiles_of(const PointIndex& index) {
   std::vector<PointTile> tiles(index.tile_count());
-  PointTile buffer;
-  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = index.tile(i, &buffer);
+  PointTile room;
+  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = index.tile(i, &room);
   return tiles;
 }
 
