@@ -1,4 +1,4 @@
-// Error of the published distances against exact truth, as a Markdown table.
+// Errors of published distances against the exact truth, as a Markdown table.
 //
 // Needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
 // Usage: accuracy [--update-doc README.md] [max_error_mm ...]

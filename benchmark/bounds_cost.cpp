@@ -1,5 +1,5 @@
-// What the bounds cost, as a Markdown table: a query that wants no more than some point's distance,
-// against ones that narrow it down, in free space and in contact.
+// Cost of tight bounds, as a Markdown table: queries that need only an upper bound against queries
+// to a tolerance, in free space and in contact.
 //
 // Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: bounds_cost [max_error_mm]
 
@@ -22,7 +22,8 @@ struct Mode {
   double tolerance;  // [m]
 };
 
-// With a tolerance beyond all distances the first point found will do; contact is decided still.
+// With a tolerance above all distances the first point found suffices, but contact is still
+// decided.
 constexpr Mode kModes[] = {
     {"upper bound only", 100.0}, {"5 mm", 0.005}, {"1 mm", 0.001}, {"exact", 0.0}};
 

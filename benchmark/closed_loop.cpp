@@ -1,9 +1,9 @@
-// Does a robot that follows the answers dodge? 50 seeded scenes in the simulator, each without
-// avoidance, with the blended repulsion, and with the nearest pair's direction: as Markdown.
+// How well a robot dodges that follows the answers, as Markdown: 50 seeded scenes in the simulator,
+// each without avoidance, with the blended repulsion, and with the nearest pair's direction.
 //
 // Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each] [--self]
 //                    [--update-doc doc/dodge.md]
-//   --self  only the blend, and whether links of the arm come near one another
+//   --self  the blend only, and the distances between links of the arm
 
 #include <algorithm>
 #include <array>
@@ -84,7 +84,7 @@ struct Options {
   std::uint64_t first = 1;
   std::size_t count = 50;
   int threads = 1;
-  double noise = -1.0;  // [m] negative: as the cameras have it
+  double noise = -1.0;  // [m] negative: the cameras' own
   std::string document;
   bool each = false, only_self = false;
 };

@@ -1,5 +1,5 @@
-// What the contact wrench costs beside the link's own distance query, in the same run, for links in
-// contact with real clouds; as a Markdown table.
+// Cost of the contact wrench against the cost of the link's distance query in the same run, for
+// links in contact with real clouds, as a Markdown table.
 //
 // Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: contact [poses per cloud]
 

@@ -1,5 +1,4 @@
-// How far a query runs past its deadline, as a Markdown table: random deadlines among real depth
-// images.
+// Overruns of a query's deadline, as a Markdown table: random deadlines among real depth images.
 //
 // Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: deadline [count]
 
@@ -24,7 +23,7 @@ struct Tally {
   int stopped = 0, violations = 0;
 };
 
-// One configuration: the whole query first, which is the truth, then stopped ones.
+// Measures one configuration: a complete query first, which gives the truth, then stopped ones.
 void measure(ist::ProximityQuery* query, ist::QueryConfig config, const ist::test::TruthCase& truth,
              const ist::CloudSnapshot& cloud, int deadlines, std::mt19937_64* rng, Tally* tally) {
   const std::vector<bool> known(ist::test::kPandaLinks, true);

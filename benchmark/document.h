@@ -8,7 +8,8 @@
 
 namespace ist::benchmark {
 
-/// Puts a table between its marks in a document; says so where it cannot.
+/// Writes a table between its marks in a document. Returns false with a message on standard error
+/// if it cannot.
 inline bool write_table(const std::string& document, const std::string& name,
                         const std::string& table) {
   std::string all = test::read_text(document);

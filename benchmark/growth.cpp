@@ -1,8 +1,8 @@
-// How the time of a query grows with the number of spheres, points and links, and with the distance
-// to the obstacle, as CSV. The scene is made here, no data is needed.
+// Growth of a query's time with the number of spheres, points and links, and with the distance to
+// the obstacle, as CSV. The scene is synthetic; no data is needed.
 //
-// One thread, processor time of that thread; every query starts from another pose, so the last
-// answer is of little help.
+// One thread, processor time of that thread. Every query starts from another pose, so temporal
+// coherence helps little.
 //
 // Usage: growth RESULT.csv CACHE_FOLDER; scripts/benchmark calls it.
 
@@ -29,7 +29,7 @@ using Model = std::shared_ptr<const ist::RobotModel>;
 using Poses = std::vector<std::vector<Eigen::Isometry3d>>;
 
 constexpr std::size_t kPoses = 100;
-constexpr double kMaxError = 0.005;             // [m] where it is not what grows
+constexpr double kMaxError = 0.005;             // [m] where it does not vary
 constexpr double kTolerances[] = {0.001, 0.0};  // [m]
 
 ist::QueryConfig query_config(double tolerance) {
@@ -45,7 +45,7 @@ ist::CloudSnapshot ingested(const Frame& frame) {
   return snapshot;
 }
 
-// Random poses of every link, out of contact.
+// Random poses of every link without contact.
 Poses free_poses(const Model& model, const ist::CloudSnapshot& cloud) {
   std::mt19937_64 rng(2);
   const std::size_t links = model->links.size();
@@ -74,7 +74,7 @@ void measure(std::FILE* csv, const char* what, double value, const Model& model,
     ist::ProximityQuery query(model, query_config(tolerance));
     std::vector<ist::LinkProximity> results;
     std::vector<double> us;
-    for (int round = 0; round < 3; ++round) {  // the first one warms the caches
+    for (int round = 0; round < 3; ++round) {  // the first round warms the caches
       for (const auto& X_FL : poses) {
         ThreadTimer timer;
         query.run(X_FL, known, {&cloud}, &results);
@@ -108,7 +108,7 @@ Frame sheet() {
   return frame;
 }
 
-// Every link turned at random, its lowest vertex `height` above the sheet.
+// Every link in a random orientation with its lowest vertex `height` above the sheet.
 Poses poses_above(const Robot& robot, double height) {
   std::mt19937_64 rng(3);
   Poses poses(kPoses);

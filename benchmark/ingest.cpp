@@ -1,7 +1,7 @@
-// What it costs to take in a depth image, organized and shuffled, against copying its bytes, as a
-// Markdown table. Every 640 x 480 frame that is there: the synthetic one, and the test data's.
+// Cost of the ingest of a depth image, organized and shuffled, against copying its bytes, as a
+// Markdown table. The frames are 640 x 480: a synthetic one, and those of the test data.
 //
-// One thread, processor time of that thread; everything is warm. Usage: ingest [repetitions]
+// One thread, processor time of that thread, with warm caches. Usage: ingest [repetitions]
 
 #include <algorithm>
 #include <cstdio>

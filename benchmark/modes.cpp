@@ -1,9 +1,9 @@
-// What the ways to ask cost, as Markdown tables: every link, the robot's minimum, one link; one
-// thread and two; each instruction set. On a motion at 1 kHz among the test data's depth images
-// where they are (IST_PROXIMITY_DATA, or ../shared/data), else in the synthetic scene.
+// Cost of the kinds of query, as Markdown tables: every link, the robot's minimum, one link; one
+// thread and two; each instruction set. The motion is sampled at 1 kHz among the test data's depth
+// images (IST_PROXIMITY_DATA, or ../shared/data), or in the synthetic scene without them.
 //
-// Usage: modes CACHE_FOLDER, for the tables; modes CACHE_FOLDER exact|1mm|minimum|ingest, for that
-// alone, a hundred times, for a profiler to count. scripts/benchmark calls both.
+// Usage: modes CACHE_FOLDER prints the tables. modes CACHE_FOLDER exact|1mm|minimum|ingest runs one
+// kind a hundred times, for a profiler. scripts/benchmark calls both.
 
 #include <hwy/highway.h>
 #include <hwy/targets.h>
@@ -49,7 +49,7 @@ QueryConfig query_config(double tolerance, double relative = 0.0) {
 }
 
 struct Bench {
-  // @param turn  of everything in the fixed frame
+  // @param turn  applied to everything in the fixed frame
   explicit Bench(const std::string& cache,
                  const Eigen::Isometry3d& turn = Eigen::Isometry3d::Identity()) {
     const auto data = ist::test::data_dir();
@@ -68,7 +68,7 @@ struct Bench {
     find_free();
   }
 
-  // What of the motion touches nothing: where the ways to ask can be compared.
+  // Finds the part of the motion without contact, in which the kinds of query can be compared.
   void find_free() {
     ProximityQuery query(model, query_config(0.001));
     std::vector<LinkProximity> results;
@@ -84,7 +84,7 @@ struct Bench {
     }
   }
 
-  // [us] of each free configuration; `ask` is made anew for each cloud.
+  // The times [us] of all free configurations; there is a new `ask` for each cloud.
   using Ask = std::function<void(const Poses&, const CloudSnapshot&)>;
   std::vector<double> time(const std::function<Ask()>& make) const {
     std::vector<double> us;
@@ -175,7 +175,7 @@ double batch_us(const Bench& bench, int threads) {
   return quantile(us, 0.5);
 }
 
-// Two sensors' images, each with an Ingest of its own.
+// The images of two sensors, each with its own Ingest.
 double ingest_us(const Bench& bench, bool side_by_side) {
   const ist::benchmark::Frame& frame = bench.set.scenes[0].frame;
   ist::Ingest ingests[2] = {ist::Ingest(ist::test::whole_cloud(false)),
@@ -222,7 +222,7 @@ void print_instruction_sets(const Bench& bench) {
       "difference of a distance |\n|---|---|---|---|---|\n");
   choose(0);
   std::vector<double> first;
-  // Those that this compiler knows, too: with any other one, the baseline would answer.
+  // Instruction sets that the compiler does not support are skipped: the baseline would answer.
   const std::int64_t all = hwy::SupportedTargets() & HWY_TARGETS;
   for (std::int64_t left = all; left != 0; left &= left - 1) {
     const std::int64_t target = left & -left;
@@ -249,7 +249,7 @@ void print_instruction_sets(const Bench& bench) {
   choose(0);
 }
 
-// For a profiler that counts only while ProximityQuery::run and the like are at work.
+// Runs under a profiler that counts within ProximityQuery::run and similar functions only.
 void count(const std::string& cache, const std::string& what) {
   const auto data = ist::test::data_dir();
   const DataSet set =
@@ -287,7 +287,7 @@ int main(int argc, char** argv) {
     return 0;
   }
   const Bench bench(argv[1]);
-  // A fixed frame that no surface lies along.
+  // In this fixed frame, no surface is parallel to an axis.
   const Eigen::AngleAxisd turn(0.5, Eigen::Vector3d(1.0, 2.0, 3.0).normalized());
   print_modes(bench, Bench(argv[1], Eigen::Isometry3d(turn)));
   print_threads(bench);

@@ -1,9 +1,10 @@
-// Links against an octree map: Inner Sphere Trees against FCL's mesh - octree distance, on the same
-// map, in the same run. Without FCL only the first.
+// Distances from links to an octree map: Inner Sphere Trees against FCL's mesh - octree distance,
+// on the same map in the same run. Without FCL the first only.
 //
-// The map is clutter in a room of 8 m: about as many occupied leaves as asked for, of 1 to 8 cm, in
-// patches of surface. The links are
-// the Panda's (test data: IST_PROXIMITY_DATA, or ../shared/data). Usage: octomap [leaves] [queries]
+// The map is clutter in a cube of 8 m: patches of surface made of occupied leaves of 1 to 8 cm. The
+// links are the Panda's (test data: IST_PROXIMITY_DATA, or ../shared/data).
+//
+// Usage: octomap [leaves] [queries]
 
 #include <algorithm>
 #include <cmath>
@@ -31,8 +32,8 @@ using ist::benchmark::quantile;
 
 constexpr double kLeaf = 0.01;  // [m]
 
-// Leaves begin at whole multiples of their own size, as an octree has them.
-std::vector<Eigen::AlignedBox3d> make_room(std::size_t leaves) {
+// Leaves begin at multiples of their own size, as in an octree.
+std::vector<Eigen::AlignedBox3d> make_map_boxes(std::size_t leaves) {
   std::mt19937_64 rng(1);
   std::uniform_real_distribution<double> place(-4.0, 4.0);
   std::vector<Eigen::AlignedBox3d> boxes;
@@ -40,9 +41,9 @@ std::vector<Eigen::AlignedBox3d> make_room(std::size_t leaves) {
     const int choice = static_cast<int>(rng() % 100);
     const int level = choice == 0 ? 3 : choice % 2;
     const double size = kLeaf * (1 << level);
-    // A patch of a surface: leaves side by side.
+    // One patch of a surface: a square of leaves.
     Eigen::Vector3d low(place(rng), place(rng), place(rng));
-    if (low.norm() < 0.6) continue;  // where the robot stands
+    if (low.norm() < 0.6) continue;  // the robot stands there
     const int flat = static_cast<int>(rng() % 3);
     for (int i = 0; i < 20; ++i) {
       for (int j = 0; j < 20; ++j) {
@@ -71,8 +72,7 @@ std::vector<ist::TriangleMesh> panda_meshes(const std::filesystem::path& data) {
 
 class Fcl {
  public:
-  // FCL's octree has leaves of one size in the end: large ones are filled with smallest ones, which
-  // octomap merges again.
+  // Large leaves are entered as smallest ones, which octomap merges again.
   Fcl(const std::vector<Eigen::AlignedBox3d>& boxes, const std::vector<ist::TriangleMesh>& meshes) {
     auto tree = std::make_shared<octomap::OcTree>(kLeaf);
     for (const Eigen::AlignedBox3d& box : boxes) {
@@ -110,7 +110,7 @@ class Fcl {
     return fcl::distance(links_[link].get(), room_.get(), request, result);
   }
 
-  /// What octomap has made of the boxes: merged, and each once.
+  /// The leaves of octomap's tree: the boxes merged, each once.
   const std::vector<Eigen::AlignedBox3d>& leaves() const { return leaves_; }
 
  private:
@@ -149,7 +149,7 @@ int main(int argc, char** argv) {
   const std::size_t leaves = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1000000;
   const int queries = argc > 2 ? std::atoi(argv[2]) : 10;
   const auto model = ist::test::panda_model(data, 0.005);
-  std::vector<Eigen::AlignedBox3d> boxes = make_room(leaves);
+  std::vector<Eigen::AlignedBox3d> boxes = make_map_boxes(leaves);
 #ifdef IST_PROXIMITY_HAS_FCL
   Fcl fcl(boxes, panda_meshes(data));
   boxes = fcl.leaves();

@@ -1,5 +1,5 @@
-// Packings, as the tables of doc/packing.md: time against a yardstick, gaps by number of spheres in
-// the three orders, how far the certificate is from the truth, growth, and ways to build the tree.
+// The tables of doc/packing.md: time against a yardstick, gaps by number of spheres in the three
+// orders, the certificate against the truth, growth, and splits of the tree.
 //
 // Most of it needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
 
@@ -71,7 +71,7 @@ std::vector<std::string> items(const std::string& list) {
   return all;
 }
 
-// False: something is not known.
+// Returns false if an option is not known.
 bool read_arguments(int argc, char** argv, Options* options, std::string* scene) {
   for (int i = 1; i < argc; ++i) {
     const std::string name = argv[i];

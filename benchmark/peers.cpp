@@ -1,9 +1,9 @@
-// The same job for everyone: for each link of a robot the minimum distance to a depth image and the
-// point where it is, ours side by side with what people would use instead, as CSV.
+// One task for all libraries: the minimum distance from each link of a robot to a depth image, and
+// its witness points. Ours is compared with the alternatives, as CSV.
 //
-// One thread, processor time of that thread. Every answer is checked against exact truth before
-// anything is timed. Data: a scene that this program makes, and the test data where it is
-// (IST_PROXIMITY_DATA, or ../shared/data).
+// One thread, processor time of that thread. Every answer is checked against the exact truth before
+// anything is timed. Data: a synthetic scene, and the test data if it is there (IST_PROXIMITY_DATA,
+// or ../shared/data).
 //
 // Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]...; scripts/benchmark calls it.
 
@@ -16,6 +16,7 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "peers/method.h"
+#include "peers/result.h"
 #include "support.h"
 #include "support/data_dir.h"
 
@@ -25,46 +26,23 @@ using ist::benchmark::Answer;
 using ist::benchmark::Configuration;
 using ist::benchmark::DataSet;
 using ist::benchmark::Kind;
-using ist::benchmark::mean;
 using ist::benchmark::Method;
 using ist::benchmark::Methods;
 using ist::benchmark::quantile;
+using ist::benchmark::Result;
 using ist::benchmark::Scene;
 using ist::benchmark::ThreadTimer;
 
-constexpr std::size_t kFewSpheres = 59;    // a common hand-made set for this arm, 59 spheres
-constexpr double kBudget = 2e6;            // [us] for what one method repeats on one scene
+constexpr std::size_t kFewSpheres = 59;    // as many as a common hand-made set for this arm
+constexpr double kBudget = 2e6;            // [us] for the repetitions of one method on one scene
 constexpr std::size_t kFrameQueries = 33;  // at 1 kHz, between two images at 30 Hz
-
-struct Result {
-  std::vector<double> ingest, query, free_query, motion, free_motion;  // [us]
-  std::vector<double> frame, free_frame, free_first;                   // [us]
-  std::vector<double> error;                                           // [m] without contact
-  std::size_t failures = 0, answers = 0;
-};
 
 bool any_contact(const Configuration& configuration) {
   return std::find(configuration.is_contact.begin(), configuration.is_contact.end(), true) !=
          configuration.is_contact.end();
 }
 
-const char* name_of(Kind kind) {
-  switch (kind) {
-    case Kind::kFloor:
-      return "floor";
-    case Kind::kOurs:
-      return "ours";
-    case Kind::kExact:
-      return "exact";
-    case Kind::kSpheres:
-      return "spheres";
-    case Kind::kGrid:
-      return "grid";
-  }
-  return "";
-}
-
-// Often enough for a median, at least three times.
+// Repeats the ingest for a median, at least three times.
 void time_ingest(Method* method, const Scene& scene, Result* result) {
   method->ingest(scene.frame);  // warm
   ThreadTimer timer;
@@ -116,14 +94,16 @@ void time_queries(Method* method, const Scene& scene, Result* result) {
   }
 }
 
-// Of images' worth of the motion, spread over it; each when there is time.
+// The motion is divided into parts, one for each image. Returns the step through the parts that the
+// budget allows: 1 if it allows all.
+// @param one  [us] time of one part
 std::size_t frame_step(const DataSet& set, double one) {
   const std::size_t frames = set.motion.size() / kFrameQueries;
   const auto affordable = static_cast<std::size_t>(std::max(1.0, kBudget / one));
   return std::max<std::size_t>(1, frames / affordable);
 }
 
-// Among one image.
+// Times the queries of the motion in one image.
 void time_motion(Method* method, const DataSet& set, const std::vector<bool>& contact,
                  Result* result) {
   std::vector<Answer> answers(set.robot.meshes.size());
@@ -143,7 +123,7 @@ void time_motion(Method* method, const DataSet& set, const std::vector<bool>& co
   }
 }
 
-// All the work from one image to the next, which comes anew each time.
+// Times all the work from one image to the next: an ingest and the queries that follow.
 void time_frames(Method* method, const DataSet& set, const Scene& scene,
                  const std::vector<bool>& contact, Result* result) {
   std::vector<Answer> answers(set.robot.meshes.size());
@@ -169,7 +149,7 @@ void time_frames(Method* method, const DataSet& set, const Scene& scene,
   }
 }
 
-// Which poses of the motion are in contact: to tell their times apart, nothing else.
+// Whether each pose of the motion is in contact. Times are reported with and without contact.
 std::vector<bool> contacts(const std::shared_ptr<const ist::RobotModel>& model, const DataSet& set,
                            const Scene& scene) {
   ist::IngestConfig config;
@@ -187,35 +167,6 @@ std::vector<bool> contacts(const std::shared_ptr<const ist::RobotModel>& model, 
     }));
   }
   return contact;
-}
-
-void print_header(std::FILE* csv) {
-  std::fprintf(csv,
-               "data,method,kind,spheres,max_error_mm,tolerance_mm,configurations,answers,failures,"
-               "ingest_us,ingest_p99_us,query_us,query_p99_us,free_query_us,free_query_p99_us,"
-               "error_mean_mm,error_least_mm,error_largest_mm,motion_queries,motion_us,"
-               "motion_p99_us,motion_max_us,motion_mean_us,free_motion_us,free_motion_p99_us,"
-               "free_motion_max_us,frames,frame_us,free_frame_us,free_first_us\n");
-}
-
-void print(std::FILE* csv, const DataSet& set, const Method& method, const Result& r) {
-  std::vector<double> size = r.error;
-  for (double& error : size) error = std::abs(error);
-  std::fprintf(csv, "%s,\"%s\",%s,%zu,%g,%g,%zu,%zu,%zu", set.name.c_str(), method.name.c_str(),
-               name_of(method.kind), method.spheres, 1e3 * method.max_error, 1e3 * method.tolerance,
-               r.query.size(), r.answers, r.failures);
-  for (const auto* times : {&r.ingest, &r.query, &r.free_query}) {
-    std::fprintf(csv, ",%.1f,%.1f", quantile(*times, 0.5), quantile(*times, 0.99));
-  }
-  std::fprintf(csv, ",%.5f,%.5f,%.5f,%zu", 1e3 * mean(size), 1e3 * quantile(r.error, 0.0),
-               1e3 * quantile(r.error, 1.0), r.motion.size());
-  std::fprintf(csv, ",%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,%.1f", quantile(r.motion, 0.5),
-               quantile(r.motion, 0.99), quantile(r.motion, 1.0), mean(r.motion),
-               quantile(r.free_motion, 0.5), quantile(r.free_motion, 0.99),
-               quantile(r.free_motion, 1.0));
-  std::fprintf(csv, ",%zu,%.1f,%.1f,%.1f\n", r.frame.size(), quantile(r.frame, 0.5),
-               quantile(r.free_frame, 0.5), quantile(r.free_first, 0.5));
-  std::fflush(csv);
 }
 
 Methods all_methods(const DataSet& set) {
@@ -245,7 +196,7 @@ Methods all_methods(const DataSet& set) {
   return methods;
 }
 
-// @returns whether every answer was right
+// Returns whether every answer was right.
 bool run(const DataSet& set, std::FILE* csv) {
   const auto model = set.robot.pack(0.005);
   std::vector<std::vector<bool>> contact;
@@ -269,7 +220,7 @@ bool run(const DataSet& set, std::FILE* csv) {
       std::fprintf(stderr, "  %zu of %zu answers are WRONG\n", result.failures, result.answers);
       all_right = false;
     }
-    print(csv, set, *method, result);
+    print(csv, set.name, *method, result);
   }
   return all_right;
 }
@@ -288,7 +239,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "cannot write %s\n", argv[1]);
     return 2;
   }
-  print_header(csv);
+  ist::benchmark::print_header(csv);
   bool all_right = true;
   for (const std::string& name : wanted) {
     const auto data = ist::test::data_dir();

@@ -1,5 +1,5 @@
-// How smooth the repulsion is along motions, what it costs, and what the number of points changes,
-// beside the nearest pair and exact geometry: tables for doc/repulsion.md.
+// Smoothness of the repulsion along motions, its cost, and its dependence on the number of points,
+// compared with the nearest pair and with exact geometry: tables for doc/repulsion.md.
 //
 // Usage: repulsion CACHE_FOLDER [DOCUMENT]; scripts/benchmark --repulsion calls it. The recorded
 // scenes need the test data: IST_PROXIMITY_DATA, or ../shared/data.
@@ -20,7 +20,7 @@ using ist::benchmark::Measured;
 using ist::benchmark::Noise;
 using ist::benchmark::quantile;
 
-// The resolutions: [m] of the packing for distances, and spheres of the disjoint one.
+// The resolutions: max_error [m] of the packing for distances, and spheres of the disjoint one.
 struct Resolution {
   double max_error;
   std::size_t spheres;

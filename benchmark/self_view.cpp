@@ -1,5 +1,5 @@
-// What padding does the self-filter need? The simulated arm moves in view of its noisy, late camera
-// and nothing else is there: whatever the queries find is false. As Markdown.
+// The padding that the self-filter needs, as Markdown. The simulated arm moves in view of its
+// noisy, late camera, and the scene is empty otherwise: every obstacle that queries find is false.
 //
 // Usage: self_view [--seconds N] [--update-doc doc/dodge.md]
 

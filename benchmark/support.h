@@ -16,8 +16,8 @@ inline double microseconds_since(Clock::time_point start) {
   return 1e6 * std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// [us] of processor time that this thread took since the last call: what others do on the machine
-/// at the same time does not count.
+/// Measures the processor time of this thread, so that other load on the machine does not count.
+/// lap() returns [us] since the last call.
 class ThreadTimer {
  public:
   ThreadTimer() { lap(); }

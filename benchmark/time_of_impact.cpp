@@ -1,4 +1,4 @@
-// Times of impact against dense sampling with exact distances, as a table for doc/repulsion.md.
+// Times of impact compared with dense sampling of exact distances: a table for doc/repulsion.md.
 //
 // Usage: time_of_impact CACHE_FOLDER [DOCUMENT]; scripts/benchmark --repulsion calls it. The
 // Panda's motions need the test data: IST_PROXIMITY_DATA, or ../shared/data.
@@ -83,8 +83,8 @@ Tally measure_primitives() {
   return tally;
 }
 
-// The Panda's visual meshes among a depth image, from one recorded configuration to another. Truth
-// is the exact distance every millisecond, by a query at tolerance 0 (doc/accuracy.md).
+// Moves the Panda's visual meshes in a depth image from one recorded configuration to another. The
+// truth is the exact distance at every millisecond, by a query at tolerance 0 (doc/accuracy.md).
 class Panda {
  public:
   Panda(const std::filesystem::path& data, const std::string& cache)
@@ -100,7 +100,7 @@ class Panda {
     config.cache_directory = cache;
     model_ = ist::build_robot_model(description, config);
     kinematics_ = std::make_shared<const ist::Kinematics>(description);
-    // The base stands at the table's edge, in contact with what is measured there.
+    // The base stands at the table's edge, in contact with points measured there.
     for (const ist::LinkModel& link : model_->links) {
       wanted_.push_back(link.name != "panda_link0" && link.name != "panda_link1");
     }

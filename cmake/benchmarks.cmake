@@ -44,6 +44,7 @@ target_sources(benchmark_packing PRIVATE
   benchmark/packing/gaps.cpp
   benchmark/packing/growth.cpp
   benchmark/packing/hierarchy.cpp
+  benchmark/packing/hierarchy_scene.cpp
   benchmark/packing/plot.cpp
   benchmark/packing/table.cpp
   benchmark/packing/time.cpp

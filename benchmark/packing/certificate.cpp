@@ -1,4 +1,4 @@
-// The certificate against many points of each link's surface and outside of it.
+// Tests the certificate at many points on each link's surface and outside.
 
 #include <algorithm>
 #include <cmath>
@@ -15,8 +15,9 @@
 namespace ist::benchmark {
 namespace {
 
-constexpr int kPoints = 1000000;     // of each kind
-constexpr int kParts = 100;          // each with random numbers of its own: threads change nothing
+constexpr int kPoints = 1000000;  // of each kind
+constexpr int kParts =
+    100;  // each with its own random numbers, so the result does not depend on threads
 constexpr double kMargin = 0.05;     // [m] about a link
 constexpr double kRounding = 1e-12;  // [m]
 
@@ -83,7 +84,7 @@ class Trial {
     return a + u * (mesh_.corner(t, 1) - a) + v * (mesh_.corner(t, 2) - a);
   }
 
-  // By brute force over the spheres.
+  // Compares the bounds of a point, by brute force over the spheres, with the truth.
   void check(const Eigen::Vector3d& p, double d_mesh, Counts* counts) const {
     double inner = std::numeric_limits<double>::infinity(), outer = inner;
     for (const InnerSphere& sphere : packing_.spheres) {

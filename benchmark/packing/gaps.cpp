@@ -18,7 +18,7 @@ constexpr PackingOrder kOrders[] = {PackingOrder::kMedial, PackingOrder::kDisjoi
                                     PackingOrder::kVolume};
 constexpr std::size_t kOrderCount = std::size(kOrders);
 
-// What a prototype reached on one link, sampled: the design's goals.
+// The design's goals: sampled gaps of a prototype on one link.
 struct Prototype {
   int spheres;
   const char *medial, *disjoint, *volume;  // [mm] gap, largest / mean
@@ -33,7 +33,7 @@ struct Job {
   int spheres;
 };
 
-// "largest / mean" and "filled".
+// Returns the cells "largest / mean" and "filled".
 std::pair<std::string, std::string> measured(const PandaLink& link, int spheres,
                                              PackingOrder order) {
   PackingConfig config;

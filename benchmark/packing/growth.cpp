@@ -1,4 +1,4 @@
-// How time and memory grow with the triangles of a mesh and the spheres of a packing.
+// Growth of time and memory with the triangles of a mesh and the spheres of a packing.
 
 #include <malloc.h>
 #include <sys/wait.h>
@@ -44,7 +44,7 @@ TriangleMesh vase(int n) {
   return mesh;
 }
 
-// [MB] of this process, from its status.
+// Memory of this process [MB], from its status.
 double memory(const std::string& what) {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -68,12 +68,12 @@ Result pack(const TriangleMesh& mesh, int spheres) {
   return {1e-6 * us, packing.certificate.max_gap, memory("VmHWM") - before};
 }
 
-// In a process of its own, so that its peak of memory is nobody else's.
+// Runs in a process of its own, so that the peak of memory is that of this packing alone.
 Result pack_alone(const TriangleMesh& mesh, int spheres) {
   int ends[2];
   Result result;
   if (pipe(ends) != 0) return result;
-  malloc_trim(0);  // what was freed before would be taken first, and not count
+  malloc_trim(0);  // freed memory would be used first and not count
   const pid_t child = fork();
   if (child == 0) {
     result = pack(mesh, spheres);
@@ -87,7 +87,7 @@ Result pack_alone(const TriangleMesh& mesh, int spheres) {
   return result;
 }
 
-// By the vase's fineness, and number of spheres.
+// The table's rows, by the vase's fineness and the number of spheres.
 constexpr std::pair<int, int> kCases[] = {{23, 1000}, {71, 1000}, {224, 1000}, {708, 1000},
                                           {71, 50},   {71, 200},  {71, 5000},  {71, 20000}};
 

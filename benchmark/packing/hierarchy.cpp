@@ -1,4 +1,4 @@
-// Ways to divide the spheres of a packing into a tree, by what they spare a query.
+// Splits of a packing's spheres into a tree, compared by the cost of queries.
 
 #include <algorithm>
 #include <cstdio>
@@ -6,7 +6,6 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
-#include <random>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -16,20 +15,14 @@
 #define IST_PROXIMITY_CALLGRIND
 #endif
 
-#include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ist_proximity/robot/link_poses.h"
+#include "packing/hierarchy_scene.h"
 #include "packing/options.h"
-#include "peers/scene.h"
 #include "support.h"
-#include "support/demo_arm.h"
 #include "support/temp_dir.h"
-#include "support/whole_cloud.h"
 
 namespace ist::benchmark {
 namespace {
-
-using Poses = std::vector<Eigen::Isometry3d>;
 
 struct Split {
   const char* name;
@@ -45,120 +38,6 @@ constexpr const char* kScenes[] = {
     "synthetic links, motion at 1 kHz", "synthetic links, unrelated poses"};
 constexpr double kMaxErrors[] = {0.005, 0.002};  // [m]
 constexpr std::size_t kCounted = 100;            // queries under valgrind
-constexpr std::size_t kSteps = 1000;             // queries of a motion
-
-// One robot, where it goes, and what it meets.
-struct HierarchyScene {
-  std::shared_ptr<const RobotModel> model;
-  std::vector<CloudSnapshot> clouds;
-  std::vector<Poses> poses;
-  std::vector<std::vector<std::vector<bool>>> known;  // by cloud, pose and link: out of contact
-};
-
-QueryConfig query_config() {
-  QueryConfig config;
-  config.max_distance = 10.0;
-  return config;
-}
-
-CloudSnapshot ingested(const Frame& frame) {
-  CloudSnapshot snapshot;
-  Ingest(test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
-  return snapshot;
-}
-
-// Joints anywhere within their limits, links placed by them.
-std::vector<Poses> demo_poses(const RobotDescription& robot, const RobotModel& model, bool motion) {
-  const Kinematics kinematics(robot);
-  const Eigen::Isometry3d X_FR(Eigen::Translation3d(-0.8, 0.0, -0.2));  // beside the table
-  std::mt19937_64 rng(1);
-  const auto draw = [&] {
-    std::vector<double> q;
-    for (const Kinematics::Joint& joint : kinematics.joints()) {
-      const double low = std::max(joint.lower, -M_PI), high = std::min(joint.upper, M_PI);
-      q.push_back(low < high ? std::uniform_real_distribution<double>(low, high)(rng) : 0.0);
-    }
-    return q;
-  };
-  const auto place = [&](const std::vector<double>& q) {
-    return link_poses(model, kinematics, q, X_FR).X_FL;
-  };
-  std::vector<Poses> poses;
-  while (!motion && poses.size() < kSteps / 4) poses.push_back(place(draw()));
-  constexpr std::size_t kWay = 500;  // [ms] from one to the next
-  for (std::vector<double> from = draw(); poses.size() < kSteps && motion;) {
-    const std::vector<double> to = draw();
-    for (std::size_t step = 0; step < kWay; ++step) {
-      std::vector<double> q = from;
-      const double share = static_cast<double>(step) / static_cast<double>(kWay);
-      for (std::size_t j = 0; j < q.size(); ++j) q[j] += share * (to[j] - q[j]);
-      poses.push_back(place(q));
-    }
-    from = to;
-  }
-  return poses;
-}
-
-// Each link anywhere in the synthetic scene.
-std::vector<Poses> synthetic_poses(std::size_t links, bool motion) {
-  std::mt19937_64 rng(1);
-  const std::size_t count = motion ? 4 : kSteps / 4;
-  std::vector<Poses> poses(count);
-  for (Poses& X_FL : poses) {
-    for (std::size_t i = 0; i < links; ++i) X_FL.push_back(synthetic_pose(&rng));
-  }
-  return motion ? interpolated(poses, 400) : poses;
-}
-
-// What touches, or what was gone through, has its own query, which does not depend on the tree.
-void find_free(HierarchyScene* scene) {
-  ProximityQuery query(scene->model, query_config());
-  std::vector<LinkProximity> results;
-  const std::vector<bool> all(scene->model->links.size(), true);
-  for (const CloudSnapshot& cloud : scene->clouds) {
-    scene->known.emplace_back();
-    for (const Poses& X_FL : scene->poses) {
-      query.run(X_FL, all, {&cloud}, &results);
-      std::vector<bool> known;
-      for (const LinkProximity& link : results) known.push_back(link.state == LinkState::kNear);
-      scene->known.back().push_back(known);
-    }
-  }
-}
-
-bool make_scene(const Options& options, const std::string& name, double max_error,
-                HierarchyScene* scene) {
-  const bool motion = name.find("motion") != std::string::npos;
-  if (name.rfind("Panda", 0) == 0) {
-    if (options.data.empty()) return false;
-    const DataSet set = kinect_data(options.data, options.cache_directory);
-    scene->model = set.robot.pack(max_error);
-    for (const Scene& one : set.scenes) {
-      scene->clouds.push_back(ingested(one.frame));
-      if (motion || !scene->poses.empty()) continue;  // the poses are the same in all of them
-      for (const Configuration& c : one.configurations) scene->poses.push_back(c.X_FL);
-    }
-    if (motion) scene->poses = set.motion;
-  } else if (name.rfind("demo", 0) == 0) {
-    const RobotDescription robot = test::demo_robot();
-    RobotModelConfig config;
-    config.packing.max_error = max_error;
-    config.cache_directory = options.cache_directory;
-    scene->model = build_robot_model(robot, config);
-    scene->clouds.push_back(ingested(synthetic_frame(640, 480)));
-    scene->poses = demo_poses(robot, *scene->model, motion);
-  } else {
-    Robot robot;
-    robot.cache_directory = options.cache_directory;
-    robot.meshes = synthetic_meshes();
-    scene->model = robot.pack(max_error);
-    scene->clouds.push_back(ingested(synthetic_frame(640, 480)));
-    scene->poses = synthetic_poses(robot.meshes.size(), motion);
-  }
-  if (motion) scene->poses.resize(std::min(scene->poses.size(), kSteps));
-  find_free(scene);
-  return true;
-}
 
 struct Built {
   std::shared_ptr<const RobotModel> model;
@@ -186,13 +65,13 @@ struct Cost {
   double node_pairs = 0.0, leaf_pairs = 0.0, exact = 0.0;
 };
 
-// All of them in turn at every pose, so that what else the machine does falls on all alike.
+// Runs all of them in turn at every pose, so that other load on the machine affects all alike.
 std::vector<Cost> measure(const HierarchyScene& scene, const std::vector<Built>& built) {
   std::vector<Cost> costs(built.size());
   std::vector<LinkProximity> results;
   for (std::size_t c = 0; c < scene.clouds.size(); ++c) {
     std::vector<ProximityQuery> queries;
-    for (const Built& one : built) queries.emplace_back(one.model, query_config());
+    for (const Built& one : built) queries.emplace_back(one.model, hierarchy_query_config());
     for (std::size_t p = 0; p < scene.poses.size(); ++p) {
       for (std::size_t i = 0; i < built.size(); ++i) {
         const std::size_t s = (i + p) % built.size();
@@ -209,7 +88,7 @@ std::vector<Cost> measure(const HierarchyScene& scene, const std::vector<Built>&
   return costs;
 }
 
-// Of one query each; empty where there is no valgrind.
+// The instructions of one query, by split; empty without valgrind.
 std::vector<double> instructions(const Options& options, const std::string& scene,
                                  double max_error) {
 #ifdef IST_PROXIMITY_CALLGRIND
@@ -287,7 +166,7 @@ bool measure_hierarchy(const Options& options, Table* table) {
     if (!wanted.empty() && std::none_of(wanted.begin(), wanted.end(), starts)) continue;
     for (const double max_error : wanted_errors(options)) {
       HierarchyScene scene;
-      if (make_scene(options, name, max_error, &scene)) {
+      if (make_hierarchy_scene(options, name, max_error, &scene)) {
         measure_scene(options, name, max_error, scene, table);
       } else {
         std::fprintf(stderr, "%s: the test data is not there\n", name.c_str());
@@ -300,11 +179,11 @@ bool measure_hierarchy(const Options& options, Table* table) {
 void count_instructions(const Options& options, const std::string& scene_name) {
 #ifdef IST_PROXIMITY_CALLGRIND
   HierarchyScene scene;
-  if (!make_scene(options, scene_name, options.max_errors.at(0), &scene)) std::exit(1);
+  if (!make_hierarchy_scene(options, scene_name, options.max_errors.at(0), &scene)) std::exit(1);
   std::vector<LinkProximity> results;
   for (const Split& split : kSplits) {
     const Built built = with_split(*scene.model, split.config);
-    ProximityQuery query(built.model, query_config());
+    ProximityQuery query(built.model, hierarchy_query_config());
     CALLGRIND_START_INSTRUMENTATION;
     CALLGRIND_ZERO_STATS;
     for (std::size_t i = 0; i < kCounted; ++i) {

@@ -9,18 +9,18 @@
 
 namespace ist::benchmark {
 
-/// What is to be measured, and with what.
+/// The tables to measure and their data.
 struct Options {
   std::vector<std::string> tables;  ///< empty: all
   std::vector<std::string> links;   ///< of the Panda; empty: all
   std::vector<int> spheres;         ///< of the gaps; empty: all
   std::vector<double> max_errors;   ///< [m] of time and hierarchy; empty: all
   std::vector<std::string> scenes;  ///< of the hierarchy, by their first words; empty: all
-  bool instructions = false;        ///< of the hierarchy's queries too, by valgrind: minutes each
-  int threads = 0;                  ///< for what is not timed
+  bool instructions = false;        ///< of the hierarchy's queries, by valgrind: takes minutes each
+  int threads = 0;                  ///< for work that is not timed
   std::string cache_directory;      ///< packings that the hierarchy's queries need
   std::filesystem::path data;       ///< the folder of test data; empty: not there
-  std::string program;              ///< this one, to run parts of it under valgrind
+  std::string program;              ///< this program's path, to run parts of it under valgrind
   bool update_doc = false;
 };
 
@@ -29,13 +29,13 @@ struct PandaLink {
   TriangleMesh mesh;
 };
 
-/// The Panda's visual meshes that are wanted; the two fingers are one mesh.
+/// The Panda's visual meshes that the options select; the two fingers are one mesh.
 std::vector<PandaLink> panda_links(const Options& options);
 
-/// All names of them.
+/// The names of all of them.
 std::vector<std::string> panda_names();
 
-/// The tables, one function each. False: it could not be made.
+/// The tables, one function each. They return false if the table could not be made.
 bool measure_time(const Options& options, Table* table);
 bool measure_gaps(const Options& options, Table* table);
 bool measure_certificate(const Options& options, Table* table);

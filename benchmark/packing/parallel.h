@@ -8,8 +8,8 @@
 
 namespace ist::benchmark {
 
-/// Calls work(i) for i = 0 ... count - 1, each once, from `threads` threads (0: as many as there
-/// are cores), in that order as far as threads allow.
+/// Calls work(i) once for each i = 0 ... count - 1, started in this order, from `threads` threads
+/// (0: as many as there are cores).
 template <typename Work>
 void parallel_for(std::size_t count, int threads, const Work& work) {
   std::atomic<std::size_t> next{0};

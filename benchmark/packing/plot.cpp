@@ -1,4 +1,4 @@
-// The table of growth as a picture.
+// Draws the table of growth as a picture.
 
 #include <algorithm>
 #include <cmath>
@@ -26,7 +26,8 @@ struct Series {
 constexpr Series kSeries[] = {{"time [s]", "#1f6fb4", 2, 20.0},
                               {"memory [MB]", "#c4572b", 4, -24.0}};
 
-// One panel: log-log, rows whose `fixed` cell is `value`, by the other of the first two cells.
+// One log-log panel: the rows whose cell `fixed` is `value`, by the other one of the first two
+// cells.
 class Panel {
  public:
   Panel(double left, const test::TableRows& rows, std::size_t fixed, const std::string& value)

@@ -22,7 +22,7 @@ std::string output_of(const std::string& command) {
   return text;
 }
 
-// With + where the working tree differs.
+// The commit, with a + if the working tree differs.
 std::string commit() {
   const std::string git = "git -C '" + std::string(IST_PROXIMITY_SOURCE_DIR) + "' ";
   const std::string hash = output_of(git + "rev-parse --short=10 HEAD 2> /dev/null");

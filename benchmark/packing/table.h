@@ -6,24 +6,24 @@
 /// Tables of doc/packing.md.
 namespace ist::benchmark {
 
-/// A Markdown table that can be made in parts: rows that were measured before stay, those that are
-/// measured again are replaced. The line below it says where and at which commits.
+/// A Markdown table that can be made in parts: rows that are measured again are replaced, the
+/// others stay. The line below the table states the machine and the commits.
 class Table {
  public:
   using Row = std::vector<std::string>;
 
   /// @param name     of the marks in the document: `<!-- NAME -->` and `<!-- end of NAME -->`
-  /// @param columns  heads; the first `keys` of them tell a row from the others
+  /// @param columns  heads; the first `keys` of them identify a row
   Table(std::string name, Row columns, std::size_t keys);
 
-  /// Where a row stands among the others: rows come in the order of their places.
+  /// Reserves the next place for the row with this key: rows come in the order of their places.
   void place(const Row& key) { places_.push_back(key); }
-  /// Said on standard error at once. Its key must have a place.
+  /// Adds a row whose key has a place, and prints it to standard error.
   void add(const Row& row);
 
-  /// On standard output.
+  /// Prints the table to standard output.
   void print() const;
-  /// @returns false, and says why, when the document lacks the marks
+  /// @returns false, with a message, when the document lacks the marks
   bool write(const std::string& document) const;
 
  private:
@@ -36,10 +36,10 @@ class Table {
   std::vector<Row> places_, rows_;
 };
 
-/// printf for one value.
+/// Formats one value as printf does.
 std::string text(const char* format, double value);
 
-/// "1.23 / 0.45": two lengths [m] in mm.
+/// Formats two lengths [m] in mm: "1.23 / 0.45".
 std::string gaps(double largest, double mean);
 
 }  // namespace ist::benchmark

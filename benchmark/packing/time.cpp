@@ -1,4 +1,4 @@
-// How long the Panda takes to pack, against a yardstick of the same run.
+// Time to pack the Panda, against a yardstick of the same run.
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +24,7 @@
 namespace ist::benchmark {
 namespace {
 
-// What the wall's clock says, and how long processors were at work.
+// Wall time and processor time.
 struct Times {
   double wall = 0.0, processor = 0.0;  // [s]
   Times& operator+=(const Times& other) {
@@ -68,7 +68,7 @@ bool nearer(RTCPointQueryFunctionArguments* arguments) {
   return true;
 }
 
-// One million closest-point queries of one thread, spread over the meshes.
+// The yardstick: one million closest-point queries of one thread, spread over the meshes.
 Times yardstick(const std::vector<PandaLink>& links) {
   constexpr int kQueries = 1000000;
   RTCDevice device = rtcNewDevice(nullptr);
@@ -121,7 +121,7 @@ Times yardstick(const std::vector<PandaLink>& links) {
 }
 #endif
 
-// Each of the 11 links of its own shape; both fingers share one.
+// The 11 links, of which the fingers share one shape.
 RobotDescription panda(const std::vector<PandaLink>& links) {
   RobotDescription robot;
   robot.name = "panda";

@@ -8,7 +8,7 @@
 
 #include "peers/flat.h"
 
-// CGAL's tree of triangles, for every point the link's box leaves.
+// CGAL's AABB tree of triangles, for every point that the link's box does not prune.
 namespace ist::benchmark {
 namespace {
 
@@ -29,7 +29,7 @@ class Cgal : public PrunedByBox {
       for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         const Kernel::Triangle_3 triangle(to_cgal(mesh.corner(t, 0)), to_cgal(mesh.corner(t, 1)),
                                           to_cgal(mesh.corner(t, 2)));
-        // It cannot do with triangles without area; their neighbours hold their edges.
+        // CGAL does not allow triangles without area; their edges belong to their neighbours.
         if (!triangle.is_degenerate()) triangles_[link].push_back(triangle);
       }
       trees_.push_back(std::make_unique<Tree>(triangles_[link].begin(), triangles_[link].end()));
@@ -43,7 +43,7 @@ class Cgal : public PrunedByBox {
     const Kernel::Point_3 p = to_cgal(p_L.cast<double>());
     Kernel::Point_3 q;
     if (std::isfinite(*distance)) {
-      // A hint as far away as the best answer: what is farther is not looked at.
+      // The hint is as far away as the best answer: farther triangles are pruned.
       const Kernel::Point_3 hint(p.x() + static_cast<double>(*distance), p.y(), p.z());
       q = trees_[link]->closest_point(p, hint);
     } else {

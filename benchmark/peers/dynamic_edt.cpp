@@ -6,7 +6,7 @@
 
 #include "peers/flat.h"
 
-// A distance field on a grid of 2 cm about the robot, looked up at each sphere's centre.
+// A distance field on a grid of 2 cm around the robot, looked up at each sphere's centre.
 namespace ist::benchmark {
 namespace {
 
@@ -15,7 +15,7 @@ class DynamicEdt : public BySpheres {
   explicit DynamicEdt(const SphereSet& set) : BySpheres(set) {
     name = "dynamicEDT3D of 2 cm";
     kind = Kind::kGrid;
-    // From the centre of the sphere's cell to that of the nearest point's cell.
+    // The distance from the centre of the sphere's cell to that of the nearest point's cell.
     const double diagonal = std::sqrt(3.0) * kCell;
     least_error = -set.gap - diagonal;
     largest_error = set.gap + diagonal;
@@ -38,19 +38,19 @@ class DynamicEdt : public BySpheres {
   }
 
  protected:
-  bool nearest(const Eigen::Vector3d& center, double /*reach*/, Nearest* found) override {
+  bool nearest(const Eigen::Vector3d& center, double /*max_distance*/, Nearest* found) override {
     const Eigen::Vector3f c = center.cast<float>();
     float distance = 0.0F;
     octomap::point3d cell;
     field_->getDistanceAndClosestObstacle(octomap::point3d(c.x(), c.y(), c.z()), distance, cell);
     *found = {{cell.x(), cell.y(), cell.z()}, static_cast<double>(distance)};
-    return distance >= 0.0F;  // else out of the grid
+    return distance >= 0.0F;  // else outside the grid
   }
 
  private:
   static constexpr double kCell = 0.02;     // [m]
   static constexpr float kReach = 1.3F;     // [m] of the robot
-  static constexpr float kFarthest = 2.0F;  // [m] beyond that it does not tell
+  static constexpr float kFarthest = 2.0F;  // [m] larger distances are not known
 
   Points points_;
   std::unique_ptr<octomap::OcTree> tree_;

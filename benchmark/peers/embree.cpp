@@ -4,12 +4,13 @@
 
 #include "peers/flat.h"
 
-// Embree's point query: the nearest triangle of a link's mesh, for every point the link's box
-// leaves.
+// Embree's point query: the nearest triangle of a link's mesh, for every point that the link's box
+// does not prune.
 namespace ist::benchmark {
 namespace {
 
-// Ericson, Real-Time Collision Detection, 5.1.5, in float as Embree's own example does it.
+// Closest point on a triangle (Ericson, Real-Time Collision Detection, section 5.1.5), in float as
+// in Embree's own example.
 Eigen::Vector3f closest_on_triangle(const Eigen::Vector3f& p, const Eigen::Vector3f& a,
                                     const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
   const Eigen::Vector3f ab = b - a, ac = c - a, ap = p - a;

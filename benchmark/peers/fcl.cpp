@@ -7,7 +7,7 @@
 
 #include "peers/method.h"
 
-// FCL's pairs of hierarchies: the link's mesh against the points as triangles without area, and
+// FCL's dual-tree distance: the link's mesh against the points as triangles without area, and
 // against an octree of 1 cm.
 namespace ist::benchmark {
 namespace {
@@ -39,7 +39,7 @@ class Fcl : public Method {
       request.enable_nearest_points = true;
       fcl::DistanceResultd result;
       fcl::distance(links_[link].get(), X_FL[link], obstacle(), identity, request, result);
-      // Negative: the volumes overlap, and by how much it does not tell.
+      // Negative: the volumes overlap; FCL does not compute by how much.
       (*answers)[link] = {std::max(0.0, result.min_distance), result.nearest_points[0],
                           result.nearest_points[1]};
     }
@@ -90,9 +90,9 @@ class FclOctree : public Fcl {
     name = "FCL, mesh and octree of 1 cm";
     kind = Kind::kGrid;
     every = 25;
-    // A cell reaches beyond its points by no more than its diagonal.
+    // A cell extends no farther from its points than its diagonal.
     least_error = -std::sqrt(3.0) * kCell - kRounding;
-    witness_error = std::numeric_limits<double>::infinity();  // it gives none
+    witness_error = std::numeric_limits<double>::infinity();  // FCL gives none
   }
 
   void ingest(const Frame& frame) override {

@@ -6,7 +6,8 @@
 namespace ist::benchmark {
 namespace {
 
-constexpr std::size_t kBlock = 1024;  // points; the nearest is looked for in one block only
+constexpr std::size_t kBlock =
+    1024;  // points; only the block with the nearest one is searched again
 
 IST_BENCHMARK_SIMD void box_pass(const float* x, const float* y, const float* z, std::size_t n,
                                  const float* R, const float* t, const float* low,
@@ -83,13 +84,15 @@ void BySpheres::query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<An
     best.distance = std::numeric_limits<double>::infinity();
     for (const SphereSet::Sphere& sphere : set_.links[link]) {
       const Eigen::Vector3d center = X_FL[link] * sphere.center;
-      const double reach = best.distance + sphere.radius;
+      const double max_distance = best.distance + sphere.radius;
       Nearest found;
-      if (reach <= 0.0 || !nearest(center, reach, &found) || found.distance >= reach) continue;
-      const Eigen::Vector3d way = found.p_FCo - center;
-      const double length = way.norm();
-      const Eigen::Vector3d direction =
-          length > 0.0 ? Eigen::Vector3d(way / length) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+      if (max_distance <= 0.0 || !nearest(center, max_distance, &found) ||
+          found.distance >= max_distance)
+        continue;
+      const Eigen::Vector3d offset = found.p_FCo - center;
+      const double length = offset.norm();
+      const Eigen::Vector3d direction = length > 0.0 ? Eigen::Vector3d(offset / length)
+                                                     : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
       best = {found.distance - sphere.radius, center + sphere.radius * direction, found.p_FCo};
     }
   }

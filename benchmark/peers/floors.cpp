@@ -2,7 +2,7 @@
 
 #include "peers/flat.h"
 
-// What memory alone costs, and the simplest thing that works.
+// The cost of reading memory alone, and the simplest method that works.
 namespace ist::benchmark {
 namespace {
 
@@ -29,12 +29,12 @@ class BruteForce : public BySpheres {
     name = "brute force, SIMD";
     kind = Kind::kSpheres;
     largest_error = set.gap + kRounding;
-    least_error = -set.gap;  // a sphere may come out through a hole of the mesh
+    least_error = -set.gap;  // a sphere may protrude through a hole of the mesh
   }
   void ingest(const Frame& frame) override { points_.read(frame); }
 
  protected:
-  bool nearest(const Eigen::Vector3d& center, double /*reach*/, Nearest* found) override {
+  bool nearest(const Eigen::Vector3d& center, double /*max_distance*/, Nearest* found) override {
     found->p_FCo = points_.at(nearest_of_all(points_, center.cast<float>())).cast<double>();
     found->distance = (found->p_FCo - center).norm();
     return true;

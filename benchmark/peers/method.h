@@ -8,23 +8,24 @@
 
 #include "peers/scene.h"
 
-/// One way to do the job: for each link of a robot the minimum distance to a cloud, and where.
+/// Methods that find the minimum distance from each link of a robot to a cloud, and its witness
+/// points.
 namespace ist::benchmark {
 
-/// Of one link, in the fixed frame.
+/// Answer for one link, in the fixed frame.
 struct Answer {
   double distance;        ///< [m]
-  Eigen::Vector3d p_FCl;  ///< [m] on the link (or what stands for it)
-  Eigen::Vector3d p_FCo;  ///< [m] on the obstacle
+  Eigen::Vector3d p_FCl;  ///< [m] witness point on the link (or its spheres)
+  Eigen::Vector3d p_FCo;  ///< [m] witness point on the obstacle
 };
 
-/// What the distance is measured to.
+/// The representation that distances are computed with.
 enum class Kind {
-  kFloor,    ///< no answer: what the memory alone costs
-  kOurs,     ///< the mesh, to a tolerance
+  kFloor,    ///< no answer: the cost of reading memory
+  kOurs,     ///< the mesh, to a tolerance, by this library
   kExact,    ///< the mesh
-  kSpheres,  ///< spheres that stand for the link
-  kGrid      ///< the cloud is replaced by cells, too
+  kSpheres,  ///< spheres instead of the link
+  kGrid      ///< a grid: distances of the link, or cells instead of the cloud
 };
 
 class Method {
@@ -34,7 +35,7 @@ class Method {
   Method& operator=(const Method&) = delete;
   virtual ~Method() = default;
 
-  /// From the bytes of a message to what queries need.
+  /// Prepares queries from the bytes of a message.
   virtual void ingest(const Frame& frame) = 0;
 
   /// @param X_FL     by link
@@ -44,25 +45,24 @@ class Method {
   std::string name;
   Kind kind = Kind::kExact;
   std::size_t spheres = 0;
-  double max_error = 0.0;  ///< [m] of ours: what the links are packed to
-  double tolerance = 0.0;  ///< [m] of ours
+  double max_error = 0.0;  ///< [m] of the packing, for ours
+  double tolerance = 0.0;  ///< [m] of the query, for ours
 
-  /// [m] What distance - truth must be in, where there is no contact; checked before anything is
-  /// timed.
+  /// [m] Limits of distance - truth without contact; checked before anything is timed.
   double least_error = -kRounding, largest_error = kRounding;
-  /// Measures the unsigned distance to the surface, so that it can be checked in contact as well.
+  /// The method measures the unsigned distance to the surface, which is checked in contact, too.
   bool is_unsigned = false;
-  /// The witnesses are `distance` apart, to this [m].
+  /// [m] Allowed difference between `distance` and the distance of the witness points.
   double witness_error = kRounding;
-  /// Only every n-th configuration is queried, where one takes long.
+  /// Step through the configurations, for methods that take long.
   std::size_t every = 1;
 
-  static constexpr double kRounding = 2e-5;  ///< [m] of float coordinates, with room to spare
+  static constexpr double kRounding = 2e-5;  ///< [m] of float coordinates, with a margin
 };
 
 using Methods = std::vector<std::unique_ptr<Method>>;
 
-// Each adds its methods; those whose library is not there do not exist.
+// Each function adds its methods. Those whose library is not installed do not exist.
 void add_floors(const Robot& robot, const SphereSet& spheres, Methods* methods);
 void add_ours(const Robot& robot, Methods* methods);
 void add_nanoflann(const SphereSet& spheres, Methods* methods);

@@ -7,8 +7,8 @@
 
 #include "peers/flat.h"
 
-// A k-d tree over all points, or over the middles of occupied voxels, asked for what is nearest to
-// each sphere.
+// A k-d tree over all points, or over the centres of occupied voxels, queried for the point nearest
+// to each sphere.
 namespace ist::benchmark {
 namespace {
 
@@ -47,13 +47,13 @@ class Nanoflann : public BySpheres {
   }
 
  protected:
-  bool nearest(const Eigen::Vector3d& center, double reach, Nearest* found) override {
+  bool nearest(const Eigen::Vector3d& center, double max_distance, Nearest* found) override {
     const Eigen::Vector3f c = center.cast<float>();
     std::size_t index = 0;
     float distance_sq = 0.0F;
     nanoflann::KNNResultSet<float> result(1);
     result.init(&index, &distance_sq);
-    if (reach < 1e15) distance_sq = static_cast<float>(reach * reach);
+    if (max_distance < 1e15) distance_sq = static_cast<float>(max_distance * max_distance);
     tree_->findNeighbors(result, c.data(), nanoflann::SearchParams());
     if (result.size() == 0) return false;
     found->p_FCo = cloud_.points.at(index).cast<double>();
@@ -62,7 +62,7 @@ class Nanoflann : public BySpheres {
   }
 
  private:
-  // The middle of each occupied voxel: sorted keys, each once.
+  // The points become the centres of occupied voxels, by sorted unique keys.
   void keep_voxels() {
     Points& points = cloud_.points;
     constexpr std::int64_t kHalf = 1 << 20;

@@ -7,7 +7,7 @@
 namespace ist::benchmark {
 namespace {
 
-// The packing decides how fast, the tolerance how exact.
+// max_error decides the speed, the tolerance the error.
 constexpr double kMaxErrors[] = {0.01, 0.005, 0.002};        // [m]
 constexpr double kTolerances[] = {0.0, 0.001, 0.005, 0.02};  // [m]
 

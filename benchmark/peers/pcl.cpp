@@ -10,7 +10,7 @@
 
 #include "peers/flat.h"
 
-// PCL's k-d tree (FLANN's) and its octree over all points, asked for what is nearest to each
+// PCL's k-d tree (FLANN's) and its octree over all points, queried for the point nearest to each
 // sphere.
 namespace ist::benchmark {
 namespace {
@@ -37,11 +37,11 @@ class PclMethod : public BySpheres {
 
  protected:
   virtual void build() = 0;
-  virtual bool find(const pcl::PointXYZ& center, double reach) = 0;
+  virtual bool find(const pcl::PointXYZ& center, double max_distance) = 0;
 
-  bool nearest(const Eigen::Vector3d& center, double reach, Nearest* found) override {
+  bool nearest(const Eigen::Vector3d& center, double max_distance, Nearest* found) override {
     const Eigen::Vector3f c = center.cast<float>();
-    if (!find({c.x(), c.y(), c.z()}, reach)) return false;
+    if (!find({c.x(), c.y(), c.z()}, max_distance)) return false;
     found->p_FCo = points_.at(static_cast<std::size_t>(index_[0])).cast<double>();
     found->distance = (found->p_FCo - center).norm();
     return true;
@@ -59,10 +59,10 @@ class KdTree : public PclMethod {
 
  private:
   void build() override { tree_.setInputCloud(cloud_); }
-  bool find(const pcl::PointXYZ& center, double reach) override {
-    // The nearest within the reach, where there is one already: it keeps one neighbour, the best.
-    if (std::isfinite(reach)) {
-      return tree_.radiusSearch(center, reach, index_, distance_sq_, 1) > 0;
+  bool find(const pcl::PointXYZ& center, double max_distance) override {
+    // With an upper bound, a radius search for at most one neighbour: FLANN keeps the nearest.
+    if (std::isfinite(max_distance)) {
+      return tree_.radiusSearch(center, max_distance, index_, distance_sq_, 1) > 0;
     }
     return tree_.nearestKSearch(center, 1, index_, distance_sq_) > 0;
   }
@@ -80,8 +80,8 @@ class Octree : public PclMethod {
     tree_->setInputCloud(cloud_);
     tree_->addPointsFromInputCloud();
   }
-  // Its search within a radius stops at the first point, not at the nearest.
-  bool find(const pcl::PointXYZ& center, double /*reach*/) override {
+  // The octree's radius search would stop at the first point, not at the nearest.
+  bool find(const pcl::PointXYZ& center, double /*max_distance*/) override {
     return tree_->nearestKSearch(center, 1, index_, distance_sq_) > 0;
   }
 

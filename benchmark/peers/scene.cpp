@@ -9,7 +9,7 @@ namespace ist::benchmark {
 
 RawCloud Frame::raw() const {
   RawCloud cloud;
-  // The frame stays as it is while its snapshots are asked.
+  // The frame does not change while its snapshots are queried.
   cloud.owner = std::shared_ptr<const void>(std::shared_ptr<void>(), data.data());
   cloud.data = reinterpret_cast<const std::uint8_t*>(data.data());
   cloud.width = width;
@@ -70,7 +70,7 @@ SphereSet few_spheres(const Robot& robot, std::size_t wanted) {
     for (const LinkModel& link : model.links) spheres += link.packing.spheres.size();
     return spheres;
   };
-  double low = 0.002, high = 0.2;  // [m] many spheres, few
+  double low = 0.002, high = 0.2;  // [m] with many and with few spheres
   std::shared_ptr<const RobotModel> best;
   const auto miss = [&](const RobotModel& model) {
     return std::abs(static_cast<double>(count(model)) - static_cast<double>(wanted));

@@ -12,11 +12,11 @@
 #include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/robot/robot_model.h"
 
-/// What the methods are given.
+/// Robots, frames and configurations that the methods get.
 namespace ist::benchmark {
 
-/// A depth camera's message: x, y, z and padding, four floats a point, NaN where nothing was
-/// measured.
+/// A depth camera's message: x, y, z and padding, four floats a point, NaN for pixels without a
+/// measurement.
 struct Frame {
   std::size_t width = 0, height = 0;
   std::vector<float> data;
@@ -26,13 +26,13 @@ struct Frame {
   RawCloud raw() const;
 };
 
-/// The finite points of a frame, in the fixed frame: where most methods start from.
+/// The finite points of a frame, in the fixed frame. Most methods start from them.
 struct Points {
   std::vector<float> x, y, z;  ///< [m]
 
   std::size_t size() const { return x.size(); }
   Eigen::Vector3f at(std::size_t i) const { return {x[i], y[i], z[i]}; }
-  /// Overwrites, in one pass over the message's bytes; keeps the memory.
+  /// Overwrites the points in one pass over the message's bytes; keeps the memory.
   void read(const Frame& frame);
 };
 
@@ -48,7 +48,7 @@ struct Scene {
   std::vector<Configuration> configurations;
 };
 
-/// A robot as a list of meshes, packed by need.
+/// A robot as a list of meshes, packed on demand.
 struct Robot {
   std::vector<TriangleMesh> meshes;  ///< by link, in the link's frame
   std::string cache_directory;
@@ -57,7 +57,7 @@ struct Robot {
   std::shared_ptr<const RobotModel> pack(double max_error, int max_spheres = 20000) const;
 };
 
-/// Spheres by link, as people would use them instead of the links.
+/// Spheres instead of the links, by link.
 struct SphereSet {
   struct Sphere {
     Eigen::Vector3d center;  ///< [m] link frame
@@ -84,13 +84,13 @@ DataSet kinect_data(const std::filesystem::path& data, const std::string& cache_
 /// Tori, spheres, boxes, cylinders and angles among a ray-traced scene, truth by brute force.
 DataSet synthetic_data(const std::string& cache_directory);
 
-/// What it is made of: a table, things on it and a wall behind, as a camera at the table's edge
-/// sees them; the links; and where they may be.
+/// The parts of the synthetic data. The frame shows a table, things on it and a wall behind, seen
+/// by a camera at the table's edge.
 Frame synthetic_frame(std::size_t width, std::size_t height);
 std::vector<TriangleMesh> synthetic_meshes();
 Eigen::Isometry3d synthetic_pose(std::mt19937_64* rng);
 
-/// Poses in between: `steps` for each pair of neighbours.
+/// Interpolates `steps` poses for each pair of successive ones.
 std::vector<std::vector<Eigen::Isometry3d>> interpolated(
     const std::vector<std::vector<Eigen::Isometry3d>>& poses, int steps);
 

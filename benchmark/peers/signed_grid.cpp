@@ -6,13 +6,14 @@
 #include "internal/geometry/triangle_bvh.h"
 #include "peers/flat.h"
 
-// A grid of distances about each link, made beforehand: every point that the link's box leaves is
-// looked up. Its witness is the point's, moved along the grid's slope.
+// A precomputed grid of distances around each link, looked up for every point that the link's box
+// does not prune. The witness point on the link is the point moved along the grid's gradient.
 namespace ist::benchmark {
 namespace {
 
 constexpr float kCell = 0.0075F;  // [m]
-constexpr float kMargin = 0.1F;   // [m] about the link's box; beyond, the box's side is asked for
+constexpr float kMargin =
+    0.1F;  // [m] around the link's box; points outside are projected onto the grid
 
 struct Grid {
   Eigen::Vector3f low;
@@ -41,7 +42,7 @@ struct Grid {
     return distance[static_cast<std::size_t>((z * size.y() + y) * size.x() + x)];
   }
 
-  // Between the nodes; outside, that of the nearest place inside and the way to it.
+  // Interpolates between the nodes. Outside, the distance to the nearest point inside is added.
   float operator()(const Eigen::Vector3f& p) const {
     const Eigen::Vector3f last = size.cast<float>().array() - 1.001F;
     const Eigen::Vector3f want = (p - low) / kCell;
@@ -76,8 +77,9 @@ class SignedGrid : public PrunedByBox {
     kind = Kind::kGrid;
     is_unsigned = false;
     for (const TriangleMesh& mesh : robot.meshes) grids_.emplace_back(mesh);
-    // Within a cell the distance is at most half its diagonal from the nodes' mean; beyond the grid
-    // the way over its side is longer than the straight one, by less than the side's length.
+    // Within a cell the distance differs from the nodes' mean by at most half the diagonal. Outside
+    // the grid, the path over its side is longer than the straight one, by less than the side's
+    // length.
     least_error = -0.5 * std::sqrt(3.0) * static_cast<double>(kCell);
     largest_error = std::numeric_limits<double>::infinity();
     witness_error = std::numeric_limits<double>::infinity();

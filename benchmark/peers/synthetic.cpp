@@ -14,7 +14,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kConfigurations = 40;
 
-// Where the ray from `origin` along `d` (unit) meets a sphere; inf: nowhere.
+// The distance along the ray from `origin` in direction `d` (unit) to a sphere; inf if it misses.
 double hit_sphere(const Eigen::Vector3d& origin, const Eigen::Vector3d& d,
                   const Eigen::Vector3d& center, double radius) {
   const Eigen::Vector3d oc = origin - center;
@@ -84,8 +84,8 @@ Enclosing enclosing(const TriangleMesh& mesh) {
   return sphere;
 }
 
-// Brute force over points and triangles. What cannot be the nearest because the link's enclosing
-// sphere is farther is skipped; negative: a point is within that sphere.
+// Distance by brute force over points and triangles. Points whose distance to the link's bounding
+// sphere is larger are skipped. Negative: a point is within that sphere.
 double true_distance(const TriangleMesh& mesh, const Enclosing& sphere,
                      const Eigen::Isometry3d& X_FL, const std::vector<Eigen::Vector3d>& points_F) {
   const Eigen::Vector3d center = X_FL * sphere.center;
@@ -139,7 +139,7 @@ DataSet synthetic_data(const std::string& cache_directory) {
   std::vector<Eigen::Vector3d> points;
   for (std::size_t i = 0; i < stored.size(); ++i) points.push_back(stored.at(i).cast<double>());
   std::mt19937_64 rng(1);
-  std::vector<std::vector<Eigen::Isometry3d>> way;
+  std::vector<std::vector<Eigen::Isometry3d>> waypoints;
   while (scene.configurations.size() < kConfigurations) {
     Configuration configuration;
     for (const TriangleMesh& mesh : set.robot.meshes) {
@@ -155,11 +155,11 @@ DataSet synthetic_data(const std::string& cache_directory) {
       configuration.distance.push_back(distance);
       configuration.is_contact.push_back(false);
     }
-    way.push_back(configuration.X_FL);
+    waypoints.push_back(configuration.X_FL);
     scene.configurations.push_back(std::move(configuration));
   }
-  way.resize(6);
-  set.motion = interpolated(way, 400);  // about 1 mm a step
+  waypoints.resize(6);
+  set.motion = interpolated(waypoints, 400);  // about 1 mm a step
   set.scenes.push_back(std::move(scene));
   return set;
 }

@@ -17,7 +17,7 @@ double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / EIGEN_PI;
 }
 
-// Of one cloud: each link is asked on its own, from its own last answer, as in a 1 kHz cycle.
+// Queries one cloud, link by link, each with its own warm start, as in a 1 kHz cycle.
 class Asker {
  public:
   Asker(const std::shared_ptr<const RobotModel>& model, const CloudSnapshot& cloud)
@@ -54,7 +54,7 @@ class Asker {
   ThreadTimer timer_;
 };
 
-// The nearest pair alone, as long as the blend would be.
+// The repulsion along the nearest pair alone, with the same strength as the blend.
 Eigen::Vector3d nearest_pair(const LinkProximity& answer) {
   const double strength = repulsion_strength(answer, {});
   return strength > 0.0 ? Eigen::Vector3d(strength * answer.direction) : Eigen::Vector3d::Zero();
@@ -64,7 +64,7 @@ bool moves(const MovingScene& scene, std::size_t link) {
   return !scene.steps.front()[link].isApprox(scene.steps.back()[link], 1e-9);
 }
 
-// The wrench's force of one link along the motion [m^3], times any stiffness.
+// The force of one link's wrench along the motion [m^3], for a stiffness of 1.
 class Contact {
  public:
   Contact(const LinkModel& link, const ContactGeometry& body, const MovingScene& scene)
@@ -79,7 +79,7 @@ class Contact {
     steps_.push_back({force, begins, in_reference});
   }
 
-  /// Adds the steps, of the largest force.
+  /// Adds the steps relative to the largest force.
   /// @param counts  by step of the reference: whether the step to it counts; overwritten
   void add_to(Noise* noise, std::vector<bool>* counts) const {
     counts->clear();

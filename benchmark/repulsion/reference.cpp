@@ -13,10 +13,10 @@ namespace {
 
 using Matrix3X = Eigen::Matrix3Xd;
 
-constexpr int kSamples = 200;        // on a link's surface
-constexpr int kWayInSamples = 5000;  // the same, for what is as near as points inside are
+constexpr int kSamples = 200;         // on a link's surface
+constexpr int kInwardSamples = 5000;  // the same, for points inside, which are near the surface
 
-// Points of the exact surface, evenly by area, the same for every run.
+// Points of the exact surface, evenly spread by area, the same in every run.
 Matrix3X surface_samples(const LinkGeometry& geometry, int count, std::mt19937_64* rng) {
   struct Triangle {
     Eigen::Vector3d a, b, c;
@@ -59,7 +59,7 @@ Matrix3X thinned_points(const CloudSnapshot& cloud) {
 Eigen::Vector3d direction(const Matrix3X& samples, const Matrix3X& points, double smoothing) {
   const Eigen::Vector3d middle = samples.rowwise().mean();
   const double radius = (samples.colwise() - middle).colwise().norm().maxCoeff();
-  // Points that no weight can reach are left out.
+  // Points whose weight is zero are skipped.
   const Eigen::RowVectorXd to_middle = (points.colwise() - middle).colwise().norm();
   std::vector<Eigen::Index> near;
   double nearest = std::numeric_limits<double>::infinity();
@@ -82,7 +82,7 @@ Eigen::Vector3d direction(const Matrix3X& samples, const Matrix3X& points, doubl
 
 namespace {
 
-// [deg] Sum of the angles between what at(k) and at(k - 1) return, over the steps that count.
+// The sum of the angles [deg] between at(k) and at(k - 1), over the steps that count.
 template <typename At>
 double variation(const std::vector<std::vector<bool>>& counts, std::size_t link, const At& at) {
   double sum = 0.0;
@@ -100,7 +100,7 @@ double variation(const std::vector<std::vector<bool>>& counts, std::size_t link,
   return sum * 180.0 / EIGEN_PI;
 }
 
-// A point counts from the surface on, in full from kFullDepth of its sphere's radius.
+// A point's weight rises from 0 at the surface to 1 at kFullDepth times its sphere's radius.
 Eigen::Vector3d contact_direction(const Solid& solid, const Matrix3X& samples,
                                   const Matrix3X& points_L, double full) {
   const Eigen::Vector3d middle = samples.rowwise().mean();
@@ -144,7 +144,8 @@ double wrench_reference_variation(const MovingScene& scene, const RobotModel& mo
   const double full = kFullDepth * kPointSphereRadius * scene.cloud.thinning;
   double sum = 0.0;
   for (std::size_t link = 0; link < scene.robot.links.size(); ++link) {
-    const Matrix3X samples = surface_samples(scene.robot.links[link].geometry, kWayInSamples, &rng);
+    const Matrix3X samples =
+        surface_samples(scene.robot.links[link].geometry, kInwardSamples, &rng);
     sum += variation(counts, link, [&](std::size_t k) {
       const Eigen::Isometry3d& X_FL = scene.steps[scene.reference_begin + k][link];
       const Eigen::Isometry3d X_LF = X_FL.inverse();

@@ -1,5 +1,5 @@
-// How long an answer takes through ROS: joint states at 1 kHz and an organized 640x480 cloud at
-// 30 Hz, beside a bare relay of the same messages in the same run.
+// Latency of answers through ROS: joint states at 1 kHz and an organized 640x480 cloud at 30 Hz,
+// compared with a bare relay of the same messages in the same run.
 //
 //   roscore & build/ros/benchmark/latency [--tcp] [--urdf FILE] [--pcd FILE --camera FILE]
 //
@@ -33,7 +33,7 @@ namespace {
 
 using ist_proximity::ProximityArray;
 
-// [s] After the first answer the model is still at work: contact volumes are packed beside it.
+// [s] Contact volumes are still being packed after the first answer.
 constexpr double kSettling = 20.0;
 
 struct Options {
@@ -53,7 +53,7 @@ struct Stopwatches {
   }
 };
 
-/// Whose thread hears all answers.
+/// Subscribes to all answers in a thread of its own.
 class Ears {
  public:
   Ears(const std::string& proximity, Stopwatches* watches) {
@@ -88,7 +88,7 @@ class Ears {
   ros::Subscriber on_relayed_, on_seen_, on_answer_;
 };
 
-/// Another program, ended with this.
+/// A child process that ends with this object.
 class Process {
  public:
   explicit Process(const std::vector<std::string>& command) : pid_(fork()) {
@@ -112,7 +112,7 @@ class Process {
   pid_t pid_;
 };
 
-/// [s] of processor time by thread name.
+/// Processor time [s] by thread name.
 std::map<std::string, double> thread_times() {
   std::map<std::string, double> times;
   for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
@@ -146,7 +146,7 @@ std::string latency_table(const Options& options, Stopwatches* watches) {
          row(options, "cloud, first answer with it", &watches->cloud, &watches->seen_cloud);
 }
 
-/// In the document: this robot's rows, after those of others.
+/// Writes this robot's rows to the document, after those of other robots.
 bool replace_rows(const Options& options, const std::string& table, const std::string& rows) {
   const std::string document = test::read_text(options.document);
   const auto [first, last] = test::table_place(document, table);
@@ -162,7 +162,7 @@ void wait(double seconds) {
   for (double t = 0.0; ros::ok() && t < seconds; t += 0.05) ros::WallDuration(0.05).sleep();
 }
 
-/// The node's parameters, below `name`.
+/// Sets the node's parameters in the namespace `name`.
 void set_parameters(const Options& options, const std::string& name, const std::string& cache) {
   ros::param::set(name + "/pose_source", "joint_states");
   ros::param::set(name + "/geometry", options.geometry);
@@ -211,7 +211,7 @@ bool run(const Options& options) {
   wait(options.seconds);
   const auto after = thread_times();
   watches.count(false);
-  wait(0.5);  // the last answers
+  wait(0.5);  // for the last answers
   if (!ros::ok()) return false;
 
   const std::string latencies = latency_table(options, &watches);

@@ -10,42 +10,48 @@
 namespace ist {
 namespace {
 
-// Where a hole leaves no room for inner spheres, outer ones have this share of the way to the mesh,
-// and of the gap that is wanted.
-constexpr double kBehindHole = 0.5;
+// The cover sphere has this share of the distance to the mesh where a hole admits no inner sphere,
+// or of the wanted gap if that is larger.
+constexpr double kHoleCoverRadius = 0.5;
 
-// A cell by a hole that may have an inside is taken to have one when it is as small as this share
-// of the gap that is wanted.
-constexpr double kUnclearSize = 0.25;
+// A cell near a hole that may contain interior points counts as interior when its circumradius is
+// at most this share of the wanted gap.
+constexpr double kMaxUnclearSize = 0.25;
 constexpr double kWindingError = 0.01;
 
-// A cell is cut where that takes away at least this share of its half width.
-constexpr double kLeastCut = 0.2;
+// A cell is clipped where that takes away at least this share of its half width.
+constexpr double kMinClip = 0.2;
 
-enum class Cell { kOutside, kInside, kAtSurface, kUnclear };
+enum class CellKind { kOutside, kInside, kAtSurface, kUnclear };
 
-// The corners of the part of a box where n.(x - center) <= end: its own, and where the plane cuts
-// its edges. The plane meets at most six edges, and leaves one corner out at least.
-constexpr std::size_t kMaxCorners = 13;
-int cut(const Eigen::Vector3d& center, const Eigen::Vector3d& half, const Eigen::Vector3d& n,
-        double end, std::array<Eigen::Vector3d, kMaxCorners>* corners) {
-  std::array<Eigen::Vector3d, 8> box;
-  std::array<double, 8> beyond;
+// Corner k of the box: bit 0, 1, 2 choose the side along x, y, z.
+Eigen::Vector3d box_corner(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
+                           std::size_t k) {
+  return center + Eigen::Vector3d((k & 1) != 0U ? half.x() : -half.x(),
+                                  (k & 2) != 0U ? half.y() : -half.y(),
+                                  (k & 4) != 0U ? half.z() : -half.z());
+}
+
+// The vertices of a box clipped to the half-space n.(x - center) <= offset: the box's corners in
+// it, and the points where the plane cuts edges. The plane cuts at most six edges, and at least one
+// corner lies outside.
+constexpr std::size_t kMaxVertices = 13;
+int clip_box(const Eigen::Vector3d& center, const Eigen::Vector3d& half, const Eigen::Vector3d& n,
+             double offset, std::array<Eigen::Vector3d, kMaxVertices>* vertices) {
+  std::array<Eigen::Vector3d, 8> corners;
+  std::array<double, 8> height;  // [m] above the plane
   std::size_t count = 0;
   for (std::size_t k = 0; k < 8; ++k) {
-    const Eigen::Vector3d arm((k & 1) != 0U ? half.x() : -half.x(),
-                              (k & 2) != 0U ? half.y() : -half.y(),
-                              (k & 4) != 0U ? half.z() : -half.z());
-    box[k] = center + arm;
-    beyond[k] = n.dot(arm) - end;
-    if (beyond[k] <= 0.0) (*corners)[count++] = box[k];
+    corners[k] = box_corner(center, half, k);
+    height[k] = n.dot(box_corner(Eigen::Vector3d::Zero(), half, k)) - offset;
+    if (height[k] <= 0.0) (*vertices)[count++] = corners[k];
   }
   for (std::size_t k = 0; k < 8; ++k) {
-    for (const std::size_t step : {1U, 2U, 4U}) {
-      const std::size_t other = k | step;
-      if (other == k || (beyond[k] <= 0.0) == (beyond[other] <= 0.0)) continue;
-      const double share = beyond[k] / (beyond[k] - beyond[other]);
-      (*corners)[count++] = box[k] + share * (box[other] - box[k]);
+    for (const std::size_t axis_bit : {1U, 2U, 4U}) {
+      const std::size_t other = k | axis_bit;
+      if (other == k || (height[k] <= 0.0) == (height[other] <= 0.0)) continue;
+      const double share = height[k] / (height[k] - height[other]);
+      (*vertices)[count++] = corners[k] + share * (corners[other] - corners[k]);
     }
   }
   return static_cast<int>(count);
@@ -58,7 +64,7 @@ class InteriorCover {
       : bvh_(bvh),
         finder_(finder),
         config_(config),
-        // Nearer than the surface is to the spheres, the interior is of no use.
+        // The interior need not be covered more tightly than the surface.
         target_(std::max(config.max_error, packing->certificate.max_gap)),
         spheres_(*spheres),
         packing_(*packing) {
@@ -75,7 +81,7 @@ class InteriorCover {
     const double side = std::max(box.sizes().minCoeff(), box.sizes().maxCoeff() / 64.0);
     const Eigen::Array3i n = (box.sizes().array() / side).ceil().cast<int>();
     const Eigen::Vector3d half = 0.5 * (box.sizes().array() / n.cast<double>()).matrix();
-    // The first two levels by hand, so that progress is told between cells.
+    // The first two levels are divided here, so that progress is reported between cells.
     const Eigen::Array3i m = 4 * n;
     const Eigen::Vector3d quarter = 0.25 * half;
     for (int i = 0; i < m.x(); ++i) {
@@ -92,42 +98,42 @@ class InteriorCover {
   }
 
  private:
-  // A single cell of a link that is far larger than the error wanted takes long, too.
+  // Asked within cells, too: a single cell takes long where a link is large against max_error.
   bool is_stopped() {
     constexpr int kStopInterval = 1024;
     if (!stopped_ && ++visits_ % kStopInterval == 0 && progress_) stopped_ = !progress_(done_);
     return stopped_;
   }
 
+  // Covers the interior points of a cell, dividing it where that is needed.
   void visit(const Eigen::Vector3d& center, const Eigen::Vector3d& half, std::uint32_t hint) {
     if (is_stopped()) return;
     std::array<Eigen::Vector3d, 8> corners;
-    for (std::size_t k = 0; k < 8; ++k) {
-      corners[k] = center + Eigen::Vector3d((k & 1) != 0U ? half.x() : -half.x(),
-                                            (k & 2) != 0U ? half.y() : -half.y(),
-                                            (k & 4) != 0U ? half.z() : -half.z());
-    }
+    for (std::size_t k = 0; k < 8; ++k) corners[k] = box_corner(center, half, k);
     const SphereSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
     if (match.cost <= target_) return;
-    const double radius = half.norm();
+    const double circumradius = half.norm();
     const ClosestPoint surface = bvh_.closest(center);
-    const double to_surface = std::sqrt(surface.distance_sq);
-    const Cell kind = classify(center, radius, to_surface);
-    if (kind == Cell::kOutside) return;
-    // The surface is covered, and its inside to a depth of target_.
-    if (to_surface + radius <= target_) return;
-    if (to_surface < radius + target_ && is_covered_below(center, half, surface.point, match))
+    const double distance = std::sqrt(surface.distance_sq);
+    const CellKind kind = classify(center, circumradius, distance);
+    if (kind == CellKind::kOutside) return;
+    // The surface is covered, and with it the interior down to a depth of target_.
+    if (distance + circumradius <= target_) return;
+    if (distance < circumradius + target_ && is_covered_below(center, half, surface.point, match)) {
       return;
-    const bool is_wanted =
-        kind == Cell::kInside || (kind == Cell::kUnclear && radius <= kUnclearSize * target_);
-    if (is_wanted && fill(center, radius, kind, match)) return;
+    }
+    const bool is_interior =
+        kind == CellKind::kInside ||
+        (kind == CellKind::kUnclear && circumradius <= kMaxUnclearSize * target_);
+    if (is_interior && is_done_with_sphere(center, circumradius, kind, match)) return;
     for (const Eigen::Vector3d& corner : corners) {
       visit(0.5 * (center + corner), 0.5 * half, match.sphere);
     }
   }
 
-  // Whether a sphere covers what of the cell is deeper than target_: cut off across the way to the
-  // nearest surface point q, or from the sphere.
+  // Whether one cover sphere covers all interior points of the cell that are deeper than target_.
+  // Two planes may show it: across the line to the nearest surface point q, and across the line to
+  // the sphere's centre.
   bool is_covered_below(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
                         const Eigen::Vector3d& q, const SphereSearch::Match& match) const {
     if (!finder_.is_closed()) return false;
@@ -137,66 +143,72 @@ class InteriorCover {
            is_covered_along(from_sphere, center, half, match);
   }
 
-  // Whether a sphere covers what of the cell is deeper than target_, as far as one plane can tell.
-  //
-  // Beyond everything that the surface reaches along n, within target_ of the cell, all is outside
-  // if one point is: it is convex, and no triangle crosses it. Points of the cell that come there
-  // by a way of target_ are outside, or cross the surface on it.
-  bool is_covered_along(const Eigen::Vector3d& way, const Eigen::Vector3d& center,
+  // The same, shown by the supporting plane of the surface near the cell in one direction n. Let h
+  // be the support (the largest n.x) of the surface within target_ of the cell. The region above h
+  // is convex and no triangle crosses it, so it is outside if one of its points is. Points of the
+  // cell above h - target_ are outside or within target_ of the surface, since a movement by
+  // target_ along n leads to that region. The rest of the cell is clipped off and must be covered.
+  bool is_covered_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& center,
                         const Eigen::Vector3d& half, const SphereSearch::Match& match) const {
-    const double reach = half.norm() + target_;
-    const Eigen::Vector3d n = way.stableNormalized();
-    if (!(n.squaredNorm() > 0.5)) return false;  // no way at all
-    const double width = n.cwiseAbs().dot(half), limit = (1.0 - kLeastCut) * width + target_;
-    const double highest = bvh_.support_in_sphere(center, reach, n, limit);
-    if (!(highest <= limit) || highest < -reach) return false;
-    if (bvh_.is_inside(center + 0.5 * (highest + reach) * n)) return false;
-    std::array<Eigen::Vector3d, kMaxCorners> corners;
-    const int count = cut(center, half, n, highest - target_, &corners);
+    const double radius = half.norm() + target_;
+    const Eigen::Vector3d n = direction.stableNormalized();
+    if (!(n.squaredNorm() > 0.5)) return false;  // no direction
+    const double half_width = n.cwiseAbs().dot(half);
+    const double limit = (1.0 - kMinClip) * half_width + target_;
+    const double support = bvh_.support_in_sphere(center, radius, n, limit);
+    if (!(support <= limit) || support < -radius) return false;
+    if (bvh_.is_inside(center + 0.5 * (support + radius) * n)) return false;
+    std::array<Eigen::Vector3d, kMaxVertices> vertices;
+    const int count = clip_box(center, half, n, support - target_, &vertices);
     return count == 0 ||
-           search_.best(corners.data(), count, match.sphere, 0, target_).cost <= target_;
+           search_.best(vertices.data(), count, match.sphere, 0, target_).cost <= target_;
   }
 
-  // A sphere about the cell's centre, when the centre itself lacks one. False: divide the cell.
-  bool fill(const Eigen::Vector3d& center, double radius, Cell kind,
-            const SphereSearch::Match& match) {
-    const double uncovered = search_.best(&center, 1, match.sphere, 0, 0.5 * target_).cost;
-    if (uncovered <= 0.5 * target_ && 2.0 * radius > 0.5 * target_) return false;
+  // Adds a sphere about the cell's centre if the centre is not covered well. False: the cell must
+  // be divided. True: no further sphere is allowed, and the cell's gap is in the certificate.
+  bool is_done_with_sphere(const Eigen::Vector3d& center, double circumradius, CellKind kind,
+                           const SphereSearch::Match& match) {
+    const double gap = search_.best(&center, 1, match.sphere, 0, 0.5 * target_).cost;
+    if (gap <= 0.5 * target_ && 2.0 * circumradius > 0.5 * target_) return false;
     if (packing_.spheres.size() >= static_cast<std::size_t>(config_.max_spheres)) {
       packing_.certificate.interior_gap = std::max(packing_.certificate.interior_gap, match.cost);
       return true;
     }
-    const MedialSphereFinder::InnerSphere sphere =
-        kind == Cell::kInside
-            ? finder_.around(center, 0.1 * target_)
-            : MedialSphereFinder::InnerSphere{center, -std::sqrt(bvh_.closest(center).distance_sq)};
+    const MedialSphere sphere =
+        kind == CellKind::kInside
+            ? finder_.containing(center, 0.1 * target_)
+            : MedialSphere{center, -std::sqrt(bvh_.closest(center).distance_sq)};
     const double cover_radius =
-        sphere.radius < 0.0 ? kBehindHole * std::max(-sphere.radius, target_) : sphere.radius;
+        sphere.radius < 0.0 ? kHoleCoverRadius * std::max(-sphere.radius, target_) : sphere.radius;
     packing_.spheres.push_back({sphere.center, sphere.radius, cover_radius});
     search_.add(sphere.center, cover_radius);
     spheres_.add(sphere.center, sphere.radius);
     return false;
   }
 
-  // A cell that no triangle touches is inside or outside as its centre is. In an open mesh the
-  // winding number changes smoothly instead: Harnack's inequality for positive harmonic functions
-  // bounds its rise from the centre to the cell's corners.
-  Cell classify(const Eigen::Vector3d& center, double radius, double distance) const {
-    if (distance <= radius) return Cell::kAtSurface;
-    if (finder_.is_closed()) return bvh_.is_inside(center) ? Cell::kInside : Cell::kOutside;
-    const double q = radius / distance;
+  // A cell that no triangle touches is on the side of its centre. In an open mesh the winding
+  // number changes smoothly instead: it is harmonic off the mesh, and Harnack's inequality bounds
+  // its rise from the centre to the cell's corners.
+  CellKind classify(const Eigen::Vector3d& center, double circumradius, double distance) const {
+    if (distance <= circumradius) return CellKind::kAtSurface;
+    if (finder_.is_closed()) {
+      return bvh_.is_inside(center) ? CellKind::kInside : CellKind::kOutside;
+    }
+    const double q = circumradius / distance;
     const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
     const double quick = bvh_.quick_winding_number(center);
-    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) return Cell::kOutside;
+    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) {
+      return CellKind::kOutside;
+    }
     const double w = bvh_.winding_number(center);
-    if (std::max(w + kWindingError, 0.0) * rise < 0.5) return Cell::kOutside;
-    return w > 0.5 ? Cell::kInside : Cell::kUnclear;
+    if (std::max(w + kWindingError, 0.0) * rise < 0.5) return CellKind::kOutside;
+    return w > 0.5 ? CellKind::kInside : CellKind::kUnclear;
   }
 
   const TriangleBvh& bvh_;
   const MedialSphereFinder& finder_;
   const PackingConfig& config_;
-  const double target_;  // [m]
+  const double target_;  // [m] wanted gap
   SphereSearch& spheres_;
   Packing& packing_;
   SphereSearch search_;  // cover spheres

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "hole_guard.h"
+#include "hole_obstacles.h"
 #include "interior_cover.h"
 #include "internal/geometry/tessellation.h"
 #include "ist_proximity/geometry/error.h"
@@ -16,20 +16,21 @@
 namespace ist {
 namespace {
 
-// The share of the wanted error that an inscribed prism may take.
+// The share of max_error that the deviation of an inscribed prism may use.
 constexpr double kTessellationShare = 0.1;
 
-// Room for a sphere smaller than this share of the wanted error is left as it is.
-constexpr double kHoleShare = 0.5;
+// In disjoint packings, spaces are filled down to spheres of this share of max_error.
+constexpr double kMinFillRadius = 0.5;
 
-// How far beyond what they must, inner spheres stay away from holes in the mesh, as a share of the
-// wanted error, and at least of the mesh's size.
-constexpr double kGuardShare = 0.1;
-constexpr double kLeastGuard = 1e-3;
+// Tolerance of the obstacles that keep inner spheres away from holes: a share of max_error, and at
+// least a share of the mesh's size.
+constexpr double kHoleTolerance = 0.1;
+constexpr double kMinHoleTolerance = 1e-3;
 
-// About how the time goes.
+// About the share of the time that the surface takes; the interior takes the rest.
 constexpr double kSurfaceShare = 0.6;
 
+// Progress of a step that goes from `from` to `to` of the whole.
 PackingProgress share_of(const PackingProgress& progress, double from, double to) {
   if (!progress) return {};
   return [progress, from, to](double done) { return progress(from + (to - from) * done); };
@@ -83,23 +84,25 @@ Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
     return !stopped;
   };
   const TriangleBvh bvh(mesh);
+  const double size = bvh.bounds().sizes().norm();
+  HoleObstacles holes(mesh, bvh,
+                      std::max(kHoleTolerance * config.max_error, kMinHoleTolerance * size));
   SphereSearch spheres;
   const bool may_overlap = config.order == PackingOrder::kMedial;
-  const double tolerance =
-      std::max(kGuardShare * config.max_error, kLeastGuard * bvh.bounds().sizes().norm());
-  HoleGuard guard(mesh, bvh, tolerance);
-  const MedialSphereFinder finder(bvh, &guard, may_overlap ? nullptr : &spheres);
+  const MedialSphereFinder finder(bvh, &holes, may_overlap ? nullptr : &spheres);
+  std::optional<VolumeFiller> filler;
+  if (!may_overlap) {
+    filler.emplace(bvh, finder, spheres, kMinFillRadius * config.max_error);
+    filler->stop_with(watched);
+  }
   SurfaceCover cover(mesh, finder, &spheres);
-  std::optional<VolumeFiller> holes;
-  if (!may_overlap) holes.emplace(bvh, finder, spheres, kHoleShare * config.max_error);
-  if (holes) holes->stop_with(watched);
-  cover.refine(config, holes ? &*holes : nullptr, share_of(watched, 0.0, kSurfaceShare));
-  if (!stopped) cover.sharpen();
+  cover.refine(config, filler ? &*filler : nullptr, share_of(watched, 0.0, kSurfaceShare));
+  if (!stopped) cover.tighten_certificate();
   Packing packing;
   cover.certify(&packing);
   const PackingProgress rest = share_of(watched, kSurfaceShare, 1.0);
   if (stopped || !cover_interior(bvh, finder, config, rest, &spheres, &packing)) {
-    packing.certificate.interior_gap = bvh.bounds().sizes().norm();
+    packing.certificate.interior_gap = size;
   }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;
   watched(1.0);

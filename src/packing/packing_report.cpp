@@ -1,3 +1,4 @@
+#include "internal/geometry/solid_queries.h"
 #include "internal/packing/packing_report.h"
 
 #include <algorithm>
@@ -5,7 +6,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "internal/geometry/solid_queries.h"
 #include "sphere_search.h"
 
 namespace ist {
@@ -24,37 +24,38 @@ Eigen::Vector3d cube_point(int i) {
   return p - p.array().floor().matrix();
 }
 
-// Evenly spread on the unit sphere (Fibonacci's spiral).
+// Evenly spread on the unit sphere (a Fibonacci lattice).
 Eigen::Vector3d direction(int i) {
   const double z = 1.0 - (2.0 * i + 1.0) / kDirections;
   const double radius = std::sqrt(1.0 - z * z);
   return {radius * std::cos(kGoldenAngle * i), radius * std::sin(kGoldenAngle * i), z};
 }
 
-// How much nearer the sphere is than the mesh to the first point outside that is met along a ray.
-double bulge(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3d& ray) {
-  double way = sphere.radius;
+// How much nearer the sphere is than the surface to the first point outside on a ray from its
+// centre, found by sphere tracing.
+double protrusion_along(const Solid& solid, const InnerSphere& sphere, const Eigen::Vector3d& ray) {
+  double t = sphere.radius;
   for (int i = 0; i < kMarchSteps; ++i) {
-    const Eigen::Vector3d p = sphere.center + way * ray;
+    const Eigen::Vector3d p = sphere.center + t * ray;
     const double distance =
         std::abs(distance_outside(solid, p, std::numeric_limits<double>::infinity()).distance);
-    const double nearer = sphere.radius + distance - way;
+    const double nearer = sphere.radius + distance - t;
     // Along a ray this does not grow.
     if (nearer <= kTouch) return 0.0;
     if (!solid.is_inside(p)) return nearer;
-    way += std::min(nearer, 0.98 * distance);  // short of the mesh
+    t += std::min(nearer, 0.98 * distance);  // short of the mesh
   }
   return 0.0;
 }
 
 double protrusion(const Solid& solid, const InnerSphere& sphere) {
   const double depth = -solid.signed_distance(sphere.center).distance;
-  double farthest = std::max(0.0, sphere.radius - depth);
-  if (solid.is_closed()) return farthest;
+  double largest = std::max(0.0, sphere.radius - depth);
+  if (solid.is_closed()) return largest;
   for (int i = 0; i < kDirections; ++i) {
-    farthest = std::max(farthest, bulge(solid, sphere, direction(i)));
+    largest = std::max(largest, protrusion_along(solid, sphere, direction(i)));
   }
-  return farthest;
+  return largest;
 }
 
 }  // namespace

@@ -10,27 +10,33 @@
 
 namespace ist {
 
-/// Which sphere covers a convex patch best, while spheres are still being added.
+/// Nearest-sphere search for points and convex patches, while spheres are still being added.
 ///
-/// The cost of a sphere for a patch is the largest of |v - c| - weight over the patch's corners v:
-/// the distance to a sphere is convex, so no point of the patch is farther from the sphere than
-/// that. A tree over the spheres, to which spheres are added one by one; it is built anew when it
-/// has grown.
+/// The cost of a sphere for a patch is the largest of |v - center| - weight over the patch's
+/// corners v. The distance to a sphere is convex, so no point of the patch is farther from the
+/// sphere than the cost. For a single point the least cost is its distance to the spheres (the
+/// additively weighted Voronoi, or Apollonius, diagram).
+///
+/// A binary BVH over centres and weights, searched by branch and bound. Spheres are inserted one by
+/// one; the BVH is rebuilt when it has grown by half. Equal calls give equal answers. Const
+/// functions are thread safe; add() is not.
 class SphereSearch {
  public:
   struct Match {
-    std::uint32_t sphere = 0;
-    double cost = 0.0;  ///< [m] negative: the patch is inside the sphere by that much
+    std::uint32_t sphere = 0;  ///< index, in the order of insertion
+    double cost = 0.0;         ///< [m] negative: the patch is inside the sphere by that much
   };
 
-  /// Adds a sphere with weight [m] (its inner or outer radius).
+  /// @param weight  [m] the inner or the cover radius
   void add(const Eigen::Vector3d& center, double weight);
 
-  /// The sphere of least cost among those added after the first `seen`, and `hint` (any sphere's
-  /// index); ties go to the lowest index. Needs at least one sphere.
-  /// @param enough  [m] the first sphere found whose cost is no more than this will do
+  /// Returns a sphere that costs no more than `hint` and all spheres from index `first` on; of
+  /// equal ones the lowest index. At least one sphere must have been added.
+  /// @param corners  [m] of a convex patch; a single one is a point
+  /// @param hint     any sphere's index; a good one prunes more
+  /// @param enough   [m] the search ends at the first sphere whose cost is at most this
   Match best(const Eigen::Vector3d* corners, int corner_count, std::uint32_t hint,
-             std::size_t seen = 0, double enough = -std::numeric_limits<double>::infinity()) const;
+             std::size_t first = 0, double enough = -std::numeric_limits<double>::infinity()) const;
 
   std::size_t size() const { return spheres_.size(); }
   const Eigen::Vector3d& center(std::uint32_t sphere) const { return spheres_[sphere].center; }
@@ -39,30 +45,33 @@ class SphereSearch {
  private:
   static constexpr std::uint32_t kLeafSize = 8;
 
-  struct Item {
+  struct WeightedCenter {
     Eigen::Vector3d center;
     double weight;
   };
   struct Node {
     Eigen::AlignedBox3d box;  ///< of the centres
     double min_weight, max_weight;
-    std::uint32_t newest;  ///< largest index of a sphere below
-    std::uint32_t count;   ///< leaf: spheres; inner: 0
-    /// Leaf: its spheres; inner: its two children, as indices into nodes_.
-    std::array<std::uint32_t, kLeafSize> below;
+    std::uint32_t newest;  ///< largest index of a sphere in the subtree
+    std::uint32_t count;   ///< leaf: its spheres; inner node: 0
+    /// Leaf: indices of its spheres. Inner node: the first two are its children in nodes_.
+    std::array<std::uint32_t, kLeafSize> children;
   };
+  class PatchCorners;
 
   void rebuild();
   std::uint32_t build(std::uint32_t* first, std::uint32_t* last);
-  Node around(const std::uint32_t* first, const std::uint32_t* last) const;
-  std::uint32_t* halve(std::uint32_t* first, std::uint32_t* last, const Node& node) const;
+  Node make_node(const std::uint32_t* first, const std::uint32_t* last) const;
+  std::uint32_t* split_at_median(std::uint32_t* first, std::uint32_t* last, const Node& node) const;
   void insert(std::uint32_t sphere);
+  void split_leaf(std::uint32_t leaf, std::uint32_t added);
   void extend(Node* node, std::uint32_t sphere) const;
-  static double apart_sq(const Node& node, const Item& sphere);
+  void search_leaf(const Node& leaf, const PatchCorners& patch, Match* match) const;
+  static double distance_sq(const Node& node, const WeightedCenter& sphere);
 
-  std::vector<Item> spheres_;
-  std::vector<Node> nodes_;  // 0 is the root
-  std::size_t built_ = 0;    // spheres when the tree was last built
+  std::vector<WeightedCenter> spheres_;
+  std::vector<Node> nodes_;  // the root is nodes_[0]
+  std::size_t built_ = 0;    // spheres at the last rebuild
 };
 
 }  // namespace ist

@@ -5,25 +5,26 @@
 #include <cmath>
 #include <limits>
 
-#include "clearance_climb.h"
+#include "clearance_ascent.h"
 
 namespace ist {
 namespace {
 
-// How near new spheres that are tried come to the point they are made for, as shares of the gap
-// there. Those that leave more of it are larger.
-constexpr double kSlacks[] = {0.6, 0.33, 0.15};
-// As much of the gap a disjoint sphere may leave, if it is the largest of its neighbourhood.
-constexpr double kLooseSlack = 0.9;
+// Gaps that candidates leave at the point they are made for, as shares of the gap there. Candidates
+// that leave more are larger.
+constexpr double kGapShares[] = {0.6, 0.33, 0.15};
+// The share that a disjoint sphere may leave if it is the largest of its neighbourhood.
+constexpr double kMaxGapShare = 0.9;
 constexpr int kProgressInterval = 256;
-// Searches for a sphere that no hole speaks against.
+// Searches for a sphere that no hole refuses.
 constexpr int kMaxTries = 8;
 
-// A patch whose gap is known to be this share of its bound gets a sphere; else it is split.
+// A patch gets a sphere if its sampled gap is at least this share of its upper bound; else it is
+// split.
 constexpr double kTight = 0.8;
-// The same, when no more spheres come: how near the certificate is to the truth.
-constexpr double kSharp = 0.95;
-constexpr std::size_t kMaxSharpenings = 1000000;
+// The same share, when no more spheres are added: how near the certificate is to the true gap.
+constexpr double kCertificateTight = 0.95;
+constexpr std::size_t kMaxCertificateSteps = 1000000;
 
 }  // namespace
 
@@ -32,7 +33,7 @@ SurfaceCover::SurfaceCover(const TriangleMesh& mesh, const MedialSphereFinder& f
     : mesh_(mesh), finder_(finder), search_(*search) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
-  smallest_patch_ = 1e-7 * box.sizes().norm();
+  min_edge_ = 1e-7 * box.sizes().norm();
 }
 
 Eigen::Vector3d SurfaceCover::normal(std::uint32_t t) const {
@@ -42,27 +43,27 @@ Eigen::Vector3d SurfaceCover::normal(std::uint32_t t) const {
   return norm > 0.0 ? Eigen::Vector3d(n / norm) : Eigen::Vector3d::Zero();
 }
 
-bool SurfaceCover::fill_hole(double at_least, VolumeFiller* holes) {
-  if (holes == nullptr) return false;
-  const auto sphere = holes->next(at_least);
+// Adds the largest sphere that fits, if its radius is at least `min_radius`.
+bool SurfaceCover::fill(double min_radius, VolumeFiller* filler) {
+  if (filler == nullptr) return false;
+  const auto sphere = filler->next(min_radius);
   if (sphere) add_sphere(*sphere);
   return sphere.has_value();
 }
 
-// What a search finds, repeated where a hole speaks against it; at last the surface point s itself.
+// Searches again while holes refuse what is found; the last resort is the surface point s itself.
 template <class Search>
-MedialSphereFinder::InnerSphere SurfaceCover::admitted(const Eigen::Vector3d& s,
-                                                       const Search& search) const {
+MedialSphere SurfaceCover::admitted(const Eigen::Vector3d& s, const Search& search) const {
   for (int i = 0; i < kMaxTries; ++i) {
-    MedialSphereFinder::InnerSphere sphere = search();
+    MedialSphere sphere = search();
     if (finder_.is_closed() || sphere.radius <= 0.0 || finder_.admits(sphere)) return sphere;
   }
   return {s, 0.0};
 }
 
-// The first sphere is as large as it gets, or touches the largest triangle.
-void SurfaceCover::seed(VolumeFiller* holes) {
-  if (fill_hole(0.0, holes)) return;
+// The first sphere is the largest that fits, or touches the largest triangle.
+void SurfaceCover::add_first_sphere(VolumeFiller* filler) {
+  if (fill(0.0, filler)) return;
   std::uint32_t largest = 0;
   double largest_area = -1.0;
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
@@ -76,87 +77,86 @@ void SurfaceCover::seed(VolumeFiller* holes) {
   }
   const Eigen::Vector3d middle =
       (mesh_.corner(largest, 0) + mesh_.corner(largest, 1) + mesh_.corner(largest, 2)) / 3.0;
-  const double slack = 1e3 * smallest_patch_;
-  add_sphere(admitted(middle, [&] { return finder_.at_surface(middle, normal(largest), slack); }));
+  const double gap = 1e3 * min_edge_;
+  add_sphere(admitted(middle, [&] { return finder_.near_surface(middle, normal(largest), gap); }));
 }
 
 void SurfaceCover::cover_triangles() {
-  // Room that is not used costs no memory; to move patches for more room does.
+  // Unused capacity costs no memory until it is touched; growing would hold all patches twice.
   patches_.reserve(2 * mesh_.triangles.size());
   heap_.reserve(2 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
     Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 0, t};
     const SphereSearch::Match match = search_.best(patch.corner, 3, 0);
-    patch.bound = match.cost;
+    patch.upper_bound = match.cost;
     patch.sphere = match.sphere;
-    patch.seen = static_cast<std::uint32_t>(spheres_.size());
+    patch.accounted = static_cast<std::uint32_t>(spheres_.size());
     patches_.push_back(patch);
-    heap_.push_back({patch.bound, t});
+    heap_.push_back({patch.upper_bound, t});
   }
-  std::make_heap(heap_.begin(), heap_.end(), Looser());
+  std::make_heap(heap_.begin(), heap_.end(), UpperBoundLess());
 }
 
-void SurfaceCover::add_sphere(const MedialSphereFinder::InnerSphere& sphere) {
+void SurfaceCover::add_sphere(const MedialSphere& sphere) {
   spheres_.push_back(sphere);
   search_.add(sphere.center, sphere.radius);
 }
 
 void SurfaceCover::push(std::uint32_t index) {
-  heap_.push_back({patches_[index].bound, index});
-  std::push_heap(heap_.begin(), heap_.end(), Looser());
+  heap_.push_back({patches_[index].upper_bound, index});
+  std::push_heap(heap_.begin(), heap_.end(), UpperBoundLess());
 }
 
-// The patch with the largest bound.
+// Takes the patch with the largest upper bound off the heap.
 std::uint32_t SurfaceCover::pop() {
-  std::pop_heap(heap_.begin(), heap_.end(), Looser());
+  std::pop_heap(heap_.begin(), heap_.end(), UpperBoundLess());
   const std::uint32_t patch = heap_.back().patch;
   heap_.pop_back();
   return patch;
 }
 
-// Spheres added since the bound was computed may cover the patch better.
+// Accounts for the spheres added since the last time; true if one of them covers the patch better.
 bool SurfaceCover::tighten(Patch* patch) const {
-  const SphereSearch::Match match = search_.best(patch->corner, 3, patch->sphere, patch->seen);
-  patch->seen = static_cast<std::uint32_t>(spheres_.size());
-  if (match.cost >= patch->bound) return false;
+  const SphereSearch::Match match = search_.best(patch->corner, 3, patch->sphere, patch->accounted);
+  patch->accounted = static_cast<std::uint32_t>(spheres_.size());
+  if (match.cost >= patch->upper_bound) return false;
   patch->sphere = match.sphere;
-  patch->bound = match.cost;
+  patch->upper_bound = match.cost;
   return true;
 }
 
-void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* holes,
+void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* filler,
                           const PackingProgress& progress) {
-  seed(holes);
+  add_first_sphere(filler);
   cover_triangles();
-  // In the order of volume every hole comes first; else one whose centre is as far from all spheres
-  // as the worst patch.
-  const double hole_share = config.order == PackingOrder::kVolume ? 0.0 : 1.0;
-  const double first_bound = std::max(heap_.front().bound, config.max_error);
-  double worst = first_bound;
-  for (int step = 0; heap_.front().bound > config.max_error; ++step) {
+  // In the order of volume, a sphere that fills a space always comes first. Else it does if its
+  // radius is at least the largest bound.
+  const double radius_share = config.order == PackingOrder::kVolume ? 0.0 : 1.0;
+  double largest_bound = std::max(heap_.front().upper_bound, config.max_error);
+  for (int step = 0; heap_.front().upper_bound > config.max_error; ++step) {
     if (progress && step % kProgressInterval == 0) {
-      // Spheres needed grow about with the inverse of the gap.
-      worst = std::min(worst, heap_.front().bound);
-      if (!progress(std::min(1.0, config.max_error / worst))) return;
+      // The number of spheres grows about with the inverse of the gap.
+      largest_bound = std::min(largest_bound, heap_.front().upper_bound);
+      if (!progress(std::min(1.0, config.max_error / largest_bound))) return;
     }
     if (spheres_.size() >= static_cast<std::size_t>(config.max_spheres)) return;
     const std::uint32_t index = pop();
     Patch& patch = patches_[index];
-    if (tighten(&patch) || fill_hole(hole_share * patch.bound, holes)) {
+    if (tighten(&patch) || fill(radius_share * patch.upper_bound, filler)) {
       push(index);
     } else {
-      split_or_fill(index, config.max_error);
+      split_or_add_sphere(index, config.max_error);
     }
   }
 }
 
-// The largest gap at the patch's own points: a lower bound of what a split could prove.
-double SurfaceCover::gap_at_points(const Patch& patch, Eigen::Vector3d* worst_point) const {
+// The largest gap at some points of the patch: a lower bound of the patch's gap.
+double SurfaceCover::sampled_gap(const Patch& patch, Eigen::Vector3d* worst_point) const {
   const Eigen::Vector3d middle = (patch.corner[0] + patch.corner[1] + patch.corner[2]) / 3.0;
   *worst_point = middle;
   double worst_gap = search_.best(&middle, 1, patch.sphere).cost;
   for (const Eigen::Vector3d& corner : patch.corner) {
-    // A little inside the patch: a corner belongs to faces of other normals too.
+    // Somewhat inside the patch: a corner also belongs to faces with other normals.
     const Eigen::Vector3d point = 0.98 * corner + 0.02 * middle;
     const double gap = search_.best(&point, 1, patch.sphere, 0, worst_gap).cost;
     if (gap > worst_gap) {
@@ -173,52 +173,48 @@ double SurfaceCover::longest_edge(const Patch& patch) {
                    (patch.corner[2] - patch.corner[0]).norm()});
 }
 
-void SurfaceCover::split_or_fill(std::uint32_t index, double target) {
+void SurfaceCover::split_or_add_sphere(std::uint32_t index, double max_error) {
   const Patch& patch = patches_[index];
   Eigen::Vector3d worst_point;
-  const double worst_gap = gap_at_points(patch, &worst_point);
-  if (worst_gap < std::max(kTight * patch.bound, 0.98 * target) &&
-      longest_edge(patch) > smallest_patch_) {
+  const double worst_gap = sampled_gap(patch, &worst_point);
+  if (worst_gap < std::max(kTight * patch.upper_bound, 0.98 * max_error) &&
+      longest_edge(patch) > min_edge_) {
     split(index);
     return;
   }
-  const double gap = std::max(std::min(worst_gap, patch.bound), 0.5 * target);
-  add_sphere(sphere_at(worst_point, patch.triangle, gap));
+  const double gap = std::max(std::min(worst_gap, patch.upper_bound), 0.5 * max_error);
+  const std::uint32_t triangle = patch.triangle;
+  add_sphere(admitted(worst_point, [&] { return candidate(worst_point, triangle, gap); }));
   push(index);
 }
 
-MedialSphereFinder::InnerSphere SurfaceCover::sphere_at(const Eigen::Vector3d& s,
-                                                        std::uint32_t triangle, double gap) const {
-  return admitted(s, [&] { return candidate(s, triangle, gap); });
-}
-
-MedialSphereFinder::InnerSphere SurfaceCover::candidate(const Eigen::Vector3d& s,
-                                                        std::uint32_t triangle, double gap) const {
-  const auto left = [&s](const MedialSphereFinder::InnerSphere& sphere) {
+// A sphere that closes the gap at the surface point s and covers much of the surface about it. On a
+// flat face, the area that it covers to within the gap grows with its radius and with the part of
+// the gap that it closes. The square of that part serves better where faces end.
+MedialSphere SurfaceCover::candidate(const Eigen::Vector3d& s, std::uint32_t triangle,
+                                     double gap) const {
+  const auto distance = [&s](const MedialSphere& sphere) {
     return (sphere.center - s).norm() - sphere.radius;
   };
-  // On a flat face a sphere covers, to within the gap, an area that grows with its radius and with
-  // what it leaves of the gap. The square serves better where faces end.
-  MedialSphereFinder::InnerSphere best{s, 0.0};
+  MedialSphere best{s, 0.0};
   double best_score = 0.0;
-  for (const double slack : kSlacks) {
+  for (const double share : kGapShares) {
     if (finder_.is_disjoint() && best.radius > 0.0) break;  // it is a start to climb from
-    const MedialSphereFinder::InnerSphere sphere =
-        finder_.at_surface(s, normal(triangle), slack * gap);
-    const double closed = std::max(0.0, gap - left(sphere));
+    const MedialSphere sphere = finder_.near_surface(s, normal(triangle), share * gap);
+    const double closed = std::max(0.0, gap - distance(sphere));
     const double score = sphere.radius * closed * closed;
     if (score <= best_score) continue;
     best_score = score;
     best = sphere;
   }
   if (!finder_.is_disjoint() || best.radius <= 0.0) return best;
-  const MedialSphereFinder::InnerSphere top = climb(finder_, best.center);
-  return left(top) <= kLooseSlack * gap ? top : best;
+  const MedialSphere largest = climb_clearance(finder_, best.center);
+  return distance(largest) <= kMaxGapShare * gap ? largest : best;
 }
 
-void SurfaceCover::sharpen() {
-  double known = 0.0;  // [m] a gap that is there
-  for (std::size_t i = 0; i < kMaxSharpenings; ++i) {
+void SurfaceCover::tighten_certificate() {
+  double lower_bound = 0.0;  // [m] of the largest gap
+  for (std::size_t i = 0; i < kMaxCertificateSteps; ++i) {
     const std::uint32_t index = pop();
     Patch& patch = patches_[index];
     if (tighten(&patch)) {
@@ -226,8 +222,9 @@ void SurfaceCover::sharpen() {
       continue;
     }
     Eigen::Vector3d worst_point;
-    known = std::max(known, gap_at_points(patch, &worst_point));
-    if (kSharp * patch.bound <= known || longest_edge(patch) <= smallest_patch_) {
+    lower_bound = std::max(lower_bound, sampled_gap(patch, &worst_point));
+    const bool is_tight = kCertificateTight * patch.upper_bound <= lower_bound;
+    if (is_tight || longest_edge(patch) <= min_edge_) {
       push(index);
       return;
     }
@@ -235,7 +232,7 @@ void SurfaceCover::sharpen() {
   }
 }
 
-// Halves the longest edge: two patches of the same triangle, covering it without overlap.
+// Bisects the longest edge: two patches that cover the old one without overlap.
 void SurfaceCover::split(std::uint32_t index) {
   const Patch patch = patches_[index];
   int longest = 0;
@@ -254,8 +251,8 @@ void SurfaceCover::split(std::uint32_t index) {
   patches_[index].corner[a] = middle;
   patches_[added].corner[b] = middle;
   for (const std::uint32_t half : {index, added}) {
-    patches_[half].seen = 0;  // another sphere may suit the smaller patch
-    // The parent's bound holds for its parts too, whatever the search says.
+    patches_[half].accounted = 0;  // another sphere may cover the smaller patch better
+    // The old patch's bound holds for its parts, too, whatever the search finds.
     tighten(&patches_[half]);
     push(half);
   }
@@ -264,7 +261,7 @@ void SurfaceCover::split(std::uint32_t index) {
 void SurfaceCover::certify(Packing* packing) {
   packing->spheres.clear();
   packing->spheres.reserve(spheres_.size());
-  for (const MedialSphereFinder::InnerSphere& sphere : spheres_) {
+  for (const MedialSphere& sphere : spheres_) {
     packing->spheres.push_back({sphere.center, sphere.radius, sphere.radius});
   }
   PackingCertificate& certificate = packing->certificate;
@@ -272,7 +269,7 @@ void SurfaceCover::certify(Packing* packing) {
   for (Patch& patch : patches_) {
     tighten(&patch);
     InnerSphere& sphere = packing->spheres[patch.sphere];
-    const double gap = std::max(0.0, patch.bound);
+    const double gap = std::max(0.0, patch.upper_bound);
     sphere.cover_radius = std::max(sphere.cover_radius, sphere.radius + gap);
     certificate.max_gap = std::max(certificate.max_gap, gap);
     const double area =

@@ -12,70 +12,71 @@
 
 namespace ist {
 
-/// The surface as patches, each with the sphere that covers it best and a proven bound of its gap.
-/// Refines, worst first: a patch is split where the bound is loose and gets a sphere where it is
-/// not. Which spheres are allowed is the finder's matter.
+/// Branch and bound over surface patches (triangles and their parts), each with the sphere that
+/// covers it best and a certified upper bound of its gap. The patch with the largest bound comes
+/// first: it is split where the bound is loose, and gets a sphere where it is not. The finder
+/// decides which spheres are allowed.
 class SurfaceCover {
  public:
-  /// @param search  the spheres there are, weighted by inner radius; the cover adds to it
+  /// All arguments must outlive this.
+  /// @param search  the packing's spheres, weighted by inner radius; the cover adds to it
   SurfaceCover(const TriangleMesh& mesh, const MedialSphereFinder& finder, SphereSearch* search);
 
-  /// Adds spheres until every patch's bound is at most `config.max_error`, or max_spheres is
-  /// reached.
-  /// @param holes  where there is one, a large enough hole comes before the worst patch
-  void refine(const PackingConfig& config, VolumeFiller* holes, const PackingProgress& progress);
+  /// Adds spheres until every patch's bound is at most `config.max_error`, or until there are
+  /// `config.max_spheres`.
+  /// @param filler  for disjoint packings, else null: a sphere that fills a large enough space
+  ///                comes before the patch with the largest bound
+  void refine(const PackingConfig& config, VolumeFiller* filler, const PackingProgress& progress);
 
-  /// Splits patches, without new spheres, until the largest bound is little above a gap that is
-  /// there for certain.
-  void sharpen();
+  /// Splits patches, without new spheres, until the largest upper bound is little above a gap that
+  /// was found at a point of the surface.
+  void tighten_certificate();
 
-  /// Gives every sphere its gap, from the patches it covers best, and fills the certificate.
+  /// Overwrites the packing's spheres, each with its gap from the patches that it covers best, and
+  /// the surface part of its certificate.
   void certify(Packing* packing);
 
-  const std::vector<MedialSphereFinder::InnerSphere>& spheres() const { return spheres_; }
+  const std::vector<MedialSphere>& spheres() const { return spheres_; }
 
  private:
   struct Patch {
     Eigen::Vector3d corner[3];
-    double bound;  ///< [m] no point of the patch is farther from `sphere`
-    std::uint32_t sphere;
-    std::uint32_t seen;  ///< spheres there were when it was last searched
-    std::uint32_t triangle;
+    double upper_bound;       ///< [m] no point of the patch is farther from `sphere`
+    std::uint32_t sphere;     ///< the one that covers it best
+    std::uint32_t accounted;  ///< spheres that `upper_bound` accounts for
+    std::uint32_t triangle;   ///< that it is a part of
   };
   struct Entry {
-    double bound;  ///< [m] of the patch
+    double upper_bound;
     std::uint32_t patch;
   };
-  struct Looser {
-    bool operator()(const Entry& a, const Entry& b) const { return a.bound < b.bound; }
+  struct UpperBoundLess {
+    bool operator()(const Entry& a, const Entry& b) const { return a.upper_bound < b.upper_bound; }
   };
 
-  void seed(VolumeFiller* holes);
+  void add_first_sphere(VolumeFiller* filler);
   void cover_triangles();
-  bool fill_hole(double at_least, VolumeFiller* holes);
-  void add_sphere(const MedialSphereFinder::InnerSphere& sphere);
-  double gap_at_points(const Patch& patch, Eigen::Vector3d* worst_point) const;
+  bool fill(double min_radius, VolumeFiller* filler);
+  void add_sphere(const MedialSphere& sphere);
+  double sampled_gap(const Patch& patch, Eigen::Vector3d* worst_point) const;
   static double longest_edge(const Patch& patch);
   std::uint32_t pop();
   void push(std::uint32_t index);
   bool tighten(Patch* patch) const;
-  void split_or_fill(std::uint32_t index, double target);
+  void split_or_add_sphere(std::uint32_t index, double max_error);
   void split(std::uint32_t index);
-  MedialSphereFinder::InnerSphere sphere_at(const Eigen::Vector3d& s, std::uint32_t triangle,
-                                            double gap) const;
   template <class Search>
-  MedialSphereFinder::InnerSphere admitted(const Eigen::Vector3d& s, const Search& search) const;
-  MedialSphereFinder::InnerSphere candidate(const Eigen::Vector3d& s, std::uint32_t triangle,
-                                            double gap) const;
+  MedialSphere admitted(const Eigen::Vector3d& s, const Search& search) const;
+  MedialSphere candidate(const Eigen::Vector3d& s, std::uint32_t triangle, double gap) const;
   Eigen::Vector3d normal(std::uint32_t triangle) const;
 
   const TriangleMesh& mesh_;
   const MedialSphereFinder& finder_;
   std::vector<Patch> patches_;
-  std::vector<Entry> heap_;  // of all patches but one that is worked on
-  std::vector<MedialSphereFinder::InnerSphere> spheres_;
+  std::vector<Entry> heap_;  // max-heap of all patches but the one at work
+  std::vector<MedialSphere> spheres_;
   SphereSearch& search_;
-  double smallest_patch_;  ///< [m] edges below it are not split: rounding would decide
+  double min_edge_;  ///< [m] patches with shorter edges are not split: rounding would decide
 };
 
 }  // namespace ist

@@ -13,63 +13,74 @@
 
 namespace ist {
 
-/// Finds the largest sphere that fits into what is left of a mesh, again and again: ProtoSphere
-/// (Weller 2013, section 5.2), prototypes that climb to local maxima of the clearance.
+/// Finds the largest sphere that fits into the space that a packing has not filled yet, again and
+/// again: ProtoSphere (Weller 2013, section 5.2), whose prototypes climb to local maxima of the
+/// clearance (the distance from a point to the nearest obstacle).
 ///
-/// Prototypes start where they can matter: in cells of an octree, the one with the largest possible
-/// sphere first. Clearance changes by no more than the way moved, so the clearance at a cell's
-/// centre bounds that in the cell, and the sphere found is the largest there is, to a tenth.
+/// Branch and bound over an octree decides where prototypes start. Clearance has the Lipschitz
+/// constant 1, so the clearance at a cell's centre plus the cell's circumradius is an upper bound
+/// of the clearance in the cell. The sphere found has at least nine tenths of the largest radius.
 class VolumeFiller {
  public:
-  /// @param finder  knows the spheres in `spheres` as taken
+  /// All references must outlive this.
+  /// @param finder      knows the spheres in `spheres` as taken
+  /// @param spheres     the packing so far; the caller adds to it
   /// @param min_radius  [m] smaller spheres are not looked for
   VolumeFiller(const TriangleBvh& bvh, const MedialSphereFinder& finder,
                const SphereSearch& spheres, double min_radius);
 
-  /// Ends the search when `progress` returns false, which is asked every now and then.
+  /// The search ends when `progress`, which is called every now and then, returns false.
   void stop_with(PackingProgress progress) { progress_ = std::move(progress); }
 
-  /// The next sphere, which must be added to `spheres`; nothing when none of radius `at_least` [m]
-  /// fits.
-  std::optional<MedialSphereFinder::InnerSphere> next(double at_least);
+  /// Returns the next sphere, which the caller must add to `spheres`; nothing when no sphere of
+  /// radius `at_least` [m] fits.
+  std::optional<MedialSphere> next(double at_least);
 
  private:
   struct Cell {
     Eigen::Vector3d center;
-    double half;         ///< [m] of an edge
-    double room;         ///< [m] from the centre to the mesh and to holes, negative outside
-    double clearance;    ///< [m] at the centre: the same, and to spheres
-    double bound;        ///< [m] no sphere about a point of the cell is larger
-    std::uint32_t seen;  ///< spheres that clearance and bound know of
-    bool has_climbed;
+    double half;  ///< [m] half an edge
+    /// [m] signed distance from the centre to the mesh and the hole obstacles; negative outside
+    double mesh_clearance;
+    double clearance;         ///< [m] of the centre: the same, and to the packing's spheres
+    double upper_bound;       ///< [m] of the clearance in the cell
+    std::uint32_t accounted;  ///< spheres that `clearance` and `upper_bound` account for
+    bool has_climbed;         ///< a prototype has started from its centre
   };
   struct Prototype {
-    MedialSphereFinder::InnerSphere sphere;
-    std::uint32_t seen;
-    int refusals;  ///< how often a hole spoke against it
+    MedialSphere sphere;
+    std::uint32_t accounted;  ///< spheres that it is known to be clear of
+    int refusals;             ///< how often it was refused because of a hole
   };
-  struct BoundLess {
-    bool operator()(const Cell& a, const Cell& b) const { return a.bound < b.bound; }
+  struct UpperBoundLess {
+    bool operator()(const Cell& a, const Cell& b) const { return a.upper_bound < b.upper_bound; }
   };
-  struct Smaller {
+  struct RadiusLess {
     bool operator()(const Prototype& a, const Prototype& b) const {
       return a.sphere.radius < b.sphere.radius;
     }
   };
 
+  void divide(const Eigen::Vector3d& center, double half, const Cell* parent);
   void add_cell(const Eigen::Vector3d& center, double half, const Cell* parent);
+  void push(const Cell& cell);
+  void push(const Prototype& prototype);
+  Cell pop_cell();
+  Prototype pop_prototype();
+  bool tighten(Cell* cell) const;
+  void refine_best_cell();
   void add_prototype(const Eigen::Vector3d& start, int refusals = 0);
   void revise_prototypes();
+  std::optional<MedialSphere> take_prototype();
   bool is_stopped();
-  bool update(Cell* cell) const;
-  std::uint32_t count() const { return static_cast<std::uint32_t>(spheres_.size()); }
+  std::uint32_t sphere_count() const { return static_cast<std::uint32_t>(spheres_.size()); }
 
   const TriangleBvh& bvh_;
   const MedialSphereFinder& finder_;
   const SphereSearch& spheres_;
   const double min_radius_;
-  std::vector<Cell> cells_;            // heap
-  std::vector<Prototype> prototypes_;  // heap
+  std::vector<Cell> cells_;            // max-heap by upper bound
+  std::vector<Prototype> prototypes_;  // max-heap by radius
   PackingProgress progress_;
   std::uint32_t steps_ = 0;
   int refusals_ = 0;

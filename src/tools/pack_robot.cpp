@@ -1,5 +1,5 @@
-// Packs a robot's links, or one mesh, offline: fills the cache, tells what became of each link, and
-// writes tables and pictures of the packings.
+// Packs a robot's links, or one mesh, offline: fills the cache, reports on each link, and writes
+// tables and pictures of the packings.
 
 #include <unistd.h>
 
@@ -73,7 +73,7 @@ void declare(CLI::App* app, Options* options) {
   app->add_option("--picture", options->picture, "draws the packings into this PNG file");
 }
 
-// One line that is drawn again and again; nothing where it would not be seen.
+// One line on the terminal that is drawn again and again; nothing if there is no terminal.
 class ProgressBar {
  public:
   void update(const ist::ModelProgress& progress) {
@@ -94,7 +94,7 @@ class ProgressBar {
   int last_ = -1;
 };
 
-// Status: 0 when every link was packed.
+// Returns 0 when every link was packed.
 int pack(Options options) {
   const ist::tools::Input input =
       ist::tools::read_input(options.input, options.visual ? ist::GeometrySource::kVisual
@@ -102,8 +102,8 @@ int pack(Options options) {
   options.model.packing.order = kOrders.at(options.order);
   if (!options.tree.empty()) options.model.tree = kTrees.at(options.tree);
   if (options.no_cache) options.model.cache_directory.clear();
-  for (const std::string& doubt : ist::doubtful_sizes(input.robot, options.model.links)) {
-    std::cerr << "warning: " << doubt << '\n';
+  for (const std::string& warning : ist::doubtful_sizes(input.robot, options.model.links)) {
+    std::cerr << "warning: " << warning << '\n';
   }
   int status = 0;
   std::ostringstream csv;

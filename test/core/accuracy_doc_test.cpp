@@ -132,7 +132,7 @@ std::string modes_table(const Measured& measured) {
     text += "| " + key + " | " + std::to_string(row.cases) + " | " + std::to_string(row.violations);
     const double tolerance = std::stod(key.substr(key.rfind('|') + 1));
     for (const double value : {row.largest, row.mean_error(), row.mean_width()}) {
-      text += " | " + test::number(test::promise(value / kMillimetre, tolerance));
+      text += " | " + test::number(test::stated_limit(value / kMillimetre, tolerance));
     }
     text += " |\n";
   }
@@ -146,8 +146,8 @@ std::string hard_table(const Measured& exact, Measured coarse) {
   for (const auto& [key, row] : exact.rows()) {
     text += "| " + key + " | " + std::to_string(row.cases) + " | " +
             std::to_string(row.violations + coarse[key].violations) + " | " +
-            test::number(test::promise(row.largest / kMillimetre, 0.0)) + " | " +
-            test::number(test::promise(coarse[key].largest / kMillimetre, 1.0));
+            test::number(test::stated_limit(row.largest / kMillimetre, 0.0)) + " | " +
+            test::number(test::stated_limit(coarse[key].largest / kMillimetre, 1.0));
     text += " |\n";
   }
   return text;

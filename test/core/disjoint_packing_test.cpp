@@ -1,5 +1,5 @@
-// Disjoint packings of whole links: no two inner spheres of an element overlap, and none reaches
-// out of its element, by more than 1e-6 m.
+// Disjoint packings of whole links: no two inner spheres of an element overlap, and none protrudes
+// from its element, by more than 1e-6 m.
 
 #include <gtest/gtest.h>
 
@@ -25,20 +25,20 @@ namespace {
 constexpr double kAllowed = 1e-6;  // [m]
 constexpr PackingOrder kOrders[] = {PackingOrder::kDisjoint, PackingOrder::kVolume};
 
-// By brute force over pairs.
+// The largest penetration depth, by brute force over all pairs.
 double overlap(const std::vector<InnerSphere>& spheres) {
   double deepest = 0.0;
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (spheres[i].radius == 0.0 || spheres[j].radius == 0.0) continue;
-      const double apart = (spheres[i].center - spheres[j].center).norm();
-      deepest = std::max(deepest, spheres[i].radius + spheres[j].radius - apart);
+      const double distance = (spheres[i].center - spheres[j].center).norm();
+      deepest = std::max(deepest, spheres[i].radius + spheres[j].radius - distance);
     }
   }
   return deepest;
 }
 
-// A sphere lies inside where its centre does, and is no farther from the surface than its radius.
+// A sphere lies inside if its centre does, at a depth of at least its radius.
 void expect_inside(const GeometryElement& element, const std::vector<InnerSphere>& spheres) {
   const GeometryElement alone{element.shape, Eigen::Isometry3d::Identity(), element.source};
   const auto* mesh = std::get_if<TriangleMesh>(&element.shape);
@@ -95,7 +95,7 @@ TEST(DisjointPacking, OfMeshesMadeHere) {
   }
 }
 
-// With up to 2010 open edges a link: spheres may bulge through holes.
+// These links have up to 2010 boundary edges: spheres could bulge through holes.
 TEST(DisjointPacking, OfAPandasLinks) {
   const auto data = test::data_dir();
   if (!data) GTEST_SKIP() << test::kNoData;

@@ -17,7 +17,7 @@ namespace {
 
 using Point = Eigen::Vector3d;
 
-// A link that is the union of some spheres, packed with exactly those.
+// A link that is a union of spheres, packed with exactly these spheres.
 struct SphereLink {
   std::vector<InnerSphere> spheres;
 
@@ -57,7 +57,7 @@ struct SphereLink {
   }
 };
 
-// `gap` [m] between inner and outer radius.
+// @param gap  [m] cover radius less inner radius
 double nearest_sphere(const std::vector<InnerSphere>& spheres, const Point& p, bool outer) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const InnerSphere& sphere : spheres) {
@@ -82,9 +82,10 @@ Point random_point(test::Rng* rng, const SphereLink& link) {
   const auto i =
       static_cast<std::size_t>(test::uniform(rng, 0, 1) * static_cast<double>(link.spheres.size()));
   const InnerSphere& sphere = link.spheres[i];
-  const double reach = sphere.radius * std::pow(10.0, test::uniform(rng, -3, 1));
-  return sphere.center + test::random_vector(rng, 1.0).normalized() *
-                             (test::uniform(rng, 0, 1) < 0.5 ? reach : sphere.radius + 0.1 * reach);
+  const double distance = sphere.radius * std::pow(10.0, test::uniform(rng, -3, 1));
+  return sphere.center +
+         test::random_vector(rng, 1.0).normalized() *
+             (test::uniform(rng, 0, 1) < 0.5 ? distance : sphere.radius + 0.1 * distance);
 }
 
 void expect_tree(const SphereLink& link, test::Rng* rng, int points) {

@@ -37,7 +37,7 @@ std::vector<std::vector<std::string>> csv_rows(const std::string& path) {
 
 class PackRobotTest : public testing::Test {
  protected:
-  // Exit code; what it says is in said_.
+  // Returns the exit code; said_ holds the output.
   int run(const std::string& arguments) {
     const std::string said = dir_.file("said");
     const std::string command = "ROS_PACKAGE_PATH='" + std::string(IST_PROXIMITY_SOURCE_DIR) +
@@ -92,7 +92,7 @@ TEST_F(PackRobotTest, anyNumberOfThreadsGivesTheSameSpheres) {
 }
 
 TEST_F(PackRobotTest, aMeshIsReadFromTheCacheTheSecondTime) {
-  // The mesh is in millimetres: as large as a house.
+  // The mesh is in millimetres, so read in metres it is as large as a house.
   const std::string arguments = kMesh + " --max-error 5 --cache " + file("cache") + " --ply ";
   ASSERT_EQ(run(arguments + file("a.ply")), 0) << said_;
   EXPECT_EQ(said_.find("(cache)"), std::string::npos) << said_;

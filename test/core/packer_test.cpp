@@ -55,7 +55,8 @@ std::vector<NamedMesh> hostile_meshes() {
           {"a point", {{{1, 2, 3}}, {{0, 0, 0}}}}};
 }
 
-// d_out <= distance everywhere outside, and a point beyond interior_gap of d_out is outside.
+// The cover spheres: d_cover <= distance everywhere outside, and a point with d_cover >
+// interior_gap is outside.
 void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, int points,
                               double* worst_excess) {
   test::Rng rng(6);
@@ -99,7 +100,7 @@ TEST(PackMesh, CertificateHoldsOnAnyMesh) {
   }
 }
 
-// Below the surface most of all: to a depth of a few gaps.
+// Points below the surface, down to a depth of a few gaps, are the hardest to cover.
 TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
   test::Rng rng(9);
   for (const auto& [name, mesh] : hostile_meshes()) {
@@ -139,8 +140,8 @@ TEST(PackMesh, InnerSpheresOfClosedMeshesStayInside) {
   }
 }
 
-// Spheres beside a hole bulged through it, or came nearer to points before it than its rim, by up
-// to 5 mm on links of the Franka Panda.
+// Regression: spheres near a hole bulged through it, or came nearer to points in front of it than
+// its rim does, by up to 5 mm on links of the Franka Panda.
 TEST(PackMesh, InnerSpheresKeepAwayFromHoles) {
   const TriangleMesh sphere = test::icosphere(0.1, 2);
   TriangleMesh with_hole = sphere;
@@ -168,8 +169,8 @@ TEST(PackMesh, InnerSpheresKeepAwayFromHoles) {
   }
 }
 
-// Triangles of any size and place: a soup, all edges open; the same twice, also shifted a little in
-// its own planes; a closed sphere through it; far from the origin.
+// Triangles of any size anywhere: a soup with all edges open, the same twice (also shifted a little
+// in its own planes), a closed sphere through it, and far from the origin.
 std::vector<NamedMesh> random_meshes(test::Rng* rng) {
   TriangleMesh soup;
   for (std::uint32_t t = 0; t < 40; ++t) {
@@ -191,7 +192,7 @@ std::vector<NamedMesh> random_meshes(test::Rng* rng) {
           {"far away", shifted(with_sphere, {3.0, -20.0, 1.0})}};
 }
 
-/// To 1 cm, with a certificate that holds but for `slack` [m].
+/// Packs to 1 cm. The certificate must hold up to `slack` [m].
 void expect_packs(const TriangleMesh& mesh, PackingOrder order, double slack) {
   PackingConfig config;
   config.max_error = 0.01;
@@ -213,8 +214,8 @@ TEST(PackMesh, CertificateHoldsOnRandomMeshes) {
   }
 }
 
-// Where every seventh face is inside out, room for a sphere that no hole speaks against was looked
-// for without end.
+// Regression: in a mesh whose every seventh face is inside out, the search for a sphere that no
+// hole refuses did not end.
 TEST(PackMesh, DisjointPackingsOfOpenMeshesEnd) {
   TriangleMesh mesh = test::icosphere(0.1, 2);
   for (std::size_t t = 0; t < mesh.triangles.size(); t += 7) {
@@ -227,7 +228,7 @@ TEST(PackMesh, DisjointPackingsOfOpenMeshesEnd) {
   int asked = 0;
   const Packing stopped = pack_mesh(mesh, config, [&asked](double) { return ++asked < 3; });
   EXPECT_FALSE(stopped.certificate.reached);
-  EXPECT_LE(asked, 10) << "what is left has to stop as well";
+  EXPECT_LE(asked, 10) << "the later steps have to stop as well";
 }
 
 constexpr PackingOrder kOrders[] = {PackingOrder::kMedial, PackingOrder::kDisjoint,
@@ -266,8 +267,8 @@ TEST(PackMesh, DisjointSpheresNeitherOverlapNorProtrude) {
   }
 }
 
-// The sphere of a cube, then the eight in its corners: each touches three faces and the first
-// sphere.
+// The inscribed sphere of a cube comes first, then the eight in its corners: each touches three
+// faces and the first sphere.
 TEST(PackMesh, VolumeOrderTakesTheLargestFirst) {
   PackingConfig config;
   config.max_error = 0.002;
@@ -341,18 +342,17 @@ TEST(PackMesh, ReportsProgressAndStopsWhenTold) {
   EXPECT_FALSE(stopped.certificate.reached);
 }
 
-// A mesh in millimetres takes minutes: whoever is told to stop meanwhile must not go on with the
-// rest.
-TEST(PackMesh, DoesNothingMoreOnceItIsTold) {
+// A mesh in millimetres takes minutes. After a request to stop, no later step may start.
+TEST(PackMesh, DoesNothingMoreAfterARequestToStop) {
   for (const double stop_at : {0.0, 0.3, 0.6, 0.9}) {
     int calls_after = 0;
-    bool told = false;
+    bool has_asked = false;  // to stop
     const Packing stopped = pack_mesh(test::l_shape(0.2, 0.05), {}, [&](double fraction) {
-      calls_after += told ? 1 : 0;
-      told = told || fraction >= stop_at;
-      return !told;
+      calls_after += has_asked ? 1 : 0;
+      has_asked = has_asked || fraction >= stop_at;
+      return !has_asked;
     });
-    EXPECT_TRUE(told);
+    EXPECT_TRUE(has_asked);
     EXPECT_EQ(calls_after, 0) << stop_at;
     EXPECT_GT(stopped.certificate.interior_gap, 0.1) << stop_at;
   }

@@ -57,7 +57,7 @@ class PackingCacheTest : public testing::Test {
  protected:
   PackingCacheTest() : cache_(dir_.file("deep/cache")) {}
 
-  // Stores the packing and returns its file, the only one in the folder.
+  // Stores the packing and returns its file's name; the folder holds no other file.
   fs::path store(const Packing& packing) {
     std::string warning;
     EXPECT_TRUE(cache_.store(kKey, packing, &warning)) << warning;
@@ -155,7 +155,7 @@ TEST_F(PackingCacheTest, saysWhyAFileIsRefused) {
   expect_refused(file, changed, "checksum");
 }
 
-// A sound checksum is no proof that the numbers are.
+// Numbers may be invalid although the checksum is right.
 TEST_F(PackingCacheTest, refusesNumbersThatAreNoPacking) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
@@ -191,11 +191,11 @@ TEST_F(PackingCacheTest, saysWhenTheDiskRefuses) {
   warning.clear();
   EXPECT_FALSE(cache_.load(kKey, &warning).has_value());
   EXPECT_NE(warning, "");
-  // No temporary file is left behind.
+  // No temporary file remains.
   EXPECT_EQ(std::distance(fs::directory_iterator(dir_.file("deep/cache")), {}), 1);
 }
 
-// Every reader sees a whole file or none, whoever writes meanwhile.
+// Every reader sees a complete file or none, while others write.
 TEST_F(PackingCacheTest, writersAndReadersDoNotMeetHalfAFile) {
   Packing big = sample_packing();
   while (big.spheres.size() < 3000) big.spheres.push_back(big.spheres[big.spheres.size() % 12]);
@@ -250,7 +250,7 @@ TEST(PackingKey, isTheSameForTheSameNumbers) {
   EXPECT_EQ(packing_key(zero, config), packing_key(minus_zero, config));
 }
 
-// Sets a variable of the environment, or removes it, while it lives.
+// Sets or removes an environment variable during its lifetime.
 class Environment {
  public:
   Environment(const char* name, const char* value) : name_(name) {

@@ -1,5 +1,5 @@
-// doc/packing.md tells what becomes of hostile meshes. This packs them again and checks every
-// certificate against brute force in double precision.
+// doc/packing.md states the result for every hostile mesh. This test packs them again and checks
+// every certificate against brute force in double precision.
 //
 // IST_PROXIMITY_UPDATE_DOC=1 writes the table.
 
@@ -27,22 +27,22 @@ constexpr int kPoints = 300;
 
 bool updating() { return std::getenv("IST_PROXIMITY_UPDATE_DOC") != nullptr; }
 
-// What the bounds of a packing say of a point, against the truth.
+// Compares the bounds that a packing gives for a point with the true distance.
 void check_point(const TriangleMesh& mesh, const Packing& packing, const Eigen::Vector3d& p,
                  double rounding) {
   const double truth = test::oracle_signed_distance(mesh, p);
-  double inner = 1e300, outer = 1e300;
+  double d_in = 1e300, d_cover = 1e300;
   for (const InnerSphere& sphere : packing.spheres) {
     const double to_center = (p - sphere.center).norm();
-    inner = std::min(inner, to_center - sphere.radius);
-    outer = std::min(outer, to_center - sphere.cover_radius);
+    d_in = std::min(d_in, to_center - sphere.radius);
+    d_cover = std::min(d_cover, to_center - sphere.cover_radius);
   }
   if (truth < 0.0) {
-    ASSERT_LE(outer, packing.certificate.interior_gap + rounding) << p.transpose();
+    ASSERT_LE(d_cover, packing.certificate.interior_gap + rounding) << p.transpose();
     return;
   }
-  ASSERT_LE(outer, truth + rounding) << p.transpose();
-  ASSERT_LE(inner, truth + packing.certificate.max_gap + rounding) << p.transpose();
+  ASSERT_LE(d_cover, truth + rounding) << p.transpose();
+  ASSERT_LE(d_in, truth + packing.certificate.max_gap + rounding) << p.transpose();
 }
 
 void check(const TriangleMesh& mesh, const Packing& packing) {
@@ -54,7 +54,7 @@ void check(const TriangleMesh& mesh, const Packing& packing) {
     const Eigen::Vector3d half = 0.5 * box.sizes() + Eigen::Vector3d::Constant(0.1 * size + 1e-3);
     check_point(mesh, packing, box.center() + half.cwiseProduct(test::random_vector(&rng, 1.0)),
                 rounding);
-    // And on the surface itself, where the gap is.
+    // Points on the surface itself show the gap.
     const std::size_t t = static_cast<std::size_t>(i) % mesh.triangles.size();
     double u = test::uniform(&rng, 0.0, 1.0), v = test::uniform(&rng, 0.0, 1.0);
     if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
@@ -65,8 +65,8 @@ void check(const TriangleMesh& mesh, const Packing& packing) {
   }
 }
 
-// Turned as load_mesh does it, unless that refuses the mesh; vertices stay apart that it would
-// merge.
+// Orients the triangles as load_mesh does, unless it refuses the mesh. Vertices that it would merge
+// stay separate.
 TriangleMesh as_loaded(TriangleMesh mesh) {
   for (const TriangleMesh::Triangle& triangle : mesh.triangles) {
     for (const std::uint32_t v : triangle) {
@@ -84,7 +84,7 @@ TriangleMesh as_loaded(TriangleMesh mesh) {
   return mesh;
 }
 
-// Whether the mesh is packed or refused; its row, without the name.
+// Packs the mesh and returns its row of the table, without the name.
 std::string outcome(const test::HostileMesh& hostile) {
   PackingConfig config;
   config.max_error = hostile.max_error;
@@ -133,7 +133,7 @@ TEST(PackingDocument, HostileMeshesArePackedOrRefusedAsStated) {
       found = true;
       EXPECT_EQ(result.substr(0, result.find(" |")), row[1]);
       if (result.rfind("packed", 0) != 0) continue;
-      // The order of a search differs between machines: not to the last sphere.
+      // Searches differ between machines in their order, so the number may differ a little.
       const double spheres = std::stod(result.substr(std::string("packed | ").size()));
       EXPECT_NEAR(spheres, std::stod(row[2]), 0.1 * spheres + 2.0);
     }

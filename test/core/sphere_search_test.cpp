@@ -23,14 +23,14 @@ double cost_of(const Weighted& sphere, const Eigen::Vector3d* corners, int count
   return farthest - sphere.weight;
 }
 
-// Large spheres among small ones, some twice, some without or with a negative weight.
+// Large spheres among small ones; some occur twice, some have weight 0 or a negative one.
 Weighted any_sphere(test::Rng* rng, const std::vector<Weighted>& before) {
   if (!before.empty() && test::uniform(rng, 0, 1) < 0.1) return before[before.size() / 2];
   const double size = test::uniform(rng, 0, 1);
   return {test::random_vector(rng, 1.0), size * size * size - 0.1};
 }
 
-// All on a way that ends where it is longest, so that each is added beside the last.
+// Spheres in a row, each added next to the one before: the BVH grows on one side only.
 Weighted next_on_a_line(test::Rng* /*rng*/, const std::vector<Weighted>& before) {
   return {{1e-3 * static_cast<double>(before.size()), 0, 0}, 0.1};
 }
@@ -60,16 +60,16 @@ TEST(SphereSearch, FindsTheBestWhileSpheresAreAdded) {
       }
       const auto hint = static_cast<std::uint32_t>(n * 7 % n);
       const SphereSearch::Match match = search.best(corners.data(), count, hint);
-      ASSERT_EQ(match.sphere, best) << "of several, the first";
+      ASSERT_EQ(match.sphere, best) << "of equal ones, the first";
       ASSERT_NEAR(match.cost, cost_of(spheres[best], corners.data(), count), 1e-12);
-      // Those that were seen may be left out, but not the others.
-      const std::size_t seen = n / 2;
-      const double of_new = search.best(corners.data(), count, hint, seen).cost;
-      for (std::size_t i = seen; i < n; ++i) {
+      // Spheres before `first` may be ignored, but not the others.
+      const std::size_t first = n / 2;
+      const double of_new = search.best(corners.data(), count, hint, first).cost;
+      for (std::size_t i = first; i < n; ++i) {
         ASSERT_LE(of_new, cost_of(spheres[i], corners.data(), count) + 1e-12);
       }
       ASSERT_LE(of_new, cost_of(spheres[hint], corners.data(), count) + 1e-12);
-      // One that is good enough will do, where there is one.
+      // The search may end at any sphere that is good enough.
       const double enough = match.cost + test::uniform(&rng, -0.1, 0.2);
       const SphereSearch::Match any = search.best(corners.data(), count, hint, 0, enough);
       ASSERT_NEAR(any.cost, cost_of(spheres[any.sphere], corners.data(), count), 1e-12);

@@ -15,15 +15,15 @@
 /// Errors of many answers, and the table in doc/accuracy.md that states their limits.
 namespace ist::test {
 
-/// What became of one mode or one hard case.
+/// Errors of one mode or one hard case, against the truth.
 struct Accuracy {
   int cases = 0;
-  int violations = 0;    ///< of lower_bound <= true <= distance, or of the state
+  int violations = 0;    ///< answers with a wrong bound or a wrong state
   double largest = 0.0;  ///< [m] distance - true
   double sum = 0.0;      ///< [m]
   double width = 0.0;    ///< [m] sum of distance - lower_bound
 
-  /// @param rounding  [m] what float and the truth's own numbers may lose
+  /// @param rounding  [m] of float coordinates and of the truth
   void add(const LinkProximity& result, double truth, double max_distance, double rounding) {
     ++cases;
     if (result.state == LinkState::kUnknown) {
@@ -67,20 +67,21 @@ class Measured {
   std::deque<std::pair<std::string, Accuracy>> rows_;  // references stay valid
 };
 
-/// What is promised of a value [mm]: 1, 2 or 5 times a power of ten, half as much again or more
-/// (the order of a search differs between machines), 1e-5 at least; but no more than the tolerance.
-inline double promise(double value, double tolerance) {
+/// The limit that the document states for a measured value [mm]: 1, 2 or 5 times a power of ten, at
+/// least 1.5 times the value (the order of a search differs between machines) and at least 1e-5,
+/// but no more than the tolerance.
+inline double stated_limit(double value, double tolerance) {
   const double wanted = std::max(1.5 * value, 1e-5);
   const double decade = std::pow(10.0, std::floor(std::log10(wanted) + 1e-9));
-  double promised = 10.0 * decade;
+  double limit = 10.0 * decade;
   for (const double step : {5.0, 2.0, 1.0}) {
-    if (step * decade >= wanted * (1.0 - 1e-9)) promised = step * decade;
+    if (step * decade >= wanted * (1.0 - 1e-9)) limit = step * decade;
   }
-  return value <= tolerance ? std::min(promised, tolerance) : promised;
+  return value <= tolerance ? std::min(limit, tolerance) : limit;
 }
 
-/// Rows of a Markdown table between `<!-- NAME -->` and `<!-- end of NAME -->`, as cells; header
-/// and rule left out.
+/// The cells of a Markdown table between `<!-- NAME -->` and `<!-- end of NAME -->`, by row,
+/// without its header.
 using TableRows = std::vector<std::vector<std::string>>;
 
 inline std::pair<std::size_t, std::size_t> table_place(const std::string& text,

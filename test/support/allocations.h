@@ -5,20 +5,20 @@
 #include <cstdlib>
 #include <new>
 
-/// Counts what this program allocates with `new`. For one file of a program only: it replaces the
-/// global operators.
+/// Counts the program's allocations with `new`. Only one file of a program may include this, since
+/// it replaces the global operators.
 namespace ist::test {
 inline std::atomic<long> allocations{0};
 }
 
-// Not inlined: the compiler would take free() for a mistake.
+// Not inlined, because the compiler would warn of free() after new.
 #define IST_NOINLINE __attribute__((noinline))
 IST_NOINLINE void* operator new(std::size_t size) {
   ++ist::test::allocations;
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-// std::stable_sort asks this way.
+// std::stable_sort allocates with this one.
 IST_NOINLINE void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
   ++ist::test::allocations;
   return std::malloc(size);

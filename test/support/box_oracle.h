@@ -14,11 +14,12 @@
 #include "support/oracle.h"
 #include "support/scene.h"
 
-/// Mesh against solid box, every triangle against every side, in another way than the library's: an
-/// oriented box is twelve triangles, and two triangles are nearest at a corner or at two edges.
+/// Distances between meshes and solid boxes by brute force, with another algorithm than the
+/// library's: an oriented box is twelve triangles, and two triangles are nearest at a corner or at
+/// two edges.
 namespace ist::test {
 
-/// A box and where it is: axis-aligned in its own frame.
+/// A box that is axis-aligned in its own frame, and its pose.
 struct PlacedBox {
   Eigen::AlignedBox3d box;
   Eigen::Isometry3d X;  ///< its frame -> the mesh's
@@ -32,12 +33,12 @@ struct PlacedBox {
   bool contains(const Eigen::Vector3d& p) const { return box.contains(X.inverse() * p); }
 };
 
-/// Segments ab and cd.
+/// Distance between the segments ab and cd.
 inline double oracle_segments(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                               const Eigen::Vector3d& c, const Eigen::Vector3d& d) {
   double nearest = std::min({oracle_segment(a, c, d), oracle_segment(b, c, d),
                              oracle_segment(c, a, b), oracle_segment(d, a, b)});
-  // Inside both: where the common normal meets them.
+  // The common normal meets both segments between their ends.
   Eigen::Matrix<double, 3, 2> along;
   along << b - a, c - d;
   const Eigen::Matrix2d gram = along.transpose() * along;
@@ -61,7 +62,7 @@ inline bool oracle_pierces(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
   return (s >= 0.0 && t >= 0.0 && u >= 0.0) || (s <= 0.0 && t <= 0.0 && u <= 0.0);
 }
 
-/// Surface of the mesh to the solid box; 0 where they touch or cross.
+/// Distance from the mesh's surface to the solid box; 0 if they touch or cross.
 inline double oracle_box_distance(const TriangleMesh& mesh, const PlacedBox& placed) {
   constexpr int kFace[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
                                {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
@@ -77,9 +78,10 @@ inline double oracle_box_distance(const TriangleMesh& mesh, const PlacedBox& pla
     const std::array<Eigen::Vector3d, 3> tri = {mesh.corner(t, 0), mesh.corner(t, 1),
                                                 mesh.corner(t, 2)};
     if (placed.contains(tri[0])) return 0.0;
-    const double reach = std::max((tri[1] - tri[0]).norm(), (tri[2] - tri[0]).norm());
+    const double longest_edge = std::max((tri[1] - tri[0]).norm(), (tri[2] - tri[0]).norm());
     const Eigen::Vector3d middle = placed.X * placed.box.center();
-    if ((tri[0] - middle).norm() - reach - 0.5 * placed.box.sizes().norm() > nearest) continue;
+    if ((tri[0] - middle).norm() - longest_edge - 0.5 * placed.box.sizes().norm() > nearest)
+      continue;
     for (const auto& side : sides) {
       for (std::size_t i = 0; i < 3; ++i) {
         nearest = std::min(nearest, oracle_triangle(tri[i], side[0], side[1], side[2]));
@@ -99,7 +101,7 @@ inline double oracle_box_distance(const TriangleMesh& mesh, const PlacedBox& pla
   return nearest;
 }
 
-/// A snapshot of a map.
+/// A snapshot of a map of boxes.
 inline CloudSnapshot make_map(const std::vector<Eigen::AlignedBox3d>& boxes_M,
                               const Eigen::Isometry3d& X_FM = Eigen::Isometry3d::Identity()) {
   auto index = std::make_shared<BoxIndex>();
@@ -111,7 +113,7 @@ inline CloudSnapshot make_map(const std::vector<Eigen::AlignedBox3d>& boxes_M,
   return snapshot;
 }
 
-/// Cubes on a grid, as an octree has them: sizes are the resolution times a power of two.
+/// A cube on an octree's grid: its size is the resolution times a power of two.
 inline Eigen::AlignedBox3d random_leaf(Rng* rng, double space, double resolution, int levels) {
   const int level =
       std::min(levels - 1, static_cast<int>(-std::log2(uniform(rng, 1e-3, 1.0)) / 1.5));

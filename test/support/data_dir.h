@@ -8,7 +8,7 @@
 namespace ist::test {
 
 /// The folder of third-party test data (robots, clouds, poses): IST_PROXIMITY_DATA, or
-/// ../shared/data from the repository's root. Nothing when it is not there; then
+/// ../shared/data from the repository's root. Nothing if there is no such folder; then
 ///   if (!data_dir()) GTEST_SKIP() << kNoData;
 inline std::optional<std::filesystem::path> data_dir() {
   const char* variable = std::getenv("IST_PROXIMITY_DATA");

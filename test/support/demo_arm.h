@@ -20,7 +20,7 @@ inline RobotDescription demo_robot() {
                     [folder](const std::string& /*package*/) { return folder; });
 }
 
-/// Packed as the demo packs it; once for all tests of a program.
+/// The arm's model, packed as the demo packs it; built once for all tests of a program.
 inline std::shared_ptr<const RobotModel> demo_model() {
   static const std::shared_ptr<const RobotModel> model = [] {
     RobotModelConfig config;

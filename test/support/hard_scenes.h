@@ -7,17 +7,18 @@
 #include "support/meshes.h"
 #include "support/random_links.h"
 
-/// The hard cases as scenes, for the table in doc/accuracy.md; each has a test of its own besides.
+/// The hard cases as scenes, for the table in doc/accuracy.md. Each has a test of its own, too.
 namespace ist::test {
 
 struct HardScene {
   std::string name;
   std::vector<LinkGeometry> links;
   std::vector<std::vector<Eigen::Vector3d>> clouds;  ///< [m] fixed frame
-  Eigen::Vector3d far = Eigen::Vector3d::Zero();     ///< links, clouds and origin are moved there
+  Eigen::Vector3d far =
+      Eigen::Vector3d::Zero();  ///< [m] links, clouds and origin are moved by this
 };
 
-/// On corners, edge middles and face middles; `inset` of the way to `middle`.
+/// The centroids of all faces, the middles of edges, and the vertices: one cloud each.
 inline std::vector<std::vector<Eigen::Vector3d>> feature_points(const TriangleMesh& mesh) {
   std::vector<std::vector<Eigen::Vector3d>> clouds(3);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {

@@ -10,10 +10,10 @@
 
 #include "ist_proximity/geometry/shapes.h"
 
-/// Meshes that geometry code stumbles over.
+/// Meshes that are hard for geometry code.
 namespace ist::test {
 
-/// Triangles given by their corners; equal corners become one vertex.
+/// Collects triangles given by their corners; equal corners become one vertex.
 class MeshBuilder {
  public:
   using Point = Eigen::Vector3d;
@@ -109,7 +109,7 @@ inline TriangleMesh sliver_plate(double length, double width, double thickness, 
   return builder.mesh();
 }
 
-/// A four-sided spike along z, its tip at the origin.
+/// A four-sided spike along z with its tip at the origin.
 inline TriangleMesh needle(double length, double radius) {
   using Point = Eigen::Vector3d;
   const Point tip(0, 0, 0);

@@ -11,13 +11,13 @@
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 
-/// Meshes as people have them, made by code.
+/// Faulty meshes of the kinds that occur in practice, made by code.
 namespace ist::test {
 
 struct HostileMesh {
   std::string name;
   TriangleMesh mesh;
-  double max_error;  ///< [m] asked of its packing
+  double max_error;  ///< [m] of its packing
 };
 
 inline TriangleMesh scaled(TriangleMesh mesh, double scale) {
@@ -30,7 +30,7 @@ inline TriangleMesh shifted(TriangleMesh mesh, const Eigen::Vector3d& by) {
   return mesh;
 }
 
-/// Every n-th triangle taken out.
+/// The mesh without every n-th triangle.
 inline TriangleMesh perforated(TriangleMesh mesh, std::size_t n) {
   std::vector<TriangleMesh::Triangle> kept;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -40,7 +40,7 @@ inline TriangleMesh perforated(TriangleMesh mesh, std::size_t n) {
   return mesh;
 }
 
-/// Every n-th triangle seen from the other side.
+/// The mesh with every n-th triangle's orientation reversed.
 inline TriangleMesh partly_flipped(TriangleMesh mesh, std::size_t n) {
   for (std::size_t t = 0; t < mesh.triangles.size(); t += n) {
     std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
@@ -48,7 +48,7 @@ inline TriangleMesh partly_flipped(TriangleMesh mesh, std::size_t n) {
   return mesh;
 }
 
-/// Each corner of each triangle a vertex of its own.
+/// The mesh with a separate vertex for each corner of each triangle.
 inline TriangleMesh unwelded(const TriangleMesh& mesh) {
   TriangleMesh soup;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -59,7 +59,7 @@ inline TriangleMesh unwelded(const TriangleMesh& mesh) {
   return soup;
 }
 
-/// Vertices at the same place as one, the triangles in their order: what reading from a file does.
+/// The mesh with vertices at the same place merged, as load_mesh does; triangles keep their order.
 inline TriangleMesh merged(const TriangleMesh& mesh) {
   TriangleMesh result;
   std::map<std::array<double, 3>, std::uint32_t> known;
@@ -76,7 +76,7 @@ inline TriangleMesh merged(const TriangleMesh& mesh) {
   return result;
 }
 
-/// With `count` triangles without area: twice the same corner, or three on a line.
+/// The mesh with `count` triangles without area added: two equal corners, or three in a line.
 inline TriangleMesh with_degenerate_triangles(TriangleMesh mesh, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     const TriangleMesh::Triangle t = mesh.triangles[i];
@@ -96,7 +96,7 @@ inline TriangleMesh box_with_wall(const Eigen::Vector3d& size) {
   return joined(box(size), wall);
 }
 
-/// Every corner moved by up to `by` [m] of its own, so that no two triangles share one: seams gape.
+/// The mesh with every corner of every triangle moved by up to `by` [m]: gaps open along all edges.
 inline TriangleMesh cracked(const TriangleMesh& mesh, double by) {
   TriangleMesh soup = unwelded(mesh);
   for (std::size_t i = 0; i < soup.vertices.size(); ++i) {
@@ -107,7 +107,7 @@ inline TriangleMesh cracked(const TriangleMesh& mesh, double by) {
   return soup;
 }
 
-/// A band of `count` quads with a half turn: it has one side only.
+/// A Moebius strip of `count` quads.
 inline TriangleMesh moebius_strip(double radius, double width, int count) {
   TriangleMesh mesh;
   for (int i = 0; i < count; ++i) {
@@ -120,7 +120,7 @@ inline TriangleMesh moebius_strip(double radius, double width, int count) {
   }
   for (int i = 0; i < count; ++i) {
     const auto a = static_cast<std::uint32_t>(2 * i), b = a + 1;
-    // Where the ends meet, the edges are exchanged.
+    // The last quad joins the first one with its edges exchanged.
     const bool last = i + 1 == count;
     const std::uint32_t c = last ? 1 : a + 2, d = last ? 0 : a + 3;
     mesh.triangles.push_back({a, b, d});

@@ -8,13 +8,13 @@
 
 namespace ist::test {
 
-/// From here on; 0: the best there is.
+/// Selects the instruction set from now on; 0: the best one of the processor.
 inline void choose_instruction_sets(std::int64_t targets) {
   hwy::SetSupportedTargetsForTest(targets);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-/// What the machine's processor can do, one instruction set after the other.
+/// All instruction sets that the processor supports.
 template <typename Test>
 void for_each_instruction_set(const Test& test) {
   choose_instruction_sets(0);

@@ -53,7 +53,7 @@ inline std::string obj(const TriangleMesh& mesh) {
   return out.str();
 }
 
-/// What surrounds the mesh in a Collada file.
+/// The parts of a Collada file around its mesh.
 struct ColladaOptions {
   std::string unit = "<unit name=\"meter\" meter=\"1\"/>";
   std::string up_axis = "Z_UP";

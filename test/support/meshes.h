@@ -11,7 +11,8 @@
 #include "internal/geometry/tessellation.h"
 #include "ist_proximity/geometry/shapes.h"
 
-/// Meshes whose distances are known. Counter-clockwise from outside, closed unless said.
+/// Simple meshes. Triangles are counter-clockwise seen from outside; meshes are closed unless their
+/// comment says otherwise.
 namespace ist::test {
 
 inline TriangleMesh box(const Eigen::Vector3d& size) { return tessellate(Box{size}).mesh; }
@@ -20,7 +21,7 @@ inline TriangleMesh box(const Eigen::Vector3d& size) { return tessellate(Box{siz
 inline TriangleMesh icosphere(double radius, int subdivisions) {
   Tessellation sphere = tessellate(Sphere{radius}, 2.0 * radius);
   for (int level = 0; level < subdivisions; ++level) {
-    // Each level divides the deviation by about four, so a little less asks for the next one.
+    // Each level divides the deviation by about four; a slightly smaller one requires the next.
     sphere = tessellate(Sphere{radius}, 0.9 * sphere.deviation);
   }
   return sphere.mesh;
@@ -89,13 +90,13 @@ inline TriangleMesh l_shape(double length, double width) {
   return mesh;
 }
 
-/// The mesh moved by X.
+/// The mesh transformed by X.
 inline TriangleMesh moved(TriangleMesh mesh, const Eigen::Isometry3d& X) {
   for (Eigen::Vector3d& v : mesh.vertices) v = X * v;
   return mesh;
 }
 
-/// Both meshes as one.
+/// The triangles of both meshes in one.
 inline TriangleMesh joined(TriangleMesh mesh, const TriangleMesh& other) {
   const auto offset = static_cast<std::uint32_t>(mesh.vertices.size());
   mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
@@ -105,7 +106,7 @@ inline TriangleMesh joined(TriangleMesh mesh, const TriangleMesh& other) {
   return mesh;
 }
 
-/// All triangles seen from the other side.
+/// The mesh with the orientation of all triangles reversed.
 inline TriangleMesh inside_out(TriangleMesh mesh) {
   for (TriangleMesh::Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
   return mesh;
@@ -136,7 +137,8 @@ inline double signed_volume(const TriangleMesh& mesh) {
   return volume;
 }
 
-/// Edges that do not belong to exactly two triangles, once in each direction; 0: closed.
+/// The number of edges that do not belong to exactly two triangles, once in each direction; 0 if
+/// the mesh is closed.
 inline std::size_t open_edges(const TriangleMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   for (const TriangleMesh::Triangle& t : mesh.triangles) {

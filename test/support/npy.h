@@ -11,7 +11,7 @@
 namespace ist {
 namespace test {
 
-/// A NumPy array file: little-endian float32 or float64, C order.
+/// The content of a NumPy array file: little-endian float32 or float64, C order.
 struct Npy {
   std::vector<std::size_t> shape;
   std::vector<double> values;

@@ -11,8 +11,8 @@
 #include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/geometry/solid.h"
 
-/// Brute force in double precision: every triangle, every point, no tree and no bound. What every
-/// accelerated path is measured against.
+/// Brute force in double precision, over every triangle and every point, without tree and bound.
+/// All accelerated algorithms are tested against it.
 namespace ist::test {
 
 inline double oracle_winding(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
@@ -36,8 +36,8 @@ inline double oracle_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
   return (a + s * ab - p).norm();
 }
 
-/// Distance from p to triangle abc: its plane where p projects inside, else its nearest edge. On
-/// purpose another way than the library's.
+/// Distance from p to triangle abc: to its plane if p projects inside, else to its nearest edge.
+/// The library uses another algorithm.
 inline double oracle_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                               const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d n = (b - a).cross(c - a);
@@ -58,7 +58,7 @@ inline double oracle_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p
   return nearest;
 }
 
-/// Negative inside (winding number above 0.5).
+/// Signed distance, negative inside (winding number above 0.5).
 inline double oracle_signed_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
   const double distance = oracle_distance(mesh, p);
   return oracle_winding(mesh, p) > 0.5 ? -distance : distance;

@@ -12,7 +12,7 @@
 namespace ist {
 namespace test {
 
-/// LibLZF's format: literal runs and back references.
+/// Decompresses LibLZF's format: literal runs and back references.
 inline std::vector<std::uint8_t> decompress_lzf(const std::vector<std::uint8_t>& in,
                                                 std::size_t size) {
   std::vector<std::uint8_t> out;
@@ -33,8 +33,8 @@ inline std::vector<std::uint8_t> decompress_lzf(const std::vector<std::uint8_t>&
   return out;
 }
 
-/// x, y, z of a binary_compressed PCD file whose fields are all four bytes wide, in file order
-/// (NaN where nothing was measured).
+/// Reads x, y, z of a binary_compressed PCD file whose fields are all four bytes wide, in file
+/// order. Pixels without a measurement are NaN.
 /// @throws std::runtime_error
 inline std::vector<Eigen::Vector3f> read_pcd(const std::string& path) {
   std::ifstream file(path, std::ios::binary);

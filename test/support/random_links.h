@@ -11,7 +11,7 @@
 #include "support/sanitizers.h"
 #include "support/scene.h"
 
-/// Small links of every kind, for as many cases as an oracle that tries every triangle can take.
+/// Small links of every kind, for many cases against an oracle that tries every triangle.
 namespace ist::test {
 
 /// A sphere with a random surface, star-shaped.
@@ -21,7 +21,7 @@ inline TriangleMesh random_lump(Rng* rng) {
   return mesh;
 }
 
-/// Triangles at random: mostly open, crossing each other, of any orientation.
+/// Random triangles: mostly open, crossing each other, of any orientation.
 inline TriangleMesh random_soup(Rng* rng, int count) {
   MeshBuilder builder;
   for (int i = 0; i < count; ++i) {

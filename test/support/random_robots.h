@@ -7,11 +7,11 @@
 #include "ist_proximity/robot/robot_description.h"
 #include "support/scene.h"
 
-/// Trees of joints of all kinds that one position moves.
+/// Kinematic trees with joints of all types that have one position.
 namespace ist::test {
 
-/// 1 to `max_joints` joints j1, j2 ... that move links l1, l2 ...: fixed, revolute, continuous and
-/// prismatic; some follow one of an earlier number. The root is l0.
+/// A robot of 1 to `max_joints` joints j1, j2 ... that move links l1, l2 ...: fixed, revolute,
+/// continuous and prismatic; some mimic a joint of a lower number. The root link is l0.
 inline RobotDescription random_robot(Rng* rng, int max_joints) {
   const auto below = [rng](int n) {
     return std::uniform_int_distribution<std::size_t>(0, static_cast<std::size_t>(n) - 1)(*rng);

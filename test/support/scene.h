@@ -51,7 +51,7 @@ inline std::shared_ptr<RobotModel> make_model(const std::vector<Shape>& shapes, 
   return model;
 }
 
-/// A snapshot of points given in the fixed frame; ids are their indices.
+/// A snapshot of points given in the fixed frame; their ids are their indices.
 inline CloudSnapshot make_snapshot(const std::vector<Eigen::Vector3d>& points_F,
                                    const Eigen::Vector3d& origin = Eigen::Vector3d::Zero()) {
   std::vector<float> x, y, z;

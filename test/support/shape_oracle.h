@@ -12,8 +12,8 @@
 #include "support/oracle.h"
 #include "support/tiles.h"
 
-/// Exact signed distances of links, without tree or bound: primitives by their distance functions,
-/// meshes triangle by triangle.
+/// Exact signed distances of links, without tree and bound: of primitives by their distance
+/// functions, of meshes triangle by triangle.
 namespace ist::test {
 
 inline double oracle_signed_distance(const Box& box, const Eigen::Vector3d& p) {
@@ -31,7 +31,7 @@ inline double oracle_signed_distance(const Sphere& sphere, const Eigen::Vector3d
   return p.norm() - sphere.radius;
 }
 
-/// Of a link (link frame): the smallest over its elements.
+/// Signed distance of a link to a point in its frame: the smallest of its elements.
 inline double oracle_signed_distance(const LinkGeometry& link, const Eigen::Vector3d& p_L) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const GeometryElement& element : link) {
@@ -54,7 +54,7 @@ inline double oracle_minimum(const LinkGeometry& link, const Eigen::Isometry3d& 
   return smallest;
 }
 
-/// The points as the index holds them, rounded to float: what a query can be exact about.
+/// The points as the index holds them, rounded to float. Queries are exact for these.
 inline std::vector<Eigen::Vector3d> stored_points(const PointIndex& index) {
   std::vector<Eigen::Vector3d> points;
   points.reserve(index.size());

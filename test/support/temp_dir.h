@@ -10,7 +10,7 @@
 
 namespace ist::test {
 
-/// A fresh folder that vanishes with its content when the object does.
+/// A new folder that is deleted with its content when the object is destroyed.
 class TempDir {
  public:
   TempDir() {

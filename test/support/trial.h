@@ -13,10 +13,10 @@
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 
-/// One query against the oracle: everything that an answer promises.
+/// Checks of a query's answers against the oracle: everything that an answer guarantees.
 namespace ist::test {
 
-/// What an answer is checked against.
+/// The true distances of a link.
 struct Truth {
   double measured;  ///< [m] smallest signed distance of the points as given
   double stored;    ///< [m] of the points as the index holds them
@@ -28,7 +28,7 @@ inline Truth truth_of(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
           oracle_minimum(link, X_FL, stored_points(cloud.index))};
 }
 
-/// Witnesses and direction fit each other, and everything is finite.
+/// Expects witness points and direction that fit each other, all finite.
 inline void expect_witness(const LinkProximity& result, const Eigen::Isometry3d& X_FL,
                            double scale = 1.0) {
   ASSERT_GE(result.state, LinkState::kNear);
@@ -40,9 +40,10 @@ inline void expect_witness(const LinkProximity& result, const Eigen::Isometry3d&
   EXPECT_EQ(result.state == LinkState::kContact, result.distance < 0.0);
 }
 
-/// State, bounds, interval width and witness of a complete answer.
-/// @param rounding  [m] what double precision may lose, and float where it tells on which side of a
-///                  mesh a point lies
+/// Expects the right state, bounds, interval width and witness points of a complete answer.
+/// @param rounding  [m] of double precision, and of float where it decides on which side of a mesh
+/// a
+///                  point lies
 /// @param size      [m] of the link, where it is large
 inline void expect_truth(const LinkProximity& result, const Truth& truth, const QueryConfig& config,
                          const Eigen::Isometry3d& X_FL, double rounding = 2e-8, double size = 1.0) {
@@ -58,16 +59,17 @@ inline void expect_truth(const LinkProximity& result, const Truth& truth, const 
   expect_witness(result, X_FL, size + X_FL.translation().norm());
   EXPECT_GE(result.distance, truth.stored - rounding);
   EXPECT_LE(result.distance, truth.stored + config.tolerance + rounding);
-  // Whether points are inside is decided however wide the tolerance; at touch, either is right.
+  // The state does not depend on the tolerance. At touch, either state is right.
   if (std::abs(truth.stored) > rounding) {
     EXPECT_EQ(result.state == LinkState::kContact, truth.stored < 0.0);
   }
-  // The width also holds what float coordinates round.
-  const double reach = X_FL.translation().norm() + std::abs(truth.stored) + 10.0 * size;
-  EXPECT_LE(result.distance - result.lower_bound, config.tolerance + 2e-7 * reach);
+  // The interval's width includes the rounding of float coordinates.
+  const double extent = X_FL.translation().norm() + std::abs(truth.stored) + 10.0 * size;
+  EXPECT_LE(result.distance - result.lower_bound, config.tolerance + 2e-7 * extent);
 }
 
-/// A link packed with `max_error`, queried cold at tolerance 0 and 1 mm, against its oracle.
+/// Links packed with `max_error`, queried without a warm start at tolerance 0 and 1 mm, against the
+/// oracle.
 class Trial {
  public:
   explicit Trial(const std::vector<Shape>& shapes, double max_error = 0.005, double rounding = 2e-8)
@@ -77,7 +79,7 @@ class Trial {
     }
   }
 
-  /// Of links with a packing of their own.
+  /// @param model  of the same links, packed by the caller
   Trial(std::shared_ptr<const RobotModel> model, std::vector<LinkGeometry> links, double rounding)
       : model_(std::move(model)), links_(std::move(links)), rounding_(rounding) {}
 

@@ -42,7 +42,7 @@ inline const char* panda_mesh(std::size_t link) {
   return kNames[link];
 }
 
-/// The visual meshes as links, in the frames of the poses.
+/// A model whose links are the visual meshes, in the frames of the poses.
 inline std::shared_ptr<RobotModel> panda_model(const std::filesystem::path& data,
                                                double max_error) {
   RobotDescription description;

@@ -6,8 +6,8 @@
 
 namespace ist::test {
 
-/// Ingest that leaves nothing out: what is compared with a truth of all points.
-/// @param thin  whether the points that repulsion needs are made too
+/// Configuration of an ingest that keeps all points, for comparison with a truth of all points.
+/// @param thin  also make the thinned cloud that repulsion needs
 inline IngestConfig whole_cloud(bool thin = true) {
   IngestConfig config;
   config.min_range = 0.0;

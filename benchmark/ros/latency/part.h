@@ -11,7 +11,7 @@
 
 namespace ist::benchmark {
 
-/// Subscribers and publishers with a thread of their own.
+/// Subscribers and publishers with their own thread.
 class Part {
  public:
   Part() { nh_.setCallbackQueue(&queue_); }
@@ -25,8 +25,8 @@ class Part {
   ros::AsyncSpinner spinner_{1, &queue_};
 };
 
-/// The least that any node does with the same messages: joint states are sent on, as they are, on
-/// `relayed`; clouds are received, or copied besides, and their header sent on `seen`.
+/// The least that any node does with the same messages. Joint states are published unchanged on
+/// `relayed`. Clouds are received, or also copied, and their header is published on `seen`.
 class Relay {
  public:
   explicit Relay(bool copies_clouds) {

@@ -11,7 +11,7 @@
 
 namespace ist::benchmark {
 
-/// When messages were sent, by stamp, and how long their answers took. Thread safe.
+/// Measures the time from sending a message to its answer, by stamp. Thread safe.
 class Stopwatch {
  public:
   void sent(const ros::Time& stamp) {

@@ -57,7 +57,7 @@ sensor_msgs::PointCloud2 make_cloud(const std::string& pcd) {
   return cloud;
 }
 
-/// All free joints swing about the middle of their ranges, at about 1 rad/s.
+/// Joint positions: all free joints swing about the middle of their ranges, at about 1 rad/s.
 std::vector<double> positions_at(const Kinematics& kinematics, double t) {
   std::vector<double> positions;
   for (std::size_t j = 0; j < kinematics.joints().size(); ++j) {

@@ -13,14 +13,14 @@
 
 namespace ist::benchmark {
 
-/// What a robot and its camera send: joint states at 1 kHz on `joint_states`, an organized 640x480
-/// cloud at 30 Hz on `cloud`, each from a thread of its own, and where the camera is.
+/// Messages of a robot and its camera: joint states at 1 kHz on `joint_states`, an organized
+/// 640x480 cloud at 30 Hz on `cloud`, each from its own thread, and the camera's pose.
 class Traffic {
  public:
   using OnSend = std::function<void(const ros::Time&)>;
 
   /// @param kinematics outlives this; its free joints swing
-  /// @param pcd        an organized cloud of 640 columns; empty: a wavy wall before the robot
+  /// @param pcd        an organized cloud of 640 columns; empty: a wavy wall in front of the robot
   /// @param camera     file with 4 x 4 numbers, sensor -> root link; empty: at the root link
   /// @param on_state, on_cloud  called before each message, with its stamp
   Traffic(const Kinematics& kinematics, const std::string& pcd, const std::string& camera,

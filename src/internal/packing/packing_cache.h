@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -9,25 +8,28 @@
 
 namespace ist {
 
-/// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity; empty when there is no home either.
+/// $ROS_HOME/ist_proximity, or ~/.ros/ist_proximity. Empty if neither variable is set.
 std::string default_cache_directory();
 
-/// Identity of a packing: a hash over the shape's own numbers, the configuration and the version
-/// of the packing algorithm. The same mesh under another file name has the same key.
+/// Identifies a packing: a hash over the shape's numbers, the configuration and the version of the
+/// packing algorithm. The same mesh under another file name has the same key.
 std::string packing_key(const Shape& shape, const PackingConfig& config);
 
-/// Packings on disk, one file per key. A file that is truncated, damaged or of another version is
-/// told apart by its header and checksum and counts as absent.
-/// Several processes may share a directory: files appear by atomic rename.
+/// Packings on disk, one file per key. A header and a checksum detect files that are truncated,
+/// damaged or of another version; they count as absent. Several processes may share a directory:
+/// files appear by atomic rename. Thread safe.
 class PackingCache {
  public:
-  /// An empty directory name turns the cache off.
+  /// @param directory  created when needed; empty turns the cache off
   explicit PackingCache(std::string directory) : directory_(std::move(directory)) {}
 
-  /// The stored packing, or nothing; `warning` says why when a file was there but unusable.
+  /// The stored packing, or nothing.
+  /// @param warning  set to one sentence when there is a file that cannot be used
   std::optional<Packing> load(const std::string& key, std::string* warning) const;
 
-  /// Stores a packing; false, with the reason in `warning`, when the disk refuses.
+  /// Stores a packing.
+  /// @param warning  set to one sentence when the file cannot be written
+  /// @returns false when the file cannot be written
   bool store(const std::string& key, const Packing& packing, std::string* warning) const;
 
  private:

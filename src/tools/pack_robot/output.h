@@ -10,7 +10,7 @@
 
 namespace ist::tools {
 
-/// What became of one link, SI units.
+/// The table's row of one link, in SI units.
 struct Row {
   std::string link;
   std::size_t triangles = 0, boundary_edges = 0, spheres = 0;
@@ -24,10 +24,10 @@ struct Row {
 /// One row for each link that was packed.
 std::vector<Row> measure(const Input& input, const RobotModel& model);
 
-/// On standard output, in mm, cm^3 and s.
+/// Prints the table to standard output, in mm, cm^3 and s.
 void print_table(const std::vector<Row>& rows);
 
-/// Lines of SI values; the header first when `csv` is empty.
+/// Appends the rows in SI units; the header comes first if `csv` is empty.
 void append_csv(double max_error, const std::vector<Row>& rows, std::ostream* csv);
 
 /// All spheres as the vertices of an ASCII PLY file, links at joint positions 0.

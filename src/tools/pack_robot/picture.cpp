@@ -16,7 +16,7 @@ namespace {
 constexpr int kMaxPanelWidth = 720, kPanelHeight = 720, kMargin = 20;
 constexpr int kOversampling = 2;  // per axis
 
-// Across the view, up, towards the eye.
+// The axes of the view as rows: to the right, up, towards the eye.
 Eigen::Matrix3d view() {
   const Eigen::Vector3d eye = Eigen::Vector3d(1.0, -1.6, 0.8).normalized();
   const Eigen::Vector3d right = Eigen::Vector3d::UnitZ().cross(eye).normalized();
@@ -25,7 +25,7 @@ Eigen::Matrix3d view() {
   return R;
 }
 
-// Well apart for neighbours: hues a golden angle from one another.
+// Neighbouring links have very different hues: they differ by the golden angle.
 Eigen::Vector3d link_color(std::size_t link) {
   const double hue = std::fmod(0.58 + 0.381966 * static_cast<double>(link), 1.0);
   Eigen::Vector3d color;
@@ -44,7 +44,8 @@ class Canvas {
         color_(static_cast<std::size_t>(width * height), Eigen::Vector3d::Ones()),
         depth_(color_.size(), -std::numeric_limits<double>::infinity()) {}
 
-  // Center and radius in pixels; x to the right, y up, z towards the eye.
+  // Draws a sphere, given in pixels: x to the right, y up, z towards the eye. Only pixels of the
+  // columns from `left` to `right` are drawn.
   void sphere(const Eigen::Vector3d& c, double radius, const Eigen::Vector3d& color, int left,
               int right) {
     const Eigen::Vector3d light = Eigen::Vector3d(-0.5, 0.6, 0.8).normalized();
@@ -147,7 +148,7 @@ void draw(const Input& input, const std::vector<std::shared_ptr<const RobotModel
     for (const PlacedSphere& sphere : panels[p]) {
       Eigen::Vector3d c = sphere.center;
       c.head<2>() -= box.center();
-      // What has no radius is drawn all the same.
+      // Spheres of radius 0 are drawn as points.
       canvas.sphere(middle + scale * c, std::max(scale * sphere.radius, 1.0),
                     link_color(sphere.link), left, left + width);
     }

@@ -9,8 +9,8 @@
 
 namespace ist::tools {
 
-/// Draws the inner spheres of each model side by side into a PNG file: one colour a link, joint
-/// positions 0, seen from the front left and above, without perspective.
+/// Draws the inner spheres of each model side by side into a PNG file. Every link has its colour
+/// and all joint positions are 0. The view is orthographic, from the front left and above.
 /// @throws ModelError when the file cannot be written
 void draw(const Input& input, const std::vector<std::shared_ptr<const RobotModel>>& models,
           const std::string& path);
