@@ -17,7 +17,7 @@ constexpr double kNear = 0.05;  // [m]
 constexpr double kBallRadius = 0.05;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Sums of two sines each, in no simple ratio.
+// Each joint follows a sum of two sines of incommensurable frequencies.
 const double kMean[] = {0.0, 0.35, 1.1, 0.0, 0.1, 0.0};
 const double kAmplitude[2][6] = {{0.6, 0.25, 0.3, 0.7, 0.4, 0.9}, {0.2, 0.15, 0.2, 0.3, 0.3, 0.4}};
 const double kRate[2][6] = {{0.83, 0.71, 0.97, 0.61, 1.13, 0.53}, {1.9, 1.7, 1.6, 1.3, 2.1, 1.1}};
@@ -54,7 +54,7 @@ double smallest(const std::vector<LinkProximity>& answers) {
   return distance;
 }
 
-// Points that are not the ball's are the robot's own: nothing else is there.
+// Points off the ball are the robot's own, because nothing else is there.
 std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, double stamp,
                              double noise) {
   std::uint64_t count = 0;
@@ -72,7 +72,7 @@ std::uint64_t count_phantoms(const PointIndex& index, const Obstacle* ball, doub
   return count;
 }
 
-// A ball beside the forearm's tube, as seen from the camera, so that the gap is in view.
+// Makes a ball beside the forearm's tube as seen from the camera, so that the gap is in view.
 // p_FC is the camera's position; the ball keeps `distance` [m] from the tube.
 Obstacle ball_at_forearm(const RobotDescription& robot, const Eigen::Vector3d& p_FC,
                          double distance) {
