@@ -113,8 +113,8 @@ void write_motion(const std::shared_ptr<const ist::RobotModel>& model, const std
   std::vector<ist::CloudSnapshot> frames;
   for (const char* frame : {"mosd0", "mosd10", "mosd40"}) {
     const double region_radius = frames.size() == 1 ? 0.6 : 3.0;  // links look beyond the smaller
-    frames.push_back(
-        ist::benchmark::ingested(data, frame, {model.get(), motion[0], known}, region_radius));
+    frames.push_back(ist::benchmark::ingested(
+        data, frame, ist::posed_solids(*model, motion[0], known), region_radius));
     out->line("cloud " + std::string(frame) + " points " +
               std::to_string(frames.back().index.size()));
   }

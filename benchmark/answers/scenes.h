@@ -21,7 +21,7 @@ constexpr int kStepsPerPose = 10;  // 1 ms apart, about
 /// A frame of the sensor as ingest takes it: an organized cloud whose points are read as needed.
 /// @param region_radius  [m] of the region of interest about the robot
 inline CloudSnapshot ingested(const std::filesystem::path& data, const std::string& name,
-                              const PosedRobot& robot, double region_radius) {
+                              Span<const PosedSolid> robot, double region_radius) {
   const auto points = std::make_shared<std::vector<Eigen::Vector3f>>(
       test::read_pcd((data / "clouds" / (name + ".pcd")).string()));
   RawCloud raw;

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/robot/kinematics.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "peers/scene.h"
 #include "support/demo_arm.h"
 #include "support/whole_cloud.h"
@@ -34,13 +34,7 @@ std::vector<Poses> demo_poses(const RobotDescription& robot, const RobotModel& m
     return q;
   };
   const auto place = [&](const std::vector<double>& q) {
-    JointPoses joints;
-    kinematics.place_joints(q, &joints);
-    Poses all, X_FL;
-    std::vector<bool> known;
-    kinematics.place_links(joints, X_FR, &all, &known);
-    for (const LinkModel& link : model.links) X_FL.push_back(all[*kinematics.find_link(link.name)]);
-    return X_FL;
+    return link_poses(model, kinematics, q, X_FR).X_FL;
   };
   std::vector<Poses> poses;
   while (!motion && poses.size() < kHierarchySteps / 4) poses.push_back(place(draw()));

@@ -16,9 +16,9 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr double kStep = 0.001;       // [m] largest movement of any point of the robot
-constexpr double kSpacing = 0.005;    // [m] approximate, between points on analytic obstacles
-constexpr double kNeighbours = 0.03;  // [m] nearer pixels belong to one surface
+constexpr double kStep = 0.001;       // [m] that no point of the robot is moved farther in
+constexpr double kSpacing = 0.005;    // [m] about, between the points on analytic obstacles
+constexpr double kNeighbours = 0.03;  // [m] pixels nearer to each other are on one surface
 
 CloudSnapshot ingested(const Points& points) {
   IngestConfig config;
@@ -42,7 +42,7 @@ CloudSnapshot ingested(const Points& points) {
   return cloud;
 }
 
-// Makes the snapshots with half of the points, all, and twice as many.
+// Half of the points, all, and twice as many.
 void set_clouds(const Points& twice, MovingScene* scene) {
   Points all, half;
   for (std::size_t i = 0; i < twice.size(); ++i) {
@@ -62,8 +62,8 @@ Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b
   return X;
 }
 
-// Moves through waypoints in steps of at most kStep for every vertex.
-void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& waypoints, MovingScene* scene) {
+// Through way points, in steps of at most kStep for every vertex.
+void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingScene* scene) {
   std::vector<Points> corners;
   for (const LinkDescription& link : scene->robot.links) {
     Points points;
@@ -73,22 +73,20 @@ void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& waypoints, Mov
     }
     corners.push_back(std::move(points));
   }
-  for (std::size_t k = 0; k + 1 < waypoints.size(); ++k) {
+  for (std::size_t k = 0; k + 1 < way.size(); ++k) {
     double farthest = 0.0;
     for (std::size_t i = 0; i < corners.size(); ++i) {
       for (std::size_t c = 0; c < corners[i].size(); c += 1 + corners[i].size() / 500) {
-        farthest = std::max(
-            farthest,
-            (waypoints[k][i] * corners[i][c] - waypoints[k + 1][i] * corners[i][c]).norm());
+        farthest =
+            std::max(farthest, (way[k][i] * corners[i][c] - way[k + 1][i] * corners[i][c]).norm());
       }
     }
-    // A fifth more steps: a point moves a little farther along an arc than along its chord.
+    // A fifth more: along the arc a point moves a little more than along its chord.
     const int count = std::max(1, static_cast<int>(std::ceil(1.2 * farthest / kStep)));
     for (int s = 0; s < count; ++s) {
       std::vector<Eigen::Isometry3d> X_FL;
       for (std::size_t i = 0; i < corners.size(); ++i) {
-        X_FL.push_back(
-            between(waypoints[k][i], waypoints[k + 1][i], static_cast<double>(s) / count));
+        X_FL.push_back(between(way[k][i], way[k + 1][i], static_cast<double>(s) / count));
       }
       scene->steps.push_back(std::move(X_FL));
       scene->begins.push_back(k == 0 && s == 0);
@@ -103,7 +101,7 @@ Eigen::Isometry3d pose(const Eigen::Vector3d& p, const Eigen::Vector3d& turn) {
   return X;
 }
 
-// Random points of a surface u, v in [0, 1]^2 with the given area, the same in every run.
+// Points of a surface u, v in [0, 1]^2 of the given area, at random, the same for every run.
 void add_surface(double area, const std::function<Eigen::Vector3d(double, double)>& surface,
                  std::mt19937_64* rng, Points* twice) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -133,13 +131,13 @@ RobotDescription one_link(const std::string& name, const TriangleMesh& mesh) {
 }
 
 MovingScene analytic(const std::string& name, const TriangleMesh& mesh, const Points& twice,
-                     const std::vector<Eigen::Isometry3d>& waypoints) {
+                     const std::vector<Eigen::Isometry3d>& way) {
   MovingScene scene;
   scene.name = name;
   scene.robot = one_link(name, mesh);
   set_clouds(twice, &scene);
   std::vector<std::vector<Eigen::Isometry3d>> links;
-  for (const Eigen::Isometry3d& X : waypoints) links.push_back({X});
+  for (const Eigen::Isometry3d& X : way) links.push_back({X});
   set_steps(links, &scene);
   scene.reference_count = scene.steps.size();
   return scene;
@@ -179,7 +177,7 @@ std::vector<MovingScene> analytic_scenes() {
       analytic("bar into a corner", bar, points,
                {pose({0.45, 0.4, 0.2}, {0, 0, 0.5}), pose({0.25, 0.15, 0.1}, {0.5, 0, 0}),
                 pose({0.2, 0.4, 0.3}, {0.5, 0.7, 0.9})}));
-  // The link moves down into the plate, along it while it turns, and up again.
+  // Down into the plate, along it and round, and up again.
   points.clear();
   add_plate({0, 0, 0}, 0.6 * x, 0.6 * y, &rng, &points);
   scenes.push_back(
@@ -192,7 +190,7 @@ std::vector<MovingScene> analytic_scenes() {
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
   const test::Npy poses = test::read_npy((data / "poses/traj.npy").string());
   constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 25, kWidth = 640;
-  std::vector<std::vector<Eigen::Isometry3d>> waypoints(kPoses);
+  std::vector<std::vector<Eigen::Isometry3d>> way(kPoses);
   for (std::size_t k = 0; k < kPoses; ++k) {
     for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
       Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
@@ -201,7 +199,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
             poses.values.at((k * test::kPandaLinks + link) * 12 + static_cast<std::size_t>(i));
       }
       X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-      waypoints[k].push_back(X);
+      way[k].push_back(X);
     }
   }
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
@@ -222,7 +220,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
           GeometryElement{load_mesh(mesh.string()), Eigen::Isometry3d::Identity(), mesh.string()}};
       scene.robot.links.push_back(std::move(link));
     }
-    // Twice the points: one more between any two neighbours of a row on one surface.
+    // Twice the points: one more between each two neighbours of a row that are on one surface.
     const auto pixels = test::read_pcd((data / "clouds" / (std::string(name) + ".pcd")).string());
     Points all, half, twice;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -239,7 +237,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
     scene.half = ingested(half);
     scene.twice = ingested(twice);
     for (std::size_t k = 0; k < kStretches; ++k) {
-      const auto first = waypoints.begin() + static_cast<std::ptrdiff_t>(k * kPoses / kStretches);
+      const auto first = way.begin() + static_cast<std::ptrdiff_t>(k * kPoses / kStretches);
       set_steps({first, first + kLength}, &scene);
     }
     scene.reference_begin = scene.steps.size() / 2;
@@ -249,16 +247,15 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
   return scenes;
 }
 
-std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
-                                                              const RobotModel& model,
-                                                              std::size_t spheres,
-                                                              const std::string& cache_directory) {
+std::vector<std::shared_ptr<const ContactGeometry>> pack_disjoint(
+    const RobotDescription& robot, const RobotModel& model, std::size_t spheres,
+    const std::string& cache_directory) {
   ContactConfig config;
   config.packing.max_spheres = spheres;
-  std::vector<std::shared_ptr<const ContactBody>> bodies;
+  std::vector<std::shared_ptr<const ContactGeometry>> bodies;
   for (std::size_t i = 0; i < robot.links.size(); ++i) {
-    bodies.push_back(
-        build_contact_body(robot.links[i].geometry, 0, model.links[i], config, cache_directory));
+    bodies.push_back(build_contact_geometry(robot.links[i].geometry, 0, model.links[i], config,
+                                            cache_directory));
   }
   return bodies;
 }

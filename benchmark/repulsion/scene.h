@@ -14,31 +14,30 @@
 
 namespace ist::benchmark {
 
-/// A robot that moves by at most 1 mm per step (1 m/s at 1 kHz) among static obstacles.
+/// A robot that moves by at most 1 mm per step (1 m/s at 1 kHz) among standing obstacles.
 struct MovingScene {
   std::string name;
   RobotDescription robot;
   CloudSnapshot cloud;
   CloudSnapshot half, twice;  ///< with half and twice as many points on the same obstacles
   std::vector<std::vector<Eigen::Isometry3d>> steps;  ///< by link; link -> fixed frame
-  std::vector<bool> begins;                           ///< by step: a new motion begins here
-  /// Steps from this one on are compared with exact geometry.
+  std::vector<bool> begins;  ///< by step: it does not follow from the one before
+  /// Steps from here on are compared with exact geometry.
   std::size_t reference_begin = 0, reference_count = 0;
 };
 
-/// The synthetic scene of analytic bodies.
+/// Of analytic bodies, made here.
 std::vector<MovingScene> analytic_scenes();
 
 /// The recorded motion among the recorded frames.
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data);
 
-/// Contact bodies by link, of `spheres` at most; read from the cache if they are there.
-std::vector<std::shared_ptr<const ContactBody>> pack_disjoint(const RobotDescription& robot,
-                                                              const RobotModel& model,
-                                                              std::size_t spheres,
-                                                              const std::string& cache_directory);
+/// By link, for wrenches: `spheres` at most; from the cache where they are there.
+std::vector<std::shared_ptr<const ContactGeometry>> pack_disjoint(
+    const RobotDescription& robot, const RobotModel& model, std::size_t spheres,
+    const std::string& cache_directory);
 
-/// The model packed to `max_error` [m]; read from the cache if it is there.
+/// Packed to `max_error` [m]; from the cache where it is there.
 std::shared_ptr<const RobotModel> pack(const RobotDescription& robot, double max_error,
                                        const std::string& cache_directory);
 

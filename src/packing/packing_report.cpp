@@ -1,5 +1,5 @@
-#include "internal/geometry/solid_queries.h"
 #include "internal/packing/packing_report.h"
+#include "internal/geometry/solid_queries.h"
 
 #include <algorithm>
 #include <cmath>

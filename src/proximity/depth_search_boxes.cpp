@@ -93,7 +93,8 @@ class BoxDepthSearch {
     if (cover > outside_distance() + radius_of(box)) return;
     ++search_.statistics->exact_evaluations;
     const Solid& solid = link_.context.solid();
-    const BoxDistance found = distance_to_box(solid, box, obstacles_.X_OL, std::max(search_.closest.exact.distance, kContact));
+    const BoxDistance found = distance_to_box(solid, box, obstacles_.X_OL,
+                                              std::max(search_.closest.exact.distance, kContact));
     if (found.distance > 0.0 && (cover > outside_distance() || !solid.is_inside(center_L))) {
       return refinement_.take_outside(found, id);
     }

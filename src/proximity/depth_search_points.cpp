@@ -163,7 +163,8 @@ class PointDepthSearch {
     ++search_.statistics->exact_evaluations;
     SignedDistanceGrid::Sample sample;
     link_.context.grid.find(p_LQ, &sample);
-    const PointDepth depth = point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), sample.near);
+    const PointDepth depth =
+        point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), sample.near);
     link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kSigned,
                                id.key(), p_LQ, depth.floor);
     if (depth.exact.distance < kInfinity) {

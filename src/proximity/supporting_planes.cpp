@@ -25,7 +25,8 @@ bool update_supporting_planes(const Eigen::Isometry3d& X_OL, LinkQueryState* lin
   kept.plane_normal_L = closest.normal;
   const Eigen::Vector3f normal = closest.normal.cast<float>();
   const double at_witness = closest.normal.dot(closest.witness);
-  const double support = ist::support(link->context.solid(), closest.normal, kSupportSlack, at_witness);
+  const double support =
+      ist::support(link->context.solid(), closest.normal, kSupportSlack, at_witness);
   kept.supports.set_direction(normal.data(), round_up(support));
   *planes = supporting_planes(X_OL, *link);
   return true;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "contact/contact_spheres.h"
 #include "contact/lens.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/contact/contact_volume.h"
@@ -18,28 +19,30 @@
 /// Contact volumes by brute force in double: all spheres of the link against all of the obstacle.
 namespace ist::test {
 
-/// A sphere of a contact body, copied from its leaves.
+/// A sphere of a contact geometry, taken out of its leaves.
 struct OracleSphere {
   Eigen::Vector3d center;  ///< [m] link frame
-  double radius, share;
-  Eigen::Vector3d out;
-  Eigen::Matrix3d slope;
+  double radius, cell_ratio;
+  Eigen::Vector3d outward;
+  Eigen::Matrix3d gradient;
 
-  /// The way out at p, shortened where it is undecided.
-  Eigen::Vector3d way_out(const Eigen::Vector3d& p) const {
-    const Eigen::Vector3d o = out + slope * (p - center);
+  /// The outward field at p, shortened where it is undecided.
+  Eigen::Vector3d outward_at(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d o = outward + gradient * (p - center);
     return o / std::sqrt(o.squaredNorm() + 0.2 * 0.2);
   }
 };
 
-inline std::vector<OracleSphere> spheres_of(const ContactBody& body) {
+inline std::vector<OracleSphere> spheres_of(const ContactGeometry& body) {
   std::vector<OracleSphere> spheres;
-  for (const ContactLeaf& leaf : body.leaves) {
+  if (!body.has_volume()) return spheres;
+  for (const ContactLeaf& leaf : body.spheres->leaves) {
     for (int k = 0; k < kSphereWidth; ++k) {
       if (!(leaf.radius[k] > 0.0F)) continue;
-      OracleSphere sphere{{leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.radius[k], leaf.share[k], {}, {}};
-      for (int i = 0; i < 3; ++i) sphere.out[i] = leaf.out[i][k];
-      for (int i = 0; i < 9; ++i) sphere.slope(i / 3, i % 3) = leaf.slope[i][k];
+      OracleSphere sphere{
+          {leaf.x[k], leaf.y[k], leaf.z[k]}, leaf.radius[k], leaf.cell_ratio[k], {}, {}};
+      for (int i = 0; i < 3; ++i) sphere.outward[i] = leaf.outward[i][k];
+      for (int i = 0; i < 9; ++i) sphere.gradient(i / 3, i % 3) = leaf.gradient[i][k];
       spheres.push_back(sphere);
     }
   }
@@ -55,8 +58,7 @@ inline Eigen::Vector3d oracle_lens_middle(const Eigen::Vector3d& a, double R,
   return a + 0.5 * (low + high) / d * (b - a);
 }
 
-/// Volume of the lens of two spheres, pi s^2 (...) / 12 d; the smaller sphere's volume if the other
-/// one contains it.
+/// pi s^2 (...) / 12 d with the smaller sphere where the other one holds it, as the formula stands.
 inline double oracle_lens(double R, double r, double d) {
   if (d >= R + r) return 0.0;
   if (d <= std::abs(R - r)) return 4.0 * M_PI / 3.0 * std::pow(std::min(R, r), 3);
@@ -68,14 +70,14 @@ inline double oracle_lens(double R, double r, double d) {
 inline void oracle_add(const std::vector<OracleSphere>& spheres, const Eigen::Vector3d& center,
                        double radius, double weight, ContactVolume* sum) {
   for (const OracleSphere& sphere : spheres) {
-    const double volume =
-        weight * sphere.share * oracle_lens(sphere.radius, radius, (center - sphere.center).norm());
+    const double volume = weight * sphere.cell_ratio *
+                          oracle_lens(sphere.radius, radius, (center - sphere.center).norm());
     if (!(volume > 0.0)) continue;
     const Eigen::Vector3d middle = oracle_lens_middle(sphere.center, sphere.radius, center, radius);
-    const Eigen::Vector3d push = -volume * sphere.way_out(middle);
+    const Eigen::Vector3d push = -volume * sphere.outward_at(middle);
     sum->volume += volume;
-    sum->push += push;
-    sum->turn += middle.cross(push);
+    sum->weighted_normal += push;
+    sum->weighted_moment += middle.cross(push);
   }
 }
 
@@ -89,7 +91,7 @@ inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
   return points;
 }
 
-/// The share of a point sphere's weight that counts at its depth in the link.
+/// The factor that a sphere's depth in the link gives its weight.
 inline double oracle_depth_weight(const LinkModel& link, const Eigen::Vector3d& p_L,
                                   double radius) {
   double depth = 0.0;
@@ -99,7 +101,7 @@ inline double oracle_depth_weight(const LinkModel& link, const Eigen::Vector3d& 
   return std::min(depth / (kFullDepth * radius), 1.0);
 }
 
-inline ContactVolume oracle_contact(const LinkModel& link, const ContactBody& body,
+inline ContactVolume oracle_contact(const LinkModel& link, const ContactGeometry& body,
                                     const Eigen::Isometry3d& X_FL, SnapshotSpan clouds) {
   const std::vector<OracleSphere> spheres = spheres_of(body);
   ContactVolume sum;
@@ -109,22 +111,22 @@ inline ContactVolume oracle_contact(const LinkModel& link, const ContactBody& bo
       const Eigen::Vector3d p_L = X_FL.inverse() * p_F;
       const double weight = oracle_depth_weight(link, p_L, radius);
       if (!(weight > 0.0)) continue;
-      double shared = 0.0;
+      double lenses = 0.0;
       for (const CloudSnapshot* other : clouds) {
         const double other_radius = kPointSphereRadius * other->thinning;
         for (const Eigen::Vector3d& q_F : points_F(*other)) {
-          shared += oracle_lens(radius, other_radius, (q_F - p_F).norm());
+          lenses += oracle_lens(radius, other_radius, (q_F - p_F).norm());
         }
       }
       const double own = 4.0 * M_PI / 3.0 * std::pow(radius, 3);
-      oracle_add(spheres, p_L, radius, weight * own / shared, &sum);
+      oracle_add(spheres, p_L, radius, weight * own / lenses, &sum);
     }
   }
   return sum;
 }
 
-/// The contact volume of two links: all spheres against all.
-inline ContactVolume oracle_contact(const ContactBody& a, const ContactBody& b,
+/// Of two links, all spheres against all.
+inline ContactVolume oracle_contact(const ContactGeometry& a, const ContactGeometry& b,
                                     const Eigen::Isometry3d& X_AB) {
   ContactVolume sum;
   const std::vector<OracleSphere> second = spheres_of(b);
@@ -132,23 +134,23 @@ inline ContactVolume oracle_contact(const ContactBody& a, const ContactBody& b,
     for (const OracleSphere& other : second) {
       const Eigen::Vector3d center = X_AB * other.center;
       const double volume =
-          sphere.share * other.share *
+          sphere.cell_ratio * other.cell_ratio *
           oracle_lens(sphere.radius, other.radius, (center - sphere.center).norm());
       if (!(volume > 0.0)) continue;
       const Eigen::Vector3d middle =
           oracle_lens_middle(sphere.center, sphere.radius, center, other.radius);
       const Eigen::Vector3d push =
           0.5 * volume *
-          (X_AB.linear() * other.way_out(X_AB.inverse() * middle) - sphere.way_out(middle));
+          (X_AB.linear() * other.outward_at(X_AB.inverse() * middle) - sphere.outward_at(middle));
       sum.volume += volume;
-      sum.push += push;
-      sum.turn += middle.cross(push);
+      sum.weighted_normal += push;
+      sum.weighted_moment += middle.cross(push);
     }
   }
   return sum;
 }
 
-/// A snapshot of points with its thinned cloud, as from a sensor at the origin.
+/// Points as a sensor at the origin would deliver them, thinned.
 inline CloudSnapshot thinned(const std::vector<Eigen::Vector3d>& points, double thinning = 0.01,
                              const Eigen::Vector3d& far = Eigen::Vector3d::Zero()) {
   std::vector<double> xyz;
@@ -178,13 +180,13 @@ struct ContactLink {
       : geometry(link_geometry), model(model_of({link_geometry}, max_error)) {
     ContactConfig config;
     config.packing.max_spheres = spheres;
-    body = build_contact_body(geometry, 0, link(), config, "");
+    body = build_contact_geometry(geometry, 0, link(), config, "");
   }
   const LinkModel& link() const { return model->links[0]; }
 
   LinkGeometry geometry;
   std::shared_ptr<const RobotModel> model;
-  std::shared_ptr<const ContactBody> body;
+  std::shared_ptr<const ContactGeometry> body;
 };
 
 }  // namespace ist::test

@@ -13,14 +13,14 @@
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 
-/// Robots of primitives that move among points, and their first contact by dense sampling.
+/// Robots of primitives that move among points, and when they first touch one, by dense sampling.
 namespace ist::test {
 
 struct Arm {
   std::shared_ptr<const RobotModel> model;
   std::shared_ptr<const Kinematics> kinematics;
   std::vector<LinkGeometry> links;  ///< by link of the model
-  std::vector<std::size_t> places;  ///< by link of the model: its index in the kinematics
+  std::vector<std::size_t> bodies;  ///< by link of the model: its body in the kinematics
   std::size_t size() const { return links.size(); }
 };
 
@@ -49,19 +49,19 @@ inline Arm random_arm(Rng* rng) {
   Arm arm;
   auto model = std::make_shared<RobotModel>();
   const auto kinematics = std::make_shared<Kinematics>(robot);
-  for (std::size_t i = 1; i < kinematics->links().size(); ++i) {
+  for (std::size_t i = 1; i < kinematics->bodies().size(); ++i) {
     const auto shape = static_cast<std::size_t>(uniform(rng, 0, 3.999));
     model->links.push_back(shapes->links[shape]);
-    model->links.back().name = kinematics->links()[i];
+    model->links.back().name = kinematics->bodies()[i];
     arm.links.push_back({GeometryElement{kShapes[shape], Eigen::Isometry3d::Identity(), "test"}});
-    arm.places.push_back(i);
+    arm.bodies.push_back(i);
   }
   arm.model = model;
   arm.kinematics = kinematics;
   return arm;
 }
 
-/// The poses of the kinematics' links `time` [s] after the start.
+/// X_FB of all bodies, `time` [s] after the start.
 inline std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& motion,
                                                     double time) {
   const auto& joints = arm.kinematics->joints();
@@ -76,25 +76,24 @@ inline std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMot
     const double q = from + s * (to - from);
     poses.X_PC[j] = arm.kinematics->joint_pose(j, joints[j].multiplier * q + joints[j].offset);
   }
-  std::vector<Eigen::Isometry3d> X_FL;
-  std::vector<bool> known;
-  arm.kinematics->place_links(poses, motion.X_FR, &X_FL, &known);
-  return X_FL;
+  BodyPoses bodies;
+  arm.kinematics->place_bodies(poses, motion.X_FR, &bodies);
+  return bodies.X_FB;
 }
 
-/// A motion of 0.5 to 2 s. Each joint moves by up to 1.5 rad or 0.25 m, or stands still. Up to five
-/// points, some of them in the path of a link.
+/// For 0.5 to 2 s, each joint up to 1.5 rad or 0.5 m, or standing still; five points or fewer, some
+/// of them in the way.
 inline ArmMotion random_motion(Rng* rng, const Arm& arm) {
   ArmMotion motion;
   motion.joints.duration = uniform(rng, 0.5, 2.0);
   motion.X_FR = random_pose(rng, 0.5);
   std::vector<double> q;
   for (const Kinematics::Joint& joint : arm.kinematics->joints()) {
-    const double range = joint.type == JointType::kPrismatic ? 0.25 : 1.5;
+    const double way = joint.type == JointType::kPrismatic ? 0.25 : 1.5;
     q.push_back(uniform(rng, -1, 1));
     const bool stands = uniform(rng, 0, 1) < 0.2;
     motion.joints.from.push_back(stands ? std::nan("") : q.back());
-    motion.joints.to.push_back(stands ? std::nan("") : q.back() + uniform(rng, -range, range));
+    motion.joints.to.push_back(stands ? std::nan("") : q.back() + uniform(rng, -way, way));
   }
   arm.kinematics->place_joints(q, &motion.still);
   for (std::size_t j = 0; j < q.size(); ++j) {
@@ -104,27 +103,27 @@ inline ArmMotion random_motion(Rng* rng, const Arm& arm) {
   }
   const int count = 1 + static_cast<int>(uniform(rng, 0, 5));
   for (int i = 0; i < count; ++i) {
-    const std::size_t link = arm.places[static_cast<std::size_t>(uniform(rng, 0, 0.999) *
+    const std::size_t body = arm.bodies[static_cast<std::size_t>(uniform(rng, 0, 0.999) *
                                                                  static_cast<double>(arm.size()))];
     const double time = uniform(rng, 0.3, 1.2) * motion.joints.duration;
-    motion.points.push_back(sampled_poses(arm, motion, time)[link] * random_vector(rng, 0.1));
+    motion.points.push_back(sampled_poses(arm, motion, time)[body] * random_vector(rng, 0.1));
   }
   return motion;
 }
 
 /// Smallest exact distance [m] of any link to any point, `time` [s] after the start.
 inline double sampled_distance(const Arm& arm, const ArmMotion& motion, double time) {
-  const std::vector<Eigen::Isometry3d> X_FL = sampled_poses(arm, motion, time);
+  const std::vector<Eigen::Isometry3d> X_FB = sampled_poses(arm, motion, time);
   double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < arm.size(); ++i) {
-    smallest = std::min(smallest, oracle_minimum(arm.links[i], X_FL[arm.places[i]], motion.points));
+    smallest = std::min(smallest, oracle_minimum(arm.links[i], X_FB[arm.bodies[i]], motion.points));
   }
   return smallest;
 }
 
-/// The first contact [s], +inf without any. It is sampled every half millisecond, then found by
-/// bisection between the last sample without and the first one with contact. Samples far from all
-/// points are skipped: no link is faster than 40 m/s.
+/// [s] The first contact that samples every half millisecond find, then bisection between the last
+/// sample without and the first one with contact; +inf without any. Far from all points some
+/// samples are spared: nothing here is faster than 40 m/s.
 inline double sampled_impact(const Arm& arm, const ArmMotion& motion) {
   constexpr double kStep = 5e-4, kFastest = 40.0;
   const auto in_contact = [&](double time) { return sampled_distance(arm, motion, time) <= 0.0; };

@@ -74,8 +74,8 @@ class ProximityCycle {
   // Valid for one cycle.
   StampedLinkPoses poses_;
   StatusInput status_input_;
-  std::vector<LinkProximity> results_;  ///< by link of the robot
-  std::vector<RepulsiveWrench> pushes_;            ///< by link of the robot, filtered
+  std::vector<LinkProximity> results_;   ///< by link of the robot
+  std::vector<RepulsiveWrench> pushes_;  ///< by link of the robot, filtered
 };
 
 }  // namespace ist

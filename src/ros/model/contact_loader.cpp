@@ -108,7 +108,7 @@ std::shared_ptr<const ContactGeometry> ContactLoader::build(
   std::shared_ptr<const ContactGeometry> body;
   try {
     body = build_contact_geometry(link.geometry, link.attached, model, config_.contacts,
-                              config_.model.cache_directory, cancelled);
+                                  config_.model.cache_directory, cancelled);
   } catch (const std::exception& error) {  // ModelError, or no memory
     body = no_body(std::string("its volume cannot be packed: ") + error.what());
   }

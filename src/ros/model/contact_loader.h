@@ -33,7 +33,7 @@ class ContactLoader {
   void run();
   void load(const std::shared_ptr<const ModelState>& state);
   std::shared_ptr<const ContactGeometry> build(const LinkDescription& link, const LinkModel& model,
-                                           const std::function<bool()>& cancelled) const;
+                                               const std::function<bool()>& cancelled) const;
   void set(std::shared_ptr<const ContactModel> contacts);
   bool is_current(const ModelState& state) const;
 

@@ -92,9 +92,9 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].has_unstated_pose()) continue;
-    joints_.known[j] =
-        look_up_in_tf(kinematics_->bodies()[joints[j].parent], kinematics_->bodies()[joints[j].child],
-                      now, instant, &joints_.X_PC[j], &joint_problems_[j]);
+    joints_.known[j] = look_up_in_tf(kinematics_->bodies()[joints[j].parent],
+                                     kinematics_->bodies()[joints[j].child], now, instant,
+                                     &joints_.X_PC[j], &joint_problems_[j]);
   }
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();
   std::string root_problem;
