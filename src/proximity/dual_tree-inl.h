@@ -11,11 +11,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "internal/bvh/traversal_stack.h"
-#include "proximity/clipped_sphere-inl.h"
 #include "proximity/dual_tree.h"
+#include "proximity/pair_bounds-inl.h"
 #include "proximity/supporting_planes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -24,53 +23,11 @@ namespace HWY_NAMESPACE {
 namespace dual_tree {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// A pair of a tree node's child and a box. It carries both volumes, so that expanding one side does
-// not touch the other's memory.
-struct Pair {
-  float bound;               // [m] lower bound of the distance
-  std::int32_t sphere_slot;  // BvttFront::Pair::sphere
-  std::int32_t box_slot;     // BvttFront::Pair::box
-  std::int32_t parent;       // in the front: kBoxWidth * pair + child; or one of those below
-  std::int32_t sphere, box;  // children: >= 0 node, < 0 leaf or tile
-  float x, y, z, radius;     // the bounding sphere, posed
-  float min[3], max[3];
-};
-
 // Parents that are no pair of the front: none is kept, or the pair itself is in the front (from
 // kReopened down) and is expanded again.
 constexpr std::int32_t kNoParent = -1, kReopened = -2;
 
 constexpr std::uint64_t kDeadlineInterval = 16;  // node pairs between two looks at the clock
-
-// Centres of eight spheres in the index's frame [m].
-struct PosedCenters {
-  alignas(64) float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];
-};
-
-template <class Bvh>
-HWY_INLINE void PoseCenters(const DualTreeInput<Bvh>& input, const float* x, const float* y,
-                            const float* z, PosedCenters* posed) {
-  const SphereTag d;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
-    const auto vx = hn::Load(d, x + k), vy = hn::Load(d, y + k), vz = hn::Load(d, z + k);
-    float* out[3] = {posed->x, posed->y, posed->z};
-    for (int row = 0; row < 3; ++row) {
-      const float* r = input.R_OL + 3 * row;
-      const auto sum =
-          hn::MulAdd(hn::Set(d, r[0]), vx,
-                     hn::MulAdd(hn::Set(d, r[1]), vy,
-                                hn::MulAdd(hn::Set(d, r[2]), vz, hn::Set(d, input.p_OL[row]))));
-      hn::Store(sum, d, out[row] + k);
-    }
-  }
-}
-
-template <class D>
-HWY_INLINE std::uint32_t MaskBits(D d, hn::Mask<D> mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(d, mask, bits);
-  return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
-}
 
 // A sphere leaf and a tile, for the visitor.
 template <class Tile>
@@ -276,14 +233,6 @@ class DualTree {
     return front_index < 0 ? 0U : front_->pair(front_index).expanded;
   }
 
-  static bool BoxIsLarger(const Pair& pair) {
-    float size_sq = 0.0F;
-    for (int i = 0; i < 3; ++i) {
-      size_sq += (pair.max[i] - pair.min[i]) * (pair.max[i] - pair.min[i]);
-    }
-    return size_sq > 4.0F * pair.radius * pair.radius;
-  }
-
   // Pushes the children whose bits are set, the nearest on top. `set_child` fills in the volume and
   // the slot of the side that is expanded.
   template <class SetChild>
@@ -309,26 +258,6 @@ class DualTree {
     }
   }
 
-  // Bit k for a bound below the limit; the least of the others goes to `pruned`. Unused slots are
-  // far away.
-  template <class D, class V>
-  static HWY_INLINE std::uint32_t BitsBelow(D d, V bound, float limit, V* pruned) {
-    const auto below = hn::Lt(bound, hn::Set(d, limit));
-    *pruned = hn::Min(*pruned, hn::IfThenElse(below, *pruned, bound));
-    return MaskBits(d, below);
-  }
-
-  // Moves the children whose bits are set far away.
-  template <class D>
-  static HWY_INLINE hn::Vec<D> MaskOut(D d, hn::Vec<D> bound, std::uint32_t bits) {
-    if (bits == 0) return bound;
-    alignas(64) float far[kBoxWidth];
-    for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
-      far[k] = ((bits >> k) & 1U) != 0 ? kFarAway : -kFarAway;
-    }
-    return hn::Max(bound, hn::Load(d, far));
-  }
-
   HWY_INLINE const float* ChildSupports(std::int32_t node) const {
     return SupportsOf(node, nodes_, leaves_, in_.supports);
   }
@@ -340,43 +269,17 @@ class DualTree {
     const std::int32_t front_index = EnterFront(pair);
     const std::uint32_t expanded = ExpandedChildren(front_index);
     const SphereNode& node = nodes_[pair.sphere];
-    const SphereTag d;
-    PosedCenters centers;
-    PoseCenters(in_, node.x, node.y, node.z, &centers);
-    const auto box_height = hn::Set(d, planes_.Height(pair.min, pair.max));
-    const BoxSphere box = CircumscribedSphere(pair);
     const float* support = ChildSupports(pair.sphere);
     if (pair.sphere_slot >= 0) {
       TightenSupport(support, &in_.supports->support[static_cast<std::size_t>(pair.sphere_slot)]);
     }
-    const float limit = visitor_.Limit();
-    std::uint32_t near = 0;
-    auto pruned = hn::Set(d, kFarAway);
+    PosedCenters centers;
+    PoseCenters(in_, node.x, node.y, node.z, &centers);
     alignas(64) float bound[kSphereWidth];
-    for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); k += hn::Lanes(d)) {
-      const auto x = hn::Load(d, centers.x + k), y = hn::Load(d, centers.y + k),
-                 z = hn::Load(d, centers.z + k), radius = hn::Load(d, node.radius + k);
-      const auto dx = IntervalDistance(d, hn::Set(d, pair.min[0]), hn::Set(d, pair.max[0]), x);
-      const auto dy = IntervalDistance(d, hn::Set(d, pair.min[1]), hn::Set(d, pair.max[1]), y);
-      const auto dz = IntervalDistance(d, hn::Set(d, pair.min[2]), hn::Set(d, pair.max[2]), z);
-      const auto child_support = hn::LoadU(d, support + k);
-      const auto sphere_bound = hn::Sub(Norm(dx, dy, dz), radius);
-      const auto plane_height = hn::Sub(hn::Add(hn::Set(d, planes_.offset()), child_support),
-                                        planes_.AlongNormal(d, x, y, z));
-      const auto lateral =
-          hn::Sub(planes_.Lateral(d, hn::Sub(hn::Set(d, box.x), x), hn::Sub(hn::Set(d, box.y), y),
-                                  hn::Sub(hn::Set(d, box.z), z)),
-                  hn::Set(d, box.radius));
-      const auto clipped_bound =
-          ClippedDistance(d, hn::Sub(box_height, child_support), hn::Max(lateral, hn::Zero(d)),
-                          radius, plane_height, RimRadius(d, radius, plane_height, in_.rounding));
-      const auto least = hn::Max(sphere_bound, clipped_bound);
-      near |= BitsBelow(d, MaskOut(d, least, expanded >> k), limit, &pruned) << k;
-      hn::Store(least, d, bound + k);
-    }
-    near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
-    PruneChildren(front_index, hn::GetLane(hn::MinOfLanes(d, pruned)));
-    PushChildren(pair, front_index, near, bound, [&](int k, Pair* child) {
+    const ChildrenBelow children = BoundSphereChildren(
+        pair, node, centers, support, planes_, in_.rounding, visitor_.Limit(), expanded, bound);
+    PruneChildren(front_index, children.pruned_bound);
+    PushChildren(pair, front_index, children.bits, bound, [&](int k, Pair* child) {
       child->sphere_slot = pair.sphere * kSphereWidth + k;
       child->sphere = node.child[k];
       child->x = centers.x[k];
@@ -389,45 +292,13 @@ class DualTree {
   void ExpandBox(const Pair& pair) {
     const std::int32_t front_index = EnterFront(pair);
     const std::uint32_t expanded = ExpandedChildren(front_index);
-    const BoxNode& node = box_nodes_[pair.box];
-    const BoxTag d;
-    const float plane_offset = planes_.offset() + SupportOfSlot(pair.sphere_slot);
-    const float center[3] = {pair.x, pair.y, pair.z};
-    const auto radius = hn::Set(d, pair.radius);
-    const auto plane_height =
-        hn::Sub(hn::Set(d, plane_offset),
-                planes_.AlongNormal(d, hn::Set(d, pair.x), hn::Set(d, pair.y), hn::Set(d, pair.z)));
-    const auto rim_radius = RimRadius(d, radius, plane_height, in_.rounding);
-    const float limit = visitor_.Limit();
-    std::uint32_t near = 0;
-    auto pruned = hn::Set(d, kFarAway);
     alignas(64) float bound[kBoxWidth];
-    for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
-      const auto sphere_bound = hn::Sub(Distance(node, k, pair.x, pair.y, pair.z), radius);
-      const auto clipped_bound =
-          ClippedDistance(d, planes_.Height(node, k, plane_offset),
-                          planes_.Lateral(node, k, center), radius, plane_height, rim_radius);
-      const auto least = hn::Max(sphere_bound, clipped_bound);
-      near |= BitsBelow(d, MaskOut(d, least, expanded >> k), limit, &pruned) << k;
-      hn::Store(least, d, bound + k);
-    }
-    near &= ((1U << static_cast<std::uint32_t>(node.count)) - 1U) & ~expanded;
-    PruneChildren(front_index, hn::GetLane(hn::MinOfLanes(d, pruned)));
-    PushChildren(pair, front_index, near, bound,
+    const ChildrenBelow children =
+        BoundBoxChildren(pair, box_nodes_[pair.box], SupportOfSlot(pair.sphere_slot), planes_,
+                         in_.rounding, visitor_.Limit(), expanded, bound);
+    PruneChildren(front_index, children.pruned_bound);
+    PushChildren(pair, front_index, children.bits, bound,
                  [&](int k, Pair* child) { SetBox(pair.box * kBoxWidth + k, child); });
-  }
-
-  // The sphere through the corners of a pair's box.
-  struct BoxSphere {
-    float x, y, z, radius;
-  };
-  static BoxSphere CircumscribedSphere(const Pair& pair) {
-    float size_sq = 0.0F;
-    for (int i = 0; i < 3; ++i) {
-      size_sq += (pair.max[i] - pair.min[i]) * (pair.max[i] - pair.min[i]);
-    }
-    return {0.5F * (pair.min[0] + pair.max[0]), 0.5F * (pair.min[1] + pair.max[1]),
-            0.5F * (pair.min[2] + pair.max[2]), 0.5F * std::sqrt(size_sq)};
   }
 
   HWY_INLINE void VisitLeaves(const Pair& pair) {

@@ -48,7 +48,7 @@ ProximityQuery::~ProximityQuery() = default;
 ProximityQuery::ProximityQuery(ProximityQuery&&) noexcept = default;
 ProximityQuery& ProximityQuery::operator=(ProximityQuery&&) noexcept = default;
 
-bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                          SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   const std::size_t count = impl_->links.size();
   assert(X_FL.size() == count && known.size() == count);
@@ -76,9 +76,8 @@ bool ProximityQuery::run(const std::vector<Eigen::Isometry3d>& X_FL, const std::
   return complete;
 }
 
-bool ProximityQuery::run_minimum(const std::vector<Eigen::Isometry3d>& X_FL,
-                                 const std::vector<bool>& known, SnapshotSpan clouds,
-                                 RobotProximity* result) {
+bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+                                 SnapshotSpan clouds, RobotProximity* result) {
   const std::size_t count = impl_->links.size();
   assert(X_FL.size() == count && known.size() == count);
   impl_->statistics = {};

@@ -84,13 +84,13 @@ class ProximityQuery {
   /// @param clouds  the snapshots of all usable sources; none makes every link UNKNOWN
   /// @param results one per link, overwritten
   /// @returns false when the deadline passed before every link met its tolerance
-  bool run(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
-           SnapshotSpan clouds, std::vector<LinkProximity>* results);
+  bool run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known, SnapshotSpan clouds,
+           std::vector<LinkProximity>* results);
 
   /// The robot's minimum only, several times faster than all links: they share one bound.
   /// @param result  overwritten; UNKNOWN when no link is known or no cloud is given
   /// @returns as run()
-  bool run_minimum(const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<bool>& known,
+  bool run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                    SnapshotSpan clouds, RobotProximity* result);
 
   /// One link only.
