@@ -10,7 +10,7 @@
 #include <memory>
 #include <vector>
 
-#include "cloud/filters/voxel_thinning.h"
+#include "cloud/thinning/voxel_thinning.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
 #include "truth_scenes.h"

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "cloud/filters/self_filter.h"
-#include "cloud/filters/voxel_thinning.h"
 #include "cloud/index/organized_cloud.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/scene_axes.h"
 #include "cloud/index/unorganized_cloud.h"
+#include "cloud/thinning/voxel_thinning.h"
 
 namespace ist {
 namespace {

@@ -8,9 +8,9 @@
 #include "contact/inner_sphere_depth.h"
 #include "contact/overlap_weight.h"
 #include "contact/sphere_contact.h"
+#include "internal/bvh/bounding_sphere.h"
 #include "internal/bvh/box_node.h"
 #include "internal/bvh/traversal_stack.h"
-#include "internal/cloud/bounding_sphere.h"
 #include "internal/cloud/box_bvh.h"
 #include "internal/cloud/point_bvh.h"
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "internal/bvh/bounding_sphere.h"
 #include "internal/bvh/traversal_stack.h"
-#include "internal/cloud/bounding_sphere.h"
 #include "proximity/depth_search.h"
 
 namespace ist {

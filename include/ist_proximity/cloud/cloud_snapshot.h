@@ -36,7 +36,7 @@ class PointIndex {
   void build(const Eigen::Vector3d& origin, const float* x, const float* y, const float* z,
              const std::uint32_t* id, std::size_t n);
 
-  bool empty() const;
+  bool empty() const;                     ///< whether it has no points
   std::size_t size() const;               ///< points
   const Eigen::Isometry3d& X_FO() const;  ///< index's -> fixed frame
   Eigen::AlignedBox3f bounds() const;     ///< [m] in O; holds all points
@@ -63,7 +63,7 @@ class BoxIndex {
   /// @param boxes  [m] in M, finite, none empty (an edge may be 0), coordinates below 1e15
   void build(const std::vector<Eigen::AlignedBox3d>& boxes);
 
-  bool empty() const;
+  bool empty() const;                     ///< whether it has no boxes
   std::size_t size() const;               ///< boxes
   const Eigen::Vector3d& origin() const;  ///< [m] in M
   /// Identifies one build, like PointIndex::build_id(); never equal to that of a PointIndex.
@@ -99,7 +99,7 @@ struct CloudSnapshot {
   RegionOfInterest region;                                 ///< points outside were discarded
   std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
-  IngestCounts counts;
+  IngestCounts counts;       ///< what was done with the points of the message
   double stamp = 0.0;        ///< [s] time of acquisition
   double ingest_time = 0.0;  ///< [s] duration of Ingest::run()
 };

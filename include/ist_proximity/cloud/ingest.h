@@ -54,7 +54,7 @@ class Ingest {
   void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
            double stamp, CloudSnapshot* snapshot);
 
-  const IngestConfig& config() const;
+  const IngestConfig& config() const;  ///< the one given to the constructor
 
  private:
   struct Impl;

@@ -13,11 +13,13 @@ namespace ist {
 /// A planar scan (the members of sensor_msgs/LaserScan): beam i points along
 /// angle_min + i * angle_increment about the sensor's z axis, 0 being x.
 struct LaserScan {
-  double angle_min = 0.0, angle_increment = 0.0;  ///< [rad]
-  double time_increment = 0.0;                    ///< [s] between beams; 0: all at once
-  double range_min = 0.0, range_max = 0.0;        ///< [m] what the sensor can measure
-  const float* ranges = nullptr;                  ///< [m] not owned
-  std::size_t count = 0;                          ///< beams
+  double angle_min = 0.0;         ///< [rad] direction of the first beam
+  double angle_increment = 0.0;   ///< [rad] from a beam to the next
+  double time_increment = 0.0;    ///< [s] between beams; 0: all at once
+  double range_min = 0.0;         ///< [m] the least that the sensor can measure
+  double range_max = 0.0;         ///< [m] the most that the sensor can measure
+  const float* ranges = nullptr;  ///< [m] not owned
+  std::size_t count = 0;          ///< beams
 
   /// [s] from the first beam to the last; negative when the last one comes first in time.
   double duration() const {
@@ -35,8 +37,8 @@ std::string check_scan(const LaserScan& scan);
 
 /// A scan as points in the sensor's frame at the first beam.
 struct ScanPoints {
-  std::vector<double> xyz;
-  RawCloud raw() const;  ///< views xyz: one point a beam, in the scan's order
+  std::vector<double> xyz;  ///< [m] three coordinates a beam
+  RawCloud raw() const;     ///< views xyz: one point a beam, in the scan's order
 };
 
 /// Places each beam's end where it was measured: in the sensor's pose at the beam's own time,

@@ -35,6 +35,7 @@ class SnapshotChannel {
 
   /// Reader: the value taken last (default constructed before the first update).
   const T& front() const { return slots_[front_]; }
+  /// Reader: the same, for the reader to change.
   T& front() { return slots_[front_]; }
 
  private:

@@ -14,6 +14,7 @@ namespace ist {
 
 /// How the spheres that contact volumes are summed over are made.
 struct ContactConfig {
+  /// How a link is packed; each attached object is packed like a link.
   PackingConfig packing = {0.002, 500, PackingOrder::kDisjoint};
   /// [s] > 0: packing one element stops after it, and a disjoint part of the packing for distances
   /// is used instead.
@@ -34,13 +35,14 @@ struct ContactSpheres;  // src/contact/contact_spheres.h
 /// area / |s - p|^4. Around each sphere's centre it is taken as linear.
 struct ContactGeometry {
   std::shared_ptr<const ContactSpheres> spheres;  ///< null: the link has no volume
-  std::size_t sphere_count = 0;
+  std::size_t sphere_count = 0;                   ///< spheres of the packing
   double volume = 0.0;         ///< [m^3] of the link: spheres, and voids by counting on a grid
   double packed_volume = 0.0;  ///< [m^3] of the spheres
-  bool from_cache = false;
-  double time = 0.0;  ///< [s] that building it took
-  std::string note;   ///< a sentence for users; empty: nothing to say
+  bool from_cache = false;     ///< the packings were read from the cache
+  double time = 0.0;           ///< [s] that building it took
+  std::string note;            ///< a sentence for users; empty: nothing to say
 
+  /// Whether there are spheres to sum over.
   bool has_volume() const { return spheres != nullptr; }
 };
 

@@ -19,6 +19,8 @@ struct ContactVolume {
   Eigen::Vector3d weighted_moment = Eigen::Vector3d::Zero();  ///< [m^4] sum of p x V n
   std::size_t spheres = 0;  ///< spheres of the obstacle that share volume with the link
 
+  /// Adds `weight` times the other's volume, normal and moment, and its number of spheres.
+  /// @param other  in the same frame, about the same point
   void add(const ContactVolume& other, double weight);
 };
 

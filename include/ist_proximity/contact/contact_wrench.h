@@ -19,8 +19,10 @@ struct Wrench {
   Eigen::Vector3d force;   ///< [N]
   Eigen::Vector3d torque;  ///< [N m]
 
+  /// No force and no torque.
   static Wrench zero() { return {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}; }
   static Wrench unknown();  ///< NaN
+  /// @param other  in the same frame, about the same point
   Wrench& operator+=(const Wrench& other);
 };
 

@@ -9,6 +9,7 @@ namespace ist {
 /// has and what to do. Thrown while a model is loaded, never by a query.
 class ModelError : public std::runtime_error {
  public:
+  /// @param message  one or more sentences for the user
   explicit ModelError(const std::string& message) : std::runtime_error(message) {}
 };
 

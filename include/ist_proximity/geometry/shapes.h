@@ -15,11 +15,13 @@ namespace ist {
 /// from outside. The mesh need not be closed, manifold or consistently oriented: its inside is
 /// where its generalized winding number exceeds 0.5.
 struct TriangleMesh {
+  /// Indices of the corners in `vertices`.
   using Triangle = std::array<std::uint32_t, 3>;
 
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<Triangle> triangles;
+  std::vector<Eigen::Vector3d> vertices;  ///< [m] in M
+  std::vector<Triangle> triangles;        ///< each names three vertices
 
+  /// Corner k (0, 1 or 2) of a triangle [m] in M.
   const Eigen::Vector3d& corner(std::size_t triangle, int k) const {
     return vertices[triangles[triangle][static_cast<std::size_t>(k)]];
   }
@@ -41,12 +43,13 @@ struct Sphere {
   double radius;  ///< [m] > 0
 };
 
+/// The shape of a geometry element, in the element's frame E.
 using Shape = std::variant<Box, Cylinder, Sphere, TriangleMesh>;
 
 /// One collision (or visual) element of a link. The shape is exactly what the URDF states: a
 /// cylinder is a cylinder, not its tessellation.
 struct GeometryElement {
-  Shape shape;
+  Shape shape;                                             ///< in E
   Eigen::Isometry3d X_LE = Eigen::Isometry3d::Identity();  ///< element frame E -> link frame L
   std::string source;  ///< for messages: the mesh's URI, or "box", "cylinder", "sphere"
 };

@@ -32,6 +32,7 @@ struct SolidElement;
 class Solid {
  public:
   Solid() = default;
+  /// The union of the elements of a link. Builds a hierarchy for each mesh.
   explicit Solid(const LinkGeometry& geometry);
 
   /// Signed distance of a point.
@@ -46,6 +47,7 @@ class Solid {
   /// in the holes too, not at its surface alone.
   bool is_closed() const;
 
+  /// Whether it has no elements.
   bool empty() const;
   /// Triangles of all meshes; primitives have none.
   std::size_t triangle_count() const;

@@ -16,9 +16,11 @@ namespace ist {
 template <typename T>
 class Span {
  public:
+  /// The elements' type, without const.
   using value_type = std::remove_cv_t<T>;
 
   Span() = default;
+  /// The `size` elements that begin at `data`.
   Span(T* data, std::size_t size) : data_(data), size_(size) {}
   /// The elements of a vector or an array; not of vector<bool>, which has none.
   template <typename Container, typename = std::enable_if_t<std::is_convertible_v<
@@ -29,6 +31,7 @@ class Span {
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Winit-list-lifetime"  // documented above
 #endif
+  /// The elements of a braced list; valid until the end of the call that the list is written in.
   template <typename U = T, typename = std::enable_if_t<std::is_const_v<U>>>
   Span(std::initializer_list<value_type> list)  // NOLINT(google-explicit-constructor): as std::span
       : data_(list.begin()), size_(list.size()) {}
@@ -36,11 +39,12 @@ class Span {
 #pragma GCC diagnostic pop
 #endif
 
-  T* data() const { return data_; }
-  std::size_t size() const { return size_; }
-  bool empty() const { return size_ == 0; }
-  T* begin() const { return data_; }
-  T* end() const { return data_ + size_; }
+  T* data() const { return data_; }           ///< the first element; may be null when empty
+  std::size_t size() const { return size_; }  ///< elements
+  bool empty() const { return size_ == 0; }   ///< whether there are no elements
+  T* begin() const { return data_; }          ///< iterator at the first element
+  T* end() const { return data_ + size_; }    ///< iterator past the last element
+  /// Element i < size().
   T& operator[](std::size_t i) const {
     assert(i < size_);
     return data_[i];

@@ -26,6 +26,7 @@ struct PackingConfig {
   /// Spheres per link, >= 1. A packing that reaches this number first is valid, with a larger
   /// error.
   int max_spheres = 20000;
+  /// Which spheres are chosen, and in which order.
   PackingOrder order = PackingOrder::kMedial;
 };
 
@@ -69,6 +70,7 @@ struct PackingCertificate {
 struct Packing {
   /// In the order of insertion: every prefix is a coarser packing.
   std::vector<InnerSphere> spheres;
+  /// The bounds of this packing.
   PackingCertificate certificate;
 };
 

@@ -26,11 +26,14 @@ struct QueryConfig {
   double relative_tolerance = 0.0;
 };
 
+/// State of knowledge about a distance. UNKNOWN: no pose, no geometry, no cloud, or the deadline
+/// passed before anything was proven. CLEAR: nothing is within max_distance. NEAR: the distance is
+/// from 0 to max_distance. CONTACT: the distance is below 0.
 enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kContact = 3 };
 
 /// Answer for one link; vectors and points in the fixed frame F unless said.
 struct LinkProximity {
-  LinkState state = LinkState::kUnknown;
+  LinkState state = LinkState::kUnknown;  ///< decides which of the other members are valid
   double distance;        ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
   Eigen::Vector3d p_FCl;  ///< [m] witness on the link; NaN unless NEAR or CONTACT
@@ -73,6 +76,7 @@ struct QueryStatistics {
 /// answer promises; poses may jump.
 class ProximityQuery {
  public:
+  /// @param model  shared with the caller; not null
   ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config);
   ~ProximityQuery();
   ProximityQuery(ProximityQuery&&) noexcept;
@@ -101,9 +105,9 @@ class ProximityQuery {
 
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
-  const QueryConfig& config() const;
+  const QueryConfig& config() const;          ///< settings of the next run()
   const QueryStatistics& statistics() const;  ///< of the last run()
-  const RobotModel& model() const;
+  const RobotModel& model() const;            ///< the one given to the constructor
 
  private:
   struct Impl;

@@ -14,12 +14,13 @@ namespace ist {
 
 /// Two links of a model, by index.
 struct LinkPair {
-  std::size_t first, second;
+  std::size_t first;   ///< index in the model
+  std::size_t second;  ///< index in the model
 };
 
 /// The distance of two links; points and vectors in the fixed frame.
 struct PairProximity {
-  LinkState state = LinkState::kUnknown;
+  LinkState state = LinkState::kUnknown;  ///< state of the pair
   double distance;        ///< [m] signed, of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
   Eigen::Vector3d p_FCa;  ///< [m] witness on the first link; NaN unless NEAR or CONTACT
@@ -68,7 +69,7 @@ class SelfQuery {
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
 
-  const std::vector<LinkPair>& pairs() const;
+  const std::vector<LinkPair>& pairs() const;  ///< the ones given to the constructor
 
  private:
   struct Impl;

@@ -30,7 +30,7 @@ struct RepulsiveWrench {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< unit of the gain
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< [that unit * m]
 
-  static RepulsiveWrench unknown();
+  static RepulsiveWrench unknown();  ///< NaN
 };
 
 /// Blended repulsion, continuous in the robot's motion.

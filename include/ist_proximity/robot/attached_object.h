@@ -11,8 +11,8 @@ namespace ist {
 
 /// An object that a link carries, such as a gripped tool: while attached, it is a part of the link.
 struct AttachedObject {
-  std::string name;
-  std::string link;
+  std::string name;         ///< name of the object
+  std::string link;         ///< name of the link that carries it
   GeometryElement element;  ///< its frame E is the object's
 };
 

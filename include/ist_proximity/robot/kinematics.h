@@ -14,13 +14,13 @@ namespace ist {
 /// Poses of all joints' child bodies in their parent bodies, by joint of the kinematics.
 struct JointPoses {
   std::vector<Eigen::Isometry3d> X_PC;  ///< child body -> parent body; valid where known
-  std::vector<bool> known;
+  std::vector<bool> known;              ///< by joint: whether its pose is known
 };
 
 /// Poses of all bodies, by body of the kinematics. LinkPoses (link_poses.h) are by link of a model.
 struct BodyPoses {
   std::vector<Eigen::Isometry3d> X_FB;  ///< body frame -> fixed frame; valid where known
-  std::vector<bool> known;
+  std::vector<bool> known;              ///< by body: whether its pose is known
 };
 
 /// Forward kinematics of a URDF's tree, in double.
@@ -39,15 +39,19 @@ class Kinematics {
   ///         joints that follow one another in a ring, or one that is not there or has no position
   explicit Kinematics(const RobotDescription& description);
 
+  /// A joint between two bodies.
   struct Joint {
-    std::string name;
-    JointType type;
-    std::size_t parent, child;  ///< bodies
-    Eigen::Isometry3d X_PJ;     ///< joint frame J -> parent body
-    Eigen::Vector3d axis;       ///< unit, in J
-    double lower, upper;        ///< [rad, m] limits, may be infinite
-    std::size_t source;         ///< joint whose position moves this one; itself unless it mimics
-    double multiplier, offset;  ///< of the source's position, over the whole chain of mimics
+    std::string name;        ///< name in the URDF
+    JointType type;          ///< kind of the joint
+    std::size_t parent;      ///< index of the parent body
+    std::size_t child;       ///< index of the child body, which the joint moves
+    Eigen::Isometry3d X_PJ;  ///< joint frame J -> parent body
+    Eigen::Vector3d axis;    ///< unit, in J
+    double lower;            ///< [rad, m] limit, may be -inf
+    double upper;            ///< [rad, m] limit, may be +inf
+    std::size_t source;      ///< joint whose position moves this one; itself unless it mimics
+    double multiplier;       ///< factor of the source's position, over the whole chain of mimics
+    double offset;           ///< [rad, m] added to that product
 
     /// Whether it takes a position of its own.
     bool is_free() const;
@@ -61,7 +65,9 @@ class Kinematics {
   const std::vector<std::string>& bodies() const { return bodies_; }
   /// Joint j moves body j + 1.
   const std::vector<Joint>& joints() const { return joints_; }
+  /// @returns the body's index; empty when no body has this name
   std::optional<std::size_t> find_body(const std::string& name) const;
+  /// @returns the joint's index; empty when no joint has this name
   std::optional<std::size_t> find_joint(const std::string& name) const;
 
   /// X_PC of one joint at position q [rad, m] of its own; q is ignored where the joint is fixed.

@@ -14,7 +14,7 @@ namespace ist {
 /// Poses of a robot model's links, by link of the model: what every query takes.
 struct LinkPoses {
   std::vector<Eigen::Isometry3d> X_FL;  ///< link frame -> fixed frame; valid where known
-  std::vector<bool> known;
+  std::vector<bool> known;              ///< by link: whether its pose is known
 };
 
 /// Forward kinematics of a model's links. A link that the URDF lacks, or that is below a joint
@@ -31,6 +31,8 @@ LinkPoses link_poses(const RobotModel& model, const Kinematics& kinematics,
 /// allocates nothing. One object per thread.
 class ForwardKinematics {
  public:
+  /// @param model       read by the constructor only
+  /// @param kinematics  of the description that the model was built from
   ForwardKinematics(const RobotModel& model, std::shared_ptr<const Kinematics> kinematics);
 
   /// @param q, X_FR  as for link_poses()
@@ -44,7 +46,9 @@ class ForwardKinematics {
 
   const LinkPoses& links() const { return links_; }    ///< of the last run()
   const BodyPoses& bodies() const { return bodies_; }  ///< of the last run(), for Jacobians
-  const Kinematics& kinematics() const { return *kinematics_; }
+  const Kinematics& kinematics() const {
+    return *kinematics_;
+  }  ///< the one given to the constructor
 
   /// The body that is a link of the model; none where the URDF lacks the link.
   const std::optional<std::size_t>& body(std::size_t link) const { return body_of_link_[link]; }

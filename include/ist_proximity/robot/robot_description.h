@@ -13,33 +13,37 @@
 
 namespace ist {
 
+/// The kinds of joints of a URDF.
 enum class JointType { kFixed, kRevolute, kContinuous, kPrismatic, kPlanar, kFloating };
 
 /// A joint that follows another: its position is multiplier * (that one's) + offset.
 struct Mimic {
-  std::string joint;
-  double multiplier = 1.0;
-  double offset = 0.0;  ///< [rad, m]
+  std::string joint;        ///< name of the joint that is followed
+  double multiplier = 1.0;  ///< ratio of the two joints' units (1, rad/m or m/rad)
+  double offset = 0.0;      ///< [rad, m]
 };
 
 /// A joint as the URDF states it.
 struct JointDescription {
-  std::string name;
-  JointType type = JointType::kFixed;
-  std::string parent_link, child_link;
+  std::string name;                                        ///< name in the URDF
+  JointType type = JointType::kFixed;                      ///< kind of the joint
+  std::string parent_link;                                 ///< name of the link P
+  std::string child_link;                                  ///< name of the link that it moves
   Eigen::Isometry3d X_PJ = Eigen::Isometry3d::Identity();  ///< joint frame J -> parent link P
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();         ///< in J; any length but 0
-  std::optional<Mimic> mimic;
-  /// [rad, m] infinite where the joint has none
+  std::optional<Mimic> mimic;                              ///< empty: it follows no other joint
+  /// [rad, m] lower limit; -inf where the joint has none
   double lower = -std::numeric_limits<double>::infinity();
+  /// [rad, m] upper limit; +inf where the joint has none
   double upper = std::numeric_limits<double>::infinity();
 };
 
+/// The elements of a URDF that a link's shapes are read from.
 enum class GeometrySource { kCollision, kVisual };
 
 /// A link of the URDF with the exact shapes it is made of.
 struct LinkDescription {
-  std::string name;
+  std::string name;          ///< name in the URDF
   LinkGeometry geometry;     ///< empty when `error` is set
   std::string error;         ///< why there is no geometry: element, file, value, what to do
   std::size_t attached = 0;  ///< how many elements, at the end of `geometry`, are attached objects
@@ -48,12 +52,12 @@ struct LinkDescription {
 
 /// The content of a URDF that the library uses: names and shapes, in the order of the document.
 struct RobotDescription {
-  std::string name;
-  std::string root_link;
-  std::vector<LinkDescription> links;  ///< links that have geometry
-  std::vector<std::string> links_without_geometry;
-  std::vector<std::string> link_order;  ///< every link, with geometry or without
-  std::vector<JointDescription> joints;
+  std::string name;                                 ///< name of the robot
+  std::string root_link;                            ///< the link that is no joint's child
+  std::vector<LinkDescription> links;               ///< links that have geometry
+  std::vector<std::string> links_without_geometry;  ///< names of the other links
+  std::vector<std::string> link_order;              ///< every link, with geometry or without
+  std::vector<JointDescription> joints;             ///< every joint
 };
 
 /// The folder of a ROS package, or an empty string when it is not known.
@@ -66,7 +70,7 @@ PackageFinder environment_package_finder();
 /// Reads a URDF (urdfdom) and the meshes it names (assimp).
 ///
 /// A link whose geometry is faulty stays in `links` with its `error`; the others are read.
-/// @throws ModelError when the text is no URDF: empty, not XML, no <robot>, no link, joints that
+/// @throws ModelError when the text is no URDF: empty, not XML, no `<robot>`, no link, joints that
 ///         form no tree.
 RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
                             const PackageFinder& find_package);

@@ -14,22 +14,23 @@ namespace ist {
 
 /// One monitored link, ready for queries.
 struct LinkModel {
-  std::string name;
-  std::string error;  ///< not empty: no geometry, the link is always UNKNOWN
-  Packing packing;    ///< of the whole link, in the link's frame
-  InnerSphereTree tree;
-  Solid solid;  ///< the exact geometry, for refinement
-  bool from_cache = false;
+  std::string name;           ///< name in the URDF
+  std::string error;          ///< not empty: no geometry, the link is always UNKNOWN
+  Packing packing;            ///< of the whole link, in the link's frame
+  InnerSphereTree tree;       ///< over the spheres of `packing`
+  Solid solid;                ///< the exact geometry, for refinement
+  bool from_cache = false;    ///< the packing was read from the cache
   double packing_time = 0.0;  ///< [s]
 
+  /// Whether queries can answer for the link.
   bool usable() const { return error.empty(); }
 };
 
 /// All monitored links, in URDF order. Immutable once built; share it by pointer.
 struct RobotModel {
-  std::string name;
-  std::string root_link;
-  std::vector<LinkModel> links;
+  std::string name;              ///< the robot's name in the URDF
+  std::string root_link;         ///< name of a link of the URDF, monitored or not
+  std::vector<LinkModel> links;  ///< "by link" and a link's index mean its place here
 };
 
 /// Progress of building the model.
@@ -40,9 +41,10 @@ struct ModelProgress {
   double fraction = 0.0;  ///< of the whole robot, 0 to 1
 };
 
+/// How a robot model is built.
 struct RobotModelConfig {
-  PackingConfig packing;
-  TreeConfig tree;
+  PackingConfig packing;           ///< settings of every link's packing
+  TreeConfig tree;                 ///< settings of every link's tree
   std::string cache_directory;     ///< empty: no cache
   std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
   int threads = 0;                 ///< packing threads; 0: as many as there are cores
@@ -51,9 +53,9 @@ struct RobotModelConfig {
 /// Each of them may be empty. They are called one at a time; `progress` and `cancelled` from
 /// packing threads too, `warning` at the end. Their exceptions come out of build_robot_model.
 struct RobotModelCallbacks {
-  std::function<void(const ModelProgress&)> progress;
-  std::function<void(const std::string&)> warning;
-  std::function<bool()> cancelled;
+  std::function<void(const ModelProgress&)> progress;  ///< called now and then
+  std::function<void(const std::string&)> warning;     ///< takes one message for the user
+  std::function<bool()> cancelled;                     ///< true ends building
 };
 
 /// Packs (or reads from the cache) every monitored link. Links with the same shapes are packed

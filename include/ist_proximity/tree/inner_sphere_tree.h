@@ -24,6 +24,7 @@ enum class TreeSplit {
 
 /// How an Inner Sphere Tree is built. It changes the cost of a query, never its answer.
 struct TreeConfig {
+  /// How spheres are divided among children.
   TreeSplit split = TreeSplit::kNeuralGas;
   /// Magnification control of neural gas, 0 to 1: a sphere is weighted by this power of its volume.
   /// 1 draws prototypes to large spheres, as in the book; 0 weights all spheres alike, which serves
@@ -39,7 +40,9 @@ constexpr int kMaxTreeLevels = 16;
 /// An inner node of the tree: the bounding spheres of its children. Unused slots have so negative a
 /// radius that they are farther than anything.
 struct alignas(32) SphereNode {
-  float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres, link frame
+  float x[kSphereWidth];             ///< [m] centres, link frame
+  float y[kSphereWidth];             ///< [m] centres, link frame
+  float z[kSphereWidth];             ///< [m] centres, link frame
   float radius[kSphereWidth];        ///< [m] encloses all cover spheres below (wrapped hierarchy)
   float max_inner[kSphereWidth];     ///< [m] largest inner radius below: bounds penetration depths
   std::int32_t child[kSphereWidth];  ///< >= 0: inner node; < 0: leaf ~child
@@ -48,10 +51,12 @@ struct alignas(32) SphereNode {
 
 /// A leaf: up to eight spheres.
 struct alignas(32) SphereLeaf {
-  float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres, link frame
-  float inner_radius[kSphereWidth];                         ///< [m] inner radius, rounded down
-  float cover_radius[kSphereWidth];                         ///< [m] cover radius, rounded up
-  std::int32_t count;                                       ///< used slots
+  float x[kSphereWidth];             ///< [m] centres, link frame
+  float y[kSphereWidth];             ///< [m] centres, link frame
+  float z[kSphereWidth];             ///< [m] centres, link frame
+  float inner_radius[kSphereWidth];  ///< [m] inner radius, rounded down
+  float cover_radius[kSphereWidth];  ///< [m] cover radius, rounded up
+  std::int32_t count;                ///< used slots
 };
 
 /// The Inner Sphere Tree (IST) of one link: a flat array of wide nodes, in float, in the link's
@@ -64,15 +69,16 @@ struct alignas(32) SphereLeaf {
 class InnerSphereTree {
  public:
   InnerSphereTree() = default;
+  /// Builds the tree over the spheres of a packing.
   explicit InnerSphereTree(const Packing& packing, const TreeConfig& config = {});
 
-  bool empty() const { return leaves_.empty(); }
-  const std::vector<SphereNode>& nodes() const { return nodes_; }  ///< nodes()[0] is the root
-  const std::vector<SphereLeaf>& leaves() const { return leaves_; }
+  bool empty() const { return leaves_.empty(); }                     ///< whether it has no spheres
+  const std::vector<SphereNode>& nodes() const { return nodes_; }    ///< nodes()[0] is the root
+  const std::vector<SphereLeaf>& leaves() const { return leaves_; }  ///< named by SphereNode::child
 
-  const Eigen::Vector3d& center() const { return center_; }  ///< [m] root sphere, link frame
-  double radius() const { return radius_; }                  ///< [m] of the root sphere
-  std::size_t sphere_count() const { return sphere_count_; }
+  const Eigen::Vector3d& center() const { return center_; }   ///< [m] root sphere, link frame
+  double radius() const { return radius_; }                   ///< [m] of the root sphere
+  std::size_t sphere_count() const { return sphere_count_; }  ///< spheres in all leaves
   /// [m] No point inside the link is farther than this from the cover spheres.
   double interior_gap() const { return interior_gap_; }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "cloud/format/largest_range.h"
 #include "cloud/format/point_reader.h"
 #include "internal/geometry/relative_pose.h"
 

@@ -9,10 +9,6 @@
 
 namespace ist {
 
-/// Farther points are out of range whatever the configuration: no sensor sees as far. Keeps
-/// coordinates far below kFarAway. [m]
-constexpr double kLargestRange = 1e9;
-
 /// The choice of the points of a cloud that are kept, and the frame O of the index that they are
 /// moved to.
 struct CropParameters {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cloud/index/point_bvh_builder.h"
+#include "cloud/filters/point_filter.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/posed_solid.h"
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "cloud/filters/crop.h"
+#include "cloud/format/largest_range.h"
 
 namespace ist {
 namespace {

@@ -4,9 +4,9 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
+#include "cloud/filters/point_filter.h"
 #include "cloud/format/cloud_point.h"
 #include "cloud/index/point_cells.h"
 #include "cloud/index/point_slicer.h"
@@ -15,13 +15,6 @@
 #include "internal/cloud/point_bvh.h"
 
 namespace ist {
-
-/// Returns which points of a tile stay out of the index: bit k for slot k. The box is that of the
-/// tile's points; unused slots of the tile are undefined.
-using PointFilter = std::function<std::uint32_t(const PointTile& tile, const PaddedBox& box)>;
-
-/// Returns whether a PointFilter may drop a point of this box.
-using BoxFilter = std::function<bool(const PaddedBox& box)>;
 
 /// Builds the data of point indices; keeps its working memory, so a steady stream of clouds
 /// allocates nothing. Not thread safe.

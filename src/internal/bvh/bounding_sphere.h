@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// A sphere in the frame of an index.
+/// A sphere in the frame of a hierarchy.
 struct BoundingSphere {
   Eigen::Vector3d center;
   double radius;  ///< [m]

@@ -1,7 +1,7 @@
 // Compiled once per instruction set; the best one there is gets chosen at run time.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "cloud/filters/voxel_kernel.cpp"
-#include "cloud/filters/voxel_kernel.h"
+#define HWY_TARGET_INCLUDE "cloud/thinning/voxel_kernel.cpp"
+#include "cloud/thinning/voxel_kernel.h"
 
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>

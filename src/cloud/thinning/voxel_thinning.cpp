@@ -1,10 +1,10 @@
-#include "cloud/filters/voxel_thinning.h"
+#include "cloud/thinning/voxel_thinning.h"
 
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
-#include "cloud/filters/voxel_kernel.h"
+#include "cloud/thinning/voxel_kernel.h"
 
 namespace ist {
 namespace {
