@@ -191,6 +191,25 @@ TEST(ProximityQuery, WarmStartNeverChangesTheAnswer) {
   }
 }
 
+// The warm start measures a point that touches, at distance 0; another one is inside by less than
+// the tolerance.
+TEST(ProximityQuery, PointInsideIsFoundWhereTheWarmStartTouches) {
+  const auto model = test::make_model({Box{{0.25, 0.25, 0.25}}}, 0.005);
+  QueryConfig config;
+  config.tolerance = 0.005;
+  ProximityQuery query(model, config);
+  const CloudSnapshot cloud = test::make_snapshot({{0.125, 0.0, 0.0}, {0.0, 0.122, 0.0}});
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  X_FL.translation() = Eigen::Vector3d(-0.01, -0.1, 0.0);
+  std::vector<LinkProximity> results;
+  ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+  ASSERT_EQ(results[0].point, 0U);  // the next query measures it first
+  X_FL.translation().setZero();
+  ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+  EXPECT_EQ(results[0].state, LinkState::kContact);
+  EXPECT_EQ(results[0].point, 1U);
+}
+
 TEST(ProximityQuery, SeveralCloudsAreOneObstacle) {
   test::Rng rng(13);
   const auto model = test::make_model({Sphere{0.1}, Box{{0.1, 0.1, 0.1}}}, 0.005);
