@@ -57,12 +57,6 @@ class BoxDepthSearch {
     return link_.context.tree().interior_gap() + 3.0 * search_.rounding;
   }
 
-  // A box that only touches is not decided yet: the search goes on until a point inside is found,
-  // however wide the tolerance.
-  double prune_bound() const {
-    return search_.closest.exact.distance == 0.0 ? 0.0 : search_.prune_bound();
-  }
-
   void give_up() { search_.prune(-link_.context.tree().radius()); }
 
   void push_children(const BoxNode& node) {
@@ -99,7 +93,7 @@ class BoxDepthSearch {
       return refinement_.take_outside(found, id);
     }
     const Cell whole = make_cell(box, id);
-    if (whole.lower_bound >= prune_bound()) return search_.prune(whole.lower_bound);
+    if (whole.lower_bound >= search_.prune_bound()) return search_.prune(whole.lower_bound);
     if (found.distance == 0.0) refinement_.take_overlap(found, id);
     divide(whole, id);
   }
@@ -128,7 +122,7 @@ class BoxDepthSearch {
     while (size > 0) {
       const double distance = search_.closest.exact.distance;
       const double resolved =
-          std::min(prune_bound(), distance - (distance < 0.0 ? kDepthResolution : 0.0));
+          std::min(search_.prune_bound(), distance - (distance < 0.0 ? kDepthResolution : 0.0));
       const Cell cell = heap[0];
       if (cell.lower_bound >= resolved || search_.box_cells_left < 2 ||
           search_.deadline->passed()) {

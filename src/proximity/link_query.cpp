@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "proximity/dual_tree.h"
 #include "proximity/refinement.h"
@@ -74,6 +75,7 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   const DualTreeResult found = search(obstacles);
   if (found.may_be_inside && !found.stopped) search_depth(obstacles, &link_);
   const bool stopped = found.stopped || link_.search.deadline->passed();
+  if (stopped) measure_closest(obstacles);
   // A pair that was left may hold a point inside.
   LinkSearch& search = link_.search;
   if (stopped && search.pruned_bound <= link_.context.tree().interior_gap() + search.rounding) {
@@ -104,6 +106,18 @@ void LinkQuery::measure_again(const PointObstacles& obstacles) {
 
 void LinkQuery::measure_again(const BoxObstacles& obstacles) {
   BoxRefinement(obstacles, &link_).measure(link_.kept.last.id);
+}
+
+// What the stopped search has measured as outside may be inside: it had yet to meet the spheres
+// that hold it.
+template <class Obstacles>
+void LinkQuery::measure_closest(const Obstacles& obstacles) {
+  const ClosestObstacle& closest = link_.search.closest;
+  if (closest.source != obstacles.source ||
+      closest.is_box != std::is_same_v<Obstacles, BoxObstacles>) {
+    return;
+  }
+  Refinement<Obstacles>(obstacles, &link_).measure(closest.id);
 }
 
 // Among points the search finds a first upper bound as soon as another traversal would.

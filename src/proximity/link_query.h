@@ -66,6 +66,8 @@ class LinkQuery {
   void upper_bound(const BoxObstacles& obstacles);
   template <class Obstacles>
   DualTreeResult search(const Obstacles& obstacles);
+  template <class Obstacles>
+  void measure_closest(const Obstacles& obstacles);
   template <class Bvh>
   DualTreeInput<Bvh> dual_tree_input(const PosedIndex<Bvh>& obstacles);
 

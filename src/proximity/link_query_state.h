@@ -99,8 +99,9 @@ struct LinkSearch {
     const double distance = std::min(closest.exact.distance, other_links);
     if (distance > range()) return range();
     const double width = std::max(config.tolerance, config.relative_tolerance * distance);
-    // Whether any point is inside is always decided, however wide the tolerance.
-    return distance > 0.0 ? std::max(distance - width, 0.0) : distance - config.tolerance;
+    // Whether any point is inside is always decided, however wide the tolerance. An obstacle that
+    // only touches, at distance 0, does not decide it.
+    return distance < 0.0 ? distance - config.tolerance : std::max(distance - width, 0.0);
   }
   /// [m] The same for lower bounds in float.
   float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }

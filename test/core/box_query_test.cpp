@@ -419,6 +419,36 @@ TEST(Boxes, PointsAndMapsTogether) {
   EXPECT_EQ(results[0].state, LinkState::kClear);
 }
 
+// An obstacle that only touches, at distance 0, does not decide whether another one is inside.
+TEST(Boxes, PointInsideIsFoundWhereAnotherObstacleTouches) {
+  const Shape cube = Box{{0.25, 0.25, 0.25}};  // numbers that float holds exactly
+  QueryConfig config;
+  config.tolerance = 0.005;
+  const Eigen::Isometry3d X_still = Eigen::Isometry3d::Identity();
+  const CloudSnapshot touching = test::make_map(
+      {{Eigen::Vector3d(0.125, -0.125, -0.125), Eigen::Vector3d(0.375, 0.125, 0.125)}});
+  const CloudSnapshot inside = test::make_snapshot({{0.0, 0.122, 0.0}});
+
+  ProximityQuery one_link(test::make_model({cube}, 0.005), config);
+  std::vector<LinkProximity> results;
+  ASSERT_TRUE(one_link.run({X_still}, {true}, {&touching}, &results));
+  ASSERT_EQ(results[0].distance, 0.0);
+  ASSERT_TRUE(one_link.run({X_still}, {true}, {&touching, &inside}, &results));
+  EXPECT_EQ(results[0].state, LinkState::kContact);
+  EXPECT_LE(results[0].lower_bound, -0.003 + 1e-7);
+
+  // The box touches one link, the point is inside the other.
+  ProximityQuery two_links(test::make_model({cube, cube}, 0.005), config);
+  Eigen::Isometry3d X_moved = X_still;
+  X_moved.translation().x() = -0.5;
+  const CloudSnapshot inside_other = test::make_snapshot({{-0.5, 0.122, 0.0}});
+  RobotProximity robot;
+  ASSERT_TRUE(
+      two_links.run_minimum({X_still, X_moved}, {true, true}, {&touching, &inside_other}, &robot));
+  EXPECT_EQ(robot.link, 1);
+  EXPECT_EQ(robot.nearest.state, LinkState::kContact);
+}
+
 TEST(Boxes, QueriesAllocateNothing) {
   test::Rng rng(37);
   const std::vector<LinkGeometry> links = test::random_links(&rng);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "support/box_oracle.h"
@@ -65,6 +66,23 @@ TEST(BvttFront, DisplacementsAddUpUntilItIsDiscarded) {
   front.end(true);
   front.begin(8, at(0.2), bound, 0.0F);
   EXPECT_TRUE(front.empty()) << "from no pose";
+}
+
+// A bound that a traversal with the one rounding has stored and a traversal with another one reads:
+// less the reader's rounding, it is not above what it was less the writer's and the displacement.
+TEST(BvttFront, BoundsLoseTheRoundingOfTheirTraversal) {
+  const auto model = test::make_model({shapes()[0]}, 0.01);
+  const DisplacementBound bound(model->links[0]);
+  for (const auto& [written, read] : {std::pair(1e-3F, 1e-5F), std::pair(1e-5F, 1e-3F)}) {
+    BvttFront front;
+    front.begin(7, at(0.0), bound, written);
+    front.prune(front.add(0, 0), 0.5F);
+    front.end(true);
+    front.begin(7, at(0.02), bound, read);
+    const float later = front.stored_bounds()[0] - front.offset();
+    EXPECT_LE(later - read, 0.5F - written - 0.02F + 1e-6F);
+    EXPECT_NEAR(later - read, 0.5F - written - 0.02F, 2e-6F);
+  }
 }
 
 TEST(BvttFront, IsDiscardedWhenItHasGrown) {

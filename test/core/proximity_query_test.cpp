@@ -191,6 +191,25 @@ TEST(ProximityQuery, WarmStartNeverChangesTheAnswer) {
   }
 }
 
+// The warm start measures a point that touches, at distance 0; another one is inside by less than
+// the tolerance.
+TEST(ProximityQuery, PointInsideIsFoundWhereTheWarmStartTouches) {
+  const auto model = test::make_model({Box{{0.25, 0.25, 0.25}}}, 0.005);
+  QueryConfig config;
+  config.tolerance = 0.005;
+  ProximityQuery query(model, config);
+  const CloudSnapshot cloud = test::make_snapshot({{0.125, 0.0, 0.0}, {0.0, 0.122, 0.0}});
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  X_FL.translation() = Eigen::Vector3d(-0.01, -0.1, 0.0);
+  std::vector<LinkProximity> results;
+  ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+  ASSERT_EQ(results[0].point, 0U);  // the next query measures it first
+  X_FL.translation().setZero();
+  ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+  EXPECT_EQ(results[0].state, LinkState::kContact);
+  EXPECT_EQ(results[0].point, 1U);
+}
+
 TEST(ProximityQuery, SeveralCloudsAreOneObstacle) {
   test::Rng rng(13);
   const auto model = test::make_model({Sphere{0.1}, Box{{0.1, 0.1, 0.1}}}, 0.005);
@@ -281,6 +300,59 @@ TEST(ProximityQuery, BoundsHoldWheneverTheDeadlinePasses) {
     }
   }
   EXPECT_GT(unfinished, test::scaled(20));
+}
+
+// The deadline passes in a cloud that is far and slow to search, since all of its points are
+// equally near; the cloud after it is nearer.
+TEST(ProximityQuery, BoundsHoldForCloudsThatADeadlineLeftUnsearched) {
+  test::Rng rng(142);
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  std::vector<Eigen::Vector3d> shell_F;
+  for (int i = 0; i < 20000; ++i) {
+    shell_F.push_back(0.6 * test::random_vector(&rng, 1.0).normalized());
+  }
+  const CloudSnapshot shell = test::make_snapshot(shell_F);
+  const CloudSnapshot near = test::make_snapshot({{0.2, 0.0, 0.0}});
+  std::vector<LinkProximity> results;
+  int late = 0;
+  for (int i = 0; i < test::scaled(200); ++i) {
+    QueryConfig config;
+    config.tolerance = 0.0;
+    config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 3.0));
+    ProximityQuery query(model, config);
+    if (query.run({Eigen::Isometry3d::Identity()}, {true}, {&shell, &near}, &results)) continue;
+    if (results[0].state == LinkState::kUnknown) continue;
+    ASSERT_LE(results[0].lower_bound, 0.1 + 1e-7);
+    ++late;
+  }
+  EXPECT_GT(late, test::kSanitized ? -1 : 20);
+}
+
+// Whatever a deadline leaves unmeasured, the point of an answer is on the side that the state says.
+TEST(ProximityQuery, LateAnswersSayOnWhichSideTheirPointIs) {
+  test::Rng rng(141);
+  const TriangleMesh mesh = test::torus(0.1, 0.03, 24, 12);
+  const auto model = test::make_model({Shape(mesh)}, 0.003);
+  std::vector<LinkProximity> results;
+  int contacts = 0;
+  for (int i = 0; i < test::scaled(500); ++i) {
+    std::vector<Eigen::Vector3d> inside_F;
+    for (int k = 0; k < 300; ++k) {
+      const double angle = test::uniform(&rng, 0.0, 2.0 * EIGEN_PI);
+      inside_F.push_back(0.1 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0) +
+                         test::random_vector(&rng, 0.015));
+    }
+    const CloudSnapshot cloud = test::make_snapshot(inside_F);
+    QueryConfig config;
+    config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 2.0));
+    ProximityQuery query(model, config);
+    query.run({Eigen::Isometry3d::Identity()}, {true}, {&cloud}, &results);
+    if (results[0].state == LinkState::kUnknown) continue;
+    ASSERT_EQ(results[0].state, LinkState::kContact) << results[0].distance;
+    ASSERT_LE(results[0].lower_bound, results[0].distance);
+    ++contacts;
+  }
+  EXPECT_GT(contacts, test::kSanitized ? -1 : 100);
 }
 
 TEST(ProximityQuery, FarFromTheOriginNothingIsLost) {
