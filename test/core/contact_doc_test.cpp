@@ -251,7 +251,7 @@ TEST(ContactDocument, ForcesDoNotJump) {
   rows["one point through a sphere, concentric"] = jumps(cloud(big, point), -0.12, 0.12);
   rows["one point through a box"] = jumps(cloud(box, point), -0.12, 0.12);
   rows["filled cloud through a box"] = jumps(cloud(box, block), -0.15, 0.15);
-  check("jumps", "| way | force [%] | torque [%] |", rows);
+  check("jumps", "| path | force [%] | torque [%] |", rows);
 }
 
 }  // namespace
