@@ -140,7 +140,7 @@ TEST_F(CloudLayoutTest, duplicateNames) {
   expect_fault({"'y'", "2 times"});
 }
 
-TEST_F(CloudLayoutTest, otherFieldsAreNotLookedAt) {
+TEST_F(CloudLayoutTest, otherFieldsAreIgnored) {
   layout_.fields[3] = {"rgb", 1000, 77, 0};
   layout_.fields.push_back({"rgb", 1000, 77, 0});
   layout_.fields.push_back({"", 0, 0, 0});

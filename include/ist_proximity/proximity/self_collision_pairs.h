@@ -12,7 +12,7 @@ namespace ist {
 
 using NamePairs = std::vector<std::pair<std::string, std::string>>;
 
-/// Pairs of usable links that may collide: all except adjacent links (parent and child, with only
+/// Pairs of usable links that may collide: all except adjacent links (parent and child, also with
 /// links without geometry between them), links that never move relative to each other, and those
 /// that `ignored` names.
 /// @param wanted   by link of the model: a pair needs two
