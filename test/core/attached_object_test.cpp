@@ -69,7 +69,7 @@ void expect_equal(const RobotModel& a, const RobotModel& b) {
   }
 }
 
-TEST(AttachedObject, rebuildingOneLinkGivesWhatBuildingAllWould) {
+TEST(AttachedObject, rebuildingOneLinkEqualsBuildingAll) {
   const auto bare = build_robot_model(robot(), config());
   for (const char* name : {"arm", "flange", "finger"}) {
     const RobotDescription carrying = with_objects(robot(), {sphere_on(name)});

@@ -168,7 +168,7 @@ TEST_F(DodgeController, KeepsLimitsAndIsContinuous) {
     for (std::size_t j = 0; j < arm.joints.size(); ++j) {
       const auto& joint = arm.kinematics.joints()[arm.joints[j]];
       const double v = dq[static_cast<Eigen::Index>(j)];
-      // The method converges to the limits; 2 % are left after its sweeps.
+      // The method converges to the limits; an error of 2 % remains after its sweeps.
       EXPECT_LE(std::abs(v), 1.02 * config.max_joint_speed);
       EXPECT_LE(v, config.limit_gain * (joint.upper - positions[j]) + 0.02);
       EXPECT_GE(v, -config.limit_gain * (positions[j] - joint.lower) - 0.02);

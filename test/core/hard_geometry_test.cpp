@@ -95,7 +95,7 @@ TEST(HardGeometry, ClosestPointOnThinMeshes) {
   }
 }
 
-// Regression: the solid angle of a sliver, seen from nearer than its width, is a small difference
+// Regression: the solid angle of a sliver, at a distance below its width, is a small difference
 // of large float products. Its sign was random, so that points up to 4e-6 m outside a needle 0.3 m
 // long and 1e-5 m thick counted as inside.
 TEST(HardGeometry, InsideOfThinMeshes) {

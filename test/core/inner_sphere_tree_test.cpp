@@ -98,7 +98,7 @@ struct LeafSphere {
   double inner_radius, cover_radius;
 };
 
-// Collects all spheres below a child and checks the nodes on the way.
+// Collects all spheres in a child's subtree and checks its nodes.
 class Walk {
  public:
   explicit Walk(const InnerSphereTree& tree) : tree_(tree) {}

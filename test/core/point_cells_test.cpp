@@ -159,7 +159,7 @@ TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
       Eigen::Index axis;
       const float longest = box.sizes().maxCoeff(&axis);
       if (!slicer.sort(cloud.data(), n, sorted.data())) {
-        EXPECT_LT(longest, 1e-36F) << "these can be told from each other";
+        EXPECT_LT(longest, 1e-36F) << "these points can be distinguished";
         continue;
       }
       std::set<std::uint32_t> ids;

@@ -55,7 +55,7 @@ TEST(RepulsionFilter, spreadsChangesByANewCloud) {
     delay += (1.0 - done) * kStep;
     last = done;
   }
-  EXPECT_NEAR(delay, config.filter_time, kStep) << "the mean delay is what the parameter says";
+  EXPECT_NEAR(delay, config.filter_time, kStep) << "the mean delay is filter_time";
 }
 
 // Each update has a new cloud, and more than the filter's time is between them: the delay does not

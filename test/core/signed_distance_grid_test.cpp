@@ -65,7 +65,7 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
 
 // A sample is the same before and after its cell is measured. A point that is not finite has no
 // cell.
-TEST(SignedDistanceGrid, HoldsOnlyWhatWasMeasured) {
+TEST(SignedDistanceGrid, HoldsOnlyMeasuredCells) {
   const test::Trial trial(shapes(), 0.005);
   const LinkModel& link = trial.model().links[2];
   SignedDistanceGrid grid(link);

@@ -60,7 +60,7 @@ TEST(RayShape, AlongTheAxes) {
 }
 
 // Every point lies on the robot or an obstacle as they were at the stamp, if there is no noise.
-TEST(Simulation, PointsLieOnWhatTheCameraSees) {
+TEST(Simulation, PointsLieOnTheRobotOrAnObstacle) {
   const RobotDescription robot = test::demo_robot();
   std::vector<DepthCameraConfig> cameras = demo_cameras();
   for (DepthCameraConfig& camera : cameras) camera.noise = 0.0;

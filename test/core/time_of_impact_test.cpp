@@ -92,7 +92,7 @@ TEST(TimeOfImpact, handComputed) {
   EXPECT_TRUE(impact[0].converged);
   EXPECT_LT(impact[0].steps, 100);
 
-  // With a margin, the time is earlier by the margin.
+  // A margin makes the time earlier.
   config.margin = 0.02;
   impacts = TimeOfImpact(model, kinematics, config);
   EXPECT_NEAR(run({&cloud}), (EIGEN_PI / 2.0 - 2.0 * std::asin(0.06)) / 0.5, 1e-4);
