@@ -85,7 +85,7 @@ struct TimeOfImpact::Impl {
   QueryConfig config;
   ProximityQuery query;
 
-  // Scratch of one call.
+  // Buffers of one call.
   std::vector<bool> moving;  // by link: the one that is being advanced
   JointPoses moved;
   std::vector<LinkProximity> answers;
