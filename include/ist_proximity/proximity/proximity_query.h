@@ -25,11 +25,13 @@ struct QueryConfig {
   double relative_tolerance = 0.0;
 };
 
+/// The state of an answer: not known, nothing within max_distance, apart, or points inside the
+/// link.
 enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kContact = 3 };
 
 /// Answer for one link; vectors and points in the fixed frame F unless said.
 struct LinkProximity {
-  LinkState state = LinkState::kUnknown;
+  LinkState state = LinkState::kUnknown;  ///< says which of the other members hold a value
   double distance;        ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
   Eigen::Vector3d p_FCl;  ///< [m] closest point on the link; NaN unless NEAR or CONTACT
@@ -73,6 +75,7 @@ struct QueryStatistics {
 /// may jump.
 class ProximityQuery {
  public:
+  /// Allocates all memory that queries need.
   ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config);
   ~ProximityQuery();
   ProximityQuery(ProximityQuery&&) noexcept;
@@ -101,9 +104,9 @@ class ProximityQuery {
 
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
-  const QueryConfig& config() const;
+  const QueryConfig& config() const;          ///< of the next run()
   const QueryStatistics& statistics() const;  ///< of the last run()
-  const RobotModel& model() const;
+  const RobotModel& model() const;            ///< whose links are queried
 
  private:
   struct Impl;

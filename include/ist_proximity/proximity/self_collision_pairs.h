@@ -10,6 +10,7 @@
 
 namespace ist {
 
+/// Pairs of names of links.
 using NamePairs = std::vector<std::pair<std::string, std::string>>;
 
 /// Pairs of usable links that may collide: all except adjacent links (parent and child, also with
@@ -28,7 +29,7 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
                                          const Kinematics& kinematics,
                                          const std::vector<LinkPair>& pairs);
 
-/// Reads the <disable_collisions> elements of an SRDF.
+/// Reads the `disable_collisions` elements of an SRDF.
 /// @throws ModelError when the text is no SRDF
 NamePairs disabled_collisions(const std::string& srdf_xml);
 

@@ -14,12 +14,13 @@ namespace ist {
 
 /// Two links of a model, by index.
 struct LinkPair {
-  std::size_t first, second;
+  std::size_t first;   ///< index in the model
+  std::size_t second;  ///< index in the model
 };
 
 /// The distance of two links; points and vectors in the fixed frame.
 struct PairProximity {
-  LinkState state = LinkState::kUnknown;
+  LinkState state = LinkState::kUnknown;  ///< says which of the other members hold a value
   double distance;        ///< [m] signed, of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
   Eigen::Vector3d p_FCa;  ///< [m] witness on the first link; NaN unless NEAR or CONTACT
@@ -69,7 +70,7 @@ class SelfQuery {
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
 
-  const std::vector<LinkPair>& pairs() const;
+  const std::vector<LinkPair>& pairs() const;  ///< in the order of the results
 
  private:
   struct Impl;

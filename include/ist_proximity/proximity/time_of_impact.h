@@ -15,9 +15,11 @@ namespace ist {
 
 /// A straight motion in joint space at constant speeds.
 struct JointMotion {
-  std::vector<double> from, to;  ///< [rad, m] by joint of the kinematics, read for free joints; NaN
-                                 ///< in both: it stands still
-  double duration = 1.0;         ///< [s] > 0
+  /// [rad, m] at the start, by joint of the kinematics, read for free joints. A joint that is NaN
+  /// in `from` and `to` stands still.
+  std::vector<double> from;
+  std::vector<double> to;  ///< [rad, m] at the end, as `from`
+  double duration = 1.0;   ///< [s] > 0
 };
 
 /// When a link first touches an obstacle.
@@ -57,6 +59,7 @@ class TimeOfImpact {
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
            const std::vector<bool>& wanted, SnapshotSpan clouds, std::vector<ImpactTime>* results);
 
+  /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
 
  private:
