@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
   }
   std::string table =
       "| motions of | motions | with contact | later than true | no more than 5 ms early [%] | "
-      "contact told where there is none | early, median / p99 / largest [ms] | queries | time "
+      "contact reported where there is none | early, median / p99 / largest [ms] | queries | time "
       "[ms] |\n|---|---|---|---|---|---|---|---|---|\n";
   table += measure_primitives().row("random arms of primitives");
   if (const auto data = ist::test::data_dir()) {

@@ -20,19 +20,19 @@ namespace ist {
 /// farther than a h + b h^2 / 2, with a the speed at the start and b the growth of that speed.
 class MotionBound {
  public:
-  /// @param center, radius  [m] of a bounding sphere, in the body's frame
+  /// @param center, radius  [m] the body's bounding sphere, in the body's frame
   MotionBound(const Kinematics& kinematics, const JointMotion& motion, const JointPoses& still,
               std::size_t body, const Eigen::Vector3d& center, double radius);
 
-  /// [s] during which no point of the body moves farther than `distance` [m]; +inf when it stands
-  /// still.
+  /// The time [s] during which no point of the body moves farther than `distance` [m]; +inf when
+  /// the body stands still.
   /// @param X_FB  by body, now
   double time_for(double distance, Span<const Eigen::Isometry3d> X_FB) const;
 
  private:
   struct Mover {
     std::size_t child;     ///< body
-    bool turns;            ///< or slides
+    bool turns;            ///< false: the joint slides
     Eigen::Vector3d axis;  ///< unit, in the child body's frame
     double speed;          ///< [rad/s, m/s] >= 0
   };

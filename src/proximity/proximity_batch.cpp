@@ -10,7 +10,7 @@
 namespace ist {
 namespace {
 
-// Consecutive configurations that a thread takes at a time; all but the first start warm.
+// Consecutive configurations that a thread takes at a time; all but the first have a warm start.
 constexpr std::size_t kChunk = 8;
 
 }  // namespace
@@ -42,7 +42,7 @@ struct ProximityBatch::Impl {
     try {
       while (others.size() + 1 < useful) others.emplace_back(work, &workers[others.size() + 1]);
     } catch (const std::system_error&) {
-      // The system has no more threads; fewer do the same.
+      // The system has no more threads; those that run answer all configurations.
     }
     work(&workers[0]);
     for (std::thread& other : others) other.join();
@@ -54,7 +54,7 @@ struct ProximityBatch::Impl {
     std::copy_n(X_FL.begin() + k * links, links, worker->X_FL.begin());
   }
 
-  /// How many configurations there are.
+  /// The number of configurations.
   std::size_t count(Span<const Eigen::Isometry3d> X_FL) const {
     assert(links == 0 ? X_FL.empty() : X_FL.size() % links == 0);
     return links == 0 ? 0 : X_FL.size() / links;

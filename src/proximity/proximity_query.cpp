@@ -38,7 +38,7 @@ struct ProximityQuery::Impl {
   QueryConfig config;
   std::vector<LinkQuery> links;
   SceneTracker scene;
-  std::size_t last_nearest = 0;  // link
+  std::size_t last_nearest = 0;  // link that the last run_minimum() found
   QueryStatistics statistics;
 };
 
@@ -56,7 +56,8 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   impl_->statistics = {};
   Deadline deadline(impl_->config.deadline);
   const SceneId scene = impl_->scene.identify(clouds);
-  // All warm starts before the first descent: should the deadline pass, every link has an answer.
+  // All warm starts precede the first traversal, so that every link has an answer if the deadline
+  // passes.
   for (std::size_t i = 0; i < count; ++i) {
     if (impl_->can_query(i, known, !clouds.empty())) {
       impl_->links[i].begin(X_FL[i], scene, impl_->config, kInfinity, &impl_->statistics);
@@ -88,7 +89,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   double nearest = kInfinity, proven = kInfinity;
   std::size_t best = count;
   bool complete = true, all_in_regions = true;
-  // Begins with the link that was nearest last time: its bound rules most of the others out.
+  // The link that was nearest last time comes first: its upper bound prunes most of the others.
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = k == 0 ? first : k <= first ? k - 1 : k;
@@ -146,7 +147,7 @@ const RobotModel& ProximityQuery::model() const { return *impl_->model; }
 
 bool is_rigid(const Eigen::Isometry3d& X, double tolerance) {
   const Eigen::Matrix3d error = X.linear().transpose() * X.linear() - Eigen::Matrix3d::Identity();
-  // Written so that NaN fails.
+  // The comparisons are false for NaN.
   return error.cwiseAbs().maxCoeff() <= tolerance && X.linear().determinant() > 0.0 &&
          X.translation().allFinite();
 }

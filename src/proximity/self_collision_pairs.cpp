@@ -22,8 +22,8 @@ std::vector<std::size_t> path(const Kinematics& kinematics, std::size_t a, std::
   return joints;
 }
 
-/// Whether two bodies are rigidly connected, or adjacent: one carries the other, with no body that
-/// has geometry between them.
+/// Whether two bodies are rigidly connected, or adjacent: one is an ancestor of the other, with no
+/// body that has geometry between them.
 bool never_collide(const Kinematics& kinematics, const std::vector<bool>& has_geometry,
                    std::size_t a, std::size_t b) {
   bool is_rigid = true, is_ancestor = false;
@@ -85,7 +85,8 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   for (const auto& joint : joints) q.push_back(std::clamp(0.0, joint.lower, joint.upper));
   JointPoses poses;
   kinematics.place_joints(q, &poses);
-  // A planar or floating joint has no rest: the bodies that it carries are a group of their own.
+  // A planar or floating joint has no rest position, so the bodies below it are a group of their
+  // own.
   std::vector<std::size_t> group_of_body = {0};
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const bool starts_group = joints[j].has_unstated_pose();

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kTouch = 1e-6;  // [m] a bound below it is contact
 constexpr int kMaxSteps = 4000;
-// Tolerance of the next distance: a share of the last bound, and at first in [m].
+// Tolerance of the next distance: as a ratio to the last bound, and in [m] at the first step.
 constexpr double kRelativeTolerance = 0.1, kFirstTolerance = 0.01;
 
 }  // namespace
@@ -85,7 +85,7 @@ struct TimeOfImpact::Impl {
   QueryConfig config;
   ProximityQuery query;
 
-  // Scratch of one call.
+  // Buffers of one call.
   std::vector<bool> moving;  // by link: the one that is being advanced
   JointPoses moved;
   std::vector<LinkProximity> answers;

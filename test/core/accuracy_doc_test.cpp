@@ -1,5 +1,5 @@
-// doc/accuracy.md states limits of every mode's error and of every hard case. This measures them
-// again: what is measured must stay below what is stated, and every row must be known here.
+// doc/accuracy.md states limits of every mode's error and of every hard case. This test measures
+// the errors again: they must stay below the limits, and it must measure every row.
 //
 // IST_PROXIMITY_UPDATE_DOC=1 writes the tables, with the 2 mm packing of the robot as well.
 
@@ -23,7 +23,7 @@ namespace {
 const std::string kDocument = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/accuracy.md";
 constexpr double kTolerances[] = {0.001, 0.0, 0.005};
 constexpr double kMillimetre = 1e-3;
-constexpr double kRounding = 2e-8;       // [m] float, where it tells sides
+constexpr double kRounding = 2e-8;       // [m] of float, which decides about sides of a surface
 constexpr double kTruthRounding = 1e-6;  // [m] poses and points of the data are float32
 
 bool updating() { return std::getenv("IST_PROXIMITY_UPDATE_DOC") != nullptr; }
@@ -61,7 +61,7 @@ void measure_synthetic(Measured* measured) {
   }
 }
 
-// Cases without contact; the depth in contact has a test of its own (contact_depth_test).
+// Measures the cases without contact; contact_depth_test measures depths.
 void measure_cases(const std::vector<test::TruthCase>& cases, const CloudSnapshot& cloud,
                    const QueryConfig& config, ProximityQuery* query, test::Accuracy* row) {
   const std::vector<bool> known(test::kPandaLinks, true);
@@ -115,7 +115,7 @@ void measure_hard_cases(Measured* exact, Measured* coarse) {
         for (std::size_t i = 0; i < results.size(); ++i) {
           const double truth =
               test::oracle_minimum(scene.links[i], X_FL, test::stored_points(cloud.index));
-          // Beside max_distance, CLEAR is right for what is beyond by less than rounding tells.
+          // Within the rounding error of max_distance, CLEAR and NEAR are both right.
           Measured& table = tolerance > 0.0 ? *coarse : *exact;
           table[scene.name].add(results[i], truth, config.max_distance, kRounding);
         }
@@ -161,8 +161,8 @@ void write_table(const std::string& name, const std::string& table) {
   std::ofstream(kDocument) << text;
 }
 
-// Measured values against what a row states, from its column `from` on. They are of the packing as
-// it is without sanitizers.
+// Compares measured values with a row's limits, from its column `from` on. The limits are for the
+// packing that is made without sanitizers.
 void expect_below(const std::vector<std::string>& row, std::size_t from,
                   const std::vector<double>& values) {
   ASSERT_EQ(row.size(), from + values.size());

@@ -21,7 +21,7 @@ LinkDescription link(const std::string& name, const Shape& shape) {
   return result;
 }
 
-// "arm", a link "flange" without geometry, "finger", and a faulty one.
+// A robot of an "arm", a link "flange" without geometry, a "finger" and a faulty link.
 RobotDescription robot() {
   RobotDescription result;
   result.name = "robot";
@@ -69,14 +69,14 @@ void expect_equal(const RobotModel& a, const RobotModel& b) {
   }
 }
 
-TEST(AttachedObject, rebuildingOneLinkGivesWhatBuildingAllWould) {
+TEST(AttachedObject, rebuildingOneLinkEqualsBuildingAll) {
   const auto bare = build_robot_model(robot(), config());
   for (const char* name : {"arm", "flange", "finger"}) {
     const RobotDescription carrying = with_objects(robot(), {sphere_on(name)});
     const auto whole = build_robot_model(carrying, config());
     const auto rebuilt = rebuild_link(*bare, carrying, name, config());
     expect_equal(*rebuilt, *whole);
-    // And back.
+    // Detaching restores the model.
     expect_equal(*rebuild_link(*rebuilt, robot(), name, config()), *bare);
   }
 }
@@ -100,7 +100,7 @@ TEST(AttachedObject, isPartOfItsLink) {
 TEST(AttachedObject, doesNotTakeSpheresFromItsLink) {
   const auto bare = build_robot_model(robot(), config());
   const auto carrying = build_robot_model(with_objects(robot(), {sphere_on("arm")}), config());
-  // The sphere is one sphere; the arm's stay as many as they were.
+  // The attached sphere needs one inner sphere; the arm keeps its number of spheres.
   EXPECT_EQ(carrying->links[0].packing.spheres.size(), bare->links[0].packing.spheres.size() + 1);
 }
 

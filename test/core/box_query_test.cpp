@@ -74,8 +74,8 @@ TEST(BoxDistance, TrianglesOfEveryKind) {
   EXPECT_GT(apart, test::scaled(1000));
 }
 
-// The cylinder's own oracle: distance to a solid cylinder is convex, so nested golden sections over
-// the box find its minimum.
+// An oracle for cylinders: the distance to a solid cylinder is convex, so nested golden-section
+// searches over the box find its minimum.
 double minimum_over_box(const Solid& solid, const Eigen::Isometry3d& X_LO,
                         const Eigen::AlignedBox3d& box) {
   const auto value = [&](const Eigen::Vector3d& p) {
@@ -237,7 +237,7 @@ TEST_P(Boxes, AgainstOracle) {
     const std::vector<Eigen::AlignedBox3d> boxes =
         random_leaves(&rng, 1 + scene % 25, 0.5, 0.02, 4);
     const CloudSnapshot map = test::make_map(boxes, test::random_pose(&rng, 0.3));
-    for (int step = 0; step < 4; ++step) {  // later steps start warm
+    for (int step = 0; step < 4; ++step) {  // later steps have a warm start
       for (Eigen::Isometry3d& X : X_FL) {
         X = step == 0 ? test::random_pose(&rng, 0.4)
                       : Eigen::Isometry3d(X * test::random_pose(&rng, 0.01));
@@ -317,8 +317,8 @@ TEST(Boxes, EveryKindOfLink) {
       ASSERT_NEAR(solids[i].signed_distance(X_FL[i].inverse() * result.p_FCo).distance,
                   result.distance, 1e-7);
       for (const Eigen::AlignedBox3d& box : boxes) {
-        // With holes, a box that touches nothing is outside as a whole, also where the winding
-        // number of some of its points says otherwise.
+        // For a mesh with holes, a box that touches no triangle is inside or outside as a whole.
+        // The winding number at its centre decides, whatever it is at other points.
         const bool is_outside =
             !solids[i].is_closed() &&
             distance_to_box(solids[i], box, X_LM.inverse(), kInfinity).distance > 0.0 &&
@@ -411,7 +411,7 @@ TEST(Boxes, PointsAndMapsTogether) {
   EXPECT_NEAR(results[0].distance, 0.2, 1e-6);
   EXPECT_EQ(results[0].source, 1);
   EXPECT_LT((results[0].direction + Eigen::Vector3d::UnitY()).norm(), 1e-6);
-  // Another map in its place: the warm start must not take the box that is gone.
+  // Another map replaces the first one: the warm start must not use a box of the old map.
   query.run(X_FL, {true}, {&cloud, &far}, &results);
   EXPECT_NEAR(results[0].distance, 0.4, 1e-6);
   EXPECT_EQ(results[0].source, 0);

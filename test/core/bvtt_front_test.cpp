@@ -1,4 +1,4 @@
-// Traversals that resume the front of the last one, against traversals from the root.
+// Traversals that resume the BVTT front of the last one, against traversals from the root.
 
 #include "proximity/coherence/bvtt_front.h"
 
@@ -47,7 +47,7 @@ TEST(BvttFront, DisplacementsAddUpUntilItIsDiscarded) {
   EXPECT_EQ(front.stored_bounds()[3], 0.5F);
   EXPECT_EQ(front.stored_bounds()[4], kFarAway);
   front.begin(7, at(0.2), bound, 0.0F);
-  EXPECT_TRUE(front.empty()) << "gone too far";
+  EXPECT_TRUE(front.empty()) << "the displacement is too large";
   EXPECT_EQ(front.offset(), 0.0F);
   EXPECT_EQ(front.stored_bounds()[3], kFarAway);
   front.add(0, 0);
@@ -57,15 +57,15 @@ TEST(BvttFront, DisplacementsAddUpUntilItIsDiscarded) {
   front.add(0, 0);
   front.end(false);
   front.begin(8, at(0.2), bound, 0.0F);
-  EXPECT_TRUE(front.empty()) << "cut short";
+  EXPECT_TRUE(front.empty()) << "the traversal was stopped";
   front.add(0, 0);
   front.end(true);
   front.begin(8, at(std::numeric_limits<double>::quiet_NaN()), bound, 0.0F);
-  EXPECT_TRUE(front.empty()) << "no pose";
+  EXPECT_TRUE(front.empty()) << "the pose is not finite";
   front.add(0, 0);
   front.end(true);
   front.begin(8, at(0.2), bound, 0.0F);
-  EXPECT_TRUE(front.empty()) << "from no pose";
+  EXPECT_TRUE(front.empty()) << "the last pose was not finite";
 }
 
 // A bound that a traversal with the one rounding has stored and a traversal with another one reads:
@@ -85,7 +85,7 @@ TEST(BvttFront, BoundsLoseTheRoundingOfTheirTraversal) {
   }
 }
 
-TEST(BvttFront, IsDiscardedWhenItHasGrown) {
+TEST(BvttFront, IsDiscardedBeforeItIsFull) {
   const auto model = test::make_model({shapes()[0]}, 0.01);
   const DisplacementBound bound(model->links[0]);
   BvttFront front;
@@ -104,11 +104,12 @@ TEST(BvttFront, IsDiscardedWhenItHasGrown) {
   EXPECT_EQ(front.size(), BvttFront::kMaxPairs);
 }
 
-TEST(BvttFronts, KeepThoseUsedLately) {
+TEST(BvttFronts, KeepTheMostRecentlyUsed) {
   const auto model = test::make_model({shapes()[0]}, 0.01);
   const DisplacementBound bound(model->links[0]);
   BvttFronts fronts;
-  const auto ask = [&](std::uint64_t index) {
+  // Uses the front of an index. Returns whether it was that of the last use.
+  const auto use = [&](std::uint64_t index) {
     BvttFront* front = fronts.find(index);
     if (front == nullptr) return false;
     const bool known = front->build_id() == index;
@@ -117,21 +118,21 @@ TEST(BvttFronts, KeepThoseUsedLately) {
     front->end(true);
     return known;
   };
-  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(ask(index));
-  for (const std::uint64_t index : {1, 3, 2, 4}) EXPECT_TRUE(ask(index));
+  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(use(index));
+  for (const std::uint64_t index : {1, 3, 2, 4}) EXPECT_TRUE(use(index));
   for (int i = 0; i < 200; ++i) {
     EXPECT_EQ(fronts.find(5), nullptr);
-    for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(ask(index));
+    for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(use(index));
   }
   for (int i = 0; i < 20; ++i) {
-    for (const std::uint64_t index : {2, 3, 4}) EXPECT_TRUE(ask(index));
+    for (const std::uint64_t index : {2, 3, 4}) EXPECT_TRUE(use(index));
   }
-  EXPECT_FALSE(ask(5)) << "in the place of 1, which is no more";
-  for (const std::uint64_t index : {2, 3, 4, 5}) EXPECT_TRUE(ask(index)) << index;
-  EXPECT_FALSE(ask(1));
+  EXPECT_FALSE(use(5)) << "a new front, in place of that of index 1";
+  for (const std::uint64_t index : {2, 3, 4, 5}) EXPECT_TRUE(use(index)) << index;
+  EXPECT_FALSE(use(1));
   fronts.forget();
-  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(ask(index));
-  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(ask(index));
+  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_FALSE(use(index));
+  for (const std::uint64_t index : {1, 2, 3, 4}) EXPECT_TRUE(use(index));
 }
 
 CloudSnapshot random_cloud(test::Rng* rng, int count) {
@@ -153,10 +154,11 @@ CloudSnapshot random_map(test::Rng* rng, int count) {
   return test::make_map(boxes, test::random_pose(rng, 0.1));
 }
 
-// Among one cloud, or more clouds and maps than there are fronts; of which one moves.
+// The parameters: the number of clouds and maps, in one case more than there are fronts, and the
+// tolerance.
 class FrontQueries : public ::testing::TestWithParam<std::tuple<int, double>> {};
 
-TEST_P(FrontQueries, AnswerAsFromTheRoot) {
+TEST_P(FrontQueries, AgreeWithTraversalsFromTheRoot) {
   const auto [sources, tolerance] = GetParam();
   test::Rng rng(81);
   static const auto model = test::make_model(shapes(), 0.003);
@@ -197,7 +199,7 @@ TEST_P(FrontQueries, AnswerAsFromTheRoot) {
       SCOPED_TRACE("step " + std::to_string(step) + ", link " + std::to_string(i));
       ASSERT_EQ(results[i].state, exact_results[i].state);
       if (results[i].state == LinkState::kClear) continue;
-      // How deep boxes are is found within a resolution, from either start.
+      // The depth of boxes is found to a resolution only, with either start.
       const double slack = results[i].state == LinkState::kContact && sources > 1 ? 0.01 : 1e-12;
       ASSERT_LE(results[i].lower_bound, exact_results[i].distance + 1e-12);
       ASSERT_GE(results[i].distance, exact_results[i].lower_bound - 1e-12);

@@ -1,5 +1,6 @@
-// The robot dodges, and does not see itself: simulator, ingest, query, repulsion and the example
-// controller together. benchmark/closed_loop.cpp and benchmark/self_view.cpp have it at length.
+// The simulated robot dodges obstacles and is not repelled by itself: simulator, ingest, query,
+// repulsion and the example controller together. benchmark/closed_loop.cpp and
+// benchmark/self_view.cpp are the longer measurements.
 
 #include "closed_loop.h"
 
@@ -12,7 +13,7 @@
 namespace ist::sim {
 namespace {
 
-// One obstacle each, that hits an arm that does not see it.
+// Each scene has one obstacle, which hits the arm if the arm does not dodge.
 TEST(ClosedLoop, TheArmDodges) {
   const RobotDescription robot = test::demo_robot();
   ClosedLoopConfig config;
@@ -62,8 +63,8 @@ TEST(SelfView, NoFalseContactInAMinute) {
   EXPECT_TRUE(std::isinf(result.smallest_distance)) << result.smallest_distance;
 }
 
-// The filter that lets none of the robot's own points through still lets a ball's, 4 cm away.
-TEST(SelfView, WhatComesNearIsStillSeen) {
+// The padding that removes all of the robot's own points keeps those of a sphere 4 cm away.
+TEST(SelfView, ANearbyObstacleIsStillFound) {
   SelfViewConfig config;
   config.duration = test::kSanitized ? 3.0 : 20.0;
   config.ball_distance = 0.042;

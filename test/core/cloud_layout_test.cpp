@@ -48,7 +48,7 @@ class CloudLayoutTest : public ::testing::Test {
   CloudLayout layout_;
 };
 
-TEST_F(CloudLayoutTest, validLayoutIsCarriedOver) {
+TEST_F(CloudLayoutTest, readsAValidLayout) {
   const RawCloud cloud = expect_valid();
   EXPECT_EQ(cloud.data, bytes_.data());
   EXPECT_EQ(cloud.width, 8U);
@@ -121,7 +121,7 @@ TEST_F(CloudLayoutTest, countLeftOutIsOne) {
   EXPECT_EQ(expect_valid().size(), 32U);
 }
 
-TEST_F(CloudLayoutTest, offsetBeyondThePoint) {
+TEST_F(CloudLayoutTest, offsetOutsideThePoint) {
   layout_.fields[2].offset = 13;
   expect_fault({"'z'", "offset 13", "17", "point_step of 16"});
   layout_.fields[2].offset = kMax - 1;  // offset + size does not fit 32 bits
@@ -140,7 +140,7 @@ TEST_F(CloudLayoutTest, duplicateNames) {
   expect_fault({"'y'", "2 times"});
 }
 
-TEST_F(CloudLayoutTest, otherFieldsAreNotLookedAt) {
+TEST_F(CloudLayoutTest, otherFieldsAreIgnored) {
   layout_.fields[3] = {"rgb", 1000, 77, 0};
   layout_.fields.push_back({"rgb", 1000, 77, 0});
   layout_.fields.push_back({"", 0, 0, 0});
@@ -206,7 +206,7 @@ TEST_F(CloudLayoutTest, morePointsThanIdsCanNumber) {
   expect_fault({"65536", "32 bits"});
 }
 
-TEST_F(CloudLayoutTest, emptyCloudIsValidWhateverTheRestSays) {
+TEST_F(CloudLayoutTest, emptyCloudIsValidWithAnyOtherValues) {
   layout_.width = 0;
   layout_.point_step = 0;
   layout_.row_step = 0;

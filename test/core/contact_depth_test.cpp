@@ -1,5 +1,5 @@
 // Signed depth in every contact of the test data: a robot's real meshes, which have holes, pushed
-// into depth images. The truth is every point in the link's box, one by one.
+// into depth images. The truth comes from measuring every point in the link's box.
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ std::vector<LinkTruth> panda_meshes(const std::filesystem::path& data) {
   return links;
 }
 
-// The file's poses are rounded to float; the witness identity is asked of rotations.
+// The file's poses are rounded to float, but the witness identity holds for rotations only.
 std::vector<Eigen::Isometry3d> rotations(std::vector<Eigen::Isometry3d> poses) {
   for (Eigen::Isometry3d& X : poses) {
     X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
@@ -47,8 +47,8 @@ std::vector<Eigen::Isometry3d> rotations(std::vector<Eigen::Isometry3d> poses) {
   return poses;
 }
 
-// Smallest signed distance of the points inside; inf when there are none. No bound is used but the
-// box. Every `stride`-th of what it finds is worked out triangle by triangle as well.
+// The smallest signed distance of the points inside; inf when there are none. No bound but the box
+// is used. One result in twenty is checked triangle by triangle.
 double deepest(const LinkTruth& link, const Eigen::Isometry3d& X_FL,
                const std::vector<Eigen::Vector3d>& points_F, std::size_t* checked) {
   const Eigen::Isometry3d X_LF = X_FL.inverse();
@@ -63,7 +63,7 @@ double deepest(const LinkTruth& link, const Eigen::Isometry3d& X_FL,
     witness = p_L;
   }
   if (depth < kInfinity && ++*checked % 20 == 0) {
-    // Where the winding number is nearly 0.5 the two may differ: not there.
+    // The two winding numbers must agree, so that they decide alike unless they are nearly 0.5.
     const double w = test::oracle_winding(link.mesh, witness);
     EXPECT_NEAR(link.bvh.winding_number(witness), w, 0.01);
     EXPECT_NEAR(test::oracle_distance(link.mesh, witness), -depth, 1e-9);

@@ -1,6 +1,6 @@
-// doc/contact.md states how near contact volumes come to the true ones, and how smooth wrenches
-// are. This measures it again: what is measured must stay below what is stated, and every row must
-// be known here. IST_PROXIMITY_UPDATE_DOC=1 writes the tables.
+// doc/contact.md states limits of the errors of contact volumes and of the jumps of wrenches. This
+// test measures them again: they must stay below the limits, and it must measure every row.
+// IST_PROXIMITY_UPDATE_DOC=1 writes the tables.
 
 #include <gtest/gtest.h>
 
@@ -28,10 +28,10 @@ const std::string kDocument = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/cont
 
 bool updating() { return std::getenv("IST_PROXIMITY_UPDATE_DOC") != nullptr; }
 
-// What a row states, in its last columns.
+// Rows of a table: the first columns, and the numbers in the last ones.
 using Rows = std::map<std::string, std::vector<double>>;
 
-// What is stated of a value: half as much again, two digits.
+// The limit stated for a measured value: one and a half times the value, to two digits.
 double limit(double value) {
   const double wanted = std::max(1.5 * value, 0.01);
   const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1.0);
@@ -205,7 +205,7 @@ TEST(ContactDocument, CloudThatFillsABody) {
   check("clouds", "| bodies | cell [mm] | mean error [%] | largest error [%] |", rows);
 }
 
-// The largest changes of a force along a way, per step, as a share of the largest force on it.
+// The largest change of force and torque per step of a path, in percent of the largest on the path.
 std::vector<double> jumps(const std::function<ContactVolume(double)>& at, double from, double to) {
   constexpr double kStep = 1e-4;  // [m]
   ContactVolume before = at(from);
@@ -218,7 +218,7 @@ std::vector<double> jumps(const std::function<ContactVolume(double)>& at, double
     turn_step = std::max(turn_step, (now.weighted_moment - before.weighted_moment).norm());
     before = now;
   }
-  // Where nothing turns but rounding.
+  // A torque that is rounding error alone counts as none.
   const double percent = turn > 0.01 * force * 0.1 ? 100.0 * turn_step / turn : 0.0;
   return {100.0 * step / force, percent};
 }
@@ -251,7 +251,7 @@ TEST(ContactDocument, ForcesDoNotJump) {
   rows["one point through a sphere, concentric"] = jumps(cloud(big, point), -0.12, 0.12);
   rows["one point through a box"] = jumps(cloud(box, point), -0.12, 0.12);
   rows["filled cloud through a box"] = jumps(cloud(box, block), -0.15, 0.15);
-  check("jumps", "| way | force [%] | torque [%] |", rows);
+  check("jumps", "| path | force [%] | torque [%] |", rows);
 }
 
 }  // namespace

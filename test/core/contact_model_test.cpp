@@ -57,7 +57,7 @@ TEST(ContactGeometry, OutwardFieldPointsToTheNearestSide) {
   for (const test::OracleSphere& sphere : test::spheres_of(*link.body)) {
     const Eigen::Vector3d outward = sphere.outward_at(sphere.center);
     EXPECT_LT(outward.norm(), 1.0);
-    // Right under the top, all other sides farther: up.
+    // The point is close to the top, and all other sides are farther.
     const double depth = 0.05 - sphere.center.z();
     const bool alone =
         depth < 0.01 && std::abs(sphere.center.x()) < 0.06 && std::abs(sphere.center.y()) < 0.04;
@@ -67,7 +67,7 @@ TEST(ContactGeometry, OutwardFieldPointsToTheNearestSide) {
     EXPECT_GT(outward.norm(), 0.9);
   }
   EXPECT_GT(near_a_side, 0);
-  // In the middle all sides are equally near.
+  // All sides are equally near to the middle.
   const ContactLink sphere(one(Sphere{0.1}), 1);
   const auto spheres = test::spheres_of(*sphere.body);
   ASSERT_EQ(spheres.size(), 1U);
@@ -77,7 +77,7 @@ TEST(ContactGeometry, OutwardFieldPointsToTheNearestSide) {
   }
 }
 
-TEST(ContactGeometry, OfWhatHasNoVolumeSaysSo) {
+TEST(ContactGeometry, OfALinkWithoutVolumeHasANote) {
   const ContactLink link(one(test::sheet(0.2)));
   EXPECT_FALSE(link.body->has_volume());
   EXPECT_NE(link.body->note.find("no volume"), std::string::npos);
@@ -110,15 +110,15 @@ TEST(ContactGeometry, ComesFromTheCacheTheNextTime) {
   EXPECT_FALSE(build()->from_cache);
 }
 
-TEST(ContactGeometry, IsBrokenOffWhenItIsNotWanted) {
+TEST(ContactGeometry, IsNullWhenItWasCancelled) {
   const LinkGeometry geometry = one(test::box({0.2, 0.1, 0.05}));
   const auto model = test::model_of({geometry}, 0.005);
   EXPECT_EQ(build_contact_geometry(geometry, 0, model->links[0], {}, "", [] { return true; }),
             nullptr);
 }
 
-// A mesh whose packing takes too long: what the packing for distances has, without overlaps.
-TEST(ContactGeometry, TakesTheOtherPackingWhenTimeIsUp) {
+// A disjoint part of the packing for distances replaces a packing that takes too long.
+TEST(ContactGeometry, FallsBackToThePackingForDistancesAfterTheTimeLimit) {
   const LinkGeometry geometry = one(test::open_box({0.2, 0.1, 0.05}));
   const auto model = test::model_of({geometry}, 0.005);
   ContactConfig config;
@@ -136,7 +136,7 @@ TEST(ContactGeometry, TakesTheOtherPackingWhenTimeIsUp) {
   }
 }
 
-TEST(ContactGeometry, HasAKeyOfAllThatMakesIt) {
+TEST(ContactGeometry, HasAKeyOfEverythingThatChangesIt) {
   LinkGeometry geometry = one(Box{{0.2, 0.1, 0.05}});
   ContactConfig config;
   const std::string key = contact_geometry_key(geometry, 0, config);

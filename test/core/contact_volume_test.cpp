@@ -19,8 +19,8 @@ using test::ContactLink;
 using test::one;
 using Points = std::vector<Eigen::Vector3d>;
 
-// Relative to what is shared, and to the sphere of one point: float, most of all in the depth of
-// points that have just come in.
+// The error of float, relative to the contact volume and to the sphere of one point. It is largest
+// in the depth of points just below the surface.
 constexpr double kRounding = 5e-5, kSphere = 2e-6;
 
 void expect_same(const ContactVolume& found, const ContactVolume& truth, double size) {
@@ -67,7 +67,7 @@ TEST(ContactVolume, IsThatOfBruteForceOnRandomScenes) {
   int in_contact = 0;
   for (const ContactLink& link : some_links()) {
     for (int i = 0; i < test::scaled(40); ++i) {
-      // Two sources, that overlap or not, each thinned in its own way.
+      // Two sources, which may overlap, are thinned separately.
       Points points = test::random_points(&rng, link.geometry, 400);
       const CloudSnapshot first = test::thinned(points, test::uniform(&rng, 0.005, 0.02));
       for (Eigen::Vector3d& p : points) p += test::random_vector(&rng, 0.005);
@@ -94,7 +94,7 @@ TEST(ContactVolume, IsTheSameFarFromTheOrigin) {
   const ContactVolume there = contact_volume(link.link(), *link.body, X_FL, {&far_cloud});
   expect_same(there, test::oracle_contact(link.link(), *link.body, X_FL, {&far_cloud}), 0.3);
   EXPECT_GT(here.volume, 0.0);
-  // Map coordinates in double are rounded to a nanometre, and decide otherwise at cells' borders.
+  // Map coordinates in double are rounded to a nanometre, so some points change cells.
   EXPECT_NEAR(there.volume, here.volume, 0.02 * here.volume);
   EXPECT_LT((there.weighted_normal - here.weighted_normal).norm(), 0.02 * here.volume);
 }
@@ -107,7 +107,7 @@ TEST(ContactVolume, OfTwoLinksIsThatOfBruteForce) {
       const Eigen::Isometry3d X_AB = test::random_pose(&rng, 0.06);
       const ContactVolume found = contact_volume(*links[a].body, *links[b].body, X_AB);
       expect_same(found, test::oracle_contact(*links[a].body, *links[b].body, X_AB), 0.3);
-      // What one gets, the other gives.
+      // Action equals reaction.
       const ContactVolume back = contact_volume(*links[b].body, *links[a].body, X_AB.inverse());
       EXPECT_NEAR(back.volume, found.volume, kRounding * found.volume + 1e-12);
       EXPECT_LT((X_AB.linear() * back.weighted_normal + found.weighted_normal).norm(),
@@ -122,7 +122,7 @@ TEST(ContactVolume, CountsNothingTwice) {
   const CloudSnapshot once = test::thinned(wall(0.2, 0.002, 0.02));
   const double volume = contact_volume(link.link(), *link.body, X_FL, {&once}).volume;
   ASSERT_GT(volume, 0.0);
-  // A second camera sees the same.
+  // A second camera delivers the same points.
   EXPECT_NEAR(contact_volume(link.link(), *link.body, X_FL, {&once, &once}).volume, volume,
               1e-6 * volume);
   // No more than the union of all spheres within the link: the wall's layer.
@@ -178,12 +178,12 @@ TEST(ContactVolume, PushesOutOfAWall) {
     const ContactVolume found = contact_volume(link.link(), *link.body, X_FL, {&cloud});
     EXPECT_GT(found.weighted_normal.normalized().z(), 0.99) << depth;
     EXPECT_LE(found.weighted_normal.norm(), found.volume);
-    // A wall that is the same on all sides turns nothing.
+    // A symmetric wall exerts no moment.
     EXPECT_LT(found.weighted_moment.norm(), 0.01 * found.volume);
   }
 }
 
-TEST(ContactVolume, TurnsWhatIsHitAtAnEnd) {
+TEST(ContactVolume, HasAMomentWhenALinkIsHitAtItsEnd) {
   const ContactLink link(one(Box{{0.2, 0.04, 0.04}}));
   Points points;
   for (const Eigen::Vector3d& p : wall(0.02, 0.003, -0.012)) {
@@ -197,7 +197,7 @@ TEST(ContactVolume, TurnsWhatIsHitAtAnEnd) {
               0.02 * found.weighted_normal.z());
 }
 
-// Every box of a map has the volume that it has, however it is divided.
+// Dividing a box of a map into cells does not change its volume.
 TEST(ContactVolume, OfAMapIsThatOfItsBoxes) {
   const ContactLink link(one(Box{{0.2, 0.2, 0.2}}), 500);
   test::Rng rng(104);
@@ -212,21 +212,21 @@ TEST(ContactVolume, OfAMapIsThatOfItsBoxes) {
     const double full = std::pow(edge, 3);
     const ContactVolume inside = contact_volume(link.link(), *link.body, X_FL, {&map});
     EXPECT_NEAR(inside.volume, full, 0.12 * full) << edge;
-    // Half of it.
+    // Half of the box is in the link.
     X_FL.translation() += X_FL.linear() * Eigen::Vector3d(0.1 + low.x() + 0.5 * edge, 0, 0);
     const ContactVolume half = contact_volume(link.link(), *link.body, X_FL, {&map});
     EXPECT_NEAR(half.volume, 0.5 * full, 0.25 * full) << edge;
     EXPECT_GT(
         (map.X_FM.linear().transpose() * X_FL.linear() * half.weighted_normal).normalized().x(),
         0.75);
-    // Beside it.
+    // The box is beside the link.
     X_FL.translation() += X_FL.linear() * Eigen::Vector3d(edge, 0, 0);
     EXPECT_EQ(contact_volume(link.link(), *link.body, X_FL, {&map}).volume, 0.0);
   }
 }
 
-// Concentric, touching, one within the other: finite and continuous.
-TEST(ContactVolume, HasNoJumpsAlongAnyWay) {
+// The volume is finite and continuous for concentric, touching and contained spheres.
+TEST(ContactVolume, HasNoJumpsAlongAnyPath) {
   const ContactLink sphere(one(Sphere{0.1}), 1);
   const ContactLink box(one(Box{{0.2, 0.15, 0.1}}));
   const CloudSnapshot cloud = test::thinned({Eigen::Vector3d::Zero()});

@@ -1,4 +1,4 @@
-// Bounds of the distances of points, kept for the places where the points have moved since.
+// Lower bounds of the distances of points, used after the points have moved in the link's frame.
 
 #include "proximity/coherence/distance_cache.h"
 
@@ -37,8 +37,8 @@ TEST(DistanceCache, FindsTheSamePointOfTheSameIndex) {
   EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, p)));
 }
 
-// Of more points than there is room for, which wander in and out of a link.
-TEST(DistanceCache, AreNeverAboveTheTruth) {
+// More points than the cache has entries move in and out of a link.
+TEST(DistanceCache, BoundsAreNeverAboveTheTruth) {
   test::Rng rng(91);
   const Solid solid({GeometryElement{test::l_shape(0.2, 0.05), Eigen::Isometry3d::Identity(), ""}});
   DistanceCache cache;

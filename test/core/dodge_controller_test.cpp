@@ -119,9 +119,9 @@ TEST_F(DodgeController, StepsAside) {
   reading.links = {near(0.06, {0.0, 0.0, 0.3})};
   const Eigen::VectorXd dq = run();
   const double wanted = config.damping * (config.keep_distance - 0.06);
-  EXPECT_GT(speed_along(reading.links[0], dq), 0.8 * wanted);  // softness takes a little
+  EXPECT_GT(speed_along(reading.links[0], dq), 0.8 * wanted);  // the constraint is soft
   EXPECT_LE(speed_along(reading.links[0], dq), wanted + 1e-9);
-  // How long `away` is does not matter.
+  // The length of `away` does not matter.
   reading.links[0].away *= 0.01;
   EXPECT_NEAR((run() - dq).norm(), 0.0, 1e-9);
 }
@@ -144,7 +144,8 @@ TEST_F(DodgeController, LinksThatCannotMoveDoNotCount) {
   EXPECT_NEAR((run() - undisturbed).norm(), 0.0, 1e-12);
 }
 
-// Whatever comes, joints keep their limits, and a small change of a reading changes little.
+// Joints keep their limits with any reading, and a small change of a reading changes the command
+// little.
 TEST_F(DodgeController, KeepsLimitsAndIsContinuous) {
   test::Rng rng(2);
   for (int i = 0; i < 500; ++i) {
@@ -167,7 +168,7 @@ TEST_F(DodgeController, KeepsLimitsAndIsContinuous) {
     for (std::size_t j = 0; j < arm.joints.size(); ++j) {
       const auto& joint = arm.kinematics.joints()[arm.joints[j]];
       const double v = dq[static_cast<Eigen::Index>(j)];
-      // The method converges to the limits; 2 % are left after its sweeps.
+      // The method converges to the limits; an error of 2 % remains after its sweeps.
       EXPECT_LE(std::abs(v), 1.02 * config.max_joint_speed);
       EXPECT_LE(v, config.limit_gain * (joint.upper - positions[j]) + 0.02);
       EXPECT_GE(v, -config.limit_gain * (positions[j] - joint.lower) - 0.02);

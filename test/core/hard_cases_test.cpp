@@ -1,4 +1,5 @@
-// Places and shapes where distance code goes wrong, against brute force: state, bounds, witness.
+// Points and shapes for which distance code often fails, against brute force: state, bounds and
+// witnesses.
 
 #include <gtest/gtest.h>
 
@@ -51,7 +52,7 @@ TEST(HardCases, OnSurfaceEdgeAndVertex) {
       expect_each(trial, features(*mesh));
     }
   }
-  // Of the primitives: cap, wall and rim of the cylinder, pole and equator of the sphere.
+  // Points on the cap, wall and rim of the cylinder, and on the pole and equator of the sphere.
   expect_each(trial, {{0, 0, 0.125},
                       {0.08, 0, 0},
                       {0.08, 0, 0.125},
@@ -94,7 +95,7 @@ TEST(HardCases, AtCentresAndOnTheMedialAxis) {
   expect_each(trial, points);
 }
 
-TEST(HardCases, OnePointAndNone) {
+TEST(HardCases, OnePointAndEmptyCloud) {
   expect_each(common_links(), {{0.3, 0.2, 0.1}, {5, 5, 5}, {-0.99, 0, 0}});
   const CloudSnapshot nothing = test::make_snapshot({});
   const std::size_t count = common_links().model().links.size();
@@ -119,7 +120,7 @@ TEST(HardCases, CollinearAndCoplanar) {
     }
     common_links().expect(points, test::random_pose(&rng, 0.2));
   }
-  // Along the axes, and in planes of the links' own faces.
+  // A line along an axis, and a plane in which a face of a link lies.
   Points line, plane;
   for (int i = -20; i <= 20; ++i) {
     line.emplace_back(0.02 * i, 0.0, 0.0);
@@ -149,7 +150,7 @@ TEST(HardCases, Chazelle) {
   }
 }
 
-// Thin parts are where spheres are small and winding numbers change fast.
+// In thin parts, inner spheres are small and winding numbers change fast.
 TEST(HardCases, ThinPlatesAndNeedles) {
   test::Rng rng(23);
   const std::vector<TriangleMesh> meshes = {test::thin_plate(0.2, 1e-3),
@@ -162,7 +163,7 @@ TEST(HardCases, ThinPlatesAndNeedles) {
                                             test::sheet(0.2)};
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     SCOPED_TRACE("mesh " + std::to_string(m));
-    // Which side of a surface a point is on is told by float sums: to 1e-6 of the size at worst.
+    // Sums in float decide on which side of a surface a point is: to 1e-6 of the size at worst.
     const test::Trial trial({meshes[m]}, 0.01, 1e-6);
     expect_each(trial, features(meshes[m]));
     for (int i = 0; i < test::scaled(200); ++i) {
@@ -212,7 +213,7 @@ TEST(HardCases, AtTheEdgeOfMaxDistance) {
           } else {
             ASSERT_EQ(result.state, LinkState::kNear);
             EXPECT_NEAR(result.distance, truth, 1e-9);
-            // Beyond, it is reported only as far as rounding cannot tell.
+            // NEAR is allowed outside max_distance only within the rounding error.
             EXPECT_LT(truth, max_distance + 1e-5);
           }
         }

@@ -1,4 +1,4 @@
-// Clouds that break indices: many equal points, every order, numbers that are none, far origins.
+// Clouds that are hard for an index: many equal points, any order, NaN and infinity, far origins.
 
 #include <gtest/gtest.h>
 
@@ -41,8 +41,8 @@ QueryConfig exact() {
   return config;
 }
 
-// Millions of points in one place, with IST_PROXIMITY_LARGE_TESTS set; else as many as a depth
-// image has.
+// The cloud has millions of equal points with IST_PROXIMITY_LARGE_TESTS set, and as many as a depth
+// image otherwise.
 TEST(HardCloud, ManyPointsInOnePlace) {
   const bool large = std::getenv("IST_PROXIMITY_LARGE_TESTS") != nullptr;
   const std::size_t count = large ? 5000000 : test::kSanitized ? 30000 : 300000;
@@ -70,7 +70,7 @@ TEST(HardCloud, OrderAndDuplicatesDoNotMatter) {
   for (int scene = 0; scene < test::scaled(60); ++scene) {
     Points points;
     for (int i = 0; i < 3000; ++i) points.push_back(test::random_vector(&rng, 0.5));
-    // A tenth of them in one place, and a sheet.
+    // A tenth of the points are equal, and a third lie in a plane.
     for (int i = 0; i < 300; ++i) points[static_cast<std::size_t>(i)] = points[0];
     for (std::size_t i = 300; i < 1300; ++i) points[i].z() = -0.31;
     std::vector<Points> orders(6, points);
@@ -78,8 +78,8 @@ TEST(HardCloud, OrderAndDuplicatesDoNotMatter) {
     std::sort(orders[1].begin(), orders[1].end(), by_x);
     std::reverse_copy(orders[1].begin(), orders[1].end(), orders[2].begin());
     std::shuffle(orders[3].begin(), orders[3].end(), rng);
-    // The order goes from end to end and back: neighbours in the message are as far apart as can
-    // be.
+    // This order alternates between both ends: neighbours in the message are as far apart as
+    // possible.
     for (std::size_t i = 0; i < points.size(); ++i) {
       orders[4][i] = orders[1][i % 2 == 0 ? i / 2 : points.size() - 1 - i / 2];
     }
@@ -132,8 +132,8 @@ CloudSnapshot ingest(const Points& points_S, const Eigen::Isometry3d& X_FS, doub
   return snapshot;
 }
 
-// Each odd number in each coordinate, among good points: the answer is that of the good points and
-// of those that differ from them by nothing.
+// Each odd number is put into each coordinate of a point among good points. Points with numbers in
+// `dropped` must not count, and those with numbers in `kept` must.
 template <typename Scalar>
 void expect_odd_numbers_dropped() {
   using Limits = std::numeric_limits<Scalar>;
@@ -180,7 +180,8 @@ TEST(HardCloud, OddNumbersInEachCoordinate) {
   expect_odd_numbers_dropped<double>();
 }
 
-// The same scene at the origin and 1e6 m away, by the sensor's pose and by map coordinates.
+// The same scene at the origin and 1e6 m away, where either the sensor's pose or the points' own
+// coordinates are large.
 TEST(HardCloud, FarFromTheOrigin) {
   test::Rng rng(62);
   for (const Point& far : {Point(1e6, -2e6, 5e5), Point(1e6 + 0.3, 1e6 - 0.7, 0.1)}) {
@@ -188,7 +189,7 @@ TEST(HardCloud, FarFromTheOrigin) {
       Points points;
       for (int i = 0; i < 200; ++i) {
         const Point p = test::random_vector(&rng, 0.8);
-        points.push_back(p.cast<float>().cast<double>());  // what both precisions hold
+        points.push_back(p.cast<float>().cast<double>());  // exact in float and double
       }
       const Eigen::Isometry3d X_FS = test::random_pose(&rng, 0.5),
                               X_FL = test::random_pose(&rng, 0.5);

@@ -27,7 +27,7 @@ std::array<Point, 3> random_sliver(test::Rng* rng) {
   switch (static_cast<int>(test::uniform(rng, 0, 8))) {
     case 0:
       c = a + where * along;
-      break;  // a line, but for rounding
+      break;  // a line up to rounding
     case 1:
       c = b;
       break;
@@ -70,7 +70,7 @@ std::vector<TriangleMesh> thin_meshes() {
           test::chazelle(4, 0.0005, 0.2)};
 }
 
-// A point near a triangle of the mesh, at any scale.
+// A point at a distance of 1e-8 to 0.1 m from a triangle of the mesh.
 Point near_surface(const TriangleMesh& mesh, test::Rng* rng) {
   const auto t = static_cast<std::size_t>(test::uniform(rng, 0, 1) *
                                           static_cast<double>(mesh.triangles.size()));
@@ -79,7 +79,7 @@ Point near_surface(const TriangleMesh& mesh, test::Rng* rng) {
          test::random_vector(rng, std::pow(10.0, test::uniform(rng, -8, -1)));
 }
 
-// Pruning in float may be too weak, never too strong.
+// Bounds in float may prune too little, but never too much.
 TEST(HardGeometry, ClosestPointOnThinMeshes) {
   test::Rng rng(32);
   for (const TriangleMesh& mesh : thin_meshes()) {
@@ -95,14 +95,14 @@ TEST(HardGeometry, ClosestPointOnThinMeshes) {
   }
 }
 
-// Regression: the solid angle of a sliver, seen from nearer than its width, is a small difference
+// Regression: the solid angle of a sliver, at a distance below its width, is a small difference
 // of large float products. Its sign was random, so that points up to 4e-6 m outside a needle 0.3 m
 // long and 1e-5 m thick counted as inside.
 TEST(HardGeometry, InsideOfThinMeshes) {
   test::Rng rng(33);
   for (const TriangleMesh& mesh : thin_meshes()) {
     const TriangleBvh bvh(mesh);
-    // The error may be that of single precision coordinates.
+    // Points within the rounding error of float coordinates are skipped.
     const double rounding = 2e-7 * test::bounds(mesh).sizes().norm();
     const int count = test::scaled(mesh.triangles.size() > 1000 ? 1000 : 5000);
     for (int i = 0; i < count; ++i) {

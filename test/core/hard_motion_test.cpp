@@ -1,4 +1,4 @@
-// Poses that are none, long motions, random deadlines.
+// Poses that are not rigid, long motions, random deadlines.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ CloudSnapshot random_cloud(test::Rng* rng, int count) {
   return test::make_snapshot(points);
 }
 
-TEST(HardPoses, AQuaternionThatIsOffIsRefused) {
+TEST(HardPoses, RefusesQuaternionsThatAreNotOfUnitLength) {
   test::Rng rng(71);
   for (int i = 0; i < 1000; ++i) {
     const Eigen::Isometry3d X = test::random_pose(&rng, 10.0);
@@ -36,7 +36,7 @@ TEST(HardPoses, AQuaternionThatIsOffIsRefused) {
       Eigen::Isometry3d X_off = X;
       Eigen::Quaterniond longer = q;
       longer.coeffs() *= 1.0 + off;
-      X_off.linear() = longer.toRotationMatrix();  // as it is, without making it of unit length
+      X_off.linear() = longer.toRotationMatrix();  // not normalized
       EXPECT_FALSE(is_rigid(X_off));
       X_off.linear() = longer.normalized().toRotationMatrix();
       EXPECT_TRUE(is_rigid(X_off));
@@ -44,7 +44,7 @@ TEST(HardPoses, AQuaternionThatIsOffIsRefused) {
   }
 }
 
-TEST(HardPoses, ReflectedScaledAndShearedAreRefused) {
+TEST(HardPoses, RefusesReflectedScaledAndShearedPoses) {
   test::Rng rng(72);
   for (int i = 0; i < 1000; ++i) {
     const Eigen::Isometry3d X = test::random_pose(&rng, 1e6);
@@ -70,7 +70,7 @@ TEST(HardPoses, ReflectedScaledAndShearedAreRefused) {
   }
 }
 
-// The last answer starts the next query; over many steps, hardly apart, that must not add up.
+// The last answer is the next query's warm start. Errors must not add up over many small steps.
 TEST(HardMotion, WarmStartDoesNotDrift) {
   test::Rng rng(73);
   const auto model = test::make_model(shapes(), 0.005);
@@ -106,7 +106,7 @@ TEST(HardMotion, WarmStartDoesNotDrift) {
   }
 }
 
-// Whatever the deadline, bounds hold; a query without one is whole again, whatever came before.
+// Bounds hold at any deadline. A later query without a deadline is complete again.
 TEST(HardMotion, RandomDeadlines) {
   test::Rng rng(74);
   const auto model = test::make_model(shapes(), 0.002);
@@ -115,7 +115,7 @@ TEST(HardMotion, RandomDeadlines) {
   config.tolerance = 0.0;
   ProximityQuery query(model, config);
   std::vector<Eigen::Isometry3d> X_FL(model->links.size());
-  std::vector<LinkProximity> whole, results;
+  std::vector<LinkProximity> exact, results;
   const int scenes = test::scaled(200);
   int stopped = 0, partial = 0;
   for (int scene = 0; scene < scenes; ++scene) {
@@ -126,25 +126,26 @@ TEST(HardMotion, RandomDeadlines) {
         for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.6);
         config.deadline = 0.0;
         query.set_config(config);
-        ASSERT_TRUE(query.run(X_FL, known, clouds, &whole)) << "no deadline, no excuse";
+        ASSERT_TRUE(query.run(X_FL, known, clouds, &exact))
+            << "a query without a deadline must be complete";
         ProximityQuery(model, config).run(X_FL, known, clouds, &results);
-        for (std::size_t i = 0; i < whole.size(); ++i) {
-          ASSERT_EQ(whole[i].state, results[i].state);
-          if (whole[i].state != LinkState::kClear) {
-            ASSERT_NEAR(whole[i].distance, results[i].distance, 1e-12);
+        for (std::size_t i = 0; i < exact.size(); ++i) {
+          ASSERT_EQ(exact[i].state, results[i].state);
+          if (exact[i].state != LinkState::kClear) {
+            ASSERT_NEAR(exact[i].distance, results[i].distance, 1e-12);
           }
         }
       }
       config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 3.0));
-      // Half of them cold: nothing is known yet when the deadline passes.
+      // Half of the queries have a cold start: no bound is known when the deadline passes.
       ProximityQuery cold(model, config);
       query.set_config(config);
       ProximityQuery& stopping = k % 2 == 0 ? cold : query;
       const bool complete = stopping.run(X_FL, known, clouds, &results);
       stopped += complete ? 0 : 1;
       for (std::size_t i = 0; i < results.size(); ++i) {
-        const bool clear = whole[i].state == LinkState::kClear;
-        const double truth = clear ? config.max_distance : whole[i].distance;
+        const bool clear = exact[i].state == LinkState::kClear;
+        const double truth = clear ? config.max_distance : exact[i].distance;
         ASSERT_LE(results[i].lower_bound, truth + 1e-12);
         if (results[i].state == LinkState::kUnknown) {
           ASSERT_FALSE(complete);
@@ -161,7 +162,7 @@ TEST(HardMotion, RandomDeadlines) {
       }
     }
   }
-  EXPECT_GT(stopped, scenes) << "the deadlines are too generous to show anything";
+  EXPECT_GT(stopped, scenes) << "too few deadlines passed for this test to show anything";
   EXPECT_GT(partial, 0);
 }
 

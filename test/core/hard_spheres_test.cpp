@@ -1,5 +1,5 @@
-// Packings made by hand: equal and concentric spheres, and radii from 1e-6 to 1e3 m, in the tree
-// and in the query.
+// Inner Sphere Trees and queries of packings made by hand: equal and concentric spheres, and radii
+// from 1e-6 to 1e3 m.
 
 #include <gtest/gtest.h>
 
@@ -57,12 +57,12 @@ struct SphereLink {
   }
 };
 
-// @param gap  [m] cover radius less inner radius
-double nearest_sphere(const std::vector<InnerSphere>& spheres, const Point& p, bool outer) {
+// The distance to the nearest inner sphere, or to the nearest cover sphere.
+double nearest_sphere(const std::vector<InnerSphere>& spheres, const Point& p, bool cover) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const InnerSphere& sphere : spheres) {
     nearest = std::min(nearest,
-                       (p - sphere.center).norm() - (outer ? sphere.cover_radius : sphere.radius));
+                       (p - sphere.center).norm() - (cover ? sphere.cover_radius : sphere.radius));
   }
   return nearest;
 }
@@ -96,16 +96,17 @@ void expect_tree(const SphereLink& link, test::Rng* rng, int points) {
     const Point p = random_point(rng, link);
     const double rounding = 4e-6 * (link.extent() + p.norm());
     const double inner = nearest_sphere(covered.spheres, p, false);
-    const double outer = nearest_sphere(covered.spheres, p, true);
+    const double cover = nearest_sphere(covered.spheres, p, true);
     EXPECT_GE(tree.inner_distance(p), inner - 1e-12 * link.extent());
     EXPECT_LE(tree.inner_distance(p), inner + rounding);
-    EXPECT_LE(tree.cover_distance(p), outer) << "a lower bound";
-    EXPECT_GE(tree.cover_distance(p), outer - rounding);
-    const double stop = outer + test::uniform(rng, -1, 1) * std::abs(outer);
+    EXPECT_LE(tree.cover_distance(p), cover) << "must be a lower bound";
+    EXPECT_GE(tree.cover_distance(p), cover - rounding);
+    const double stop = cover + test::uniform(rng, -1, 1) * std::abs(cover);
     const double stopped = tree.cover_distance(p, stop);
-    EXPECT_EQ(stopped > stop, tree.cover_distance(p) > stop) << "stopping early decides the same";
-    EXPECT_FALSE(tree.cover_distance_exceeds(p, stop) && outer <= stop);
-    EXPECT_TRUE(tree.cover_distance_exceeds(p, stop) || outer - rounding <= stop);
+    EXPECT_EQ(stopped > stop, tree.cover_distance(p) > stop)
+        << "stopping early must not change the comparison";
+    EXPECT_FALSE(tree.cover_distance_exceeds(p, stop) && cover <= stop);
+    EXPECT_TRUE(tree.cover_distance_exceeds(p, stop) || cover - rounding <= stop);
   }
 }
 

@@ -12,7 +12,7 @@
 namespace ist {
 namespace {
 
-// The winding number of mesh and caps together is an integer, whatever the mesh.
+// The winding number of any mesh together with its caps is an integer.
 TEST(HoleCaps, CloseEveryMesh) {
   std::size_t open_meshes = 0;
   for (const test::HostileMesh& hostile : test::hostile_meshes()) {

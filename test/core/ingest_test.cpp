@@ -26,14 +26,14 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 using Points = std::vector<Eigen::Vector3d>;
 
-// How a message lays out its points.
+// The layout of a message's points.
 struct Format {
   bool is_double = false, is_bigendian = false;
   std::size_t x = 0, y = 4, z = 8, point_step = 12;
   std::size_t width = 0;        // 0: one row
   std::size_t row_padding = 0;  // bytes after each row
   std::size_t misaligned = 1;   // bytes before the first point; 1: nothing is aligned
-  bool owned = false;           // whether the bytes live as long as somebody wants them
+  bool owned = false;           // the cloud shares the bytes, so tiles can be loaded lazily
 };
 
 template <typename T>
@@ -42,7 +42,7 @@ void put(T value, bool reversed, std::uint8_t* bytes) {
   if (reversed) std::reverse(bytes, bytes + sizeof value);
 }
 
-// A message's bytes, checked the way the node does it. The bytes between the coordinates are 0xFF.
+// A message's bytes, checked as the node checks them. The bytes between the coordinates are 0xFF.
 class Message {
  public:
   Message(const Points& points, const Format& format) {
@@ -121,7 +121,7 @@ std::map<std::uint32_t, Eigen::Vector3d> points_by_id(const PointIndex& index) {
 
 Points random_points(std::size_t n, double size, unsigned seed) {
   std::mt19937 random(seed);
-  // Floats, so that both precisions hold the same.
+  // The coordinates are floats, so that float32 and float64 messages hold the same points.
   std::uniform_real_distribution<float> u(-static_cast<float>(size), static_cast<float>(size));
   Points points;
   for (std::size_t i = 0; i < n; ++i) {
@@ -142,7 +142,8 @@ TEST(Ingest, emptyCloud) {
   const CloudSnapshot snapshot = ingest({});
   EXPECT_TRUE(snapshot.index.empty());
   EXPECT_TRUE(snapshot.coarse.empty());
-  EXPECT_FALSE(snapshot.counts.saw_nothing()) << "a measurement of nothing";
+  EXPECT_FALSE(snapshot.counts.saw_nothing())
+      << "an empty cloud is a measurement without obstacles";
 }
 
 TEST(Ingest, countsAndStamp) {
@@ -157,13 +158,14 @@ TEST(Ingest, countsAndStamp) {
   EXPECT_GT(snapshot.ingest_time, 0.0);
 }
 
-TEST(Ingest, onlyAllNanIsSeeingNothing) {
+TEST(Ingest, sawNothingOnlyIfEveryPointIsNan) {
   EXPECT_TRUE(ingest({{kNan, 0, 0}, {0, 0, kNan}}).counts.saw_nothing());
   EXPECT_FALSE(ingest({{kNan, 0, 0}, {kInf, 0, 0}}).counts.saw_nothing());
   EXPECT_FALSE(ingest({{kNan, 0, 0}, {100, 0, 0}}).counts.saw_nothing());
 }
 
-// Squares of these overflow float, and the last ones double: none may become NaN, infinite or near.
+// The squares of these coordinates overflow float, and those of the last ones overflow double. No
+// such point may become NaN, infinite or near.
 TEST(Ingest, hugeFiniteCoordinatesAreOutOfRange) {
   for (const double max_range : {3.0, kInf}) {
     SCOPED_TRACE(max_range);
@@ -183,11 +185,11 @@ TEST(Ingest, rangesIncludeTheirBounds) {
   IngestConfig config;
   config.min_range = 0.5;
   config.max_range = 2.0;
-  const float below = std::nextafter(0.5F, 0.0F), beyond = std::nextafter(2.0F, 3.0F);
+  const float too_near = std::nextafter(0.5F, 0.0F), too_far = std::nextafter(2.0F, 3.0F);
   const CloudSnapshot snapshot = ingest({{0.5, 0, 0},
                                          {0, 2.0, 0},
-                                         {0, 0, static_cast<double>(below)},
-                                         {static_cast<double>(beyond), 0, 0},
+                                         {0, 0, static_cast<double>(too_near)},
+                                         {static_cast<double>(too_far), 0, 0},
                                          {1.2, 1.2, 1.2},
                                          {1.1, 1.1, 1.1}},
                                         config);
@@ -211,7 +213,7 @@ TEST(Ingest, denormalsAndZeroFollowMinRange) {
   EXPECT_EQ(ingest(points, config).counts.used, 4U);
 }
 
-TEST(Ingest, infiniteMaxRangeKeepsAllThatIsFinite) {
+TEST(Ingest, infiniteMaxRangeKeepsEveryFinitePoint) {
   IngestConfig config;
   config.max_range = kInf;
   const CloudSnapshot snapshot = ingest({{1e5, 0, 0}, {0, 5e6, 0}, {kInf, 0, 0}}, config);
@@ -235,7 +237,7 @@ TEST(Ingest, everyFormatReadsTheSame) {
       Format odd;
       odd.is_double = is_double;
       odd.is_bigendian = is_bigendian;
-      odd.point_step = 37;  // odd stride and offsets, and another order
+      odd.point_step = 37;  // odd stride and offsets, coordinates in another order
       odd.z = 1;
       odd.x = 1 + size + 2;
       odd.y = 37 - size;
@@ -287,7 +289,8 @@ TEST(Ingest, pointsAreInTheFixedFrame) {
   expect_transformed(points, X_FS, ingest(points, without_limits(), {}, X_FS).index, 5e-7);
 }
 
-// Every tile has one parent, every box is that of the points below, unused slots are far away.
+// Every tile has one parent, every box bounds the points in its subtree, and unused slots are at
+// kFarAway.
 // @param slack  [m] by how much boxes of tiles may be larger
 void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F) {
   const PointBvh& index = point_index.bvh();
@@ -335,7 +338,7 @@ void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F) {
   }
 }
 
-// Frames differ, and what float rounds with them.
+// The two indices have different frames, so their points are rounded to float differently.
 void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
                  const std::map<std::uint32_t, Eigen::Vector3d>& b) {
   ASSERT_EQ(a.size(), b.size());
@@ -345,8 +348,8 @@ void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
   }
 }
 
-// A depth camera's view: a wall and a board before it, and nothing at some pixels.
-// @param blind  one pixel of so many sees nothing; 0: none
+// A depth image: a wall, a board in front of it, and some NaN pixels.
+// @param blind  one pixel in `blind` is NaN; 0: none
 Points depth_image(std::size_t width, std::size_t height, unsigned blind = 10) {
   std::mt19937 random(8);
   Points points;
@@ -363,8 +366,8 @@ Points depth_image(std::size_t width, std::size_t height, unsigned blind = 10) {
   return points;
 }
 
-// Organized clouds are read by other code than unorganized ones, and so are sizes that are no
-// multiple of a block.
+// Organized clouds have a code path of their own, and so have images whose size is no multiple of a
+// block's.
 void check_images(const Format& format, unsigned blind) {
   for (const auto& [width, height] :
        {std::pair<std::size_t, std::size_t>{160, 120}, {163, 41}, {300, 5}, {17, 90}, {257, 64}}) {
@@ -375,14 +378,14 @@ void check_images(const Format& format, unsigned blind) {
     points[5 * width / 2].y() = kInf;
     IngestConfig config;
     config.max_range = 1.7;
-    config.thin = !format.owned;  // else all is read at once
+    config.thin = !format.owned;  // thinning would load all tiles at once
     const CloudSnapshot a = ingest(points, config, {}, pose(0.5, 0.2, 1.0));
     const CloudSnapshot b = ingest(points, config, organized, pose(0.5, 0.2, 1.0));
     EXPECT_EQ(a.counts.not_a_number, b.counts.not_a_number);
     EXPECT_EQ(a.counts.infinite, b.counts.infinite);
     EXPECT_EQ(a.counts.out_of_range, b.counts.out_of_range);
     expect_same(points_by_id(a.index), points_by_id(b.index));
-    // Tiles do not span the edge of the board, 0.6 m deep.
+    // No tile spans the depth discontinuity of 0.6 m at the board's edge.
     for (const PointTile& tile : test::tiles_of(b.index)) {
       Eigen::AlignedBox3f box;
       for (int k = 0; k < tile.count; ++k) {
@@ -390,12 +393,12 @@ void check_images(const Format& format, unsigned blind) {
       }
       ASSERT_LT(box.diagonal().norm(), 0.25F);
     }
-    expect_hierarchy(b.index, 4e-6F);  // a millionth of the range, there and back
+    expect_hierarchy(b.index, 4e-6F);  // a millionth of the range, for each change of frame
   }
 }
 
-// Tiles are loaded at once, or when a query first looks at them.
-void check_images_both_ways(Format format) {
+// Tiles are loaded at once, or lazily when a query first looks at them.
+void check_images_eager_and_lazy(Format format) {
   for (const bool owned : {false, true}) {
     format.owned = owned;
     for (const unsigned blind : {10U, 1000U, 0U}) {
@@ -404,34 +407,36 @@ void check_images_both_ways(Format format) {
   }
 }
 
-TEST(Ingest, imageHoldsTheSamePointsAsAList) { check_images_both_ways({}); }
+TEST(Ingest, imageHoldsTheSamePointsAsAList) { check_images_eager_and_lazy({}); }
 
-// Layouts that drivers write, of sixteen or more bytes a point, are read by other code.
+// Layouts of sixteen or more aligned bytes a point, as drivers write them, have a code path of
+// their own.
 TEST(Ingest, imageOfFourFloatsHoldsTheSamePointsAsAList) {
   Format four_floats;
   four_floats.point_step = 16;
   four_floats.misaligned = 0;
-  check_images_both_ways(four_floats);
+  check_images_eager_and_lazy(four_floats);
   four_floats.row_padding = 48;
-  check_images_both_ways(four_floats);
+  check_images_eager_and_lazy(four_floats);
 }
 
 TEST(Ingest, imageOfMoreThanFourFloatsHoldsTheSamePointsAsAList) {
   Format coloured;
   coloured.point_step = 32;
   coloured.misaligned = 0;
-  check_images_both_ways(coloured);
+  check_images_eager_and_lazy(coloured);
   coloured.point_step = 20;
   coloured.x = 4;
   coloured.y = 8;
   coloured.z = 12;
-  check_images_both_ways(coloured);
+  check_images_eager_and_lazy(coloured);
   coloured.is_bigendian = true;
-  check_images_both_ways(coloured);
-  check_images_both_ways(float64());
+  check_images_eager_and_lazy(coloured);
+  check_images_eager_and_lazy(float64());
 }
 
-// Surfaces on which float does not tell what is in range: points lie on it, and a hair off.
+// Points lie on the sphere of a range limit or a fraction of a micrometre off it, where float alone
+// cannot decide whether they are in range.
 TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
   IngestConfig config;
   config.min_range = 0.7;
@@ -465,8 +470,8 @@ TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
   }
 }
 
-// Several threads read tiles that are not loaded yet.
-TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
+// Several threads load the same tiles at once.
+TEST(Ingest, lazilyLoadedTilesAreTheSameInEveryThread) {
   const Points points = depth_image(320, 240, 1000);
   Format organized;
   organized.width = 320;
@@ -495,7 +500,8 @@ TEST(Ingest, tilesAreTheSameForAllWhoLookFirst) {
   }
 }
 
-// Rows and columns that say nothing about space: the index must be as good as that of a list.
+// Rows and columns of a shuffled image are unrelated to space. The index must be as good as that of
+// an unorganized cloud.
 TEST(Ingest, shuffledImageIsIndexedAsAList) {
   Points points = depth_image(160, 120);
   std::shuffle(points.begin(), points.end(), std::mt19937(9));
@@ -514,7 +520,8 @@ TEST(Ingest, thinnedCloudCanBeLeftOut) {
   EXPECT_TRUE(snapshot.coarse.empty());
 }
 
-// Four ways to be far away. In float, a coordinate of 4e6 m is off by up to 0.25 m.
+// The next four tests have points far from an origin. In float, a coordinate of 4e6 m is off by up
+// to 0.25 m.
 TEST(Ingest, farSensorLosesNothing) {
   const Points points = random_points(500, 2.0, 3);
   const Eigen::Isometry3d X_FS = pose(691000.123, 5334000.456, 520.789);
@@ -535,7 +542,7 @@ TEST(Ingest, farPointsLoseNothing) {
   }
 }
 
-TEST(Ingest, farPointsWithASensorFrameThatBringsThemBack) {
+TEST(Ingest, farPointsLoseNothingWhenTheSensorPoseBringsThemNear) {
   Points points = random_points(500, 2.0, 5);
   for (Eigen::Vector3d& p : points) p += Eigen::Vector3d(691000.123, 5334000.456, 520.789);
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
@@ -545,7 +552,7 @@ TEST(Ingest, farPointsWithASensorFrameThatBringsThemBack) {
   expect_transformed(points, X_FS, snapshot.index, 1e-6);
 }
 
-// A few far points must not move the origin away from where most are.
+// A few far points must not move the origin away from most of the points.
 TEST(Ingest, farOutliersDoNotMoveTheOrigin) {
   Points points = random_points(500, 2.0, 6);
   for (int i = 0; i < 50; ++i) points.emplace_back(1e8, -1e8, 1e8);
@@ -559,8 +566,9 @@ TEST(Ingest, originIsOnWholeMetres) {
   EXPECT_EQ(snapshot.coarse.X_FO().translation(), snapshot.index.X_FO().translation());
 }
 
-// All code that reads points: float or double, organized or unorganized, four floats or not.
-TEST(Ingest, whatIsBeyondTheRegionIsLeftOut) {
+// The formats cover every code path that reads points: float or double, organized or unorganized,
+// four floats or not.
+TEST(Ingest, pointsOutsideTheRegionOfInterestAreDiscarded) {
   const Points points = depth_image(160, 120);
   const Eigen::Isometry3d X_FS = pose(0.5, 0.2, 1.0);
   RegionOfInterest region;
@@ -583,12 +591,12 @@ TEST(Ingest, whatIsBeyondTheRegionIsLeftOut) {
     ingest.run(message.raw, X_FS, {}, 0.0, &inside);
     EXPECT_EQ(all.region.radius, kInf);
     EXPECT_EQ(inside.region.radius, 1.5);
-    const auto kept = points_by_id(inside.index);
+    const auto found = points_by_id(inside.index);
     std::size_t expected = 0;
     for (const auto& [id, p] : points_by_id(all.index)) {
       const double from_center = (p - region.center_F).norm();
-      ASSERT_GT(std::abs(from_center - 1.5), 1e-9) << "nobody knows";
-      ASSERT_EQ(kept.count(id), from_center < 1.5 ? 1U : 0U) << from_center;
+      ASSERT_GT(std::abs(from_center - 1.5), 1e-9) << "rounding decides about this point";
+      ASSERT_EQ(found.count(id), from_center < 1.5 ? 1U : 0U) << from_center;
       expected += from_center < 1.5;
     }
     EXPECT_GT(expected, 1000U);
@@ -598,7 +606,7 @@ TEST(Ingest, whatIsBeyondTheRegionIsLeftOut) {
   }
 }
 
-TEST(Ingest, aRegionThatIsNoSphereIsRefused) {
+TEST(Ingest, refusesARegionOfInterestThatIsNoSphere) {
   Ingest ingest{IngestConfig()};
   for (const double radius : {kNan, -1.0}) {
     EXPECT_THROW(ingest.set_region_of_interest({Eigen::Vector3d::Zero(), radius}),
@@ -608,7 +616,7 @@ TEST(Ingest, aRegionThatIsNoSphereIsRefused) {
                std::invalid_argument);
 }
 
-TEST(Ingest, badConfigurationIsNamed) {
+TEST(Ingest, namesTheFaultyMemberOfItsConfiguration) {
   const auto fault = [](const IngestConfig& config) -> std::string {
     try {
       Ingest ingest(config);
@@ -634,7 +642,7 @@ TEST(Ingest, badConfigurationIsNamed) {
   EXPECT_NE(fault(config).find("thinning"), std::string::npos);
 }
 
-TEST(Ingest, poseThatIsNotFiniteIsRefused) {
+TEST(Ingest, refusesAPoseThatIsNotFinite) {
   const Message message({{1, 0, 0}}, {});
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   X_FS.translation().x() = kNan;
@@ -689,13 +697,15 @@ void check_cells() {
   }
 }
 
-TEST(Thinning, onePointOfEachOccupiedCell) { test::for_each_instruction_set(check_cells); }
+TEST(Thinning, keepsThePointNearestToTheCentreOfEachOccupiedVoxel) {
+  test::for_each_instruction_set(check_cells);
+}
 
 TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
   IngestConfig config = without_limits();
   config.thinning = 0.05;
   Points points = random_points(5000, 0.5, 10);
-  points.insert(points.end(), points.begin(), points.begin() + 100);  // some twice
+  points.insert(points.end(), points.begin(), points.begin() + 100);  // duplicates
   const auto coordinates = [&config](const Points& cloud) {
     std::set<std::vector<double>> set;
     for (const auto& [id, p] : points_by_id(ingest(cloud, config).coarse)) {
@@ -708,17 +718,17 @@ TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
   EXPECT_EQ(coordinates(points), expected);
 }
 
-// The grid belongs to the fixed frame, not to the sensor or the origin.
+// The voxel grid belongs to the fixed frame, not to the sensor or the index's origin.
 TEST(Thinning, gridStaysWhenTheSensorMoves) {
   IngestConfig config = without_limits();
   const Points points = random_points(3000, 0.3, 11);
   const auto thinned = [&](const Eigen::Vector3d& sensor) {
-    Points seen = points;
-    for (Eigen::Vector3d& p : seen) p -= sensor;
+    Points points_S = points;
+    for (Eigen::Vector3d& p : points_S) p -= sensor;
     Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
     X_FS.translation() = sensor;
     std::set<std::uint32_t> ids;
-    for (const auto& [id, p] : points_by_id(ingest(seen, config, float64(), X_FS).coarse)) {
+    for (const auto& [id, p] : points_by_id(ingest(points_S, config, float64(), X_FS).coarse)) {
       ids.insert(id);
     }
     return ids;
@@ -726,7 +736,7 @@ TEST(Thinning, gridStaysWhenTheSensorMoves) {
   EXPECT_EQ(thinned({0, 0, 0}), thinned({0.25, -7.5, 3.75}));
 }
 
-TEST(Thinning, cellsThatCannotBeNumberedGrow) {
+TEST(Thinning, voxelsGrowUntilTheyCanBeNumbered) {
   IngestConfig config = without_limits();
   config.thinning = 1e-6;
   const CloudSnapshot snapshot =

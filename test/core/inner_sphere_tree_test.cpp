@@ -33,7 +33,7 @@ struct NamedPacking {
   Packing packing;
 };
 
-// Spheres like those of packings, and unusual ones.
+// Sets of spheres: some like those of packings, and unusual ones.
 std::vector<NamedPacking> hard_spheres() {
   test::Rng rng(11);
   std::vector<NamedPacking> all;
@@ -98,7 +98,7 @@ struct LeafSphere {
   double inner_radius, cover_radius;
 };
 
-// Collects all spheres below a child and checks the nodes on the way.
+// Collects all spheres in a child's subtree and checks its nodes.
 class Walk {
  public:
   explicit Walk(const InnerSphereTree& tree) : tree_(tree) {}
@@ -172,8 +172,8 @@ Eigen::Vector3d in_float(const Eigen::Vector3d& p) {
   return {x, y, z};
 }
 
-// Every sphere is in one leaf: its inner sphere holds the leaf's, its cover sphere lies in the
-// leaf's.
+// Every sphere is in one leaf. Its inner sphere contains that of the leaf, and its cover sphere is
+// in that of the leaf.
 void expect_every_sphere(const Packing& packing, std::vector<LeafSphere> found) {
   ASSERT_EQ(found.size(), packing.spheres.size());
   std::vector<LeafSphere> given;
@@ -249,7 +249,7 @@ TEST(InnerSphereTree, SameSpheresSameBytes) {
   }
 }
 
-TEST(InnerSphereTree, SplitsDoNotChangeWhatIsAnswered) {
+TEST(InnerSphereTree, SplitsDoNotChangeTheAnswers) {
   auto model = test::make_model({Shape(test::torus(0.1, 0.03, 32, 16)),
                                  Shape(test::l_shape(0.2, 0.05)), Shape(Cylinder{0.05, 0.2})},
                                 0.004);

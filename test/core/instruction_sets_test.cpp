@@ -1,4 +1,4 @@
-// Every SIMD path that this machine can run gives the same answers.
+// Every instruction set of this machine gives the same answers.
 
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
@@ -75,7 +75,7 @@ TEST_F(InstructionSets, SameAnswers) {
             ASSERT_EQ(results[i].state, first[i].state);
           }
           if (first[i].state == LinkState::kClear) continue;
-          // Float decides which side of a mesh a point at its surface is on.
+          // Float decides on which side of a mesh a point at its surface is.
           ASSERT_NEAR(results[i].distance, first[i].distance, tolerance + 4e-8);
           test::expect_witness(results[i], X_FL[i]);
         }
@@ -110,7 +110,7 @@ TEST_F(InstructionSets, SameDistancesToBoxes) {
       if (first.empty()) first = results;
       for (std::size_t i = 0; i < links.size(); ++i) {
         ASSERT_EQ(results[i].state, first[i].state);
-        if (first[i].state != LinkState::kNear) continue;  // of depths, any in the bounds will do
+        if (first[i].state != LinkState::kNear) continue;  // any depth within the bounds is right
         ASSERT_NEAR(results[i].distance, first[i].distance, 4e-8);
         ++near;
       }

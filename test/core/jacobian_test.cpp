@@ -18,7 +18,7 @@ std::vector<Eigen::Isometry3d> place(const Kinematics& k, const std::vector<doub
                                      const Eigen::Isometry3d& X_FR) {
   JointPoses joints;
   k.place_joints(q, &joints);
-  // Planar and floating joints stand where nothing says otherwise.
+  // Planar and floating joints are at their origin.
   for (std::size_t j = 0; j < joints.known.size(); ++j) {
     if (!k.joints()[j].has_unstated_pose()) continue;
     joints.X_PC[j] = k.joints()[j].X_PJ;
@@ -104,7 +104,7 @@ TEST(Jacobian, randomRobotsAgainstFiniteDifferences) {
   }
 }
 
-TEST(Jacobian, tellsWhosePoseItNeeds) {
+TEST(Jacobian, namesTheBodyWhosePoseItNeeds) {
   RobotDescription robot;
   robot.root_link = "l0";
   const JointType types[] = {JointType::kRevolute, JointType::kFloating, JointType::kPrismatic,
@@ -128,7 +128,7 @@ TEST(Jacobian, tellsWhosePoseItNeeds) {
   known[3] = known[4] = false;
   EXPECT_EQ(first_body_needed(k, known, 4), 4U);
 
-  // What is not needed is not read.
+  // Poses that are not needed are not read.
   auto X_FB = place(k, {0.3, 0.0, 0.1, 0.0}, Eigen::Isometry3d::Identity());
   Jacobian all, some;
   point_jacobian(k, X_FB, 4, X_FB[4].translation(), &all);

@@ -53,7 +53,7 @@ void expect_says(const std::string& text, const std::string& part) {
   EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
 }
 
-// Positions by name; what is left out is NaN.
+// Positions by name of the joint; the other ones are NaN.
 std::vector<double> positions(const Kinematics& k, const std::map<std::string, double>& q) {
   std::vector<double> result(k.joints().size(), kNaN);
   for (const auto& [name, value] : q) result[k.find_joint(name).value()] = value;
@@ -74,7 +74,8 @@ Placed place(const Kinematics& k, const std::map<std::string, double>& q,
 }
 
 TEST(Kinematics, handComputedChain) {
-  // Up 1, bent about y by 90 degrees, out 0.5 along the bent x (which is down), and a fixed tip.
+  // The chain goes up 1 m, turns about y by 90 degrees, goes 0.5 m along the turned x (down), and
+  // ends in a fixed tip.
   const Kinematics k = kinematics(
       links(4) + joint("bend", "revolute", 0, 1, "<origin xyz=\"0 0 1\"/><axis xyz=\"0 2 0\"/>") +
       joint("slide", "prismatic", 1, 2, "<origin xyz=\"0.1 0 0\"/><axis xyz=\"10 0 0\"/>") +
@@ -97,14 +98,14 @@ TEST(Kinematics, chainsOfMimics) {
   const std::string axis = "<axis xyz=\"0 0 1\"/>";
   const Kinematics k = kinematics(
       links(5) +
-      // Named and placed so that those that follow come before the one they follow.
+      // The mimic joints precede the joint that they follow, by name and by place.
       joint("a", "continuous", 0, 1,
             axis + "<mimic joint=\"b\" multiplier=\"-2\" offset=\"0.1\"/>") +
       joint("b", "prismatic", 0, 2, axis + "<mimic joint=\"c\" multiplier=\"3\" offset=\"0.5\"/>") +
       joint("c", "revolute", 2, 3, axis) +
       joint("d", "revolute", 3, 4, axis + "<mimic joint=\"c\"/>"));
   const double c = 0.7, b = 3 * c + 0.5, a = -2 * b + 0.1;
-  // A position of a mimic's own is not listened to.
+  // The position of a mimic joint itself is ignored.
   const Placed placed = place(k, {{"c", c}, {"a", 99.0}, {"b", kNaN}});
   const auto X = [&](const std::string& link) { return placed.bodies.X_FB[*k.find_body(link)]; };
   EXPECT_NEAR(X("l2").translation().z(), b, 1e-15);
@@ -118,7 +119,7 @@ TEST(Kinematics, chainsOfMimics) {
   EXPECT_TRUE(k.joints()[*k.find_joint("c")].is_free());
 }
 
-TEST(Kinematics, whatIsNotKnown) {
+TEST(Kinematics, bodiesBelowUnknownJointsAreUnknown) {
   const Kinematics k =
       kinematics(links(6) + joint("a", "revolute", 0, 1, "") + joint("b", "floating", 1, 2, "") +
                  joint("c", "revolute", 2, 3, "") + joint("d", "planar", 0, 4, "") +
@@ -161,7 +162,7 @@ TEST(Kinematics, faults) {
   expect_says(error_of(links(3) + joint("a", "revolute", 0, 1, "<mimic joint=\"b\"/>") +
                        joint("b", "floating", 1, 2, "")),
               "joint 'a' mimics joint 'b', which has no position");
-  // An axis is of no use to a joint without position, and so not asked for.
+  // A joint without a position needs no axis.
   EXPECT_EQ(error_of(links(2) + joint("a", "fixed", 0, 1, "<axis xyz=\"0 0 0\"/>")), "(no error)");
 }
 

@@ -48,7 +48,7 @@ std::vector<Eigen::Vector3d> by_beam(const CloudSnapshot& snapshot, std::size_t 
   return points;
 }
 
-TEST(LaserScan, BeamsGoWhereTheyPoint) {
+TEST(LaserScan, PointsLieAlongTheirBeams) {
   const std::vector<float> ranges = {1.0F, 2.0F, 0.5F};
   test::Rng rng(1);
   const Eigen::Isometry3d X_FS = test::random_pose(&rng, 3.0);
@@ -62,14 +62,14 @@ TEST(LaserScan, BeamsGoWhereTheyPoint) {
   }
 }
 
-// REP 117, and drivers that say 0 where nothing came back.
-TEST(LaserScan, WhatABeamSays) {
+// Special values follow REP 117. Many drivers write 0 where nothing came back.
+TEST(LaserScan, CountsSpecialValues) {
   const std::vector<float> ranges = {kNaN,  -kInfinity, 0.0F, 0.05F, -1.0F, kInfinity,
                                      11.0F, 0.2F,       7.0F, 1.0F,  10.0F};
   const IngestCounts counts = ingested(scan_of(ranges), 0.5, 5.0).counts;
   EXPECT_EQ(counts.received, ranges.size());
   EXPECT_EQ(counts.not_a_number, 5U) << "NaN, -inf and below range_min";
-  EXPECT_EQ(counts.infinite, 2U) << "+inf and beyond range_max";
+  EXPECT_EQ(counts.infinite, 2U) << "+inf and above range_max";
   EXPECT_EQ(counts.out_of_range, 3U) << "0.2 m, 7 m and 10 m";
   EXPECT_EQ(counts.used, 1U);
   EXPECT_FALSE(counts.saw_nothing());
@@ -79,7 +79,7 @@ TEST(LaserScan, WhatABeamSays) {
   }
 }
 
-// A sensor on a moving arm: all beams hit one fixed wall, each from where the sensor was then.
+// A sensor on a moving arm scans a fixed wall, each beam from the sensor's pose at the beam's time.
 TEST(LaserScan, EachBeamAtItsOwnTime) {
   test::Rng rng(2);
   constexpr std::size_t kBeams = 200;
@@ -115,8 +115,8 @@ TEST(LaserScan, EachBeamAtItsOwnTime) {
   }
 }
 
-// A range limit is about the beam, not about the distance to where the sensor was at first.
-TEST(LaserScan, RangeIsTheBeamsOwn) {
+// Range limits apply to the length of a beam, not to the distance from the sensor's first pose.
+TEST(LaserScan, RangeLimitsApplyToTheBeam) {
   const std::vector<float> ranges(11, 1.0F);
   LaserScan scan = scan_of(ranges);
   scan.time_increment = 0.01;
@@ -156,7 +156,7 @@ TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
   EXPECT_GT(both.counts.on_robot, first.counts.on_robot);
 }
 
-TEST(CheckScan, SaysWhatIsWrong) {
+TEST(CheckScan, NamesTheFaultyMember) {
   const std::vector<float> ranges(5, 1.0F);
   const LaserScan good = scan_of(ranges);
   EXPECT_EQ(check_scan(good), "");

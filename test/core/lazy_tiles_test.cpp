@@ -1,5 +1,4 @@
-// Queries among organized clouds of which no tile is loaded when the first query comes; by several
-// threads, too.
+// Queries of organized clouds whose tiles are lazily loaded, by one and by several threads.
 
 #include <gtest/gtest.h>
 
@@ -23,7 +22,7 @@ namespace {
 
 constexpr std::size_t kWidth = 96, kHeight = 80;
 
-// A wall, a board before it and some pixels that see nothing, as four floats a point.
+// A depth image of a wall, a board in front of it and some NaN pixels, as four floats a point.
 std::shared_ptr<std::vector<float>> depth_image(test::Rng* rng) {
   auto pixels = std::make_shared<std::vector<float>>(4 * kWidth * kHeight);
   const double board = test::uniform(rng, 0.5, 0.7);
@@ -125,7 +124,7 @@ TEST(LazyTiles, LoadingAllocatesNothing) {
   EXPECT_EQ(test::allocations - before, 0);
 }
 
-// All start at tiles that nobody has read.
+// All threads begin when no tile is loaded.
 TEST(LazyTiles, ThreadsGetTheSameAnswers) {
   test::Rng rng(73);
   const Scene scene(&rng);
@@ -150,7 +149,7 @@ TEST(LazyTiles, ThreadsGetTheSameAnswers) {
   }
 }
 
-// A copy needs no message.
+// A copy does not need the message.
 TEST(LazyTiles, CopyHoldsAllPoints) {
   test::Rng rng(75);
   const Scene scene(&rng);

@@ -11,13 +11,13 @@
 namespace ist {
 namespace {
 
-// Where the lens's middle lies between the centres of two spheres, 0 to 1.
+// The position of the lens's middle between the centres of two spheres, from 0 to 1.
 double middle_of_lens(double R, double r, double d) {
   using One = Eigen::Array<double, 1, 1>;
   return lens_middle<One>(One::Constant(R - r), One::Constant(d)).value();
 }
 
-// Both spheres' sections, along the line of their centres.
+// The volume of the lens by integrating the common sections along the line of centres.
 double integrated(double R, double r, double d) {
   const double low = std::max(-R, d - r), high = std::min(R, d + r);
   if (high <= low) return 0.0;
@@ -32,7 +32,7 @@ double integrated(double R, double r, double d) {
   return volume;
 }
 
-TEST(Lens, IsTheVolumeThatBothSpheresHold) {
+TEST(Lens, IsTheVolumeOfTheIntersection) {
   test::Rng rng(21);
   for (int i = 0; i < test::scaled(300); ++i) {
     const double R = test::uniform(&rng, 0.001, 0.2), r = test::uniform(&rng, 0.001, 0.2);
@@ -47,7 +47,7 @@ TEST(Lens, IsTheVolumeThatBothSpheresHold) {
   }
 }
 
-TEST(Lens, HoldsAtTouchContainmentAndCommonCentres) {
+TEST(Lens, IsExactAtTouchContainmentAndCommonCentres) {
   for (const double R : {1e-6, 0.01, 0.1, 10.0}) {
     for (const double ratio : {1e-3, 0.5, 1.0 - 1e-12, 1.0}) {
       const double r = ratio * R, sphere = 4.0 * M_PI / 3.0 * r * r * r;

@@ -122,7 +122,7 @@ TEST(ReadOctree, Files) {
   EXPECT_TRUE(octree.occupied.empty());
 }
 
-TEST(ReadOctree, WhatIsNoTreeIsSaid) {
+TEST(ReadOctree, RefusesOtherMessagesWithAReason) {
   test::Rng rng(53);
   const octomap::OcTree tree = random_tree(&rng, 0.05, 100);
   const std::string full = bytes_of(tree, false), binary = bytes_of(tree, true);
@@ -142,8 +142,8 @@ TEST(ReadOctree, WhatIsNoTreeIsSaid) {
   EXPECT_TRUE(octree.occupied.empty());
 }
 
-// Every length that is too short is noticed.
-TEST(ReadOctree, CutOffAnywhere) {
+// A truncated tree is refused at every length.
+TEST(ReadOctree, RefusesEveryTruncation) {
   test::Rng rng(54);
   octomap::OcTree tree(0.05);
   for (int i = 0; i < 20; ++i) {
@@ -172,7 +172,7 @@ TEST(ReadOctree, CutOffAnywhere) {
   EXPECT_NE(read_octree_file(folder.path().string(), &octree), "");
 }
 
-// Whatever the bytes are, reading ends, and what it takes for leaves are boxes of the map.
+// Reading random bytes ends, and any leaves that it returns are boxes of the map.
 TEST(ReadOctree, RandomBytes) {
   test::Rng rng(55);
   const octomap::OcTree tree = random_tree(&rng, 0.05, 60);

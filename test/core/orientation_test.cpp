@@ -25,7 +25,7 @@ TriangleMesh oriented(TriangleMesh mesh) {
 // [m^3]
 double volume(const TriangleMesh& mesh) { return test::signed_volume(mesh); }
 
-TEST(OrientOutward, FlipsWhatIsInsideOut) {
+TEST(OrientOutward, FlipsShellsThatAreInsideOut) {
   const TriangleMesh sphere = test::icosphere(0.1, 2), cube = test::box({0.1, 0.1, 0.1});
   const double v = volume(sphere);
   EXPECT_NEAR(volume(oriented(inside_out(sphere))), v, 1e-12);
@@ -57,7 +57,7 @@ TEST(OrientOutward, KeepsCavities) {
   EXPECT_NEAR(volume(oriented(two)), volume(nested) + volume(scaled(hollow, 2.0)), 1e-12);
 }
 
-TEST(OrientOutward, KeepsWhatHasNoCertainOutside) {
+TEST(OrientOutward, KeepsMeshesWithoutACertainOutside) {
   const TriangleMesh sphere = test::icosphere(0.1, 2);
   const std::vector<std::pair<std::string, TriangleMesh>> meshes = {
       {"nothing", {}},

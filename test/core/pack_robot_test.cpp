@@ -113,7 +113,7 @@ TEST_F(PackRobotTest, saysWhatIsWrong) {
   EXPECT_NE(said_.find("/nowhere/a.png"), std::string::npos) << said_;
 }
 
-TEST_F(PackRobotTest, aFaultyLinkIsToldAndTheOthersArePacked) {
+TEST_F(PackRobotTest, reportsAFaultyLinkAndPacksTheOthers) {
   std::ofstream(file("half.urdf")) << R"(<robot name="half">
     <link name="good"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
     <link name="bad"><collision><geometry><mesh filename="file:///nowhere.stl"/></geometry>

@@ -73,7 +73,7 @@ void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, 
       outer = std::min(outer, (p - sphere.center).norm() - sphere.cover_radius);
     }
     const double tree_outer = tree.cover_distance(p);
-    ASSERT_LE(tree_outer, outer) << "the float tree may only be more careful";
+    ASSERT_LE(tree_outer, outer) << "rounding to float may only lower the bound";
     ASSERT_GT(tree_outer, outer - 1e-5 * (1.0 + p.norm()));
     if (truth < 0.0) {
       ASSERT_LE(outer, packing.certificate.interior_gap) << p.transpose();
@@ -142,7 +142,7 @@ TEST(PackMesh, InnerSpheresOfClosedMeshesStayInside) {
 
 // Regression: spheres near a hole bulged through it, or came nearer to points in front of it than
 // its rim does, by up to 5 mm on links of the Franka Panda.
-TEST(PackMesh, InnerSpheresKeepAwayFromHoles) {
+TEST(PackMesh, InnerSpheresDoNotProtrudeThroughHoles) {
   const TriangleMesh sphere = test::icosphere(0.1, 2);
   TriangleMesh with_hole = sphere;
   with_hole.triangles.resize(with_hole.triangles.size() - 6);
@@ -297,7 +297,7 @@ TEST(PackMesh, SmallerErrorsTakeMoreSpheresAndLessGap) {
   }
 }
 
-TEST(PackMesh, MaxSpheresReachedFirstIsSaidAndStillHolds) {
+TEST(PackMesh, CertificateHoldsWhenMaxSpheresIsReachedFirst) {
   const TriangleMesh mesh = test::torus(0.1, 0.03, 32, 16);
   PackingConfig config;
   config.max_error = 0.001;
@@ -326,7 +326,7 @@ TEST(PackMesh, SameInputSameSpheres) {
   }
 }
 
-TEST(PackMesh, ReportsProgressAndStopsWhenTold) {
+TEST(PackMesh, ReportsProgressAndCanBeCancelled) {
   double last = 0.0;
   pack_mesh(test::l_shape(0.2, 0.05), {}, [&](double fraction) {
     EXPECT_GE(fraction, last);

@@ -83,7 +83,7 @@ class PackingCacheTest : public testing::Test {
   PackingCache cache_;
 };
 
-TEST_F(PackingCacheTest, returnsWhatWasStored) {
+TEST_F(PackingCacheTest, returnsTheStoredPacking) {
   store(sample_packing());
   std::string warning;
   const auto loaded = cache_.load(kKey, &warning);

@@ -34,7 +34,7 @@ TEST(Penetration, IsTheVolumeTimesTheStiffnessInTheFixedFrame) {
   const Wrench wrench =
       penetration_wrench(answer(LinkState::kContact, -0.01, -0.011), {}, &volume, X_FL, config);
   EXPECT_LT((wrench.force - 5e4 * (X_FL.linear() * volume.weighted_normal)).norm(), 1e-9);
-  // About the link's origin, wherever that is.
+  // The torque is about the link's origin at any pose.
   EXPECT_LT((wrench.torque - 5e4 * (X_FL.linear() * volume.weighted_moment)).norm(), 1e-9);
 }
 
@@ -48,11 +48,11 @@ TEST(Penetration, IsZeroApartAndNaNWhenItIsNotKnown) {
   EXPECT_TRUE(is_unknown(wrench(LinkProximity(), &volume)));
   EXPECT_TRUE(is_zero(wrench(answer(LinkState::kClear, INFINITY, 1.0), nullptr)));
   EXPECT_TRUE(is_zero(wrench(answer(LinkState::kNear, 0.01, 0.009), nullptr)));
-  // The margin is taken off a bound that holds without it.
+  // The margin was subtracted from a bound that holds without it.
   EXPECT_TRUE(is_zero(wrench(answer(LinkState::kNear, 0.001, -0.0199), nullptr)));
   // A deadline passed before it was known whether points are inside.
   EXPECT_TRUE(is_unknown(wrench(answer(LinkState::kNear, 0.01, -0.15), nullptr)));
-  // No disjoint packing yet.
+  // The disjoint packing is not built yet.
   EXPECT_TRUE(is_unknown(wrench(answer(LinkState::kContact, -0.01, -0.011), nullptr)));
 }
 

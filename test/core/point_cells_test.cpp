@@ -1,4 +1,4 @@
-// How a list of points is brought into the order of an index: cells, slices, tiles.
+// The points of an unorganized cloud are sorted into cells, slices and tiles.
 
 #include "cloud/index/point_cells.h"
 
@@ -38,8 +38,8 @@ Cloud in_a_box(std::size_t n, float size, unsigned seed) {
   return numbered(points);
 }
 
-// Each point about half as far from the corner as the one before, over and over: whatever the
-// scale, nearly all are close together.
+// Each point is about half as far from the corner as the one before, repeatedly: at any scale,
+// nearly all points are close together.
 Cloud nested(std::size_t n, int halvings) {
   Cloud points = in_a_box(n, 1.0F, 3);
   for (std::size_t i = 0; i < n; ++i) {
@@ -119,7 +119,8 @@ TEST(PointCells, eachPointIsInOneCell) {
           ASSERT_LT(id, cloud.size());
           ASSERT_TRUE(is_same(cell.points[i], cloud[id]));
           ASSERT_FALSE(seen[id]);
-          ASSERT_TRUE(i == 0 || cell.points[i - 1].id < id) << "in the order they came";
+          ASSERT_TRUE(i == 0 || cell.points[i - 1].id < id)
+              << "the order of the message must be kept";
           seen[id] = true;
         }
       }
@@ -130,7 +131,7 @@ TEST(PointCells, eachPointIsInOneCell) {
   });
 }
 
-// A few points far away are no reason to lay the grid over them.
+// A few far points must not make the grid's cells larger.
 TEST(PointCells, cellsAreSmall) {
   Cloud cloud = with_outliers(in_a_box(100000, 1.0F, 6), 1000.0F);
   Cloud sample(cloud.end() - PointCells::kSample, cloud.end());
@@ -158,7 +159,7 @@ TEST(PointCells, slicesAreInOrderAndHoldEachPoint) {
       Eigen::Index axis;
       const float longest = box.sizes().maxCoeff(&axis);
       if (!slicer.sort(cloud.data(), n, sorted.data())) {
-        EXPECT_LT(longest, 1e-36F) << "these can be told from each other";
+        EXPECT_LT(longest, 1e-36F) << "these points can be distinguished";
         continue;
       }
       std::set<std::uint32_t> ids;
@@ -184,7 +185,7 @@ PointBvh build(const Cloud& cloud) {
   return index;
 }
 
-// The same numbers whatever the processor: no answer may depend on it.
+// Answers may not depend on the instruction set, so the indices are equal.
 TEST(PointCells, indexIsTheSameOnEveryInstructionSet) {
   const std::vector<Cloud> clouds = hard_clouds();
   std::vector<PointBvh> expected;
@@ -210,7 +211,7 @@ float diagonal_of(const PointTile& tile) {
   return box.diagonal().norm();
 }
 
-// Tiles are full and small where points are close together, whatever there is besides.
+// Tiles are full, and small where points are close together, in clouds of any shape.
 TEST(PointCells, tilesOfHardCloudsAreGood) {
   for (const Cloud& cloud : hard_clouds()) {
     const PointBvh index = build(cloud);
@@ -227,8 +228,8 @@ TEST(PointCells, tilesOfHardCloudsAreGood) {
     EXPECT_LT(diagonals[diagonals.size() / 2], 0.4F);
     EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.8F);
   }
-  // The scales of nested clouds do not share tiles, but for few: tiles near the corner are as small
-  // as they are near to it.
+  // Few tiles hold several scales of the nested clouds: a tile's size is in proportion to its
+  // distance from the corner.
   const PointBvh index = build(nested(20000, 40));
   std::size_t large = 0;
   for (const PointTile& tile : test::tiles_of(index)) {

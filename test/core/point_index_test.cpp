@@ -70,7 +70,7 @@ Eigen::AlignedBox3f box_of(const BoxNode& node, int k) {
 
 Eigen::Vector3f point_of(const PointTile& tile, int k) { return {tile.x[k], tile.y[k], tile.z[k]}; }
 
-// Walks down and checks every promise of the header.
+// Traverses the index and checks every statement of the header.
 class Checker {
  public:
   Checker(const Points& points, const PointBvh& index)
@@ -98,7 +98,7 @@ class Checker {
   }
 
  private:
-  // Returns the exact bounds of what is below; the stored box must equal them.
+  // Returns the exact bounds of the subtree; the stored box must equal them.
   Eigen::AlignedBox3f node(std::int32_t i) {
     ++nodes_;
     const BoxNode& node_i = index_.nodes()[static_cast<std::size_t>(i)];
@@ -155,7 +155,7 @@ class Checker {
 
 void check(const Points& points) { Checker(points, build(points)).run(); }
 
-// Distance to the nearest point, and what was visited on the way.
+// Distance to the nearest point, and the numbers of nodes and tiles visited.
 struct Nearest {
   const PointBvh& index;
   Eigen::Vector3f query;
@@ -261,7 +261,7 @@ TEST(PointIndex, tilesDoNotSpanDiscontinuities) {
   EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.08F);
   EXPECT_LT(diagonals.back(), 0.2F);
   EXPECT_GT(static_cast<double>(index.size()) / static_cast<double>(index.tile_count()), 10.0)
-      << "points a tile: cutting must not empty the tiles";
+      << "points a tile: splits must not empty the tiles";
 }
 
 TEST(PointIndex, nearestPointAgainstBruteForce) {
@@ -283,7 +283,7 @@ TEST(PointIndex, nearestPointAgainstBruteForce) {
     nodes += nearest.nodes;
     tiles += nearest.tiles;
   }
-  // Measured: 6.2 and 4.7. Uncut and grouped along the Morton order alone: 9.5 and 9.1.
+  // Measured: 6.2 and 4.7. In Morton order without splits, it would be 9.5 and 9.1.
   EXPECT_LT(nodes / kQueries, 7.5);
   EXPECT_LT(tiles / kQueries, 5.5);
 }
@@ -365,7 +365,7 @@ TEST(PointIndex, filterDropsPointsOneByOne) {
     }
   }
   EXPECT_EQ(found, expected);
-  EXPECT_LE(index.bounds().max().x(), 0.2F) << "boxes must shrink to what is left";
+  EXPECT_LE(index.bounds().max().x(), 0.2F) << "boxes must shrink to the remaining points";
 }
 
 TEST(PointIndex, filterThatDropsAll) {

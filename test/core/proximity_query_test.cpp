@@ -49,7 +49,7 @@ std::vector<Eigen::Vector3d> random_cloud(test::Rng* rng, int kind, int count) {
   return points;
 }
 
-// Points as the index holds them: what a query can be exact about.
+// The points in float as the index stores them: a query is exact about these.
 std::vector<Eigen::Vector3d> stored_points(const CloudSnapshot& snapshot,
                                            const Eigen::Isometry3d& X_LF) {
   std::vector<Eigen::Vector3d> points;
@@ -88,7 +88,7 @@ TEST_P(AgainstOracle, RandomScenes) {
   for (int scene = 0; scene < 60; scene += test::kSanitized ? 6 : 1) {
     const CloudSnapshot snapshot =
         test::make_snapshot(random_cloud(&rng, scene, 1 + scene * 7), test::random_vector(&rng, 1));
-    for (int step = 0; step < 4; ++step) {  // later steps start warm
+    for (int step = 0; step < 4; ++step) {  // later steps have a warm start
       for (Eigen::Isometry3d& X : X_FL) {
         X = step == 0 ? test::random_pose(&rng, 0.4)
                       : Eigen::Isometry3d(X * test::random_pose(&rng, 0.01));
@@ -119,8 +119,8 @@ TEST_P(AgainstOracle, RandomScenes) {
   EXPECT_GT(contact, test::scaled(50));
 }
 
-// Many points are about equally near, the more the farther they are; through a hole, inner spheres
-// may come nearer to a point than the mesh.
+// Many points of a plane are about equally near to a link, and the farther it is the more of them.
+// Through the hole of the open box, an inner sphere may be nearer to a point than the mesh is.
 TEST_P(AgainstOracle, FlatObstaclesNearAndFar) {
   const double tolerance = GetParam();
   test::Rng rng(12);
@@ -225,13 +225,13 @@ TEST(ProximityQuery, SeveralCloudsAreOneObstacle) {
   EXPECT_NEAR(results[1].distance, 0.45, 1e-6);
   EXPECT_EQ(results[0].source, 2);
   query.run(X_FL, {true, true}, {&far}, &results);
-  EXPECT_NEAR(results[0].distance, 0.8, 1e-6) << "the point of the other cloud is gone";
+  EXPECT_NEAR(results[0].distance, 0.8, 1e-6) << "the nearest cloud is no longer given";
   query.run(X_FL, {true, true}, {&nothing}, &results);
   EXPECT_EQ(results[0].state, LinkState::kClear);
   EXPECT_EQ(results[0].lower_bound, config.max_distance);
 }
 
-TEST(ProximityQuery, WhatIsNotKnownIsUnknown) {
+TEST(ProximityQuery, LinksWithoutPoseGeometryOrCloudAreUnknown) {
   const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}}, 0.005);
   model->links[1].error = "mesh is missing";
   ProximityQuery query(model, {});
@@ -355,7 +355,7 @@ TEST(ProximityQuery, LateAnswersSayOnWhichSideTheirPointIs) {
   EXPECT_GT(contacts, test::kSanitized ? -1 : 100);
 }
 
-TEST(ProximityQuery, FarFromTheOriginNothingIsLost) {
+TEST(ProximityQuery, DistancesAreTheSameFarFromTheOrigin) {
   test::Rng rng(15);
   const auto model = test::make_model(shapes_of(link_meshes()), 0.005);
   QueryConfig config;
@@ -403,14 +403,14 @@ TEST(ProximityQuery, PointsOnTheSurfaceAndAtCentres) {
   }
 }
 
-TEST(IsRigid, RefusesWhatIsNoRotation) {
+TEST(IsRigid, RefusesScaledReflectedAndNonFinitePoses) {
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
   EXPECT_TRUE(is_rigid(X));
   X.linear() *= 1.001;
   EXPECT_FALSE(is_rigid(X)) << "scaled";
   X.setIdentity();
   X.linear()(2, 2) = -1.0;
-  EXPECT_FALSE(is_rigid(X)) << "mirrored";
+  EXPECT_FALSE(is_rigid(X)) << "reflected";
   X.setIdentity();
   X.translation().y() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(is_rigid(X));

@@ -1,4 +1,5 @@
-// The robot's minimum, one link, tolerances as a share, and batches, against brute force.
+// Queries of the robot's minimum, of one link, with relative tolerances and in batches, against
+// brute force.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +27,7 @@ std::shared_ptr<RobotModel> model_of(const std::vector<TriangleMesh>& meshes) {
   return test::make_model({meshes.begin(), meshes.end()}, 0.005);
 }
 
-// A table below and things about, in the fixed frame.
+// Half of the points lie in a plane below the links, the others anywhere; fixed frame.
 std::vector<Eigen::Vector3d> random_points(test::Rng* rng, int count) {
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < count; ++i) {
@@ -67,7 +68,7 @@ TEST_P(QueryModes, AgainstBruteForce) {
     const std::vector<Eigen::Vector3d> points = random_points(&rng, scene < 8 ? 2 : 4 * scene);
     const CloudSnapshot cloud = test::make_snapshot(points);
     std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
-    for (int step = 0; step < 3; ++step) {  // later steps start warm
+    for (int step = 0; step < 3; ++step) {  // later steps have a warm start
       for (Eigen::Isometry3d& X : X_FL) X = X * test::random_pose(&rng, 0.01);
       double least = std::numeric_limits<double>::infinity();
       for (std::size_t i = 0; i < meshes.size(); ++i) {
@@ -111,7 +112,7 @@ TEST_P(QueryModes, AgainstBruteForce) {
 
 INSTANTIATE_TEST_SUITE_P(Tolerances, QueryModes, ::testing::Values(0.0, 0.001, 0.02));
 
-TEST(RobotMinimum, SaysWhatItDoesNotKnow) {
+TEST(RobotMinimum, ReportsUnknownLinks) {
   const auto model = model_of({test::box({0.2, 0.2, 0.2}), test::box({0.2, 0.2, 0.2})});
   ProximityQuery query(model, {});
   std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
@@ -164,10 +165,10 @@ TEST(RelativeTolerance, WidensWithTheDistance) {
       ASSERT_EQ(results[i].state == LinkState::kContact, truth < 0.0);
     }
   }
-  EXPECT_LT(wide_pairs, narrow_pairs) << "the tolerance is made use of";
+  EXPECT_LT(wide_pairs, narrow_pairs) << "a wider tolerance must prune more node pairs";
 }
 
-TEST(ProximityBatch, EqualsOneByOne) {
+TEST(ProximityBatch, EqualsOneQueryPerConfiguration) {
   test::Rng rng(33);
   const auto model = model_of(link_meshes());
   const std::size_t links = model->links.size();

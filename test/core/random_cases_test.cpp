@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-// Float tells on which side of a mesh's surface a point is.
+// The rounding error of float, which decides on which side of a mesh's surface a point is.
 constexpr double kRounding = 2e-8;
 
 QueryConfig random_config(test::Rng* rng) {
@@ -25,7 +25,7 @@ QueryConfig random_config(test::Rng* rng) {
 
 TEST(RandomCases, BoundsHoldAndZeroToleranceIsExact) {
   const int wanted = test::scaled(100000);
-  constexpr int kSteps = 3;  // later ones start warm
+  constexpr int kSteps = 3;  // later ones have a warm start
   test::Rng rng(41);
   const std::vector<LinkGeometry> links = test::random_links(&rng);
   const auto model = test::model_of(links, 0.01);
@@ -34,7 +34,7 @@ TEST(RandomCases, BoundsHoldAndZeroToleranceIsExact) {
   std::vector<LinkProximity> results;
   int cases = 0, contacts = 0, clear = 0;
   while (cases < wanted) {
-    // One link at a time sees its own cloud; the others are unknown.
+    // One link at a time is queried with its own cloud; the others are UNKNOWN.
     for (std::size_t i = 0; i < count; ++i) {
       std::vector<bool> known(count, false);
       known[i] = true;

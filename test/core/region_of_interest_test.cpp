@@ -1,4 +1,5 @@
-// The region of interest: points outside are discarded, and answers say what is not known there.
+// The region of interest: points outside are discarded, and answers account for what is unknown
+// there.
 
 #include "ist_proximity/robot/robot_region.h"
 
@@ -42,7 +43,7 @@ struct Arm {
   std::shared_ptr<RobotModel> model;
 };
 
-TEST(Reach, NoLinkGetsFarther) {
+TEST(KinematicReach, BoundsEveryLinkInEveryConfiguration) {
   test::Rng rng(5);
   for (int k = 0; k < test::scaled(60); ++k) {
     const Arm arm(&rng, 6);
@@ -83,7 +84,7 @@ JointDescription joint(JointType type, const std::string& parent, const std::str
   return result;
 }
 
-TEST(Reach, OfAnArmThatIsStretched) {
+TEST(KinematicReach, OfAStretchedArm) {
   RobotDescription arm;
   arm.root_link = "l0";
   arm.joints = {joint(JointType::kRevolute, "l0", "l1", {0.0, 0.0, 0.3}),
@@ -99,8 +100,8 @@ TEST(Reach, OfAnArmThatIsStretched) {
   EXPECT_EQ(kinematic_reach(*model, Kinematics(arm)), kInfinity);
 }
 
-// The root stands still in the frames that fixed joints hang on it, and in no others.
-TEST(RegionOfInterest, OnlyInFramesThatStandStill) {
+// The root stands still in the frames that are fixed to it, and in no others.
+TEST(RegionOfInterest, ExistsOnlyInFramesFixedToTheRoot) {
   RobotDescription robot;
   robot.root_link = "world";
   robot.joints = {joint(JointType::kFixed, "world", "l0", {1.0, 2.0, 3.0}),
@@ -120,8 +121,8 @@ TEST(RegionOfInterest, OnlyInFramesThatStandStill) {
   EXPECT_EQ(at_base.radius, at_root.radius);
 }
 
-// Links about the edge of what is kept: what is said holds for all points, also for those left out.
-TEST(RegionOfInterest, WhatIsBeyondIsNotKnown) {
+// Links are near the region's border. Bounds must hold for all points, also for the discarded ones.
+TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
   test::Rng rng(17);
   const std::vector<TriangleMesh> meshes = {test::l_shape(0.2, 0.05), test::icosphere(0.08, 2)};
   const auto model = test::make_model({meshes.begin(), meshes.end()}, 0.005);

@@ -21,12 +21,12 @@ LinkProximity near_by(double distance) {
   return proximity;
 }
 
-// Deep in the influence distance, where nothing fades.
+// The distance is far below the influence distance, where the length does not fade.
 const LinkProximity kNear = near_by(0.1);
 
 RepulsiveWrench push(double x) { return {Vector3d(x, 0.0, -0.5 * x), Vector3d(0.0, 2.0 * x, 0.0)}; }
 
-TEST(RepulsionFilter, passesWhatTheRobotsMotionChanges) {
+TEST(RepulsionFilter, passesChangesByTheRobotsMotion) {
   RepulsionFilter filter;
   for (int i = 0; i < 200; ++i) {
     const RepulsiveWrench raw = push(0.3 * std::sin(0.1 * i));
@@ -36,7 +36,7 @@ TEST(RepulsionFilter, passesWhatTheRobotsMotionChanges) {
   }
 }
 
-TEST(RepulsionFilter, spreadsWhatACloudChanges) {
+TEST(RepulsionFilter, spreadsChangesByANewCloud) {
   RepulsionConfig config;
   config.filter_time = 0.08;
   RepulsionFilter filter;
@@ -48,17 +48,18 @@ TEST(RepulsionFilter, spreadsWhatACloudChanges) {
     EXPECT_GE(done, last) << i;
     EXPECT_LE(done, 1.0) << "no overshoot";
     EXPECT_LE(done - last, 0.74 * kStep / config.filter_time + 1e-12) << i;
-    // The closed form, and force and torque as one.
+    // Force and torque follow the closed form.
     const double t = kStep * i / (0.5 * config.filter_time);
     EXPECT_NEAR(done, 1.0 - (1.0 + t) * std::exp(-t), 1e-12);
     EXPECT_NEAR(out.torque.y(), 2.0 * out.force.x(), 1e-12);
     delay += (1.0 - done) * kStep;
     last = done;
   }
-  EXPECT_NEAR(delay, config.filter_time, kStep) << "the mean delay is what the parameter says";
+  EXPECT_NEAR(delay, config.filter_time, kStep) << "the mean delay is filter_time";
 }
 
-// A cloud at every update, and longer than the filter's time between them: no delay builds up.
+// Each update has a new cloud, and more than the filter's time is between them: the delay does not
+// grow.
 TEST(RepulsionFilter, slowUpdatesAreHardlyDelayed) {
   RepulsionFilter filter;
   for (int i = 0; i < 20; ++i) {
@@ -74,14 +75,15 @@ TEST(RepulsionFilter, followsARampWithItsDelay) {
   RepulsionConfig config;
   config.filter_time = 0.05;
   RepulsiveWrench out;
-  for (int i = 0; i <= 1000; ++i) {  // an obstacle that nears for a second, seen anew every 2 ms
+  for (int i = 0; i <= 1000;
+       ++i) {  // an obstacle approaches for a second, with a new cloud every 2 ms
     out = filter.update(kStep * i, static_cast<std::uint64_t>(i / 2), push(0.4e-3 * (i - i % 2)),
                         kNear, config);
   }
   EXPECT_NEAR(out.force.x(), 0.4 * (1.0 - config.filter_time), 0.4 * 2.1e-3);
 }
 
-TEST(RepulsionFilter, whatIsBeyondTheInfluenceDistanceRepelsNothingAtOnce) {
+TEST(RepulsionFilter, repulsionEndsAtOnceOutsideTheInfluenceDistance) {
   LinkProximity clear;
   clear.state = LinkState::kClear;
   clear.distance = std::numeric_limits<double>::infinity();
@@ -89,12 +91,12 @@ TEST(RepulsionFilter, whatIsBeyondTheInfluenceDistanceRepelsNothingAtOnce) {
     RepulsionFilter filter;
     filter.update(0.0, 1, push(0.8), kNear, {});
     EXPECT_TRUE(filter.update(kStep, 2, {}, gone, {}).force.isZero(0.0));
-    // And comes back smoothly: what is seen in one cloud and not in the next one flickers less.
+    // It returns smoothly, so an obstacle that is missing in one cloud makes less flicker.
     const RepulsiveWrench back = filter.update(2 * kStep, 3, push(0.8), kNear, {});
     EXPECT_GT(back.force.x(), 0.0);
     EXPECT_LT(back.force.x(), 0.01);
   }
-  // On the way there the length fades, however much the filter holds.
+  // The length fades towards the influence distance, whatever the filter holds.
   RepulsionFilter filter;
   filter.update(0.0, 1, push(0.8), kNear, {});
   double last = filter.update(kStep, 2, push(0.01), near_by(0.269), {}).force.norm();
@@ -128,7 +130,7 @@ TEST(RepulsionFilter, startsAnew) {
   fresh(filter.update(4.4, 6, raw, kNear, off), raw);
 }
 
-TEST(RepulsionFilter, tellsCloudsApart) {
+TEST(RepulsionFilter, recognizesNewClouds) {
   const CloudSnapshot a = test::make_snapshot({{0, 0, 0}}), b = test::make_snapshot({{0, 0, 0}});
   CloudSnapshot map;
   auto boxes = std::make_shared<BoxIndex>();
@@ -136,7 +138,7 @@ TEST(RepulsionFilter, tellsCloudsApart) {
   map.boxes = boxes;
   const std::uint64_t key = obstacles_key({&a, &map});
   EXPECT_EQ(key, obstacles_key({&a, &map}));
-  CloudSnapshot moved = map;  // a map's frame moves as the robot drives: no other map
+  CloudSnapshot moved = map;  // the map's frame moves as the robot drives, but it is the same map
   moved.X_FM.translation().x() = 1.0;
   EXPECT_EQ(key, obstacles_key({&a, &moved}));
   for (const auto& other : {obstacles_key({&b, &map}), obstacles_key({&a}),

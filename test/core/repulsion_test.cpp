@@ -73,7 +73,7 @@ struct Weighted {
   double weight;
 };
 
-// The points of a cloud, by how much of its cell a surface through each covers.
+// The thinned points of a cloud, each weighted by how much of its cell a surface through it covers.
 std::vector<Weighted> weighted_points(const CloudSnapshot& cloud) {
   std::vector<Weighted> all;
   for (const PointTile& tile : test::tiles_of(cloud.coarse)) {
@@ -88,7 +88,7 @@ std::vector<Weighted> weighted_points(const CloudSnapshot& cloud) {
   return all;
 }
 
-// What the formula in the header says, pair by pair in double.
+// The formula in the header, evaluated pair by pair in double.
 struct Expected {
   double nearest = kInf;  // [m] smallest distance
   Vector3d nearest_direction = Vector3d::Zero();
@@ -187,16 +187,16 @@ TEST(Repulsion, agreesWithTheFormula) {
     Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
     X_FL.rotate(Eigen::AngleAxisd(5.0 * u(random), Vector3d(1, 2, 3).normalized()));
     const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
-    const RepulsiveWrench push = repulsion.wrench(0, X_FL, {&cloud}, near_by(e.nearest), config);
+    const RepulsiveWrench wrench = repulsion.wrench(0, X_FL, {&cloud}, near_by(e.nearest), config);
     const double length = config.gain * std::min(1.0, 1.0 - e.nearest);
-    ASSERT_LT((push.force - length * e.blend).norm(), 2e-4) << trial;
-    ASSERT_LT((push.torque - length * e.torque).norm(), 2e-4) << trial;
+    ASSERT_LT((wrench.force - length * e.blend).norm(), 2e-4) << trial;
+    ASSERT_LT((wrench.torque - length * e.torque).norm(), 2e-4) << trial;
   }
 }
 
-// A bar slides between two walls, and past a third. The direction of the nearest pair jumps by 94
-// degrees in one step of 0.12 mm where two walls are equally near, and the vector with it by 0.79;
-// blended it moves by 0.005 at most.
+// A bar slides between two walls, and past a third. With the nearest pair alone, the direction
+// would jump by 94 degrees and the vector by 0.79 in one step of 0.12 mm where two walls are
+// equally near. The blended vector changes by 0.005 at most.
 TEST(Repulsion, isContinuousPastTwoEquallyNearObstacles) {
   std::vector<Vector3d> points = wall({0, 0, -0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02);
   for (const Vector3d& p : wall({0, 0, 0.15}, Vector3d::UnitX(), Vector3d::UnitY(), 0.02)) {
@@ -234,8 +234,8 @@ TEST(Repulsion, symmetricSqueezeCancels) {
   EXPECT_LT(repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.05), {}).norm(), 1e-6);
 }
 
-// Weights are normalized, so twice the points push no harder; and the obstacle's edges show up in
-// the direction by no more than a few percent.
+// Weights are normalized, so twice the points give the same force. The obstacle's edges change it
+// by a few percent at most.
 TEST(Repulsion, doesNotDependOnDensity) {
   const Repulsion repulsion(robot_of(bar()));
   const auto over_a_wall = [&repulsion](double spacing, const Vector3d& p) {
@@ -254,9 +254,9 @@ TEST(Repulsion, doesNotDependOnDensity) {
   }
 }
 
-// A sphere of radius 0.15 m, seen at `count` points, thinned as clouds are.
-CloudSnapshot seen_sphere(int count) {
-  std::mt19937 random(9);  // fewer points are the first of more
+// A cloud of `count` points on a sphere of radius 0.15 m, thinned by Ingest.
+CloudSnapshot sphere_cloud(int count) {
+  std::mt19937 random(9);  // a smaller cloud holds the first points of a larger one
   std::normal_distribution<double> normal;
   std::vector<float> data;
   for (int i = 0; i < count; ++i) {
@@ -279,11 +279,11 @@ CloudSnapshot seen_sphere(int count) {
   return cloud;
 }
 
-// At 1 m/s and 1 kHz, past a sphere and turning: direction and length change little in each step,
-// and half or twice as many points change either little (doc/repulsion.md).
+// A bar turns and passes a sphere at 1 m/s, in steps of 1 ms. Direction and length change little in
+// each step, and little with half or twice as many points (doc/repulsion.md).
 TEST(Repulsion, isSmoothAndIndependentOfTheNumberOfPoints) {
-  const CloudSnapshot cloud = seen_sphere(12000), half = seen_sphere(6000),
-                      twice = seen_sphere(24000);
+  const CloudSnapshot cloud = sphere_cloud(12000), half = sphere_cloud(6000),
+                      twice = sphere_cloud(24000);
   const std::vector<InnerSphere> spheres = bar();
   const Repulsion repulsion(robot_of(spheres));
   Vector3d last = Vector3d::Zero();
@@ -321,7 +321,7 @@ TEST(Repulsion, contactIsBoundedAndContinuous) {
     const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(-z - 0.1), config);
     EXPECT_LE(v.norm(), 2.0 * (1.0 + 1e-6));
     EXPECT_LT((v - last).norm(), 0.01);
-    EXPECT_GT(v.z(), 0.0) << "the way out of the sphere is away from the point";
+    EXPECT_GT(v.z(), 0.0) << "the force points out of the obstacle, away from the point";
     last = v;
   }
   EXPECT_NEAR(last.norm(), 2.0, 1e-5);
@@ -363,7 +363,7 @@ TEST(Repulsion, severalCloudsAreOneObstacle) {
   EXPECT_LT((together - apart).norm(), 1e-4);
 }
 
-// Leaves of a map count with the point that is nearest to each sphere.
+// A leaf of a map counts with its point nearest to each sphere.
 TEST(Repulsion, boxesAgreeWithTheFormula) {
   std::mt19937_64 rng(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -407,7 +407,7 @@ TEST(Repulsion, boxesAgreeWithTheFormula) {
   }
 }
 
-// Along a shelf of leaves of all sizes the vector turns a little at a time.
+// The vector turns little in each step along a row of leaves of different sizes.
 TEST(Repulsion, isContinuousAlongBoxes) {
   std::vector<Eigen::AlignedBox3d> boxes;
   for (int i = -10; i < 10; ++i) {
@@ -444,8 +444,8 @@ TEST(Repulsion, losesNothingFarFromTheFixedFramesOrigin) {
             1e-5);
 }
 
-// Nothing to sum over: the link's own direction is the best that is known.
-TEST(Repulsion, withoutPairsTheLinksDirectionServes) {
+// There are no pairs to sum over, so the direction is that of the distance query.
+TEST(Repulsion, withoutPairsItHasTheDirectionOfTheQuery) {
   const Repulsion repulsion(robot_of({}));
   const CloudSnapshot cloud = cloud_of({{0, 0, 0}}), empty = cloud_of({});
   const Vector3d v = repulsion(0, at({0, 0, 0}), {&cloud}, near_by(0.15, Vector3d::UnitY()), {});
@@ -472,15 +472,15 @@ TEST(CoarseSpheres, beginWithTheLargestAndSpread) {
   EXPECT_GT(in_second, 15);
   EXPECT_LT(in_second, 35);
   for (const InnerSphere& b : packing.spheres) {
-    double beyond = kInf;
+    double protrusion = kInf;
     for (const InnerSphere& c : chosen) {
-      beyond = std::min(beyond, (b.center - c.center).norm() + b.radius - c.radius);
+      protrusion = std::min(protrusion, (b.center - c.center).norm() + b.radius - c.radius);
     }
-    EXPECT_LT(beyond, 0.1);
+    EXPECT_LT(protrusion, 0.1);
   }
 }
 
-TEST(CoarseSpheres, endWhenTheRestLiesWithin) {
+TEST(CoarseSpheres, endWhenTheOtherSpheresAreInsideThem) {
   Packing packing;
   EXPECT_TRUE(coarse_spheres(packing, 50).empty());
   packing.spheres = {sphere(0, 0, 0, 0.01), sphere(0, 0, 0, 0.1), sphere(0.05, 0, 0, 0.02),

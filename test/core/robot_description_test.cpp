@@ -32,7 +32,7 @@ std::string collision(const std::string& shape, const std::string& origin = "") 
   return "<collision>" + origin + "<geometry>" + shape + "</geometry></collision>";
 }
 
-// A sound link and, below it, one to be tried.
+// A URDF of a valid link and, below it, the link under test.
 std::string with_link(const std::string& content) {
   return robot("<link name=\"good\">" + collision("<sphere radius=\"0.1\"/>") +
                "</link><link name=\"tried\">" + content + "</link>" + fixed_joint("good", "tried"));
@@ -52,7 +52,7 @@ std::string structure_error(const std::string& urdf) {
   return "(no error)";
 }
 
-// The error of the link that is tried; the sound one must come through.
+// The error of the link under test; the valid link must be read all the same.
 std::string link_error(const std::string& content) {
   const RobotDescription description = parse(with_link(content));
   EXPECT_EQ(description.links.size(), 2U);
@@ -144,7 +144,7 @@ TEST(RobotDescription, aFaultyCollisionElementIsNotReplacedByTheVisual) {
               "radius is 0 m");
 }
 
-TEST(RobotDescription, ignoresWhatGeometryDoesNotNeed) {
+TEST(RobotDescription, ignoresElementsThatAreNoGeometry) {
   const RobotDescription description = parse(robot(
       "<material/><material name=\"x\"><color rgba=\"red\"/></material><gazebo><link/></gazebo>"
       "<link name=\"a\"><inertial><mass value=\"heavy\"/></inertial><visual><geometry>"
@@ -208,7 +208,7 @@ TEST(RobotDescription, loadsMeshesWithTheirScale) {
   EXPECT_NEAR(test::signed_volume(std::get<TriangleMesh>(element.shape)), 0.006, 1e-9);
 }
 
-TEST(RobotDescription, doubtsMeshesInMillimetres) {
+TEST(RobotDescription, warnsAboutMeshesInMillimetres) {
   const test::TempDir dir;
   const std::string file = dir.write("a.stl", test::binary_stl(test::box({100, 200, 300})));
   const auto mesh = [&](const std::string& scale) {
@@ -233,7 +233,7 @@ TEST(RobotDescription, doubtsMeshesInMillimetres) {
   EXPECT_TRUE(doubtful_sizes(description, {"right", "floor"}).empty());
 }
 
-TEST(RobotDescription, refusesWhatIsNoUrdf) {
+TEST(RobotDescription, refusesTextThatIsNoUrdf) {
   expect_says(structure_error(""), "empty");
   expect_says(structure_error(" \n"), "empty");
   expect_says(structure_error("not XML"), "not well-formed");

@@ -43,7 +43,7 @@ LinkDescription link(const std::string& name, LinkGeometry geometry) {
   return result;
 }
 
-// Two equal fingers (one of them turned round), a hand of two elements, and a faulty link.
+// A robot of two equal fingers (one of them turned), a hand of two elements, and a faulty link.
 RobotDescription gripper() {
   RobotDescription robot;
   robot.name = "gripper";
@@ -219,7 +219,7 @@ TEST(RobotModel, worksWithoutACacheThatCannotBeWritten) {
   EXPECT_NE(warnings[0].find(config.cache_directory), std::string::npos) << warnings[0];
 }
 
-TEST(RobotModel, warnsOfFallbackAndOfSpheresThatDidNotSuffice) {
+TEST(RobotModel, warnsAboutVisualFallbackAndTooFewSpheres) {
   RobotDescription robot = gripper();
   robot.links[1].used_visual_fallback = true;
   RobotModelConfig config;
@@ -235,7 +235,7 @@ TEST(RobotModel, warnsOfFallbackAndOfSpheresThatDidNotSuffice) {
   EXPECT_NE(warnings[1].find("max_spheres (10)"), std::string::npos) << warnings[1];
   EXPECT_NE(warnings[1].find(" mm"), std::string::npos) << warnings[1];
   warnings.clear();
-  config.links = {"hand"};  // the fallback of links that are not monitored is nobody's concern
+  config.links = {"hand"};  // no warning for links that are not monitored
   config.packing.max_spheres = 20000;
   build_robot_model(robot, config, callbacks);
   EXPECT_TRUE(warnings.empty());
@@ -272,7 +272,7 @@ TEST(RobotModel, canBeCancelled) {
   callbacks.cancelled = [] { return true; };
   EXPECT_EQ(build_robot_model(gripper(), {}, callbacks), nullptr);
 
-  // On the way; what was left half done must not be found by the next start.
+  // Cancelled while it packs: the next start must not find a partial packing.
   const test::TempDir dir;
   RobotModelConfig config;
   config.cache_directory = dir.file("cache");
@@ -290,13 +290,13 @@ TEST(RobotModel, canBeCancelled) {
   }
 }
 
-TEST(RobotModel, passesOnWhatCallbacksThrow) {
+TEST(RobotModel, passesOnExceptionsOfCallbacks) {
   RobotModelCallbacks callbacks;
   callbacks.progress = [](const ModelProgress&) { throw std::runtime_error("stop it"); };
   EXPECT_THROW(build_robot_model(gripper(), {}, callbacks), std::runtime_error);
 }
 
-TEST(RobotModel, refusesAPackingThatCannotBe) {
+TEST(RobotModel, refusesAnInvalidPackingConfiguration) {
   RobotModelConfig config;
   config.packing.max_error = 0.0;
   EXPECT_THROW(build_robot_model(gripper(), config), ModelError);

@@ -1,4 +1,4 @@
-// The axes of an index lie along the scene's surfaces, and say nothing of what is measured.
+// The axes of an index lie along the scene's surfaces, and do not change any answer.
 
 #include "cloud/index/scene_axes.h"
 
@@ -63,7 +63,7 @@ Image corner(const Eigen::Matrix3d& R_SR, double noise, test::Rng* rng) {
   return image;
 }
 
-// The angle [rad] to the nearest axis.
+// The angle [rad] between a direction and the nearest axis.
 double to_nearest(const Eigen::Matrix3d& axes, const Eigen::Vector3d& normal) {
   return std::acos(std::min((axes.transpose() * normal).cwiseAbs().maxCoeff(), 1.0));
 }
@@ -83,7 +83,7 @@ TEST(SceneAxes, LieAlongWalls) {
         if (image.share[axis] < 0.25) continue;
         EXPECT_LT(to_nearest(R_FO, R_FS * R_SR.col(axis)), 0.05) << k << ", list: " << as_list;
       }
-      // Named after the fixed frame's axes that they are nearest to: never turned by half a turn.
+      // Each axis is the one nearest to that axis of the fixed frame.
       EXPECT_GT(R_FO.diagonal().maxCoeff(), 0.5);
     }
   }
@@ -105,7 +105,7 @@ TEST(SceneAxes, AreTheFixedFramesWhereNothingIsFlat) {
     EXPECT_EQ(scene_axes(noise.raw(as_list), R_FS, !as_list), none);
   }
   EXPECT_EQ(scene_axes(few.raw(true), R_FS, false), none);
-  Image line;  // what a planar scanner sees of a wall
+  Image line;  // a planar scan of a wall
   for (int i = 0; i < 1000; ++i) {
     line.xyz.insert(line.xyz.end(), {1.0F, 0.002F * static_cast<float>(i), 0.0F});
   }
@@ -113,8 +113,8 @@ TEST(SceneAxes, AreTheFixedFramesWhereNothingIsFlat) {
   EXPECT_EQ(scene_axes(Image().raw(true), R_FS, false), none);
 }
 
-// The thinned cloud's cells are the fixed frame's, whatever the index's axes are: it is the same
-// from cloud to cloud.
+// The voxels of thinning belong to the fixed frame, whatever the index's axes are, and stay the
+// same from cloud to cloud.
 TEST(SceneAxes, DoNotTurnTheThinnedCloud) {
   test::Rng rng(6);
   const Eigen::Matrix3d R_SR = test::random_pose(&rng, 0.0).linear();
@@ -124,7 +124,7 @@ TEST(SceneAxes, DoNotTurnTheThinnedCloud) {
   Ingest(test::whole_cloud(true)).run(image.raw(false), X_FS, {}, 0.0, &snapshot);
   EXPECT_GT((snapshot.index.X_FO().linear() - Eigen::Matrix3d::Identity()).norm(), 0.1);
   EXPECT_EQ(snapshot.coarse.X_FO().linear(), Eigen::Matrix3d::Identity());
-  // One of a cell's points, and the nearest to its centre but for rounding.
+  // The thinned cloud holds one point of each voxel: up to rounding, the nearest to its centre.
   const double cell = snapshot.thinning;
   const auto cell_of = [&](const Eigen::Vector3d& p) {
     return Eigen::Vector3d((p / cell).array().floor());

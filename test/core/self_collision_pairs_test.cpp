@@ -50,7 +50,7 @@ struct Robot {
   }
 };
 
-TEST(SelfCollisionPairs, leavesOutAdjacentAndRigidOnes) {
+TEST(SelfCollisionPairs, excludesAdjacentAndRigidlyConnectedLinks) {
   const Robot robot;
   // Adjacent: base-a, a-b (plain does not count), b-tip (rigid as well), base-c.
   const Names all = {"base-b", "base-tip", "a-tip", "a-c", "b-c", "tip-c"};
@@ -85,8 +85,8 @@ TEST(SelfCollisionPairs, inContactAtRest) {
   EXPECT_EQ(robot.names(found), Names{"a-c"});
 }
 
-// Two carts with a tool each, one cart floating: where they are at zero says nothing of where they
-// are.
+// Two carts with a tool each, of which one floats: their pose relative to each other at zero means
+// nothing.
 TEST(SelfCollisionPairs, floatingBodiesHaveNoRest) {
   const auto sphere = [](const std::string& name) {
     return "<link name='" + name +

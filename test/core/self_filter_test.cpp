@@ -28,8 +28,8 @@ LinkModel link_of(const std::string& name, const Shape& shape, double max_error)
   return link;
 }
 
-// Coarsely packed, so that there is much between inner and cover spheres for the geometry to
-// decide.
+// The packing is coarse, so that the exact geometry has to decide for many points between inner and
+// cover spheres.
 RobotModel coarse_robot() {
   RobotModel model;
   model.links.push_back(link_of("box", Box{{0.3, 0.2, 0.1}}, 0.02));
@@ -124,7 +124,7 @@ IngestConfig config_with(double padding) {
   return config;
 }
 
-// Every point is judged as its exact distance says; rounding decides within a micrometre.
+// Exactly the points within the padding are dropped; rounding decides within a micrometre.
 void expect_exact(const std::vector<Eigen::Vector3f>& points, const PosedRobot& robot,
                   double padding, const Eigen::Vector3d& base = Eigen::Vector3d::Zero()) {
   const CloudSnapshot snapshot = ingest(points, robot, config_with(padding), base);
@@ -157,8 +157,8 @@ TEST(SelfFilter, agreesWithExactDistanceFarFromTheFixedFramesOrigin) {
   expect_exact(cloud_about_the_robot(10000), posed(model, base), 0.02, base);
 }
 
-// Points on the robot's own surface, as its camera sees them, with noise: none may remain.
-TEST(SelfFilter, leavesNoPointOfTheSurface) {
+// A camera's noisy points on the robot's own surface: none may remain.
+TEST(SelfFilter, removesEveryPointOfTheSurface) {
   const RobotModel model = coarse_robot();
   const PosedRobot robot = posed(model);
   std::mt19937 random(4);
@@ -179,7 +179,7 @@ TEST(SelfFilter, leavesNoPointOfTheSurface) {
   EXPECT_FALSE(snapshot.counts.saw_nothing());
 }
 
-TEST(SelfFilter, linkOfUnknownPoseClaimsNothing) {
+TEST(SelfFilter, linkOfUnknownPoseDropsNothing) {
   const RobotModel model = coarse_robot();
   PosedRobot robot = posed(model);
   robot.known[1] = false;
@@ -189,7 +189,7 @@ TEST(SelfFilter, linkOfUnknownPoseClaimsNothing) {
   EXPECT_EQ(ingest(cloud_about_the_robot(1000), robot, config_with(0.02)).counts.on_robot, 0U);
 }
 
-TEST(SelfFilter, linkWithoutGeometryClaimsNothing) {
+TEST(SelfFilter, linkWithoutGeometryDropsNothing) {
   RobotModel model = coarse_robot();
   model.links[0].error = "no mesh";
   model.links[2] = LinkModel();
@@ -209,7 +209,7 @@ TEST(SelfFilter, canBeSwitchedOff) {
   EXPECT_EQ(ingest(cloud_about_the_robot(1000), {}, config_with(0.02)).counts.on_robot, 0U);
 }
 
-// No point may be claimed for a robot of fewer poses than links.
+// Links without a pose in the list drop no point.
 TEST(SelfFilter, missingPosesAreUnknown) {
   const RobotModel model = coarse_robot();
   PosedRobot robot = posed(model);
@@ -222,7 +222,7 @@ TEST(SelfFilter, missingPosesAreUnknown) {
             ids(ingest(cloud_about_the_robot(5000), robot, config_with(0.02)).index));
 }
 
-// Also in the paths that ask the exact geometry. Clouds of a stream are never quite the same.
+// This includes the paths that use the exact geometry. Clouds of a stream differ a little.
 TEST(SelfFilter, aSteadyStreamAllocatesNothing) {
   const RobotModel model = coarse_robot();
   const std::vector<PosedSolid> robot = posed(model).solids();

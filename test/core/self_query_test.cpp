@@ -19,7 +19,7 @@ namespace {
 constexpr double kMaxError = 0.005;       // [m]
 constexpr std::size_t kClosedLinks = 17;  // of random_links; the others have holes
 
-// Points of a link, on its surface and inside, link frame.
+// Points of a link on its surface and inside it, in the link frame.
 std::vector<Eigen::Vector3d> points_of(const LinkGeometry& link, test::Rng* rng) {
   std::vector<Eigen::Vector3d> points;
   for (const GeometryElement& element : link) {
@@ -39,8 +39,8 @@ std::vector<Eigen::Vector3d> points_of(const LinkGeometry& link, test::Rng* rng)
   return points;
 }
 
-// The smallest signed distance to B of any point of A that a search at random finds: not below the
-// true one.
+// The smallest signed distance to B of any point of A that a random search finds. It is an upper
+// bound of the true one.
 double found_distance(const LinkGeometry& a, const LinkGeometry& b, const Eigen::Isometry3d& X_BA,
                       test::Rng* rng) {
   double best = std::numeric_limits<double>::infinity();
@@ -54,7 +54,8 @@ double found_distance(const LinkGeometry& a, const LinkGeometry& b, const Eigen:
   };
   for (const Eigen::Vector3d& p_A : points_of(a, rng)) attempt(p_A);
   double step = 0.05;
-  for (int i = 0; i < test::scaled(300); ++i) {  // downhill, within A
+  for (int i = 0; i < test::scaled(300);
+       ++i) {  // a random walk within A that keeps what is nearer to B
     const Eigen::Vector3d p_A = at + test::random_vector(rng, step);
     const bool better = test::oracle_signed_distance(a, p_A) <= 0.0 && attempt(p_A);
     step *= better ? 1.2 : 0.95;
@@ -87,7 +88,7 @@ QueryConfig config() {
   return result;
 }
 
-// Both witnesses are where they are said to be, and `distance` apart.
+// The witnesses are `distance` apart, and one of them has this signed distance to the other link.
 void check_witnesses(const Scene& scene, const LinkPair& pair, const PairProximity& result) {
   const auto signed_distance = [&](std::size_t link, const Eigen::Vector3d& p_F) {
     return test::oracle_signed_distance(scene.links[link], scene.X_FL[link].inverse() * p_F);
@@ -95,7 +96,7 @@ void check_witnesses(const Scene& scene, const LinkPair& pair, const PairProximi
   EXPECT_NEAR(result.direction.norm(), 1.0, 1e-9);
   const Eigen::Vector3d apart = result.p_FCa - result.p_FCb;
   EXPECT_LT((apart - result.distance * result.direction).norm(), 1e-7);
-  // One of them is a point of its link with that signed distance to the other.
+  // The search ends at a point of one link, and its signed distance to the other is `distance`.
   const double of_first = signed_distance(pair.second, result.p_FCa);
   const double of_second = signed_distance(pair.first, result.p_FCb);
   const bool first_searched = std::abs(of_first - result.distance) < 1e-7 &&
@@ -106,7 +107,7 @@ void check_witnesses(const Scene& scene, const LinkPair& pair, const PairProximi
       << of_first << " " << of_second << " " << result.distance;
 }
 
-TEST(SelfQuery, randomLinksAgainstSearch) {
+TEST(SelfQuery, randomLinksAgainstARandomSearch) {
   test::Rng rng(11);
   Scene scene = random_scene(&rng, kClosedLinks);
   SelfQuery query(scene.model, scene.pairs, config());
@@ -119,7 +120,7 @@ TEST(SelfQuery, randomLinksAgainstSearch) {
     for (std::size_t i = 0; i < results.size(); ++i) {
       const auto [first, second] = scene.pairs[i];
       const PairProximity& result = results[i];
-      // In contact the depths differ; the deeper point counts.
+      // In contact, the depth depends on the link whose points are taken; the deeper one counts.
       const Eigen::Isometry3d X = scene.X_FL[second].inverse() * scene.X_FL[first];
       const double there = found_distance(scene.links[first], scene.links[second], X, &rng);
       const double back =
@@ -135,7 +136,7 @@ TEST(SelfQuery, randomLinksAgainstSearch) {
       EXPECT_LE(result.lower_bound, std::min(there, back) + 1e-9) << what;
       EXPECT_LE(result.lower_bound, result.distance) << what;
       check_witnesses(scene, scene.pairs[i], result);
-      if (result.state == LinkState::kContact) {  // as the witnesses prove
+      if (result.state == LinkState::kContact) {  // the witnesses prove it
         ++contacts;
         EXPECT_LT(result.distance, 0.0) << what;
         continue;
@@ -143,7 +144,7 @@ TEST(SelfQuery, randomLinksAgainstSearch) {
       ++near;
       EXPECT_EQ(result.state, LinkState::kNear) << what;
       EXPECT_GE(result.distance, 0.0) << what;
-      EXPECT_GT(std::min(there, back), -0.003) << what;  // crossing plates of 2 mm may pass
+      EXPECT_GT(std::min(there, back), -0.003) << what;  // crossing plates of 2 mm may be NEAR
       if (result.lower_bound > kMaxError) {
         EXPECT_LE(result.distance, result.lower_bound + test::packed_to(kMaxError) + 0.001 + 1e-6)
             << what;
@@ -180,7 +181,7 @@ TEST(SelfQuery, spheresAreExact) {
   }
 }
 
-TEST(SelfQuery, linksWithHolesHaveBoundsToo) {
+TEST(SelfQuery, boundsHoldForLinksWithHoles) {
   test::Rng rng(13);
   Scene scene = random_scene(&rng, 100);
   SelfQuery query(scene.model, scene.pairs, config());
@@ -200,10 +201,10 @@ TEST(SelfQuery, linksWithHolesHaveBoundsToo) {
       apart += results[i].lower_bound > 0.0 ? 1 : 0;
     }
   }
-  EXPECT_GT(apart, 10);  // and the bounds say something
+  EXPECT_GT(apart, 10) << "the bounds must separate some links";
 }
 
-TEST(SelfQuery, oneInsideTheOther) {
+TEST(SelfQuery, aLinkInsideAnotherIsInContact) {
   const auto model = test::make_model({Box{{1.0, 1.0, 1.0}}, Sphere{0.05}}, 0.02);
   for (const LinkPair pair : {LinkPair{0, 1}, LinkPair{1, 0}}) {
     SelfQuery query(model, {pair}, config());
@@ -215,7 +216,7 @@ TEST(SelfQuery, oneInsideTheOther) {
   }
 }
 
-TEST(SelfQuery, unknownAndMargin) {
+TEST(SelfQuery, unknownPosesAndMargin) {
   const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}, Sphere{0.1}}, kMaxError);
   std::vector<Eigen::Isometry3d> X_FL(3, Eigen::Isometry3d::Identity());
   X_FL[1].translation().x() = 0.3;
@@ -231,7 +232,7 @@ TEST(SelfQuery, unknownAndMargin) {
   EXPECT_EQ(results[1].state, LinkState::kClear);
   EXPECT_EQ(results[1].lower_bound, with_margin.max_distance);
 
-  // Beyond the largest distance, but not by the margin.
+  // The distance exceeds max_distance by less than the margin.
   X_FL[1].translation().x() = 0.2 + with_margin.max_distance + 0.01;
   query.run(X_FL, {true, true, true}, &results);
   EXPECT_EQ(results[0].state, LinkState::kNear);

@@ -31,7 +31,7 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
     int known = 0, sides = 0, close = 0;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
     for (int i = 0; i < 6000; ++i) {
-      // Now and then somewhere, mostly nearby.
+      // Most points are near the last one, and some are far from the link.
       if (i % 4 == 0) {
         p = link.tree.center() +
             test::random_vector(&rng, i % 40 == 0 ? 5.0 : 0.5 * link.tree.radius());
@@ -52,7 +52,7 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
         ASSERT_EQ(found.near.side == NearSurface::Side::kInside, is_inside);
         ++sides;
       }
-      // What is known of a place makes its depth no other.
+      // The hint from the grid does not change the depth.
       const PointDepth hinted = point_depth(link.solid, p, -1.0, found.near);
       ASSERT_EQ(hinted.exact.distance, truth.exact.distance);
       ASSERT_EQ(hinted.floor, truth.floor);
@@ -63,9 +63,9 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
   }
 }
 
-// A sample is the same before and after its cell was measured; a place that is not finite has no
+// A sample is the same before and after its cell is measured. A point that is not finite has no
 // cell.
-TEST(SignedDistanceGrid, HoldsOnlyWhatWasMeasured) {
+TEST(SignedDistanceGrid, HoldsOnlyMeasuredCells) {
   const test::Trial trial(shapes(), 0.005);
   const LinkModel& link = trial.model().links[2];
   SignedDistanceGrid grid(link);

@@ -13,7 +13,7 @@
 namespace ist::sim {
 namespace {
 
-// A ray meets the surface where it is said to, and nothing before.
+// A ray meets the surface at the stated distance, and no other surface before.
 void check_hit(const Shape& shape, const Solid& solid, test::Rng* rng) {
   const RayShape caster(shape);
   int hits = 0;
@@ -59,8 +59,8 @@ TEST(RayShape, AlongTheAxes) {
   EXPECT_TRUE(std::isinf(cylinder.hit({{0.2, 0.0, 1.0}, {0.0, 0.0, -1.0}})));
 }
 
-// Without noise, every point lies on the robot or an obstacle, as they were at the stamp.
-TEST(Simulation, PointsLieOnWhatTheCameraSees) {
+// Every point lies on the robot or an obstacle as they were at the stamp, if there is no noise.
+TEST(Simulation, PointsLieOnTheRobotOrAnObstacle) {
   const RobotDescription robot = test::demo_robot();
   std::vector<DepthCameraConfig> cameras = demo_cameras();
   for (DepthCameraConfig& camera : cameras) camera.noise = 0.0;

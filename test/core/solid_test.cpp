@@ -82,9 +82,9 @@ TEST(Solid, UnionTakesTheNearestOutsideAndTheDeepestInside) {
   EXPECT_NEAR(solid.signed_distance({0.15, 0, 0}).distance, -0.1, 1e-15);
 }
 
-// Solids with and without holes, of one element and of several: the exact depth where it is asked
-// for, a bound elsewhere.
-TEST(Solid, DepthEqualsTheSignedDistanceWhereItIsAsked) {
+// Solids with and without holes, of one element and of several: the depth is exact where it is
+// needed, and a bound elsewhere.
+TEST(Solid, DepthEqualsTheSignedDistanceWhereItIsNeeded) {
   test::Rng rng(8);
   const GeometryElement closed{test::box({0.2, 0.2, 0.4}), Eigen::Isometry3d::Identity(), "box"};
   const GeometryElement open{test::open_box({0.2, 0.3, 0.2}), test::random_pose(&rng, 0.1), "open"};

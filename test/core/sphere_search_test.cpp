@@ -60,7 +60,7 @@ TEST(SphereSearch, FindsTheBestWhileSpheresAreAdded) {
       }
       const auto hint = static_cast<std::uint32_t>(n * 7 % n);
       const SphereSearch::Match match = search.best(corners.data(), count, hint);
-      ASSERT_EQ(match.sphere, best) << "of equal ones, the first";
+      ASSERT_EQ(match.sphere, best) << "the first of equal spheres";
       ASSERT_NEAR(match.cost, cost_of(spheres[best], corners.data(), count), 1e-12);
       // Spheres before `first` may be ignored, but not the others.
       const std::size_t first = n / 2;

@@ -1,5 +1,5 @@
-// Temporal coherence: bounds that were proven at one pose and hold at others, and queries that use
-// them, on long motions against brute force.
+// Temporal coherence: bounds that are proven at one pose and used at later ones, and queries that
+// use them, on long motions against brute force.
 
 #include "proximity/coherence/link_bound.h"
 
@@ -40,16 +40,16 @@ Points random_points(test::Rng* rng, int count, double size) {
   return points;
 }
 
-// Turned about a place by an angle, and moved.
-Eigen::Isometry3d turned(const Eigen::Isometry3d& X, const Eigen::Vector3d& center, double angle,
-                         const Eigen::Vector3d& axis, const Eigen::Vector3d& way) {
-  Eigen::Isometry3d result = Eigen::Translation3d(center + way) * Eigen::AngleAxisd(angle, axis) *
-                             Eigen::Translation3d(-center) * X;
+// Rotates a pose about a point by an angle, and translates it.
+Eigen::Isometry3d displaced(const Eigen::Isometry3d& X, const Eigen::Vector3d& center, double angle,
+                            const Eigen::Vector3d& axis, const Eigen::Vector3d& translation) {
+  Eigen::Isometry3d result = Eigen::Translation3d(center + translation) *
+                             Eigen::AngleAxisd(angle, axis) * Eigen::Translation3d(-center) * X;
   result.linear() = Eigen::Quaterniond(result.linear()).normalized().toRotationMatrix();
   return result;
 }
 
-TEST(DisplacementBound, NoPointOfTheLinkMovesFarther) {
+TEST(DisplacementBound, BoundsTheDisplacementOfEveryPoint) {
   test::Rng rng(61);
   for (std::size_t i = 2; i < shapes().size(); ++i) {
     const DisplacementBound bound(links().model().links[i]);
@@ -58,23 +58,23 @@ TEST(DisplacementBound, NoPointOfTheLinkMovesFarther) {
       const Eigen::Isometry3d A = test::random_pose(&rng, 3.0);
       const double size = std::pow(10.0, test::uniform(&rng, -9, 1));
       const Eigen::Isometry3d B =
-          turned(A, test::random_vector(&rng, 5.0), test::uniform(&rng, -size, size),
-                 test::random_vector(&rng, 1.0).normalized(), test::random_vector(&rng, size));
-      const double motion = bound.between(A, B);
+          displaced(A, test::random_vector(&rng, 5.0), test::uniform(&rng, -size, size),
+                    test::random_vector(&rng, 1.0).normalized(), test::random_vector(&rng, size));
+      const double displacement = bound.between(A, B);
       double farthest = 0.0;
       for (const Eigen::Vector3d& v : mesh.vertices) {
         farthest = std::max(farthest, (A * v - B * v).norm());
       }
-      ASSERT_GE(motion, farthest);
-      // No farther than the ends of the box, which the link does not fill.
-      ASSERT_LE(motion, 4.0 * farthest + 1e-9);
+      ASSERT_GE(displacement, farthest);
+      // The bound is that of the link's box, which the link does not fill.
+      ASSERT_LE(displacement, 4.0 * farthest + 1e-9);
     }
     const Eigen::Isometry3d still = test::random_pose(&rng, 3.0);
     EXPECT_EQ(bound.between(still, still), 0.0);
   }
 }
 
-TEST(DisplacementBound, PosesThatAreNotFinite) {
+TEST(DisplacementBound, IsHugeOrNanForPosesThatAreNotFinite) {
   const DisplacementBound bound(links().model().links[0]);
   const Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
   for (const double odd : {kNaN, kInfinity, -kInfinity, 1e300}) {
@@ -87,7 +87,7 @@ TEST(DisplacementBound, PosesThatAreNotFinite) {
   }
 }
 
-TEST(LinkBound, HoldsAmongTheSameCloudsOnly) {
+TEST(LinkBound, HoldsForTheSameSceneOnly) {
   const LinkModel& link = links().model().links[0];
   LinkBound kept(link);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
@@ -100,10 +100,10 @@ TEST(LinkBound, HoldsAmongTheSameCloudsOnly) {
   EXPECT_EQ(kept.at(2, X), -kInfinity);
   EXPECT_EQ(kept.at(0, X), -kInfinity);
   X.translation().x() = 0.31;
-  EXPECT_EQ(kept.at(1, X), -kInfinity) << "may be in contact";
+  EXPECT_EQ(kept.at(1, X), -kInfinity) << "the link may be in contact";
   X.translation().x() = kNaN;
   EXPECT_EQ(kept.at(1, X), -kInfinity);
-  kept.prove(1, X, 0.3, 0.0, 1.0);  // at a pose that is none
+  kept.prove(1, X, 0.3, 0.0, 1.0);  // the pose is not finite
   EXPECT_EQ(kept.at(1, X), -kInfinity);
   EXPECT_EQ(kept.at(1, Eigen::Isometry3d::Identity()), -kInfinity);
   kept.prove(0, Eigen::Isometry3d::Identity(), 0.3, 0.0, 1.0);
@@ -112,7 +112,7 @@ TEST(LinkBound, HoldsAmongTheSameCloudsOnly) {
   EXPECT_EQ(kept.at(1, Eigen::Isometry3d::Identity()), -kInfinity) << "in contact";
 }
 
-TEST(LinkBound, WithHolesOnlyFarFromTheSpheres) {
+TEST(LinkBound, OfAMeshWithHolesHoldsOnlyFarFromItsSpheres) {
   const LinkModel& link = links().model().links[4];
   ASSERT_FALSE(link.solid.is_closed());
   const double gap = link.tree.interior_gap();
@@ -152,12 +152,12 @@ TEST(SceneTracker, RecognizesTheSameScene) {
   map.X_FM.translation().x() += 1e-9;
   EXPECT_TRUE(changes({&a, &map})) << "the map has moved";
   a = test::make_snapshot({{0, 0, 1}});
-  EXPECT_TRUE(changes({&a, &map})) << "in the same place";
+  EXPECT_TRUE(changes({&a, &map})) << "equal points, a new index";
   EXPECT_EQ(tracker.identify(std::vector<const CloudSnapshot*>(100, &a)), 0U);
   EXPECT_NE(tracker.identify({&a, &map}), last);
 }
 
-// A motion of all links, and what they move among.
+// A motion of all links, and the cloud of each step.
 struct Motion {
   explicit Motion(std::uint64_t seed) : rng(seed), X_FL(shapes().size()) {
     jump();
@@ -173,7 +173,7 @@ struct Motion {
     cloud = test::make_snapshot(points);
   }
 
-  // Links stand still, creep, turn about far places; seldom, all is new.
+  // Links stand still, move a little or turn about a far point. Few steps jump or change the cloud.
   void step() {
     const double kind = test::uniform(&rng, 0.0, 1.0);
     if (kind < 0.01) return jump();
@@ -182,12 +182,12 @@ struct Motion {
     if (kind < 0.09) {
       center = test::random_vector(&rng, kind < 0.075 ? 10.0 : 0.3);
       axis = test::random_vector(&rng, 1.0).normalized();
-      way = test::random_vector(&rng, 1.0);
+      direction = test::random_vector(&rng, 1.0);
     }
     if (kind > 0.9) return;
     const double angle = speed / (0.3 + center.norm());
     for (std::size_t i = 1; i < X_FL.size(); ++i) {  // the first one only jumps
-      X_FL[i] = turned(X_FL[i], center, angle, axis, i % 2 * speed * way);
+      X_FL[i] = displaced(X_FL[i], center, angle, axis, i % 2 * speed * direction);
     }
   }
 
@@ -197,7 +197,7 @@ struct Motion {
   CloudSnapshot cloud;
   double speed = 1e-3;
   Eigen::Vector3d center = Eigen::Vector3d::Zero(), axis = Eigen::Vector3d::UnitZ(),
-                  way = Eigen::Vector3d::UnitX();
+                  direction = Eigen::Vector3d::UnitX();
 };
 
 void expect_minimum(const RobotProximity& robot, const std::vector<test::Truth>& truth,
@@ -210,10 +210,10 @@ void expect_minimum(const RobotProximity& robot, const std::vector<test::Truth>&
   test::expect_truth(robot.nearest, least, config, motion.X_FL[i]);
 }
 
-class CarriedQueries : public ::testing::TestWithParam<double> {};
+class CoherentQueries : public ::testing::TestWithParam<double> {};
 
-// All ways to ask in turn, of one object.
-TEST_P(CarriedQueries, LongMotions) {
+// All kinds of queries in turn, of one query object.
+TEST_P(CoherentQueries, BoundsHoldOnLongMotions) {
   Motion motion(static_cast<std::uint64_t>(62 + 1e4 * GetParam()));
   QueryConfig config;
   config.tolerance = GetParam();
@@ -223,7 +223,7 @@ TEST_P(CarriedQueries, LongMotions) {
   const std::vector<bool> known(count, true);
   std::vector<LinkProximity> results;
   RobotProximity robot;
-  int settled = 0, contact = 0, steps = test::scaled(1200);
+  int without_traversal = 0, contact = 0, steps = test::scaled(1200);
   for (int step = 0; step < steps && !::testing::Test::HasFailure(); ++step) {
     SCOPED_TRACE("step " + std::to_string(step));
     motion.step();
@@ -231,14 +231,14 @@ TEST_P(CarriedQueries, LongMotions) {
     for (std::size_t i = 0; i < count; ++i) {
       truth.push_back(test::truth_of(links().link(i), motion.X_FL[i], motion.points, motion.cloud));
     }
-    const int way = static_cast<int>(test::uniform(&motion.rng, 0.0, 4.0));
-    if (way == 0) {
+    const int kind = static_cast<int>(test::uniform(&motion.rng, 0.0, 4.0));
+    if (kind == 0) {
       ASSERT_TRUE(query.run(motion.X_FL, known, {&motion.cloud}, &results));
       for (std::size_t i = 0; i < count; ++i) {
         test::expect_truth(results[i], truth[i], config, motion.X_FL[i]);
         contact += results[i].state == LinkState::kContact ? 1 : 0;
       }
-    } else if (way == 1) {
+    } else if (kind == 1) {
       const std::size_t i = motion.rng() % count;
       results.resize(1);
       ASSERT_TRUE(query.run_link(i, motion.X_FL[i], {&motion.cloud}, &results[0]));
@@ -247,16 +247,16 @@ TEST_P(CarriedQueries, LongMotions) {
       ASSERT_TRUE(query.run_minimum(motion.X_FL, known, {&motion.cloud}, &robot));
       expect_minimum(robot, truth, motion, config);
     }
-    settled += query.statistics().node_pairs == 0 ? 1 : 0;
+    without_traversal += query.statistics().node_pairs == 0 ? 1 : 0;
   }
-  EXPECT_GT(settled, steps / 100) << "nothing was carried";
+  EXPECT_GT(without_traversal, steps / 100) << "no bound of an earlier pose was used";
   EXPECT_GT(contact, steps / 50);
 }
 
-INSTANTIATE_TEST_SUITE_P(Tolerances, CarriedQueries, ::testing::Values(0.0, 0.001, 0.02));
+INSTANTIATE_TEST_SUITE_P(Tolerances, CoherentQueries, ::testing::Values(0.0, 0.001, 0.02));
 
-// Cut off anywhere, bounds hold, then and later.
-TEST(CarriedQueries, Deadlines) {
+// A deadline may stop a query anywhere. The bounds of this query and of later ones hold.
+TEST(CoherentQueries, BoundsHoldAfterDeadlines) {
   Motion motion(63);
   QueryConfig config;
   ProximityQuery query(links().shared_model(), config);
@@ -290,9 +290,9 @@ TEST(CarriedQueries, Deadlines) {
   EXPECT_GT(stopped, 0);
 }
 
-// Through the opening, where a point's distance jumps from one side of nothing to the other, while
-// another point, or another link, is what was nearest.
-TEST(CarriedQueries, ThroughAHole) {
+// A point passes through the opening of a box, where its signed distance jumps, while another point
+// or another link is the nearest.
+TEST(CoherentQueries, BoundsHoldThroughAHole) {
   const TriangleMesh open = test::open_box({0.15, 0.1, 0.2});
   const auto model = test::make_model({Box{{0.02, 0.02, 0.02}}, open}, 0.005);
   const std::vector<bool> known(2, true);
@@ -307,24 +307,24 @@ TEST(CarriedQueries, ThroughAHole) {
     Poses X_FL(2, Eigen::Isometry3d::Identity());
     X_FL[0].translation().x() = 0.12;  // 1.5 cm from the point on the right
     int contacts = 0;
-    for (double way = -0.25; way < 0.25; way += 0.0007) {
-      X_FL[1].translation().z() = way;
+    for (double z = -0.25; z < 0.25; z += 0.0007) {
+      X_FL[1].translation().z() = z;
       const double truth = test::oracle_minimum(
           open, {X_FL[1].inverse() * points[0], X_FL[1].inverse() * points[1]});
       query.run(X_FL, known, {&cloud}, &results);
-      ASSERT_LE(results[1].lower_bound, truth + 1e-6) << way;
-      ASSERT_LE(results[1].distance, truth + tolerance + 1e-6) << way;
+      ASSERT_LE(results[1].lower_bound, truth + 1e-6) << z;
+      ASSERT_LE(results[1].distance, truth + tolerance + 1e-6) << z;
       minimum.run_minimum(X_FL, known, {&cloud}, &robot);
-      ASSERT_LE(robot.nearest.lower_bound, truth + 1e-6) << way;
-      ASSERT_LE(robot.nearest.distance, truth + tolerance + 1e-6) << way;
+      ASSERT_LE(robot.nearest.lower_bound, truth + 1e-6) << z;
+      ASSERT_LE(robot.nearest.distance, truth + tolerance + 1e-6) << z;
       contacts += truth < 0.0 ? 1 : 0;
     }
     EXPECT_GT(contacts, 100);
   }
 }
 
-// A map that moves under links that stand still.
-TEST(CarriedQueries, MapsMove) {
+// A map moves while the links stand still.
+TEST(CoherentQueries, BoundsHoldWhenAMapMoves) {
   test::Rng rng(64);
   CloudSnapshot map = test::make_map({{Eigen::Vector3d(0.5, -1, -1), Eigen::Vector3d(1, 1, 1)}});
   const auto model = test::make_model({Sphere{0.1}, Box{{0.2, 0.2, 0.2}}}, 0.005);

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// Never later than what dense sampling finds, and in 99 % of the motions no more than 5 ms before.
+// The time is never later than the one that dense sampling finds, and in 99 % of the motions no
+// more than 5 ms earlier.
 TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   test::Rng rng(66);
   int contacts = 0, close = 0, motions = 0, late = 0, alarms = 0;
@@ -33,7 +34,7 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
       const double truth = test::sampled_impact(arm, motion);
       if (truth == 0.0) {
         EXPECT_EQ(first, 0.0);
-        continue;  // in contact from the start: no motion to speak of
+        continue;  // in contact from the start
       }
       ++motions;
       late += first > truth ? 1 : 0;
@@ -53,7 +54,7 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   EXPECT_GT(motions - contacts, motions / 10);
 }
 
-// A sphere on an arm of 1 m that turns, by hand: it touches the point when they are 0.1 m apart.
+// A sphere on a turning arm of 1 m touches a point when its centre is 0.1 m from it.
 TEST(TimeOfImpact, handComputed) {
   RobotDescription robot;
   robot.root_link = "base";
@@ -91,7 +92,7 @@ TEST(TimeOfImpact, handComputed) {
   EXPECT_TRUE(impact[0].converged);
   EXPECT_LT(impact[0].steps, 100);
 
-  // A margin comes earlier by as much.
+  // A margin makes the time earlier.
   config.margin = 0.02;
   impacts = TimeOfImpact(model, kinematics, config);
   EXPECT_NEAR(run({&cloud}), (EIGEN_PI / 2.0 - 2.0 * std::asin(0.06)) / 0.5, 1e-4);
@@ -105,13 +106,13 @@ TEST(TimeOfImpact, handComputed) {
   EXPECT_TRUE(std::isnan(run({}))) << "no cloud";
   const CloudSnapshot touching = test::make_snapshot({{1.05, 0, 0}});
   EXPECT_EQ(run({&touching}), 0.0);
-  // Nothing moves: apart for ever.
+  // Nothing moves, so there is no contact.
   motion.to = motion.from;
   EXPECT_EQ(run({&cloud}), kInf);
   motion.from = motion.to = {std::nan(""), std::nan("")};
   EXPECT_EQ(run({&cloud}), kInf);
   still.known[0] = false;
-  EXPECT_TRUE(std::isnan(run({&cloud}))) << "where the joint is is not known";
+  EXPECT_TRUE(std::isnan(run({&cloud}))) << "the joint's position is not known";
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST(TriangleBvh, ClosestPointEqualsBruteForce) {
           test::oracle_triangle(closest.point, mesh.corner(closest.triangle, 0),
                                 mesh.corner(closest.triangle, 1), mesh.corner(closest.triangle, 2)),
           1e-9)
-          << "the witness lies on the triangle that is named";
+          << "the witness must lie on the returned triangle";
     }
   }
 }
@@ -89,7 +89,7 @@ TEST(TriangleBvh, ClosestPointMayBeALittleFarther) {
   });
 }
 
-TEST(TriangleBvh, ClosestPointStopsWhereItIsNearEnough) {
+TEST(TriangleBvh, ClosestPointSearchStopsAtAPointThatIsNearEnough) {
   test::Rng rng(5);
   for (const TriangleMesh& mesh : meshes()) {
     const TriangleBvh bvh(mesh);

@@ -1,4 +1,4 @@
-// Every published number against exact truth: a real robot's meshes among real depth images.
+// Compares every answer with the exact truth: a real robot's meshes among recorded depth images.
 
 #include "support/truth.h"
 
@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-// Truth and clouds are float32 and double; both sides round.
+// The truth and the clouds are in float32 and double, and both are rounded.
 constexpr double kRounding = 1e-6;
 
 TEST(Truth, BoundsHoldInEveryCase) {

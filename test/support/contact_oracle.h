@@ -125,7 +125,7 @@ inline ContactVolume oracle_contact(const LinkModel& link, const ContactGeometry
   return sum;
 }
 
-/// Of two links, all spheres against all.
+/// The contact volume of two links, from all pairs of spheres.
 inline ContactVolume oracle_contact(const ContactGeometry& a, const ContactGeometry& b,
                                     const Eigen::Isometry3d& X_AB) {
   ContactVolume sum;

@@ -12,7 +12,7 @@ namespace ist {
 /// Queries for many configurations of a robot at once, on several threads: a planner's batch.
 ///
 /// Each thread has a ProximityQuery of its own and takes chunks of consecutive configurations, so
-/// that each configuration starts warm from the answers to the one before. At tolerance 0 the
+/// that the answers to one configuration are the warm start of the next. At tolerance 0 the
 /// distances do not depend on the number of threads; otherwise they lie within the tolerance. A
 /// deadline applies to each configuration by itself. Queries allocate nothing; each run starts its
 /// threads and joins them. Not thread safe: one run at a time.

@@ -13,16 +13,15 @@ namespace ist {
 
 /// How a query answers.
 struct QueryConfig {
-  /// [m] what is farther is CLEAR; > 0.
+  /// [m] a link without an obstacle nearer than this is CLEAR; > 0.
   double max_distance = 1.0;
-  /// [m] how wide `distance - lower_bound` may be; 0 asks for the exact distance. >= 0.
+  /// [m] largest `distance - lower_bound`; 0 asks for the exact distance. >= 0.
   double tolerance = 0.001;
-  /// [s] from the start of run(); 0: none. A query that reaches it returns bounds that hold.
+  /// [s] from the start of run(); 0: none. A query that it stops returns bounds that hold.
   double deadline = 0.0;
-  /// [m] taken off every lower bound: for what geometry does not know (sensor noise, calibration,
-  /// latency). >= 0.
+  /// [m] >= 0, subtracted from every lower bound to allow for sensor noise, calibration, latency.
   double margin = 0.0;
-  /// The same width as a share of the distance, where that is more than `tolerance`; from 0 to 1.
+  /// The tolerance as a ratio to the distance, used where that is wider than `tolerance`; 0 to 1.
   double relative_tolerance = 0.0;
 };
 
@@ -36,12 +35,12 @@ struct LinkProximity {
   LinkState state = LinkState::kUnknown;  ///< decides which of the other members are valid
   double distance;        ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
-  Eigen::Vector3d p_FCl;  ///< [m] witness on the link; NaN unless NEAR or CONTACT
+  Eigen::Vector3d p_FCl;  ///< [m] closest point on the link; NaN unless NEAR or CONTACT
   Eigen::Vector3d p_LCl;  ///< [m] the same in the link's own frame
-  Eigen::Vector3d p_FCo;  ///< [m] witness on the obstacle
-  Eigen::Vector3d
-      direction;  ///< unit, the way the link should go: p_FCl - p_FCo = distance * direction
-  std::int32_t source = -1;  ///< index of the snapshot the nearest point is in
+  Eigen::Vector3d p_FCo;  ///< [m] closest point on the obstacle
+  /// Unit vector along which the link moves away: p_FCl - p_FCo = distance * direction.
+  Eigen::Vector3d direction;
+  std::int32_t source = -1;  ///< index of the snapshot that holds the nearest point
   std::uint32_t point = 0;   ///< id of that point in its message
 
   LinkProximity() { reset(); }
@@ -55,25 +54,26 @@ struct RobotProximity {
   bool all_known = false;  ///< false: links without pose or geometry were left out
 };
 
-/// What a query cost, for tuning and tests.
+/// Counts of a query's work, for tuning and tests.
 struct QueryStatistics {
-  std::uint64_t node_pairs = 0;         ///< pairs of tree node and box expanded
-  std::uint64_t leaf_pairs = 0;         ///< sphere leaf against point tile
-  std::uint64_t exact_evaluations = 0;  ///< point against the link's exact geometry
-  std::uint64_t outside_region = 0;     ///< links that would see beyond a cloud's region
+  std::uint64_t node_pairs = 0;         ///< pairs of tree node and BVH node that were expanded
+  std::uint64_t leaf_pairs = 0;         ///< pairs of sphere leaf and tile of obstacles
+  std::uint64_t exact_evaluations = 0;  ///< points measured against the link's exact geometry
+  std::uint64_t outside_region = 0;     ///< links whose range ends outside a cloud's region
 };
 
 /// Distances from the links of a robot to point clouds.
 ///
-/// Each link's Inner Sphere Tree descends against the boxes of every cloud; pairs that survive its
-/// bounds are evaluated against the exact geometry until `tolerance` is met, so `distance` is
-/// always the exact distance of one obstacle point. Points that may lie inside the link are a
-/// query of their own (branch and bound on the exact signed distance).
+/// Branch and bound: a dual-tree traversal of each link's Inner Sphere Tree and the BVH of every
+/// cloud prunes pairs by lower bounds. Obstacles that remain are measured against the exact
+/// geometry until `tolerance` is met, so `distance` is always the exact distance of one obstacle
+/// point. A depth search then measures the points that may be inside the link.
 ///
 /// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
-/// starts the next query's bound (warm start), and what was proven at one pose is used at the next
-/// ones, less how far the link has gone, while the snapshots are the same. Neither changes what an
-/// answer promises; poses may jump.
+/// gives the next query its first upper bound (warm start). While the snapshots stay the same,
+/// lower bounds that are proven at one pose hold at the next one, less the displacement bound
+/// (temporal coherence). Neither changes the bounds and states that an answer guarantees, and poses
+/// may jump.
 class ProximityQuery {
  public:
   /// @param model  shared with the caller; not null
@@ -91,7 +91,7 @@ class ProximityQuery {
   bool run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known, SnapshotSpan clouds,
            std::vector<LinkProximity>* results);
 
-  /// The robot's minimum only, several times faster than all links: they share one bound.
+  /// The robot's minimum only. The links share one upper bound, so it is several times faster.
   /// @param result  overwritten; UNKNOWN when no link is known or no cloud is given
   /// @returns as run()
   bool run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,

@@ -13,7 +13,7 @@ namespace ist {
 /// Pairs of links, by name.
 using NamePairs = std::vector<std::pair<std::string, std::string>>;
 
-/// Pairs of usable links that may collide: all except adjacent links (parent and child, with only
+/// Pairs of usable links that may collide: all except adjacent links (parent and child, also with
 /// links without geometry between them), links that never move relative to each other, and those
 /// that `ignored` names.
 /// @param wanted   by link of the model: a pair needs two

@@ -24,7 +24,7 @@ struct PairProximity {
   double distance;        ///< [m] signed, of the two witnesses; +inf when CLEAR, NaN when UNKNOWN
   double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
   Eigen::Vector3d p_FCa;  ///< [m] witness on the first link; NaN unless NEAR or CONTACT
-  Eigen::Vector3d p_FCb;  ///< [m] on the second
+  Eigen::Vector3d p_FCb;  ///< [m] witness on the second link
   /// Unit vector along which the first link moves away: p_FCa - p_FCb = distance * direction.
   Eigen::Vector3d direction;
 
@@ -37,18 +37,19 @@ struct PairProximity {
 /// The distance of two solids is the smallest signed distance of any point of either to the other:
 /// positive when they are apart, minus the depth of the deepest point when they are not.
 ///
-/// Lower bound: the cover spheres of a link A cover it, so the smallest, over spheres, of the exact
-/// signed distance of the centre to the other link B less the cover radius bounds the distance from
-/// below (signed distances change no faster than points move). Best-first branch and bound in A's
-/// tree finds it; bounds from B's tree spare most exact evaluations. A is the link with the smaller
-/// gap; where the links may touch, each takes that part in turn.
+/// Lower bound: the cover spheres of a link A cover it. The exact signed distance of a sphere's
+/// centre to the other link B, less the cover radius, bounds the distance of that sphere from
+/// below, because signed distances change no faster than points move. Best-first branch and bound
+/// in A's tree finds the smallest of these bounds; bounds from B's tree avoid most exact
+/// evaluations. A is the link with the smaller gap; where the links may touch, the search runs in
+/// both directions.
 ///
 /// Upper bound: `distance` is measured between two real points, which alternating projections
 /// between the surfaces find, starting from the nearest spheres. It is not below the true distance.
 /// For links that are apart it is above `lower_bound` by no more than max_error of A's packing and
-/// the tolerance (where they nearly touch, its interior gap comes on top, and both gaps wherever
-/// one of the meshes has holes, because its inside shows there); in contact the two may differ by
-/// more. Where solids merely touch, the state may be NEAR with a lower bound below 0.
+/// the tolerance. Where they nearly touch, A's interior gap is added to this, and wherever one of
+/// the meshes has holes both interior gaps are. In contact the two may differ by more. Where solids
+/// merely touch, the state may be NEAR with a lower bound below 0.
 ///
 /// run() never throws. One object per thread.
 class SelfQuery {

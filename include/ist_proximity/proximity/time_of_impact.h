@@ -27,7 +27,7 @@ struct ImpactTime {
   /// [s] from the start of the motion, never later than the first contact; 0 in contact, +inf
   /// without contact, NaN when not known.
   double time = std::numeric_limits<double>::quiet_NaN();
-  /// False: the search gave up after many steps; the contact, if any, may be much later.
+  /// False: the search stopped after many steps; the contact, if any, may be much later.
   bool converged = true;
   int steps = 0;  ///< distance queries
 };
@@ -53,7 +53,7 @@ class TimeOfImpact {
   /// @param motion   sizes as the kinematics' joints
   /// @param still    poses of joints that the motion does not move; planar and floating ones too
   /// @param X_FR     root link -> fixed frame
-  /// @param wanted   by link of the model: false leaves it out (NaN)
+  /// @param wanted   by link of the model: false skips the link, and its time is NaN
   /// @param clouds   as for ProximityQuery::run; none makes every link unknown
   /// @param results  by link of the model, overwritten
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
