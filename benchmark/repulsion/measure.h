@@ -31,7 +31,7 @@ constexpr double kShort = 0.05;
 /// [m] Another smoothing than the default.
 constexpr double kNarrow = 0.05;
 
-/// Of one scene at one resolution.
+/// The measurements of one scene at one resolution.
 struct Measured {
   Noise nearest, blend, narrow;      ///< narrow: the blend with kNarrow for smoothing
   Noise wrench;                      ///< its force, of each link's largest along the motion

@@ -26,7 +26,7 @@ struct MovingScene {
   std::size_t reference_begin = 0, reference_count = 0;
 };
 
-/// Of analytic bodies, made here.
+/// Scenes of analytic bodies, which are made here.
 std::vector<MovingScene> analytic_scenes();
 
 /// The recorded motion among the recorded frames.

@@ -67,7 +67,7 @@ class PlaneFrame {
   void Set(const SupportingPlanes& planes) { planes_ = planes; }
   float offset() const { return planes_.offset; }
 
-  // Of a box above the plane of the link's origin (support 0), at least.
+  // The least height of a box above the plane of the link's origin (support 0).
   HWY_INLINE float Height(const float* min, const float* max) const {
     float height = -planes_.offset;
     for (int i = 0; i < 3; ++i) {
@@ -75,7 +75,7 @@ class PlaneFrame {
     }
     return height;
   }
-  // Of sixteen points, or at least of sixteen boxes, above the plane at `offset`.
+  // The heights of sixteen points, or the least ones of sixteen boxes, above the plane at `offset`.
   HWY_INLINE hn::Vec<BoxTag> Height(const PointTile& tile, std::size_t k, float offset) const {
     return Height(tile.x + k, tile.y + k, tile.z + k, offset);
   }

@@ -49,7 +49,7 @@ class PointDepthSearch {
     std::int32_t child;
   };
 
-  // What is known of the points of a tile.
+  // The points of a tile and their bounds.
   struct Tile {
     int count;
     std::array<Eigen::Vector3d, kPointWidth> p_OQ, p_LQ;

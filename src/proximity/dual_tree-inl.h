@@ -75,7 +75,7 @@ class DualTree {
   std::uint64_t leaf_pairs() const { return leaf_pairs_; }
 
  private:
-  // Until the stack is empty.
+  // Expands pairs until the stack is empty.
   void Traverse() {
     while (!stack_.empty()) {
       const Pair pair = stack_.pop();
@@ -84,7 +84,7 @@ class DualTree {
         continue;
       }
       if (visitor_.IsSettled()) {
-        // What is left is outside and too far, or the depth search's.
+        // The rest is outside and too far, or it is the depth search's.
         Prune(in_.inside_bound);
         is_cut_short_ = true;
         stack_.clear();

@@ -14,7 +14,7 @@ namespace ist {
 class PointRefinement;
 class BoxRefinement;
 
-/// What a dual-tree traversal works on: a link's Inner Sphere Tree, posed, and the BVH of an index,
+/// The input of a dual-tree traversal: a link's Inner Sphere Tree, posed, and the BVH of an index,
 /// in the index's frame O, all in float. Lower bounds of the traversal have an error of `rounding`,
 /// which the caller takes off; `prune_bound` and `inside_bound` contain it already.
 template <class Bvh>

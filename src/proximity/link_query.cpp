@@ -108,8 +108,8 @@ void LinkQuery::measure_again(const BoxObstacles& obstacles) {
   BoxRefinement(obstacles, &link_).measure(link_.kept.last.id);
 }
 
-// What the stopped search has measured as outside may be inside: it had yet to meet the spheres
-// that hold it.
+// A point that the stopped search has measured as outside may be inside: it had yet to meet the
+// spheres that hold it.
 template <class Obstacles>
 void LinkQuery::measure_closest(const Obstacles& obstacles) {
   const ClosestObstacle& closest = link_.search.closest;

@@ -17,10 +17,10 @@
 #include "proximity/supporting_planes.h"
 #include "proximity/visited_set.h"
 
-/// What the query of one link works with: three types, by how long their content lives.
+/// The state of a link's query: three types, by how long their content lives.
 namespace ist {
 
-/// What belongs to the link for ever, whatever its pose and whatever the clouds.
+/// The part that belongs to the link for ever, whatever its pose and whatever the clouds.
 struct LinkContext {
   explicit LinkContext(const LinkModel& link) : model(&link), displacement(link), grid(link) {}
 
@@ -32,8 +32,8 @@ struct LinkContext {
   const Solid& solid() const { return model->solid; }
 };
 
-/// What is kept from one query to the next. It speeds queries up and never changes what an answer
-/// promises.
+/// The part that is kept from one query to the next. It speeds queries up and never changes what an
+/// answer promises.
 struct LinkCoherence {
   explicit LinkCoherence(const LinkModel& link) : bound(link), supports(link.tree) {}
 
@@ -71,7 +71,7 @@ struct ClosestObstacle {
 /// its lower bound in `pruned_bound`. So at any time no obstacle has a smaller signed distance than
 /// lower_bound().
 struct LinkSearch {
-  // What is asked.
+  // The question.
   Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
   SceneId scene = kUnknownScene;
   QueryConfig config;
@@ -79,7 +79,7 @@ struct LinkSearch {
   Deadline* deadline = nullptr;
   QueryStatistics* statistics = nullptr;
 
-  // What is known.
+  // The answer so far.
   ClosestObstacle closest;
   double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured
   double refined_bound = 0.0;   ///< [m] the same of what was measured, to within the tolerance

@@ -47,7 +47,7 @@ inline Eigen::Vector3d point_O(const PointBvh& bvh, ObstacleId id) {
 inline Eigen::AlignedBox3d box_O(const BoxBvh& bvh, ObstacleId id) {
   return bvh.tiles()[static_cast<std::size_t>(id.tile)].box(id.lane);
 }
-/// As the message, or BoxIndex::build(), numbered it.
+/// The number that the message, or BoxIndex::build(), gave to an obstacle.
 template <class Bvh>
 std::uint32_t message_id(const Bvh& bvh, ObstacleId id) {
   typename Bvh::Tile scratch;

@@ -22,7 +22,7 @@ class PointRefinement {
   /// @param lower_bound  [m] by the clipped cover spheres
   /// @returns [m] the new prune bound
   float refine(std::int32_t tile, int lane, float lower_bound);
-  /// As update_supporting_planes().
+  /// Calls update_supporting_planes().
   bool update_planes(SupportingPlanes* planes);
   bool deadline_passed() { return link_.search.deadline->passed(); }
 
@@ -46,7 +46,7 @@ class BoxRefinement {
   BoxRefinement(const BoxObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
 
-  /// As PointRefinement::refine().
+  /// Does for a box what PointRefinement::refine() does for a point.
   float refine(std::int32_t tile, int lane, float lower_bound);
   bool update_planes(SupportingPlanes* planes);
   bool deadline_passed() { return link_.search.deadline->passed(); }

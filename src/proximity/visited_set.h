@@ -6,8 +6,8 @@
 
 namespace ist {
 
-/// Which obstacles of an index a traversal has refined: several sphere leaves meet the same one. A
-/// direct-mapped table of fixed size: an obstacle whose place another one took counts as new.
+/// The obstacles of an index that a traversal has refined: several sphere leaves meet the same one.
+/// A direct-mapped table of fixed size: an obstacle whose place another one took counts as new.
 class VisitedSet {
  public:
   void clear() {

@@ -1,4 +1,4 @@
-// A link's groups of spheres in the frame of an index, and the descent to the tiles near them.
+// A link's groups of spheres in the frame of an index, and the traversal to the tiles near them.
 // Compiled once per instruction set: to be included again for each.
 #if defined(IST_PROXIMITY_POSED_GROUPS_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_PROXIMITY_POSED_GROUPS_INL_H

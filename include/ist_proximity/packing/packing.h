@@ -26,7 +26,7 @@ struct PackingConfig {
   /// Spheres per link, >= 1. A packing that reaches this number first is valid, with a larger
   /// error.
   int max_spheres = 20000;
-  /// Which spheres are chosen, and in which order.
+  /// The choice of spheres and their order.
   PackingOrder order = PackingOrder::kMedial;
 };
 

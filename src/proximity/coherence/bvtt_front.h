@@ -43,7 +43,7 @@ class BvttFront {
   /// Ends a traversal.
   /// @param is_complete  false: it was stopped, or a pair found no place; the front is discarded
   void end(bool is_complete);
-  /// Of which index; 0: there is no front.
+  /// The index that the front belongs to; 0: there is no front.
   std::uint64_t build_id() const { return build_id_; }
 
   bool empty() const { return size_ == 0; }

@@ -12,7 +12,7 @@ namespace ist {
 /// a new entry replaces an older one.
 class DistanceCache {
  public:
-  /// Which distance of the point.
+  /// The distance of a point that an entry bounds.
   enum class Quantity : std::uint8_t {
     kUnsigned,  ///< to the surface, for a point outside
     kSigned     ///< PointDepth::floor
