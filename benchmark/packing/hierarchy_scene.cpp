@@ -69,6 +69,16 @@ void find_free(HierarchyScene* scene) {
   }
 }
 
+// Poses of the synthetic links, a motion or one by one.
+std::vector<Poses> synthetic_poses(std::size_t links, bool motion) {
+  std::mt19937_64 rng(1);
+  std::vector<Poses> poses(motion ? 4 : kHierarchySteps / 4);
+  for (Poses& X_FL : poses) {
+    for (std::size_t i = 0; i < links; ++i) X_FL.push_back(synthetic_pose(&rng));
+  }
+  return motion ? interpolated(poses, 400) : poses;
+}
+
 }  // namespace
 
 QueryConfig hierarchy_query_config() {
@@ -104,14 +114,7 @@ bool make_hierarchy_scene(const Options& options, const std::string& name, doubl
     robot.meshes = synthetic_meshes();
     scene->model = robot.pack(max_error);
     scene->clouds.push_back(ingested(synthetic_frame(640, 480)));
-    std::mt19937_64 rng(1);
-    const std::size_t count = motion ? 4 : kHierarchySteps / 4;
-    while (scene->poses.size() < count) {
-      Poses X_FL;
-      for (std::size_t i = 0; i < robot.meshes.size(); ++i) X_FL.push_back(synthetic_pose(&rng));
-      scene->poses.push_back(std::move(X_FL));
-    }
-    if (motion) scene->poses = interpolated(scene->poses, 400);
+    scene->poses = synthetic_poses(robot.meshes.size(), motion);
   }
   if (motion) scene->poses.resize(std::min(scene->poses.size(), kHierarchySteps));
   find_free(scene);

@@ -143,6 +143,25 @@ MovingScene analytic(const std::string& name, const TriangleMesh& mesh, const Po
   return scene;
 }
 
+// The first poses of the recorded trajectory, by link.
+std::vector<std::vector<Eigen::Isometry3d>> recorded_poses(const std::filesystem::path& data,
+                                                           std::size_t count) {
+  const test::Npy poses = test::read_npy((data / "poses/traj.npy").string());
+  std::vector<std::vector<Eigen::Isometry3d>> X_FL(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
+      Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+      for (int i = 0; i < 12; ++i) {
+        X.matrix()(i / 4, i % 4) =
+            poses.values.at((k * test::kPandaLinks + link) * 12 + static_cast<std::size_t>(i));
+      }
+      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+      X_FL[k].push_back(X);
+    }
+  }
+  return X_FL;
+}
+
 }  // namespace
 
 std::vector<MovingScene> analytic_scenes() {
@@ -188,20 +207,8 @@ std::vector<MovingScene> analytic_scenes() {
 }
 
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
-  const test::Npy poses = test::read_npy((data / "poses/traj.npy").string());
   constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 25, kWidth = 640;
-  std::vector<std::vector<Eigen::Isometry3d>> way(kPoses);
-  for (std::size_t k = 0; k < kPoses; ++k) {
-    for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
-      Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-      for (int i = 0; i < 12; ++i) {
-        X.matrix()(i / 4, i % 4) =
-            poses.values.at((k * test::kPandaLinks + link) * 12 + static_cast<std::size_t>(i));
-      }
-      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-      way[k].push_back(X);
-    }
-  }
+  const std::vector<std::vector<Eigen::Isometry3d>> way = recorded_poses(data, kPoses);
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   std::ifstream file(data / "clouds/T_base_cam.txt");
   for (int i = 0; i < 16; ++i) file >> X_FS.matrix()(i / 4, i % 4);

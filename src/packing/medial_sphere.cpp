@@ -50,7 +50,7 @@ MedialSphere MedialSphereFinder::shrink_along(const Eigen::Vector3d& direction,
     const Eigen::Vector3d center = s + t * direction;
     const Obstacle obstacle = nearest(center);
     *contact = obstacle.contact;
-    const MedialSphere sphere{center, std::max(0.0, obstacle.distance)};
+    MedialSphere sphere{center, std::max(0.0, obstacle.distance)};
     if (obstacle.distance >= t - gap - accuracy || t <= gap) return sphere;
     // |s + t d - q| >= t - gap + r, solved for t.
     const Eigen::Vector3d from_center = s - obstacle.center;
@@ -92,7 +92,7 @@ MedialSphere MedialSphereFinder::best_direction(const Eigen::Vector3d& s,
 
 MedialSphere MedialSphereFinder::near_surface(const Eigen::Vector3d& s,
                                               const Eigen::Vector3d& normal, double gap) const {
-  const MedialSphere nothing{s, 0.0};
+  MedialSphere nothing{s, 0.0};
   if (normal.isZero()) return nothing;
   // The winding number decides which side is inside: faces may be inside out.
   const double step = 1e-3 * gap;
@@ -124,8 +124,7 @@ MedialSphere MedialSphereFinder::containing(const Eigen::Vector3d& x, double gap
     const MedialSphere grown =
         shrink_along((x - obstacle.contact) / depth, obstacle.contact, gap, &contact);
     // A sphere that contains x and that no triangle enters is on the same side as x.
-    const MedialSphere sphere =
-        grown.radius > (grown.center - x).norm() ? grown : MedialSphere{x, depth};
+    MedialSphere sphere = grown.radius > (grown.center - x).norm() ? grown : MedialSphere{x, depth};
     if (is_closed() || admits(sphere)) return sphere;
   }
   return {x, -std::sqrt(bvh_.closest(x).distance_sq)};

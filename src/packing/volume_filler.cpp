@@ -24,7 +24,7 @@ constexpr int kMaxRefusalsInAll = 500;
 VolumeFiller::VolumeFiller(const TriangleBvh& bvh, const MedialSphereFinder& finder,
                            const SphereSearch& spheres, double min_radius)
     : bvh_(bvh), finder_(finder), spheres_(spheres), min_radius_(min_radius) {
-  const Eigen::AlignedBox3d box = bvh.bounds();
+  const Eigen::AlignedBox3d& box = bvh.bounds();
   if (box.sizes().minCoeff() <= 0.0) return;  // flat: nothing to fill
   divide(box.center(), 0.5 * box.sizes().maxCoeff(), nullptr);
 }
@@ -65,14 +65,14 @@ void VolumeFiller::push(const Prototype& prototype) {
 
 VolumeFiller::Cell VolumeFiller::pop_cell() {
   std::pop_heap(cells_.begin(), cells_.end(), UpperBoundLess());
-  const Cell cell = cells_.back();
+  Cell cell = cells_.back();
   cells_.pop_back();
   return cell;
 }
 
 VolumeFiller::Prototype VolumeFiller::pop_prototype() {
   std::pop_heap(prototypes_.begin(), prototypes_.end(), RadiusLess());
-  const Prototype prototype = prototypes_.back();
+  Prototype prototype = prototypes_.back();
   prototypes_.pop_back();
   return prototype;
 }
@@ -158,7 +158,7 @@ std::optional<MedialSphere> VolumeFiller::next(double at_least) {
       continue;
     }
     if (found <= 0.0 || found < kEnough * at_least) return std::nullopt;
-    if (const auto sphere = take_prototype()) return sphere;
+    if (auto sphere = take_prototype()) return sphere;
   }
   return std::nullopt;
 }

@@ -64,8 +64,9 @@ struct ProximityBatch::Impl {
   std::vector<Worker> workers;
 };
 
-ProximityBatch::ProximityBatch(std::shared_ptr<const RobotModel> model, const QueryConfig& config,
-                               int threads)
+ProximityBatch::ProximityBatch(
+    std::shared_ptr<const RobotModel> model,  // NOLINT(performance-unnecessary-value-param): as the
+    const QueryConfig& config, int threads)   // other queries take it
     : impl_(std::make_unique<Impl>()) {
   impl_->links = model->links.size();
   const std::size_t count = threads > 0 ? static_cast<std::size_t>(threads)

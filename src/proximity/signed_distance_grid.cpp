@@ -64,11 +64,11 @@ SignedDistanceGrid::Sample SignedDistanceGrid::sample(const Eigen::Vector3d& p_L
   return sample;
 }
 
-bool SignedDistanceGrid::find(const Eigen::Vector3d& p_LQ, Sample* out) const {
+bool SignedDistanceGrid::find(const Eigen::Vector3d& p_LQ, Sample* sample) const {
   if (!box_.contains(p_LQ)) return false;
   const Cell cell = this->cell(p_LQ);
   if (!(values_[cell.index] < kUnknown)) return false;
-  *out = sample(p_LQ, cell);
+  *sample = this->sample(p_LQ, cell);
   return true;
 }
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <vector>
 
-#include "ros/thread_name.h"
+#include "ros/common/thread_name.h"
 #include "support.h"
 #include "support/pcd.h"
 
