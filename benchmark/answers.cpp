@@ -16,7 +16,7 @@
 #include "answers/scenes.h"
 #include "internal/geometry/mesh_io.h"
 #include "internal/packing/packer.h"
-#include "ist_proximity/robot/posed_solids.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "support/box_oracle.h"
 #include "support/hard_scenes.h"
 #include "support/random_links.h"

@@ -19,11 +19,10 @@
 #include "dodge_controller.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/contact/contact_model.h"
-#include "ist_proximity/contact/contact_wrench.h"
+#include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/link_poses.h"
-#include "ist_proximity/robot/posed_solids.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace {

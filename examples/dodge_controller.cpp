@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "ist_proximity/robot/jacobian.h"
+#include "ist_proximity/robot/kinematics.h"
 
 namespace ist::example {
 namespace {

@@ -10,7 +10,6 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/link_poses.h"
-#include "ist_proximity/robot/posed_solids.h"
 
 int main(int argc, char** argv) try {
   // Once: the robot. Every link is packed; ROS_PACKAGE_PATH is where meshes are looked for.

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "ist_proximity/proximity/self_collision_pairs.h"
 #include "ist_proximity/proximity/self_query.h"
-#include "ist_proximity/robot/posed_solids.h"
+#include "ist_proximity/robot/link_poses.h"
 
 namespace ist::sim {
 namespace {

@@ -7,7 +7,7 @@
 #include "internal/cloud/point_bvh.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ist_proximity/robot/posed_solids.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "scene.h"
 
 namespace ist::sim {

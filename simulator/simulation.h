@@ -10,7 +10,7 @@
 
 #include "arm.h"
 #include "depth_camera.h"
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/geometry/solid.h"
 #include "obstacle.h"
 

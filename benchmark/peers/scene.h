@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/robot_model.h"
 
 /// Robots, frames and configurations that the methods get.

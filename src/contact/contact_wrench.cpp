@@ -1,4 +1,4 @@
-#include "ist_proximity/contact/contact_wrench.h"
+#include "ist_proximity/contact/contact_volume.h"
 
 #include <limits>
 

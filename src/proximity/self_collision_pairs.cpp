@@ -1,4 +1,4 @@
-#include "ist_proximity/proximity/self_collision_pairs.h"
+#include "ist_proximity/proximity/self_query.h"
 
 #include <tinyxml2.h>
 

@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/attached_object.h"
+#include "ist_proximity/robot/robot_model.h"
 
 #include <algorithm>
 #include <utility>

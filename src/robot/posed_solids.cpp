@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/posed_solids.h"
+#include "ist_proximity/robot/link_poses.h"
 
 #include <algorithm>
 

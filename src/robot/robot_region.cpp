@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/robot_region.h"
+#include "ist_proximity/robot/link_poses.h"
 
 #include <algorithm>
 #include <cmath>

@@ -11,7 +11,7 @@
 #include <mutex>
 #include <thread>
 
-#include "ist_proximity/robot/robot_region.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stop_signal.h"
 #include "ros/common/thread_name.h"

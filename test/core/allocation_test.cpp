@@ -11,7 +11,6 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/link_poses.h"
-#include "ist_proximity/robot/posed_solids.h"
 #include "support/allocations.h"
 #include "support/demo_arm.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ist_proximity/robot/jacobian.h"
+#include "ist_proximity/robot/kinematics.h"
 #include "support/demo_arm.h"
 #include "support/scene.h"
 

@@ -14,7 +14,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include "ist_proximity/cloud/cloud_layout.h"
 #include "support/instruction_sets.h"
 #include "support/tiles.h"
 

@@ -1,4 +1,4 @@
-#include "ist_proximity/robot/jacobian.h"
+#include "ist_proximity/robot/kinematics.h"
 
 #include <gtest/gtest.h>
 

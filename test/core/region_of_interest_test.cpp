@@ -1,7 +1,7 @@
 // The region of interest: points outside are discarded, and answers account for what is unknown
 // there.
 
-#include "ist_proximity/robot/robot_region.h"
+#include "ist_proximity/robot/link_poses.h"
 
 #include <gtest/gtest.h>
 

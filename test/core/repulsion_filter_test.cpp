@@ -1,4 +1,4 @@
-#include "ist_proximity/repulsion/repulsion_filter.h"
+#include "ist_proximity/repulsion/repulsion.h"
 
 #include <gtest/gtest.h>
 

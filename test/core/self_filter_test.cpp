@@ -8,7 +8,7 @@
 
 #include "internal/packing/packer.h"
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/robot/posed_solids.h"
+#include "ist_proximity/robot/link_poses.h"
 #include "support/allocations.h"
 #include "support/tiles.h"
 

@@ -1,4 +1,4 @@
-#include "ist_proximity/cloud/snapshot_channel.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ist_proximity/geometry/solid.h"
 #include "ist_proximity/packing/packing.h"
 
 namespace ist {
@@ -103,6 +104,14 @@ class InnerSphereTree {
   double radius_ = 0.0;
   double interior_gap_ = 0.0;
   std::size_t sphere_count_ = 0;
+};
+
+/// One link's geometry at a pose, for whatever needs to know where a robot is but not what a robot
+/// is. The same link at several instants is as many of them.
+struct PosedSolid {
+  const InnerSphereTree* tree = nullptr;  ///< in the link frame L; not owned, not null
+  const Solid* solid = nullptr;           ///< exact geometry in L; not owned, not null
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< link frame -> fixed frame, rigid
 };
 
 }  // namespace ist

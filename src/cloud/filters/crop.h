@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "cloud/filters/crop_parameters.h"
-#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <limits>
 
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/geometry/region_of_interest.h"
 
 namespace ist {

@@ -7,7 +7,7 @@
 
 #include "cloud/filters/point_filter.h"
 #include "ist_proximity/geometry/span.h"
-#include "ist_proximity/tree/posed_solid.h"
+#include "ist_proximity/tree/inner_sphere_tree.h"
 
 namespace ist {
 

@@ -1,4 +1,4 @@
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 
 #include <algorithm>
 #include <limits>

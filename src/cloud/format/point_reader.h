@@ -6,7 +6,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 
 /// Reads points from a message's bytes, whose layout check_layout has passed.
 namespace ist {

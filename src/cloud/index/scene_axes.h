@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

@@ -5,7 +5,7 @@
 
 #include "cloud/filters/crop.h"
 #include "internal/cloud/point_tile.h"
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

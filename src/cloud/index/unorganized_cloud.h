@@ -5,8 +5,8 @@
 #include "cloud/filters/crop_parameters.h"
 #include "cloud/filters/self_filter.h"
 #include "cloud/index/point_bvh_builder.h"
-#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

@@ -9,8 +9,8 @@
 #include "internal/bvh/box_node.h"
 #include "internal/cloud/lazy_tile_flags.h"
 #include "internal/cloud/point_tile.h"
-#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

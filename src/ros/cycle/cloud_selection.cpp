@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "ist_proximity/repulsion/repulsion_filter.h"
+#include "ist_proximity/repulsion/repulsion.h"
 
 namespace ist {
 

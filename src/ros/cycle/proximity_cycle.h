@@ -10,7 +10,6 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
-#include "ist_proximity/repulsion/repulsion_filter.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/input/cloud_source.h"
 #include "ros/model/model_state.h"

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "ist_proximity/cloud/cloud_layout.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/tree/posed_solid.h"
+#include "ist_proximity/tree/inner_sphere_tree.h"
 #include "ros/parameters/source_config.h"
 
 namespace ist {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "ist_proximity/cloud/cloud_layout.h"
+#include "ist_proximity/cloud/ingest.h"
 #include "ros/parameters/source_config.h"
 
 namespace ist {

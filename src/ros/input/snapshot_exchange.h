@@ -3,7 +3,7 @@
 #include <memory>
 #include <mutex>
 
-#include "ist_proximity/cloud/snapshot_channel.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ros/input/source_snapshot.h"
 
 namespace ist {

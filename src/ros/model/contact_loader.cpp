@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "ist_proximity/robot/attached_object.h"
+#include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
 namespace {

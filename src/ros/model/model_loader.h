@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "ist_proximity/robot/attached_object.h"
+#include "ist_proximity/robot/robot_model.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/robot/attached_object.h"
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/repulsion/repulsion.h"
-#include "ist_proximity/robot/jacobian.h"
+#include "ist_proximity/robot/kinematics.h"
 #include "ros/model/model_state.h"
 #include "ros/poses/pose_source.h"
 

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "ist_proximity/contact/contact_wrench.h"
+#include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/input/source_report.h"

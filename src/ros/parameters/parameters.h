@@ -11,7 +11,7 @@
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/contact/contact_model.h"
-#include "ist_proximity/contact/contact_wrench.h"
+#include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"

@@ -2,8 +2,8 @@
 
 #include <ist_proximity/AttachObject.h>
 
-#include "ist_proximity/robot/attached_object.h"
 #include "ist_proximity/robot/robot_description.h"
+#include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
 

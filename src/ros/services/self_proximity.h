@@ -12,7 +12,6 @@
 #include <thread>
 #include <vector>
 
-#include "ist_proximity/proximity/self_collision_pairs.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/common/stop_signal.h"
 #include "ros/model/model_state.h"
