@@ -68,6 +68,7 @@ target_sources(benchmark_peers PRIVATE
   benchmark/peers/scene.cpp
   benchmark/peers/signed_grid.cpp
   benchmark/peers/synthetic.cpp)
+target_sources(benchmark_answers PRIVATE benchmark/peers/scene.cpp)
 target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_ingest PRIVATE
   benchmark/peers/kinect.cpp

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "peers/scene.h"
 #include "support/box_oracle.h"
 #include "support/truth.h"
 
@@ -15,8 +16,8 @@ namespace ist::benchmark {
 
 using Poses = std::vector<Eigen::Isometry3d>;  ///< by link
 
-constexpr int kMotionPoses = 50;   // taken from the recorded trajectory
-constexpr int kStepsPerPose = 10;  // 1 ms apart, about
+constexpr std::size_t kMotionPoses = 50;  // taken from the recorded trajectory
+constexpr int kStepsPerPose = 10;         // 1 ms apart, about
 
 /// A frame of the sensor as ingest takes it: an organized cloud whose points are read as needed.
 /// @param region_radius  [m] of the region of interest about the robot
@@ -48,30 +49,18 @@ inline CloudSnapshot ingested(const std::filesystem::path& data, const std::stri
 /// The recorded trajectory in small steps, so that a bound of one step serves the next ones.
 inline std::vector<Poses> small_steps(const std::filesystem::path& data) {
   const test::Npy array = test::read_npy((data / "poses/traj.npy").string());
-  const auto pose = [&](int k, std::size_t link) {
-    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-    const std::size_t first = (static_cast<std::size_t>(k) * test::kPandaLinks + link) * 12;
-    for (int i = 0; i < 12; ++i) {
-      X.matrix()(i / 4, i % 4) = array.values.at(first + static_cast<std::size_t>(i));
-    }
-    return X;
-  };
-  std::vector<Poses> motion;
-  for (int step = 0; step < kMotionPoses * kStepsPerPose; ++step) {
-    const int k = step / kStepsPerPose;
-    const double s = static_cast<double>(step % kStepsPerPose) / kStepsPerPose;
-    Poses X_FL;
+  std::vector<Poses> poses(kMotionPoses + 1);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
     for (std::size_t link = 0; link < test::kPandaLinks; ++link) {
-      const Eigen::Isometry3d a = pose(k, link), b = pose(k + 1, link);
-      const Eigen::Quaterniond q(a.linear()), r(b.linear());
       Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-      X.linear() = q.normalized().slerp(s, r.normalized()).toRotationMatrix();
-      X.translation() = (1.0 - s) * a.translation() + s * b.translation();
-      X_FL.push_back(X);
+      const std::size_t first = (k * test::kPandaLinks + link) * 12;
+      for (int i = 0; i < 12; ++i) {
+        X.matrix()(i / 4, i % 4) = array.values.at(first + static_cast<std::size_t>(i));
+      }
+      poses[k].push_back(X);
     }
-    motion.push_back(std::move(X_FL));
   }
-  return motion;
+  return interpolated(poses, kStepsPerPose);
 }
 
 /// Cubes of 2 to 16 cm about the robot.

@@ -62,8 +62,8 @@ Eigen::Isometry3d between(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b
   return X;
 }
 
-// Through way points, in steps of at most kStep for every vertex.
-void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingScene* scene) {
+// Moves through waypoints, in steps of at most kStep for every vertex.
+void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& waypoints, MovingScene* scene) {
   std::vector<Points> corners;
   for (const LinkDescription& link : scene->robot.links) {
     Points points;
@@ -73,12 +73,13 @@ void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingSce
     }
     corners.push_back(std::move(points));
   }
-  for (std::size_t k = 0; k + 1 < way.size(); ++k) {
+  for (std::size_t k = 0; k + 1 < waypoints.size(); ++k) {
     double farthest = 0.0;
     for (std::size_t i = 0; i < corners.size(); ++i) {
       for (std::size_t c = 0; c < corners[i].size(); c += 1 + corners[i].size() / 500) {
-        farthest =
-            std::max(farthest, (way[k][i] * corners[i][c] - way[k + 1][i] * corners[i][c]).norm());
+        farthest = std::max(
+            farthest,
+            (waypoints[k][i] * corners[i][c] - waypoints[k + 1][i] * corners[i][c]).norm());
       }
     }
     // A fifth more: along the arc a point moves a little more than along its chord.
@@ -86,7 +87,8 @@ void set_steps(const std::vector<std::vector<Eigen::Isometry3d>>& way, MovingSce
     for (int s = 0; s < count; ++s) {
       std::vector<Eigen::Isometry3d> X_FL;
       for (std::size_t i = 0; i < corners.size(); ++i) {
-        X_FL.push_back(between(way[k][i], way[k + 1][i], static_cast<double>(s) / count));
+        X_FL.push_back(
+            between(waypoints[k][i], waypoints[k + 1][i], static_cast<double>(s) / count));
       }
       scene->steps.push_back(std::move(X_FL));
       scene->begins.push_back(k == 0 && s == 0);
@@ -131,13 +133,13 @@ RobotDescription one_link(const std::string& name, const TriangleMesh& mesh) {
 }
 
 MovingScene analytic(const std::string& name, const TriangleMesh& mesh, const Points& twice,
-                     const std::vector<Eigen::Isometry3d>& way) {
+                     const std::vector<Eigen::Isometry3d>& waypoints) {
   MovingScene scene;
   scene.name = name;
   scene.robot = one_link(name, mesh);
   set_clouds(twice, &scene);
   std::vector<std::vector<Eigen::Isometry3d>> links;
-  for (const Eigen::Isometry3d& X : way) links.push_back({X});
+  for (const Eigen::Isometry3d& X : waypoints) links.push_back({X});
   set_steps(links, &scene);
   scene.reference_count = scene.steps.size();
   return scene;
@@ -208,7 +210,7 @@ std::vector<MovingScene> analytic_scenes() {
 
 std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
   constexpr std::size_t kPoses = 2000, kStretches = 10, kLength = 25, kWidth = 640;
-  const std::vector<std::vector<Eigen::Isometry3d>> way = recorded_poses(data, kPoses);
+  const std::vector<std::vector<Eigen::Isometry3d>> trajectory = recorded_poses(data, kPoses);
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   std::ifstream file(data / "clouds/T_base_cam.txt");
   for (int i = 0; i < 16; ++i) file >> X_FS.matrix()(i / 4, i % 4);
@@ -244,7 +246,7 @@ std::vector<MovingScene> recorded_scenes(const std::filesystem::path& data) {
     scene.half = ingested(half);
     scene.twice = ingested(twice);
     for (std::size_t k = 0; k < kStretches; ++k) {
-      const auto first = way.begin() + static_cast<std::ptrdiff_t>(k * kPoses / kStretches);
+      const auto first = trajectory.begin() + static_cast<std::ptrdiff_t>(k * kPoses / kStretches);
       set_steps({first, first + kLength}, &scene);
     }
     scene.reference_begin = scene.steps.size() / 2;

@@ -216,6 +216,32 @@ std::vector<TriangleMesh> link_meshes() {
           test::thin_plate(0.1, 0.001), test::icosphere(0.08, 1)};
 }
 
+// Expects the state and the bounds of the truth, and closest points that fit them.
+void expect_truth(const LinkProximity& result, const Truth& truth, const TriangleMesh& mesh,
+                  const CloudSnapshot& map, const Eigen::Isometry3d& X_FL,
+                  const QueryConfig& config) {
+  if (result.state == LinkState::kClear) {
+    ASSERT_GE(truth.distance, config.max_distance - 1e-9);
+    ASSERT_FALSE(truth.is_contact);
+    return;
+  }
+  ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
+  ASSERT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
+  ASSERT_LT((X_FL * result.p_LCl - result.p_FCl).norm(), 1e-12);
+  ASSERT_TRUE(in_a_box(map, result.p_FCo));
+  ASSERT_LT(test::oracle_distance(mesh, result.p_LCl), 1e-9);
+  ASSERT_LE(result.lower_bound, result.distance);
+  ASSERT_EQ(result.state == LinkState::kContact, truth.is_contact) << result.distance;
+  if (result.state == LinkState::kNear) {
+    ASSERT_LE(result.lower_bound, truth.distance);
+    ASSERT_GE(result.distance, truth.distance - 1e-9);
+    ASSERT_LE(result.distance - result.lower_bound, config.tolerance + 2e-6);
+    return;
+  }
+  const Eigen::Vector3d p_L = X_FL.inverse() * result.p_FCo;
+  ASSERT_NEAR(result.distance, test::oracle_signed_distance(mesh, p_L), 1e-9);
+}
+
 class Boxes : public ::testing::TestWithParam<double> {};
 
 TEST_P(Boxes, AgainstOracle) {
@@ -248,29 +274,11 @@ TEST_P(Boxes, AgainstOracle) {
                      std::to_string(i));
         const Truth truth = truth_of(meshes[i], map, X_FL[i]);
         const LinkProximity& result = results[i];
-        if (result.state == LinkState::kClear) {
-          ++clear;
-          ASSERT_GE(truth.distance, config.max_distance - 1e-9);
-          ASSERT_FALSE(truth.is_contact);
-          continue;
-        }
-        ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
-        ASSERT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
-        ASSERT_LT((X_FL[i] * result.p_LCl - result.p_FCl).norm(), 1e-12);
-        ASSERT_TRUE(in_a_box(map, result.p_FCo));
-        ASSERT_LT(test::oracle_distance(meshes[i], result.p_LCl), 1e-9);
-        ASSERT_LE(result.lower_bound, result.distance);
-        ASSERT_EQ(result.state == LinkState::kContact, truth.is_contact) << result.distance;
-        if (result.state == LinkState::kNear) {
-          ++near;
-          ASSERT_LE(result.lower_bound, truth.distance);
-          ASSERT_GE(result.distance, truth.distance - 1e-9);
-          ASSERT_LE(result.distance - result.lower_bound, tolerance + 2e-6);
-          continue;
-        }
+        ASSERT_NO_FATAL_FAILURE(expect_truth(result, truth, meshes[i], map, X_FL[i], config));
+        clear += result.state == LinkState::kClear;
+        near += result.state == LinkState::kNear;
+        if (result.state != LinkState::kContact) continue;
         ++contact;
-        const Eigen::Vector3d p_L = X_FL[i].inverse() * result.p_FCo;
-        ASSERT_NEAR(result.distance, test::oracle_signed_distance(meshes[i], p_L), 1e-9);
         widest = std::max(widest, result.distance - result.lower_bound);
         if (cases % 10 == 0) {
           ASSERT_LE(result.lower_bound, sampled_depth(&rng, meshes[i], map, X_FL[i], 200));

@@ -154,6 +154,38 @@ CloudSnapshot random_map(test::Rng* rng, int count) {
   return test::make_map(boxes, test::random_pose(rng, 0.1));
 }
 
+// Makes clouds and maps by turns.
+std::vector<CloudSnapshot> random_sources(test::Rng* rng, int count) {
+  std::vector<CloudSnapshot> sources;
+  for (int i = 0; i < count; ++i) {
+    sources.push_back(i % 2 == 0 ? random_cloud(rng, 1500) : random_map(rng, 200));
+  }
+  return sources;
+}
+
+// Moves every link by `size` [m] along each axis at most, and turns it by `size` [rad].
+void move_links(test::Rng* rng, double size, Poses* X_FL) {
+  for (Eigen::Isometry3d& X : *X_FL) {
+    X.translation() += test::random_vector(rng, size);
+    X.rotate(Eigen::AngleAxisd(size, test::random_vector(rng, 1.0).normalized()));
+    X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+  }
+}
+
+// Expects an answer at `tolerance` that agrees with the one at tolerance 0.
+void expect_agrees(const LinkProximity& result, const LinkProximity& exact, double tolerance,
+                   bool has_boxes) {
+  ASSERT_EQ(result.state, exact.state);
+  if (result.state == LinkState::kClear) return;
+  // The depth of boxes is found to a resolution only, with either start.
+  const double slack = result.state == LinkState::kContact && has_boxes ? 0.01 : 1e-12;
+  ASSERT_LE(result.lower_bound, exact.distance + 1e-12);
+  ASSERT_GE(result.distance, exact.lower_bound - 1e-12);
+  ASSERT_LE(result.distance, exact.distance + tolerance + slack);
+  if (result.state == LinkState::kContact) return;
+  ASSERT_LE(result.distance - result.lower_bound, tolerance + 3e-6);
+}
+
 // The parameters: the number of clouds and maps, in one case more than there are fronts, and the
 // tolerance.
 class FrontQueries : public ::testing::TestWithParam<std::tuple<int, double>> {};
@@ -167,10 +199,7 @@ TEST_P(FrontQueries, AgreeWithTraversalsFromTheRoot) {
   config.tolerance = tolerance;
   exact.tolerance = 0.0;
   ProximityQuery query(model, config);
-  std::vector<CloudSnapshot> snapshots;
-  for (int i = 0; i < sources; ++i) {
-    snapshots.push_back(i % 2 == 0 ? random_cloud(&rng, 1500) : random_map(&rng, 200));
-  }
+  std::vector<CloudSnapshot> snapshots = random_sources(&rng, sources);
   std::vector<const CloudSnapshot*> clouds;
   for (const CloudSnapshot& snapshot : snapshots) clouds.push_back(&snapshot);
   Poses X_FL(model->links.size());
@@ -179,12 +208,7 @@ TEST_P(FrontQueries, AgreeWithTraversalsFromTheRoot) {
   std::uint64_t pairs = 0, root_pairs = 0;
   const int steps = test::scaled(100);
   for (int step = 0; step < steps; ++step) {
-    const double size = step % 25 == 24 ? 0.1 : 5e-4;
-    for (Eigen::Isometry3d& X : X_FL) {
-      X.translation() += test::random_vector(&rng, size);
-      X.rotate(Eigen::AngleAxisd(size, test::random_vector(&rng, 1.0).normalized()));
-      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
-    }
+    move_links(&rng, step % 25 == 24 ? 0.1 : 5e-4, &X_FL);
     for (CloudSnapshot& snapshot : snapshots) {
       snapshot.X_FM.translation() += test::random_vector(&rng, 1e-4);
     }
@@ -197,15 +221,7 @@ TEST_P(FrontQueries, AgreeWithTraversalsFromTheRoot) {
     root_pairs += cold.statistics().node_pairs;
     for (std::size_t i = 0; i < results.size(); ++i) {
       SCOPED_TRACE("step " + std::to_string(step) + ", link " + std::to_string(i));
-      ASSERT_EQ(results[i].state, exact_results[i].state);
-      if (results[i].state == LinkState::kClear) continue;
-      // The depth of boxes is found to a resolution only, with either start.
-      const double slack = results[i].state == LinkState::kContact && sources > 1 ? 0.01 : 1e-12;
-      ASSERT_LE(results[i].lower_bound, exact_results[i].distance + 1e-12);
-      ASSERT_GE(results[i].distance, exact_results[i].lower_bound - 1e-12);
-      ASSERT_LE(results[i].distance, exact_results[i].distance + tolerance + slack);
-      if (results[i].state == LinkState::kContact) continue;
-      ASSERT_LE(results[i].distance - results[i].lower_bound, tolerance + 3e-6);
+      ASSERT_NO_FATAL_FAILURE(expect_agrees(results[i], exact_results[i], tolerance, sources > 1));
     }
   }
   EXPECT_LT(pairs, 3 * root_pairs / 4);

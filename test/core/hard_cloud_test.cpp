@@ -180,47 +180,65 @@ TEST(HardCloud, OddNumbersInEachCoordinate) {
   expect_odd_numbers_dropped<double>();
 }
 
+// Points whose coordinates float holds exactly.
+Points random_float_points(test::Rng* rng, int count) {
+  Points points;
+  for (int i = 0; i < count; ++i) {
+    const Point p = test::random_vector(rng, 0.8);
+    points.push_back(p.cast<float>().cast<double>());
+  }
+  return points;
+}
+
+// Expects the answers of two scenes, of which one is the other moved by `far` [m].
+void expect_same_answers(const std::vector<LinkProximity>& here,
+                         const std::vector<LinkProximity>& there, const Point& far) {
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    EXPECT_EQ(here[i].state, there[i].state);
+    if (here[i].state < LinkState::kNear) continue;
+    EXPECT_NEAR(here[i].distance, there[i].distance, 1e-6);
+    EXPECT_NEAR(here[i].lower_bound, there[i].lower_bound, 1e-5);
+    EXPECT_LT((here[i].p_FCo + far - there[i].p_FCo).norm(), 1e-5);
+  }
+}
+
+void expect_same_distances(const std::vector<LinkProximity>& here,
+                           const std::vector<LinkProximity>& there) {
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    if (here[i].state < LinkState::kNear) continue;
+    EXPECT_NEAR(here[i].distance, there[i].distance, 1e-6);
+  }
+}
+
 // The same scene at the origin and 1e6 m away, where either the sensor's pose or the points' own
 // coordinates are large.
 TEST(HardCloud, FarFromTheOrigin) {
   test::Rng rng(62);
   for (const Point& far : {Point(1e6, -2e6, 5e5), Point(1e6 + 0.3, 1e6 - 0.7, 0.1)}) {
     for (int scene = 0; scene < test::scaled(100); ++scene) {
-      Points points;
-      for (int i = 0; i < 200; ++i) {
-        const Point p = test::random_vector(&rng, 0.8);
-        points.push_back(p.cast<float>().cast<double>());  // exact in float and double
-      }
+      const Points points = random_float_points(&rng, 200);
       const Eigen::Isometry3d X_FS = test::random_pose(&rng, 0.5),
                               X_FL = test::random_pose(&rng, 0.5);
       const Eigen::Translation3d move(far);
-      Points map_points;
-      for (const Point& p : points) map_points.push_back(far + X_FS * p);
+      Points near_map_points, map_points;
+      for (const Point& p : points) {
+        near_map_points.push_back(X_FS * p);
+        map_points.push_back(far + X_FS * p);
+      }
       const CloudSnapshot here = ingest<float>(points, X_FS, 3.0);
       const CloudSnapshot there = ingest<float>(points, Eigen::Isometry3d(move * X_FS), 3.0);
       const CloudSnapshot map = ingest<double>(map_points, Eigen::Isometry3d::Identity(),
                                                std::numeric_limits<double>::infinity());
       ASSERT_EQ(there.index.size(), here.index.size());
       ASSERT_EQ(map.index.size(), points.size());
-      const CloudSnapshot near_map = [&] {
-        Points local;
-        for (const Point& p : points) local.push_back(X_FS * p);
-        return ingest<double>(local, Eigen::Isometry3d::Identity(), 100.0);
-      }();
+      const CloudSnapshot near_map =
+          ingest<double>(near_map_points, Eigen::Isometry3d::Identity(), 100.0);
       const auto a = query({&here}, X_FL, exact());
       const auto b = query({&there}, Eigen::Isometry3d(move * X_FL), exact());
       const auto c = query({&near_map}, X_FL, exact());
       const auto d = query({&map}, Eigen::Isometry3d(move * X_FL), exact());
-      for (std::size_t i = 0; i < a.size(); ++i) {
-        EXPECT_EQ(a[i].state, b[i].state);
-        if (a[i].state < LinkState::kNear) continue;
-        EXPECT_NEAR(a[i].distance, b[i].distance, 1e-6);
-        EXPECT_NEAR(a[i].lower_bound, b[i].lower_bound, 1e-5);
-        EXPECT_LT((a[i].p_FCo + far - b[i].p_FCo).norm(), 1e-5);
-      }
-      for (std::size_t i = 0; i < c.size(); ++i) {
-        if (c[i].state >= LinkState::kNear) EXPECT_NEAR(c[i].distance, d[i].distance, 1e-6);
-      }
+      expect_same_answers(a, b, far);
+      expect_same_distances(c, d);
     }
   }
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "support/meshes.h"
@@ -12,6 +13,8 @@
 
 namespace ist {
 namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;  // by link
 
 const std::vector<Shape>& shapes() {
   static const std::vector<Shape> kShapes = {
@@ -106,6 +109,54 @@ TEST(HardMotion, WarmStartDoesNotDrift) {
   }
 }
 
+// Expects that a query without a deadline is complete and that its answers, with its warm start,
+// are those of a cold start.
+void expect_complete(const std::shared_ptr<const RobotModel>& model, const Poses& X_FL,
+                     SnapshotSpan clouds, QueryConfig config, ProximityQuery* query,
+                     std::vector<LinkProximity>* exact) {
+  const std::vector<bool> known(X_FL.size(), true);
+  config.deadline = 0.0;
+  query->set_config(config);
+  ASSERT_TRUE(query->run(X_FL, known, clouds, exact))
+      << "a query without a deadline must be complete";
+  std::vector<LinkProximity> cold_results;
+  ProximityQuery(model, config).run(X_FL, known, clouds, &cold_results);
+  for (std::size_t i = 0; i < exact->size(); ++i) {
+    ASSERT_EQ((*exact)[i].state, cold_results[i].state);
+    if ((*exact)[i].state == LinkState::kClear) continue;
+    ASSERT_NEAR((*exact)[i].distance, cold_results[i].distance, 1e-12);
+  }
+}
+
+// The true distance [m], or max_distance where the true state is CLEAR.
+double true_distance(const LinkProximity& exact, const QueryConfig& config) {
+  return exact.state == LinkState::kClear ? config.max_distance : exact.distance;
+}
+
+// Expects bounds on both sides of the truth, whether or not the query was complete.
+void expect_bounds(const LinkProximity& result, const LinkProximity& exact, bool complete,
+                   const QueryConfig& config, const Eigen::Isometry3d& X_FL) {
+  const double truth = true_distance(exact, config);
+  ASSERT_LE(result.lower_bound, truth + 1e-12);
+  if (result.state == LinkState::kUnknown) {
+    ASSERT_FALSE(complete);
+    ASSERT_TRUE(std::isnan(result.distance));
+    return;
+  }
+  if (result.state == LinkState::kClear) {
+    ASSERT_EQ(exact.state, LinkState::kClear);
+    return;
+  }
+  ASSERT_GE(result.distance, truth - 1e-12);
+  test::expect_witness(result, X_FL);
+}
+
+// Whether the deadline ended the search before the nearest point was measured.
+bool is_partial(const LinkProximity& result, const LinkProximity& exact,
+                const QueryConfig& config) {
+  return result.state >= LinkState::kNear && result.distance > true_distance(exact, config) + 1e-9;
+}
+
 // Bounds hold at any deadline. A later query without a deadline is complete again.
 TEST(HardMotion, RandomDeadlines) {
   test::Rng rng(74);
@@ -114,7 +165,7 @@ TEST(HardMotion, RandomDeadlines) {
   QueryConfig config;
   config.tolerance = 0.0;
   ProximityQuery query(model, config);
-  std::vector<Eigen::Isometry3d> X_FL(model->links.size());
+  Poses X_FL(model->links.size());
   std::vector<LinkProximity> exact, results;
   const int scenes = test::scaled(200);
   int stopped = 0, partial = 0;
@@ -124,17 +175,7 @@ TEST(HardMotion, RandomDeadlines) {
     for (int k = 0; k < 50; ++k) {
       if (k % 10 == 0) {
         for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.6);
-        config.deadline = 0.0;
-        query.set_config(config);
-        ASSERT_TRUE(query.run(X_FL, known, clouds, &exact))
-            << "a query without a deadline must be complete";
-        ProximityQuery(model, config).run(X_FL, known, clouds, &results);
-        for (std::size_t i = 0; i < exact.size(); ++i) {
-          ASSERT_EQ(exact[i].state, results[i].state);
-          if (exact[i].state != LinkState::kClear) {
-            ASSERT_NEAR(exact[i].distance, results[i].distance, 1e-12);
-          }
-        }
+        ASSERT_NO_FATAL_FAILURE(expect_complete(model, X_FL, clouds, config, &query, &exact));
       }
       config.deadline = 1e-6 * std::pow(10.0, test::uniform(&rng, 0.0, 3.0));
       // Half of the queries have a cold start: no bound is known when the deadline passes.
@@ -144,21 +185,8 @@ TEST(HardMotion, RandomDeadlines) {
       const bool complete = stopping.run(X_FL, known, clouds, &results);
       stopped += complete ? 0 : 1;
       for (std::size_t i = 0; i < results.size(); ++i) {
-        const bool clear = exact[i].state == LinkState::kClear;
-        const double truth = clear ? config.max_distance : exact[i].distance;
-        ASSERT_LE(results[i].lower_bound, truth + 1e-12);
-        if (results[i].state == LinkState::kUnknown) {
-          ASSERT_FALSE(complete);
-          ASSERT_TRUE(std::isnan(results[i].distance));
-          continue;
-        }
-        if (results[i].state == LinkState::kClear) {
-          ASSERT_TRUE(clear);
-          continue;
-        }
-        ASSERT_GE(results[i].distance, truth - 1e-12);
-        test::expect_witness(results[i], X_FL[i]);
-        partial += results[i].distance > truth + 1e-9 ? 1 : 0;
+        ASSERT_NO_FATAL_FAILURE(expect_bounds(results[i], exact[i], complete, config, X_FL[i]));
+        partial += is_partial(results[i], exact[i], config) ? 1 : 0;
       }
     }
   }

@@ -5,6 +5,7 @@
 #include <hwy/targets.h>
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "ist_proximity/repulsion/repulsion.h"
@@ -48,11 +49,39 @@ TEST_F(InstructionSets, SameGeometry) {
   }
 }
 
+// Expects the answer of another instruction set, up to the rounding of float.
+void expect_same(const LinkProximity& result, const LinkProximity& first, double tolerance,
+                 const Eigen::Isometry3d& X_FL) {
+  if (std::abs(first.distance) > 2e-8 + tolerance) ASSERT_EQ(result.state, first.state);
+  if (first.state == LinkState::kClear) return;
+  // Float decides on which side of a mesh a point at its surface is.
+  ASSERT_NEAR(result.distance, first.distance, tolerance + 4e-8);
+  test::expect_witness(result, X_FL);
+}
+
+// Runs the same query with each instruction set; `results` are the last one's.
+void expect_same_answers(const std::vector<std::int64_t>& targets,
+                         const std::shared_ptr<const RobotModel>& model, const QueryConfig& config,
+                         const std::vector<Eigen::Isometry3d>& X_FL, const CloudSnapshot& cloud,
+                         std::vector<LinkProximity>* results) {
+  const std::vector<bool> known(X_FL.size(), true);
+  std::vector<LinkProximity> first;
+  for (const std::int64_t target : targets) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    test::choose_instruction_sets(target);
+    ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&cloud}, results));
+    if (first.empty()) first = *results;
+    for (std::size_t i = 0; i < X_FL.size(); ++i) {
+      SCOPED_TRACE("link " + std::to_string(i));
+      ASSERT_NO_FATAL_FAILURE(expect_same((*results)[i], first[i], config.tolerance, X_FL[i]));
+    }
+  }
+}
+
 TEST_F(InstructionSets, SameAnswers) {
   test::Rng rng(82);
   const std::vector<LinkGeometry> links = test::random_links(&rng);
   const auto model = test::model_of(links, 0.01);
-  const std::vector<bool> known(links.size(), true);
   const std::vector<std::int64_t> targets = machine_targets();
   EXPECT_GT(targets.size(), 1U);
   for (int scene = 0; scene < test::scaled(300); ++scene) {
@@ -63,23 +92,8 @@ TEST_F(InstructionSets, SameAnswers) {
     for (const double tolerance : {0.0, 0.001}) {
       QueryConfig config;
       config.tolerance = tolerance;
-      std::vector<LinkProximity> first, results;
-      for (const std::int64_t target : targets) {
-        SCOPED_TRACE(hwy::TargetName(target));
-        test::choose_instruction_sets(target);
-        ASSERT_TRUE(ProximityQuery(model, config).run(X_FL, known, {&cloud}, &results));
-        if (first.empty()) first = results;
-        for (std::size_t i = 0; i < links.size(); ++i) {
-          SCOPED_TRACE("link " + std::to_string(i));
-          if (std::abs(first[i].distance) > 2e-8 + tolerance) {
-            ASSERT_EQ(results[i].state, first[i].state);
-          }
-          if (first[i].state == LinkState::kClear) continue;
-          // Float decides on which side of a mesh a point at its surface is.
-          ASSERT_NEAR(results[i].distance, first[i].distance, tolerance + 4e-8);
-          test::expect_witness(results[i], X_FL[i]);
-        }
-      }
+      std::vector<LinkProximity> results;
+      ASSERT_NO_FATAL_FAILURE(expect_same_answers(targets, model, config, X_FL, cloud, &results));
       if (scene % 10 != 0) continue;
       for (std::size_t i = 0; i < links.size(); ++i) {
         test::expect_truth(results[i], test::truth_of(links[i], X_FL[i], points, cloud), config,

@@ -119,6 +119,24 @@ TEST_P(AgainstOracle, RandomScenes) {
   EXPECT_GT(contact, test::scaled(50));
 }
 
+// A square grid of points about the plane z = 0, each at most `noise` [m] above or below it.
+std::vector<Eigen::Vector3d> flat_obstacle(test::Rng* rng, double spacing, double noise) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 400; ++i) {
+    const Eigen::Vector3d grid(i % 20 - 10, i / 20 - 10, 0);
+    points.emplace_back(spacing * grid +
+                        test::uniform(rng, -1, 1) * (Eigen::Vector3d::UnitZ() * noise));
+  }
+  return points;
+}
+
+// Raises a pose X of a mesh until its lowest vertex is at `height` [m].
+void raise_to(double height, const TriangleMesh& mesh, Eigen::Isometry3d* X) {
+  double lowest = kInfinity;
+  for (const Eigen::Vector3d& v : mesh.vertices) lowest = std::min(lowest, (*X * v).z());
+  X->translation().z() += height - lowest;
+}
+
 // Many points of a plane are about equally near to a link, and the farther it is the more of them.
 // Through the hole of the open box, an inner sphere may be nearer to a point than the mesh is.
 TEST_P(AgainstOracle, FlatObstaclesNearAndFar) {
@@ -136,20 +154,13 @@ TEST_P(AgainstOracle, FlatObstaclesNearAndFar) {
   for (const double height : {0.003, 0.03, 0.3, 3.0}) {
     for (int scene = 0; scene < 6; scene += test::kSanitized ? 3 : 1) {
       const double spacing = test::uniform(&rng, 0.003, 0.01);
-      const Eigen::Vector3d noise = Eigen::Vector3d::UnitZ() * (scene % 3 == 0 ? 0.001 : 0.0);
-      std::vector<Eigen::Vector3d> points;
-      for (int i = 0; i < 400; ++i) {
-        const Eigen::Vector3d grid(i % 20 - 10, i / 20 - 10, 0);
-        points.emplace_back(spacing * grid + test::uniform(&rng, -1, 1) * noise);
-      }
-      const CloudSnapshot snapshot = test::make_snapshot(points, Eigen::Vector3d::Zero());
+      const CloudSnapshot snapshot =
+          test::make_snapshot(flat_obstacle(&rng, spacing, scene % 3 == 0 ? 0.001 : 0.0));
       std::vector<Eigen::Isometry3d> X_FL;
       for (const TriangleMesh& mesh : meshes) {
         Eigen::Isometry3d X = test::random_pose(&rng, 0.02);
         if (scene % 4 == 0) X.linear().setIdentity();  // flat on flat
-        double lowest = kInfinity;
-        for (const Eigen::Vector3d& v : mesh.vertices) lowest = std::min(lowest, (X * v).z());
-        X.translation().z() += height - lowest;
+        raise_to(height, mesh, &X);
         X_FL.push_back(X);
       }
       ASSERT_TRUE(query.run(X_FL, known, {&snapshot}, &results));

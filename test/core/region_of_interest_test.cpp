@@ -121,6 +121,55 @@ TEST(RegionOfInterest, ExistsOnlyInFramesFixedToTheRoot) {
   EXPECT_EQ(at_base.radius, at_root.radius);
 }
 
+// All points of a scene, and the cloud of those that are in its region of interest.
+struct CroppedScene {
+  std::vector<Eigen::Vector3d> points;  ///< [m] in the fixed frame
+  CloudSnapshot cloud;
+};
+
+CroppedScene random_cropped_scene(test::Rng* rng) {
+  CroppedScene scene;
+  RegionOfInterest region;
+  region.center_F = test::random_vector(rng, 0.2);
+  region.radius = 1.0;
+  std::vector<Eigen::Vector3d> kept;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d p = test::random_vector(rng, 1.2);
+    scene.points.push_back(p);
+    if ((p - region.center_F).norm() <= region.radius) kept.push_back(p);
+  }
+  scene.cloud = test::make_snapshot(kept);
+  scene.cloud.region = region;
+  return scene;
+}
+
+double true_distance(const TriangleMesh& mesh, const Eigen::Isometry3d& X_FL,
+                     const std::vector<Eigen::Vector3d>& points) {
+  std::vector<Eigen::Vector3d> points_L;
+  for (const Eigen::Vector3d& p : points) points_L.push_back(X_FL.inverse() * p);
+  return test::oracle_minimum(mesh, points_L);
+}
+
+// Whether all points within max_distance of a link are in the region.
+bool is_inside(const InnerSphereTree& tree, const Eigen::Isometry3d& X_FL,
+               const RegionOfInterest& region, double max_distance) {
+  const double from_center = (X_FL * tree.center() - region.center_F).norm();
+  return from_center + tree.radius() + max_distance <= region.radius;
+}
+
+bool is_measured(const LinkProximity& link) { return link.state >= LinkState::kNear; }
+
+// Expects bounds that hold for the discarded points, too.
+// @param truth   [m] distance to the nearest of all points
+// @param inside  whether all points within max_distance of the link are in the region
+void expect_bounds(const LinkProximity& link, double truth, bool inside,
+                   const QueryConfig& config) {
+  ASSERT_LE(link.lower_bound, truth + kRounding);
+  if (link.state == LinkState::kClear) ASSERT_GE(truth, config.max_distance - kRounding);
+  if (inside) ASSERT_NE(link.state, LinkState::kUnknown);
+  if (is_measured(link)) ASSERT_GE(link.distance, truth - kRounding);
+}
+
 // Links are near the region's border. Bounds must hold for all points, also for the discarded ones.
 TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
   test::Rng rng(17);
@@ -131,42 +180,26 @@ TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
   ProximityQuery query(model, config);
   const std::vector<bool> known(meshes.size(), true);
   int clear = 0, measured = 0, unknown = 0, cut = 0;
-  for (int scene = 0; scene < (test::kSanitized ? 20 : 40); ++scene) {
-    std::vector<Eigen::Vector3d> points, kept;
-    RegionOfInterest region;
-    region.center_F = test::random_vector(&rng, 0.2);
-    region.radius = 1.0;
-    for (int i = 0; i < 60; ++i) {
-      points.push_back(test::random_vector(&rng, 1.2));
-      if ((points.back() - region.center_F).norm() <= region.radius) kept.push_back(points.back());
-    }
-    CloudSnapshot cloud = test::make_snapshot(kept);
-    cloud.region = region;
+  for (int k = 0; k < (test::kSanitized ? 20 : 40); ++k) {
+    const auto [points, cloud] = random_cropped_scene(&rng);
     std::vector<Eigen::Isometry3d> X_FL;
     double least = kInfinity;
     bool all_inside = true;
-    for (const TriangleMesh& mesh : meshes) {
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
       X_FL.push_back(test::random_pose(&rng, 0.8));
-      std::vector<Eigen::Vector3d> points_L;
-      for (const Eigen::Vector3d& p : points) points_L.push_back(X_FL.back().inverse() * p);
-      const double truth = test::oracle_minimum(mesh, points_L);
+      const double truth = true_distance(meshes[i], X_FL[i], points);
       least = std::min(least, truth);
-      const std::size_t i = X_FL.size() - 1;
       LinkProximity link;
       ASSERT_TRUE(query.run_link(i, X_FL[i], {&cloud}, &link));
-      ASSERT_LE(link.lower_bound, truth + kRounding);
-      const InnerSphereTree& tree = model->links[i].tree;
-      const double from_center = (X_FL[i] * tree.center() - region.center_F).norm();
-      const bool inside = from_center + tree.radius() + config.max_distance <= region.radius;
+      const bool inside =
+          is_inside(model->links[i].tree, X_FL[i], cloud.region, config.max_distance);
       all_inside = all_inside && inside;
+      ASSERT_NO_FATAL_FAILURE(expect_bounds(link, truth, inside, config));
       clear += link.state == LinkState::kClear;
       unknown += link.state == LinkState::kUnknown;
-      if (link.state == LinkState::kClear) ASSERT_GE(truth, config.max_distance - kRounding);
-      if (inside) ASSERT_NE(link.state, LinkState::kUnknown);
-      if (link.state != LinkState::kNear && link.state != LinkState::kContact) continue;
+      if (!is_measured(link)) continue;
       ++measured;
       cut += link.distance > link.lower_bound + config.tolerance + kRounding;
-      ASSERT_GE(link.distance, truth - kRounding);
     }
     RobotProximity robot;
     ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));

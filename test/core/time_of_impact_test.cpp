@@ -13,45 +13,65 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
+// [s] The first time of contact of any link; infinity where there is none.
+double first_impact(TimeOfImpact* impacts, const test::Arm& arm, const test::ArmMotion& motion) {
+  const CloudSnapshot cloud = test::make_snapshot(motion.points);
+  std::vector<ImpactTime> found;
+  impacts->run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true),
+               {&cloud}, &found);
+  double first = kInf;
+  for (const ImpactTime& one : found) first = std::min(first, one.time);
+  return first;
+}
+
+// Counts motions that do not start in contact, by how the time that was found differs from the
+// true one.
+struct MotionCounts {
+  int motions = 0;   ///< all
+  int contacts = 0;  ///< with a contact
+  int close = 0;     ///< no more than 5 ms early, or without a contact that was not found either
+  int late = 0;      ///< later than the true time
+  int alarms = 0;    ///< a time was found where there is no contact
+
+  void add(double first, double truth) {
+    ++motions;
+    late += first > truth ? 1 : 0;
+    if (truth == kInf) {
+      alarms += first < kInf ? 1 : 0;
+      close += first == kInf ? 1 : 0;
+      return;
+    }
+    ++contacts;
+    close += truth - first <= 0.005 ? 1 : 0;
+  }
+};
+
 // The time is never later than the one that dense sampling finds, and in 99 % of the motions no
 // more than 5 ms earlier.
 TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   test::Rng rng(66);
-  int contacts = 0, close = 0, motions = 0, late = 0, alarms = 0;
-  while (motions < test::scaled(1000)) {
+  MotionCounts counts;
+  while (counts.motions < test::scaled(1000)) {
     const test::Arm arm = test::random_arm(&rng);
     QueryConfig config;
     config.max_distance = 0.5;
     TimeOfImpact impacts(arm.model, arm.kinematics, config);
-    for (int i = 0; i < 25 && motions < test::scaled(1000); ++i) {
+    for (int i = 0; i < 25 && counts.motions < test::scaled(1000); ++i) {
       const test::ArmMotion motion = test::random_motion(&rng, arm);
-      const CloudSnapshot cloud = test::make_snapshot(motion.points);
-      std::vector<ImpactTime> found;
-      impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true),
-                  {&cloud}, &found);
-      double first = kInf;
-      for (const ImpactTime& one : found) first = std::min(first, one.time);
+      const double first = first_impact(&impacts, arm, motion);
       const double truth = test::sampled_impact(arm, motion);
       if (truth == 0.0) {
         EXPECT_EQ(first, 0.0);
         continue;  // in contact from the start
       }
-      ++motions;
-      late += first > truth ? 1 : 0;
-      if (truth == kInf) {
-        alarms += first < kInf ? 1 : 0;
-        close += first == kInf ? 1 : 0;
-        continue;
-      }
-      ++contacts;
-      close += truth - first <= 0.005 ? 1 : 0;
+      counts.add(first, truth);
     }
   }
-  EXPECT_EQ(late, 0);
-  EXPECT_GE(close, 0.99 * motions);
-  EXPECT_LE(alarms, 0.01 * motions);
-  EXPECT_GT(contacts, motions / 4) << "motions must be hard ones";
-  EXPECT_GT(motions - contacts, motions / 10);
+  EXPECT_EQ(counts.late, 0);
+  EXPECT_GE(counts.close, 0.99 * counts.motions);
+  EXPECT_LE(counts.alarms, 0.01 * counts.motions);
+  EXPECT_GT(counts.contacts, counts.motions / 4) << "motions must be hard ones";
+  EXPECT_GT(counts.motions - counts.contacts, counts.motions / 10);
 }
 
 // A sphere on a turning arm of 1 m touches a point when its centre is 0.1 m from it.

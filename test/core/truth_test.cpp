@@ -14,40 +14,56 @@ namespace {
 // The truth and the clouds are in float32 and double, and both are rounded.
 constexpr double kRounding = 1e-6;
 
+// How many answers were compared.
+struct Counts {
+  int without_contact = 0, with_contact = 0;
+};
+
+void expect_truth(const LinkProximity& result, const test::TruthRecord& truth, double tolerance) {
+  const bool contact = truth.points_inside > 0;
+  ASSERT_EQ(result.state, contact ? LinkState::kContact : LinkState::kNear);
+  ASSERT_LE(result.distance - result.lower_bound, tolerance + kRounding);
+  if (contact) return;
+  ASSERT_LE(result.lower_bound, truth.distance + kRounding);
+  ASSERT_GE(result.distance, truth.distance - kRounding);
+}
+
+// Queries the poses of all cases one after another, so that each is the next one's warm start.
+void check_cases(const std::vector<test::TruthCase>& cases, const CloudSnapshot& snapshot,
+                 const std::shared_ptr<const RobotModel>& model, double tolerance, Counts* counts) {
+  QueryConfig config;
+  config.max_distance = 10.0;
+  config.tolerance = tolerance;
+  ProximityQuery query(model, config);
+  const std::vector<bool> known(test::kPandaLinks, true);
+  std::vector<LinkProximity> results;
+  for (std::size_t k = 0; k < cases.size(); k += test::kStride) {
+    query.run(cases[k].X_FL, known, {&snapshot}, &results);
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      const test::TruthRecord& truth = cases[k].links[i];
+      ASSERT_NO_FATAL_FAILURE(expect_truth(results[i], truth, tolerance));
+      truth.points_inside > 0 ? ++counts->with_contact : ++counts->without_contact;
+    }
+  }
+}
+
 TEST(Truth, BoundsHoldInEveryCase) {
   const auto data = test::data_dir();
   if (!data) GTEST_SKIP() << test::kNoData;
   const auto model = test::panda_model(*data, 0.005);
-  const std::vector<bool> known(test::kPandaLinks, true);
-  int without_contact = 0, with_contact = 0;
+  Counts counts;
   for (const char* cloud : {"mosd0", "mosd10", "mosd40"}) {
     const CloudSnapshot snapshot = test::truth_cloud(*data, cloud);
     for (const char* motion : {"traj", "rand"}) {
+      SCOPED_TRACE(std::string(cloud) + " " + motion);
       const std::vector<test::TruthCase> cases = test::truth_cases(*data, cloud, motion);
       for (const double tolerance : {0.0, 0.001}) {
-        QueryConfig config;
-        config.max_distance = 10.0;
-        config.tolerance = tolerance;
-        ProximityQuery query(model, config);
-        std::vector<LinkProximity> results;
-        for (std::size_t k = 0; k < cases.size(); k += test::kStride) {
-          const test::TruthCase& truth = cases[k];
-          query.run(truth.X_FL, known, {&snapshot}, &results);
-          for (std::size_t i = 0; i < results.size(); ++i) {
-            const bool contact = truth.links[i].points_inside > 0;
-            ASSERT_EQ(results[i].state, contact ? LinkState::kContact : LinkState::kNear);
-            ASSERT_LE(results[i].distance - results[i].lower_bound, tolerance + kRounding);
-            contact ? ++with_contact : ++without_contact;
-            if (contact) continue;
-            ASSERT_LE(results[i].lower_bound, truth.links[i].distance + kRounding);
-            ASSERT_GE(results[i].distance, truth.links[i].distance - kRounding);
-          }
-        }
+        ASSERT_NO_FATAL_FAILURE(check_cases(cases, snapshot, model, tolerance, &counts));
       }
     }
   }
-  EXPECT_EQ(without_contact + with_contact, test::scaled(2 * 6600));
-  EXPECT_GT(without_contact, test::scaled(2 * 5000));
+  EXPECT_EQ(counts.without_contact + counts.with_contact, test::scaled(2 * 6600));
+  EXPECT_GT(counts.without_contact, test::scaled(2 * 5000));
 }
 
 }  // namespace
