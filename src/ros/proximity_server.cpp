@@ -47,9 +47,9 @@ constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
 /// The cycle takes the newest poses and clouds, queries and publishes, and waits for nothing. It
 /// runs at ~rate of the wall clock, so that a paused /clock does not silence it, or with
 /// pose_source joint_states once for each joint state, and ten times a second while none come. The
-/// diagnostics thread runs once a second and reads the live parameters again. The parts have
-/// threads of their own: one per source, ~query, ~self_proximity, the model and contact loaders,
-/// the listeners of tf and joint_states.
+/// diagnostics thread runs once a second. The parts have threads of their own: one per source,
+/// ~query, ~self_proximity, the live parameters, the model and contact loaders, the listeners of tf
+/// and joint_states.
 class ProximityServer::Impl {
  public:
   Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const ServerConfig& config);
@@ -251,12 +251,12 @@ void ProximityServer::Impl::run_diagnostics() {
   Clock::time_point last = Clock::now();
   while (diagnostics_signal_.sleep_until(last + std::chrono::seconds(1))) {
     last = Clock::now();
-    live_.read_again();
     CycleReport report;
     {
       const std::lock_guard<std::mutex> lock(report_mutex_);
       report = report_;
     }
+    report.parameter_problem = live_.problem();
     if (joint_states_) report.joint_states = joint_states_->report();
     diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                          joint_states_received_);

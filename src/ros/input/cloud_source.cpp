@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
@@ -226,7 +227,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
   complete(measurement, placement, &snapshot);
   in_use_ = snapshot.stamp;
   if (show) {
-    filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
+    publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
     state_.update([](SourceReport* report) { ++report->shown; });
   }
   exchange_.publish();

@@ -38,6 +38,7 @@ class StatedPoseSource : public PoseSource {
   // Results of the last look_up().
   const JointPoses& joints() const { return joints_; }
   const Eigen::Isometry3d& X_FR() const { return X_FR_; }  ///< root link -> fixed frame
+  bool is_root_known() const { return root_known_; }       ///< whether joints() and X_FR() hold
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
@@ -54,6 +55,7 @@ class StatedPoseSource : public PoseSource {
   std::vector<double> q_;  ///< by joint; NaN where it is left out
   JointPoses joints_;
   Eigen::Isometry3d X_FR_ = Eigen::Isometry3d::Identity();
+  bool root_known_ = false;
 };
 
 }  // namespace ist

@@ -4,6 +4,8 @@
 #include <ros/node_handle.h>
 #include <tf2/buffer_core.h>
 
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -21,7 +23,8 @@
 namespace ist {
 
 /// Answers ~query in a thread of its own with a query of its own, so that requests never delay the
-/// cycle. ~query/deadline does not apply here.
+/// cycle. ~query/deadline does not apply here; ~query/max_answers bounds a request's time and
+/// memory.
 class QueryService {
  public:
   /// @param sources, buffer  outlive this
@@ -45,6 +48,8 @@ class QueryService {
                                 Service::Response* response);
   std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
+  std::string check_size(std::size_t states) const;
+  void return_memory();
 
   const ServerConfig config_;
   const CloudSources& sources_;
@@ -62,6 +67,9 @@ class QueryService {
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
   std::vector<bool> chosen_;  ///< by monitored link
+  /// Until then, memory of a large answer is returned to the system: roscpp frees it after
+  /// answer().
+  std::chrono::steady_clock::time_point return_memory_until_, next_return_;
 };
 
 }  // namespace ist

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "ist_proximity/geometry/error.h"
+#include "ros/common/publish.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/output/message_conversion.h"
@@ -203,7 +204,7 @@ void SelfProximity::publish_once() {
   const Status status = overall_status(input, now.toSec());
   message->status = status.code;
   message->status_text = status.text;
-  publisher_.publish(message);
+  publish_message(publisher_, message);
 }
 
 void SelfProximity::add_link(std::size_t link, ProximityArray* message) {

@@ -124,6 +124,12 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
     raise(DiagnosticStatus::WARN, "the rate is lower than " + wanted + ": the machine is too busy",
           &status);
   }
+  if (!report.parameter_problem.empty()) {
+    raise(DiagnosticStatus::WARN, report.parameter_problem, &status);
+  }
+  add_value("live parameters",
+            report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,
+            &status);
   add_value("rate", format_text("%.1f Hz", rate), &status);
   add_value(wanted, format_text("%.1f Hz", wanted_rate), &status);
   add_value("deadlines missed", report.deadlines_missed, &status);
