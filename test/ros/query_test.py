@@ -262,7 +262,7 @@ class QueryTest(unittest.TestCase):
         self.assertIn("~query/max_answers", answer.message)
         self.assertEqual(len(self.ask(*[NOW] * 10000).results), 10000)
         self.assertEqual(len(self.ask(*[NOW] * 10001, links=["ball_link"]).results), 10001)
-        allowed = before + (memory("VmHWM") - before) / 3
+        allowed = before + 0.6 * (memory("VmHWM") - before)
         pt.wait_until(lambda: memory("VmRSS") < allowed, "the memory of the answers", 10.0)
 
         for bad, words in (

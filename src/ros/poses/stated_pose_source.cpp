@@ -8,7 +8,7 @@
 namespace ist {
 
 StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
-                                   const tf2::BufferCore& buffer, const std::string& fixed_frame,
+                                   const TransformBuffer& buffer, const std::string& fixed_frame,
                                    const std::vector<std::string>& links, double timeout)
     : kinematics_(std::move(kinematics)),
       buffer_(buffer),
@@ -51,14 +51,14 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   placer_.reset();
   root_known_ = false;
   kinematics_->place_joints(q_, &joints_);
-  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
+  if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
   const std::string problem =
       look_up_newest(buffer_, fixed_frame_, kinematics_->bodies()[0], now, timeout_, &X_FR_);
-  if (!problem.empty()) return poses->set_problem(wanted_, problem);
+  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
   root_known_ = true;
 
   const auto& joints = kinematics_->joints();
-  std::vector<std::string> joint_problems(joints.size());
+  std::vector<PoseProblem> joint_problems(joints.size());
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
     const std::string why =
@@ -66,7 +66,8 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
                        kinematics_->bodies()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
     joints_.known[j] = why.empty();
     if (!why.empty()) {
-      joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
+      joint_problems[j].text =
+          "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
     }
   }
   placer_.place(joints_, X_FR_, wanted_, joint_problems, poses);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <sensor_msgs/JointState.h>
-#include <tf2/buffer_core.h>
 
 #include <memory>
 #include <string>
@@ -10,6 +9,7 @@
 #include "ist_proximity/robot/kinematics.h"
 #include "ros/poses/link_placer.h"
 #include "ros/poses/pose_source.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -22,7 +22,7 @@ class StatedPoseSource : public PoseSource {
   /// @param fixed_frame  frame F
   /// @param links        names
   /// @param timeout      [s] allowed age of transforms
-  StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const tf2::BufferCore& buffer,
+  StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const TransformBuffer& buffer,
                    const std::string& fixed_frame, const std::vector<std::string>& links,
                    double timeout);
 
@@ -47,7 +47,7 @@ class StatedPoseSource : public PoseSource {
 
  private:
   std::shared_ptr<const Kinematics> kinematics_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   std::string fixed_frame_;
   LinkPlacer placer_;
   std::vector<bool> wanted_;

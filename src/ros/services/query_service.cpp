@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "ros/common/memory.h"
+#include "ros/output/message_invariants.h"
 
 namespace ist {
 
@@ -39,7 +40,7 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 }  // namespace
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
-                           const CloudSources& sources, const tf2::BufferCore& buffer,
+                           const CloudSources& sources, const TransformBuffer& buffer,
                            std::function<LiveConfig()> live)
     : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
   private_nh.setCallbackQueue(thread_.queue());
@@ -161,6 +162,8 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     ProximityArray& result = response->results.back();
     cycle_->forget();  // the configurations are no motion, so there is no speed between them
     cycle_->run(ros::Time::now(), sources_, live, &result, &ignored);
+    assert_invariants(result,
+                      {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }

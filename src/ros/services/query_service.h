@@ -2,7 +2,6 @@
 
 #include <ist_proximity/QueryProximity.h>
 #include <ros/node_handle.h>
-#include <tf2/buffer_core.h>
 
 #include <chrono>
 #include <cstddef>
@@ -30,7 +29,7 @@ class QueryService {
   /// @param sources, buffer  outlive this
   /// @param live             gives the present configuration; called from the service's thread
   QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
-               const tf2::BufferCore& buffer, std::function<LiveConfig()> live);
+               const TransformBuffer& buffer, std::function<LiveConfig()> live);
   ~QueryService();
   QueryService(const QueryService&) = delete;
   QueryService& operator=(const QueryService&) = delete;
@@ -53,7 +52,7 @@ class QueryService {
 
   const ServerConfig config_;
   const CloudSources& sources_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   const std::function<LiveConfig()> live_;
   CallbackThread thread_;
   ros::ServiceServer service_;
