@@ -171,7 +171,8 @@ std::string JointStateListener::why_unusable(const sensor_msgs::JointState& mess
 }
 
 /// Finds the joints that a message states, each once, and what is wrong with them.
-void JointStateListener::collect(const sensor_msgs::JointState& message) {
+/// @param complains  whether names that are no joints are reported
+void JointStateListener::collect(const sensor_msgs::JointState& message, bool complains) {
   stated_.clear();
   const std::string* unknown = nullptr;
   std::size_t unknowns = 0;
@@ -186,7 +187,7 @@ void JointStateListener::collect(const sensor_msgs::JointState& message) {
     const Kinematics::Joint& joint = kinematics_->joints()[j];
     if (!joint.is_free()) {
       // Many publishers state mimic joints too, which follow theirs; a fixed joint stays in place.
-      if (joint.has_unstated_pose()) {
+      if (joint.has_unstated_pose() && complains) {
         drop("joint '" + joint.name + "' is planar or floating, so its pose must come from tf", 1);
       }
       continue;
@@ -206,7 +207,7 @@ void JointStateListener::collect(const sensor_msgs::JointState& message) {
     }
   }
   for (const Stated& one : stated_) place_[one.joint] = kNowhere;
-  if (unknowns == 0) return;
+  if (unknowns == 0 || !complains) return;
   const std::string others =
       unknowns > 1 ? ", like " + std::to_string(unknowns - 1) + " others of the message" : "";
   drop("joint '" + *unknown + "' is not in the URDF" + others + ": its position is not used",
@@ -218,7 +219,7 @@ bool JointStateListener::read(const sensor_msgs::JointState& message,
                               const std::string& publisher) {
   if (message.position.empty()) return false;  // the message holds velocities or efforts alone
   const std::string problem = why_unusable(message);
-  collect(message);
+  collect(message, problem.empty());
   if (!problem.empty()) {
     for (const Stated& one : stated_) refuse(one.joint, problem);
     drop(problem, message.position.size());

@@ -86,7 +86,7 @@ class JointStateListener {
   void receive(const ros::MessageEvent<const sensor_msgs::JointState>& event);
   bool read(const sensor_msgs::JointState& message, const std::string& publisher);
   std::string why_unusable(const sensor_msgs::JointState& message) const;
-  void collect(const sensor_msgs::JointState& message);
+  void collect(const sensor_msgs::JointState& message, bool complains);
   void refuse(std::size_t joint, const std::string& reason);
   ros::Time counted_stamp(const ros::Time& stamp);
   void use(const Stated& stated, const ros::Time& stamp);
