@@ -42,7 +42,7 @@ struct ServerConfig {
   double pose_timeout = 0.5;  ///< [s] a link whose pose is older is UNKNOWN; > 0
   /// [s] With kJointStates, a joint may be older than the newest one by twice the usual time
   /// between its samples and this; >= 0.
-  double joint_lag = 0.02;
+  double joint_lag = 0.05;
   double rate = 100.0;  ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
