@@ -107,6 +107,25 @@ if(TARGET pack_robot_test)
     IST_PROXIMITY_PACK_ROBOT="$<TARGET_FILE:pack_robot>")
 endif()
 
+# Tests of the ROS rooms that need no master: one GoogleTest program per test/ros/*_test.cpp.
+if(catkin_FOUND AND TARGET ist_proximity_ros)
+  file(GLOB ros_test_sources CONFIGURE_DEPENDS test/ros/*_test.cpp)
+  foreach(source IN LISTS ros_test_sources)
+    get_filename_component(test ${source} NAME_WE)
+    add_executable(${test} EXCLUDE_FROM_ALL ${source})
+    target_include_directories(${test} PRIVATE src)
+    target_include_directories(${test} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+    target_link_libraries(${test} PRIVATE ist_proximity_ros GTest::GTest GTest::Main)
+    set_target_properties(${test} PROPERTIES
+      RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
+    add_dependencies(tests ${test})
+    set(arguments --gtest_output=xml:${results_dir}/gtest-${test}.xml)
+    catkin_run_tests_target(gtest ${test} gtest-${test}.xml
+      COMMAND "${CMAKE_CURRENT_BINARY_DIR}/test/${test} ${arguments}" DEPENDENCIES ${test})
+    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${test} PROPERTIES LABELS core TIMEOUT 600)
+  endforeach()
+endif()
+
 if(catkin_FOUND)
   find_package(rostest QUIET)
 endif()

@@ -1,14 +1,18 @@
 #include "ros/input/cloud_source.h"
 
+#include <ros/console.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/input/cloud_conversion.h"
 #include "ros/input/map_measurement.h"
+#include "ros/poses/clock_skew.h"
 
 namespace ist {
 namespace {
@@ -17,12 +21,31 @@ constexpr std::size_t kMaxWaiting = 10;
 const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 
 /// Stamps that are farther ahead of the clock are not believed. [s]
-double future_tolerance(double timeout) { return std::min(timeout, 1.0); }
+double future_tolerance(double timeout) { return std::min(timeout, kMaxAhead); }
+
+/// The end of a sentence about a measurement that waits for tf: its clock may be the reason.
+std::string clock_difference(const Measurement& measurement) {
+  const double ahead = seconds_between(measurement.counts_from(), measurement.header().stamp);
+  if (ahead < kToldSkew) return "";
+  return format_text("; its stamp is %.3f s ahead of the clock", ahead);
+}
+
+/// Says that a measurement is being taken in, as long as it lives.
+class IngestMark {
+ public:
+  explicit IngestMark(SourceState* state) : state_(*state) { state_.set_ingesting(true); }
+  ~IngestMark() { state_.set_ingesting(false); }
+  IngestMark(const IngestMark&) = delete;
+  IngestMark& operator=(const IngestMark&) = delete;
+
+ private:
+  SourceState& state_;
+};
 
 }  // namespace
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
-                         const tf2::BufferCore& buffer, const ros::Publisher& filtered)
+                         const TransformBuffer& buffer, const ros::Publisher& filtered)
     : config_(config),
       is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
@@ -116,7 +139,7 @@ void CloudSource::take_target() {
 void CloudSource::drop_overdue() {
   const double now = ros::Time::now().toSec();
   while (!waiting_.empty() && (waiting_.size() > kMaxWaiting ||
-                               now - waiting_.front()->header().stamp.toSec() > config_.timeout)) {
+                               now - waiting_.front()->counts_from().toSec() > config_.timeout)) {
     state_.update([](SourceReport* report) { ++report->unusable; });
     waiting_.pop_front();
   }
@@ -129,10 +152,18 @@ void CloudSource::receive(const Received& received) {
   const std::string problem = why_unusable(received);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
+  if (is_believed && ahead >= kToldSkew) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': its stamps are " << ahead
+                                              << " s ahead of the clock; their age counts from "
+                                                 "their receipt; compare the clocks");
+  }
   bool is_used = true;
   state_.update([&](SourceReport* report) {
     ++report->messages;
-    if (is_believed) report->newest = std::fmax(report->newest, stamp.toSec());
+    if (is_believed) {
+      report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
+      report->ahead = ahead;
+    }
     if (is_believed && stamp < in_use_) {
       ++report->out_of_order;
       is_used = false;
@@ -185,7 +216,7 @@ void CloudSource::use_newest_ready() {
     std::string problem = placer_.missing_transform(*waiting_[i], target_);
     if (!problem.empty()) {
       if (i + 1 == waiting_.size() && !is_usual) {
-        state_.set_problem(problem, false);
+        state_.set_problem(problem + clock_difference(*waiting_[i]), false);
         waits_for_tf_ = true;
       }
       continue;
@@ -217,6 +248,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
   // The published cloud is not cropped at the region of interest.
   const bool show = !is_map_ && filtered_.getNumSubscribers() > 0;
   ingest_.set_region_of_interest(show ? RegionOfInterest() : target_.region);
+  const IngestMark mark(&state_);
   try {
     measurement.ingest(placement, &ingest_, &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a huge cloud
@@ -226,7 +258,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
   complete(measurement, placement, &snapshot);
   in_use_ = snapshot.stamp;
   if (show) {
-    filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
+    publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
     state_.update([](SourceReport* report) { ++report->shown; });
   }
   exchange_.publish();
@@ -237,6 +269,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
 void CloudSource::complete(const Measurement& measurement, const Placement& placement,
                            SourceSnapshot* snapshot) const {
   snapshot->stamp = measurement.header().stamp;
+  snapshot->counts_from = measurement.counts_from();
   snapshot->model = target_.model;
   snapshot->fixed_frame = target_.fixed_frame;
   snapshot->map_frame = without_slash(measurement.header().frame_id);

@@ -2,7 +2,6 @@
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
-#include <tf2/buffer_core.h>
 
 #include <atomic>
 #include <chrono>
@@ -19,6 +18,7 @@
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
 #include "ros/parameters/source_config.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -38,7 +38,7 @@ class CloudSource {
   /// @param nh        in the namespace that the topic is relative to
   /// @param buffer    outlives this
   /// @param filtered  publisher of what queries see, used while it has subscribers
-  CloudSource(const SourceConfig& config, ros::NodeHandle nh, const tf2::BufferCore& buffer,
+  CloudSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
               const ros::Publisher& filtered);
   ~CloudSource();
   CloudSource(const CloudSource&) = delete;
@@ -81,7 +81,7 @@ class CloudSource {
 
   const SourceConfig config_;
   const bool is_map_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
   ros::Subscriber subscriber_;

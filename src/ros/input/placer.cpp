@@ -17,7 +17,7 @@ constexpr std::chrono::milliseconds kGrace(500);
 
 // A cloud is worth more without one link's self-filter than after its timeout, so the wait ends
 // before that.
-Placer::Placer(const SourceConfig& config, const tf2::BufferCore& buffer)
+Placer::Placer(const SourceConfig& config, const TransformBuffer& buffer)
     : self_filter_(config.ingest.self_filter),
       patience_(0.8 * std::min(config.timeout, 1.0)),
       buffer_(buffer) {}
@@ -92,7 +92,7 @@ std::string Placer::place(const Measurement& measurement, const SourceTarget& ta
   return "";
 }
 
-std::string place_map(const tf2::BufferCore& buffer, const ros::Time& time, double max_age,
+std::string place_map(const TransformBuffer& buffer, const ros::Time& time, double max_age,
                       SourceSnapshot* snapshot) {
   const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
   Eigen::Isometry3d& X_FM = snapshot->cloud.X_FM;

@@ -46,6 +46,11 @@ SourceReport SourceState::report() {
   SourceReport report = report_;
   if (!placing_problem_.empty()) report.problem = placing_problem_;
   if (!file_problem_.empty()) report.problem = file_problem_;
+  if (ingesting_since_) {
+    const std::chrono::duration<double> since =
+        std::chrono::steady_clock::now() - *ingesting_since_;
+    report.ingesting = since.count();
+  }
   return report;
 }
 
@@ -63,6 +68,12 @@ void SourceState::set_file_problem(const std::string& problem) {
 void SourceState::set_placing_problem(const std::string& problem) {
   const std::lock_guard<std::mutex> lock(mutex_);
   placing_problem_ = problem;
+}
+
+void SourceState::set_ingesting(bool is_ingesting) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ingesting_since_.reset();
+  if (is_ingesting) ingesting_since_ = std::chrono::steady_clock::now();
 }
 
 /// The caller holds mutex_.

@@ -2,9 +2,11 @@
 
 #include <ros/time.h>
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "ist_proximity/geometry/region_of_interest.h"
@@ -56,6 +58,8 @@ class SourceState {
   /// set again, whatever messages come.
   void set_file_problem(const std::string& problem);
   void set_placing_problem(const std::string& problem);
+  /// Says that a message is being taken in from now on, or not any more.
+  void set_ingesting(bool is_ingesting);
 
  private:
   void notice_clock_jump();
@@ -66,6 +70,7 @@ class SourceState {
   SourceReport report_;
   std::string file_problem_, placing_problem_;
   ros::Time last_now_;
+  std::optional<std::chrono::steady_clock::time_point> ingesting_since_;
 };
 
 }  // namespace ist

@@ -1,5 +1,6 @@
 #include <ist_proximity/ProximityArray.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "ros/common/text.h"
@@ -9,6 +10,9 @@ namespace ist {
 namespace {
 
 using ist_proximity::ProximityArray;
+
+/// A message that takes more of its timeout to be taken in leaves too little for the next one.
+constexpr double kSlowShare = 0.5;
 
 std::string seconds(double value) {
   return std::abs(value) < 100 ? format_text("%.2f s", value) : format_text("%.0f s", value);
@@ -41,8 +45,18 @@ Status without_messages(const SourceReport& source) {
   return {ProximityArray::NO_CLOUD, title(source) + ": nothing received yet" + cause};
 }
 
+/// The cause where messages take longer to be taken in than they live; else empty.
+std::string slow_ingest(const SourceReport& source) {
+  const double taken = std::max(source.ingesting, source.has_snapshot ? source.ingest_time : 0.0);
+  if (taken < kSlowShare * source.timeout) return "";
+  return ": its messages come, and taking in one takes " + seconds(taken) +
+         "; send smaller ones, lower max_range, switch noise_filter off, or raise ~" +
+         source.timeout_parameter;
+}
+
 Status stale(const SourceReport& source, double age) {
   std::string cause = because(source.problem);
+  if (cause.empty()) cause = slow_ingest(source);
   if (cause.empty() && source.noun == "map") {
     cause = "; is it latched, and sent once? Then its timeout should be .inf";
   } else if (cause.empty()) {
@@ -65,13 +79,15 @@ Status source_status(const SourceReport& source, double now) {
   if (newest_age > source.timeout) return stale(source, newest_age);
   if (!source.has_snapshot) {
     return {ProximityArray::NO_CLOUD,
-            title(source) + ": no " + source.noun + " could be used yet" + because(source.problem)};
+            title(source) + ": no " + source.noun + " could be used yet" +
+                (source.problem.empty() ? slow_ingest(source) : because(source.problem))};
   }
-  const double age = now - source.stamp.toSec();
+  const double age = now - source.counts_from.toSec();
   if (age > source.timeout) {
-    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
-                                             " is " + seconds(age) + " old, allowed is " +
-                                             allowed(source) + because(source.problem)};
+    return {ProximityArray::STALE_CLOUD,
+            title(source) + ": the last usable " + source.noun + " is " + seconds(age) +
+                " old, allowed is " + allowed(source) +
+                (source.problem.empty() ? slow_ingest(source) : because(source.problem))};
   }
   if (source.counts.saw_nothing()) {
     return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
