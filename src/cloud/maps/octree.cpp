@@ -122,7 +122,8 @@ std::string read(const OctreeData& data, const OctreeLimits& limits, Octree* oct
   *octree = Octree();
   *remaining = 0;
   if (data.id != "OcTree") {
-    return "the tree's type is '" + data.id + "', it must be 'OcTree'.";
+    constexpr std::size_t kShown = 40;  // characters of what may be any text
+    return "the tree's type is '" + data.id.substr(0, kShown) + "', it must be 'OcTree'.";
   }
   if (!(data.resolution >= kSmallest && data.resolution <= kLargest)) {
     std::ostringstream text;
