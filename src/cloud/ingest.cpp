@@ -42,7 +42,7 @@ void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestCon
   const Eigen::Vector3d& p_FS = X_FS.translation();
   if (!(p_FS.cwiseAbs().maxCoeff() <= kLargestRange)) {
     std::ostringstream text;
-    text << "the sensor is at (" << p_FS.transpose()
+    text << "the sensor is at (" << p_FS.x() << ", " << p_FS.y() << ", " << p_FS.z()
          << ") m in the fixed frame, allowed are at most " << kLargestRange << " m.";
     throw std::invalid_argument(text.str());
   }

@@ -113,7 +113,7 @@ UNUSABLE = [
     (empty_without_fields, "field 'x' is missing"),
     (empty_of_colours, "field 'x' is missing"),
     (too_many_points, "1001 points, allowed are at most 1000 (max_points)"),
-    (sensor_far_out, "(1e+16 0 0) m, allowed are at most 10000 m"),
+    (sensor_far_out, "(1e+16, 0, 0) m, allowed are at most 10000 m"),
     (unknown_frame, "nowhere"),
     (empty_frame, "frame_id"),
     (long_frame, "frame_id of 1000000 characters"),

@@ -303,7 +303,7 @@ class OctomapTest(unittest.TestCase):
         # A map whose frame is far out is nowhere.
         self.world.poses["far_map"] = ("base", pt.transform((0, -2e4, 0)))
         self.publisher.publish(message(few, frame="far_map"))
-        m = node.wait_for_status(ProximityArray.NO_CLOUD, "(0 -20000 0) m, allowed are at most")
+        m = node.wait_for_status(ProximityArray.NO_CLOUD, "(0, -20000, 0) m, allowed are at most")
         self.assertTrue(pt.all_unknown(m))
 
     def test_files_that_never_end(self):

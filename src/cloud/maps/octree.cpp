@@ -102,10 +102,11 @@ class Reader {
   }
 
   std::string too_far(const Eigen::AlignedBox3d& box) const {
+    const Eigen::Vector3d &low = box.min(), &high = box.max();
     std::ostringstream text;
-    text << "has an occupied leaf from (" << box.min().transpose() << ") to ("
-         << box.max().transpose() << ") m, farther out than " << limits_.max_position
-         << " m (max_position)";
+    text << "has an occupied leaf from (" << low.x() << ", " << low.y() << ", " << low.z()
+         << ") to (" << high.x() << ", " << high.y() << ", " << high.z() << ") m, farther out than "
+         << limits_.max_position << " m (max_position)";
     return text.str();
   }
 

@@ -21,7 +21,8 @@ std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isomet
   if (!is_rigid(result)) return "it holds NaN or infinity";
   if (!(result.translation().cwiseAbs().maxCoeff() <= kMaxPosition)) {
     std::ostringstream text;
-    text << "it is at (" << result.translation().transpose() << ") m, allowed are at most "
+    const Eigen::Vector3d& p = result.translation();
+    text << "it is at (" << p.x() << ", " << p.y() << ", " << p.z() << ") m, allowed are at most "
          << kMaxPosition << " m; choose a frame that is nearer to the robot";
     return text.str();
   }

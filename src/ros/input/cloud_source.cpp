@@ -298,8 +298,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     measurement.ingest(placement, &ingest_, &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a huge cloud
     snapshot.generation = 0;
-    const std::string problem =
-        std::string("the ") + noun(config_.type) + " could not be read: " + error.what();
+    problem = std::string("the ") + noun(config_.type) + " could not be read: " + error.what();
     ROS_ERROR_STREAM_THROTTLE(5.0, "source '" << config_.name << "': " << problem);
     return problem;
   }
