@@ -189,8 +189,7 @@ TEST(CheckScan, NamesTheFaultyMember) {
   many.count = million.size();
   many.angle_increment = 1e-6;
   many.time_increment = 9.9e-6;
-  EXPECT_EQ(check_scan(many),
-            "ranges holds 1000000 beams, allowed are at most 100000 (max_beams).");
+  EXPECT_EQ(check_scan(many), "ranges holds 1000000 beams, allowed are at most 50000 (max_beams).");
   ScanLimits limits;
   limits.max_beams = million.size();
   EXPECT_EQ(check_scan(many, limits), "");

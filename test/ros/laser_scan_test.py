@@ -56,7 +56,7 @@ MALFORMED = [
     ({"time_increment": 1e30}, "more than 10 s"),
     ({"angle_increment": 1e30}, "more than two turns"),
     ({"ranges": []}, "ranges is empty"),
-    ({"ranges": [1.0] * 100001, "angle_increment": 3e-5}, "at most 100000 (max_beams)"),
+    ({"ranges": [1.0] * 50001, "angle_increment": 6e-5}, "at most 50000 (max_beams)"),
 ]
 
 

@@ -34,7 +34,7 @@ constexpr double kLongestScan = 10.0;
 struct ScanLimits {
   /// Beams; scanners have up to 36,000 a turn. The self-filter compares each with the robot's poses
   /// at up to 400 instants of a scan of kLongestScan, so that it bounds the time of one scan.
-  std::size_t max_beams = 100000;
+  std::size_t max_beams = 50000;
 };
 
 /// @returns an empty string, or one sentence with the faulty member and its value: no beams, or
