@@ -1,5 +1,6 @@
 #include "ist_proximity/ros/proximity_server.h"
 
+#include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <thread>
 
 #include "ist_proximity/robot/link_poses.h"
+#include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stop_signal.h"
 #include "ros/common/thread_name.h"
@@ -60,10 +62,13 @@ class ProximityServer::Impl {
   void run_cycles();
   bool wait_for_joint_states();
   void run_cycle();
+  void run_cycle_guarded();
+  void publish_failure(const std::string& fault);
   void notice_clock_jump(const ros::Time& now);
   void take_model();
   void set_source_targets(const QueryConfig& query);
   void run_diagnostics();
+  void publish_diagnostics();
   LiveConfig live_config() const;
 
   const ServerConfig config_;
@@ -158,7 +163,7 @@ void ProximityServer::Impl::run_cycles() {
   name_thread("ist cycle");
   if (joint_states_) {
     do {
-      run_cycle();
+      run_cycle_guarded();
     } while (wait_for_joint_states());
     return;
   }
@@ -166,9 +171,28 @@ void ProximityServer::Impl::run_cycles() {
       std::chrono::duration<double>(1.0 / config_.rate));
   Clock::time_point next = Clock::now();
   do {
-    run_cycle();
+    run_cycle_guarded();
     next = std::max(next + period, Clock::now());  // no burst follows a cycle that took too long
   } while (cycle_signal_.sleep_until(next));
+}
+
+/// Runs a cycle. Where an exception ends it, a message says so and that nothing is known, and the
+/// next cycle is run as usual.
+void ProximityServer::Impl::run_cycle_guarded() {
+  const std::string fault = exception_of([this] { run_cycle(); });
+  if (fault.empty()) return;
+  ROS_ERROR_STREAM_THROTTLE(5.0, "a cycle failed, and all links are UNKNOWN: " << fault);
+  exception_of([&] { publish_failure(fault); });  // there may be no memory even for that
+}
+
+void ProximityServer::Impl::publish_failure(const std::string& fault) {
+  const auto message = boost::make_shared<ist_proximity::ProximityArray>();
+  const std::lock_guard<std::mutex> lock(report_mutex_);
+  ModelState failed = model_ ? *model_ : ModelState();
+  failed.problem = "the last cycle failed: " + fault;
+  fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
+  ++report_.cycles;
+  results_.publish(message, [](ist_proximity::JointRepulsion*) {});
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -259,16 +283,22 @@ void ProximityServer::Impl::run_diagnostics() {
   Clock::time_point last = Clock::now();
   while (diagnostics_signal_.sleep_until(last + std::chrono::seconds(1))) {
     last = Clock::now();
-    CycleReport report;
-    {
-      const std::lock_guard<std::mutex> lock(report_mutex_);
-      report = report_;
-    }
-    report.parameter_problem = live_.problem();
-    if (joint_states_) report.joint_states = joint_states_->report();
-    diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
-                         joint_states_received_);
+    const std::string fault = exception_of([this] { publish_diagnostics(); });
+    if (fault.empty()) continue;
+    ROS_ERROR_STREAM_THROTTLE(5.0, "the diagnostics are not published: " << fault);
   }
+}
+
+void ProximityServer::Impl::publish_diagnostics() {
+  CycleReport report;
+  {
+    const std::lock_guard<std::mutex> lock(report_mutex_);
+    report = report_;
+  }
+  report.parameter_problem = live_.problem();
+  if (joint_states_) report.joint_states = joint_states_->report();
+  diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
+                       joint_states_received_);
 }
 
 LiveConfig ProximityServer::Impl::live_config() const {

@@ -377,8 +377,8 @@ class PoseFaultsTest(unittest.TestCase):
             publisher.publish(message)
 
         self.world.repeat(10, send)
-        answer = node.wait_for_status(ProximityArray.STALE_CLOUD, "taking in one takes")
-        self.assertIn("(~cloud_timeout): its messages come", answer.status_text)
+        answer = node.wait_for_status(ProximityArray.STALE_CLOUD, "too long for its timeout")
+        self.assertIn("raise ~cloud_timeout", answer.status_text)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -29,6 +30,11 @@ namespace ist {
 /// the cloud's own stamp; a scan waits until the time of its last beam. The newest measurement that
 /// is ready is used, and older ones are dropped. Links whose transforms have stopped are not waited
 /// for (see Placer).
+///
+/// Messages are used in the order of their stamps. Where stamps go back (the sensor's driver or the
+/// map server has started again, with another clock), that is a new start, and is told.
+///
+/// An exception in the thread becomes the source's problem, and the thread goes on.
 ///
 /// A map is placed when a query asks for it, at the pose of its frame at that time, so that it
 /// stays right on a robot that drives. The last map is kept for a model that is loaded later,
@@ -68,8 +74,14 @@ class CloudSource {
   using MeasurementPtr = std::shared_ptr<const Measurement>;
 
   void run();
+  void guard(const std::function<void()>& function);
+  void read_file();
   void receive(const Received& received);
   std::string why_unusable(const Received& received) const;
+  double went_back(const ros::Time& stamp) const;
+  bool is_new_start(const ros::Time& stamp) const;
+  void start_again(const ros::Time& stamp);
+  std::string older_than_used(double seconds) const;
   void take_target();
   void drop_overdue();
   void use_newest_ready();

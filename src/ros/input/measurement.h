@@ -65,12 +65,15 @@ struct Received {
   std::shared_ptr<const Measurement> measurement;
 };
 using Receiver = std::function<void(const Received&)>;
+/// Called before a message is read, which takes long for a large map.
+using ReadingBegins = std::function<void()>;
 
 /// The configuration of a source's Ingest. The range limits of scans apply to beams instead.
 IngestConfig ingest_config(const SourceConfig& config);
 
 /// Subscribes to the source's topic with its message type.
-/// @param receive  called from the callback queue of the node handle
-ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh, const Receiver& receive);
+/// @param begin, receive  called from the callback queue of the node handle
+ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh,
+                          const ReadingBegins& begin, const Receiver& receive);
 
 }  // namespace ist

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "ros/input/measurement.h"
 #include "ros/input/source_snapshot.h"
@@ -38,7 +39,13 @@ class Placer {
  private:
   bool is_worth_waiting_for(const std::string& link, const std::string& fixed_frame,
                             const ros::Time& stamp) const;
-  void pose_robot(const SourceTarget& target, const ros::Time& stamp, Placement* placement) const;
+  /// By link: the last of its poses that the self-filter is given.
+  struct FilterPoses {
+    std::vector<Eigen::Isometry3d> X_FL;
+    std::vector<bool> known;
+  };
+  void pose_robot(const SourceTarget& target, const ros::Time& stamp, FilterPoses* last,
+                  Placement* placement) const;
 
   const bool self_filter_;
   const double patience_;  ///< [s] a cloud waits this long at most for one link's pose

@@ -44,13 +44,11 @@ SourceReport SourceState::report() {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
   SourceReport report = report_;
+  if (work_since_ != kNoWork) {
+    report.working = std::chrono::duration<double>(Clock::now() - work_since_).count();
+  }
   if (!placing_problem_.empty()) report.problem = placing_problem_;
   if (!file_problem_.empty()) report.problem = file_problem_;
-  if (ingesting_since_) {
-    const std::chrono::duration<double> since =
-        std::chrono::steady_clock::now() - *ingesting_since_;
-    report.ingesting = since.count();
-  }
   return report;
 }
 
@@ -58,6 +56,18 @@ void SourceState::set_problem(const std::string& problem, bool dropped) {
   const std::lock_guard<std::mutex> lock(mutex_);
   report_.problem = problem;
   if (dropped) ++report_.unusable;
+}
+
+void SourceState::begin_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  work_since_ = Clock::now();
+}
+
+void SourceState::end_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (work_since_ == kNoWork) return;
+  report_.last_work = std::chrono::duration<double>(Clock::now() - work_since_).count();
+  work_since_ = kNoWork;
 }
 
 void SourceState::set_file_problem(const std::string& problem) {
@@ -68,12 +78,6 @@ void SourceState::set_file_problem(const std::string& problem) {
 void SourceState::set_placing_problem(const std::string& problem) {
   const std::lock_guard<std::mutex> lock(mutex_);
   placing_problem_ = problem;
-}
-
-void SourceState::set_ingesting(bool is_ingesting) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  ingesting_since_.reset();
-  if (is_ingesting) ingesting_since_ = std::chrono::steady_clock::now();
 }
 
 /// The caller holds mutex_.

@@ -54,12 +54,13 @@ class SourceState {
   /// Sets the problem of the newest message; empty clears it.
   /// @param dropped  whether the message counts as unusable
   void set_problem(const std::string& problem, bool dropped);
+  /// Brackets the reading and ingesting of a message, which a status names where it takes too long.
+  void begin_work();
+  void end_work();
   /// Sets a problem with a map's file or with its place in the fixed frame. It stays until it is
   /// set again, whatever messages come.
   void set_file_problem(const std::string& problem);
   void set_placing_problem(const std::string& problem);
-  /// Says that a message is being taken in from now on, or not any more.
-  void set_ingesting(bool is_ingesting);
 
  private:
   void notice_clock_jump();
@@ -70,7 +71,9 @@ class SourceState {
   SourceReport report_;
   std::string file_problem_, placing_problem_;
   ros::Time last_now_;
-  std::optional<std::chrono::steady_clock::time_point> ingesting_since_;
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point work_since_ = kNoWork;
+  static constexpr Clock::time_point kNoWork = Clock::time_point::min();
 };
 
 }  // namespace ist

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "ist_proximity/geometry/error.h"
+#include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
@@ -47,9 +48,30 @@ void SelfProximity::run() {
   while (true) {
     next = std::max(next + period, Clock::now());
     if (!stop_signal_.sleep_until(next)) return;
-    take_model();
-    if (model_) publish_once();
+    const std::string fault = exception_of([this] {
+      take_model();
+      if (model_) publish_once();
+    });
+    if (!fault.empty()) publish_failure(fault);
   }
+}
+
+/// Says that an exception has ended a cycle, and that nothing is known. The next one is run as
+/// usual.
+void SelfProximity::publish_failure(const std::string& fault) {
+  ROS_ERROR_STREAM_THROTTLE(
+      5.0, "link against link: a cycle failed, and all links are UNKNOWN: " << fault);
+  exception_of([&] {  // there may be no memory even for that
+    ProximityArray message;
+    message.header.stamp = ros::Time::now();
+    message.status = ProximityArray::MODEL_ERROR;
+    message.status_text = "the last cycle failed: " + fault;
+    if (model_) {
+      message.header.frame_id = fixed_frame_of(*model_, config_);
+      for (const std::string& link : model_->links) message.links.push_back(unknown_link(link));
+    }
+    publisher_.publish(message);
+  });
 }
 
 void SelfProximity::take_model() {

@@ -45,6 +45,7 @@ class SelfProximity {
  private:
   void run();
   void publish_once();
+  void publish_failure(const std::string& fault);
   void take_model();
   std::vector<LinkPair> choose_pairs() const;
   NamePairs ignored_pairs() const;

@@ -45,6 +45,7 @@ void add_source_counts(const SourceReport& source, double rate, double now,
   if (source.ahead > 0.0) add_value("stamps ahead", milliseconds(source.ahead), status);
   add_value("dropped: unusable", source.unusable, status);
   add_value("dropped: out of order", source.out_of_order, status);
+  add_value("new starts: stamps went back", source.restarts, status);
   add_value("dropped: overtaken by a newer one", source.overtaken, status);
   add_value("shown on ~filtered_cloud", source.shown, status);
   if (!std::isnan(source.blind_skin)) {
