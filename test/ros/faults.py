@@ -202,7 +202,7 @@ class FaultTest(unittest.TestCase):
         self.world = pt.World(self.namespace).stand(box=FAR_BOX)
         self.sensor = Sensor(self.world)
         self.poses = Sent()
-        self.nodes = []
+        self.nodes, self.cloud_timeout = [], CLOUD_TIMEOUT
 
     def tearDown(self):
         self.world.stop()
@@ -243,7 +243,7 @@ class FaultTest(unittest.TestCase):
         cloud = self.sensor.sent.find(message.cloud_stamp)
         self.assertIsNotNone(cloud, "a cloud that was not sent, or not usable: %s" % message)
         sent, truth = cloud
-        age, limit = received - sent, CLOUD_TIMEOUT + PERIOD
+        age, limit = received - sent, self.cloud_timeout + PERIOD
         if age > limit:
             limit += self.slack(node, sent, received)
         self.assertLess(age, limit, "known although the cloud is too old: %s" % message)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
-"""Faults of a sensor: it stops, freezes, floods, errs about the time, changes frame or layout."""
+"""Faults of a sensor: it stops, freezes, errs about the time, changes frame or layout."""
 
-import subprocess
 import sys
 import time
 
@@ -14,11 +13,7 @@ from proximity_testing import ProximityArray
 from sensor_msgs.msg import PointField
 
 LIMIT = CLOUD_TIMEOUT + PERIOD
-# Share of messages that are OK while nothing is wrong with what the node gets; this program's own
-# clouds are late now and then on a loaded machine.
-MOST = 0.7
 AGAIN = "with the next cloud"
-NEIGHBOR = np.array([[0.0, 0.0, 0.48]])  # the noise filter keeps the obstacle for its sake
 
 
 class FaultsSensorTest(faults.FaultTest):
@@ -64,31 +59,6 @@ class FaultsSensorTest(faults.FaultTest):
         self.sensor.resume()
         return message, reaction, AGAIN, self.recover(node, since)
 
-    def test_floods(self):
-        """Ten times the rate, of clouds of 5000 points: the newest is used, and none piles up."""
-        self.sensor.extra = np.random.default_rng(1).uniform(-0.5, 0.5, (5000, 3)) + [0, 0, 2]
-        node = self.start()
-        memory = faults_memory(node.process.pid)
-        flood = self.world.repeat(9 * self.sensor.RATE, self.sensor.send)
-        begin = len(node.messages)
-        time.sleep(4.0)
-        flood.stop()
-        messages = list(zip(node.times, node.messages))[begin:]
-        ages = []
-        good = [(t, m) for t, m in messages if m.status == ProximityArray.OK]
-        self.assertGreater(len(good), MOST * len(messages), messages[-1][1].status_text)
-        for received, message in good:
-            ages.append(received - self.sensor.sent.find(message.cloud_stamp)[0])
-        growth = faults_memory(node.process.pid) - memory
-        self.assertLess(growth, 64e6, "bytes during the flood")
-        self.assertLess(np.median(ages), 0.2, "age of the cloud in use [s]")
-        said = "the cloud in use is %.0f ms old (median); memory grew by %.1f MB" % (
-            1e3 * np.median(ages),
-            max(growth, 0) / 1e6,
-        )
-        self.record("sensor floods", "300 Hz in place of 30 Hz, for 4 s", good[-1][1], None,
-                    "nothing to recover from", None, said=said)
-
     def test_goes_back_in_time(self):
         node = self.start()
         result = self.break_sensor(node, ProximityArray.STALE_CLOUD, "", offset=-5.0)
@@ -98,15 +68,15 @@ class FaultsSensorTest(faults.FaultTest):
 
     def test_stamps_ahead_then_stops(self):
         """Stamps that are ahead of the clock do not lengthen the timeout."""
-        self.sensor.offset = 0.4
+        self.sensor.offset = 0.28  # its clouds wait for tf, ten at most
         node = self.start()
         last = self.sensor.pause(node)
         message, reaction = self.react(node, last, ProximityArray.STALE_CLOUD)
         self.sensor.offset = 0.0
-        since = time.monotonic() + 0.4  # until then, stamps would go back
+        since = time.monotonic()
         self.sensor.resume()
-        recovery = self.recover(node, since - 0.4)
-        self.record("sensor's clock is ahead, then it stops", "stamps 0.4 s ahead; no cloud any more",
+        recovery = self.recover(node, since)
+        self.record("sensor's clock is ahead, then it stops", "stamps 0.28 s ahead; no cloud any more",
                     message, reaction, AGAIN, recovery, LIMIT)
 
     def test_changes_frame(self):
@@ -190,84 +160,6 @@ class FaultsSensorTest(faults.FaultTest):
         message, reaction, recovery = self.break_sensor(node, ProximityArray.NO_CLOUD, "NaN", to_nan)
         self.record("sensor is covered", "every point is NaN", message, reaction, AGAIN, recovery,
                     LIMIT)
-
-    def test_ingest_slower_than_its_timeout(self):
-        """A cloud whose noise filter takes longer than the timeout; the reason is not the driver."""
-        self.sensor.extra = NEIGHBOR
-        node = self.start(**{"noise_filter": {"radius": 0.2, "neighbors": 1}})
-        if "noise" in node.log() and "PCL" in node.log():
-            self.skipTest("built without PCL: no noise filter")
-        # Each point has every other one as a neighbor: the time grows with the square.
-        crowd = np.random.default_rng(2).uniform(-0.014, 0.014, (14000, 3)) + [0, 0, 1.5]
-        last = self.sensor.pause(node)
-        self.sensor.extra = np.vstack([NEIGHBOR, crowd])
-        self.sensor.resume()
-        _, reaction = self.react(node, last, ProximityArray.STALE_CLOUD)
-        # Clouds keep coming: the reason is not that they do not.
-        message = node.wait_for_status(ProximityArray.STALE_CLOUD, "last usable")
-        for other in node.messages:
-            self.assertNotIn("driver stopped", other.status_text)
-        self.sensor.halt()
-        self.sensor.extra = NEIGHBOR
-        since = time.monotonic()
-        self.sensor.resume()
-        recovery = self.recover(node, since)
-        self.record("ingest is slower than the timeout", "14,000 points in 28 mm, noise filter on",
-                    message, reaction, "when the last such cloud has been read", recovery, LIMIT)
-
-    def test_slow_subscriber(self):
-        """A subscriber that is stopped delays nobody and costs no memory."""
-        rng = np.random.default_rng(3)
-        self.sensor.extra = rng.uniform(-1.0, 1.0, (40000, 3)) + [0, 0, 2.0]
-        node = self.start()
-        program = (
-            "import rospy\n"
-            "from ist_proximity.msg import ProximityArray\n"
-            "from sensor_msgs.msg import PointCloud2\n"
-            "rospy.init_node('slow', anonymous=True)\n"
-            "print('up', flush=True)\n"
-            "age = lambda m: print((rospy.Time.now() - m.header.stamp).to_sec(), flush=True)\n"
-            "rospy.Subscriber('%s/proximity', ProximityArray, age, queue_size=1)\n"
-            "rospy.Subscriber('%s/filtered_cloud', PointCloud2, lambda m: None, queue_size=1)\n"
-            "rospy.spin()\n"
-        ) % (node.name, node.name)
-        slow = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
-        try:
-            for _ in range(3):
-                slow.stdout.readline()
-            slow.send_signal(subprocess.signal.SIGSTOP)
-            time.sleep(1.0)  # buffers of the system fill up
-            memory, begin, since = faults_memory(node.process.pid), len(node.messages), time.monotonic()
-            time.sleep(4.0)
-            growth = faults_memory(node.process.pid) - memory
-            messages = list(zip(node.times, node.messages))[begin:]
-            gap = node.gap(since, messages[-1][0])
-            self.assertLess(gap, 0.3 + self.stalls.worst(since, messages[-1][0]))
-            good = [m for _, m in messages if m.status == ProximityArray.OK]
-            self.assertGreater(len(good), MOST * len(messages), messages[-1][1].status_text)
-            self.assertLess(growth, 64e6, "bytes while the subscriber stood still")
-            since = time.monotonic()
-            slow.send_signal(subprocess.signal.SIGCONT)
-            while float(slow.stdout.readline()) > 0.5:
-                self.assertLess(time.monotonic() - since, pt.TIMEOUT, "old messages")
-            recovery = 1e3 * (time.monotonic() - since)
-            said = "other subscribers: %.0f Hz; memory grew by %.1f MB" % (
-                len(messages) / 4.0,
-                max(growth, 0) / 1e6,
-            )
-            self.record("a subscriber is too slow", "one of ~proximity and ~filtered_cloud stands "
-                        "still for 5 s", good[-1], None,
-                        "it has a message of now after going on", recovery, said=said)
-        finally:
-            slow.kill()
-            slow.wait()
-            slow.stdout.close()
-
-
-def faults_memory(pid):
-    """[bytes] resident"""
-    with open("/proc/%d/statm" % pid, encoding="ascii") as file:
-        return int(file.read().split()[1]) * 4096
 
 
 if __name__ == "__main__":
