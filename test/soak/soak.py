@@ -6,6 +6,7 @@ and soak.svg. The exit code is 0 only if every promise held; the last line says 
 """
 
 import argparse
+import collections
 import csv
 import os
 import signal
@@ -41,6 +42,7 @@ ROUNDING = 1e-5  # [m] of float32 points
 IDLE_PERIOD = 0.1  # [s] between answers when no joint states come
 # [s] A loaded machine may bring a message this much later to this program than the node sent it.
 DELIVERY = 0.25
+STALL_MEMORY = 1.0  # [s] for which a time without messages excuses late ones
 LONGEST_GAP = 5.0  # [s] without a message: a node that is silent for longer hangs
 WARM_UP = 1.0 / 3.0  # of the run, in which memory may grow
 
@@ -52,6 +54,7 @@ class Checker:
         self._world, self._report = SoakWorld(seed), report
         self._lock, self._waiting = threading.Lock(), []
         self._last = None
+        self._gaps = collections.deque()  # (time of a message, time without one before it)
         self.second = Second()
         self.wrong = {"false bounds": 0, "wrong distances": 0, "stale shown as fresh": 0,
                       "clear or near where unknown": 0, "gaps": 0}
@@ -59,11 +62,16 @@ class Checker:
         self.messages = 0
 
     def receive(self, message):
+        """Notes the longest time without a message of late: what waited then comes all at once."""
         now = time.time()
         gap = now - self._last if self._last else 0.0
         self._last = now
+        if gap > 0.01:
+            self._gaps.append((now, gap))
+        while self._gaps and self._gaps[0][0] < now - STALL_MEMORY:
+            self._gaps.popleft()
         with self._lock:
-            self._waiting.append((now, gap, message))
+            self._waiting.append((now, max([gap] + [gap for _, gap in self._gaps]), message))
 
     def take(self):
         """Checks what has come since the last call; returns the statistics of that time."""
