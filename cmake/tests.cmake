@@ -107,6 +107,14 @@ if(TARGET pack_robot_test)
     IST_PROXIMITY_PACK_ROBOT="$<TARGET_FILE:pack_robot>")
 endif()
 
+if(catkin_FOUND AND IST_PROXIMITY_SANITIZE)
+  add_executable(nodelet_manager EXCLUDE_FROM_ALL test/soak/nodelet_manager.cpp)
+  target_link_libraries(nodelet_manager PRIVATE -Wl,--no-as-needed ist_proximity_ros)
+  target_include_directories(nodelet_manager SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  set_target_properties(nodelet_manager PROPERTIES
+    RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
+endif()
+
 if(catkin_FOUND)
   find_package(rostest QUIET)
 endif()

@@ -176,12 +176,13 @@ class Node:
     REMAP = ["__ns:=" + NAMESPACE, "/tf:=" + NAMESPACE + "/tf",
              "/tf_static:=" + NAMESPACE + "/tf_static"]
 
-    def __init__(self, nodelet, folder, wrapper):
+    def __init__(self, nodelet, folder, wrapper, manager):
         self._log = open(os.path.join(folder, "node.log"), "wb")
         self._processes = []
         if nodelet:
             program = pt.find_program("nodelet", "nodelet")
-            self.start(wrapper + [program, "manager", "__name:=manager"])
+            command = [manager] if manager else [program, "manager"]
+            self.start(wrapper + command + ["__name:=manager"])
             self.start([program, "load", "ist_proximity/Proximity", "manager", "__name:=proximity"])
         else:
             program = pt.find_program("ist_proximity", "proximity_node")
@@ -225,7 +226,7 @@ def run(folder, arguments, report):
     checker = Checker(arguments.seed, report)
     rospy.Subscriber(NODE + "/proximity", ProximityArray, checker.receive, queue_size=10000,
                      tcp_nodelay=True, buff_size=1 << 24)
-    node = Node(arguments.nodelet, folder, arguments.wrapper.split())
+    node = Node(arguments.nodelet, folder, arguments.wrapper.split(), arguments.manager)
     driver = subprocess.Popen(
         [sys.executable, os.path.join(os.path.dirname(os.path.realpath(__file__)), "soak_driver.py"),
          NODE, str(arguments.seed), os.path.join(folder, "events.csv"), "__ns:=" + NAMESPACE,
@@ -268,11 +269,10 @@ def judge(rows, checker, code, folder, arguments, report):
     if len(later) < 6:
         failures.append("too short to say how memory grows")
     else:
-        # Medians of the first and the last third of that time: a single peak is no growth.
+        # What is left when nothing is going on, in the first and in the last third of that time:
+        # messages that wait for a slow subscriber, and queries, come and go.
         first, last = later[: len(later) // 3], later[-(len(later) // 3):]
-        growth = np.median(last[:, 1]) - np.median(first[:, 1])
-        # What is left when nothing is going on: subscribers and services come and go.
-        threads, descriptors = last[:, 2].min() - first[:, 2].min(), last[:, 3].min() - first[:, 3].min()
+        growth, threads, descriptors = last[:, 1:4].min(0) - first[:, 1:4].min(0)
         if growth > arguments.max_growth:
             failures.append("memory grew by %.1f MB, allowed is %g" % (growth, arguments.max_growth))
         if threads > 0:
@@ -299,6 +299,7 @@ def main():
     parser.add_argument("--nodelet", action="store_true")
     parser.add_argument("--max-growth", type=float, help="[MB] over the last two thirds")
     parser.add_argument("--wrapper", default="", help="command in front of the node's")
+    parser.add_argument("--manager", help="program of the nodelet's manager")
     parser.add_argument("folder")
     arguments = parser.parse_args(rospy.myargv()[1:])
     if arguments.max_growth is None:
