@@ -57,7 +57,7 @@ def table(rows):
 
 
 def update(records, document=DOCUMENT):
-    """Replaces or appends the rows of records; several processes may do so at once."""
+    """Replaces or adds the rows of records, in the order of their names; processes take turns."""
     with open(document, "r+", encoding="utf-8") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         text = file.read()
@@ -66,7 +66,8 @@ def update(records, document=DOCUMENT):
         before, rest = text.split(BEGIN, 1)
         after = rest.split(END, 1)[1]
         file.seek(0)
-        file.write(before + BEGIN + table(rows.values()) + END + after)
+        ordered = [rows[fault] for fault in sorted(rows, key=str.lower)]
+        file.write(before + BEGIN + table(ordered) + END + after)
         file.truncate()
 
 

@@ -125,9 +125,24 @@ DISTANCE = {
 }
 
 
+def lagging_truths(world, pose_at, cloud_at, link, lag):
+    """(n) distances of a link where one joint's position is older than the others' by up to `lag`."""
+    lags = np.linspace(0.0, lag, 13)
+    q = np.repeat(world.joints(np.full(1, pose_at)), len(JOINTS) * len(lags), axis=0)
+    for j in range(len(JOINTS)):
+        rows = slice(j * len(lags), (j + 1) * len(lags))
+        q[rows, j] = world.joints(pose_at - lags)[:, j]
+    return distances(world, q, np.full(len(q), cloud_at))[link]
+
+
 def truth(world, poses_at, clouds_at):
     """By link the smallest signed distance (n), for poses and clouds of these times (n), in double."""
-    poses = link_poses(world.joints(poses_at))
+    return distances(world, world.joints(poses_at), clouds_at)
+
+
+def distances(world, q, clouds_at):
+    """The same for positions (n, 4)."""
+    poses = link_poses(q)
     X_BC = CAMERAS["camera"]
     unique, index = np.unique(clouds_at, return_inverse=True)
     points = np.stack([world.points(t).astype(float) for t in unique])[index]
