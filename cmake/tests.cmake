@@ -107,14 +107,6 @@ if(TARGET pack_robot_test)
     IST_PROXIMITY_PACK_ROBOT="$<TARGET_FILE:pack_robot>")
 endif()
 
-if(catkin_FOUND AND IST_PROXIMITY_SANITIZE)
-  add_executable(nodelet_manager EXCLUDE_FROM_ALL test/soak/nodelet_manager.cpp)
-  target_link_libraries(nodelet_manager PRIVATE -Wl,--no-as-needed ist_proximity_ros)
-  target_include_directories(nodelet_manager SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-  set_target_properties(nodelet_manager PROPERTIES
-    RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
-endif()
-
 if(catkin_FOUND)
   find_package(rostest QUIET)
 endif()
@@ -132,4 +124,12 @@ if(rostest_FOUND)
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES
       LABELS ros TIMEOUT 300 RUN_SERIAL ${serial})
   endforeach()
+endif()
+
+if(catkin_FOUND AND IST_PROXIMITY_SANITIZE)
+  add_executable(nodelet_manager EXCLUDE_FROM_ALL test/soak/nodelet_manager.cpp)
+  target_link_libraries(nodelet_manager PRIVATE -Wl,--no-as-needed ist_proximity_ros)
+  target_include_directories(nodelet_manager SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  set_target_properties(nodelet_manager PROPERTIES
+    RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
 endif()
