@@ -106,6 +106,10 @@ class Sent:
         """(time of sending, truth) of a stamp; None where nothing was sent with it."""
         return self._by_stamp.get(stamp.to_nsec())
 
+    def latest(self, t):
+        """The same of what was sent last before a time of time.monotonic()."""
+        return max((sent for sent in self._by_stamp.values() if sent[0] <= t), default=None)
+
     def between(self, stamp):
         """The same for an instant between two stamps, where tf interpolates."""
         t = stamp.to_nsec()
@@ -267,8 +271,9 @@ class FaultTest(unittest.TestCase):
         machine added beyond the limit is not counted.
         """
         begin = next(
-            i for i, m in enumerate(node.messages)
-            if node.times[i] >= last_input and self.known(m, links)
+            (i for i, m in enumerate(node.messages)
+             if node.times[i] >= last_input and self.known(m, links)),
+            len(node.messages),
         )
         message = node.wait_for(
             lambda m: m.status == status and text in m.status_text and not self.known(m, links),

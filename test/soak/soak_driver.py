@@ -23,6 +23,8 @@ from tf2_msgs.msg import TFMessage
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "ros"))
 import proximity_testing as pt  # noqa: E402
 from soak_world import (  # noqa: E402
+    AHEAD,
+    AHEAD_FAULT,
     CAMERAS,
     DISTANCE,
     JOINTS,
@@ -237,7 +239,7 @@ class Driver:
                 faults[name] = self._changing(sender, change)
         for name, sender in (("clouds", self._clouds), ("joint states", self._joints)):
             faults[name + " go back 2 s"] = self._shifting(sender, -2.0)
-            faults[name + " are 0.2 s ahead"] = self._shifting(sender, 0.2)
+            faults[name + AHEAD_FAULT] = self._shifting(sender, AHEAD)
         faults["clouds flood"] = self._flood
         faults["a subscriber stands still"] = self._slow_subscriber
         faults["parameters are deleted"] = self._delete_parameters

@@ -11,6 +11,8 @@ MARGIN = 0.03  # [m] ~query/margin, for the whole run
 TOLERANCE = 0.001  # [m] ~query/tolerance
 TIMEOUT = 0.5  # [s] of clouds and of poses
 POINTS = 60
+AHEAD = 0.2  # [s] of stamps while a clock is ahead of the node's
+AHEAD_FAULT = " are ahead"  # end of this fault's name
 TOOL_RADIUS = 0.04  # [m] of the sphere that is attached to tool0
 
 URDF = """<robot name="soak">
@@ -132,6 +134,12 @@ def lagging_truths(world, pose_at, cloud_at, link, lag):
     for j in range(len(JOINTS)):
         rows = slice(j * len(lags), (j + 1) * len(lags))
         q[rows, j] = world.joints(pose_at - lags)[:, j]
+    return distances(world, q, np.full(len(q), cloud_at))[link]
+
+
+def leading_truths(world, pose_at, cloud_at, link, lead):
+    """(n) distances of a link with the positions of later instants, by up to `lead`."""
+    q = world.joints(pose_at + np.linspace(0.0, lead, 81))
     return distances(world, q, np.full(len(q), cloud_at))[link]
 
 
