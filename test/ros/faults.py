@@ -261,7 +261,9 @@ class FaultTest(unittest.TestCase):
         self.assertAlmostEqual(one.distance, truth, delta=0.001 + 1e-5)
 
     def known(self, message, links=("ball_link",)):
-        return any(pt.link(message, name).state != LinkProximity.UNKNOWN for name in links)
+        """Whether one of the links is known; before the model is read there are none."""
+        states = {one.link: one.state for one in message.links}
+        return any(states.get(name, LinkProximity.UNKNOWN) != LinkProximity.UNKNOWN for name in links)
 
     def react(self, node, last_input, status, text="", links=("ball_link",), timeout=CLOUD_TIMEOUT):
         """Waits until the links are unknown, with this status and text.

@@ -25,7 +25,7 @@ import sys, time
 sys.path.insert(0, %r)
 import proximity_testing as pt
 import rospy
-rospy.init_node('second', anonymous=True)
+rospy.init_node('second')
 publisher = rospy.Publisher('%s/tf', pt.TFMessage, queue_size=10)
 while publisher.get_num_connections() == 0:
     time.sleep(0.01)
@@ -71,9 +71,9 @@ class PosesTest(faults.FaultTest):
 
     def check_message(self, node, received, message):
         """Distances belong to the poses of header.stamp; those were sent a timeout ago at most."""
-        ball = pt.link(message, "ball_link")
-        if ball.state == LinkProximity.UNKNOWN:
+        if not self.known(message):
             return
+        ball = pt.link(message, "ball_link")
         if self.is_ahead:  # at rest: header.stamp is between stamps, or before the first
             found = self.poses.latest(received)
         else:

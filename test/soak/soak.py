@@ -155,7 +155,7 @@ class Checker:
             self.lagging += 1
             return
         kind = "false bounds" if self.is_false(one, true) else "wrong distances"
-        leading = leading_truths(self._world, *at, AHEAD)
+        leading = leading_truths(self._world, *at, AHEAD + DELIVERY)
         if self.is_right(one, leading.min(), leading.max()):
             self._leading.append((now, kind, where))
         else:
