@@ -24,18 +24,19 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), "..
 import proximity_testing as pt  # noqa: E402
 from soak_world import (  # noqa: E402
     AHEAD,
-    AHEAD_FAULT,
     CAMERAS,
     DISTANCE,
     JOINTS,
     MARGIN,
     MAX_DISTANCE,
     POINTS,
+    REST,
     TOLERANCE,
     TOOL_RADIUS,
     SoakWorld,
     inverse,
     link_poses,
+    rest_left,
 )
 
 from ist_proximity.msg import LinkProximity, ProximityArray  # noqa: E402
@@ -239,7 +240,7 @@ class Driver:
                 faults[name] = self._changing(sender, change)
         for name, sender in (("clouds", self._clouds), ("joint states", self._joints)):
             faults[name + " go back 2 s"] = self._shifting(sender, -2.0)
-            faults[name + AHEAD_FAULT] = self._shifting(sender, AHEAD)
+            faults[name + " are ahead"] = self._ahead(sender)
         faults["clouds flood"] = self._flood
         faults["a subscriber stands still"] = self._slow_subscriber
         faults["parameters are deleted"] = self._delete_parameters
@@ -257,6 +258,17 @@ class Driver:
         def fault(seconds):
             sender.offset = offset
             time.sleep(seconds)
+            sender.offset = 0.0
+
+        return fault
+
+    def _ahead(self, sender):
+        """Within one rest of the robot, before, after and with the stamps that are ahead."""
+        def fault(seconds):
+            while not 2 * AHEAD + 0.8 < rest_left(time.time()) < REST - 0.05:
+                time.sleep(0.005)
+            sender.offset = AHEAD
+            time.sleep(min(seconds, 0.7))
             sender.offset = 0.0
 
         return fault

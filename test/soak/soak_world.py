@@ -12,7 +12,9 @@ TOLERANCE = 0.001  # [m] ~query/tolerance
 TIMEOUT = 0.5  # [s] of clouds and of poses
 POINTS = 60
 AHEAD = 0.2  # [s] of stamps while a clock is ahead of the node's
-AHEAD_FAULT = " are ahead"  # end of this fault's name
+# [s] The robot moves, then rests, again and again. While it rests its pose is the same at every instant:
+# that is when joint states can be ahead, and the truth is still that of header.stamp.
+MOVE, REST = 3.0, 1.5
 TOOL_RADIUS = 0.04  # [m] of the sphere that is attached to tool0
 
 URDF = """<robot name="soak">
@@ -92,11 +94,20 @@ class SoakWorld:
     def joints(self, t):
         """(..., 4) positions [rad, m]."""
         t = np.asarray(t, float)[..., None]
+        rounds, phase = np.divmod(t, MOVE + REST)
+        part = np.minimum(phase / MOVE, 1.0)
+        t = 2 * MOVE * (rounds + part * part * (3 - 2 * part))  # starts and stops smoothly
         return self._middle + self._amplitude * np.sin(self._rate * t + self._phase)
 
     def points(self, t):
         """(n, 3) float32, in the frame `camera`."""
         return (self._home + self._swing * np.sin(self._swing_rate * t + self._swing_phase)).astype("<f4")
+
+
+def rest_left(t):
+    """[s] for which the robot still rests at a time; 0 while it moves."""
+    phase = t % (MOVE + REST)
+    return MOVE + REST - phase if phase > MOVE else 0.0
 
 
 def link_poses(q):
@@ -129,17 +140,11 @@ DISTANCE = {
 
 def lagging_truths(world, pose_at, cloud_at, link, lag):
     """(n) distances of a link where one joint's position is older than the others' by up to `lag`."""
-    lags = np.linspace(0.0, lag, 13)
+    lags = np.linspace(0.0, lag, 61)
     q = np.repeat(world.joints(np.full(1, pose_at)), len(JOINTS) * len(lags), axis=0)
     for j in range(len(JOINTS)):
         rows = slice(j * len(lags), (j + 1) * len(lags))
         q[rows, j] = world.joints(pose_at - lags)[:, j]
-    return distances(world, q, np.full(len(q), cloud_at))[link]
-
-
-def leading_truths(world, pose_at, cloud_at, link, lead):
-    """(n) distances of a link with the positions of later instants, by up to `lead`."""
-    q = world.joints(pose_at + np.linspace(0.0, lead, 81))
     return distances(world, q, np.full(len(q), cloud_at))[link]
 
 
