@@ -127,9 +127,9 @@ if(rostest_FOUND)
 endif()
 
 if(catkin_FOUND AND IST_PROXIMITY_SANITIZE)
-  add_executable(nodelet_manager EXCLUDE_FROM_ALL test/soak/nodelet_manager.cpp)
-  target_link_libraries(nodelet_manager PRIVATE -Wl,--no-as-needed ist_proximity_ros)
-  target_include_directories(nodelet_manager SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-  set_target_properties(nodelet_manager PROPERTIES
-    RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
+  add_executable(test_nodelet_manager EXCLUDE_FROM_ALL test/soak/nodelet_manager.cpp)
+  target_link_libraries(test_nodelet_manager PRIVATE -Wl,--no-as-needed ist_proximity_ros)
+  target_include_directories(test_nodelet_manager SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  set_target_properties(test_nodelet_manager PROPERTIES
+    OUTPUT_NAME nodelet_manager RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
 endif()
