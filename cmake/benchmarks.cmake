@@ -1,6 +1,10 @@
 # Programs that measure: one per benchmark/*.cpp, built on demand (target `benchmarks`), not installed.
 
 file(GLOB benchmark_sources CONFIGURE_DEPENDS benchmark/*.cpp)
+if(NOT IST_PROXIMITY_CLI11_INCLUDE_DIR)
+  list(FILTER benchmark_sources EXCLUDE REGEX "/hard_cases\\.cpp$")
+  message(STATUS "ist_proximity: no benchmark/hard_cases, CLI11 is missing (apt install libcli11-dev)")
+endif()
 add_custom_target(benchmarks)
 foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
@@ -56,6 +60,12 @@ find_package(embree 3 QUIET)
 if(TARGET embree)
   target_link_libraries(benchmark_packing PRIVATE embree)
   target_compile_definitions(benchmark_packing PRIVATE IST_PROXIMITY_EMBREE)
+endif()
+
+if(TARGET benchmark_hard_cases)
+  file(GLOB hard_case_sources CONFIGURE_DEPENDS benchmark/hard_cases/*.cpp)
+  target_sources(benchmark_hard_cases PRIVATE ${hard_case_sources} benchmark/peers/scene.cpp)
+  target_include_directories(benchmark_hard_cases SYSTEM PRIVATE ${IST_PROXIMITY_CLI11_INCLUDE_DIR})
 endif()
 
 # What people would use instead, in benchmark/peers: each where its library is found
