@@ -2,8 +2,9 @@
 
 file(GLOB benchmark_sources CONFIGURE_DEPENDS benchmark/*.cpp)
 if(NOT IST_PROXIMITY_CLI11_INCLUDE_DIR)
-  list(FILTER benchmark_sources EXCLUDE REGEX "/hard_cases\\.cpp$")
-  message(STATUS "ist_proximity: no benchmark/hard_cases, CLI11 is missing (apt install libcli11-dev)")
+  list(FILTER benchmark_sources EXCLUDE REGEX "/(hard_cases|near_touch)\\.cpp$")
+  message(STATUS "ist_proximity: no benchmark/hard_cases and near_touch, CLI11 is missing "
+    "(apt install libcli11-dev)")
 endif()
 add_custom_target(benchmarks)
 foreach(source IN LISTS benchmark_sources)
@@ -65,7 +66,12 @@ endif()
 if(TARGET benchmark_hard_cases)
   file(GLOB hard_case_sources CONFIGURE_DEPENDS benchmark/hard_cases/*.cpp)
   target_sources(benchmark_hard_cases PRIVATE ${hard_case_sources} benchmark/peers/scene.cpp)
-  target_include_directories(benchmark_hard_cases SYSTEM PRIVATE ${IST_PROXIMITY_CLI11_INCLUDE_DIR})
+  file(GLOB near_touch_sources CONFIGURE_DEPENDS benchmark/near_touch/*.cpp)
+  target_sources(benchmark_near_touch PRIVATE
+    ${hard_case_sources} ${near_touch_sources} benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
+  foreach(name hard_cases near_touch)
+    target_include_directories(benchmark_${name} SYSTEM PRIVATE ${IST_PROXIMITY_CLI11_INCLUDE_DIR})
+  endforeach()
 endif()
 
 # What people would use instead, in benchmark/peers: each where its library is found
