@@ -92,15 +92,15 @@ std::vector<MovingRobot> pandas(const std::filesystem::path& data) {
 
 MovingRobot demo_arm() {
   const auto arm = std::make_shared<const DemoMotion>();
-  RobotDescription robot = arm->robot();
+  RobotDescription robot;
+  robot.name = arm->robot().name;
   std::vector<std::size_t> moving;
-  for (std::size_t i = 0; i < robot.links.size(); ++i) {
-    const std::string& name = robot.links[i].name;
-    if (name != "base_link" && name != "stand_link") moving.push_back(i);
+  for (std::size_t i = 0; i < arm->robot().links.size(); ++i) {
+    const LinkDescription& link = arm->robot().links[i];
+    if (link.name == "base_link" || link.name == "stand_link") continue;
+    moving.push_back(i);
+    robot.links.push_back(link);
   }
-  std::vector<LinkDescription> links;
-  for (const std::size_t i : moving) links.push_back(robot.links[i]);
-  robot.links = std::move(links);
   const auto part = [arm, moving](std::size_t number) {
     constexpr double kSwing = 0.5;  // [rad]
     std::vector<Poses> poses;
