@@ -33,6 +33,7 @@ using ist::benchmark::Frame;
 using ist::benchmark::HardScene;
 using ist::benchmark::kAllAsked;
 using ist::benchmark::MovingRobot;
+using ist::benchmark::next_image;
 using ist::benchmark::Poses;
 using ist::benchmark::quantile;
 using ist::benchmark::ThreadTimer;
@@ -43,7 +44,7 @@ struct Options {
   std::vector<std::string> robots;
   std::size_t parts = 12;
   std::size_t steps = 33;
-  double noise = 1.425e-3;
+  double noise = ist::benchmark::kKinectNoise;
   double max_error_mm = 1e3 * ist::PackingConfig().max_error;
   bool check = true;
   std::string csv, cache;
@@ -58,19 +59,6 @@ struct Class {
 
   std::vector<double>& of(Asked asked) { return us[static_cast<std::size_t>(asked)]; }
 };
-
-// The frame as the sensor's next image of a still scene: Gaussian noise along the ray, of standard
-// deviation noise * z^2 (Khoshelham and Elberink 2012: 1.425e-3 / m for the Kinect).
-Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
-  Frame next = frame;
-  std::normal_distribution<double> normal;
-  for (std::size_t i = 0; i < next.data.size(); i += 4) {
-    const double z = static_cast<double>(next.data[i + 2]);
-    const auto scale = static_cast<float>(1.0 + noise * z * normal(*rng));
-    for (std::size_t k = 0; k < 3; ++k) next.data[i + k] *= scale;
-  }
-  return next;
-}
 
 // One part of a motion: a first query that nothing is known for (cold), a motion, and two new
 // images at its end.
@@ -184,6 +172,10 @@ void print(std::FILE* csv, const std::string& robot, double tolerance_mm, double
   }
   if (csv != nullptr) std::fflush(csv);
   const std::vector<double>& warm = c->of(Asked::kWarm);
+  if (warm.empty()) {
+    std::printf("%s: no part of the motion gets to %g mm\n", robot.c_str(), distance_mm);
+    return;
+  }
   std::printf(
       "| %s | %g | %g | %zu | %.0f | %.0f | %.0f | %.0f | %.0f | %.0f | %.0f | %zu of %zu |\n",
       robot.c_str(), tolerance_mm, distance_mm, warm.size(), quantile(warm, 0.5),
@@ -198,7 +190,7 @@ bool run(const Options& options, std::FILE* csv) {
   const std::filesystem::path data = ist::benchmark::data_or_exit();
   const ist::benchmark::DataSet set = ist::benchmark::kinect_data(data, options.cache);
   std::vector<MovingRobot> robots = ist::benchmark::pandas(data);
-  robots.push_back(ist::benchmark::demo_arm());
+  for (MovingRobot& robot : ist::benchmark::demo_arms()) robots.push_back(std::move(robot));
   bool all_right = true;
   print_header(csv);
   std::printf(

@@ -64,12 +64,10 @@ if(TARGET embree)
 endif()
 
 if(TARGET benchmark_hard_cases)
-  file(GLOB hard_case_sources CONFIGURE_DEPENDS benchmark/hard_cases/*.cpp)
-  target_sources(benchmark_hard_cases PRIVATE ${hard_case_sources} benchmark/peers/scene.cpp)
-  file(GLOB near_touch_sources CONFIGURE_DEPENDS benchmark/near_touch/*.cpp)
-  target_sources(benchmark_near_touch PRIVATE
-    ${hard_case_sources} ${near_touch_sources} benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
+  file(GLOB hard_case_sources CONFIGURE_DEPENDS benchmark/hard_cases/*.cpp benchmark/near_touch/*.cpp)
   foreach(name hard_cases near_touch)
+    target_sources(benchmark_${name} PRIVATE
+      ${hard_case_sources} benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
     target_include_directories(benchmark_${name} SYSTEM PRIVATE ${IST_PROXIMITY_CLI11_INCLUDE_DIR})
   endforeach()
 endif()

@@ -25,6 +25,7 @@ struct HardScene {
   /// The next image: about `points` points with Gaussian noise of standard deviation `noise` [m].
   std::function<Frame(std::size_t points, double noise, std::mt19937_64* rng)> image;
   std::function<Poses(double time)> poses;  ///< X_FL by link, `time` [s] after the start
+  bool is_recorded = false;                 ///< images have a size and a noise of their own
 };
 
 /// Unorganized clouds, sampled anew from the surfaces. The sensor frame is the fixed frame.

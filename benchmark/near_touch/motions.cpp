@@ -15,6 +15,7 @@ namespace ist::benchmark {
 namespace {
 
 constexpr std::size_t kPosesPerPart = 6, kStepsPerPose = 10;
+constexpr std::size_t kPartsOfScene = 20;
 constexpr std::size_t kStride = 167;  // recorded poses, or hundredths of a second, between parts
 
 RobotDescription panda(const std::filesystem::path& data, bool visual) {
@@ -50,6 +51,39 @@ std::vector<Poses> recorded(const std::filesystem::path& data) {
     }
   }
   return motion;
+}
+
+// The demo arm without the links that stand still.
+// @param swing   [rad] amplitude of the joints
+// @param middle  [rad] about which they swing, by joint
+MovingRobot demo_arm(const std::string& name, const std::shared_ptr<const DemoMotion>& arm,
+                     double swing, const std::vector<double>& middle) {
+  RobotDescription robot;
+  robot.name = arm->robot().name;
+  std::vector<std::size_t> moving;
+  for (std::size_t i = 0; i < arm->robot().links.size(); ++i) {
+    const LinkDescription& link = arm->robot().links[i];
+    if (link.name == "base_link" || link.name == "stand_link") continue;
+    moving.push_back(i);
+    robot.links.push_back(link);
+  }
+  const auto part = [=](std::size_t number) {
+    constexpr double kRate = 1.5;  // [rad/s]
+    std::vector<Poses> poses;
+    for (std::size_t k = 0; k < (kPosesPerPart - 1) * kStepsPerPose; ++k) {
+      const double t =
+          0.01 * static_cast<double>(number * kStride) + 0.001 * static_cast<double>(k);
+      std::vector<double> q = middle;
+      for (std::size_t j = 0; j < q.size(); ++j) {
+        q[j] += swing * std::sin(kRate * t + static_cast<double>(j));
+      }
+      const Poses all = arm->poses(q);
+      poses.emplace_back();
+      for (const std::size_t i : moving) poses.back().push_back(all[i]);
+    }
+    return poses;
+  };
+  return {name, robot, part};
 }
 
 // Finds the height at which the nearest link is at `distance`, from `*height` on. Where the
@@ -90,32 +124,48 @@ std::vector<MovingRobot> pandas(const std::filesystem::path& data) {
           {"Panda, collision meshes", panda(data, false), part}};
 }
 
-MovingRobot demo_arm() {
+std::vector<MovingRobot> demo_arms() {
   const auto arm = std::make_shared<const DemoMotion>();
-  RobotDescription robot;
-  robot.name = arm->robot().name;
-  std::vector<std::size_t> moving;
-  for (std::size_t i = 0; i < arm->robot().links.size(); ++i) {
-    const LinkDescription& link = arm->robot().links[i];
-    if (link.name == "base_link" || link.name == "stand_link") continue;
-    moving.push_back(i);
-    robot.links.push_back(link);
+  return {demo_arm("demo arm", arm, 0.5, {0.0, 0.9, 0.9, 0.0, 0.8, 0.0}),
+          demo_arm("demo arm, level", arm, 0.03, {0.0, 0.5 * EIGEN_PI, 0.0, 0.0, 0.0, 0.0})};
+}
+
+Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
+  Frame next = frame;
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < next.data.size(); i += 4) {
+    const auto z = static_cast<double>(next.data[i + 2]);
+    const auto scale = static_cast<float>(1.0 + noise * z * normal(*rng));
+    for (std::size_t k = 0; k < 3; ++k) next.data[i + k] *= scale;
   }
-  const auto part = [arm, moving](std::size_t number) {
-    constexpr double kSwing = 0.5;  // [rad]
-    std::vector<Poses> poses;
-    for (std::size_t k = 0; k + kStepsPerPose < kPosesPerPart * kStepsPerPose; ++k) {
-      const double t =
-          0.01 * static_cast<double>(number * kStride) + 0.001 * static_cast<double>(k);
-      const auto swing = [t](double phase) { return kSwing * std::sin(1.5 * t + phase); };
-      const Poses all = arm->poses({swing(0.0), 0.9 + swing(1.0), 0.9 + swing(2.0), swing(3.0),
-                                    0.8 + swing(4.0), swing(5.0)});
-      poses.emplace_back();
-      for (const std::size_t i : moving) poses.back().push_back(all[i]);
-    }
-    return poses;
-  };
-  return {"demo arm", robot, part};
+  return next;
+}
+
+std::vector<HardScene> recorded_scenes(const std::filesystem::path& data,
+                                       const std::string& cache_directory) {
+  const MovingRobot robot = pandas(data).front();
+  // Parts of the motion, one after the other; the first query of each is as good as cold.
+  const auto motion = std::make_shared<std::vector<Poses>>();
+  for (std::size_t part = 0; part < kPartsOfScene; ++part) {
+    for (const Poses& X_FL : robot.part(part)) motion->push_back(X_FL);
+  }
+  std::vector<HardScene> scenes;
+  for (const Scene& recorded : kinect_data(data, cache_directory).scenes) {
+    HardScene scene;
+    scene.name = "Kinect frame " + recorded.name;
+    scene.link = robot.name;
+    scene.robot = robot.robot;
+    scene.is_recorded = true;
+    scene.image = [frame = recorded.frame](std::size_t /*points*/, double /*noise*/,
+                                           std::mt19937_64* rng) {
+      return next_image(frame, kKinectNoise, rng);
+    };
+    scene.poses = [motion](double time) {
+      return (*motion)[static_cast<std::size_t>(std::lround(1e3 * time)) % motion->size()];
+    };
+    scenes.push_back(std::move(scene));
+  }
+  return scenes;
 }
 
 std::vector<Poses> kept_at(double distance, const std::vector<Poses>& motion,
