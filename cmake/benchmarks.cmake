@@ -77,6 +77,8 @@ endif()
 target_sources(benchmark_peers PRIVATE
   benchmark/peers/flat.cpp
   benchmark/peers/floors.cpp
+  benchmark/peers/grid_of_groups.cpp
+  benchmark/peers/image_pyramid.cpp
   benchmark/peers/kinect.cpp
   benchmark/peers/ours.cpp
   benchmark/peers/scene.cpp
