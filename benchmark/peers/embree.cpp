@@ -157,11 +157,14 @@ class EmbreeOfGroups : public Method {
     for (std::size_t link = 0; link < X_FL.size(); ++link) {
       const Eigen::Isometry3f X_LS = (X_FL[link].inverse() * X_FS_).cast<float>();
       Eigen::Vector3f surface_L = Eigen::Vector3f::Zero();
-      const NearestPixel nearest =
-          search_.run(pyramid_, X_LS, last_[link], [&](const Eigen::Vector3f& p_L, float bound) {
-            return surfaces_.closest(link, p_L, bound, &surface_L);
-          });
-      // Centres of balls were asked for, too: ask for the nearest pixel's surface point again.
+      const auto distance = [&](const Eigen::Vector3f& p_L, float bound,
+                                Eigen::Vector3f* witness_L) {
+        // A surface point near the nearest one makes the search short; NaN compares as false.
+        const float near = kWiden * (p_L - *witness_L).norm() + kRounding;
+        return surfaces_.closest(link, p_L, near < bound ? near : bound, witness_L);
+      };
+      const NearestPixel nearest = search_.run(pyramid_, X_LS, last_[link], distance);
+      // The search keeps no surface points of pixels.
       surfaces_.closest(link, X_LS * pyramid_.point(nearest.pixel),
                         std::numeric_limits<float>::infinity(), &surface_L);
       last_[link] = nearest.pixel;
@@ -172,6 +175,8 @@ class EmbreeOfGroups : public Method {
   }
 
  private:
+  static constexpr float kWiden = 1.00001F, kRounding = 1e-6F;  // [m]
+
   Surfaces surfaces_;
   ImagePyramid pyramid_;
   PyramidSearch search_;

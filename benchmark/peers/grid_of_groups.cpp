@@ -133,7 +133,8 @@ class GridOfGroups : public Method {
       const LinkGrid& grid = grids_[link];
       const NearestPixel nearest =
           search_.run(pyramid_, X_LS, last_[link],
-                      [&](const Eigen::Vector3f& p_L, float /*bound*/) { return grid(p_L); });
+                      [&](const Eigen::Vector3f& p_L, float /*bound*/,
+                          Eigen::Vector3f* /*witness_L*/) { return grid(p_L); });
       last_[link] = nearest.pixel;
       const Eigen::Vector3f p_L = X_LS * pyramid_.point(nearest.pixel);
       const Eigen::Vector3f surface_L = p_L - nearest.distance * grid.slope(p_L);

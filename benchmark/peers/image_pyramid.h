@@ -72,7 +72,8 @@ class PyramidSearch {
                    Distance&& distance) {
     nearest_ = NearestPixel();
     if (start < pyramid.width() * pyramid.height()) {
-      measure(X_LS * pyramid.point(start), start, std::numeric_limits<float>::infinity(), distance);
+      measure(X_LS * pyramid.point(start), start, std::numeric_limits<float>::infinity(),
+              no_witness(), distance);
     }
     queue_.clear();
     const auto top = static_cast<std::uint32_t>(pyramid.levels().size() - 1);
@@ -91,20 +92,26 @@ class PyramidSearch {
   }
 
  private:
+  static Eigen::Vector3f no_witness() {
+    return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  }
+
   // A ball that was measured: `bound` is the centre's distance less the radius.
   struct Entry {
     float bound;  // [m]
     std::uint32_t level, u, v;
     Eigen::Vector3f center_L = Eigen::Vector3f::Zero();  // [m]
     float distance = 0.0F;                               // [m] of the centre
+    Eigen::Vector3f witness_L = no_witness();            // [m] the surface point nearest to it
 
     bool operator<(const Entry& other) const { return bound > other.bound; }
   };
 
   template <typename Distance>
-  void measure(const Eigen::Vector3f& p_L, std::size_t pixel, float at_most, Distance& distance) {
+  void measure(const Eigen::Vector3f& p_L, std::size_t pixel, float at_most,
+               Eigen::Vector3f witness_L, Distance& distance) {
     if (!(p_L.x() == p_L.x())) return;  // NaN
-    const float d = distance(p_L, std::min(nearest_.distance, at_most));
+    const float d = distance(p_L, std::min(nearest_.distance, at_most), &witness_L);
     if (d < nearest_.distance) nearest_ = {pixel, d};
   }
 
@@ -122,8 +129,9 @@ class PyramidSearch {
       if (parent->distance - moved >= bound) return;
       // The centre is within parent->distance + moved; a little more, for rounding.
       bound = std::min(bound, 1.0001F * (parent->distance + moved) + 1e-5F);
+      entry.witness_L = parent->witness_L;
     }
-    entry.distance = distance(entry.center_L, bound);
+    entry.distance = distance(entry.center_L, bound, &entry.witness_L);
     entry.bound = entry.distance - ball.radius;
     if (entry.bound >= nearest_.distance) return;
     queue_.push_back(entry);
@@ -155,7 +163,8 @@ class PyramidSearch {
         const Eigen::Vector3f p_L = X_LS * pyramid.point(pixel);
         const float moved = (p_L - entry.center_L).norm();
         if (entry.distance - moved < nearest_.distance) {
-          measure(p_L, pixel, 1.0001F * (entry.distance + moved) + 1e-5F, distance);
+          measure(p_L, pixel, 1.0001F * (entry.distance + moved) + 1e-5F, entry.witness_L,
+                  distance);
         }
       }
     }
