@@ -199,7 +199,7 @@ int main(int argc, char** argv) {
   app.option_defaults()->always_capture_default();
   app.add_option("--scene", options.scenes, "Scenes whose names contain one of these words")
       ->delimiter(',');
-  app.add_option("--link", options.links, "The same for links: ball, box, cylinder, mesh, arm")
+  app.add_option("--link", options.links, "The same for links: sphere, box, cylinder, mesh, arm")
       ->delimiter(',');
   app.add_option("--points", options.points, "Points of the clouds")->delimiter(',');
   app.add_option("--noise", options.noise_mm, "Standard deviation of the points [mm]")

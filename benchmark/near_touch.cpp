@@ -187,12 +187,12 @@ void print(std::FILE* csv, const std::string& robot, double tolerance_mm, double
 
 // Returns whether every answer was right.
 bool run(const Options& options, std::FILE* csv) {
+  print_header(csv);
   const std::filesystem::path data = ist::benchmark::data_or_exit();
   const ist::benchmark::DataSet set = ist::benchmark::kinect_data(data, options.cache);
   std::vector<MovingRobot> robots = ist::benchmark::pandas(data);
   for (MovingRobot& robot : ist::benchmark::demo_arms()) robots.push_back(std::move(robot));
   bool all_right = true;
-  print_header(csv);
   std::printf(
       "| robot | tolerance [mm] | nearest link [mm] | queries | median [µs] | p99 | largest | "
       "same pose again | new image | new image, still | cold | wrong |\n"

@@ -7,7 +7,7 @@ namespace ist::benchmark {
 namespace {
 
 // Dimensions [m]. A mesh has as many triangles as a scanned or exported part has: 10^4 to 2*10^4.
-constexpr double kBallRadius = 0.1;
+constexpr double kSphereRadius = 0.1;
 constexpr double kTubeRadius = 0.05, kTubeLength = 0.3;
 constexpr double kDeviation = 4e-5;  // of the cylinder's mesh from the cylinder
 constexpr double kEdge = 0.004;      // of the box's squares
@@ -41,8 +41,9 @@ struct Variant {
   Shape shape;
 };
 
-std::vector<Variant> balls() {
-  return {{"ball", Sphere{kBallRadius}}, {"ball mesh", tessellate(Sphere{kBallRadius}, 2e-5).mesh}};
+std::vector<Variant> spheres() {
+  return {{"sphere", Sphere{kSphereRadius}},
+          {"sphere mesh", tessellate(Sphere{kSphereRadius}, 2e-5).mesh}};
 }
 
 std::vector<Variant> boxes() {
@@ -87,7 +88,7 @@ std::vector<HardScene> body_scenes() {
       },
       &scenes);
   add(
-      "concentric shell", balls(), {sphere_patch(2.0 * kBallRadius)},
+      "concentric shell", spheres(), {sphere_patch(2.0 * kSphereRadius)},
       [](double time) {
         return Eigen::Isometry3d(
             Eigen::AngleAxisd(kTurn * time, Eigen::Vector3d(1, 2, 3).normalized()));

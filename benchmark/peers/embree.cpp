@@ -144,7 +144,7 @@ class EmbreeOfGroups : public Method {
  public:
   explicit EmbreeOfGroups(const Robot& robot)
       : surfaces_(robot), last_(robot.meshes.size(), NearestPixel::kNone) {
-    name = "Embree point query, hierarchy of balls over the image";
+    name = "Embree point query, hierarchy of spheres over the image";
     is_unsigned = true;
   }
 

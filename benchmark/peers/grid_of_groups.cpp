@@ -114,7 +114,7 @@ class GridOfGroups : public Method {
       bytes += grids_.back().bytes();
     }
     name = "signed distance grid of 10 and 40 mm (" + std::to_string(bytes >> 20U) +
-           " MB), hierarchy of balls over the image";
+           " MB), hierarchy of spheres over the image";
     // Within a cell the distance differs from the nodes' mean by at most half the diagonal. Outside
     // the grids, the path over their side is longer than the straight one.
     least_error = -0.5 * std::sqrt(3.0) * static_cast<double>(kCoarseCell);

@@ -16,8 +16,8 @@ Quad load(const float* p) {
 
 Eigen::Vector3f vector(const Quad& quad) { return {quad[0], quad[1], quad[2]}; }
 
-// The box and the ball of a square of pixels. NaN compares as false and changes nothing.
-void bound_pixels(const Frame& frame, std::size_t u0, std::size_t v0, Ball* ball,
+// The box and the sphere of a square of pixels. NaN compares as false and changes nothing.
+void bound_pixels(const Frame& frame, std::size_t u0, std::size_t v0, GroupSphere* sphere,
                   Eigen::AlignedBox3f* box) {
   constexpr float kMax = std::numeric_limits<float>::max();
   const std::size_t u1 = std::min(u0 + ImagePyramid::kSide, frame.width),
@@ -31,7 +31,7 @@ void bound_pixels(const Frame& frame, std::size_t u0, std::size_t v0, Ball* ball
     }
   }
   if (low[0] > high[0]) {
-    ball->radius = -1.0F;
+    sphere->radius = -1.0F;
     box->setEmpty();
     return;
   }
@@ -45,13 +45,13 @@ void bound_pixels(const Frame& frame, std::size_t u0, std::size_t v0, Ball* ball
       radius_sq = distance_sq > radius_sq ? distance_sq : radius_sq;
     }
   }
-  *ball = {vector(middle), 1.00001F * std::sqrt(radius_sq)};
+  *sphere = {vector(middle), 1.00001F * std::sqrt(radius_sq)};
   *box = Eigen::AlignedBox3f(vector(low), vector(high));
 }
 
-// The box and the ball of up to four squares.
-void bound_squares(const ImagePyramid::Level& below, std::size_t u0, std::size_t v0, Ball* ball,
-                   Eigen::AlignedBox3f* box) {
+// The box and the sphere of up to four squares.
+void bound_squares(const ImagePyramid::Level& below, std::size_t u0, std::size_t v0,
+                   GroupSphere* sphere, Eigen::AlignedBox3f* box) {
   const std::size_t u1 = std::min(u0 + 2, below.width), v1 = std::min(v0 + 2, below.height);
   box->setEmpty();
   for (std::size_t v = v0; v < v1; ++v) {
@@ -59,26 +59,26 @@ void bound_squares(const ImagePyramid::Level& below, std::size_t u0, std::size_t
       if (below.at(u, v).radius >= 0.0F) box->extend(below.boxes[v * below.width + u]);
     }
   }
-  ball->radius = -1.0F;
+  sphere->radius = -1.0F;
   if (box->isEmpty()) return;
-  ball->center = box->center();
+  sphere->center = box->center();
   float radius = 0.0F;
   for (std::size_t v = v0; v < v1; ++v) {
     for (std::size_t u = u0; u < u1; ++u) {
-      const Ball& part = below.at(u, v);
+      const GroupSphere& part = below.at(u, v);
       if (part.radius < 0.0F) continue;
-      radius = std::max(radius, (part.center - ball->center).norm() + part.radius);
+      radius = std::max(radius, (part.center - sphere->center).norm() + part.radius);
     }
   }
-  ball->radius = 1.00001F * std::min(radius, 0.5F * box->diagonal().norm());
+  sphere->radius = 1.00001F * std::min(radius, 0.5F * box->diagonal().norm());
 }
 
 // As many squares as `side` of the level below, or pixels, fit into it.
 void resize(std::size_t width, std::size_t height, std::size_t side, ImagePyramid::Level* level) {
   level->width = (width + side - 1) / side;
   level->height = (height + side - 1) / side;
-  level->balls.resize(level->width * level->height);
-  level->boxes.resize(level->balls.size());
+  level->spheres.resize(level->width * level->height);
+  level->boxes.resize(level->spheres.size());
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ void ImagePyramid::build(const Frame& frame) {
   for (std::size_t v = 0; v < levels_[0].height; ++v) {
     for (std::size_t u = 0; u < levels_[0].width; ++u) {
       const std::size_t i = v * levels_[0].width + u;
-      bound_pixels(frame, kSide * u, kSide * v, &levels_[0].balls[i], &levels_[0].boxes[i]);
+      bound_pixels(frame, kSide * u, kSide * v, &levels_[0].spheres[i], &levels_[0].boxes[i]);
     }
   }
   for (std::size_t l = 1; l < levels_.size(); ++l) {
@@ -102,7 +102,7 @@ void ImagePyramid::build(const Frame& frame) {
     for (std::size_t v = 0; v < level.height; ++v) {
       for (std::size_t u = 0; u < level.width; ++u) {
         const std::size_t i = v * level.width + u;
-        bound_squares(below, 2 * u, 2 * v, &level.balls[i], &level.boxes[i]);
+        bound_squares(below, 2 * u, 2 * v, &level.spheres[i], &level.boxes[i]);
       }
     }
   }

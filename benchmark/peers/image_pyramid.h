@@ -10,12 +10,13 @@
 
 #include "peers/scene.h"
 
-/// A hierarchy of balls over the pixels of a depth image, for methods that know the distance of a
-/// point to a link: a group of points is no nearer than its ball's centre, less the ball's radius.
+/// A hierarchy of bounding spheres over the pixels of a depth image, for methods that know the
+/// distance of a point to a link: a group of points is no nearer than its sphere's centre, less the
+/// sphere's radius.
 namespace ist::benchmark {
 
 /// A group of points: all are within `radius` of `center`.
-struct Ball {
+struct GroupSphere {
   Eigen::Vector3f center;  ///< [m] in the sensor frame
   float radius;            ///< [m] < 0: no points
 };
@@ -27,10 +28,10 @@ class ImagePyramid {
 
   struct Level {
     std::size_t width = 0, height = 0;  // squares
-    std::vector<Ball> balls;            // by row
+    std::vector<GroupSphere> spheres;   // by row
     std::vector<Eigen::AlignedBox3f> boxes;
 
-    const Ball& at(std::size_t u, std::size_t v) const { return balls[v * width + u]; }
+    const GroupSphere& at(std::size_t u, std::size_t v) const { return spheres[v * width + u]; }
   };
 
   /// One pass over the bytes, and one over the squares of each level. Keeps its memory.
@@ -96,7 +97,7 @@ class PyramidSearch {
     return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   }
 
-  // A ball that was measured: `bound` is the centre's distance less the radius.
+  // A sphere that was measured: `bound` is the centre's distance less the radius.
   struct Entry {
     float bound;  // [m]
     std::uint32_t level, u, v;
@@ -115,15 +116,15 @@ class PyramidSearch {
     if (d < nearest_.distance) nearest_ = {pixel, d};
   }
 
-  // Measures a ball's centre and queues it, unless no point of it is near enough. The distance of
+  // Measures a sphere's centre and queues it, unless no point of it is near enough. The distance of
   // the parent's centre bounds it from both sides.
   template <typename Distance>
   void push(Entry entry, const Eigen::Isometry3f& X_LS, const ImagePyramid& pyramid,
             const Entry* parent, Distance& distance) {
-    const Ball& ball = pyramid.levels()[entry.level].at(entry.u, entry.v);
-    if (ball.radius < 0.0F) return;
-    entry.center_L = X_LS * ball.center;
-    float bound = nearest_.distance + ball.radius;  // farther centres need no distance
+    const GroupSphere& sphere = pyramid.levels()[entry.level].at(entry.u, entry.v);
+    if (sphere.radius < 0.0F) return;
+    entry.center_L = X_LS * sphere.center;
+    float bound = nearest_.distance + sphere.radius;  // farther centres need no distance
     if (parent != nullptr) {
       const float moved = (entry.center_L - parent->center_L).norm();
       if (parent->distance - moved >= bound) return;
@@ -132,7 +133,7 @@ class PyramidSearch {
       entry.witness_L = parent->witness_L;
     }
     entry.distance = distance(entry.center_L, bound, &entry.witness_L);
-    entry.bound = entry.distance - ball.radius;
+    entry.bound = entry.distance - sphere.radius;
     if (entry.bound >= nearest_.distance) return;
     queue_.push_back(entry);
     std::push_heap(queue_.begin(), queue_.end());
