@@ -51,8 +51,8 @@ class DeadlineTrial {
   void cold(std::vector<Stopped>* all) {
     double spent = 0.0;
     for (std::size_t i = 0; i < setting_.cold && (i == 0 || spent < setting_.budget); ++i) {
-      const Poses X_FL =
-          scene_.poses(kPeriod * static_cast<double>(i * setting_.steps / setting_.cold));
+      const std::size_t step = i * setting_.steps / setting_.cold;
+      const Poses X_FL = scene_.poses(kPeriod * static_cast<double>(step));
       ingest();
       ProximityQuery full(model_, config_);
       const double full_us = run(&full, X_FL, &truth_);
