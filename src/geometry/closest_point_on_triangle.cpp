@@ -59,29 +59,26 @@ Eigen::Vector3d closest_on_sliver(const Eigen::Vector3d& p, const Eigen::Vector3
 Eigen::Vector3d closest_point_on_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                           const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, n = ab.cross(ac);
-  const double n_sq = n.squaredNorm();
-  if (!(n_sq > kLeastSineSq * ab.squaredNorm() * ac.squaredNorm())) {
-    return closest_on_sliver(p, a, b, c);
-  }
+  const double ab_sq = ab.squaredNorm(), ac_sq = ac.squaredNorm(), n_sq = n.squaredNorm();
+  if (!(n_sq > kLeastSineSq * ab_sq * ac_sq)) return closest_on_sliver(p, a, b, c);
+  const double along_ab = ab.dot(ap), along_ac = ac.dot(ap);
+  if (along_ab <= 0.0 && along_ac <= 0.0) return a;
   // Barycentric coordinates of the corners, times n.n.
-  const Eigen::Vector3d along = ap.cross(n);
-  const double of_c = ab.dot(along), of_b = -ac.dot(along), of_a = n_sq - of_b - of_c;
+  const Eigen::Vector3d turned = ap.cross(n);
+  const double of_c = ab.dot(turned), of_b = -ac.dot(turned), of_a = n_sq - of_b - of_c;
   if (of_a >= 0.0 && of_b >= 0.0 && of_c >= 0.0) return p - (n.dot(ap) / n_sq) * n;
   // The closest point is on an edge that has p on its outer side.
-  Eigen::Vector3d nearest;
+  Eigen::Vector3d nearest = a;
   double nearest_sq = std::numeric_limits<double>::infinity();
-  const auto try_edge = [&](double of_opposite, const Eigen::Vector3d& from,
-                            const Eigen::Vector3d& to) {
-    if (of_opposite >= 0.0) return;
-    const Eigen::Vector3d q = closest_on_segment(p, from, to);
+  const auto take_nearer = [&](const Eigen::Vector3d& q) {
     const double q_sq = (q - p).squaredNorm();
     if (!(q_sq < nearest_sq)) return;
     nearest = q;
     nearest_sq = q_sq;
   };
-  try_edge(of_c, a, b);
-  try_edge(of_b, a, c);
-  try_edge(of_a, b, c);
+  if (of_c < 0.0) take_nearer(a + std::clamp(along_ab / ab_sq, 0.0, 1.0) * ab);
+  if (of_b < 0.0) take_nearer(a + std::clamp(along_ac / ac_sq, 0.0, 1.0) * ac);
+  if (of_a < 0.0) take_nearer(closest_on_segment(p, b, c));
   return nearest;
 }
 
