@@ -154,7 +154,7 @@ TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
       const std::size_t i = X_FL.size() - 1;
       LinkProximity link;
       ASSERT_TRUE(query.run_link(i, X_FL[i], {&cloud}, &link));
-      ASSERT_LE(link.lower_bound, truth + kRounding);
+      ASSERT_LE(link.lower_bound, truth);
       const InnerSphereTree& tree = model->links[i].tree;
       const double from_center = (X_FL[i] * tree.center() - region.center_F).norm();
       const bool inside = from_center + tree.radius() + config.max_distance <= region.radius;
@@ -170,7 +170,7 @@ TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
     }
     RobotProximity robot;
     ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));
-    ASSERT_LE(robot.nearest.lower_bound, least + kRounding);
+    ASSERT_LE(robot.nearest.lower_bound, least);
     if (robot.nearest.state == LinkState::kClear) ASSERT_TRUE(all_inside);
   }
   EXPECT_GT(clear, 0);

@@ -133,7 +133,7 @@ TEST(SelfQuery, randomLinksAgainstARandomSearch) {
         EXPECT_EQ(result.distance, std::numeric_limits<double>::infinity());
         continue;
       }
-      EXPECT_LE(result.lower_bound, std::min(there, back) + 1e-9) << what;
+      EXPECT_LE(result.lower_bound, std::min(there, back) + 1e-12) << what;
       EXPECT_LE(result.lower_bound, result.distance) << what;
       check_witnesses(scene, scene.pairs[i], result);
       if (result.state == LinkState::kContact) {  // the witnesses prove it
@@ -176,7 +176,7 @@ TEST(SelfQuery, spheresAreExact) {
       if (results[i].state != LinkState::kNear || truth < 1e-3) continue;
       EXPECT_NEAR(results[i].distance, truth, 1e-6);
       EXPECT_NEAR(results[i].lower_bound, truth, 1e-5);
-      EXPECT_LE(results[i].lower_bound, truth + 1e-9);
+      EXPECT_LE(results[i].lower_bound, truth + 1e-12);
     }
   }
 }
@@ -197,7 +197,7 @@ TEST(SelfQuery, boundsHoldForLinksWithHoles) {
       const double there = found_distance(scene.links[first], scene.links[second], X, &rng);
       const double back =
           found_distance(scene.links[second], scene.links[first], X.inverse(), &rng);
-      EXPECT_LE(results[i].lower_bound, std::min(there, back) + 1e-9) << first << ", " << second;
+      EXPECT_LE(results[i].lower_bound, std::min(there, back) + 1e-12) << first << ", " << second;
       apart += results[i].lower_bound > 0.0 ? 1 : 0;
     }
   }

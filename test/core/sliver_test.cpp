@@ -78,6 +78,24 @@ TriangleMesh random_prism(test::Rng* rng) {
   return prism(length, width, height, shear, test::random_pose(rng, 0.5));
 }
 
+// A tetrahedron of two far corners and two that are next to the line between them: two of its
+// triangles have an angle of nearly half a turn.
+TriangleMesh random_splinter(test::Rng* rng) {
+  const Eigen::Isometry3d X = test::random_pose(rng, 0.5);
+  const double length = std::pow(10.0, test::uniform(rng, -2, 0.3));
+  const double width = length * std::pow(10.0, test::uniform(rng, -6, -0.5));
+  const double where = test::uniform(rng, 0.05, 0.95), other = test::uniform(rng, 0.05, 0.95);
+  const Point a = X * Point(0, 0, 0), b = X * Point(length, 0, 0),
+              c = X * Point(where * length, width, 0),
+              d = X * Point(other * length, 0.3 * width, width);
+  test::MeshBuilder builder;
+  builder.triangle(a, c, b);
+  builder.triangle(a, b, d);
+  builder.triangle(a, d, c);
+  builder.triangle(b, c, d);
+  return builder.mesh();
+}
+
 // A point at a distance of `least` to 1 m from the mesh: around the surface in every direction, or
 // straight above a place within a triangle.
 Point random_point(const TriangleMesh& mesh, double least, test::Rng* rng) {
@@ -130,7 +148,7 @@ TEST(Sliver, ClosestPointOfEveryRatio) {
   int wrong = 0;
   double worst = 0.0;
   for (int i = 0; i < wanted_cases(); i += 4) {
-    const TriangleMesh mesh = random_prism(&rng);
+    const TriangleMesh mesh = i % 8 == 0 ? random_splinter(&rng) : random_prism(&rng);
     const TriangleBvh bvh(mesh);
     for (int k = 0; k < 4; ++k) {
       wrong += count_wrong(bvh, mesh, random_point(mesh, 1e-9, &rng), &rng, &worst);
