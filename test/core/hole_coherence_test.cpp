@@ -65,5 +65,40 @@ TEST(HoleCoherence, PointsGoInThroughTheOpening) {
   EXPECT_GT(jumps, test::scaled(200));
 }
 
+// The nearest point is above the rim, and a second one goes in through the opening. It was
+// measured, and farther: only its cover distance says that it may be inside after some more steps.
+TEST(HoleCoherence, ASecondPointGoesInUnnoticedByTheWarmStart) {
+  test::Rng rng(82);
+  const TriangleMesh mesh = test::open_box({0.2, 0.2, 0.2});
+  const Point out = opening(mesh);
+  const auto model = test::make_model({mesh}, 0.005);
+  const Point side = out.unitOrthogonal();
+  std::vector<LinkProximity> results;
+  int contacts = 0;
+  for (int run = 0; run < test::scaled(100); ++run) {
+    QueryConfig config;
+    config.tolerance = run % 2 == 0 ? 0.0 : 0.001;
+    ProximityQuery query(model, config);
+    const Point through = (0.1 + test::uniform(&rng, 0.02, 0.05)) * out;
+    const Point above_rim = 0.1 * side + (0.1 + test::uniform(&rng, 0.08, 0.09)) * out;
+    const CloudSnapshot cloud = test::make_snapshot({through, above_rim});
+    const std::vector<Point> stored = test::stored_points(cloud.index);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    const double step = std::pow(10.0, test::uniform(&rng, -3.5, -2));
+    for (double moved = 0.0; moved < 0.07; moved += step) {
+      X_FL.translation() = moved * out;
+      ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+      double truth = 1.0;
+      for (const Point& p : stored) {
+        truth = std::min(truth, test::oracle_signed_distance(mesh, p - X_FL.translation()));
+      }
+      ASSERT_LE(results[0].lower_bound, truth) << run << ": after " << moved << " m";
+      ASSERT_EQ(results[0].state == LinkState::kContact, truth < 0.0) << run;
+      contacts += truth < 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(contacts, 100);
+}
+
 }  // namespace
 }  // namespace ist
