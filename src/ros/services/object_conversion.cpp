@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/geometry/limits.h"
 #include "internal/geometry/mesh_io.h"
 #include "internal/robot/package_resolver.h"
 #include "ist_proximity/geometry/error.h"
@@ -22,10 +23,10 @@ std::vector<double> sizes(const Request& request, std::size_t count, const char*
          << ": " << what;
     throw ModelError(text.str());
   }
-  for (const double size : request.dimensions) {
-    if (std::isfinite(size) && size > 0.0) continue;
-    text << "dimensions holds " << size << " m; allowed is more than 0 (" << what << ")";
-    throw ModelError(text.str());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string fault =
+        size_fault("dimensions[" + std::to_string(i) + "]", request.dimensions[i]);
+    if (!fault.empty()) throw ModelError(fault + " (" + what + ")");
   }
   return request.dimensions;
 }
@@ -68,6 +69,8 @@ AttachedObject to_object(const Request& request, const PackageFinder& find_packa
   X_LE.rotation = request.pose.orientation;
   const std::string fault = to_isometry(X_LE, &object.element.X_LE);
   if (!fault.empty()) throw ModelError("pose: " + fault);
+  const std::string misplaced = position_fault("pose", object.element.X_LE.translation());
+  if (!misplaced.empty()) throw ModelError(misplaced);
   object.element.shape = to_shape(request, find_package);
   object.element.source = "attached object '" + request.name + "'";
   return object;
