@@ -11,8 +11,7 @@
 namespace ist {
 namespace {
 
-constexpr std::array<const char*, 8> kFormats = {"stl", "dae", "obj",  "ply",
-                                                 "off", "3ds", "gltf", "glb"};
+constexpr std::array<const char*, 5> kFormats = {"stl", "dae", "obj", "ply", "off"};
 
 std::string lower_case(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),

@@ -50,11 +50,14 @@ void check_scale(const std::string& path, const Eigen::Vector3d& scale) {
 
 // Metres per unit of a Collada file. It is read here, as in rviz. Assimp's root node, which holds
 // its own conversion of unit and up-axis, is skipped, because that differs from version to version.
+// @throws ModelError also for a file that must not reach assimp
 double collada_unit(const std::string& path, const std::string& bytes) {
   tinyxml2::XMLDocument document;
-  if (document.Parse(bytes.data(), bytes.size()) != tinyxml2::XML_SUCCESS) {
-    return 1.0;  // assimp reports it
+  const tinyxml2::XMLError error = document.Parse(bytes.data(), bytes.size());
+  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {  // assimp would nest calls as deep
+    fail(path, "nests its XML elements too deep; export or download it again");
   }
+  if (error != tinyxml2::XML_SUCCESS) return 1.0;  // assimp reports it
   const tinyxml2::XMLElement* root = document.FirstChildElement("COLLADA");
   const tinyxml2::XMLElement* asset = root != nullptr ? root->FirstChildElement("asset") : nullptr;
   const tinyxml2::XMLElement* unit = asset != nullptr ? asset->FirstChildElement("unit") : nullptr;
@@ -150,6 +153,8 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale,
                        const CancelRequest& cancelled) {
   check_scale(path, scale);
   const std::string bytes = read_mesh_file(path, cancelled);
+  const bool is_collada = mesh_format(path) == "dae";
+  const double unit = is_collada ? collada_unit(path, bytes) : 1.0;
   Assimp::Importer importer;
   std::string reason;
   const aiScene* scene = import_mesh(path, bytes, cancelled, &importer, &reason);
@@ -158,8 +163,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale,
                    "); STL, DAE and OBJ are known to work");
   }
   const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
-  const bool is_collada = mesh_format(path) == "dae";
-  MeshBuilder builder(path, is_collada ? collada_unit(path, bytes) * scale : scale);
+  MeshBuilder builder(path, unit * scale);
   if (is_collada) {
     // The root holds nothing but assimp's conversion of unit and up-axis.
     builder.add_children(*scene, *scene->mRootNode, X_MR);

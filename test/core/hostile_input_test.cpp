@@ -117,12 +117,11 @@ TEST_F(HostileFile, HeadersThatAnnounceTooMuchAreRefused) {
               "announces 1e+09 elements 'vertex' in a file of");
   expect_says(mesh_error(dir_.write("a.off", "OFF\n# 1\n1000000000 1000000000 0\n0 0 0\n")),
               "announces 1e+09 vertices or faces");
-  const std::string gltf =
-      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,)"
-      R"("componentType":5126,"count":1000000000,"type":"VEC3"}],"bufferViews":[{"buffer":0,)"
-      R"("byteLength":12000000000}],"buffers":[{"byteLength":12000000000}]})";
-  expect_says(mesh_error(dir_.write("a.gltf", gltf)), "mesh file");
+  std::string nested = "<COLLADA><library_visual_scenes><visual_scene>";
+  for (int i = 0; i < 200000; ++i) nested += "<node>";
+  expect_says(mesh_error(dir_.write("a.dae", nested)), "nests its XML elements too deep");
+  expect_says(mesh_error(dir_.write("a.gltf", std::string(1000000, '['))),
+              "its name ends in '.gltf'; known are stl, dae, obj, ply, off");
   expect_says(mesh_error(dir_.write("a.ase", "*3DSMAX_ASCIIEXPORT 200\n")),
               "its name ends in '.ase'");
   if (!test::kSanitized) {
@@ -196,9 +195,9 @@ TEST(HostileUrdf, LongChainsTakeTimeInProportion) {
   for (const bool mimic : {false, true}) {
     const double one = load_time(1000, mimic), four = load_time(4000, mimic);
     std::printf("1000 links %.3f s, 4000 links %.3f s\n", one, four);
-    EXPECT_LT(four, 10.0 * one + 0.1);
+    EXPECT_LT(four, 10.0 * one + 1.0);
     if (!test::kSanitized) {
-      EXPECT_LT(four, 3.0);
+      EXPECT_LT(four, 5.0);
     }
   }
 }
@@ -312,7 +311,7 @@ TEST(HostileShape, PackingStopsSoonWhereverItIs) {
   }
   std::printf("longest time without asking, or after a stop: %.0f ms\n", 1e3 * longest);
   if (!test::kSanitized) {
-    EXPECT_LT(longest, 0.5) << "the machine may be busy; it is about 0.05 s";
+    EXPECT_LT(longest, 2.0) << "it is about 0.05 s where the machine is not busy";
   }
 }
 

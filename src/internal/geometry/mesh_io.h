@@ -8,8 +8,8 @@
 
 namespace ist {
 
-/// Reads the triangles of an STL, DAE or OBJ file, with assimp. PLY, OFF, 3DS and glTF files are
-/// read too; other formats are not.
+/// Reads the triangles of an STL, DAE or OBJ file, with assimp. PLY and OFF files are read too;
+/// other formats are not.
 ///
 /// Node transforms and the file's unit are applied; Collada's up-axis is ignored, as rviz does;
 /// lines and points are dropped; vertices with the same coordinates are merged; triangles with a
@@ -18,8 +18,7 @@ namespace ist {
 /// (orient_outward).
 /// @param path   a file on disk
 /// @param scale  dimensionless, not 0 and at most kMaxScale in any axis
-/// @throws ModelError naming the file and what is wrong: missing, no regular file, empty,
-/// unreadable,
+/// @throws ModelError naming the file and what is wrong: missing, no regular file, empty, no mesh,
 ///         no triangle, beyond a limit of limits.h (bytes, triangles, scale, coordinates).
 /// @throws Cancelled
 /// Thread safe.
