@@ -44,6 +44,7 @@ struct LeafPair {
 //   float Limit() const;                      pairs whose bound is not below it are pruned
 //   bool IsSettled() const;                   nothing that is left can matter
 //   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the deadline has passed
+//   float BoundOfBox(const Pair&);            a bound that prunes the pair, or -inf
 //   float Visit(const LeafPair<Tile>&);       returns the least lower bound of the tile's points
 //   float pruned_bound                        [m] least bound of what it pruned itself
 template <class Visitor, class Bvh>
@@ -95,6 +96,12 @@ class DualTree {
         Prune(pair.bound);
         while (!stack_.empty()) Prune(stack_.pop().bound);
         return;
+      }
+      const float bound_of_box = visitor_.BoundOfBox(pair);
+      if (bound_of_box > pair.bound) {
+        Prune(bound_of_box);
+        if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, bound_of_box);
+        continue;
       }
       Expand(pair);
     }

@@ -40,6 +40,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.pruned_bound = -link_.context.tree().radius();
   search.rounding = search.max_coordinate = 0.0;
   search.is_complete = false;
+  search.measured = 0;
 }
 
 bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
@@ -144,6 +145,7 @@ template <class Obstacles>
 DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
   search.visited.clear();
+  search.box_bounds.clear();
   auto input = dual_tree_input(obstacles);
   input.front = link_.kept.fronts.find(obstacles.bvh->build_id());
   if (input.front != nullptr) {

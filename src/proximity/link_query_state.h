@@ -11,6 +11,7 @@
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
+#include "proximity/box_bounds.h"
 #include "proximity/deadline.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
@@ -88,7 +89,9 @@ struct LinkSearch {
   double rounding = 0.0;        ///< [m] largest error of a lower bound of the traversals
   double max_coordinate = 0.0;  ///< [m] of the link in the frames of the indices
   bool is_complete = false;     ///< nothing that matters was left
+  BoxBounds box_bounds;
   VisitedSet visited;           ///< obstacles of the index at work that were refined
+  int measured = 0;             ///< points
   int box_cells_left = 0;       ///< into which overlapping boxes may still be divided
 
   /// [m] Beyond it nothing matters.
@@ -106,6 +109,10 @@ struct LinkSearch {
   /// [m] The same for lower bounds in float.
   float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }
 
+  void count_exact() {
+    ++measured;
+    ++statistics->exact_evaluations;
+  }
   void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }
 
   /// [m] No obstacle has a smaller signed distance; inf where none is in range.
