@@ -6,14 +6,17 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import PointField
 
 FAR_BOX = pt.transform((0, 0.8, 0))
+MAX_POINTS = 1000
 POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
 
 
@@ -53,12 +56,48 @@ def huge():
     return message
 
 
+def no_width_but_data():
+    message = pt.cloud(POINT)
+    message.width = message.row_step = 0
+    return message
+
+
+def no_height_but_data():
+    message = pt.cloud(POINT)
+    message.height = 0
+    return message
+
+
+def empty_without_fields():
+    message = pt.cloud(np.zeros((0, 3)))
+    message.fields = []
+    return message
+
+
+def empty_of_colours():
+    message = pt.cloud(np.zeros((0, 3)))
+    message.fields = [PointField("rgb", 0, PointField.FLOAT32, 1)]
+    return message
+
+
+def too_many_points():
+    return pt.cloud(np.repeat(POINT, MAX_POINTS + 1, axis=0))
+
+
+def sensor_far_out():
+    return pt.cloud(POINT, frame="far_camera")
+
+
 def unknown_frame():
     return pt.cloud(POINT, frame="nowhere")
 
 
 def empty_frame():
     return pt.cloud(POINT, frame="")
+
+
+def long_frame():
+    return pt.cloud(POINT, frame="f" * 1000000)
 
 
 # Functions that make a malformed cloud, and a word of the text that says what is wrong.
@@ -69,8 +108,16 @@ UNUSABLE = [
     (contradicting_rows, "row_step"),
     (field_beyond_point, "z"),
     (huge, "malformed"),
+    # A cloud that says to be empty was taken for free space: OK and CLEAR.
+    (no_width_but_data, "no point, but data holds"),
+    (no_height_but_data, "no point, but data holds"),
+    (empty_without_fields, "field 'x' is missing"),
+    (empty_of_colours, "field 'x' is missing"),
+    (too_many_points, "1001 points, allowed are at most 1000 (max_points)"),
+    (sensor_far_out, "(1e+16, 0, 0) m, allowed are at most 10000 m"),
     (unknown_frame, "nowhere"),
     (empty_frame, "frame_id"),
+    (long_frame, "frame_id of 1000000 characters"),
 ]
 
 
@@ -78,7 +125,8 @@ class BadCloudTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.world = pt.World("/bad_clouds").stand(box=FAR_BOX)
-        cls.node = pt.ProximityNode("/bad_clouds", urdf_text=pt.urdf())
+        cls.node = pt.ProximityNode("/bad_clouds", {"max_points": MAX_POINTS}, pt.urdf())
+        cls.world.poses["far_camera"] = ("base", pt.transform((1e16, 0, 0)))
         cls.world.start_tf()
 
     @classmethod
@@ -237,6 +285,34 @@ class BadModelTest(unittest.TestCase):
                 "vertex 0 1 0\nendloop\nendfacet\nendsolid t\n"
             )
         self.check_one_bad_link('<mesh filename="file://%s" scale="1 0 1"/>' % path, ["scale"])
+
+    def test_fifo_as_mesh(self):
+        """Opening it waits for a writer: the model was never loaded, for a reason that was wrong."""
+        path = os.path.join(self.folder, "pipe.stl")
+        os.mkfifo(path)
+        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["no regular file but a FIFO"])
+
+    def test_huge_sizes(self):
+        for shape in ('<box size="1e300 1 1"/>', '<cylinder radius="1" length="1e39"/>'):
+            self.check_one_bad_link(shape, ["m; allowed is more than 0 and at most 10000 m"])
+            self.assertEqual(self.node.stop(), 0)
+
+    def test_large_mesh_is_told_and_does_not_hold_up_the_end(self):
+        """While a mesh is read or packed, the status names it and its link; SIGINT ends the node."""
+        path = os.path.join(self.folder, "large.stl")
+        count = 1000000
+        facets = np.zeros(count, [("numbers", "<f4", 12), ("spare", "<u2")])
+        facets["numbers"][:, 3:] = np.random.default_rng(1).uniform(-0.5, 0.5, (count, 9))
+        with open(path, "wb") as f:
+            f.write(b" " * 80 + np.uint32(count).tobytes() + facets.tobytes())
+        node = self.start(pt.urdf(box='<mesh filename="file://%s"/>' % path))
+        words = "reading mesh 'file://%s' of link 'box_link'" % path
+        node.wait_for_status(ProximityArray.MODEL_ERROR, words, start=0)
+        node.wait_for_status(ProximityArray.MODEL_ERROR, "packing link 'box_link'", start=0, timeout=60)
+        time.sleep(0.5)
+        begin = time.time()
+        self.assertEqual(node.stop(), 0)
+        self.assertLess(time.time() - begin, 3.0)
 
     def test_mesh_that_appears(self):
         """A mesh is missing at first; ~reload_model reads it once it is there."""

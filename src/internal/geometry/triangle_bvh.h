@@ -9,6 +9,7 @@
 
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/box_distance.h"
+#include "internal/geometry/cancelled.h"
 #include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
@@ -31,7 +32,10 @@ class TriangleBvh {
  public:
   TriangleBvh() = default;
   /// Copies the corners. Triangles without area are kept: the edge of a flap is surface too.
-  explicit TriangleBvh(const TriangleMesh& mesh);
+  explicit TriangleBvh(const TriangleMesh& mesh) : TriangleBvh(mesh, CancelRequest()) {}
+  /// The same; building a million triangles takes about a second.
+  /// @throws Cancelled
+  TriangleBvh(const TriangleMesh& mesh, const CancelRequest& cancelled);
 
   /// The closest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
   /// @param outward_hint_M  unit vector, roughly the direction from the closest point to p_M; it
@@ -119,12 +123,13 @@ class TriangleBvh {
 
   /// Corners of up to eight triangles in float; unused slots repeat a corner.
   struct alignas(32) Leaf {
-    float corner[9][kWidth];  ///< [m] ax ay az bx by bz cx cy cz, from the centre of the box
-    std::uint32_t first;      ///< triangle of slot 0; the others follow
+    /// [m] ax ay az bx by bz cx cy cz, from the centre of the box; a is opposite the longest edge
+    float corner[9][kWidth];
+    std::uint32_t first;  ///< triangle of slot 0; the others follow
     std::uint32_t count;
   };
 
-  /// The same triangles in double.
+  /// The same triangles in double, their corners in the same order.
   struct Triangle {
     Eigen::Vector3d a, b, c;
     std::uint32_t index;  ///< in the mesh
