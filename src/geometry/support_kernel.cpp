@@ -38,8 +38,8 @@ inline double SupportInSphere(const TriangleBvh::Triangle& t, const SupportSpher
   if (std::abs(plane) > radius) return -std::numeric_limits<double>::infinity();
   const double cosine = n.dot(normal) / area;
   const double sine = std::sqrt(std::max(0.0, (1.0 - cosine) * (1.0 + cosine)));
-  return center + std::min(corners, plane * cosine +
-                                        std::sqrt((radius - plane) * (radius + plane)) * sine);
+  return center +
+         std::min(corners, plane * cosine + std::sqrt((radius - plane) * (radius + plane)) * sine);
 }
 
 // Bounds in float decide which nodes and leaves are visited; supports of triangles are in double.
@@ -103,10 +103,9 @@ class SupportSearch {
     auto distance_sq = hn::Zero(d);
     for (int axis = 0; axis < 3; ++axis) {
       const auto center = hn::Set(d, center_[axis]);
-      const auto gap =
-          hn::Max(hn::Max(hn::Sub(hn::Load(d, boxes.min[axis] + k), center),
-                          hn::Sub(center, hn::Load(d, boxes.max[axis] + k))),
-                  hn::Zero(d));
+      const auto gap = hn::Max(hn::Max(hn::Sub(hn::Load(d, boxes.min[axis] + k), center),
+                                       hn::Sub(center, hn::Load(d, boxes.max[axis] + k))),
+                               hn::Zero(d));
       distance_sq = hn::MulAdd(gap, gap, distance_sq);
     }
     return hn::IfThenElse(hn::Le(distance_sq, hn::Set(d, radius_sq_)), support,
@@ -140,9 +139,8 @@ class SupportSearch {
     if (Prune(hn::GetLane(hn::MaxOfLanes(d, support)))) return;
     for (std::uint32_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
       const TriangleBvh::Triangle& t = bvh_.triangles[k];
-      largest_ = sphere_ == nullptr
-                     ? std::max({largest_, n_.dot(t.a), n_.dot(t.b), n_.dot(t.c)})
-                     : std::max(largest_, SupportInSphere(t, *sphere_, n_));
+      largest_ = sphere_ == nullptr ? std::max({largest_, n_.dot(t.a), n_.dot(t.b), n_.dot(t.c)})
+                                    : std::max(largest_, SupportInSphere(t, *sphere_, n_));
     }
   }
 

@@ -184,8 +184,7 @@ class PointDepthSearch {
     NearSurface near =
         cell == nullptr ? NearSurface() : link_.context.grid.near_surface(cell, p_LQ);
     if (side != NearSurface::Side::kUnknown) near.side = side;
-    const PointDepth depth =
-        point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), near);
+    const PointDepth depth = point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), near);
     link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kSigned,
                                id.key(), p_LQ, depth.floor);
     if (depth.exact.distance < kInfinity) {

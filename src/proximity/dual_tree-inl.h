@@ -27,7 +27,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // kReopened down) and is expanded again.
 constexpr std::int32_t kNoParent = -1, kReopened = -2;
 
-constexpr std::uint64_t kDeadlineInterval = 16;  // node pairs between two looks at the clock
+constexpr std::uint64_t kDeadlineInterval = 8;  // node pairs between two looks at the clock
 
 // A sphere leaf and a tile, for the visitor.
 template <class Tile>

@@ -8,8 +8,6 @@
 namespace ist {
 namespace {
 
-// The share of the tolerance that the distance of one point may take.
-constexpr double kPointShare = 0.25;
 // A query of a link measures cells of its grid when it has measured so many points.
 constexpr int kMeasuredBeforeCells = 32;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -26,11 +24,10 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   const double kept = link_.kept.distances.find(obstacles_.bvh->build_id(),
                                                 DistanceCache::Quantity::kUnsigned, id.key(), p_LQ);
   const double bound = std::max(kept, grid_bound({p_LQ}, search.prune_bound()).surface_distance);
-  if (bound >= search.prune_bound()) {
-    search.prune(bound);
+  if (bound >= search.prune_bound() || deadline_passed()) {
+    search.prune(std::max(bound, static_cast<double>(lower_bound) - search.rounding));
   } else {
-    const bool has_closest =
-        search.closest.exact.distance < kInfinity;
+    const bool has_closest = search.closest.exact.distance < kInfinity;
     measure_outside(id, p_OQ, p_LQ, kInfinity,
                     has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L);
   }
@@ -56,7 +53,8 @@ float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const fl
   PointTile scratch;
   if (child < 0) part.points = &obstacles_.bvh->tile(static_cast<std::size_t>(~child), &scratch);
   const SignedDistanceGrid::Bound bound = grid_bound(part, search.prune_bound());
-  return search.box_bounds.insert(slot, bound.is_outside ? round_down(bound.signed_distance) : kNone);
+  return search.box_bounds.insert(slot,
+                                  bound.is_outside ? round_down(bound.signed_distance) : kNone);
 }
 
 bool PointRefinement::is_outside(ObstacleId id, const Eigen::Vector3d& p_LQ) {
@@ -66,6 +64,7 @@ bool PointRefinement::is_outside(ObstacleId id, const Eigen::Vector3d& p_LQ) {
   const auto quantity = DistanceCache::Quantity::kOutside;
   const std::uint64_t build_id = obstacles_.bvh->build_id();
   if (kept.find(build_id, quantity, id.key(), p_LQ) > 0.0) return true;
+  if (deadline_passed()) return false;
   link_.search.count_exact();
   if (link_.context.solid().is_inside(p_LQ)) return false;
   if (link_.context.solid().is_closed() && bound.surface_distance > 0.0) {
@@ -81,8 +80,7 @@ SignedDistanceGrid::Bound PointRefinement::grid_bound(const SignedDistanceGrid::
   SignedDistanceGrid::Cell* cell = link_.search.measured < kMeasuredBeforeCells
                                        ? grid.find(part.center_L)
                                        : grid.measure(part.center_L);
-  return cell == nullptr ? SignedDistanceGrid::Bound()
-                         : grid.bound(cell, part, enough);
+  return cell == nullptr ? SignedDistanceGrid::Bound() : grid.bound(cell, part, enough);
 }
 
 bool PointRefinement::update_planes(SupportingPlanes* planes) {
@@ -109,7 +107,7 @@ void PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ
   double lower_bound;
   const SignedDistance exact =
       distance_outside(link_.context.solid(), p_LQ, limit, direction_L,
-                       kPointShare * search.config.tolerance, &lower_bound);
+                       0.0, &lower_bound);
   link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
                              id.key(), p_LQ, lower_bound);
   if (lower_bound < exact.distance) {

@@ -42,9 +42,9 @@ SignedDistanceGrid::SignedDistanceGrid(const LinkModel& link)
 // Written so that NaN has no key.
 std::uint64_t SignedDistanceGrid::key(const Eigen::Vector3d& p_LQ, Eigen::Vector3d* center) const {
   const Eigen::Array3d at = (per_size_ * (p_LQ - origin_)).array();
-  if (!(at.abs().maxCoeff() < kMaxIndex)) return 0;
   std::uint64_t key = 1;
   for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(at[axis]) < kMaxIndex)) return 0;
     const double i = std::floor(at[axis]);
     (*center)[axis] = origin_[axis] + size_ * (i + 0.5);
     key = key << 21U | static_cast<std::uint64_t>(i + kMaxIndex + 1.0);
@@ -91,16 +91,14 @@ void SignedDistanceGrid::find_plane(Cell* cell) const {
   const auto floor = static_cast<double>(cell->floor);
   const double radius = (1.0 + kStored) * std::abs(floor) + 2.0 * plane_radius_ + kRounding;
   const Eigen::Vector3d normal = cell->normal.cast<double>();
-  const double plane =
-      surface_support_in_sphere(*solid_, cell->center, radius, normal,
-                                kPlaneTolerance * plane_radius_, cell->witness) +
-      kStored * radius;
+  const double plane = surface_support_in_sphere(*solid_, cell->center, radius, normal,
+                                                 kPlaneTolerance * plane_radius_, cell->witness) +
+                       kStored * radius;
   if (!(plane < kHighestPlane * radius)) return;
   cell->plane = round_up(plane);
   // No surface is in the part of the sphere above the plane: one place is outside if all are.
   const double place = 0.5 * (std::max(plane, 0.0) + radius);
-  cell->is_outside_above_plane =
-      is_closed_ && !solid_->is_inside(cell->center + place * normal);
+  cell->is_outside_above_plane = is_closed_ && !solid_->is_inside(cell->center + place * normal);
 }
 
 double SignedDistanceGrid::Part::extent_against(const Eigen::Vector3d& n_L) const {
@@ -160,8 +158,8 @@ NearSurface SignedDistanceGrid::near_surface(Cell* cell, const Eigen::Vector3d& 
   if (!is_one_mesh_) return near;
   const double distance = (p_LQ - cell->center).norm() + kRounding;
   const auto floor = static_cast<double>(cell->floor);
-  near.within = std::min((1.0 + kStored) * std::abs(floor) + distance,
-                         -depth_bound(*cell, p_LQ, 0.0));
+  near.within =
+      std::min((1.0 + kStored) * std::abs(floor) + distance, -depth_bound(*cell, p_LQ, 0.0));
   if (bound(cell, {p_LQ}, std::numeric_limits<double>::infinity()).is_outside) {
     near.side = NearSurface::Side::kOutside;
   } else if (is_closed_ && floor < 0.0 && distance < (1.0 - kStored) * -floor) {

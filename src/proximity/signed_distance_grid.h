@@ -33,9 +33,9 @@ class SignedDistanceGrid {
 
   /// A part of space: a place, a sphere, or a box and the points that are in it.
   struct Part {
-    Eigen::Vector3d center_L;        ///< [m]
-    double radius = 0.0;             ///< [m] of a bounding sphere about the centre
-    const Eigen::Matrix3d* R_LO = nullptr;  ///< of the box; null: a sphere
+    Eigen::Vector3d center_L;                        ///< [m]
+    double radius = 0.0;                             ///< [m] of a bounding sphere about the centre
+    const Eigen::Matrix3d* R_LO = nullptr;           ///< of the box; null: a sphere
     Eigen::Vector3d half = Eigen::Vector3d::Zero();  ///< [m] half edges of the box, in O
     const PointTile* points = nullptr;               ///< null: all of the box
     Eigen::Vector3d center_O = Eigen::Vector3d::Zero();  ///< [m]
@@ -76,14 +76,14 @@ class SignedDistanceGrid {
 
   struct Cell {
     std::uint64_t key = 0;  ///< of the place in the grid; 0: not measured
-    Eigen::Vector3d center = Eigen::Vector3d::Zero();    ///< [m] C, link frame
-    Eigen::Vector3f normal = Eigen::Vector3f::Zero();    ///< outward, at the closest point
-    float witness = 0.0F;                                ///< [m] from C to that point along normal
-    float floor = 0.0F;                                  ///< [m] PointDepth::floor at C
-    float plane = std::numeric_limits<float>::max();     ///< [m] from C to the plane along normal
-    std::uint32_t triangle = kNoTriangle;                ///< of a solid that is one mesh
-    bool has_plane = false;  ///< whether the plane was looked for
-    bool is_outside_above_plane = false;  ///< every place there that the plane bounds
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< [m] C, link frame
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< outward, at the closest point
+    float witness = 0.0F;                              ///< [m] from C to that point along normal
+    float floor = 0.0F;                                ///< [m] PointDepth::floor at C
+    float plane = std::numeric_limits<float>::max();   ///< [m] from C to the plane along normal
+    std::uint32_t triangle = kNoTriangle;              ///< of a solid that is one mesh
+    bool has_plane = false;                            ///< whether the plane was looked for
+    bool is_outside_above_plane = false;               ///< every place there that the plane bounds
   };
 
  private:
@@ -97,9 +97,9 @@ class SignedDistanceGrid {
 
   const Solid* solid_;
   bool is_one_mesh_, is_closed_;
-  Eigen::Vector3d origin_;      ///< [m] link frame
-  double size_, per_size_;      ///< [m] edge of a cell, and 1 / edge
-  double plane_radius_;         ///< [m] of the sphere about C where the plane holds
+  Eigen::Vector3d origin_;  ///< [m] link frame
+  double size_, per_size_;  ///< [m] edge of a cell, and 1 / edge
+  double plane_radius_;     ///< [m] of the sphere about C where the plane holds
   std::vector<Cell> cells_;
 };
 

@@ -17,12 +17,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::vector<Shape> shapes() {
-  return {Box{{0.2, 0.1, 0.3}},
-          Cylinder{0.05, 0.25},
-          test::l_shape(0.2, 0.05),
-          test::torus(0.1, 0.03, 12, 6),
-          test::icosphere(0.1, 3),
-          test::open_box({0.15, 0.1, 0.2}),
+  return {Box{{0.2, 0.1, 0.3}},          Cylinder{0.05, 0.25},    test::l_shape(0.2, 0.05),
+          test::torus(0.1, 0.03, 12, 6), test::icosphere(0.1, 3), test::open_box({0.15, 0.1, 0.2}),
           test::thin_plate(0.2, 0.004)};
 }
 
@@ -100,7 +96,8 @@ TEST(SignedDistanceGrid, HoldsNearTheSurface) {
     for (int i = 0; i < 4000; ++i) {
       const Eigen::Vector3d p = link.tree.center() + test::random_vector(&rng, link.tree.radius());
       const SignedDistance from = link.solid.signed_distance(p);
-      const double height = std::pow(10.0, -1.0 - 8.0 * (i % 100) / 100.0) * (i % 2 == 0 ? 0.1 : -0.1);
+      const double height =
+          std::pow(10.0, -1.0 - 8.0 * (i % 100) / 100.0) * (i % 2 == 0 ? 0.1 : -0.1);
       ASSERT_NO_FATAL_FAILURE(
           expect_bounds(link, &grid, from.witness + height * from.normal, &counts));
     }

@@ -42,7 +42,8 @@ struct PointDepth {
   /// path through a hole the signed distance jumps from d outside to -d inside, so that the floor
   /// of a point outside is -d too.
   double floor = std::numeric_limits<double>::infinity();
-  /// The closest triangle of a solid that is one mesh, for distance_to_triangle(); else kNoTriangle.
+  /// The closest triangle of a solid that is one mesh, for distance_to_triangle(); else
+  /// kNoTriangle.
   std::uint32_t triangle = kNoTriangle;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
 };
