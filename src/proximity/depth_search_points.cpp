@@ -173,11 +173,8 @@ class PointDepthSearch {
     if (link_.context.tree().cover_distance_exceeds(p_LQ, outside_distance())) return;
     NearSurface::Side side = NearSurface::Side::kUnknown;
     if (search_.prune_bound() <= 0.0) {
-      if (PointRefinement(obstacles_, &link_).is_outside(id, p_LQ)) {
-        search_.prune(0.0);
-        return;
-      }
-      side = NearSurface::Side::kInside;
+      side = PointRefinement(obstacles_, &link_).side(id, p_LQ);
+      if (side == NearSurface::Side::kOutside) return search_.prune(0.0);
     }
     search_.count_exact();
     SignedDistanceGrid::Cell* cell = link_.context.grid.find(p_LQ);

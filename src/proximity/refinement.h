@@ -25,9 +25,11 @@ class PointRefinement {
   float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max);
   bool is_outside(std::int32_t tile, int lane) {
     const ObstacleId id{tile, lane};
-    return is_outside(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id));
+    return side(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id)) == Side::kOutside;
   }
-  bool is_outside(ObstacleId id, const Eigen::Vector3d& p_LQ);
+  using Side = NearSurface::Side;
+  /// On which side of the link's surface a point is; unknown after the deadline.
+  Side side(ObstacleId id, const Eigen::Vector3d& p_LQ);
   /// Measures a point that is outside the link, unless it was measured in this traversal or a kept
   /// bound proves that it does not matter.
   /// @param lower_bound  [m] by the clipped cover spheres

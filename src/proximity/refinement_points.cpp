@@ -19,13 +19,17 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   search.cover_bound =
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
   const ObstacleId id{tile, lane};
-  if (!search.visited.insert(id.key())) return search.traversal_prune_bound();
+  const bool is_late = deadline_passed();
+  if (!is_late && !search.visited.insert(id.key())) return search.traversal_prune_bound();
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
   const double kept = link_.kept.distances.find(obstacles_.bvh->build_id(),
                                                 DistanceCache::Quantity::kUnsigned, id.key(), p_LQ);
   const double bound = std::max(kept, grid_bound({p_LQ}, search.prune_bound()).surface_distance);
-  if (bound >= search.prune_bound() || deadline_passed()) {
-    search.prune(std::max(bound, static_cast<double>(lower_bound) - search.rounding));
+  if (bound >= search.prune_bound()) {
+    search.prune(bound);
+  } else if (is_late) {
+    // The bound is that of one part of the link; the others are in pairs of their own.
+    search.prune(static_cast<double>(lower_bound) - search.rounding);
   } else {
     const bool has_closest = search.closest.exact.distance < kInfinity;
     measure_outside(id, p_OQ, p_LQ, kInfinity,
@@ -57,20 +61,21 @@ float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const fl
                                   bound.is_outside ? round_down(bound.signed_distance) : kNone);
 }
 
-bool PointRefinement::is_outside(ObstacleId id, const Eigen::Vector3d& p_LQ) {
+// The winding number is asked last. It is not asked after the deadline.
+PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ) {
   const SignedDistanceGrid::Bound bound = grid_bound({p_LQ}, kInfinity);
-  if (bound.is_outside) return true;
+  if (bound.is_outside) return Side::kOutside;
   DistanceCache& kept = link_.kept.distances;
   const auto quantity = DistanceCache::Quantity::kOutside;
   const std::uint64_t build_id = obstacles_.bvh->build_id();
-  if (kept.find(build_id, quantity, id.key(), p_LQ) > 0.0) return true;
-  if (deadline_passed()) return false;
+  if (kept.find(build_id, quantity, id.key(), p_LQ) > 0.0) return Side::kOutside;
+  if (deadline_passed()) return Side::kUnknown;
   link_.search.count_exact();
-  if (link_.context.solid().is_inside(p_LQ)) return false;
+  if (link_.context.solid().is_inside(p_LQ)) return Side::kInside;
   if (link_.context.solid().is_closed() && bound.surface_distance > 0.0) {
     kept.store(build_id, quantity, id.key(), p_LQ, bound.surface_distance);
   }
-  return true;
+  return Side::kOutside;
 }
 
 // A cell costs as much as a few points: where few have to be measured, it does not pay.
