@@ -16,11 +16,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <locale>
 #include <sstream>
 #include <unordered_map>
 #include <utility>
 
+#include "geometry/collada_check.h"
 #include "geometry/orientation.h"
 #include "ist_proximity/geometry/error.h"
 
@@ -107,6 +109,13 @@ void check_end_of_stl(const std::string& path) {
   fail(path,
        "is cut off: an STL file that begins with 'solid' ends with 'endsolid'; export or "
        "download it again");
+}
+
+void check_collada(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string fault =
+      collada_fault({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
+  if (!fault.empty()) fail(path, fault);
 }
 
 // Metres per unit of a Collada file. It is read here, as in rviz. Assimp's root node, which holds
@@ -222,6 +231,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale) {
   check_scale(path, scale);
   check_file(path);
   check_end_of_stl(path);
+  if (is_collada(path)) check_collada(path);
   Assimp::Importer importer;
   const aiScene& scene = read_scene(path, &importer);
   const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
