@@ -57,6 +57,15 @@ ist::LinkGeometry link_from(ByteReader* in) {
   return link;
 }
 
+double extent(const ist::Shape& shape) {
+  if (const auto* box = std::get_if<ist::Box>(&shape)) return box->size.norm();
+  if (const auto* cylinder = std::get_if<ist::Cylinder>(&shape)) {
+    return 2.0 * cylinder->radius + cylinder->length;
+  }
+  if (const auto* sphere = std::get_if<ist::Sphere>(&shape)) return 2.0 * sphere->radius;
+  return ist::fuzz::extent(std::get<ist::TriangleMesh>(shape));
+}
+
 std::shared_ptr<const ist::RobotModel> model_of(const std::vector<ist::LinkGeometry>& links,
                                                 ByteReader* in) {
   ist::RobotDescription description;
@@ -66,8 +75,14 @@ std::shared_ptr<const ist::RobotModel> model_of(const std::vector<ist::LinkGeome
     link.geometry = geometry;
     description.links.push_back(std::move(link));
   }
+  // Coarse packings: they take most of the time, and bounds must hold for any.
+  double size = 0.0;
+  for (const ist::LinkGeometry& geometry : links) {
+    for (const ist::GeometryElement& element : geometry)
+      size = std::max(size, extent(element.shape));
+  }
   ist::RobotModelConfig config;
-  config.packing.max_error = in->between(0.003, 0.05);
+  config.packing.max_error = size * in->between(0.1, 1.0);
   config.packing.max_spheres = 1 + static_cast<int>(in->below(30));
   config.threads = 1;
   return ist::build_robot_model(description, config);
