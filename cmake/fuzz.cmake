@@ -25,6 +25,8 @@ if(catkin_FOUND AND IST_PROXIMITY_FUZZ)
   file(GLOB sources CONFIGURE_DEPENDS src/ros/common/*.cpp src/ros/parameters/*.cpp)
   add_library(fuzz_ros_sources STATIC EXCLUDE_FROM_ALL
     ${sources} src/ros/input/noise_filter.cpp src/ros/services/object_conversion.cpp)
+  # roscpp reads numbers where they lie in a message.
+  target_compile_options(fuzz_ros_sources PUBLIC -fno-sanitize=alignment)
   target_include_directories(fuzz_ros_sources PRIVATE src)
   target_include_directories(fuzz_ros_sources SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
   target_link_libraries(fuzz_ros_sources PUBLIC ist_proximity_core ${catkin_LIBRARIES})

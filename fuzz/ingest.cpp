@@ -1,6 +1,7 @@
 // Ingest::run() against a plain loop in double: what is done with each point, where it is stored,
 // and what the thinned cloud holds.
 // Covers: src/cloud/ingest.cpp src/cloud/filters src/cloud/index src/cloud/thinning
+// Longest input: 1500
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,6 +1,7 @@
 // A whole query from bytes: tiny links, points and boxes, poses one after the other, against brute
 // force in double.
 // Covers: src/proximity src/packing src/tree src/bvh src/geometry src/repulsion
+// Longest input: 600
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -145,12 +146,14 @@ void check_answer(const ist::LinkProximity& answer, const Scene& scene, std::siz
                "clear at %.12g", highest);
     return;
   }
-  FUZZ_CHECK(answer.distance <= highest + config.tolerance + rounding,
+  // Depths in boxes are searched to half a millimetre (depth_search_boxes.cpp).
+  const double tolerance = scene.samples.empty() ? config.tolerance : config.tolerance + 5e-4;
+  FUZZ_CHECK(answer.distance <= highest + tolerance + rounding,
              "link %zu: distance %.12g, truth %.12g, tolerance %g", link, answer.distance, highest,
-             config.tolerance);
+             tolerance);
   if (scene.samples.empty()) {
-    FUZZ_CHECK(answer.distance >= stored.low - rounding, "link %zu: distance %.12g, truth %.12g",
-               link, answer.distance, stored.low);
+    FUZZ_CHECK(answer.distance >= stored.low - 0.25 * config.tolerance - rounding,
+               "link %zu: distance %.12g, truth %.12g", link, answer.distance, stored.low);
   }
   FUZZ_CHECK(answer.p_FCl.allFinite() && answer.p_FCo.allFinite(), "witness is not finite");
   FUZZ_CHECK(std::abs(answer.direction.norm() - 1.0) < 1e-9, "direction of length %g",

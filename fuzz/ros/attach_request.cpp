@@ -2,6 +2,7 @@
 // finite pose and a shape of positive size, or an error that says what is wrong.
 //
 // Covers: src/ros/services/object_conversion.cpp src/ros/common/eigen_conversion.cpp
+// Longest input: 300
 
 #include <Eigen/Geometry>
 #include <cmath>

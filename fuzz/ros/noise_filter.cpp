@@ -2,6 +2,7 @@
 // as many as it says, and only where they have too few neighbours within the range.
 //
 // Covers: src/ros/input/noise_filter.cpp
+// Longest input: 600
 
 #include "ros/input/noise_filter.h"
 

@@ -2,8 +2,9 @@
 // is said.
 //
 // Covers: src/ros/parameters/parameters.cpp src/ros/parameters/parameter_reader.cpp
-// src/ros/parameters/source_parameters.cpp src/ros/parameters/range.cpp
-// src/ros/parameters/nearest_name.cpp
+// Covers: src/ros/parameters/source_parameters.cpp src/ros/parameters/range.cpp
+// Covers: src/ros/parameters/nearest_name.cpp
+// Longest input: 400
 
 #include "ros/parameters/parameters.h"
 
@@ -21,7 +22,7 @@ namespace {
 using ist::fuzz::ByteReader;
 using XmlRpc::XmlRpcValue;
 
-constexpr int kDeepest = 4;
+constexpr int kDeepest = 3;
 
 // Names that the node reads, some of them misspelt.
 std::string name(ByteReader* in) {
@@ -114,7 +115,7 @@ XmlRpcValue value_from(ByteReader* in, int depth) {
     }
     default: {
       XmlRpcValue tree;
-      for (std::size_t i = in->below(8); i > 0; --i) {
+      for (std::size_t i = in->below(5); i > 0; --i) {
         const std::string key = name(in);
         tree[key] = value_from(in, depth + 1);
       }
@@ -153,7 +154,7 @@ void check_sources(const std::vector<ist::SourceConfig>& sources) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   ByteReader in(data, size);
   XmlRpcValue tree;
-  for (std::size_t i = in.below(24); i > 0; --i) {
+  for (std::size_t i = in.below(12); i > 0; --i) {
     const std::string key = name(&in);
     tree[key] = value_from(&in, 1);
   }
