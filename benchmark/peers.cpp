@@ -5,7 +5,8 @@
 // anything is timed. Data: a synthetic scene, and the test data if it is there (IST_PROXIMITY_DATA,
 // or ../shared/data).
 //
-// Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]...; scripts/benchmark calls it.
+// Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]... [--only WORD]...; scripts/benchmark
+// calls it. --only: methods whose names contain one of these words.
 
 #include <algorithm>
 #include <cmath>
@@ -140,7 +141,10 @@ void time_frames(Method* method, const DataSet& set, const Scene& scene,
       timer.lap();
       method->query(set.motion[k], &answers);
       const double us = timer.lap();
-      if (k == frame * kFrameQueries && !contact[k]) result->free_first.push_back(us);
+      if (k == frame * kFrameQueries) {
+        result->first.push_back(us);
+        if (!contact[k]) result->free_first.push_back(us);
+      }
       sum += us;
       is_free = is_free && !contact[k];
     }
@@ -181,6 +185,7 @@ Methods all_methods(const DataSet& set) {
   add_pcl(spheres, &methods);
 #endif
   add_signed_grid(set.robot, &methods);
+  add_grid_of_groups(set.robot, &methods);
 #ifdef IST_BENCHMARK_EMBREE
   add_embree(set.robot, &methods);
 #endif
@@ -197,12 +202,17 @@ Methods all_methods(const DataSet& set) {
 }
 
 // Returns whether every answer was right.
-bool run(const DataSet& set, std::FILE* csv) {
+bool run(const DataSet& set, const std::vector<std::string>& words, std::FILE* csv) {
   const auto model = set.robot.pack(0.005);
   std::vector<std::vector<bool>> contact;
   for (const Scene& scene : set.scenes) contact.push_back(contacts(model, set, scene));
   bool all_right = true;
   for (const auto& method : all_methods(set)) {
+    if (!words.empty() && std::none_of(words.begin(), words.end(), [&](const std::string& word) {
+          return method->name.find(word) != std::string::npos;
+        })) {
+      continue;
+    }
     std::fprintf(stderr, "%s: %s, max_error %g mm, tolerance %g mm\n", set.name.c_str(),
                  method->name.c_str(), 1e3 * method->max_error, 1e3 * method->tolerance);
     Result result;
@@ -229,10 +239,19 @@ bool run(const DataSet& set, std::FILE* csv) {
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::fprintf(stderr, "Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]...\n");
+    std::fprintf(stderr,
+                 "Usage: peers RESULT.csv CACHE_FOLDER [synthetic|kinect]... [--only WORD]...\n");
     return 2;
   }
-  std::vector<std::string> wanted(argv + 3, argv + argc);
+  std::vector<std::string> wanted, words;
+  for (int i = 3; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--only" && i + 1 < argc) {
+      words.emplace_back(argv[++i]);
+    } else {
+      wanted.push_back(argument);
+    }
+  }
   if (wanted.empty()) wanted = {"synthetic", "kinect"};
   std::FILE* csv = std::fopen(argv[1], "w");
   if (csv == nullptr) {
@@ -246,9 +265,9 @@ int main(int argc, char** argv) {
     if (name == "kinect" && !data) {
       std::fprintf(stderr, "%s\n", ist::test::kNoData.c_str());
     } else if (name == "kinect") {
-      all_right = run(ist::benchmark::kinect_data(*data, argv[2]), csv) && all_right;
+      all_right = run(ist::benchmark::kinect_data(*data, argv[2]), words, csv) && all_right;
     } else {
-      all_right = run(ist::benchmark::synthetic_data(argv[2]), csv) && all_right;
+      all_right = run(ist::benchmark::synthetic_data(argv[2]), words, csv) && all_right;
     }
   }
   std::fclose(csv);

@@ -1,6 +1,11 @@
 # Programs that measure: one per benchmark/*.cpp, built on demand (target `benchmarks`), not installed.
 
 file(GLOB benchmark_sources CONFIGURE_DEPENDS benchmark/*.cpp)
+if(NOT IST_PROXIMITY_CLI11_INCLUDE_DIR)
+  list(FILTER benchmark_sources EXCLUDE REGEX "/(hard_cases|near_touch)\\.cpp$")
+  message(STATUS "ist_proximity: no benchmark/hard_cases and near_touch, CLI11 is missing "
+    "(apt install libcli11-dev)")
+endif()
 add_custom_target(benchmarks)
 foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
@@ -58,11 +63,22 @@ if(TARGET embree)
   target_compile_definitions(benchmark_packing PRIVATE IST_PROXIMITY_EMBREE)
 endif()
 
+if(TARGET benchmark_hard_cases)
+  file(GLOB hard_case_sources CONFIGURE_DEPENDS benchmark/hard_cases/*.cpp benchmark/near_touch/*.cpp)
+  foreach(name hard_cases near_touch)
+    target_sources(benchmark_${name} PRIVATE
+      ${hard_case_sources} benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
+    target_include_directories(benchmark_${name} SYSTEM PRIVATE ${IST_PROXIMITY_CLI11_INCLUDE_DIR})
+  endforeach()
+endif()
+
 # What people would use instead, in benchmark/peers: each where its library is found
 # (scripts/install_dependencies benchmark).
 target_sources(benchmark_peers PRIVATE
   benchmark/peers/flat.cpp
   benchmark/peers/floors.cpp
+  benchmark/peers/grid_of_groups.cpp
+  benchmark/peers/image_pyramid.cpp
   benchmark/peers/kinect.cpp
   benchmark/peers/ours.cpp
   benchmark/peers/scene.cpp

@@ -113,6 +113,25 @@ if(TARGET pack_robot_test)
     IST_PROXIMITY_PACK_ROBOT="$<TARGET_FILE:pack_robot>")
 endif()
 
+# Tests of the ROS rooms that need no master: one GoogleTest program per test/ros/*_test.cpp.
+if(catkin_FOUND AND TARGET ist_proximity_ros)
+  file(GLOB ros_test_sources CONFIGURE_DEPENDS test/ros/*_test.cpp)
+  foreach(source IN LISTS ros_test_sources)
+    get_filename_component(test ${source} NAME_WE)
+    add_executable(${test} EXCLUDE_FROM_ALL ${source})
+    target_include_directories(${test} PRIVATE src)
+    target_include_directories(${test} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+    target_link_libraries(${test} PRIVATE ist_proximity_ros GTest::GTest GTest::Main)
+    set_target_properties(${test} PROPERTIES
+      RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
+    add_dependencies(tests ${test})
+    set(arguments --gtest_output=xml:${results_dir}/gtest-${test}.xml)
+    catkin_run_tests_target(gtest ${test} gtest-${test}.xml
+      COMMAND "${CMAKE_CURRENT_BINARY_DIR}/test/${test} ${arguments}" DEPENDENCIES ${test})
+    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${test} PROPERTIES LABELS core TIMEOUT 600)
+  endforeach()
+endif()
+
 if(catkin_FOUND)
   find_package(rostest QUIET)
 endif()
@@ -122,8 +141,20 @@ if(rostest_FOUND)
     add_rostest(${file} DEPENDENCIES
       proximity_node ist_proximity_nodelet simulator_node dodge_node)
     string(REPLACE "/" "_" test ${file})
-    # One at a time: they measure rates and ages.
+    # One at a time: they measure rates and ages. Tests of faults know how late the machine is.
+    set(serial ON)
+    if(test MATCHES "faults_")
+      set(serial OFF)
+    endif()
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES
-      LABELS ros TIMEOUT 300 RUN_SERIAL ON)
+      LABELS ros TIMEOUT 300 RUN_SERIAL ${serial})
   endforeach()
+endif()
+
+if(catkin_FOUND AND IST_PROXIMITY_SANITIZE)
+  add_executable(test_nodelet_manager EXCLUDE_FROM_ALL test/soak/nodelet_manager.cpp)
+  target_link_libraries(test_nodelet_manager PRIVATE -Wl,--no-as-needed ist_proximity_ros)
+  target_include_directories(test_nodelet_manager SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  set_target_properties(test_nodelet_manager PROPERTIES
+    OUTPUT_NAME nodelet_manager RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
 endif()

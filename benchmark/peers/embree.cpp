@@ -3,9 +3,10 @@
 #include <limits>
 
 #include "peers/flat.h"
+#include "peers/image_pyramid.h"
 
 // Embree's point query: the nearest triangle of a link's mesh, for every point that the link's box
-// does not prune.
+// does not prune; and for groups of points and those points that a group's bound does not prune.
 namespace ist::benchmark {
 namespace {
 
@@ -58,10 +59,10 @@ bool visit(RTCPointQueryFunctionArguments* arguments) {
   return true;
 }
 
-class Embree : public PrunedByBox {
+// The meshes of a robot in Embree's hierarchies.
+class Surfaces {
  public:
-  explicit Embree(const Robot& robot) : PrunedByBox(robot), device_(rtcNewDevice("threads=1")) {
-    name = "Embree point query, link boxes";
+  explicit Surfaces(const Robot& robot) : device_(rtcNewDevice("threads=1")) {
     for (const TriangleMesh& mesh : robot.meshes) {
       Surface surface;
       surface.scene = rtcNewScene(device_);
@@ -92,25 +93,24 @@ class Embree : public PrunedByBox {
       surfaces_.push_back(std::move(surface));
     }
   }
-  ~Embree() override {
+  ~Surfaces() {
     for (const Surface& surface : surfaces_) rtcReleaseScene(surface.scene);
     rtcReleaseDevice(device_);
   }
-  Embree(const Embree&) = delete;
-  Embree& operator=(const Embree&) = delete;
+  Surfaces(const Surfaces&) = delete;
+  Surfaces& operator=(const Surfaces&) = delete;
 
- protected:
-  bool closest(std::size_t link, const Eigen::Vector3f& p_L, float* distance,
-               Eigen::Vector3d* surface_L) override {
+  // The surface point nearest to p_L. Returns its distance where it is below `bound`, else `bound`.
+  float closest(std::size_t link, const Eigen::Vector3f& p_L, float bound,
+                Eigen::Vector3f* surface_L) const {
     Found found{&surfaces_[link], Eigen::Vector3f::Zero()};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
-    RTCPointQuery query{p_L.x(), p_L.y(), p_L.z(), 0.0F, *distance};
+    RTCPointQuery query{p_L.x(), p_L.y(), p_L.z(), 0.0F, bound};
     rtcPointQuery(surfaces_[link].scene, &query, &context, visit, &found);
-    if (!found.any) return false;
-    *distance = query.radius;
-    *surface_L = found.point.cast<double>();
-    return true;
+    if (!found.any) return bound;
+    *surface_L = found.point;
+    return query.radius;
   }
 
  private:
@@ -118,10 +118,77 @@ class Embree : public PrunedByBox {
   std::vector<Surface> surfaces_;
 };
 
+class Embree : public PrunedByBox {
+ public:
+  explicit Embree(const Robot& robot) : PrunedByBox(robot), surfaces_(robot) {
+    name = "Embree point query, link boxes";
+  }
+
+ protected:
+  bool closest(std::size_t link, const Eigen::Vector3f& p_L, float* distance,
+               Eigen::Vector3d* surface_L) override {
+    Eigen::Vector3f point;
+    const float d = surfaces_.closest(link, p_L, *distance, &point);
+    if (!(d < *distance)) return false;
+    *distance = d;
+    *surface_L = point.cast<double>();
+    return true;
+  }
+
+ private:
+  Surfaces surfaces_;
+};
+
+// Whole groups of pixels are bounded by Embree's distance of their centre.
+class EmbreeOfGroups : public Method {
+ public:
+  explicit EmbreeOfGroups(const Robot& robot)
+      : surfaces_(robot), last_(robot.meshes.size(), NearestPixel::kNone) {
+    name = "Embree point query, hierarchy of spheres over the image";
+    is_unsigned = true;
+  }
+
+  void ingest(const Frame& frame) override {
+    pyramid_.build(frame);
+    X_FS_ = frame.X_FS;
+  }
+
+  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+    for (std::size_t link = 0; link < X_FL.size(); ++link) {
+      const Eigen::Isometry3f X_LS = (X_FL[link].inverse() * X_FS_).cast<float>();
+      Eigen::Vector3f surface_L = Eigen::Vector3f::Zero();
+      const auto distance = [&](const Eigen::Vector3f& p_L, float bound,
+                                Eigen::Vector3f* witness_L) {
+        // A surface point near the nearest one makes the search short; NaN compares as false.
+        const float near = kWiden * (p_L - *witness_L).norm() + kRounding;
+        return surfaces_.closest(link, p_L, near < bound ? near : bound, witness_L);
+      };
+      const NearestPixel nearest = search_.run(pyramid_, X_LS, last_[link], distance);
+      // The search keeps no surface points of pixels.
+      surfaces_.closest(link, X_LS * pyramid_.point(nearest.pixel),
+                        std::numeric_limits<float>::infinity(), &surface_L);
+      last_[link] = nearest.pixel;
+      (*answers)[link] = {static_cast<double>(nearest.distance),
+                          X_FL[link] * surface_L.cast<double>(),
+                          X_FS_ * pyramid_.point(nearest.pixel).cast<double>()};
+    }
+  }
+
+ private:
+  static constexpr float kWiden = 1.00001F, kRounding = 1e-6F;  // [m]
+
+  Surfaces surfaces_;
+  ImagePyramid pyramid_;
+  PyramidSearch search_;
+  Eigen::Isometry3d X_FS_;
+  std::vector<std::size_t> last_;  // nearest pixel by link
+};
+
 }  // namespace
 
 void add_embree(const Robot& robot, Methods* methods) {
   methods->push_back(std::make_unique<Embree>(robot));
+  methods->push_back(std::make_unique<EmbreeOfGroups>(robot));
 }
 
 }  // namespace ist::benchmark

@@ -68,6 +68,7 @@ void add_ours(const Robot& robot, Methods* methods);
 void add_nanoflann(const SphereSet& spheres, Methods* methods);
 void add_pcl(const SphereSet& spheres, Methods* methods);
 void add_signed_grid(const Robot& robot, Methods* methods);
+void add_grid_of_groups(const Robot& robot, Methods* methods);
 void add_embree(const Robot& robot, Methods* methods);
 void add_cgal(const Robot& robot, Methods* methods);
 void add_fcl(const Robot& robot, Methods* methods);

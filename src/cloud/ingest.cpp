@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "cloud/index/scene_axes.h"
 #include "cloud/index/unorganized_cloud.h"
 #include "cloud/thinning/voxel_thinning.h"
+#include "internal/cloud/largest_range.h"
 
 namespace ist {
 namespace {
@@ -30,6 +32,25 @@ void check(const IngestConfig& config) {
           "self_filter_padding", config.self_filter_padding, "0 or more");
   require(config.thinning > 0.0 && std::isfinite(config.thinning), "thinning", config.thinning,
           "more than 0");
+  require(config.max_points > 0, "max_points", 0.0, "1 or more");
+}
+
+void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestConfig& config) {
+  if (!X_FS.matrix().allFinite()) {
+    throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
+  }
+  const Eigen::Vector3d& p_FS = X_FS.translation();
+  if (!(p_FS.cwiseAbs().maxCoeff() <= kLargestRange)) {
+    std::ostringstream text;
+    text << "the sensor is at (" << p_FS.x() << ", " << p_FS.y() << ", " << p_FS.z()
+         << ") m in the fixed frame, allowed are at most " << kLargestRange << " m.";
+    throw std::invalid_argument(text.str());
+  }
+  if (cloud.size() > config.max_points) {
+    throw std::invalid_argument("the cloud has " + std::to_string(cloud.size()) +
+                                " points, allowed are at most " +
+                                std::to_string(config.max_points) + " (max_points).");
+  }
 }
 
 }  // namespace
@@ -63,10 +84,8 @@ void Ingest::set_region_of_interest(const RegionOfInterest& region) {
 void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
                  double stamp, CloudSnapshot* snapshot) {
   const auto start = std::chrono::steady_clock::now();
-  if (!X_FS.matrix().allFinite()) {
-    throw std::invalid_argument("the sensor's pose holds a NaN or infinite number.");
-  }
   const IngestConfig& config = impl_->config;
+  check(cloud, X_FS, config);
   CropParameters crop = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
   limit_to_region(impl_->region, X_FS, &crop);
   const bool organized = is_organized(cloud, crop);

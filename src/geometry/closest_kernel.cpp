@@ -23,6 +23,9 @@ using triangle_bvh::FloatTag;
 
 constexpr std::size_t kWidth = TriangleBvh::kWidth;
 
+// Squared sine of the angle between two edges below which the normal is not certain in float.
+constexpr float kLeastSineSq = 0.25F;
+
 template <class V>
 struct Vec3 {
   V x, y, z;
@@ -55,9 +58,24 @@ HWY_INLINE V SegmentSq(D d, const Vec3<V>& e, const Vec3<V>& v) {
   return Dot3(r, r);
 }
 
-// Squared distances [m^2] from p to the triangles of a leaf: to a triangle's plane where p projects
-// inside it, else to its nearest edge.
-HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* p, float* out) {
+// What is certain of a triangle whose normal is not: no point of it is farther from its edges than
+// the radius of its inscribed circle, half its height at most. So its squared distance is no less
+// than that to its edges minus the square of that radius.
+template <class D, class V>
+HWY_INLINE V LeastFromEdges(D d, V edges, V n_sq, V longest_sq, float rounding) {
+  const V half_height = hn::Mul(hn::Set(d, 0.5F), hn::Sqrt(hn::Div(n_sq, longest_sq)));
+  const V radius = hn::Add(half_height, hn::Set(d, rounding));
+  return hn::Max(hn::NegMulAdd(radius, radius, edges), hn::Zero(d));
+}
+
+// Lower bounds [m^2] of the squared distances from p to the triangles of a leaf: to a triangle's
+// plane where p projects inside it, else to its nearest edge. The error in distance stays below
+// `rounding`: the normal is taken at the corner that is opposite the longest edge, where float
+// turns it by no more than 12 roundings (2^-24 rad each) if that corner's angle is between 30 and
+// 150 degrees. Height and side of an edge are then wrong by no more than 26 roundings of |p - a|,
+// and `rounding` is 33 of more than that. No decision is taken by a normal that is less certain.
+HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* p, float rounding,
+                                    float* out) {
   const FloatTag d;
   using V = hn::Vec<FloatTag>;
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
@@ -72,13 +90,23 @@ HWY_INLINE void TriangleDistancesSq(const TriangleBvh::Leaf& leaf, const float* 
     const Vec3<V> n = Cross(ca, ab);
     const V edges =
         hn::Min(SegmentSq(d, ab, va), hn::Min(SegmentSq(d, bc, vb), SegmentSq(d, ca, vc)));
+    // Barycentric coordinates of c, b and a, times n.n.
     const auto zero = hn::Zero(d);
-    const auto inside = hn::And(
-        hn::Le(Dot3(Cross(ab, n), va), zero),
-        hn::And(hn::Le(Dot3(Cross(bc, n), vb), zero), hn::Le(Dot3(Cross(ca, n), vc), zero)));
+    const Vec3<V> along = Cross(va, n);
+    const V n_sq = Dot3(n, n), of_c = Dot3(ab, along), of_b = Dot3(ca, along);
+    const auto inside =
+        hn::And(hn::Ge(hn::Min(of_b, of_c), zero), hn::Le(hn::Add(of_b, of_c), n_sq));
     const V height = Dot3(n, va);
-    const V plane = hn::Div(hn::Mul(height, height), hn::Max(Dot3(n, n), hn::Set(d, 1e-30F)));
-    hn::Store(hn::IfThenElse(inside, hn::Min(plane, edges), edges), d, out + k);
+    const V plane = hn::Div(hn::Mul(height, height), hn::Max(n_sq, hn::Set(d, 1e-30F)));
+    V least = hn::IfThenElse(inside, hn::Min(plane, edges), edges);
+    const auto is_uncertain =
+        hn::Lt(n_sq, hn::Mul(hn::Set(d, kLeastSineSq), hn::Mul(Dot3(ab, ab), Dot3(ca, ca))));
+    if (HWY_UNLIKELY(!hn::AllFalse(d, is_uncertain))) {
+      const V longest_sq = hn::Max(Dot3(bc, bc), hn::Set(d, 1e-30F));
+      least =
+          hn::IfThenElse(is_uncertain, LeastFromEdges(d, edges, n_sq, longest_sq, rounding), least);
+    }
+    hn::Store(least, d, out + k);
   }
 }
 
@@ -97,6 +125,7 @@ class ClosestPointSearch {
     for (int axis = 0; axis < 3; ++axis) p_float_[axis] = static_cast<float>(local[axis]);
     // Float's error, in distance.
     rounding_ = 2e-6 * (local.norm() + bvh.radius);
+    rounding_float_ = static_cast<float>(rounding_);
     UpdatePruneBound();
     SetOutward(outward_hint);
   }
@@ -213,7 +242,7 @@ class ClosestPointSearch {
   void VisitLeaf(const TriangleBvh::Leaf& leaf) {
     if (PruneByPlane(leaf)) return;
     alignas(32) float distance_sq[kWidth];
-    TriangleDistancesSq(leaf, p_float_, distance_sq);
+    TriangleDistancesSq(leaf, p_float_, rounding_float_, distance_sq);
     std::uint32_t nearest = 0;
     for (std::uint32_t k = 1; k < leaf.count; ++k) {
       if (distance_sq[k] < distance_sq[nearest]) nearest = k;
@@ -244,6 +273,7 @@ class ClosestPointSearch {
   double best_sq_;    // [m^2] upper bound
   double early_out_sq_, tolerance_;
   double rounding_;
+  float rounding_float_;
   float prune_bound_sq_ = 0.0F;
   float least_pruned_sq_ = std::numeric_limits<float>::max();
   float outward_[3];  // unit, or zero

@@ -4,15 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 
 namespace ist {
 namespace {
 
-// Ericson's method divides by the square of the triangle's area: its error grows with the square of
-// length over height. Triangles with less height than this share of their length are slivers.
-constexpr double kSliver = 1e-3;
+// Squared sine of the angle between two edges below which their normal is not certain.
+constexpr double kLeastSineSq = 0.25;
 // Triangles with less height than this share of their length have no plane.
-constexpr double kNoArea = 1e-8;
+constexpr double kNoArea = 1e-12;
 
 Eigen::Vector3d closest_on_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                    const Eigen::Vector3d& b) {
@@ -58,29 +58,28 @@ Eigen::Vector3d closest_on_sliver(const Eigen::Vector3d& p, const Eigen::Vector3
 
 Eigen::Vector3d closest_point_on_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
                                           const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-  const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a;
-  const double longest_sq = std::max({ab.squaredNorm(), ac.squaredNorm(), (c - b).squaredNorm()});
-  if (!(ab.cross(ac).squaredNorm() > kSliver * kSliver * longest_sq * longest_sq)) {
-    return closest_on_sliver(p, a, b, c);
-  }
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Eigen::Vector3d bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + (d1 / std::max(d1 - d3, 1e-300)) * ab;
-  const Eigen::Vector3d cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + (d2 / std::max(d2 - d6, 1e-300)) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    return b + ((d4 - d3) / std::max((d4 - d3) + (d5 - d6), 1e-300)) * (c - b);
-  }
-  const double denominator = 1.0 / (va + vb + vc);
-  return a + ab * (vb * denominator) + ac * (vc * denominator);
+  const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, n = ab.cross(ac);
+  const double ab_sq = ab.squaredNorm(), ac_sq = ac.squaredNorm(), n_sq = n.squaredNorm();
+  if (!(n_sq > kLeastSineSq * ab_sq * ac_sq)) return closest_on_sliver(p, a, b, c);
+  const double along_ab = ab.dot(ap), along_ac = ac.dot(ap);
+  if (along_ab <= 0.0 && along_ac <= 0.0) return a;
+  // Barycentric coordinates of the corners, times n.n.
+  const Eigen::Vector3d turned = ap.cross(n);
+  const double of_c = ab.dot(turned), of_b = -ac.dot(turned), of_a = n_sq - of_b - of_c;
+  if (of_a >= 0.0 && of_b >= 0.0 && of_c >= 0.0) return p - (n.dot(ap) / n_sq) * n;
+  // The closest point is on an edge that has p on its outer side.
+  Eigen::Vector3d nearest = a;
+  double nearest_sq = std::numeric_limits<double>::infinity();
+  const auto take_nearer = [&](const Eigen::Vector3d& q) {
+    const double q_sq = (q - p).squaredNorm();
+    if (!(q_sq < nearest_sq)) return;
+    nearest = q;
+    nearest_sq = q_sq;
+  };
+  if (of_c < 0.0) take_nearer(a + std::clamp(along_ab / ab_sq, 0.0, 1.0) * ab);
+  if (of_b < 0.0) take_nearer(a + std::clamp(along_ac / ac_sq, 0.0, 1.0) * ac);
+  if (of_a < 0.0) take_nearer(closest_on_segment(p, b, c));
+  return nearest;
 }
 
 }  // namespace ist

@@ -14,6 +14,21 @@ constexpr float kFar = 1e9F;
 
 Eigen::Vector3d centroid(const TriangleBvh::Triangle& t) { return (t.a + t.b + t.c) / 3.0; }
 
+// A triangle with its corners in the same sense, a opposite the longest edge: there the angle is
+// largest and the normal most certain.
+TriangleBvh::Triangle from_largest_angle(const TriangleMesh& mesh, std::uint32_t t) {
+  int apex = 0;
+  double longest_sq = -1.0;
+  for (int k = 0; k < 3; ++k) {
+    const double edge_sq =
+        (mesh.corner(t, (k + 2) % 3) - mesh.corner(t, (k + 1) % 3)).squaredNorm();
+    if (!(edge_sq > longest_sq)) continue;
+    longest_sq = edge_sq;
+    apex = k;
+  }
+  return {mesh.corner(t, apex), mesh.corner(t, (apex + 1) % 3), mesh.corner(t, (apex + 2) % 3), t};
+}
+
 Eigen::Vector3d area_normal(const TriangleBvh::Triangle& t) {
   return 0.5 * (t.b - t.a).cross(t.c - t.a);
 }
@@ -23,7 +38,7 @@ Eigen::Vector3d area_normal(const TriangleBvh::Triangle& t) {
 void TriangleBvhBuilder::run() {
   bvh_.triangles_.reserve(mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-    bvh_.triangles_.push_back({mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2), t});
+    bvh_.triangles_.push_back(from_largest_angle(mesh_, t));
     for (int k = 0; k < 3; ++k) bvh_.bounds_.extend(mesh_.corner(t, k));
   }
   if (bvh_.triangles_.empty()) return;

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
     ist::ProximityServer server(nh, private_nh);
     ros::spin();
   } catch (const std::exception& error) {
+    if (!ros::ok()) return 0;  // told to end while it waited for the master
     ROS_FATAL_STREAM("proximity_node cannot start:\n" << error.what());
     return 1;
   }

@@ -28,7 +28,9 @@ constexpr double kStepsAhead = 8.0;
 void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryConfig& config,
                       double other_links, QueryStatistics* statistics) {
   LinkSearch& search = link_.search;
-  search.X_FL = X_FL;
+  const RigidPose rigid = nearest_rigid(X_FL);
+  search.X_FL = rigid.X;
+  search.drift = rigid.drift;
   search.scene = scene;
   search.config = config;
   search.other_links = other_links;
@@ -38,7 +40,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.region_bound = kInfinity;
   // Before anything is proven: no point is deeper than the radius of the bounding sphere.
   search.pruned_bound = -link_.context.tree().radius();
-  search.rounding = search.max_coordinate = 0.0;
+  search.rounding = search.max_coordinate = search.index_error = 0.0;
   search.is_complete = false;
 }
 
@@ -183,13 +185,19 @@ DualTreeInput<Bvh> LinkQuery::dual_tree_input(const PosedIndex<Bvh>& obstacles) 
 template <class Obstacles>
 void LinkQuery::enter(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
-  const InnerSphereTree& tree = link_.context.tree();
-  const double coordinate =
-      obstacles.X_OL.translation().cwiseAbs().maxCoeff() + tree.center().norm() + tree.radius();
+  const double range = search.config.max_distance + search.config.margin, extent = this->extent();
+  const double coordinate = obstacles.X_OL.translation().cwiseAbs().maxCoeff() + extent;
   search.max_coordinate = std::max(search.max_coordinate, coordinate);
+  const double lever = obstacles.X_OL.translation().norm() + extent + obstacles.drift_lever;
+  search.index_error = std::max(search.index_error, pose_error(obstacles.drift, lever, range));
   search.rounding =
-      std::max(search.rounding,
-               kFloatError * (coordinate + search.config.max_distance + search.config.margin));
+      std::max(search.rounding, kFloatError * (coordinate + range) +
+                                    pose_error(search.drift, extent, range) + search.index_error);
+}
+
+double LinkQuery::extent() const {
+  const InnerSphereTree& tree = link_.context.tree();
+  return tree.center().norm() + tree.radius();
 }
 
 // Whether the bound that was proven at another pose is enough at this one.
@@ -203,6 +211,7 @@ bool LinkQuery::is_settled(SnapshotSpan clouds) {
     search.region_bound =
         std::min(search.region_bound, std::max(region.radius - from_center, 0.0) - tree.radius());
   }
+  search.region_bound -= pose_error(search.drift, extent(), 0.0);
   const LinkBound& kept = link_.kept.bound;
   const double bound = kept.at(search.scene, search.X_FL);
   if (!is_inside_regions() || !(bound >= search.prune_bound() - kRounding) ||
@@ -228,18 +237,26 @@ void LinkQuery::look_ahead() {
 
 void LinkQuery::keep_bound() {
   const LinkSearch& search = link_.search;
-  double bound = search.lower_bound();
+  double bound = search.lower_bound() - search.index_error;
   // Float loses more, the farther.
   if (bound > search.range()) bound -= kFloatError * (bound - search.range());
   link_.kept.bound.prove(search.scene, search.X_FL, bound,
                          std::min(search.cover_bound, search.pruned_bound), search.max_coordinate);
 }
 
+// The error of a distance by the coordinates of stored points and by poses that are not quite
+// rigid.
+double LinkQuery::answer_error(double distance) const {
+  const LinkSearch& search = link_.search;
+  return kPointError * (search.max_coordinate + std::abs(distance)) +
+         pose_error(search.drift, extent(), distance) + search.index_error;
+}
+
 double LinkQuery::proven_bound() const {
   const LinkSearch& search = link_.search;
   const double bound = search.lower_bound();
   if (bound == kInfinity) return bound;
-  return bound - kPointError * (search.max_coordinate + std::abs(bound)) - search.config.margin;
+  return bound - answer_error(bound) - search.config.margin;
 }
 
 void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
@@ -264,9 +281,7 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   result->state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = distance;
   // Points that could be nearer have coordinates no larger than this one's bound.
-  result->lower_bound = search.lower_bound() -
-                        kPointError * (search.max_coordinate + std::abs(distance)) -
-                        search.config.margin;
+  result->lower_bound = search.lower_bound() - answer_error(distance) - search.config.margin;
   result->p_LCl = closest.exact.witness;
   result->p_FCl = search.X_FL * closest.exact.witness;
   result->p_FCo = closest.p_FCo;

@@ -55,6 +55,8 @@ class LinkQuery {
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
   void keep_bound();
+  double answer_error(double distance) const;
+  double extent() const;  ///< [m] no point of the link is farther from its origin
 
   template <class Obstacles>
   bool run(const Obstacles& obstacles);

@@ -72,7 +72,7 @@ struct ClosestObstacle {
 /// lower_bound().
 struct LinkSearch {
   // The question.
-  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< a rotation in double
   SceneId scene = kUnknownScene;
   QueryConfig config;
   double other_links = 0.0;  ///< [m] upper bound of other links, below which this one matters only
@@ -87,6 +87,8 @@ struct LinkSearch {
   double region_bound = 0.0;    ///< [m] no point outside the regions of interest is nearer
   double rounding = 0.0;        ///< [m] largest error of a lower bound of the traversals
   double max_coordinate = 0.0;  ///< [m] of the link in the frames of the indices
+  double drift = 0.0;           ///< of the pose as given, see RigidPose
+  double index_error = 0.0;     ///< [m] by the poses of maps as given, within range
   bool is_complete = false;     ///< nothing that matters was left
   VisitedSet visited;           ///< obstacles of the index at work that were refined
   int box_cells_left = 0;       ///< into which overlapping boxes may still be divided

@@ -14,16 +14,22 @@ namespace ist {
 /// An index of a snapshot and where the link is in its frame O.
 template <class Bvh>
 struct PosedIndex {
-  PosedIndex(const Bvh& index, std::int32_t source_index, const Eigen::Isometry3d& X_FO_,
-             const Eigen::Isometry3d& X_FL)
+  /// @param pose             X_FO
+  /// @param origin_distance  [m] of O from the frame whose pose was given
+  PosedIndex(const Bvh& index, std::int32_t source_index, const RigidPose& pose,
+             double origin_distance, const Eigen::Isometry3d& X_FL)
       : bvh(&index),
         source(source_index),
-        X_FO(X_FO_),
+        drift(pose.drift),
+        drift_lever(2.0 * origin_distance),
+        X_FO(pose.X),
         X_OL(relative_pose(X_FO, X_FL)),
         X_LO(X_OL.inverse()) {}
 
   const Bvh* bvh;
   std::int32_t source;  ///< index of the snapshot among those of the query
+  double drift;         ///< of X_FO as it was given, see RigidPose
+  double drift_lever;   ///< [m] what adds to the extent in its pose_error()
   Eigen::Isometry3d X_FO, X_OL, X_LO;
 };
 
@@ -62,11 +68,12 @@ void for_each_index(const CloudSnapshot& cloud, std::int32_t source, const Eigen
                     const Visit& visit) {
   if (!cloud.index.empty()) {
     const PointBvh& bvh = cloud.index.bvh();
-    visit(PointObstacles(bvh, source, bvh.X_FO(), X_FL));
+    visit(PointObstacles(bvh, source, {bvh.X_FO(), 0.0}, 0.0, X_FL));
   }
   if (cloud.boxes != nullptr && !cloud.boxes->empty()) {
     const BoxBvh& bvh = cloud.boxes->bvh();
-    visit(BoxObstacles(bvh, source, cloud.X_FM * Eigen::Translation3d(bvh.origin()), X_FL));
+    visit(BoxObstacles(bvh, source, nearest_rigid(cloud.X_FM * Eigen::Translation3d(bvh.origin())),
+                       bvh.origin().norm(), X_FL));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <limits>
 
+#include "internal/geometry/relative_pose.h"
 #include "proximity/link_pair_search.h"
 
 namespace ist {
@@ -18,6 +19,7 @@ void PairProximity::reset() {
 
 struct SelfQuery::Impl {
   LinkPairSearch search(std::size_t a, std::size_t b, Span<const Eigen::Isometry3d> X_FL);
+  double error(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL, double distance) const;
   void run(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL, PairProximity* result);
 
   std::shared_ptr<const RobotModel> model;
@@ -60,16 +62,30 @@ void report(const LinkPairSearch& search, const Eigen::Isometry3d& X_FB, double 
 
 LinkPairSearch SelfQuery::Impl::search(std::size_t a, std::size_t b,
                                        Span<const Eigen::Isometry3d> X_FL) {
-  LinkPairSearch result(model->links[a], model->links[b], X_FL[b].inverse() * X_FL[a], range,
+  LinkPairSearch result(model->links[a], model->links[b],
+                        relative_pose(nearest_rigid(X_FL[b]).X, nearest_rigid(X_FL[a]).X), range,
                         &queue);
   result.run();
   return result;
+}
+
+// [m] The error of a pair's distance by poses that are not quite rigid.
+double SelfQuery::Impl::error(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL,
+                              double distance) const {
+  const auto extent = [&](std::size_t i) {
+    const InnerSphereTree& tree = model->links[i].tree;
+    return tree.center().norm() + tree.radius();
+  };
+  const auto drift = [&](std::size_t i) { return nearest_rigid(X_FL[i]).drift; };
+  return pose_error(drift(pair.first) + drift(pair.second),
+                    extent(pair.first) + extent(pair.second), distance);
 }
 
 void SelfQuery::Impl::run(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL,
                           PairProximity* result) {
   range = config;
   range.max_distance += config.margin;
+  range.max_distance += error(pair, X_FL, range.max_distance);
   // The link with the smaller gap gives the tighter bound; apart, one direction is as good as the
   // other.
   const auto gap = [&](std::size_t i) { return model->links[i].packing.certificate.max_gap; };
@@ -92,7 +108,7 @@ void SelfQuery::Impl::run(const LinkPair& pair, Span<const Eigen::Isometry3d> X_
     report(of_b, X_FL[a], -sign, result);
   }
   result->state = result->distance < 0.0 ? LinkState::kContact : LinkState::kNear;
-  result->lower_bound = lower - config.margin;
+  result->lower_bound = lower - error(pair, X_FL, lower) - config.margin;
 }
 
 void SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,

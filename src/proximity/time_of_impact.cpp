@@ -1,7 +1,6 @@
 #include "ist_proximity/proximity/time_of_impact.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 #include "ist_proximity/robot/link_poses.h"
@@ -107,10 +106,12 @@ void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
                        const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted,
                        SnapshotSpan clouds, std::vector<ImpactTime>* results) {
   const std::size_t count = impl_->model->links.size();
-  assert(wanted.size() == count && motion.duration > 0.0);
-  assert(motion.from.size() == impl_->forward.kinematics().joints().size());
-  assert(motion.to.size() == motion.from.size() && still.X_PC.size() == motion.from.size());
+  const std::size_t joints = impl_->forward.kinematics().joints().size();
   results->assign(count, ImpactTime());
+  const bool fits = wanted.size() == count && motion.from.size() == joints &&
+                    motion.to.size() == joints && still.X_PC.size() == joints &&
+                    still.known.size() == joints;
+  if (!fits || !(motion.duration > 0.0) || !std::isfinite(motion.duration)) return;
   for (std::size_t i = 0; i < count; ++i) {
     if (!wanted[i] || !impl_->forward.body(i) || !impl_->model->links[i].usable()) continue;
     impl_->moving[i] = true;

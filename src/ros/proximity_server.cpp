@@ -1,7 +1,7 @@
 #include "ist_proximity/ros/proximity_server.h"
 
+#include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>
-#include <tf2/buffer_core.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "ist_proximity/robot/link_poses.h"
+#include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stop_signal.h"
 #include "ros/common/thread_name.h"
@@ -20,12 +21,14 @@
 #include "ros/input/cloud_source.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/model_loader.h"
+#include "ros/output/message_invariants.h"
 #include "ros/output/result_publisher.h"
 #include "ros/output/sphere_publisher.h"
 #include "ros/parameters/live_parameters.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/make_pose_source.h"
+#include "ros/poses/transform_buffer.h"
 #include "ros/poses/transform_listener.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
@@ -47,9 +50,9 @@ constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
 /// The cycle takes the newest poses and clouds, queries and publishes, and waits for nothing. It
 /// runs at ~rate of the wall clock, so that a paused /clock does not silence it, or with
 /// pose_source joint_states once for each joint state, and ten times a second while none come. The
-/// diagnostics thread runs once a second and reads the live parameters again. The parts have
-/// threads of their own: one per source, ~query, ~self_proximity, the model and contact loaders,
-/// the listeners of tf and joint_states.
+/// diagnostics thread runs once a second. The parts have threads of their own: one per source,
+/// ~query, ~self_proximity, the live parameters, the model and contact loaders, the listeners of tf
+/// and joint_states.
 class ProximityServer::Impl {
  public:
   Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const ServerConfig& config);
@@ -59,10 +62,13 @@ class ProximityServer::Impl {
   void run_cycles();
   bool wait_for_joint_states();
   void run_cycle();
+  void run_cycle_guarded();
+  void publish_failure(const std::string& fault);
   void notice_clock_jump(const ros::Time& now);
   void take_model();
   void set_source_targets(const QueryConfig& query);
   void run_diagnostics();
+  void publish_diagnostics();
   LiveConfig live_config() const;
 
   const ServerConfig config_;
@@ -70,7 +76,7 @@ class ProximityServer::Impl {
   ResultPublisher results_;
   SpherePublisher spheres_;
   DiagnosticsPublisher diagnostics_;
-  tf2::BufferCore buffer_;
+  TransformBuffer buffer_;
   TransformListener listener_;
   CloudSources sources_;
   ModelLoader loader_;
@@ -91,6 +97,7 @@ class ProximityServer::Impl {
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
   double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
   ros::Time last_now_;
+  ros::Time last_stamp_;  ///< of the last ~proximity
 
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
@@ -156,7 +163,7 @@ void ProximityServer::Impl::run_cycles() {
   name_thread("ist cycle");
   if (joint_states_) {
     do {
-      run_cycle();
+      run_cycle_guarded();
     } while (wait_for_joint_states());
     return;
   }
@@ -164,9 +171,28 @@ void ProximityServer::Impl::run_cycles() {
       std::chrono::duration<double>(1.0 / config_.rate));
   Clock::time_point next = Clock::now();
   do {
-    run_cycle();
+    run_cycle_guarded();
     next = std::max(next + period, Clock::now());  // no burst follows a cycle that took too long
   } while (cycle_signal_.sleep_until(next));
+}
+
+/// Runs a cycle. Where an exception ends it, a message says so and that nothing is known, and the
+/// next cycle is run as usual.
+void ProximityServer::Impl::run_cycle_guarded() {
+  const std::string fault = exception_of([this] { run_cycle(); });
+  if (fault.empty()) return;
+  ROS_ERROR_STREAM_THROTTLE(5.0, "a cycle failed, and all links are UNKNOWN: " << fault);
+  exception_of([&] { publish_failure(fault); });  // there may be no memory even for that
+}
+
+void ProximityServer::Impl::publish_failure(const std::string& fault) {
+  const auto message = boost::make_shared<ist_proximity::ProximityArray>();
+  const std::lock_guard<std::mutex> lock(report_mutex_);
+  ModelState failed = model_ ? *model_ : ModelState();
+  failed.problem = "the last cycle failed: " + fault;
+  fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
+  ++report_.cycles;
+  results_.publish(message, [](ist_proximity::JointRepulsion*) {});
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -184,10 +210,14 @@ void ProximityServer::Impl::run_cycle() {
     if (cycle_) {
       cycle_->run(now, sources_, live, message.get(), &report_);
     } else {
-      fill_without_model(*model_, config_, now, sources_, message.get(), &report_);
+      fill_without_model(*model_, config_, std::max(now, last_stamp_), sources_, message.get(),
+                         &report_);
     }
+    last_stamp_ = message->header.stamp;
     ++report_.cycles;
   }
+  assert_invariants(*message,
+                    {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
   const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
     if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
   };
@@ -201,6 +231,7 @@ void ProximityServer::Impl::run_cycle() {
 void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
   listener_.notice_clock_jump();
   if (now < last_now_) {
+    last_stamp_ = ros::Time();
     if (cycle_) cycle_->forget();
     spheres_.repeat_after_clock_jump();
   }
@@ -218,6 +249,7 @@ void ProximityServer::Impl::take_model() {
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),
                          JointPoseSource::Which::kTaken),
         CloudSelection::Reader::kOnly);
+    cycle_->continue_from(last_stamp_);
   } else {
     cycle_.reset();
   }
@@ -251,16 +283,22 @@ void ProximityServer::Impl::run_diagnostics() {
   Clock::time_point last = Clock::now();
   while (diagnostics_signal_.sleep_until(last + std::chrono::seconds(1))) {
     last = Clock::now();
-    live_.read_again();
-    CycleReport report;
-    {
-      const std::lock_guard<std::mutex> lock(report_mutex_);
-      report = report_;
-    }
-    if (joint_states_) report.joint_states = joint_states_->report();
-    diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
-                         joint_states_received_);
+    const std::string fault = exception_of([this] { publish_diagnostics(); });
+    if (fault.empty()) continue;
+    ROS_ERROR_STREAM_THROTTLE(5.0, "the diagnostics are not published: " << fault);
   }
+}
+
+void ProximityServer::Impl::publish_diagnostics() {
+  CycleReport report;
+  {
+    const std::lock_guard<std::mutex> lock(report_mutex_);
+    report = report_;
+  }
+  report.parameter_problem = live_.problem();
+  if (joint_states_) report.joint_states = joint_states_->report();
+  diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
+                       joint_states_received_);
 }
 
 LiveConfig ProximityServer::Impl::live_config() const {

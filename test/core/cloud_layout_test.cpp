@@ -206,17 +206,82 @@ TEST_F(CloudLayoutTest, morePointsThanIdsCanNumber) {
   expect_fault({"65536", "32 bits"});
 }
 
-TEST_F(CloudLayoutTest, emptyCloudIsValidWithAnyOtherValues) {
-  layout_.width = 0;
-  layout_.point_step = 0;
-  layout_.row_step = 0;
-  layout_.data = nullptr;
+// An empty cloud with its fields is a measurement of nothing. Drivers fill in the steps or leave
+// them out.
+TEST_F(CloudLayoutTest, emptyCloudWithItsFieldsIsValid) {
   layout_.data_size = 0;
-  layout_.fields.clear();
-  EXPECT_EQ(expect_valid().size(), 0U);
-  layout_.width = 100;
+  for (const std::uint8_t* data : {static_cast<const std::uint8_t*>(nullptr), layout_.data}) {
+    layout_.data = data;
+    for (const std::uint32_t point_step : {0U, 16U}) {
+      layout_.point_step = point_step;
+      layout_.width = 0;
+      layout_.row_step = 0;
+      for (const std::uint32_t height : {0U, 1U, 4U}) {
+        layout_.height = height;
+        EXPECT_EQ(expect_valid().size(), 0U);
+        EXPECT_EQ(expect_valid().width + expect_valid().height, 0U);
+      }
+      layout_.height = 0;
+      layout_.width = 100;
+      for (const std::uint32_t row_step : {0U, 1600U}) {
+        layout_.row_step = row_step;
+        EXPECT_EQ(expect_valid().size(), 0U);
+      }
+    }
+  }
+}
+
+// A cloud that says to be empty and holds bytes is not one of nothing: an obstacle may be in them.
+TEST_F(CloudLayoutTest, emptyCloudWithDataContradictsItself) {
+  const CloudLayout whole = layout_;
+  layout_.width = 0;
+  layout_.row_step = 0;
+  expect_fault({"width 0", "height 4", "no point", "512 bytes"});
   layout_.height = 0;
-  EXPECT_EQ(expect_valid().size(), 0U);
+  expect_fault({"width 0", "height 0", "no point", "512 bytes"});
+  layout_ = whole;
+  layout_.height = 0;
+  expect_fault({"width 8", "height 0", "no point", "512 bytes"});
+  layout_.data_size = 1;
+  expect_fault({"1 bytes"});
+  layout_.data_size = 0;  // rows of 128 bytes are announced, and none is there
+  layout_.width = 0;
+  layout_.height = 4;
+  expect_fault({"data holds 0 bytes", "height 4", "row_step 128"});
+}
+
+// A cloud of colours alone, or of no field at all, has not measured where anything is.
+TEST_F(CloudLayoutTest, emptyCloudWithoutCoordinatesIsFaulty) {
+  layout_.width = layout_.height = layout_.row_step = 0;
+  layout_.data_size = 0;
+  layout_.data = nullptr;
+  const CloudLayout empty = layout_;
+  layout_.fields.clear();
+  expect_fault({"'x'", "missing"});
+  layout_.fields = {{"rgb", 0, kFloat32, 1}};
+  expect_fault({"'x'", "missing"});
+  layout_ = empty;
+  layout_.fields.erase(layout_.fields.begin() + 2);
+  expect_fault({"'z'", "missing"});
+  layout_ = empty;
+  layout_.fields[0].datatype = kInt16;
+  expect_fault({"'x'", "int16"});
+  layout_ = empty;
+  layout_.fields[1].offset = 0;
+  expect_fault({"overlap"});
+  layout_ = empty;
+  layout_.point_step = 8;
+  expect_fault({"'z'", "point_step of 8"});
+}
+
+TEST_F(CloudLayoutTest, morePointsThanAllowed) {
+  RawCloud cloud;
+  EXPECT_EQ(check_layout(layout_, &cloud, 32), "");
+  cloud = RawCloud();
+  const std::string fault = check_layout(layout_, &cloud, 31);
+  EXPECT_NE(fault.find("32 points, allowed are at most 31 (max_points)"), std::string::npos)
+      << fault;
+  EXPECT_EQ(cloud.data, nullptr);
 }
 
 }  // namespace

@@ -243,5 +243,82 @@ TEST(HardCloud, FarFromTheOrigin) {
   }
 }
 
+// Points near a link among points of huge finite coordinates, up to the largest of each type. Those
+// beyond 10^9 m are dropped as out of range. None changes the nearest obstacle, nor makes a bound
+// wrong.
+template <typename Scalar>
+void expect_huge_coordinates_are_sound(const std::vector<double>& sizes) {
+  test::Rng rng(63);
+  for (const double size : sizes) {
+    SCOPED_TRACE(size);
+    Points points;
+    for (int i = 0; i < 100; ++i) {
+      points.push_back(test::random_vector(&rng, 0.8).cast<float>().cast<double>());
+    }
+    const CloudSnapshot near = ingest<Scalar>(points, Eigen::Isometry3d::Identity(), 10.0);
+    for (int axis = 0; axis < 3; ++axis) {
+      points.emplace_back(size * Point::Unit(axis));
+      points.emplace_back(-size * Point::Unit(axis));
+    }
+    const CloudSnapshot all = ingest<Scalar>(points, Eigen::Isometry3d::Identity(),
+                                             std::numeric_limits<double>::infinity());
+    EXPECT_EQ(all.counts.used, size <= 1e9 ? points.size() : points.size() - 6);
+    EXPECT_EQ(all.counts.out_of_range, size <= 1e9 ? 0U : 6U);
+    EXPECT_EQ(all.counts.infinite + all.counts.not_a_number, 0U);
+    const Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.5);
+    const auto truth = query({&near}, X_FL, exact());
+    const auto results = query({&all}, X_FL, exact());
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      ASSERT_LE(results[i].lower_bound, truth[i].distance + 1e-12);
+      if (truth[i].state < LinkState::kNear) continue;
+      ASSERT_GE(results[i].state, LinkState::kNear);
+      ASSERT_NEAR(results[i].distance, truth[i].distance, 1e-6);
+      ASSERT_GE(results[i].lower_bound, truth[i].lower_bound - 1e-5);
+    }
+  }
+}
+
+TEST(HardCloud, HugeFiniteCoordinates) {
+  expect_huge_coordinates_are_sound<float>({1e4, 1e6, 9e8, 2e9, 1e13, 1e15, 1e19, 1e20, 3.4e38});
+  expect_huge_coordinates_are_sound<double>(
+      {1e4, 1e6, 9e8, 2e9, 1e15, 1e20, 1e40, 1e150, 1e160, 1e300});
+}
+
+// A pose at any finite place ends a query: links and clouds that are far apart are clear, and no
+// traversal runs over (boxes whose distances are NaN or infinite in float must not be visited for
+// ever).
+TEST(HardCloud, HugePosesOfLinks) {
+  test::Rng rng(64);
+  Points points;
+  for (int i = 0; i < 5000; ++i) points.push_back(test::random_vector(&rng, 0.8));
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  CloudSnapshot map;
+  auto boxes = std::make_shared<BoxIndex>();
+  std::vector<Eigen::AlignedBox3d> leaves;
+  for (const Point& p : points) leaves.emplace_back(p, p + Point::Constant(0.05));
+  boxes->build(leaves);
+  map.boxes = boxes;
+  for (const double size : {1e4, 1e9, 1e16, 1e19, 1e20, 1e38, 1e39, 1e154, 1e155, 1e300}) {
+    SCOPED_TRACE(size);
+    Eigen::Isometry3d X_FL = test::random_pose(&rng, 0.5);
+    X_FL.translation() += size * Point(1.0, -1.0, 0.5);
+    map.X_FM = Eigen::Isometry3d::Identity();
+    for (const bool map_is_far : {false, true}) {
+      if (map_is_far) {
+        map.X_FM.translation() = X_FL.translation();
+        X_FL.translation().setZero();
+      }
+      for (const LinkProximity& result : query({&map}, X_FL, exact())) {
+        ASSERT_LT(result.state, LinkState::kNear);
+        ASSERT_LE(result.lower_bound, size);
+      }
+    }
+    X_FL.translation() = map.X_FM.translation();
+    for (const LinkProximity& result : query({&cloud}, X_FL, exact())) {
+      ASSERT_LT(result.state, LinkState::kNear);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ist

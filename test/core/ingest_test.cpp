@@ -519,6 +519,34 @@ TEST(Ingest, thinnedCloudCanBeLeftOut) {
   EXPECT_TRUE(snapshot.coarse.empty());
 }
 
+// A sensor that tf places at 10^16 m: coordinates there are whole metres, so no bound means
+// anything.
+TEST(Ingest, refusesASensorFarOut) {
+  const Points points = random_points(50, 1.0, 3);
+  for (const double far : {1.1e9, 1e16, 1e300, kInf, kNan}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+      X_FS.translation()[axis] = -far;
+      EXPECT_THROW(ingest(points, {}, {}, X_FS), std::invalid_argument) << far;
+    }
+  }
+  try {
+    ingest(points, {}, {}, pose(1e16, 0, 0));
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("(1e+16"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(ingest(points, without_limits(), {}, pose(0, 0, 9e8)).counts.used, points.size());
+}
+
+TEST(Ingest, refusesMorePointsThanAllowed) {
+  IngestConfig config = without_limits();
+  config.max_points = 50;
+  EXPECT_EQ(ingest(random_points(50, 1.0, 3), config).counts.used, 50U);
+  EXPECT_THROW(ingest(random_points(51, 1.0, 3), config), std::invalid_argument);
+  config.max_points = 0;
+  EXPECT_THROW(Ingest{config}, std::invalid_argument);
+}
+
 // The next four tests have points far from an origin. In float, a coordinate of 4e6 m is off by up
 // to 0.25 m.
 TEST(Ingest, farSensorLosesNothing) {

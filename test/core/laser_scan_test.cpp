@@ -183,6 +183,16 @@ TEST(CheckScan, NamesTheFaultyMember) {
   for (const double bad : {nan, inf, 3.0}) {
     expect_fault("time_increment", [=](LaserScan* s) { s->time_increment = bad; });
   }
+  LaserScan many = good;  // a million beams over 9.9 s took 41 s with the self-filter
+  const std::vector<float> million(1000000, 1.0F);
+  many.ranges = million.data();
+  many.count = million.size();
+  many.angle_increment = 1e-6;
+  many.time_increment = 9.9e-6;
+  EXPECT_EQ(check_scan(many), "ranges holds 1000000 beams, allowed are at most 50000 (max_beams).");
+  ScanLimits limits;
+  limits.max_beams = million.size();
+  EXPECT_EQ(check_scan(many, limits), "");
   LaserScan unlimited_range = good;
   unlimited_range.range_max = inf;
   EXPECT_EQ(check_scan(unlimited_range), "");

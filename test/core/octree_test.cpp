@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 #include <octomap/octomap.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -201,6 +203,92 @@ TEST(ReadOctree, RandomBytes) {
     }
   }
   EXPECT_GT(readable, 0);
+}
+
+void expect_words(const std::string& fault, const std::string& words) {
+  EXPECT_NE(fault.find(words), std::string::npos) << "'" << words << "' not in: " << fault;
+}
+
+// Two bytes of a binary tree can be eight leaves: a message of 2.3 MB made 8 million of them, which
+// took 1.2 GB. The reader stops at the limit.
+TEST(ReadOctree, StopsAtTheLargestNumberOfLeaves) {
+  std::string bytes;
+  for (int depth = 0; depth < 10; ++depth) bytes += std::string("\x03\x00", 2);  // one child
+  std::string dense = "\xaa\xaa";  // eight occupied leaves
+  for (int level = 0; level < 5; ++level) {
+    std::string whole = "\xff\xff";  // eight inner nodes
+    for (int i = 0; i < 8; ++i) whole += dense;
+    dense = whole;
+  }
+  bytes += dense;
+  Octree octree;
+  ASSERT_EQ(read(bytes, true, &octree), "");
+  const std::size_t leaves = 262144;  // 8^6
+  EXPECT_EQ(octree.occupied.size(), leaves);
+  OctreeData data;
+  data.id = "OcTree";
+  data.is_binary = true;
+  data.resolution = 0.05;
+  data.data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+  data.size = bytes.size();
+  OctreeLimits limits;
+  limits.max_leaves = leaves;
+  EXPECT_EQ(read_octree(data, &octree, limits), "");
+  limits.max_leaves = leaves - 1;
+  expect_words(read_octree(data, &octree, limits), "262143 (max_leaves)");
+  EXPECT_LE(octree.occupied.size(), limits.max_leaves);
+  limits = {};
+  limits.max_bytes = bytes.size() - 1;
+  expect_words(read_octree(data, &octree, limits),
+               std::to_string(bytes.size()) + " bytes, allowed are at most");
+}
+
+// With a resolution of 0.4 m the tree's space reaches 13 km from its middle, with 1000 m 33,000 km.
+TEST(ReadOctree, RefusesLeavesFarOut) {
+  const std::string root_corner = std::string("\x02\x00", 2);  // one leaf: an eighth of the space
+  Octree octree;
+  EXPECT_EQ(read(root_corner, true, &octree, "OcTree", 0.3), "") << "9830.4 m";
+  EXPECT_EQ(octree.occupied.size(), 1U);
+  for (const double resolution : {0.4, 1000.0}) {
+    const std::string fault = read(root_corner, true, &octree, "OcTree", resolution);
+    expect_words(fault, "farther out than 10000 m (max_position)");
+    expect_words(fault, resolution < 1 ? "-13107.2" : "-3.2768e+07");
+  }
+  for (const double resolution : {1e-300, 1e300}) {
+    expect_words(read(root_corner, true, &octree, "OcTree", resolution), "resolution is 1e");
+  }
+  // A small leaf in the middle of the same space is near enough.
+  std::string chain;
+  for (int depth = 0; depth < 15; ++depth) {
+    chain += depth == 0 ? std::string("\x00\xc0", 2) : std::string("\x03\x00", 2);
+  }
+  EXPECT_EQ(read(chain + std::string("\x02\x00", 2), true, &octree, "OcTree", 1000.0), "");
+}
+
+// A FIFO without a writer would block for ever when it is opened, and /dev/zero never ends.
+TEST(ReadOctree, ReadsOnlyRegularFilesOfLimitedSize) {
+  const test::TempDir folder;
+  const std::string fifo = folder.file("fifo.bt");
+  ASSERT_EQ(mkfifo(fifo.c_str(), 0600), 0);
+  Octree octree;
+  for (const std::string& path : {fifo, std::string("/dev/zero"), folder.path().string()}) {
+    const std::string fault = read_octree_file(path, &octree);
+    expect_words(fault, "'" + path + "'");
+    expect_words(fault, "no regular file");
+  }
+  test::Rng rng(56);
+  const std::string path = folder.file("map.ot");
+  ASSERT_TRUE(random_tree(&rng, 0.05, 50).write(path));
+  const auto size = static_cast<std::size_t>(std::filesystem::file_size(path));
+  OctreeLimits limits;
+  limits.max_bytes = size;
+  EXPECT_EQ(read_octree_file(path, &octree, limits), "");
+  limits.max_bytes = size - 1;
+  expect_words(read_octree_file(path, &octree, limits),
+               std::to_string(size) + " bytes, allowed are at most " + std::to_string(size - 1));
+  // A sparse file of a terabyte is refused before it is read.
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40U);
+  expect_words(read_octree_file(path, &octree), "1099511627776 bytes");
 }
 
 }  // namespace

@@ -333,7 +333,7 @@ TEST(ProximityQuery, BoundsHoldForCloudsThatADeadlineLeftUnsearched) {
     ProximityQuery query(model, config);
     if (query.run({Eigen::Isometry3d::Identity()}, {true}, {&shell, &near}, &results)) continue;
     if (results[0].state == LinkState::kUnknown) continue;
-    ASSERT_LE(results[0].lower_bound, 0.1 + 1e-7);
+    ASSERT_LE(results[0].lower_bound, 0.1);
     ++late;
   }
   EXPECT_GT(late, test::kSanitized ? -1 : 20);

@@ -164,7 +164,7 @@ bool is_measured(const LinkProximity& link) { return link.state >= LinkState::kN
 // @param inside  whether all points within max_distance of the link are in the region
 void expect_bounds(const LinkProximity& link, double truth, bool inside,
                    const QueryConfig& config) {
-  ASSERT_LE(link.lower_bound, truth + kRounding);
+  ASSERT_LE(link.lower_bound, truth);
   if (link.state == LinkState::kClear) ASSERT_GE(truth, config.max_distance - kRounding);
   if (inside) ASSERT_NE(link.state, LinkState::kUnknown);
   if (is_measured(link)) ASSERT_GE(link.distance, truth - kRounding);
@@ -203,7 +203,7 @@ TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
     }
     RobotProximity robot;
     ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));
-    ASSERT_LE(robot.nearest.lower_bound, least + kRounding);
+    ASSERT_LE(robot.nearest.lower_bound, least);
     if (robot.nearest.state == LinkState::kClear) ASSERT_TRUE(all_inside);
   }
   EXPECT_GT(clear, 0);

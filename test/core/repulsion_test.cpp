@@ -488,5 +488,47 @@ TEST(CoarseSpheres, endWhenTheOtherSpheresAreInsideThem) {
   EXPECT_EQ(coarse_spheres(packing, 50).size(), 2U);
 }
 
+// A scene that is turned as a whole gets a wrench that is turned with it. The map's own frame
+// turns, so force, torque and the arm of pairs without a direction have to be turned out of it.
+TEST(Repulsion, turnedMapsTurnForceAndTorque) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  const std::vector<InnerSphere> spheres = bar();
+  const Repulsion repulsion(robot_of(spheres));
+  RepulsionConfig config;
+  config.influence_distance = 1.0;
+  int undirected = 0;
+  double largest_torque = 0.0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Eigen::Isometry3d X_FL = at({0.2 * u(random), 0.2 * u(random), 0.2 * u(random)});
+    X_FL.rotate(Eigen::AngleAxisd(3.0 * u(random), Vector3d(1, -2, 3).normalized()));
+    // Every third box holds a sphere's centre: that pair has no direction but the answer's.
+    const bool holds_center = trial % 3 == 0;
+    const Vector3d middle =
+        X_FL * spheres[static_cast<std::size_t>(trial) % spheres.size()].center +
+        (holds_center ? 0.0 : 0.3) * Vector3d(u(random), u(random), u(random));
+    const Vector3d half = Vector3d::Constant(0.02);
+    auto index = std::make_shared<BoxIndex>();
+    index->build({Eigen::AlignedBox3d(middle - half, middle + half)});
+    CloudSnapshot map;
+    map.boxes = index;
+    const Vector3d direction = Vector3d(u(random), u(random), u(random)).normalized();
+    const RepulsiveWrench plain =
+        repulsion.wrench(0, X_FL, {&map}, near_by(0.05, direction), config);
+
+    Eigen::Isometry3d X_FG = at({u(random), u(random), u(random)});  // turns the scene
+    X_FG.rotate(Eigen::AngleAxisd(3.0 * u(random), Vector3d(-1, 2, 2).normalized()));
+    map.X_FM = X_FG;
+    const RepulsiveWrench turned =
+        repulsion.wrench(0, X_FG * X_FL, {&map}, near_by(0.05, X_FG.linear() * direction), config);
+    ASSERT_LT((turned.force - X_FG.linear() * plain.force).norm(), 1e-4) << trial;
+    ASSERT_LT((turned.torque - X_FG.linear() * plain.torque).norm(), 1e-4) << trial;
+    largest_torque = std::max(largest_torque, plain.torque.norm());
+    undirected += holds_center && plain.force.normalized().dot(direction) > 0.5 ? 1 : 0;
+  }
+  EXPECT_GT(largest_torque, 0.05);
+  EXPECT_GT(undirected, 10);
+}
+
 }  // namespace
 }  // namespace ist

@@ -133,7 +133,7 @@ TEST(SelfQuery, randomLinksAgainstARandomSearch) {
         EXPECT_EQ(result.distance, std::numeric_limits<double>::infinity());
         continue;
       }
-      EXPECT_LE(result.lower_bound, std::min(there, back) + 1e-9) << what;
+      EXPECT_LE(result.lower_bound, std::min(there, back) + 1e-12) << what;
       EXPECT_LE(result.lower_bound, result.distance) << what;
       check_witnesses(scene, scene.pairs[i], result);
       if (result.state == LinkState::kContact) {  // the witnesses prove it
@@ -176,7 +176,7 @@ TEST(SelfQuery, spheresAreExact) {
       if (results[i].state != LinkState::kNear || truth < 1e-3) continue;
       EXPECT_NEAR(results[i].distance, truth, 1e-6);
       EXPECT_NEAR(results[i].lower_bound, truth, 1e-5);
-      EXPECT_LE(results[i].lower_bound, truth + 1e-9);
+      EXPECT_LE(results[i].lower_bound, truth + 1e-12);
     }
   }
 }
@@ -197,7 +197,7 @@ TEST(SelfQuery, boundsHoldForLinksWithHoles) {
       const double there = found_distance(scene.links[first], scene.links[second], X, &rng);
       const double back =
           found_distance(scene.links[second], scene.links[first], X.inverse(), &rng);
-      EXPECT_LE(results[i].lower_bound, std::min(there, back) + 1e-9) << first << ", " << second;
+      EXPECT_LE(results[i].lower_bound, std::min(there, back) + 1e-12) << first << ", " << second;
       apart += results[i].lower_bound > 0.0 ? 1 : 0;
     }
   }
@@ -247,6 +247,40 @@ TEST(SelfQuery, unknownPosesAndMargin) {
     EXPECT_EQ(result.state, LinkState::kUnknown);
     EXPECT_TRUE(std::isnan(result.distance));
     EXPECT_EQ(result.lower_bound, -std::numeric_limits<double>::infinity());
+  }
+}
+
+// A small box above the face of a large one, packed coarsely, corner down: inner spheres stay away
+// from corners by more than a centimetre, so a bound from them would be that much too high. The
+// true distance is the height of the lowest corner.
+TEST(SelfQuery, CoarsePackingsAreNoLargerThanTheirLinks) {
+  test::Rng rng(13);
+  const Eigen::Vector3d small(0.2, 0.15, 0.1), large(2.0, 2.0, 0.2);
+  const auto model = test::make_model({test::box(small), test::box(large)}, 0.02);
+  QueryConfig config;
+  config.max_distance = 1.0;
+  for (const bool swapped : {false, true}) {
+    const LinkPair pair = swapped ? LinkPair{1, 0} : LinkPair{0, 1};
+    SelfQuery query(model, {pair}, config);
+    std::vector<PairProximity> results;
+    for (int i = 0; i < test::scaled(500); ++i) {
+      std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+      X_FL[0] = test::random_pose(&rng, 0.2);
+      double lowest = std::numeric_limits<double>::infinity();
+      for (const double x : {-0.5, 0.5}) {
+        for (const double y : {-0.5, 0.5}) {
+          for (const double z : {-0.5, 0.5}) {
+            const Eigen::Vector3d corner(x * small.x(), y * small.y(), z * small.z());
+            lowest = std::min(lowest, (X_FL[0].linear() * corner).z());
+          }
+        }
+      }
+      const double truth = test::uniform(&rng, 0.001, 0.3);
+      X_FL[0].translation().z() = 0.5 * large.z() + truth - lowest;
+      query.run(X_FL, {true, true}, &results);
+      ASSERT_LE(results[0].lower_bound, truth + 1e-12) << i;
+      ASSERT_GE(results[0].distance, truth - 1e-9) << i;
+    }
   }
 }
 

@@ -74,6 +74,35 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   EXPECT_GT(counts.motions - counts.contacts, counts.motions / 10);
 }
 
+// Arguments that do not fit the model, as a request can bring about, give no time at all.
+TEST(TimeOfImpact, unknownWhereArgumentsDoNotFit) {
+  test::Rng rng(67);
+  const test::Arm arm = test::random_arm(&rng);
+  TimeOfImpact impacts(arm.model, arm.kinematics, QueryConfig());
+  const test::ArmMotion motion = test::random_motion(&rng, arm);
+  const CloudSnapshot cloud = test::make_snapshot(motion.points);
+  const auto all_unknown = [&](const JointMotion& joints, const JointPoses& still,
+                               std::size_t wanted) {
+    std::vector<ImpactTime> found(1);
+    found[0].time = kInf;
+    impacts.run(joints, still, motion.X_FR, std::vector<bool>(wanted, true), {&cloud}, &found);
+    return found.size() == arm.size() &&
+           std::all_of(found.begin(), found.end(),
+                       [](const ImpactTime& one) { return std::isnan(one.time); });
+  };
+  EXPECT_FALSE(all_unknown(motion.joints, motion.still, arm.size()));
+  EXPECT_TRUE(all_unknown(motion.joints, JointPoses(), arm.size()));
+  EXPECT_TRUE(all_unknown(motion.joints, motion.still, arm.size() + 1));
+  for (const double duration : {0.0, -1.0, std::nan(""), kInf}) {
+    JointMotion joints = motion.joints;
+    joints.duration = duration;
+    EXPECT_TRUE(all_unknown(joints, motion.still, arm.size())) << duration;
+  }
+  JointMotion joints = motion.joints;
+  joints.to.push_back(0.0);
+  EXPECT_TRUE(all_unknown(joints, motion.still, arm.size()));
+}
+
 // A sphere on a turning arm of 1 m touches a point when its centre is 0.1 m from it.
 TEST(TimeOfImpact, handComputed) {
   RobotDescription robot;

@@ -12,8 +12,10 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import PointField
 
 FAR_BOX = pt.transform((0, 0.8, 0))
+MAX_POINTS = 1000
 POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
 
 
@@ -53,12 +55,48 @@ def huge():
     return message
 
 
+def no_width_but_data():
+    message = pt.cloud(POINT)
+    message.width = message.row_step = 0
+    return message
+
+
+def no_height_but_data():
+    message = pt.cloud(POINT)
+    message.height = 0
+    return message
+
+
+def empty_without_fields():
+    message = pt.cloud(np.zeros((0, 3)))
+    message.fields = []
+    return message
+
+
+def empty_of_colours():
+    message = pt.cloud(np.zeros((0, 3)))
+    message.fields = [PointField("rgb", 0, PointField.FLOAT32, 1)]
+    return message
+
+
+def too_many_points():
+    return pt.cloud(np.repeat(POINT, MAX_POINTS + 1, axis=0))
+
+
+def sensor_far_out():
+    return pt.cloud(POINT, frame="far_camera")
+
+
 def unknown_frame():
     return pt.cloud(POINT, frame="nowhere")
 
 
 def empty_frame():
     return pt.cloud(POINT, frame="")
+
+
+def long_frame():
+    return pt.cloud(POINT, frame="f" * 1000000)
 
 
 # Functions that make a malformed cloud, and a word of the text that says what is wrong.
@@ -69,8 +107,16 @@ UNUSABLE = [
     (contradicting_rows, "row_step"),
     (field_beyond_point, "z"),
     (huge, "malformed"),
+    # A cloud that says to be empty was taken for free space: OK and CLEAR.
+    (no_width_but_data, "no point, but data holds"),
+    (no_height_but_data, "no point, but data holds"),
+    (empty_without_fields, "field 'x' is missing"),
+    (empty_of_colours, "field 'x' is missing"),
+    (too_many_points, "1001 points, allowed are at most 1000 (max_points)"),
+    (sensor_far_out, "(1e+16, 0, 0) m, allowed are at most 10000 m"),
     (unknown_frame, "nowhere"),
     (empty_frame, "frame_id"),
+    (long_frame, "frame_id of 1000000 characters"),
 ]
 
 
@@ -78,7 +124,8 @@ class BadCloudTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.world = pt.World("/bad_clouds").stand(box=FAR_BOX)
-        cls.node = pt.ProximityNode("/bad_clouds", urdf_text=pt.urdf())
+        cls.node = pt.ProximityNode("/bad_clouds", {"max_points": MAX_POINTS}, pt.urdf())
+        cls.world.poses["far_camera"] = ("base", pt.transform((1e16, 0, 0)))
         cls.world.start_tf()
 
     @classmethod

@@ -22,9 +22,9 @@ class SimulatedClock:
         self._repeater = None
 
     def start(self):
-        self._repeater = pt.Repeater(200, self._tick)
+        self._repeater = pt.Repeater(200, self.tick)
 
-    def _tick(self):
+    def tick(self):
         with self._lock:
             self.now += self.step
             self._publisher.publish(Clock(rospy.Time.from_sec(self.now)))

@@ -56,6 +56,7 @@ MALFORMED = [
     ({"time_increment": 1e30}, "more than 10 s"),
     ({"angle_increment": 1e30}, "more than two turns"),
     ({"ranges": []}, "ranges is empty"),
+    ({"ranges": [1.0] * 50001, "angle_increment": 6e-5}, "at most 50000 (max_beams)"),
 ]
 
 

@@ -65,6 +65,31 @@ class NoiseFilterTest(unittest.TestCase):
         source = {"topic": "cloud", "noise_filter": {"radius": 0.02}}
         self.check_all(dtype=">f8", sources={"camera": source, "cloud": dict(source)})
 
+    def test_huge_coordinates(self):
+        """Float64 coordinates that are infinite as float ended the node, in PCL."""
+        huge = [[1e40, 0, 0], [0, -1e150, 0], [0, 0, 1e300], [2e9, 0, 0], [0, 0, 1e38]]
+        self.world.points = np.vstack([LONE, PATCH, huge])
+        self.start(dtype="<f8", max_range=float("inf"), **{"noise_filter/radius": 0.02})
+        self.check(0.4, len(PATCH))
+        message = self.node.wait_for(lambda m: m.status == 0, "OK")
+        self.assertEqual(message.sources[0].points_received, 1 + len(PATCH) + len(huge))
+
+    def test_slower_than_timeout(self):
+        """An ingest slower than the timeout is named; the driver is not said to have stopped."""
+        parameters = {"noise_filter/radius": 1.0, "noise_filter/neighbors": 1000}
+        cube = np.random.default_rng(1).uniform(-0.25, 0.25, (40000, 3)) + [0, 0, 0.7]
+        self.world.points = cube
+        self.start(**parameters)
+        begin = len(self.node.messages)
+        message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "read and indexed for")
+        self.assertTrue(pt.all_unknown(message))
+        message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "too long for its timeout")
+        self.assertIn("noise filter", message.status_text)
+        for m in self.node.messages[begin:]:
+            self.assertNotIn("has its driver stopped", m.status_text)
+        self.world.points = cube[:1100]
+        self.node.wait_for_status(ProximityArray.OK)
+
     def test_off(self):
         self.world.points = np.vstack([LONE, PATCH])
         self.start()

@@ -258,6 +258,74 @@ class OctomapTest(unittest.TestCase):
         self.world.repeat(10, lambda: self.publisher.publish(message(Tree())))
         self.wait_for_ball(ball_truth(Tree().boxes(), pt.transform()), "a map ten times a second")
 
+    def test_restarted_server(self):
+        """A map server that starts again with an older clock is heard, at timeout .inf too."""
+        node = self.start({"room": self.topic(timeout=float("inf"))})
+        tree, other = Tree(), Tree([((5, 5, 0), 1)])
+        self.publisher.publish(message(tree))
+        self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the map")
+        for back in (3600.0, 0.001):  # from the map that is in use
+            tree, other = other, tree
+            older = message(tree)
+            older.header.stamp = node.messages[-1].sources[0].stamp - rospy.Duration(back)
+            self.publisher.publish(older)
+            m = self.wait_for_ball(ball_truth(tree.boxes(), pt.transform()), "the older map")
+            self.assertEqual(m.sources[0].stamp, older.header.stamp)
+        node.wait_until(
+            lambda: node.diagnostic("input room", "new starts: stamps went back") == "2",
+            "both new starts in the diagnostics",
+        )
+        self.assertIn("went back by 3600.00 s", node.log())
+
+    def test_limits(self):
+        """A map of more leaves or bytes than allowed, or farther out, is refused before it is built."""
+        node = self.start({"room": self.topic(timeout=float("inf"), max_leaves=2, max_bytes=1000)})
+        few, many = Tree([((5, 5, 0), 1)], []), Tree()
+        self.publisher.publish(message(few))
+        truth = ball_truth(few.boxes(), pt.transform())
+        self.wait_for_ball(truth, "a small map")
+        for one, words in (
+            (message(many), "more occupied leaves than allowed, which are 2 (max_leaves)"),
+            (message(few, data=[0] * 1001), "1001 bytes, allowed are at most 1000 (max_bytes)"),
+            (message(few, data=[2, 0], resolution=1000.0), "farther out than 10000 m"),
+            (message(few, resolution=1e-300), "resolution is 1e-300"),
+            (message(few, resolution=1e300), "resolution is 1e+300"),
+        ):
+            with self.subTest(words):
+                self.publisher.publish(one)
+                node.wait_until(
+                    lambda: "input room" in node.diagnostics
+                    and words in node.diagnostics["input room"].message,
+                    words,
+                )
+        self.wait_for_ball(truth, "the last good map")
+
+        # A map whose frame is far out is nowhere.
+        self.world.poses["far_map"] = ("base", pt.transform((0, -2e4, 0)))
+        self.publisher.publish(message(few, frame="far_map"))
+        m = node.wait_for_status(ProximityArray.NO_CLOUD, "(0, -20000, 0) m, allowed are at most")
+        self.assertTrue(pt.all_unknown(m))
+
+    def test_files_that_never_end(self):
+        """A FIFO would block, and /dev/zero would fill the memory; the node ends when it is told to."""
+        fifo = os.path.join(self.folder, "fifo.bt")
+        os.mkfifo(fifo)
+        large = self.write("large.bt", Tree().file(True))
+        os.truncate(large, 1 << 40)
+        sources = {"camera": {"topic": "cloud"}}
+        for name, path in (("fifo", fifo), ("zero", "/dev/zero"), ("large", large)):
+            sources[name] = {"type": "octomap_msgs/Octomap", "file": path, "required": False}
+        node = self.start(sources)
+        self.world.points = np.array([[0.0, 0.0, 0.3]])
+        self.world.start_clouds()
+        self.wait_for_ball(0.2, "the camera")
+        words = {"fifo": "no regular file", "zero": "no regular file", "large": "1099511627776 bytes"}
+        for name, text in words.items():
+            key = "input " + name
+            node.wait_until(
+                lambda: key in node.diagnostics and text in node.diagnostics[key].message, text
+            )
+
     def test_bad_maps(self):
         node = self.start({"room": self.topic(timeout=float("inf"))})
         good = message(Tree())

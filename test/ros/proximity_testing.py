@@ -118,7 +118,7 @@ class Repeater:
     """Calls a function at a rate, in a thread, until stopped or paused."""
 
     def __init__(self, rate, function):
-        self._period, self._function = 1.0 / rate, function
+        self._period, self.function = 1.0 / rate, function
         self._stop = threading.Event()
         self.paused = False
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -127,7 +127,7 @@ class Repeater:
     def _run(self):
         while not self._stop.wait(self._period):
             if not self.paused:
-                self._function()
+                self.function()
 
     def stop(self):
         self._stop.set()
@@ -199,7 +199,9 @@ class ProximityNode:
     # Command to run instead of the node, e.g. to load the nodelet.
     command = None
 
-    def __init__(self, namespace, parameters=None, urdf_text=None, listen=True):
+    def __init__(
+        self, namespace, parameters=None, urdf_text=None, listen=True, preexec_fn=None
+    ):
         self.namespace, self.name = namespace, namespace + "/proximity"
         self.messages, self.diagnostics = [], {}
         self._condition = threading.Condition()
@@ -228,6 +230,8 @@ class ProximityNode:
             ],
             stdout=self._log,
             stderr=subprocess.STDOUT,
+            preexec_fn=preexec_fn,
+            restore_signals=preexec_fn is None,
         )
         atexit.register(self.process.kill)  # no process stays when a test fails
 

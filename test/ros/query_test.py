@@ -201,6 +201,78 @@ class QueryTest(unittest.TestCase):
         self.node.wait_for_status(ProximityArray.OK)
         self.check_all()
 
+    def test_motion_without_root(self):
+        """A motion is not known while the root link's pose is not: NaN, neither free nor a crash."""
+        self.start(fixed_frame="world")
+        self.points = np.array([[0.0, 3.0, 0.5]])  # out of the robot's way
+        publisher = self.world.cloud_publisher
+        self.world.repeat(20, lambda: publisher.publish(pt.cloud(self.points, "world")))
+        self.clouds.paused = True
+        self.node.wait_for(
+            lambda m: m.status == ProximityArray.NO_POSE and m.sources[0].status == 0, "the cloud"
+        )
+        motion = [{"turn": 0.0, "slide": 0.2}, {"turn": 0.5, "slide": 0.4}]
+
+        def check_unknown(words):
+            answer = self.ask(*motion, times=[0.0, 1.0])
+            self.assertTrue(answer.success, answer.message)
+            self.assertIn(words, answer.message)
+            self.assertEqual(answer.impact_links, ["ball_link", "box_link"])
+            self.assertTrue(np.isnan(answer.impact_times).all(), answer.impact_times)
+            for result in answer.results:
+                pt.check_invariants(self, result, 3.0)
+                self.assertTrue(pt.all_unknown(result))
+
+        # Neither has the root link ever had a pose, nor the service an earlier answer.
+        check_unknown("no transform from 'base' to 'world'")
+        self.world.poses = {"base": ("world", pt.transform())}
+        tf = self.world.start_tf()
+
+        def known():
+            answer = self.ask(*motion, times=[0.0, 1.0])
+            return not np.isnan(answer.impact_times).any()
+
+        pt.wait_until(known, "a known motion")
+        self.assertEqual(list(self.ask(*motion, times=[0.0, 1.0]).impact_times), [np.inf] * 2)
+        # After a good answer, the root link's pose grows too old.
+        tf.stop()
+        pt.wait_until(lambda: not known(), "an unknown motion")
+        check_unknown("allowed is 0.50 s (~pose_timeout)")
+        # Differences of times that overflow are refused.
+        answer = self.ask(*motion, times=[-1.7e308, 1.7e308])
+        self.assertFalse(answer.success)
+        self.assertIn("times[1]", answer.message)
+
+    def test_limits(self):
+        """Requests are bounded, and the memory of a large answer is returned."""
+        self.start(**{"query/max_answers": 20000})
+        self.tf()
+        self.node.wait_for_status(ProximityArray.OK)
+
+        def memory(name):
+            """Returns VmRSS, or VmHWM, the largest that it has been [kB]."""
+            with open("/proc/%d/status" % self.node.process.pid) as f:
+                return [int(line.split()[1]) for line in f if line.startswith(name)][0]
+
+        self.assertTrue(self.ask(NOW).success)
+        before = memory("VmRSS")
+        answer = self.ask(*[NOW] * 10001)
+        self.assertFalse(answer.success)
+        self.assertIn("10001 states for 2 links are more than 20000 answers", answer.message)
+        self.assertIn("~query/max_answers", answer.message)
+        self.assertEqual(len(self.ask(*[NOW] * 10000).results), 10000)
+        self.assertEqual(len(self.ask(*[NOW] * 10001, links=["ball_link"]).results), 10001)
+        allowed = before + 0.6 * (memory("VmHWM") - before)
+        pt.wait_until(lambda: memory("VmRSS") < allowed, "the memory of the answers", 10.0)
+
+        for bad, words in (
+            (JointState(name=["turn", "turn"], position=[0.1, 0.2]), "'turn' is stated twice"),
+            (JointState(name=["slide"], position=[1e300]), "'slide' is 1e+300 m: allowed is up to"),
+        ):
+            answer = self.service(states=[bad])
+            self.assertFalse(answer.success)
+            self.assertIn(words, answer.message)
+
     def test_no_model(self):
         self.node = pt.ProximityNode(self.namespace, {})
         service = rospy.ServiceProxy(self.node.name + "/query", QueryProximity)

@@ -8,7 +8,7 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from dynamic_reconfigure.client import Client
-from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter, StrParameter
 from proximity_testing import ProximityArray
 
 
@@ -78,6 +78,62 @@ class ReconfigureTest(unittest.TestCase):
                 rospy.get_param(self.node.name + "/query").get("margin"), 0.07
             )
         self.node.wait_until(lambda: "~query/tolerance is -1 m" in self.node.log(), "the refusal")
+        self.ball("as before", lambda ball: abs(ball.distance - ball.lower_bound - 0.02) < 0.0011)
+
+    def margin_stays(self, words, margin):
+        """The ball's lower bound stays that of the margin for two readings of the server."""
+        begin = len(self.node.messages)
+        self.node.wait_until(
+            lambda: words in self.node.diagnostic("query", "live parameters")
+            and words in self.node.log(),
+            words,
+        )
+        self.ball("a second more", lambda ball: len(self.node.messages) > begin + 100)
+        for message in self.node.messages[begin:]:
+            if message.status == ProximityArray.OK:
+                self.assertLess(pt.link(message, "ball_link").lower_bound, 0.2 - margin + 1e-6)
+
+    def test_lost_values(self):
+        """What was configured stays until something valid replaces it, and the loss is told."""
+        name = self.node.name + "/query"
+        # Nothing that has never been there is missed.
+        self.node.wait_until(
+            lambda: self.node.diagnostic("query", "live parameters") == "as on the server", "no problem"
+        )
+        rospy.delete_param(name + "/margin")
+        self.margin_stays("no longer on the parameter server: ~query/margin (0.02 m)", 0.02)
+        rospy.set_param(name, "x")  # in place of all names below
+        self.margin_stays('~query is "x": a dictionary is needed', 0.02)
+        rospy.set_param(name, {"margin": -1.0, "tolerance": 0.002})
+        self.margin_stays("~query/margin is -1 m: allowed is from 0", 0.02)
+        rospy.set_param(self.node.name, 3)
+        self.margin_stays("no longer on the parameter server: ~query/tolerance (0.002 m)", 0.02)
+        rospy.delete_param(self.node.name)
+        self.margin_stays("~query/margin (0.02 m)", 0.02)
+        # A wrong value elsewhere does not keep a larger margin away.
+        rospy.set_param(self.node.name + "/repulsion/gain", "strong")
+        rospy.set_param(name + "/margin", 0.05)
+        self.ball("the new margin", lambda ball: ball.lower_bound < 0.15 + 1e-6)
+        self.margin_stays('~repulsion/gain is "strong"', 0.05)
+
+    def test_unknown_names(self):
+        """A request that names anything but the group's parameters fails and writes nothing."""
+        query = self.client("query")
+        pt.wait_until(lambda: query.get_configuration(), "~query/parameter_updates")
+        before = rospy.get_param(self.node.name)
+        wrong = [
+            Config(doubles=[DoubleParameter("margin", 0.07), DoubleParameter(name, 0.0)])
+            for name in ("", "margins", "margin/x", "/margin", "../rate", "repulsion/gain")
+        ]
+        wrong += [
+            Config(strs=[StrParameter("", "x")]),
+            Config(ints=[IntParameter("arbitrary", 1)]),
+            Config(bools=[BoolParameter("", True)]),
+        ]
+        for request in wrong:
+            with self.assertRaises(rospy.ServiceException):
+                query._set_service(request)
+            self.assertEqual(rospy.get_param(self.node.name), before)
         self.ball("as before", lambda ball: abs(ball.distance - ball.lower_bound - 0.02) < 0.0011)
 
 

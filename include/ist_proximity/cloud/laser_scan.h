@@ -30,10 +30,18 @@ struct LaserScan {
 /// A scan that takes longer than this is rejected as malformed. [s]
 constexpr double kLongestScan = 10.0;
 
-/// @returns an empty string, or one sentence with the faulty member and its value: no beams; an
-/// angle, an increment or a limit that is not finite or makes no sense (range_max may be inf);
-/// beams over more than two turns; a scan longer than kLongestScan. Thread safe.
-std::string check_scan(const LaserScan& scan);
+/// The largest scan that is used; a larger one is refused.
+struct ScanLimits {
+  /// Beams; scanners have up to 36,000 a turn. The self-filter compares each with the robot's poses
+  /// at up to 400 instants of a scan of kLongestScan, so that it bounds the time of one scan.
+  std::size_t max_beams = 50000;
+};
+
+/// @returns an empty string, or one sentence with the faulty member and its value: no beams, or
+/// more than allowed; an angle, an increment or a limit that is not finite or makes no sense
+/// (range_max may be inf); beams over more than two turns; a scan longer than kLongestScan. Thread
+/// safe.
+std::string check_scan(const LaserScan& scan, const ScanLimits& limits = {});
 
 /// A scan as points in the sensor's frame at the first beam.
 struct ScanPoints {

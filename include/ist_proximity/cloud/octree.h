@@ -25,6 +25,17 @@ struct Octree {
   std::size_t nodes = 0;                      ///< number of nodes, inner ones too
 };
 
+/// The largest tree that is read; a larger one is refused. They bound time and memory of one map.
+struct OctreeLimits {
+  /// Occupied leaves. Two million take about 350 MB and a second while their index is built.
+  std::size_t max_leaves = 2000000;
+  /// [bytes] of the tree's data, or of a map file. It bounds the leaves known to be free, too,
+  /// which take time to read but no memory: at most four for each byte.
+  std::size_t max_bytes = std::size_t{256} << 20U;
+  /// [m] Coordinates of occupied leaves in the map's frame. Float resolves 1 mm there.
+  double max_position = 1e4;
+};
+
 /// Reads the occupied leaves. In a binary tree each leaf says whether it is occupied; in a full
 /// tree it is when its probability is at least 0.5 (log-odds >= 0), octomap's default. Unknown
 /// space holds no obstacle.
@@ -34,11 +45,14 @@ struct Octree {
 /// without end on data that is cut off or is no tree.
 /// @param octree  overwritten; undefined when there is a fault
 /// @returns an empty string, or one sentence: another type of tree, an impossible resolution, data
-/// that ends too early, goes on after the tree, or is no tree. Thread safe.
-std::string read_octree(const OctreeData& data, Octree* octree);
+/// that ends too early, goes on after the tree, or is no tree; a limit that is passed, with its
+/// value. Thread safe.
+std::string read_octree(const OctreeData& data, Octree* octree, const OctreeLimits& limits = {});
 
-/// Reads a map file, `.bt` (binary) or `.ot` (full); its header says which.
+/// Reads a map file, `.bt` (binary) or `.ot` (full); its header says which. Only regular files are
+/// read.
 /// @returns an empty string, or one sentence that names the fault
-std::string read_octree_file(const std::string& path, Octree* octree);
+std::string read_octree_file(const std::string& path, Octree* octree,
+                             const OctreeLimits& limits = {});
 
 }  // namespace ist

@@ -55,7 +55,9 @@ class TimeOfImpact {
   /// @param X_FR     root link -> fixed frame
   /// @param wanted   by link of the model: false skips the link, and its time is NaN
   /// @param clouds   as for ProximityQuery::run; none makes every link unknown
-  /// @param results  by link of the model, overwritten
+  /// @param results  by link of the model, overwritten; every time is NaN where the sizes of the
+  /// other
+  ///                 arguments differ or the duration is not finite and more than 0
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
            const std::vector<bool>& wanted, SnapshotSpan clouds, std::vector<ImpactTime>* results);
 

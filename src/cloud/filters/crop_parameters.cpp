@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 
-#include "cloud/format/largest_range.h"
 #include "cloud/format/point_reader.h"
+#include "internal/cloud/largest_range.h"
 #include "internal/geometry/relative_pose.h"
 
 namespace ist {

@@ -44,7 +44,8 @@ std::string find_coordinate(const CloudLayout& layout, const char* name, const R
   // Some drivers leave the count 0; PCL takes it for 1, too.
   if (field.count > 1) return field_name + " has count " + text(field.count) + ", it must be 1.";
   const std::uint64_t end = std::uint64_t{field.offset} + size_of(field);
-  if (end > layout.point_step) {
+  const bool has_point_step = layout.point_step > 0;  // an empty cloud may leave it out
+  if (has_point_step && end > layout.point_step) {
     return field_name + " of type " + datatype_name(field.datatype) + " at offset " +
            text(field.offset) + " ends at byte " + text(end) + ", beyond the point_step of " +
            text(layout.point_step) + ".";
@@ -67,8 +68,8 @@ std::string check_pair(const RawField& a, const RawField& b) {
 }
 
 // Checks sizes in 64 bits, which hold the product of two 32-bit numbers.
-std::string check_sizes(const CloudLayout& layout, std::uint64_t row_step) {
-  const std::uint64_t width = layout.width, height = layout.height;
+std::string check_sizes(const CloudLayout& layout, std::uint64_t row_step, std::size_t max_points) {
+  const std::uint64_t width = layout.width, height = layout.height, points = width * height;
   const std::uint64_t row = width * layout.point_step;
   if (row_step < row) {
     return "row_step is " + text(row_step) + ", less than width " + text(width) + " * point_step " +
@@ -79,46 +80,66 @@ std::string check_sizes(const CloudLayout& layout, std::uint64_t row_step) {
     return "data holds " + text(layout.data_size) + " bytes, less than height " + text(height) +
            " * row_step " + text(row_step) + " = " + text(needed) + ".";
   }
-  if (layout.data == nullptr) return "data is null but " + text(needed) + " bytes are announced.";
-  if (width * height > std::numeric_limits<std::uint32_t>::max()) {
+  if (points == 0 && layout.data_size > 0) {
+    return "width " + text(width) + " * height " + text(height) + " is no point, but data holds " +
+           text(layout.data_size) + " bytes.";
+  }
+  if (layout.data == nullptr && needed > 0) {
+    return "data is null but " + text(needed) + " bytes are announced.";
+  }
+  if (points > std::numeric_limits<std::uint32_t>::max()) {
     return "width " + text(width) + " * height " + text(height) +
            " is more points than 32 bits can number.";
+  }
+  if (points > max_points) {
+    return "width " + text(width) + " * height " + text(height) + " is " + text(points) +
+           " points, allowed are at most " + text(max_points) + " (max_points).";
+  }
+  return {};
+}
+
+// Checks x, y and z, each by itself and with the others.
+// @param found  the fields of x, y and z
+std::string find_coordinates(const CloudLayout& layout, const RawField* (&found)[3]) {
+  static const char* const kNames[] = {"x", "y", "z"};
+  for (int i = 0; i < 3; ++i) {
+    std::string fault = find_coordinate(layout, kNames[i], &found[i]);
+    if (!fault.empty()) return fault;
+  }
+  for (int i = 0; i < 3; ++i) {
+    std::string fault = check_pair(*found[i / 2], *found[1 + (i + 1) / 2]);
+    if (!fault.empty()) return fault;
   }
   return {};
 }
 
 }  // namespace
 
-std::string check_layout(const CloudLayout& layout, RawCloud* cloud) {
-  if (layout.width == 0 || layout.height == 0) {
-    *cloud = RawCloud();
-    return {};
-  }
-  if (layout.point_step == 0) return "point_step is 0, a point needs at least 12 bytes.";
-  const RawField *x = nullptr, *y = nullptr, *z = nullptr;
-  std::string fault = find_coordinate(layout, "x", &x);
-  if (fault.empty()) fault = find_coordinate(layout, "y", &y);
-  if (fault.empty()) fault = find_coordinate(layout, "z", &z);
-  if (fault.empty()) fault = check_pair(*x, *y);
-  if (fault.empty()) fault = check_pair(*x, *z);
-  if (fault.empty()) fault = check_pair(*y, *z);
+std::string check_layout(const CloudLayout& layout, RawCloud* cloud, std::size_t max_points) {
+  const bool is_empty = layout.width == 0 || layout.height == 0;
+  if (layout.point_step == 0 && !is_empty)
+    return "point_step is 0, a point needs at least 12 bytes.";
+  const RawField* xyz[3] = {};
+  std::string fault = find_coordinates(layout, xyz);
   if (!fault.empty()) return fault;
 
-  const bool row_step_omitted = layout.row_step == 0 && layout.height == 1;
+  const bool row_step_omitted = layout.row_step == 0 && (layout.height == 1 || is_empty);
   const std::uint64_t row_step = row_step_omitted ? std::uint64_t{layout.width} * layout.point_step
                                                   : std::uint64_t{layout.row_step};
-  fault = check_sizes(layout, row_step);
+  fault = check_sizes(layout, row_step, max_points);
   if (!fault.empty()) return fault;
 
+  *cloud = RawCloud();
+  if (is_empty) return {};
   cloud->data = layout.data;
   cloud->width = layout.width;
   cloud->height = layout.height;
   cloud->point_step = layout.point_step;
   cloud->row_step = static_cast<std::size_t>(row_step);
-  cloud->x = x->offset;
-  cloud->y = y->offset;
-  cloud->z = z->offset;
-  cloud->is_double = x->datatype == kFloat64;
+  cloud->x = xyz[0]->offset;
+  cloud->y = xyz[1]->offset;
+  cloud->z = xyz[2]->offset;
+  cloud->is_double = xyz[0]->datatype == kFloat64;
   cloud->swap_bytes = layout.is_bigendian != kMachineIsBigEndian;
   return {};
 }

@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "cloud/format/largest_range.h"
+#include "internal/cloud/largest_range.h"
 
 namespace ist {
 namespace {
@@ -30,11 +30,15 @@ Beam judge(const LaserScan& scan, double range, double min_range, double max_ran
 
 }  // namespace
 
-std::string check_scan(const LaserScan& scan) {
+std::string check_scan(const LaserScan& scan, const ScanLimits& limits) {
   if (scan.count == 0) return "ranges is empty, a scan has at least one beam.";
   if (scan.ranges == nullptr) return "ranges is null.";
   if (scan.count > std::numeric_limits<std::uint32_t>::max()) {
     return "ranges holds more beams than 32 bits can number.";
+  }
+  if (scan.count > limits.max_beams) {
+    return "ranges holds " + std::to_string(scan.count) + " beams, allowed are at most " +
+           std::to_string(limits.max_beams) + " (max_beams).";
   }
   if (!(std::abs(scan.angle_min) <= kTwoTurns)) {
     return fault("angle_min", scan.angle_min, "it must be an angle in rad");

@@ -115,12 +115,13 @@ class TriangleBvh {
 
   /// Corners of up to eight triangles in float; unused slots repeat a corner.
   struct alignas(32) Leaf {
-    float corner[9][kWidth];  ///< [m] ax ay az bx by bz cx cy cz, from the centre of the box
-    std::uint32_t first;      ///< triangle of slot 0; the others follow
+    /// [m] ax ay az bx by bz cx cy cz, from the centre of the box; a is opposite the longest edge
+    float corner[9][kWidth];
+    std::uint32_t first;  ///< triangle of slot 0; the others follow
     std::uint32_t count;
   };
 
-  /// The same triangles in double.
+  /// The same triangles in double, their corners in the same order.
   struct Triangle {
     Eigen::Vector3d a, b, c;
     std::uint32_t index;  ///< in the mesh

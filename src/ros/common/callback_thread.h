@@ -1,17 +1,20 @@
 #pragma once
 
 #include <ros/callback_queue.h>
+#include <ros/console.h>
 
 #include <atomic>
 #include <functional>
 #include <string>
 #include <thread>
 
+#include "ros/common/exceptions.h"
 #include "ros/common/thread_name.h"
 
 namespace ist {
 
-/// A callback queue with a thread of its own. Subscribers and services that use the queue must be
+/// A callback queue with a thread of its own. An exception in a callback is logged, and the thread
+/// goes on with the next one. Subscribers and services that use the queue must be
 /// shut down after stop().
 class CallbackThread {
  public:
@@ -29,8 +32,13 @@ class CallbackThread {
     thread_ = std::thread([this, name, after_callbacks = std::move(after_callbacks)] {
       name_thread(name);
       while (running_) {
-        queue_.callAvailable(ros::WallDuration(0.05));
-        after_callbacks();
+        const std::string fault = exception_of([&] {
+          queue_.callAvailable(ros::WallDuration(0.05));
+          after_callbacks();
+        });
+        if (fault.empty()) continue;
+        ROS_ERROR_STREAM_THROTTLE(5.0, "a message or request to thread '"
+                                           << name << "' is dropped, it failed: " << fault);
       }
     });
   }

@@ -1,6 +1,7 @@
 #include "ros/common/eigen_conversion.h"
 
 #include <cmath>
+#include <sstream>
 
 #include "ist_proximity/proximity/proximity_query.h"
 
@@ -18,6 +19,13 @@ std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isomet
   result.linear() = q.toRotationMatrix();
   result.translation() = to_vector(transform.translation);
   if (!is_rigid(result)) return "it holds NaN or infinity";
+  if (!(result.translation().cwiseAbs().maxCoeff() <= kMaxPosition)) {
+    std::ostringstream text;
+    const Eigen::Vector3d& p = result.translation();
+    text << "it is at (" << p.x() << ", " << p.y() << ", " << p.z() << ") m, allowed are at most "
+         << kMaxPosition << " m; choose a frame that is nearer to the robot";
+    return text.str();
+  }
   *X = result;
   return "";
 }

@@ -7,8 +7,12 @@
 
 namespace ist {
 
+/// The farthest that a frame may be from another one that it is placed in [m]. Robots and the maps
+/// that they move in are smaller, and float still resolves 1 mm there.
+constexpr double kMaxPosition = 1e4;
+
 /// Converts a message's transform. The length of its quaternion may differ from 1 by rounding
-/// (1e-3); the result is a rotation.
+/// (1e-3); the result is a rotation. Positions beyond kMaxPosition are refused.
 /// @param X  the transform; untouched on failure
 /// @returns empty on success, else what is wrong with the numbers
 std::string to_isometry(const geometry_msgs::Transform& transform, Eigen::Isometry3d* X);

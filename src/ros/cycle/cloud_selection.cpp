@@ -21,6 +21,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
     if (snapshot) {
       report.has_snapshot = true;
       report.stamp = snapshot->stamp;
+      report.counts_from = snapshot->counts_from;
       report.counts = snapshot->cloud.counts;
       report.ingest_time = snapshot->cloud.ingest_time;
     }

@@ -1,5 +1,6 @@
 #include "ros/cycle/proximity_cycle.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -75,7 +76,7 @@ void ProximityCycle::look_up_poses(const ros::Time& now) {
     pose_source_->look_up(now, &poses_);
   } else {
     poses_.reset(now, robot_.links.size());
-    poses_.set_problem(wanted_links(*model_), no_kinematics(*model_));
+    poses_.set_problem(wanted_links(*model_), {no_kinematics(*model_), false});
   }
   status_input_.clock_runs = !now.isZero();
 }
@@ -90,7 +91,11 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
                                                     status_input_.sources[i].name);
     if (!unfiltered.empty()) problems.push_back(unfiltered);
   }
-  if (!problems.empty() && !transform_problem.empty()) problems.push_back(transform_problem);
+  status_input_.pose_doubts = poses_.doubts;
+  const bool is_new = std::none_of(problems.begin(), problems.end(), [&](const std::string& text) {
+    return text.find(transform_problem) != std::string::npos;
+  });
+  if (!problems.empty() && is_new) problems.push_back(transform_problem);
 }
 
 void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* message) {
@@ -126,6 +131,7 @@ Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) c
 void ProximityCycle::forget() {
   speeds_.assign(speeds_.size(), ClosingSpeed());
   filters_.assign(filters_.size(), RepulsionFilter());
+  poses_.stamp = ros::Time();
 }
 
 void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,

@@ -39,8 +39,11 @@ class ProximityCycle {
            ist_proximity::ProximityArray* message, CycleReport* report);
 
   /// Forgets the last cycles after a jump of the clock: no speed is computed across it, and the
-  /// repulsion's filter starts again.
+  /// repulsion's filter and the stamps start again.
   void forget();
+
+  /// Makes the next answer's stamp not go back before this one, which another cycle gave.
+  void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
 
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }

@@ -7,7 +7,8 @@
 
 namespace ist {
 
-std::string view_cloud(const sensor_msgs::PointCloud2& message, RawCloud* raw) {
+std::string view_cloud(const sensor_msgs::PointCloud2& message, std::size_t max_points,
+                       RawCloud* raw) {
   CloudLayout layout;
   for (const sensor_msgs::PointField& field : message.fields) {
     layout.fields.push_back({field.name, field.offset, field.datatype, field.count});
@@ -19,7 +20,7 @@ std::string view_cloud(const sensor_msgs::PointCloud2& message, RawCloud* raw) {
   layout.is_bigendian = message.is_bigendian;
   layout.data = message.data.data();
   layout.data_size = message.data.size();
-  return check_layout(layout, raw);
+  return check_layout(layout, raw, max_points);
 }
 
 sensor_msgs::PointCloud2Ptr to_message(const CloudSnapshot& snapshot, const ros::Time& stamp,

@@ -1,28 +1,45 @@
 #include "ros/input/cloud_source.h"
 
+#include <ros/console.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/input/cloud_conversion.h"
 #include "ros/input/map_measurement.h"
+#include "ros/poses/clock_skew.h"
 
 namespace ist {
 namespace {
 
 constexpr std::size_t kMaxWaiting = 10;
+// Clouds of one stream may overtake each other; stamps that go back farther are a new start. [s]
+constexpr double kMaxDisorder = 1.0;
+// Characters of a frame's name, which every status that mentions it repeats.
+constexpr std::size_t kMaxFrameName = 256;
 const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
 
 /// Stamps that are farther ahead of the clock are not believed. [s]
-double future_tolerance(double timeout) { return std::min(timeout, 1.0); }
+double future_tolerance(double timeout) { return std::min(timeout, kMaxAhead); }
+
+/// The end of a sentence about a measurement that waits for tf: its clock may be the reason.
+std::string clock_difference(const Measurement& measurement) {
+  const double ahead = seconds_between(measurement.counts_from(), measurement.header().stamp);
+  if (ahead < kToldSkew) return "";
+  return format_text("; its stamp is %.3f s ahead of the clock", ahead);
+}
 
 }  // namespace
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
-                         const tf2::BufferCore& buffer, const ros::Publisher& filtered)
+                         const TransformBuffer& buffer, const ros::Publisher& filtered)
     : config_(config),
       is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
@@ -32,7 +49,13 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
       ingest_(ingest_config(config)) {
   nh.setCallbackQueue(&queue_);
   if (config.file.empty()) {
-    subscriber_ = subscribe(config, &nh, [this](const Received& received) { receive(received); });
+    const auto begin = [this] {
+      if (is_map_) state_.begin_work();  // others are read in no time
+    };
+    subscriber_ = subscribe(config, &nh, begin, [this](const Received& received) {
+      if (is_map_) state_.end_work();
+      guard([&] { receive(received); });
+    });
   }
   thread_ = std::thread(&CloudSource::run, this);
 }
@@ -73,20 +96,39 @@ std::shared_ptr<const SourceSnapshot> CloudSource::share(
 
 void CloudSource::run() {
   name_thread("ist " + config_.name);
-  if (!config_.file.empty()) {
-    const Received received = read_map_file(config_.file, without_slash(config_.frame_id));
-    state_.set_file_problem(received.fault);
-    last_map_ = received.measurement;
-    map_is_new_ = last_map_ != nullptr;
-  }
+  guard([this] { read_file(); });
   while (running_) {
-    queue_.callAvailable(waiting_.empty() ? kPollIdle : kPollTf);
-    take_target();
-    drop_overdue();
-    use_newest_ready();
-    use_map();
-    count_publishers();
+    guard([this] { queue_.callAvailable(waiting_.empty() ? kPollIdle : kPollTf); });
+    guard([this] {
+      take_target();
+      drop_overdue();
+      use_newest_ready();
+      use_map();
+      count_publishers();
+    });
   }
+}
+
+/// Calls a function. An exception drops what waits, so that it is not met again and again: the
+/// source goes stale unless other messages can be used.
+void CloudSource::guard(const std::function<void()>& function) {
+  const std::string fault = exception_of(function);
+  if (fault.empty()) return;
+  waiting_.clear();
+  state_.end_work();
+  const std::string problem =
+      std::string("its ") + noun(config_.type) + " could not be used: " + fault;
+  state_.set_problem(problem, true);
+  ROS_ERROR_STREAM_THROTTLE(5.0, "source '" << config_.name << "': " << problem);
+}
+
+void CloudSource::read_file() {
+  if (config_.file.empty()) return;
+  const Received received =
+      read_map_file(config_.file, without_slash(config_.frame_id), config_.map);
+  state_.set_file_problem(received.fault);
+  last_map_ = received.measurement;
+  map_is_new_ = last_map_ != nullptr;
 }
 
 void CloudSource::count_publishers() {
@@ -116,7 +158,7 @@ void CloudSource::take_target() {
 void CloudSource::drop_overdue() {
   const double now = ros::Time::now().toSec();
   while (!waiting_.empty() && (waiting_.size() > kMaxWaiting ||
-                               now - waiting_.front()->header().stamp.toSec() > config_.timeout)) {
+                               now - waiting_.front()->counts_from().toSec() > config_.timeout)) {
     state_.update([](SourceReport* report) { ++report->unusable; });
     waiting_.pop_front();
   }
@@ -129,12 +171,22 @@ void CloudSource::receive(const Received& received) {
   const std::string problem = why_unusable(received);
   const double ahead = seconds_between(ros::Time::now(), stamp);
   const bool is_believed = !stamp.isZero() && ahead <= future_tolerance(config_.timeout);
+  if (is_believed && ahead >= kToldSkew) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': its stamps are " << ahead
+                                              << " s ahead of the clock; their age counts from "
+                                                 "their receipt; compare the clocks");
+  }
+  if (problem.empty() && is_believed && is_new_start(stamp)) start_again(stamp);
   bool is_used = true;
   state_.update([&](SourceReport* report) {
     ++report->messages;
-    if (is_believed) report->newest = std::fmax(report->newest, stamp.toSec());
+    if (is_believed) {
+      report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
+      report->ahead = ahead;
+    }
     if (is_believed && stamp < in_use_) {
       ++report->out_of_order;
+      if (went_back(stamp) > kMaxDisorder) report->problem = older_than_used(went_back(stamp));
       is_used = false;
       return;
     }
@@ -159,6 +211,41 @@ void CloudSource::receive(const Received& received) {
   waiting_.insert(after, received.measurement);
 }
 
+/// [s] How much earlier a stamp is than the newest one that is in use or waits; negative: it is
+/// later.
+double CloudSource::went_back(const ros::Time& stamp) const {
+  const ros::Time newest =
+      waiting_.empty() ? in_use_ : std::max(in_use_, waiting_.back()->header().stamp);
+  return newest.isZero() ? -1.0 : seconds_between(stamp, newest);
+}
+
+/// Whether a message that came later has an earlier stamp because the clock of its sender went
+/// back. Maps come one by one, so that any earlier stamp says so. A message that is stale already
+/// does not replace one that is not.
+bool CloudSource::is_new_start(const ros::Time& stamp) const {
+  return went_back(stamp) > (is_map_ ? 0.0 : kMaxDisorder) &&
+         seconds_between(stamp, ros::Time::now()) <= config_.timeout;
+}
+
+void CloudSource::start_again(const ros::Time& stamp) {
+  ROS_WARN_STREAM_THROTTLE(
+      5.0, "source '" << config_.name << "': the stamps of its " << noun(config_.type) << "s went "
+                      << format_text("back by %.2f s", went_back(stamp))
+                      << "; the sender has started again, and its messages are used from now on");
+  waiting_.clear();
+  in_use_ = ros::Time();
+  state_.update([](SourceReport* report) {
+    ++report->restarts;
+    report->newest = std::numeric_limits<double>::quiet_NaN();
+  });
+}
+
+std::string CloudSource::older_than_used(double seconds) const {
+  return std::string("its ") + noun(config_.type) + "s " +
+         format_text("are stamped %.2f s before the one in use and are stale: ", seconds) +
+         "has the sender's clock gone back?";
+}
+
 std::string CloudSource::why_unusable(const Received& received) const {
   const ros::Time& stamp = received.header.stamp;
   const std::string plural = std::string("its ") + noun(config_.type) + "s ";
@@ -168,7 +255,12 @@ std::string CloudSource::why_unusable(const Received& received) const {
     return plural + format_text("are stamped %.2f s in the future: ", ahead) +
            "compare the clocks of sensor and node";
   }
-  if (received.header.frame_id.empty()) return plural + "have an empty frame_id";
+  const std::size_t name_length = received.header.frame_id.size();
+  if (name_length == 0) return plural + "have an empty frame_id";
+  if (name_length > kMaxFrameName) {
+    return plural + "have a frame_id of " + std::to_string(name_length) +
+           " characters, allowed are at most " + std::to_string(kMaxFrameName);
+  }
   if (!received.fault.empty()) return received.fault;
   if (!target_.model && !is_map_) return "it waits for the robot's model";
   return "";
@@ -185,13 +277,15 @@ void CloudSource::use_newest_ready() {
     std::string problem = placer_.missing_transform(*waiting_[i], target_);
     if (!problem.empty()) {
       if (i + 1 == waiting_.size() && !is_usual) {
-        state_.set_problem(problem, false);
+        state_.set_problem(problem + clock_difference(*waiting_[i]), false);
         waits_for_tf_ = true;
       }
       continue;
     }
     waits_since_ = now;
+    state_.begin_work();
     problem = ingest(*waiting_[i]);
+    state_.end_work();
     waits_for_tf_ = false;
     state_.set_problem(problem, !problem.empty());
     state_.update([i](SourceReport* report) { report->overtaken += i; });
@@ -221,12 +315,14 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     measurement.ingest(placement, &ingest_, &snapshot.cloud);
   } catch (const std::exception& error) {  // no memory for a huge cloud
     snapshot.generation = 0;
-    return std::string("the ") + noun(config_.type) + " could not be read: " + error.what();
+    problem = std::string("the ") + noun(config_.type) + " could not be read: " + error.what();
+    ROS_ERROR_STREAM_THROTTLE(5.0, "source '" << config_.name << "': " << problem);
+    return problem;
   }
   complete(measurement, placement, &snapshot);
   in_use_ = snapshot.stamp;
   if (show) {
-    filtered_.publish(to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
+    publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
     state_.update([](SourceReport* report) { ++report->shown; });
   }
   exchange_.publish();
@@ -237,6 +333,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
 void CloudSource::complete(const Measurement& measurement, const Placement& placement,
                            SourceSnapshot* snapshot) const {
   snapshot->stamp = measurement.header().stamp;
+  snapshot->counts_from = measurement.counts_from();
   snapshot->model = target_.model;
   snapshot->fixed_frame = target_.fixed_frame;
   snapshot->map_frame = without_slash(measurement.header().frame_id);

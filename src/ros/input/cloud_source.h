@@ -2,11 +2,11 @@
 
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
-#include <tf2/buffer_core.h>
 
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -19,6 +19,7 @@
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
 #include "ros/parameters/source_config.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -30,6 +31,11 @@ namespace ist {
 /// is ready is used, and older ones are dropped. Links whose transforms have stopped are not waited
 /// for (see Placer).
 ///
+/// Messages are used in the order of their stamps. Where stamps go back (the sensor's driver or the
+/// map server has started again, with another clock), that is a new start, and is told.
+///
+/// An exception in the thread becomes the source's problem, and the thread goes on.
+///
 /// A map is placed when a query asks for it, at the pose of its frame at that time, so that it
 /// stays right on a robot that drives. The last map is kept for a model that is loaded later,
 /// because it may never be sent again. A map file is read once, in this thread.
@@ -38,7 +44,7 @@ class CloudSource {
   /// @param nh        in the namespace that the topic is relative to
   /// @param buffer    outlives this
   /// @param filtered  publisher of what queries see, used while it has subscribers
-  CloudSource(const SourceConfig& config, ros::NodeHandle nh, const tf2::BufferCore& buffer,
+  CloudSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
               const ros::Publisher& filtered);
   ~CloudSource();
   CloudSource(const CloudSource&) = delete;
@@ -68,8 +74,14 @@ class CloudSource {
   using MeasurementPtr = std::shared_ptr<const Measurement>;
 
   void run();
+  void guard(const std::function<void()>& function);
+  void read_file();
   void receive(const Received& received);
   std::string why_unusable(const Received& received) const;
+  double went_back(const ros::Time& stamp) const;
+  bool is_new_start(const ros::Time& stamp) const;
+  void start_again(const ros::Time& stamp);
+  std::string older_than_used(double seconds) const;
   void take_target();
   void drop_overdue();
   void use_newest_ready();
@@ -81,7 +93,7 @@ class CloudSource {
 
   const SourceConfig config_;
   const bool is_map_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
   ros::Subscriber subscriber_;

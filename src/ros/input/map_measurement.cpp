@@ -66,7 +66,7 @@ void parse(ser::IStream* stream, std_msgs::Header* header, OctreeData* data) {
 
 }  // namespace
 
-Received read_map(const topic_tools::ShapeShifter& message) {
+Received read_map(const topic_tools::ShapeShifter& message, const OctreeLimits& limits) {
   const auto begin = std::chrono::steady_clock::now();
   Received received;
   if (message.getDataType() != message_type(SourceType::kMap)) {
@@ -77,15 +77,15 @@ Received read_map(const topic_tools::ShapeShifter& message) {
         "a " + message.getDataType() + " comes in, it must be a " + message_type(SourceType::kMap);
     return received;
   }
-  std::vector<std::uint8_t> bytes(message.size());
-  ser::OStream out(bytes.data(), message.size());
-  message.write(out);
   OctreeData data;
   Octree octree;
   try {
+    std::vector<std::uint8_t> bytes(message.size());
+    ser::OStream out(bytes.data(), message.size());
+    message.write(out);
     ser::IStream in(bytes.data(), message.size());
     parse(&in, &received.header, &data);
-    received.fault = read_octree(data, &octree);
+    received.fault = read_octree(data, &octree, limits);
     if (received.fault.empty()) return make_received(received.header, octree, begin);
   } catch (const std::exception& error) {  // the stream ends too early, or there is no memory
     received.fault = error.what();
@@ -94,13 +94,14 @@ Received read_map(const topic_tools::ShapeShifter& message) {
   return received;
 }
 
-Received read_map_file(const std::string& path, const std::string& frame_id) {
+Received read_map_file(const std::string& path, const std::string& frame_id,
+                       const OctreeLimits& limits) {
   const auto begin = std::chrono::steady_clock::now();
   Received received;
   received.header.frame_id = frame_id;
   Octree octree;
   try {
-    received.fault = read_octree_file(path, &octree);
+    received.fault = read_octree_file(path, &octree, limits);
     if (received.fault.empty()) return make_received(received.header, octree, begin);
   } catch (const std::exception& error) {
     received.fault = "map file '" + path + "' cannot be read: " + error.what() + ".";

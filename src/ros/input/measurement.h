@@ -2,9 +2,11 @@
 
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>
+#include <ros/time.h>
 #include <std_msgs/Header.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -29,12 +31,16 @@ struct Placement {
 /// turns itself into a snapshot. Immutable; it keeps the message alive.
 class Measurement {
  public:
-  explicit Measurement(const std_msgs::Header& header) : header_(header) {}
+  explicit Measurement(const std_msgs::Header& header)
+      : header_(header), received_(ros::Time::now()) {}
   virtual ~Measurement() = default;
   Measurement(const Measurement&) = delete;
   Measurement& operator=(const Measurement&) = delete;
 
   const std_msgs::Header& header() const { return header_; }
+  /// The instant from which its age counts: its stamp, or its receipt where the stamp was ahead of
+  /// the clock.
+  ros::Time counts_from() const { return std::min(header_.stamp, received_); }
 
   /// The instants, in order, at which the poses of sensor and robot must be known, the stamp first:
   /// several for a scan, which takes its time, and none for a map, which stays in its own frame.
@@ -49,6 +55,7 @@ class Measurement {
 
  private:
   std_msgs::Header header_;
+  ros::Time received_;
 };
 
 /// A received message: its header, and either a sentence about its fault or a measurement.
@@ -58,12 +65,15 @@ struct Received {
   std::shared_ptr<const Measurement> measurement;
 };
 using Receiver = std::function<void(const Received&)>;
+/// Called before a message is read, which takes long for a large map.
+using ReadingBegins = std::function<void()>;
 
 /// The configuration of a source's Ingest. The range limits of scans apply to beams instead.
 IngestConfig ingest_config(const SourceConfig& config);
 
 /// Subscribes to the source's topic with its message type.
-/// @param receive  called from the callback queue of the node handle
-ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh, const Receiver& receive);
+/// @param begin, receive  called from the callback queue of the node handle
+ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh,
+                          const ReadingBegins& begin, const Receiver& receive);
 
 }  // namespace ist

@@ -13,6 +13,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "internal/cloud/largest_range.h"
+
 namespace ist {
 
 #ifdef IST_PROXIMITY_WITH_PCL
@@ -39,9 +41,12 @@ Point point_at(const RawCloud& cloud, std::size_t row, std::size_t column) {
           read(point + cloud.z, cloud.swap_bytes)};
 }
 
+// False for NaN and infinity, too. Coordinates within kLargestRange are finite in float: PCL ends
+// the program when it is given others.
 bool is_within(const Point& p, double range) {
   const double range_sq = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-  return range_sq <= range * range && std::isfinite(range_sq);
+  const double limit = std::min(range, kLargestRange);
+  return range_sq <= limit * limit;
 }
 
 RawCloud view(const std::vector<Point>& points, const RawCloud& like) {

@@ -13,11 +13,23 @@ namespace {
 
 constexpr std::chrono::milliseconds kGrace(500);
 
+// Poses of a link that are nearer to each other count once in the self-filter, whose padding is
+// much more: a scan of ten seconds has 400 instants, and the robot often stands still. [m]
+constexpr double kSamePlace = 0.001;
+
+/// Whether no point of a link moves farther than kSamePlace between two poses.
+bool stays_in_place(const InnerSphereTree& tree, const Eigen::Isometry3d& X_FL,
+                    const Eigen::Isometry3d& X_FM) {
+  const double turned = (X_FL.linear() - X_FM.linear()).norm();  // at least the spectral norm
+  return (X_FL * tree.center() - X_FM * tree.center()).norm() + tree.radius() * turned <=
+         kSamePlace;
+}
+
 }  // namespace
 
 // A cloud is worth more without one link's self-filter than after its timeout, so the wait ends
 // before that.
-Placer::Placer(const SourceConfig& config, const tf2::BufferCore& buffer)
+Placer::Placer(const SourceConfig& config, const TransformBuffer& buffer)
     : self_filter_(config.ingest.self_filter),
       patience_(0.8 * std::min(config.timeout, 1.0)),
       buffer_(buffer) {}
@@ -57,8 +69,8 @@ bool Placer::is_worth_waiting_for(const std::string& link, const std::string& fi
          seconds_between(newest, now) < patience_;
 }
 
-/// Adds the links whose poses are known at an instant.
-void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp,
+/// Adds the links whose poses are known at an instant, but for those that have not moved.
+void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, FilterPoses* last,
                         Placement* placement) const {
   const auto& links = target.model->links;
   std::vector<Eigen::Isometry3d> X_FL(links.size(), Eigen::Isometry3d::Identity());
@@ -71,6 +83,13 @@ void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp,
                look_up(buffer_, target.fixed_frame, links[i].name, stamp, &X_FL[i]).empty();
     // A link whose pose is unknown at any instant is not filtered for certain.
     placement->known[i] = placement->known[i] && known[i];
+    if (!known[i]) continue;
+    if (last->known[i] && stays_in_place(links[i].tree, last->X_FL[i], X_FL[i])) {
+      known[i] = false;  // it is where it was already
+      continue;
+    }
+    last->known[i] = true;
+    last->X_FL[i] = X_FL[i];
   }
   append_posed_solids(*target.model, X_FL, known, &placement->robot);
 }
@@ -88,11 +107,15 @@ std::string Placer::place(const Measurement& measurement, const SourceTarget& ta
   }
   if (!problem.empty() || !self_filter_) return problem;
   placement->known.assign(target.model->links.size(), true);
-  for (const ros::Time& instant : instants) pose_robot(target, instant, placement);
+  const std::size_t count = target.model->links.size();
+  FilterPoses last;
+  last.X_FL.assign(count, Eigen::Isometry3d::Identity());
+  last.known.assign(count, false);
+  for (const ros::Time& instant : instants) pose_robot(target, instant, &last, placement);
   return "";
 }
 
-std::string place_map(const tf2::BufferCore& buffer, const ros::Time& time, double max_age,
+std::string place_map(const TransformBuffer& buffer, const ros::Time& time, double max_age,
                       SourceSnapshot* snapshot) {
   const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
   Eigen::Isometry3d& X_FM = snapshot->cloud.X_FM;

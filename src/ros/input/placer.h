@@ -1,14 +1,15 @@
 #pragma once
 
 #include <ros/time.h>
-#include <tf2/buffer_core.h>
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "ros/input/measurement.h"
 #include "ros/input/source_snapshot.h"
 #include "ros/input/source_state.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -20,7 +21,7 @@ namespace ist {
 class Placer {
  public:
   /// @param buffer  outlives this
-  Placer(const SourceConfig& config, const tf2::BufferCore& buffer);
+  Placer(const SourceConfig& config, const TransformBuffer& buffer);
 
   /// Tells that the target's model or generation is new: all links get time to appear in tf.
   void begin_target();
@@ -38,11 +39,17 @@ class Placer {
  private:
   bool is_worth_waiting_for(const std::string& link, const std::string& fixed_frame,
                             const ros::Time& stamp) const;
-  void pose_robot(const SourceTarget& target, const ros::Time& stamp, Placement* placement) const;
+  /// By link: the last of its poses that the self-filter is given.
+  struct FilterPoses {
+    std::vector<Eigen::Isometry3d> X_FL;
+    std::vector<bool> known;
+  };
+  void pose_robot(const SourceTarget& target, const ros::Time& stamp, FilterPoses* last,
+                  Placement* placement) const;
 
   const bool self_filter_;
   const double patience_;  ///< [s] a cloud waits this long at most for one link's pose
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   std::chrono::steady_clock::time_point target_since_;
 };
 
@@ -51,7 +58,7 @@ class Placer {
 /// @param max_age   [s] allowed age of the newest instant
 /// @param snapshot  its frames are read, cloud.X_FM is set
 /// @returns empty on success, else a sentence
-std::string place_map(const tf2::BufferCore& buffer, const ros::Time& time, double max_age,
+std::string place_map(const TransformBuffer& buffer, const ros::Time& time, double max_age,
                       SourceSnapshot* snapshot);
 
 }  // namespace ist

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "ist_proximity/cloud/laser_scan.h"
 
@@ -12,9 +13,15 @@ namespace {
 // farther from one of the poses than half the self-filter's usual padding.
 constexpr double kBetweenPoses = 0.025;  // [s]
 
-// Simulated time begins at 0, and no stamp can be earlier.
+// Stamps are later than 0, where simulated time begins, and end before 2^32 s: instants outside are
+// moved to the nearest stamp there is.
 ros::Time shifted(const ros::Time& stamp, double seconds) {
-  return stamp.toSec() + seconds > 0.0 ? stamp + ros::Duration(seconds) : ros::Time(0, 1);
+  const auto shift = static_cast<std::int64_t>(std::llround(1e9 * seconds));
+  const auto latest = static_cast<std::int64_t>(ros::TIME_MAX.toNSec());
+  const std::int64_t time = static_cast<std::int64_t>(stamp.toNSec()) + shift;
+  ros::Time result;
+  result.fromNSec(static_cast<std::uint64_t>(std::clamp<std::int64_t>(time, 1, latest)));
+  return result;
 }
 
 class ScanMeasurement : public Measurement {
@@ -53,7 +60,7 @@ class ScanMeasurement : public Measurement {
 }  // namespace
 
 Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_range,
-                   double max_range) {
+                   double max_range, const ScanLimits& limits) {
   LaserScan scan;
   scan.angle_min = static_cast<double>(message->angle_min);
   scan.angle_increment = static_cast<double>(message->angle_increment);
@@ -62,7 +69,7 @@ Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_ran
   scan.range_max = static_cast<double>(message->range_max);
   scan.ranges = message->ranges.data();
   scan.count = message->ranges.size();
-  const std::string fault = check_scan(scan);
+  const std::string fault = check_scan(scan, limits);
   if (!fault.empty()) return {message->header, "malformed scan: " + fault, nullptr};
   return {message->header, "",
           std::make_shared<ScanMeasurement>(message, scan, min_range, max_range)};

@@ -2,6 +2,7 @@
 
 #include <sensor_msgs/LaserScan.h>
 
+#include "ist_proximity/cloud/laser_scan.h"
 #include "ros/input/measurement.h"
 
 namespace ist {
@@ -10,6 +11,6 @@ namespace ist {
 /// self-filter uses the robot's poses at several instants of the scan.
 /// @param min_range, max_range  [m] points outside these limits are dropped
 Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_range,
-                   double max_range);
+                   double max_range, const ScanLimits& limits);
 
 }  // namespace ist

@@ -28,14 +28,21 @@ struct SourceReport {
   std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use
   std::uint64_t overtaken = 0;     ///< dropped: a newer one was ready first
   std::uint64_t shown = 0;         ///< published on ~filtered_cloud, while it has subscribers
+  std::uint64_t restarts = 0;      ///< times that the stamps went back and were taken all the same
   std::uint64_t unusable = 0;      ///< dropped: malformed, in the future, or without transform
   std::uint32_t publishers = 0;
-  /// Newest stamp received, except for stamps far in the future; NaN: none.
+  double ahead = 0.0;  ///< [s] of the newest message's stamp at its receipt
+  /// Newest stamp received, or its receipt where it was ahead of the clock, except for stamps far
+  /// in the future; NaN: none.
   double newest = std::numeric_limits<double>::quiet_NaN();
-  std::string problem;  ///< why the last message is not in use (yet); empty when it is
+  /// [s] for which the present message has been read and ingested; 0: none is.
+  double working = 0.0;
+  double last_work = 0.0;  ///< [s] what reading and ingesting the last message took
+  std::string problem;     ///< why the last message is not in use (yet); empty when it is
 
   bool has_snapshot = false;  ///< whether a cloud is in use; the members below describe it
   ros::Time stamp;
+  ros::Time counts_from;     ///< the age counts from then
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
 };

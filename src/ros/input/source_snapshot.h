@@ -16,6 +16,7 @@ namespace ist {
 struct SourceSnapshot {
   CloudSnapshot cloud;
   ros::Time stamp;
+  ros::Time counts_from;  ///< see Measurement::counts_from()
   std::shared_ptr<const RobotModel> model;
   /// By link: false where the self-filter had no pose at the cloud's stamp, so that points on that
   /// link are still among the obstacles. Empty: the source does not filter.

@@ -44,6 +44,9 @@ SourceReport SourceState::report() {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
   SourceReport report = report_;
+  if (work_since_ != kNoWork) {
+    report.working = std::chrono::duration<double>(Clock::now() - work_since_).count();
+  }
   if (!placing_problem_.empty()) report.problem = placing_problem_;
   if (!file_problem_.empty()) report.problem = file_problem_;
   return report;
@@ -53,6 +56,18 @@ void SourceState::set_problem(const std::string& problem, bool dropped) {
   const std::lock_guard<std::mutex> lock(mutex_);
   report_.problem = problem;
   if (dropped) ++report_.unusable;
+}
+
+void SourceState::begin_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  work_since_ = Clock::now();
+}
+
+void SourceState::end_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (work_since_ == kNoWork) return;
+  report_.last_work = std::chrono::duration<double>(Clock::now() - work_since_).count();
+  work_since_ = kNoWork;
 }
 
 void SourceState::set_file_problem(const std::string& problem) {

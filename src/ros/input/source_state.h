@@ -2,9 +2,11 @@
 
 #include <ros/time.h>
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "ist_proximity/geometry/region_of_interest.h"
@@ -52,6 +54,9 @@ class SourceState {
   /// Sets the problem of the newest message; empty clears it.
   /// @param dropped  whether the message counts as unusable
   void set_problem(const std::string& problem, bool dropped);
+  /// Brackets the reading and ingesting of a message, which a status names where it takes too long.
+  void begin_work();
+  void end_work();
   /// Sets a problem with a map's file or with its place in the fixed frame. It stays until it is
   /// set again, whatever messages come.
   void set_file_problem(const std::string& problem);
@@ -66,6 +71,9 @@ class SourceState {
   SourceReport report_;
   std::string file_problem_, placing_problem_;
   ros::Time last_now_;
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point work_since_ = kNoWork;
+  static constexpr Clock::time_point kNoWork = Clock::time_point::min();
 };
 
 }  // namespace ist

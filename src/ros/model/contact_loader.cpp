@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/robot/robot_model.h"
+#include "ros/common/exceptions.h"
 
 namespace ist {
 namespace {
@@ -57,12 +58,14 @@ bool ContactLoader::is_current(const ModelState& state) const {
 
 void ContactLoader::run() {
   do {
-    const auto state = loader_.state();
-    const auto contacts = this->contacts();
-    try {
+    const std::string fault = exception_of([this] {
+      const auto state = loader_.state();
+      const auto contacts = this->contacts();
       if (state->robot && (!contacts || contacts->robot != state->robot)) load(state);
-    } catch (const std::exception& error) {  // no memory; the next round tries again
-      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << error.what());
+    });
+    // No memory, for example; the next round tries again.
+    if (!fault.empty()) {
+      ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << fault);
     }
   } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
 }

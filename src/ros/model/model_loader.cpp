@@ -9,6 +9,7 @@
 #include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/robot_description.h"
+#include "ros/common/exceptions.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/model/progress_report.h"
@@ -103,9 +104,21 @@ void ModelLoader::run() {
       if (reload_) rejected_.clear();
       reload_ = false;
     }
-    load_once();
+    const std::string fault = exception_of([this] { load_once(); });
+    if (!fault.empty()) fail(fault);
     wait();
   }
+}
+
+/// Says that an exception has ended the loading; the next round tries again.
+void ModelLoader::fail(const std::string& fault) {
+  exception_of([&] {  // there may be no memory even for that
+    ModelState state;
+    state.phase = ModelState::Phase::kFailed;
+    state.problem = "the robot's model cannot be loaded: " + fault;
+    ROS_ERROR_STREAM_THROTTLE(5.0, state.problem);
+    set_state(std::move(state));
+  });
 }
 
 std::string ModelLoader::waiting_for_description() const {

@@ -46,6 +46,7 @@ class ModelLoader {
  private:
   void run();
   void load_once();
+  void fail(const std::string& fault);
   std::string waiting_for_description() const;
   bool fetch_urdf(std::string* urdf, std::string* problem) const;
   void load(const std::string& urdf);

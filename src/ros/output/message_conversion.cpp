@@ -63,7 +63,7 @@ ist_proximity::SourceStatus to_message(const SourceReport& source, const Status&
   message.age = kNaN;
   if (!source.has_snapshot) return message;
   message.stamp = source.stamp;
-  if (!source.is_file) message.age = seconds_between(message.stamp, stamp);
+  if (!source.is_file) message.age = seconds_between(source.counts_from, stamp);
   message.points_received = source.counts.received;
   message.points_used = source.counts.used + source.counts.outside_region;
   message.points_on_robot = source.counts.on_robot;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "ros/common/publish.h"
 #include "ros/output/message_conversion.h"
 
 namespace ist {
@@ -24,23 +25,23 @@ ResultPublisher::ResultPublisher(ros::NodeHandle private_nh, const ServerConfig&
 bool ResultPublisher::publish(
     const ist_proximity::ProximityArrayConstPtr& result,
     const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion) {
-  proximity_.publish(result);
+  publish_message(proximity_, result);
   if (joint_repulsion_.getNumSubscribers() > 0) {
     ist_proximity::JointRepulsion message;
     message.header.stamp = result->header.stamp;
     message.status = result->status;
     message.status_text = result->status_text;
     fill_joint_repulsion(&message);
-    joint_repulsion_.publish(message);
+    publish_message(joint_repulsion_, message);
   }
   std_msgs::Float64 smallest;
   smallest.data = min_distance(*result);
-  min_distance_.publish(smallest);
+  publish_message(min_distance_, smallest);
 
   const auto now = std::chrono::steady_clock::now();
   if (markers_.getNumSubscribers() == 0 || now < next_markers_) return false;
   next_markers_ = now + kMarkerPeriod;
-  markers_.publish(marker_drawer_.draw(*result));
+  publish_message(markers_, marker_drawer_.draw(*result));
   return true;
 }
 

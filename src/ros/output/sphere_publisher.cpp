@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "ros/common/publish.h"
 #include "ros/output/markers.h"
 
 namespace ist {
@@ -16,11 +17,11 @@ SpherePublisher::SpherePublisher(ros::NodeHandle private_nh)
     : publisher_(private_nh.advertise<visualization_msgs::MarkerArray>("spheres", 1, true)) {}
 
 void SpherePublisher::show(const ModelState& model) {
-  if (!shown_.markers.empty()) publisher_.publish(deleted(shown_));
+  if (!shown_.markers.empty()) publish_message(publisher_, deleted(shown_));
   shown_.markers.clear();
   if (!model.robot) return;
   shown_ = sphere_markers(*model.robot, model.monitored, kMaxSpheresPerLink);
-  publisher_.publish(shown_);
+  publish_message(publisher_, shown_);
 }
 
 void SpherePublisher::repeat_after_clock_jump() {
@@ -30,7 +31,7 @@ void SpherePublisher::repeat_after_clock_jump() {
 
 void SpherePublisher::repeat_when_due() {
   if (Clock::now() < next_repeat_) return;
-  publisher_.publish(shown_);
+  publish_message(publisher_, shown_);
   repeat_delay_ *= 2;
   next_repeat_ =
       repeat_delay_ <= kLastDelay ? Clock::now() + repeat_delay_ : Clock::time_point::max();

@@ -2,7 +2,16 @@
 
 #include <dynamic_reconfigure/ConfigDescription.h>
 #include <ros/console.h>
+#include <ros/master.h>
 #include <ros/serialization.h>
+#include <ros/this_node.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "ros/common/publish.h"
+#include "ros/common/text.h"
+#include "ros/common/thread_name.h"
 
 namespace ist {
 namespace {
@@ -90,9 +99,30 @@ ConfigDescription describe(const std::string& group, const std::vector<Tunable>&
   return description;
 }
 
-void warn_of_refusal(const std::string& reason) {
-  ROS_WARN_STREAM_THROTTLE(
-      5.0, "the last valid ~query, ~repulsion and ~penetration stay in use: " << reason);
+constexpr char kKept[] = "the last valid ~query, ~repulsion and ~penetration stay in use: ";
+constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
+
+/// Names the first member of a request that is no parameter of the group.
+/// @returns empty when all are
+template <class Parameters>
+std::string unknown_name(const std::string& group, const std::vector<Tunable>& tunables,
+                         const Parameters& parameters) {
+  for (const auto& parameter : parameters) {
+    const bool known = std::any_of(tunables.begin(), tunables.end(), [&](const Tunable& tunable) {
+      return !parameter.name.empty() && name_within(group, tunable) == parameter.name;
+    });
+    if (!known) return "~" + group + "/" + parameter.name;
+  }
+  return "";
+}
+
+/// Writes to the parameter server; ros::param::set() would wait for a master that does not answer.
+bool write(const std::string& name, const XmlRpc::XmlRpcValue& value) {
+  XmlRpc::XmlRpcValue request, response, payload;
+  request[0] = ros::this_node::getName();
+  request[1] = name;
+  request[2] = value;
+  return ros::master::execute("setParam", request, response, payload, false);
 }
 
 bool same(const Config& a, const Config& b) {
@@ -106,13 +136,28 @@ bool same(const Config& a, const Config& b) {
 }  // namespace
 
 LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config)
-    : private_nh_(private_nh),
-      max_distance_(config.query.max_distance),
-      live_{config.query, config.repulsion, config.penetration, nullptr} {
-  const std::lock_guard<std::mutex> lock(change_mutex_);
-  parse_live(XmlRpc::XmlRpcValue(), max_distance_, &tunables_);  // names and ranges
-  for (const char* name : {"query", "repulsion", "penetration"}) advertise(name);
-  apply({});
+    : private_nh_(private_nh), live_{config.query, config.repulsion, config.penetration, nullptr} {
+  {
+    const std::lock_guard<std::mutex> lock(change_mutex_);
+    LiveConfig defaults;
+    defaults.query.max_distance = config.query.max_distance;
+    tunables_ = parse_live(XmlRpc::XmlRpcValue(), defaults).tunables;  // names, ranges, defaults
+    configured_.assign(tunables_.size(), false);
+    lost_ = configured_;
+    for (const char* name : {"query", "repulsion", "penetration"}) advertise(name);
+  }
+  read_again();
+  thread_ = std::thread(&LiveParameters::run, this);
+}
+
+LiveParameters::~LiveParameters() {
+  stop_signal_.stop();
+  thread_.join();
+}
+
+void LiveParameters::run() {
+  name_thread("ist parameters");
+  while (stop_signal_.sleep_until(Clock::now() + std::chrono::seconds(1))) read_again();
 }
 
 void LiveParameters::advertise(const std::string& name) {
@@ -121,7 +166,7 @@ void LiveParameters::advertise(const std::string& name) {
   group->name = name;
   ros::NodeHandle nh(private_nh_, name);
   group->descriptions = nh.advertise<ConfigDescription>("parameter_descriptions", 1, true);
-  group->descriptions.publish(describe(name, tunables_));
+  publish_message(group->descriptions, describe(name, tunables_));
   group->updates = nh.advertise<Config>("parameter_updates", 1, true);
   group->service = nh.advertiseService<Reconfigure::Request, Reconfigure::Response>(
       "set_parameters",
@@ -135,48 +180,138 @@ LiveConfig LiveParameters::get() const {
   return live_;
 }
 
+std::string LiveParameters::problem() const {
+  const std::lock_guard<std::mutex> lock(live_mutex_);
+  const auto waits = Clock::now() - asked_;
+  if (asked_ != Clock::time_point() && waits > kPatience) {
+    const double seconds = std::chrono::duration<double>(waits).count();
+    return kKept + format_text("the parameter server has not answered for %.0f s", seconds);
+  }
+  return problem_;
+}
+
 void LiveParameters::read_again() {
   const std::lock_guard<std::mutex> lock(change_mutex_);
-  apply({});
+  if (read_server()) publish_updates();
+}
+
+/// Takes what is valid on the parameter server. The caller holds change_mutex_.
+/// @returns false when the server does not answer
+bool LiveParameters::read_server() {
+  {
+    const std::lock_guard<std::mutex> lock(live_mutex_);
+    asked_ = Clock::now();
+  }
+  const std::optional<XmlRpc::XmlRpcValue> tree = fetch_parameters(private_nh_);
+  {
+    const std::lock_guard<std::mutex> lock(live_mutex_);
+    asked_ = Clock::time_point();
+  }
+  if (!tree) {
+    set_problem("the parameter server at " + ros::master::getURI() + " does not answer");
+    return false;
+  }
+  const LiveReading reading = parse_live(*tree, get());
+  for (std::size_t i = 0; i < lost_.size(); ++i) {
+    lost_[i] = configured_[i] && !reading.found[i];
+    configured_[i] = configured_[i] || reading.found[i];
+  }
+  take(reading);
+  std::vector<std::string> problems = reading.errors;
+  if (const std::string lost = lost_names(); !lost.empty()) problems.push_back(lost);
+  set_problem(join(problems, "; "));
+  return true;
+}
+
+/// Names the parameters that have gone from the server, with the values in use.
+std::string LiveParameters::lost_names() const {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < lost_.size(); ++i) {
+    if (!lost_[i]) continue;
+    names.push_back("~" + tunables_[i].name + " (" +
+                    with_unit(number_text(tunables_[i].value), tunables_[i].range) + ")");
+  }
+  if (names.empty()) return "";
+  return "no longer on the parameter server: " + join(names, ", ") +
+         "; set them again, or restart the node for the defaults";
+}
+
+/// The caller holds change_mutex_.
+void LiveParameters::set_problem(const std::string& problem) {
+  const std::string text = problem.empty() ? "" : kKept + problem;
+  {
+    const std::lock_guard<std::mutex> lock(live_mutex_);
+    problem_ = text;
+  }
+  const auto now = Clock::now();
+  if (text.empty()) {
+    if (!logged_problem_.empty()) ROS_INFO("the live parameters are those of the server again");
+  } else if (text != logged_problem_ || now - logged_time_ > kRepeatLog) {
+    ROS_WARN_STREAM(text);
+    logged_time_ = now;
+  }
+  logged_problem_ = text;
+}
+
+/// The caller holds change_mutex_.
+void LiveParameters::take(const LiveReading& reading) {
+  for (std::size_t i = 0; i < tunables_.size(); ++i) tunables_[i].value = reading.tunables[i].value;
+  const std::lock_guard<std::mutex> lock(live_mutex_);
+  live_ = reading.config;
 }
 
 bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
                          Reconfigure::Response& response) {
   const std::lock_guard<std::mutex> lock(change_mutex_);
-  Change change;
-  const std::string prefix = group->name + "/";
-  for (const auto& one : request.config.doubles) change[prefix + one.name] = one.value;
-  for (const auto& one : request.config.ints) change[prefix + one.name] = one.value;
-  for (const auto& one : request.config.bools) {
-    change[prefix + one.name] = XmlRpc::XmlRpcValue(static_cast<bool>(one.value));
+  const Config& wanted = request.config;
+  std::string unknown = unknown_name(group->name, tunables_, wanted.doubles);
+  if (unknown.empty()) unknown = unknown_name(group->name, tunables_, wanted.ints);
+  if (unknown.empty()) unknown = unknown_name(group->name, tunables_, wanted.bools);
+  if (unknown.empty()) unknown = unknown_name(group->name, tunables_, wanted.strs);
+  if (!unknown.empty()) {
+    ROS_WARN_STREAM_THROTTLE(5.0, "a request to " << private_nh_.getNamespace() << "/"
+                                                  << group->name << "/set_parameters is refused: '"
+                                                  << unknown << "' is none of its parameters");
+    return false;
   }
-  for (const auto& one : request.config.strs) change[prefix + one.name] = one.value;
-  apply(change);
+  XmlRpc::XmlRpcValue change;
+  for (const auto& one : wanted.doubles) change[one.name] = one.value;
+  for (const auto& one : wanted.ints) change[one.name] = one.value;
+  for (const auto& one : wanted.bools) change[one.name] = XmlRpc::XmlRpcValue(one.value != 0);
+  for (const auto& one : wanted.strs) change[one.name] = one.value;
+  const bool answered = apply(group->name, change);
   response.config = group->published;
-  return true;
+  return answered;
 }
 
 /// Applies the change on top of the parameter server's values, entirely or not at all. The caller
 /// holds change_mutex_.
-void LiveParameters::apply(const Change& change) {
-  std::vector<Tunable> tunables;
-  try {
-    XmlRpc::XmlRpcValue tree = fetch_parameters(private_nh_);
-    for (const auto& [name, value] : change) {
-      const std::size_t slash = name.find('/');
-      tree[name.substr(0, slash)][name.substr(slash + 1)] = value;
+/// @param change  values by name in the group; may be empty
+/// @returns false when the parameter server does not answer; then nothing changes
+bool LiveParameters::apply(const std::string& group, XmlRpc::XmlRpcValue change) {
+  if (!read_server()) return false;
+  if (change.valid()) {
+    XmlRpc::XmlRpcValue tree;
+    tree[group] = change;
+    const LiveReading reading = parse_live(tree, get());
+    if (!reading.errors.empty()) {
+      ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
+      publish_updates();
+      return true;  // the response holds the values in use
     }
-    const LiveConfig live = parse_live(tree, max_distance_, &tunables);
-    for (const auto& [name, value] : change) private_nh_.setParam(name, value);
-    const std::lock_guard<std::mutex> lock(live_mutex_);
-    live_ = live;
-  } catch (const ParameterError& error) {
-    return warn_of_refusal(error.what());
-  } catch (const XmlRpc::XmlRpcException& error) {
-    return warn_of_refusal(error.getMessage());
+    for (const auto& [name, value] : change) {
+      if (!write(private_nh_.resolveName(group + "/" + name), value)) {
+        set_problem("the parameter server does not take ~" + group + "/" + name);
+        return false;
+      }
+    }
+    for (std::size_t i = 0; i < lost_.size(); ++i) {
+      configured_[i] = configured_[i] || reading.found[i];
+    }
+    take(reading);
   }
-  tunables_ = std::move(tunables);
   publish_updates();
+  return true;
 }
 
 void LiveParameters::publish_updates() {
@@ -184,7 +319,7 @@ void LiveParameters::publish_updates() {
     const Config now = values_of(group->name, tunables_);
     if (same(now, group->published)) continue;
     group->published = now;
-    group->updates.publish(now);
+    publish_message(group->updates, now);
   }
 }
 

@@ -4,22 +4,27 @@
 #include <dynamic_reconfigure/Reconfigure.h>
 #include <ros/node_handle.h>
 
-#include <functional>
-#include <map>
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "ros/common/stop_signal.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
 
 /// Parameters that may change while the node runs: ~query/*, ~repulsion/* and
-/// ~penetration/stiffness. They change on the parameter server, which is read again whenever the
-/// owner asks, or through dynamic_reconfigure, in one group for each of the three names
-/// (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`). A wrong value is
-/// refused with a warning, and the last valid values stay in use.
+/// ~penetration/stiffness. They change on the parameter server, which is read again once a second
+/// in a thread of its own, or through dynamic_reconfigure, in one group for each of the three names
+/// (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`).
+///
+/// Every value stays in use until a valid one replaces it, whatever happens to the parameter
+/// server: no answer, a master that restarts, names that are deleted, values that are wrong.
+/// problem() says so. A request through dynamic_reconfigure takes effect entirely or not at all;
+/// one that names anything else than the group's parameters fails.
 ///
 /// This class speaks dynamic_reconfigure's messages without its generated server: a .cfg file would
 /// state defaults and ranges a second time, and that server writes a whole group back at each
@@ -30,13 +35,17 @@ class LiveParameters {
  public:
   /// @param config  as read at the start
   LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config);
+  ~LiveParameters();
+  LiveParameters(const LiveParameters&) = delete;
+  LiveParameters& operator=(const LiveParameters&) = delete;
 
   LiveConfig get() const;
 
-  /// Reads the parameter server again.
-  void read_again();
+  /// Why values stay in use that the parameter server does not hold; empty when there are none.
+  std::string problem() const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   /// The topics and the service of one dynamic_reconfigure server.
   struct Group {
     std::string name;
@@ -44,21 +53,35 @@ class LiveParameters {
     ros::ServiceServer service;
     dynamic_reconfigure::Config published;
   };
-  using Change = std::map<std::string, XmlRpc::XmlRpcValue>;  ///< new values by name below `~`
 
   void advertise(const std::string& name);
+  void run();
+  void read_again();
+  bool read_server();
   bool set(Group* group, const dynamic_reconfigure::Reconfigure::Request& request,
            dynamic_reconfigure::Reconfigure::Response& response);
-  void apply(const Change& change);
+  bool apply(const std::string& group, XmlRpc::XmlRpcValue change);
+  void take(const LiveReading& reading);
+  std::string lost_names() const;
+  void set_problem(const std::string& problem);
   void publish_updates();
 
   ros::NodeHandle private_nh_;
-  const double max_distance_;
   std::mutex change_mutex_;  ///< held from reading the parameter server to the end of the change
   std::vector<std::unique_ptr<Group>> groups_;
   std::vector<Tunable> tunables_;
-  mutable std::mutex live_mutex_;
+  std::vector<bool> configured_;  ///< by tunable: it has been on the parameter server
+  std::vector<bool> lost_;        ///< by tunable: it was there and is not any more
+  std::string logged_problem_;
+  Clock::time_point logged_time_;
+
+  mutable std::mutex live_mutex_;  ///< guards the members below
   LiveConfig live_;
+  std::string problem_;
+  Clock::time_point asked_;  ///< when the server was asked that has not answered yet; else 0
+
+  StopSignal stop_signal_;
+  std::thread thread_;
 };
 
 }  // namespace ist

@@ -88,6 +88,12 @@ void ParameterReader::read(const std::string& name, const Range& range, int* val
       {name, Tunable::Kind::kInt, range, default_value, static_cast<double>(*value)});
 }
 
+void ParameterReader::read(const std::string& name, const Range& range, std::size_t* value) {
+  int number = static_cast<int>(*value);
+  read(name, range, &number);
+  *value = static_cast<std::size_t>(number);
+}
+
 void ParameterReader::read(const std::string& name, bool* value) {
   const double default_value = *value ? 1.0 : 0.0;
   read_bool(name, value);

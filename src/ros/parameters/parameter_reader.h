@@ -2,6 +2,7 @@
 
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <cstddef>
 #include <map>
 #include <set>
 #include <string>
@@ -34,6 +35,8 @@ class ParameterReader {
   /// Reads a number; an integer is accepted for a double. NaN is never allowed.
   void read(const std::string& name, const Range& range, double* value);
   void read(const std::string& name, const Range& range, int* value);
+  /// @param range  within what an int holds, as a parameter does; so is the default
+  void read(const std::string& name, const Range& range, std::size_t* value);
   void read(const std::string& name, bool* value);
   void read(const std::string& name, std::string* value);
   void read(const std::string& name, std::vector<std::string>* value);

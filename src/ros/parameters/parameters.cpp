@@ -1,6 +1,7 @@
 #include "ros/parameters/parameters.h"
 
 #include <ros/console.h>
+#include <ros/master.h>
 #include <ros/param.h>
 
 #include "internal/packing/packing_cache.h"
@@ -29,6 +30,7 @@ void read_poses(ParameterReader* reader, ServerConfig* config) {
   reader->read_choice("pose_source", {"tf", "joint_states"}, &pose_source);
   config->pose_source = pose_source == "tf" ? PoseSourceKind::kTf : PoseSourceKind::kJointStates;
   reader->read("pose_timeout", Range::positive("s", 3600.0), &config->pose_timeout);
+  reader->read("joint_lag", Range::non_negative("s", 3600.0), &config->joint_lag);
   reader->read("rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
 }
 
@@ -86,19 +88,28 @@ void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
 
 }  // namespace
 
-XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh) {
+std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& private_nh) {
   XmlRpc::XmlRpcValue tree;
-  ros::param::get(private_nh.getNamespace(), tree);
-  return tree;
+  if (ros::param::get(private_nh.getNamespace(), tree)) return tree;
+  // False stands for "nothing is set" and for "no answer" alike.
+  if (!ros::master::check()) return std::nullopt;
+  // The master may have come back between the two calls, with parameters.
+  if (ros::param::get(private_nh.getNamespace(), tree)) return tree;
+  if (!ros::master::check()) return std::nullopt;
+  return XmlRpc::XmlRpcValue();
 }
 
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);
   ServerConfig config;
+  for (const char* group : {"query", "repulsion", "penetration", "packing", "self_collision"}) {
+    reader.children(group);  // adds an error unless it is a dictionary
+  }
   read_poses(&reader, &config);
   read_model(&reader, &config);
   reader.read("max_distance", Range::positive("m", 1e3), &config.query.max_distance);
   read_query(&reader, &config.query);
+  reader.read("query/max_answers", Range{"", 1.0, 1e7}, &config.max_query_answers);
   if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {
     warnings->push_back(
         "~repulsion/influence_distance is more than ~max_distance, and nothing farther "
@@ -117,22 +128,30 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 
 ServerConfig read_parameters(const ros::NodeHandle& private_nh) {
   std::vector<std::string> warnings;
-  ServerConfig config = parse_parameters(fetch_parameters(private_nh), &warnings);
+  const std::optional<XmlRpc::XmlRpcValue> tree = fetch_parameters(private_nh);
+  if (!tree) {  // the defaults would do without a configured margin
+    throw ParameterError("the parameter server at " + ros::master::getURI() +
+                         " does not answer: start the ROS master, then this node");
+  }
+  ServerConfig config = parse_parameters(*tree, &warnings);
   for (const std::string& warning : warnings) ROS_WARN_STREAM(warning);
   return config;
 }
 
-LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
-                      std::vector<Tunable>* tunables) {
+LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const LiveConfig& last) {
   ParameterReader reader(tree);
-  LiveConfig live;
-  live.query.max_distance = max_distance;
-  read_query(&reader, &live.query);
-  read_repulsion(&reader, max_distance, &live.repulsion);
-  read_penetration(&reader, &live.penetration);
-  if (tunables) *tunables = reader.tunables();
-  if (!reader.errors().empty()) throw ParameterError(join(reader.errors(), "\n"));
-  return live;
+  LiveReading reading;
+  reading.config = last;
+  for (const char* group : {"query", "repulsion", "penetration"}) {
+    reader.children(group);  // adds an error unless it is a dictionary
+  }
+  read_query(&reader, &reading.config.query);
+  read_repulsion(&reader, last.query.max_distance, &reading.config.repulsion);
+  read_penetration(&reader, &reading.config.penetration);
+  reading.tunables = reader.tunables();
+  for (const Tunable& tunable : reading.tunables) reading.found.push_back(reader.has(tunable.name));
+  reading.errors = reader.errors();
+  return reading;
 }
 
 }  // namespace ist

@@ -4,6 +4,7 @@
 #include <xmlrpcpp/XmlRpc.h>
 
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -39,10 +40,14 @@ struct ServerConfig {
   std::string fixed_frame;                              ///< empty: the URDF's root link
   PoseSourceKind pose_source = PoseSourceKind::kTf;
   double pose_timeout = 0.5;  ///< [s] a link whose pose is older is UNKNOWN; > 0
-  double rate = 100.0;        ///< [Hz] of ~proximity with kTf; > 0
+  /// [s] With kJointStates, a joint may be older than the newest one by twice the usual time
+  /// between its samples and this; >= 0.
+  double joint_lag = 0.05;
+  double rate = 100.0;  ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
   QueryConfig query;
+  int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
   RepulsionConfig repulsion;
   bool contacts_wanted = true;  ///< ~penetration/enabled
   ContactConfig contacts;
@@ -78,15 +83,22 @@ struct LiveConfig {
 };
 
 /// Fetches all parameters of the private namespace in one call, so that they belong together.
-XmlRpc::XmlRpcValue fetch_parameters(const ros::NodeHandle& private_nh);
+/// @returns an invalid value when none is set; empty when the parameter server does not answer
+std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& private_nh);
 
-/// Reads ~query/*, ~repulsion/* and ~penetration/stiffness again.
-/// @param tree          as fetch_parameters() returns it
-/// @param max_distance  [m] as it was at the start. It limits the influence distance: nothing
-///                      farther away is measured, and the vector could not end in zero
-/// @param tunables      if not null: each of them, with its range
-/// @throws ParameterError
-LiveConfig parse_live(const XmlRpc::XmlRpcValue& tree, double max_distance,
-                      std::vector<Tunable>* tunables = nullptr);
+/// The live parameters of a tree, and how they were found.
+struct LiveReading {
+  LiveConfig config;
+  std::vector<Tunable> tunables;    ///< each of them with its range and its value in `config`
+  std::vector<bool> found;          ///< by tunable: whether the tree has it
+  std::vector<std::string> errors;  ///< one sentence for each that is wrong
+};
+
+/// Reads ~query/*, ~repulsion/* and ~penetration/stiffness again. What the tree lacks, or has
+/// wrong, keeps its value in `last`.
+/// @param tree  as fetch_parameters() returns it
+/// @param last  the last valid values. Its max_distance limits the influence distance: nothing
+///              farther away is measured, and the vector could not end in zero
+LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const LiveConfig& last);
 
 }  // namespace ist

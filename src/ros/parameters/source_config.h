@@ -3,6 +3,8 @@
 #include <string>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/cloud/laser_scan.h"
+#include "ist_proximity/cloud/octree.h"
 
 namespace ist {
 
@@ -34,6 +36,8 @@ struct SourceConfig {
   bool required = true;  ///< false: the absence of this source shows in its own status only
   IngestConfig ingest;
   NoiseFilterConfig noise;  ///< used for clouds
+  ScanLimits scan;          ///< used for scans
+  OctreeLimits map;         ///< used for maps
 
   /// Whether a message stays valid for ever and survives jumps of the clock: a map from a file, or
   /// a map with an infinite timeout.

@@ -11,7 +11,7 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 
 void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
   const double default_max_range = ingest->max_range;
-  reader->read(prefix + "min_range", Range::non_negative("m", 1e6), &ingest->min_range);
+  reader->read(prefix + "min_range", Range::non_negative("m", 1e4), &ingest->min_range);
   reader->read(prefix + "max_range", Range::positive("m", kInf, true), &ingest->max_range);
   reader->read(prefix + "self_filter", &ingest->self_filter);
   reader->read(prefix + "self_filter_padding", Range::non_negative("m", 1.0),
@@ -32,6 +32,19 @@ void read_noise(ParameterReader* reader, const std::string& prefix, NoiseFilterC
     reader->add_error("~" + prefix +
                       "noise_filter/radius is set, but this build has no noise filter: it was made "
                       "without PCL (libpcl-dev)");
+  }
+}
+
+// Upper limits of one message. The largest values are what 32 bits, or a machine's memory, hold.
+void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+  switch (source->type) {
+    case SourceType::kCloud:
+      return reader->read(prefix + "max_points", Range{"", 1.0, 1e9}, &source->ingest.max_points);
+    case SourceType::kScan:
+      return reader->read(prefix + "max_beams", Range{"", 1.0, 1e7}, &source->scan.max_beams);
+    case SourceType::kMap:
+      reader->read(prefix + "max_leaves", Range{"", 1.0, 5e7}, &source->map.max_leaves);
+      reader->read(prefix + "max_bytes", Range{"", 1.0, 2e9}, &source->map.max_bytes);
   }
 }
 
@@ -79,6 +92,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
     read_ingest(reader, prefix, &source->ingest);
     if (source->type == SourceType::kCloud) read_noise(reader, prefix, &source->noise);
   }
+  read_limits(reader, prefix, source);
   reader->read(prefix + "topic", &source->topic);
   if (source->topic.empty()) {
     reader->add_error("~" + prefix + "topic is empty: the name of a topic is needed");
@@ -97,6 +111,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   reader->read("cloud_timeout", Range::positive("s", kInf, true), &single.timeout);
   read_ingest(reader, "", &single.ingest);
   read_noise(reader, "", &single.noise);
+  read_limits(reader, "", &single);
   if (!reader->has("sources")) return {single};
 
   std::vector<SourceConfig> sources;

@@ -1,6 +1,7 @@
 #include "ros/poses/joint_pose_source.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "ros/common/ros_time.h"
@@ -8,12 +9,18 @@
 #include "ros/poses/transforms.h"
 
 namespace ist {
+namespace {
+
+constexpr std::chrono::seconds kDisputeMemory(1);
+constexpr double kStampResolution = 1e-3;  // [s]
+
+}  // namespace
 
 JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
                                  JointStateListener* joints, Which which,
-                                 const tf2::BufferCore& buffer, const std::string& fixed_frame,
+                                 const TransformBuffer& buffer, const std::string& fixed_frame,
                                  const std::vector<std::string>& links,
-                                 const std::vector<bool>& wanted, double timeout)
+                                 const std::vector<bool>& wanted, double timeout, double lag)
     : kinematics_(std::move(kinematics)),
       listener_(*joints),
       which_(which),
@@ -22,14 +29,80 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
       placer_(kinematics_, links),
       wanted_(wanted),
       timeout_(timeout),
-      tf_source_(buffer, fixed_frame, links, wanted, timeout) {}
+      lag_(lag),
+      tf_source_(buffer, fixed_frame, links, wanted, timeout) {
+  const auto& tree = kinematics_->joints();
+  moved_by_.resize(links.size());
+  matters_.assign(tree.size(), false);
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (!wanted_[i]) continue;
+    std::size_t body = kinematics_->find_body(links[i]).value_or(0);
+    for (; body > 0; body = tree[body - 1].parent) {
+      const std::size_t source = tree[body - 1].source;
+      if (!tree[source].is_free()) continue;
+      moved_by_[i].push_back(source);
+      matters_[source] = true;
+    }
+  }
+}
 
 std::string JointPoseSource::hint() const {
   return "does everything that moves joints publish on '" + listener_.report().topic + "'?";
 }
 
-/// Reads the fresh positions, and notes why the others are not known.
-/// @returns the newest stamp of a fresh position; `now` when there is none
+/// Says why a joint's newest position cannot be used, whatever the other joints' are.
+PoseProblem JointPoseSource::problem_of(std::size_t joint, const ros::Time& now) const {
+  const JointPosition& position = positions_[joint];
+  const std::string name = "joint '" + kinematics_->joints()[joint].name + "'";
+  const std::string cause = position.refusal ? ": " + *position.refusal : std::string();
+  if (position.stamp.isZero()) {
+    if (position.refusal) return {"no position of " + name + " could be used yet" + cause, true};
+    return {name + " has not come in any joint state", false};
+  }
+  const double age = seconds_between(position.stamp, now);
+  if (age > timeout_) {
+    return {"the newest position of " + name +
+                format_text(" is %.2f s old, allowed is %.2f s (~pose_timeout)", age, timeout_) +
+                cause,
+            position.refusal != nullptr};
+  }
+  if (position.dispute &&
+      std::chrono::steady_clock::now() - position.dispute_time < kDisputeMemory) {
+    return {*position.dispute, true};
+  }
+  return {};
+}
+
+/// Whether a joint is later than its samples usually are: by more than one and a half times its
+/// usual spacing behind a joint that came in the same message before; behind the newest one, whose
+/// publisher may be another, by more than twice the spacing and ~joint_lag.
+/// @returns empty, or a sentence
+std::string JointPoseSource::is_late(std::size_t joint, std::size_t newest) const {
+  const JointPosition& position = positions_[joint];
+  const std::string& name = kinematics_->joints()[joint].name;
+  const auto sentence = [&](std::size_t other, double lag) {
+    return "the newest position of joint '" + name + "' that can be used is " +
+           format_text("%.3f s older than that of joint '", lag) +
+           kinematics_->joints()[other].name + "'" +
+           (position.refusal ? ": " + *position.refusal
+                             : format_text("; its samples come every %.3f s", position.spacing));
+  };
+  const double lag = seconds_between(position.stamp, positions_[newest].stamp);
+  if (lag <= 0.0) return "";
+  if (position.is_missing) return sentence(newest, lag);
+  const JointPosition& companion = positions_[position.companion];
+  const double behind = seconds_between(position.stamp, companion.stamp);
+  double spacing = position.spacing > 0.0 ? position.spacing : companion.spacing;
+  if (spacing > 0.0 && behind > 1.5 * spacing + kStampResolution) {
+    return sentence(position.companion, behind);
+  }
+  spacing = position.spacing > 0.0 ? position.spacing : positions_[newest].spacing;
+  if (lag > 2.0 * spacing + lag_) return sentence(newest, lag);
+  return "";
+}
+
+/// Reads the positions that can be used, and notes why the others cannot.
+/// @returns the newest stamp of a usable position; 0 when there is none
 ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   const auto& joints = kinematics_->joints();
   if (which_ == Which::kTaken) {
@@ -39,37 +112,63 @@ ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   }
   positions_.resize(joints.size());
   q_.assign(joints.size(), std::nan(""));
-  joint_problems_.assign(joints.size(), std::string());
-  ros::Time instant;
+  joint_problems_.assign(joints.size(), PoseProblem());
+  std::size_t newest = joints.size();
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints[j].is_free()) continue;
-    const JointPosition& position = positions_[j];
-    if (position.stamp.isZero()) {
-      joint_problems_[j] = "joint '" + joints[j].name + "' has not come in any joint state";
-      continue;
-    }
-    const double age = seconds_between(position.stamp, now);
-    if (age > timeout_) {
-      joint_problems_[j] =
-          "the newest position of joint '" + joints[j].name +
-          format_text("' is %.2f s old, allowed is %.2f s (~pose_timeout)", age, timeout_);
-      continue;
-    }
-    q_[j] = position.q;
-    instant = std::max(instant, position.stamp);
+    joint_problems_[j] = problem_of(j, now);
+    if (!joint_problems_[j].empty()) continue;
+    if (newest == joints.size() || positions_[j].stamp > positions_[newest].stamp) newest = j;
   }
-  return instant.isZero() ? now : instant;
+  if (newest == joints.size()) return ros::Time();
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!joints[j].is_free() || !joint_problems_[j].empty()) continue;
+    joint_problems_[j] = {is_late(j, newest), true};
+    if (joint_problems_[j].empty()) q_[j] = positions_[j].q;
+  }
+  return positions_[newest].stamp;
+}
+
+/// Whether a joint that matters is behind the instant because its newest sample was refused.
+bool JointPoseSource::must_hold(const ros::Time& instant) const {
+  for (std::size_t j = 0; j < positions_.size(); ++j) {
+    if (!matters_[j] || std::isnan(q_[j])) continue;
+    if (positions_[j].refusal && positions_[j].stamp < instant) return true;
+  }
+  return false;
+}
+
+void JointPoseSource::describe_doubts(StampedLinkPoses* poses) const {
+  const auto& joints = kinematics_->joints();
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!matters_[j] || std::isnan(q_[j]) || !positions_[j].is_implausible) continue;
+    poses->doubts.push_back("joint '" + joints[j].name +
+                            format_text("' is at %g, far outside its limits of %g to %g: is its "
+                                        "unit right?",
+                                        q_[j], joints[j].lower, joints[j].upper));
+  }
 }
 
 /// Looks up the pose of a child frame in its parent at the instant. Notes that tf is behind when it
 /// has a fresh pose for an earlier instant only.
 bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string& child,
                                     const ros::Time& now, const ros::Time& instant,
-                                    Eigen::Isometry3d* X, std::string* problem) {
-  if (is_known(buffer_, parent, child, instant, problem)) {
-    *problem = ist::look_up(buffer_, parent, child, instant, X);
+                                    Eigen::Isometry3d* X, PoseProblem* problem) {
+  if (is_known(buffer_, parent, child, instant, &problem->text)) {
+    problem->text = ist::look_up(buffer_, parent, child, instant, X);
+    if (!problem->empty()) return false;
+    problem->text = buffer_.dispute(parent, child);
+    // Transforms that are stamped ahead are known for longer than their publisher lives.
+    const double age = seconds_between(buffer_.counts_from(parent, child, instant), now);
+    if (problem->empty() && age > timeout_) {
+      problem->text = too_old(parent, child, age, timeout_);
+    }
+    problem->explained = !problem->empty();
     return problem->empty();
   }
+  const std::string cause = buffer_.why_refused(parent, child);
+  problem->explained = !cause.empty();
+  if (problem->explained) problem->text += ": " + cause;
   ros::Time stamp;
   Eigen::Isometry3d ignored;
   std::string ignored_problem;
@@ -82,12 +181,22 @@ bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string
 }
 
 void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
+  const ros::Time last = poses->stamp;
+  ros::Time instant = now.isZero() ? ros::Time() : read_positions(now);
+  if (!now.isZero() && last_.stamp == last && last_.count_known() > 0 && must_hold(instant)) {
+    *poses = last_;
+    return;
+  }
   poses->reset(now, placer_.size());
   tf_is_behind_ = false;
   placer_.reset();
-  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
+  if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
+  if (!instant.isZero() && instant < last) {
+    poses->stamp = last;
+    return poses->set_problem(wanted_, {"the joint states are from before the last answer", true});
+  }
+  if (instant.isZero()) instant = poses->stamp;
 
-  const ros::Time instant = read_positions(now);
   kinematics_->place_joints(q_, &joints_);
   const auto& joints = kinematics_->joints();
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -97,18 +206,36 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
                                      &joints_.X_PC[j], &joint_problems_[j]);
   }
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity();
-  std::string root_problem;
+  PoseProblem root_problem;
   const bool root_known =
       look_up_in_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR, &root_problem);
-  if (tf_is_behind_) return tf_source_.look_up(now, poses);
-  if (!root_known) return poses->set_problem(wanted_, root_problem);
-
   // A mimic joint is unknown for the same reason as the joint that it follows.
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints[j].source != j) joint_problems_[j] = joint_problems_[joints[j].source];
   }
   poses->stamp = instant;
-  placer_.place(joints_, X_FR, wanted_, joint_problems_, poses);
+  if (tf_is_behind_) {
+    poses->stamp = last;
+    look_up_behind(now, poses);
+  } else if (root_known) {
+    placer_.place(joints_, X_FR, wanted_, joint_problems_, poses);
+  } else {
+    poses->set_problem(wanted_, root_problem);
+  }
+  describe_doubts(poses);
+  last_ = *poses;
+}
+
+/// Takes all poses from tf, at the newest instant that it knows.
+void JointPoseSource::look_up_behind(const ros::Time& now, StampedLinkPoses* poses) {
+  tf_source_.look_up(now, poses);
+  for (std::size_t i = 0; i < moved_by_.size(); ++i) {
+    for (const std::size_t j : moved_by_[i]) {
+      if (joint_problems_[j].empty()) continue;
+      poses->known[i] = false;
+      poses->problems[i] = joint_problems_[j];
+    }
+  }
 }
 
 void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time& instant,

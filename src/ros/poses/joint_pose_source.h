@@ -1,7 +1,5 @@
 #pragma once
 
-#include <tf2/buffer_core.h>
-
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,10 +14,15 @@ namespace ist {
 /// Computes link poses from joint states.
 ///
 /// The poses belong to the stamp of the newest joint state, or of the one that was taken last. A
-/// joint with a slower publisher keeps its last position until that is older than the timeout; then
-/// the links below it are unknown. The poses of planar and floating joints, and of the root link in
-/// the fixed frame, come from tf at the same instant. While tf is behind the joint states, all
-/// poses are those of the newest instant at which both tf and the joints are known.
+/// joint with a slower publisher keeps its last position as long as that is no older than its
+/// samples usually are (see is_late()). The links below a joint are unknown when it is later than
+/// that, older than the timeout, or disputed by two publishers, and when its newest sample was
+/// refused while other joints of the same message went on. When only that sample was refused, the
+/// last poses stay, with their stamp, until the joint is late.
+///
+/// The poses of planar and floating joints, and of the root link in the fixed frame, come from tf
+/// at the same instant. While tf is behind the joint states, all poses are those of the newest
+/// instant at which both tf and the joints are known. The instant never goes back.
 class JointPoseSource : public PoseSource {
  public:
   /// kTaken: the message that JointStateListener::take_next() has taken.
@@ -31,10 +34,11 @@ class JointPoseSource : public PoseSource {
   /// @param links        names
   /// @param wanted       by link: false leaves it unknown, without a problem
   /// @param timeout      [s]
+  /// @param lag          [s] a joint may be older than the newest by this and twice its spacing
   JointPoseSource(std::shared_ptr<const Kinematics> kinematics, JointStateListener* joints,
-                  Which which, const tf2::BufferCore& buffer, const std::string& fixed_frame,
+                  Which which, const TransformBuffer& buffer, const std::string& fixed_frame,
                   const std::vector<std::string>& links, const std::vector<bool>& wanted,
-                  double timeout);
+                  double timeout, double lag);
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
@@ -43,25 +47,33 @@ class JointPoseSource : public PoseSource {
 
  private:
   ros::Time read_positions(const ros::Time& now);
+  PoseProblem problem_of(std::size_t joint, const ros::Time& now) const;
+  std::string is_late(std::size_t joint, std::size_t newest) const;
+  bool must_hold(const ros::Time& instant) const;
+  void describe_doubts(StampedLinkPoses* poses) const;
+  void look_up_behind(const ros::Time& now, StampedLinkPoses* poses);
   bool look_up_in_tf(const std::string& parent, const std::string& child, const ros::Time& now,
-                     const ros::Time& instant, Eigen::Isometry3d* X, std::string* problem);
+                     const ros::Time& instant, Eigen::Isometry3d* X, PoseProblem* problem);
 
   std::shared_ptr<const Kinematics> kinematics_;
   JointStateListener& listener_;
   const Which which_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   std::string fixed_frame_;
   LinkPlacer placer_;
   std::vector<bool> wanted_;
-  double timeout_;
+  std::vector<std::vector<std::size_t>> moved_by_;  ///< by link: the joints whose positions move it
+  std::vector<bool> matters_;                       ///< by joint: whether it moves a wanted link
+  double timeout_, lag_;
   TfPoseSource tf_source_;  ///< used while tf is behind
 
   // Valid for one look_up().
   JointPositions positions_;
   std::vector<double> q_;                    ///< by joint; NaN where it is not known
-  std::vector<std::string> joint_problems_;  ///< by joint
+  std::vector<PoseProblem> joint_problems_;  ///< by joint
   JointPoses joints_;
   bool tf_is_behind_ = false;
+  StampedLinkPoses last_;  ///< the result of the last look_up()
 };
 
 }  // namespace ist

@@ -2,17 +2,32 @@
 
 #include <ros/time.h>
 
+#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <limits>
+#include <memory>
+#include <string>
 #include <vector>
 
 namespace ist {
 
-/// A joint's position [rad, m]; NaN and stamp 0 until a message states it.
+/// A joint's newest position that could be used, and what is wrong with newer ones.
 struct JointPosition {
+  /// [rad, m]; NaN and stamp 0 until a message states it.
   double q = std::numeric_limits<double>::quiet_NaN();
+  /// As the message states it; the receipt where that is ahead of the clock. Never goes back.
   ros::Time stamp;
+  ros::Time sent;        ///< the message's stamp
+  double spacing = 0.0;  ///< [s] usual time between two stamps; 0: not known yet
+  /// Another joint that was in the same message; itself when there was none.
+  std::size_t companion = 0;
+  std::shared_ptr<const std::string> refusal;  ///< why the newest sample is not used; null: it is
+  bool is_missing =
+      false;  ///< the newest message had new positions of other joints, not of this one
+  bool is_implausible = false;                 ///< far outside the joint's limits
+  std::shared_ptr<const std::string> dispute;  ///< null unless two publishers have disagreed
+  std::chrono::steady_clock::time_point dispute_time;
 };
 using JointPositions = std::vector<JointPosition>;  ///< by joint of the kinematics
 
@@ -24,7 +39,7 @@ class JointPositionQueue {
   void reset(std::size_t joints);
 
   const JointPositions& newest() const { return newest_; }
-  void set(std::size_t joint, const JointPosition& position) { newest_[joint] = position; }
+  JointPosition& at(std::size_t joint) { return newest_[joint]; }
 
   /// Queues the newest positions. When ten wait already, the robot has gone on too far: those are
   /// dropped.

@@ -1,8 +1,9 @@
 #include "ros/poses/joint_state_listener.h"
 
 #include <ros/console.h>
-#include <tf2/exceptions.h>
 
+#include <algorithm>
+#include <boost/function.hpp>
 #include <cmath>
 #include <sstream>
 
@@ -10,23 +11,33 @@
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
+#include "ros/poses/clock_skew.h"
+#include "ros/poses/position_limits.h"
 
 namespace ist {
 namespace {
 
-constexpr double kMaxAhead = 1.0;     // [s] the same as for transforms
 constexpr double kLimitSlack = 1e-3;  // [rad, m] accuracy of encoders and controllers
 constexpr std::chrono::seconds kProblemAge(1);
+// A message with more names is refused: it would take longer than a cycle to read, and no robot has
+// as many joints.
+constexpr std::size_t kMaxNames = 10000;
+constexpr double kMaxSpacing = 1.0;  // [s] after a longer pause, the usual spacing is not known
+constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
 }  // namespace
 
-JointStateListener::JointStateListener(tf2::BufferCore* buffer, ros::NodeHandle nh,
+JointStateListener::JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh,
                                        std::function<void()> on_state)
     : buffer_(*buffer), on_state_(std::move(on_state)) {
   report_.topic = nh.resolveName("joint_states");
   nh.setCallbackQueue(thread_.queue());
-  subscriber_ = nh.subscribe("joint_states", 100, &JointStateListener::receive, this,
-                             ros::TransportHints().tcpNoDelay());
+  using Event = ros::MessageEvent<const sensor_msgs::JointState>;
+  const boost::function<void(const Event&)> callback = [this](const Event& event) {
+    receive(event);
+  };
+  subscriber_ = nh.subscribe<sensor_msgs::JointState, const Event&>(
+      "joint_states", 100, callback, {}, ros::TransportHints().tcpNoDelay());
   thread_.start("ist joints", [this] { count_publishers(); });
 }
 
@@ -104,7 +115,10 @@ void JointStateListener::notice_clock_jump() {
 
 /// The caller holds mutex_.
 void JointStateListener::forget() {
-  positions_.reset(kinematics_ ? kinematics_->joints().size() : 0);
+  const std::size_t joints = kinematics_ ? kinematics_->joints().size() : 0;
+  positions_.reset(joints);
+  tracks_.assign(joints, PublisherTrack());
+  place_.assign(joints, kNowhere);
 }
 
 /// Counts outside report(), because roscpp's answer can wait for the master.
@@ -122,14 +136,14 @@ void JointStateListener::drop(const std::string& problem, std::size_t count) {
   ROS_WARN_STREAM_THROTTLE(5.0, report_.topic << ": " << problem);
 }
 
-void JointStateListener::receive(const sensor_msgs::JointStateConstPtr& message) {
+void JointStateListener::receive(const ros::MessageEvent<const sensor_msgs::JointState>& event) {
   bool is_new = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     notice_clock_jump();
     if (!kinematics_) return;
     ++report_.messages;
-    is_new = read(*message);
+    is_new = read(*event.getConstMessage(), event.getPublisherName());
     if (is_new) {
       ++report_.used;
       report_.skipped += positions_.push();
@@ -139,6 +153,10 @@ void JointStateListener::receive(const sensor_msgs::JointStateConstPtr& message)
 }
 
 std::string JointStateListener::why_unusable(const sensor_msgs::JointState& message) const {
+  if (message.name.size() > kMaxNames) {
+    return "a message has " + std::to_string(message.name.size()) + " names, allowed are " +
+           std::to_string(kMaxNames) + ": it is not used";
+  }
   if (message.position.size() != message.name.size()) {
     return "a message has " + std::to_string(message.name.size()) + " names and " +
            std::to_string(message.position.size()) + " positions: it is not used";
@@ -152,49 +170,149 @@ std::string JointStateListener::why_unusable(const sensor_msgs::JointState& mess
                      ahead);
 }
 
+/// Finds the joints that a message states, each once, and what is wrong with them.
+/// @param complains  whether names that are no joints are reported
+void JointStateListener::collect(const sensor_msgs::JointState& message, bool complains) {
+  stated_.clear();
+  const std::string* unknown = nullptr;
+  std::size_t unknowns = 0;
+  for (std::size_t i = 0; i < std::min(message.name.size(), kMaxNames); ++i) {
+    const double q = i < message.position.size() ? message.position[i] : std::nan("");
+    const auto found = index_.find(message.name[i]);
+    if (found == index_.end()) {
+      if (unknowns++ == 0) unknown = &message.name[i];
+      continue;
+    }
+    const std::size_t j = found->second;
+    const Kinematics::Joint& joint = kinematics_->joints()[j];
+    if (!joint.is_free()) {
+      // Many publishers state mimic joints too, which follow theirs; a fixed joint stays in place.
+      if (joint.has_unstated_pose() && complains) {
+        drop("joint '" + joint.name + "' is planar or floating, so its pose must come from tf", 1);
+      }
+      continue;
+    }
+    if (place_[j] == kNowhere) {
+      place_[j] = stated_.size();
+      stated_.push_back({j, q, ""});
+      const std::string fault = why_not_a_position(joint, q);
+      if (!fault.empty()) {
+        stated_.back().fault =
+            "the position of joint '" + joint.name + "' " + fault + " and is not used";
+      }
+    } else if (Stated& first = stated_[place_[j]]; first.fault.empty() && !(first.q == q)) {
+      first.fault = "joint '" + joint.name +
+                    format_text("' is stated twice in a message, at %g and at %g: it is not used",
+                                first.q, q);
+    }
+  }
+  for (const Stated& one : stated_) place_[one.joint] = kNowhere;
+  if (unknowns == 0 || !complains) return;
+  const std::string others =
+      unknowns > 1 ? ", like " + std::to_string(unknowns - 1) + " others of the message" : "";
+  drop("joint '" + *unknown + "' is not in the URDF" + others + ": its position is not used",
+       unknowns);
+}
+
 /// Reads all positions of a message; returns whether one of them was new.
-bool JointStateListener::read(const sensor_msgs::JointState& message) {
+bool JointStateListener::read(const sensor_msgs::JointState& message,
+                              const std::string& publisher) {
   if (message.position.empty()) return false;  // the message holds velocities or efforts alone
   const std::string problem = why_unusable(message);
+  collect(message, problem.empty());
   if (!problem.empty()) {
+    for (const Stated& one : stated_) refuse(one.joint, problem);
     drop(problem, message.position.size());
     return false;
   }
-  bool is_new = false;
-  for (std::size_t i = 0; i < message.name.size(); ++i) {
-    is_new = read_joint(message.name[i], message.position[i], message.header.stamp) || is_new;
+  const ros::Time stamp = counted_stamp(message.header.stamp);
+  std::size_t last = kNowhere;  // the joint that was used before
+  std::size_t first = kNowhere;
+  for (const Stated& one : stated_) {
+    if (!one.fault.empty()) {
+      refuse(one.joint, one.fault);
+      drop(one.fault, 1);
+      continue;
+    }
+    JointPosition& position = positions_.at(one.joint);
+    // After a publisher whose clock was ahead, one whose clock is right is new all the same.
+    const bool was_ahead = position.sent > position.stamp;
+    const bool is_newer = was_ahead ? stamp > position.stamp : message.header.stamp > position.sent;
+    note_publisher(one, message.header.stamp, publisher);
+    if (!is_newer) continue;
+    position.sent = message.header.stamp;
+    use(one, stamp);
+    if (first == kNowhere) first = one.joint;
+    position.companion = last == kNowhere ? one.joint : last;
+    last = one.joint;
   }
-  return is_new;
+  if (first == kNowhere) return false;
+  positions_.at(first).companion = last;
+  for (const Stated& one : stated_) positions_.at(one.joint).is_missing = !one.fault.empty();
+  return true;
 }
 
-bool JointStateListener::read_joint(const std::string& name, double q, const ros::Time& stamp) {
-  const auto found = index_.find(name);
-  if (found == index_.end()) {
-    drop("joint '" + name + "' is not in the URDF: its position is not used", 1);
-    return false;
+/// The instant from which the age of a message counts; complains about clocks that differ.
+ros::Time JointStateListener::counted_stamp(const ros::Time& stamp) {
+  const double ahead = seconds_between(last_now_, stamp);
+  if (ahead >= kToldSkew) {
+    drop(format_text(
+             "joint states are stamped %.3f s ahead of the clock: their age counts from their "
+             "receipt; compare the clocks",
+             ahead),
+         0);
   }
-  const Kinematics::Joint& joint = kinematics_->joints()[found->second];
-  if (!joint.is_free()) {
-    // Many publishers state mimic joints too, which follow theirs; a fixed joint stays in place.
-    if (joint.has_unstated_pose()) {
-      drop("joint '" + name + "' is planar or floating, so its pose must come from tf", 1);
-    }
-    return false;
-  }
-  if (!std::isfinite(q)) {
-    drop("the position of joint '" + name + "' is NaN or infinite and is not used", 1);
-    return false;
-  }
-  if (stamp <= positions_.newest()[found->second].stamp) return false;  // out of order or repeated
-  if (q < joint.lower - kLimitSlack || q > joint.upper + kLimitSlack) {
+  return ahead > kClockResolution ? last_now_ : stamp;
+}
+
+void JointStateListener::refuse(std::size_t joint, const std::string& reason) {
+  JointPosition& position = positions_.at(joint);
+  if (position.refusal && *position.refusal == reason) return;
+  position.refusal = std::make_shared<const std::string>(reason);
+}
+
+/// Makes a position the joint's newest one.
+void JointStateListener::use(const Stated& stated, const ros::Time& stamp) {
+  const Kinematics::Joint& joint = kinematics_->joints()[stated.joint];
+  JointPosition& position = positions_.at(stated.joint);
+  if (stated.q < joint.lower - kLimitSlack || stated.q > joint.upper + kLimitSlack) {
     std::ostringstream text;
-    text << "joint '" << name << "' is at " << q << ", outside its limits of " << joint.lower
-         << " to " << joint.upper << "; it is used all the same";
+    text << "joint '" << joint.name << "' is at " << stated.q << ", outside its limits of "
+         << joint.lower << " to " << joint.upper << "; it is used all the same";
     drop(text.str(), 0);
   }
-  positions_.set(found->second, {q, stamp});
-  for (const std::size_t j : moved_by_[found->second]) put_into_tf(j, stamp, false);
-  return true;
+  const bool is_later = stamp > position.stamp;
+  const double interval = seconds_between(position.stamp, stamp);
+  if (position.stamp.isZero() || interval > kMaxSpacing) {
+    position.spacing = 0.0;
+  } else if (is_later) {
+    // The longest interval of late, so that one that varies is no alarm.
+    position.spacing = std::max(interval, 0.9 * position.spacing + 0.1 * interval);
+  }
+  position.q = stated.q;
+  position.stamp = std::max(position.stamp, stamp);
+  position.refusal.reset();
+  position.is_missing = false;
+  position.is_implausible = is_implausible(joint, stated.q);
+  if (is_later) {
+    for (const std::size_t j : moved_by_[stated.joint]) put_into_tf(j, stamp, false);
+  }
+}
+
+void JointStateListener::note_publisher(const Stated& stated, const ros::Time& stamp,
+                                        const std::string& publisher) {
+  PublisherTrack::Values values = PublisherTrack::Values::Zero(), other_values;
+  values[0] = stated.q;
+  std::string other;
+  if (!tracks_[stated.joint].add(publisher, stamp, values, &other, &other_values)) return;
+  JointPosition& position = positions_.at(stated.joint);
+  const std::string text = "joint '" + kinematics_->joints()[stated.joint].name +
+                           "' has two publishers that disagree: " + other +
+                           format_text(" says %.3f and ", other_values[0]) + publisher +
+                           format_text(" says %.3f; stop one of them", stated.q);
+  position.dispute = std::make_shared<const std::string>(text);
+  position.dispute_time = std::chrono::steady_clock::now();
+  drop(text, 0);
 }
 
 void JointStateListener::put_into_tf(std::size_t joint, const ros::Time& stamp, bool is_static) {
@@ -205,11 +323,8 @@ void JointStateListener::put_into_tf(std::size_t joint, const ros::Time& stamp, 
   message.header.stamp = stamp;
   message.header.frame_id = kinematics_->bodies()[at.parent];
   message.child_frame_id = kinematics_->bodies()[at.child];
-  try {
-    buffer_.setTransform(message, "joint_states", is_static);
-  } catch (const std::exception& error) {
-    drop(error.what(), 1);
-  }
+  const std::string problem = buffer_.add(message, "joint_states", is_static, last_now_);
+  if (!problem.empty()) drop(problem, 1);
 }
 
 std::vector<std::string> computed_frames(const Kinematics& kinematics) {

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/JointState.h>
-#include <tf2/buffer_core.h>
 
 #include <chrono>
 #include <cstdint>
@@ -17,6 +17,8 @@
 #include "ros/common/callback_thread.h"
 #include "ros/common/publisher_count.h"
 #include "ros/poses/joint_position_queue.h"
+#include "ros/poses/publisher_track.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -34,9 +36,11 @@ struct JointStateReport {
 /// Receives joint_states in a thread of its own and keeps each joint's newest position.
 ///
 /// Messages may hold some of the joints only, from any number of publishers. A faulty message or
-/// position (sizes that differ, NaN, a joint that the URDF lacks, a stamp of 0 or of the future) is
-/// dropped; positions that are known already stay. A position outside the joint's limits is used
-/// and reported, because the robot is there.
+/// position (sizes that differ, NaN, a joint that the URDF lacks or that is stated twice, a stamp
+/// of 0 or of the future, more names than any robot has) is dropped; positions that are known
+/// already stay, with the reason why no newer one is used. A position outside the joint's limits is
+/// used and reported, because the robot is there. A stamp that is ahead of the clock by up to a
+/// second counts from its receipt.
 ///
 /// Every joint's pose also goes into a tf buffer, which interpolates it at the stamps of clouds and
 /// combines it with all other frames: cameras on links, the frame in which the robot stands.
@@ -50,7 +54,7 @@ class JointStateListener {
   /// @param buffer   outlives this
   /// @param nh       in the namespace that `joint_states` is relative to
   /// @param on_state called from the listener's thread after each message with a new position
-  JointStateListener(tf2::BufferCore* buffer, ros::NodeHandle nh, std::function<void()> on_state);
+  JointStateListener(TransformBuffer* buffer, ros::NodeHandle nh, std::function<void()> on_state);
   ~JointStateListener();
   JointStateListener(const JointStateListener&) = delete;
   JointStateListener& operator=(const JointStateListener&) = delete;
@@ -72,10 +76,21 @@ class JointStateListener {
   JointStateReport report();
 
  private:
-  void receive(const sensor_msgs::JointStateConstPtr& message);
-  bool read(const sensor_msgs::JointState& message);
+  /// A position that a message states.
+  struct Stated {
+    std::size_t joint;
+    double q;
+    std::string fault;  ///< why it cannot be used; empty: it can
+  };
+
+  void receive(const ros::MessageEvent<const sensor_msgs::JointState>& event);
+  bool read(const sensor_msgs::JointState& message, const std::string& publisher);
   std::string why_unusable(const sensor_msgs::JointState& message) const;
-  bool read_joint(const std::string& name, double q, const ros::Time& stamp);
+  void collect(const sensor_msgs::JointState& message, bool complains);
+  void refuse(std::size_t joint, const std::string& reason);
+  ros::Time counted_stamp(const ros::Time& stamp);
+  void use(const Stated& stated, const ros::Time& stamp);
+  void note_publisher(const Stated& stated, const ros::Time& stamp, const std::string& publisher);
   void put_into_tf(std::size_t joint, const ros::Time& stamp, bool is_static);
   void notice_clock_jump();
   void forget();
@@ -83,7 +98,7 @@ class JointStateListener {
   void count_publishers();
   void drop(const std::string& problem, std::size_t count);
 
-  tf2::BufferCore& buffer_;
+  TransformBuffer& buffer_;
   const std::function<void()> on_state_;
   CallbackThread thread_;
   ros::Subscriber subscriber_;
@@ -93,6 +108,9 @@ class JointStateListener {
   std::unordered_map<std::string, std::size_t> index_;  ///< index of a joint by its name
   std::vector<std::vector<std::size_t>> moved_by_;      ///< by joint: the joints that it moves
   JointPositionQueue positions_;
+  std::vector<PublisherTrack> tracks_;  ///< by joint
+  std::vector<Stated> stated_;          ///< the positions of the message being read
+  std::vector<std::size_t> place_;      ///< by joint: its place in stated_; else kNowhere
   JointStateReport report_;
   std::chrono::steady_clock::time_point problem_time_;
   ros::Time last_now_;

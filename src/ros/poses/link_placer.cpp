@@ -18,12 +18,12 @@ void LinkPlacer::reset() {
 
 void LinkPlacer::place(const JointPoses& joints, const Eigen::Isometry3d& X_FR,
                        const std::vector<bool>& wanted,
-                       const std::vector<std::string>& joint_problems, StampedLinkPoses* poses) {
+                       const std::vector<PoseProblem>& joint_problems, StampedLinkPoses* poses) {
   kinematics_->place_bodies(joints, X_FR, &bodies_);
   for (std::size_t i = 0; i < index_.size(); ++i) {
     if (!wanted[i]) continue;
     if (index_[i] == bodies_.X_FB.size()) {
-      poses->problems[i] = "it is not in the URDF";
+      poses->problems[i] = {"it is not in the URDF", true};
     } else if (bodies_.known[index_[i]]) {
       poses->X_FL[i] = bodies_.X_FB[index_[i]];
       poses->known[i] = true;

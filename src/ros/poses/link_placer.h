@@ -28,7 +28,7 @@ class LinkPlacer {
   /// @param joint_problems  by joint: why its pose is not known
   /// @param poses           receives the links; its stamp stays
   void place(const JointPoses& joints, const Eigen::Isometry3d& X_FR,
-             const std::vector<bool>& wanted, const std::vector<std::string>& joint_problems,
+             const std::vector<bool>& wanted, const std::vector<PoseProblem>& joint_problems,
              StampedLinkPoses* poses);
 
   /// The result of the last place().

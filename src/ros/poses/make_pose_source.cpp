@@ -8,7 +8,7 @@
 namespace ist {
 
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
-                                             const tf2::BufferCore& buffer,
+                                             const TransformBuffer& buffer,
                                              JointStateListener* joints,
                                              JointPoseSource::Which which) {
   const std::string fixed_frame = fixed_frame_of(model, config);
@@ -19,7 +19,7 @@ std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const Serv
   }
   if (!model.kinematics) return nullptr;
   return std::make_unique<JointPoseSource>(model.kinematics, joints, which, buffer, fixed_frame,
-                                           names, wanted, config.pose_timeout);
+                                           names, wanted, config.pose_timeout, config.joint_lag);
 }
 
 }  // namespace ist

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <tf2/buffer_core.h>
-
 #include <memory>
 
 #include "ros/model/model_state.h"
@@ -9,6 +7,7 @@
 #include "ros/poses/joint_pose_source.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/pose_source.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -19,7 +18,7 @@ namespace ist {
 /// @param which   the joint states to use
 /// @returns null when the URDF's kinematics is needed and faulty
 std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
-                                             const tf2::BufferCore& buffer,
+                                             const TransformBuffer& buffer,
                                              JointStateListener* joints,
                                              JointPoseSource::Which which);
 

@@ -5,13 +5,14 @@
 namespace ist {
 
 void StampedLinkPoses::reset(const ros::Time& now, std::size_t links) {
-  stamp = now;
+  stamp = std::max(stamp, now);
   X_FL.resize(links, Eigen::Isometry3d::Identity());
   known.assign(links, false);
-  problems.assign(links, std::string());
+  problems.assign(links, PoseProblem());
+  doubts.clear();
 }
 
-void StampedLinkPoses::set_problem(const std::vector<bool>& wanted, const std::string& problem) {
+void StampedLinkPoses::set_problem(const std::vector<bool>& wanted, const PoseProblem& problem) {
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (wanted[i]) problems[i] = problem;
   }

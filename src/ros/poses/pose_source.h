@@ -12,15 +12,26 @@
 
 namespace ist {
 
+/// Why a link or joint has no pose.
+struct PoseProblem {
+  std::string text;        ///< empty: it has one
+  bool explained = false;  ///< the text names the cause, so that no likely one needs to be added
+
+  bool empty() const { return text.empty(); }
+};
+
 /// The poses of the links at one common instant.
 struct StampedLinkPoses : LinkPoses {
-  ros::Time stamp;                    ///< that instant; now when no link is known
-  std::vector<std::string> problems;  ///< by link: why it is not known; else empty
+  /// That instant; when no link is known, now or the stamp before. It never goes back, unless the
+  /// owner sets it to 0: look_up() reads the stamp of the last poses here.
+  ros::Time stamp;
+  std::vector<PoseProblem> problems;  ///< by link: why it is not known; else empty
+  std::vector<std::string> doubts;    ///< sentences on poses that are known, and hardly true
 
-  /// Makes every link unknown, without a problem.
+  /// Makes every link unknown, without a problem, at an instant that is not before the last stamp.
   void reset(const ros::Time& now, std::size_t links);
   /// Gives every wanted link the same problem.
-  void set_problem(const std::vector<bool>& wanted, const std::string& problem);
+  void set_problem(const std::vector<bool>& wanted, const PoseProblem& problem);
   std::size_t count_known() const;
 };
 
@@ -30,7 +41,8 @@ class PoseSource {
   virtual ~PoseSource() = default;
 
   /// Looks up the poses of all wanted links.
-  /// @param now  the ROS clock's time; 0 (no clock yet) makes every link unknown
+  /// @param now    the ROS clock's time; 0 (no clock yet) makes every link unknown
+  /// @param poses  the result of the last call, overwritten; its stamp does not go back
   virtual void look_up(const ros::Time& now, StampedLinkPoses* poses) = 0;
 
   /// Looks up the poses of all bodies of the robot, links without geometry too, at the instant of

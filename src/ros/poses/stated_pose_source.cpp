@@ -2,12 +2,13 @@
 
 #include <cmath>
 
+#include "ros/poses/position_limits.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
 
 StatedPoseSource::StatedPoseSource(std::shared_ptr<const Kinematics> kinematics,
-                                   const tf2::BufferCore& buffer, const std::string& fixed_frame,
+                                   const TransformBuffer& buffer, const std::string& fixed_frame,
                                    const std::vector<std::string>& links, double timeout)
     : kinematics_(std::move(kinematics)),
       buffer_(buffer),
@@ -31,9 +32,10 @@ std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration
     if (kinematics_->joints()[*joint].has_unstated_pose()) {
       return title + " is planar or floating, so one position cannot give its pose; leave it out";
     }
-    if (!std::isfinite(configuration.position[i])) {
-      return "the position of " + title + " is NaN or infinite";
-    }
+    const std::string fault =
+        why_not_a_position(kinematics_->joints()[*joint], configuration.position[i]);
+    if (!fault.empty()) return "the position of " + title + " " + fault;
+    if (!std::isnan(q[*joint])) return title + " is stated twice";
     q[*joint] = configuration.position[i];
   }
   q_ = std::move(q);
@@ -47,14 +49,16 @@ std::string StatedPoseSource::hint() const {
 void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   poses->reset(now, placer_.size());
   placer_.reset();
-  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
+  root_known_ = false;
+  kinematics_->place_joints(q_, &joints_);
+  if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
   const std::string problem =
       look_up_newest(buffer_, fixed_frame_, kinematics_->bodies()[0], now, timeout_, &X_FR_);
-  if (!problem.empty()) return poses->set_problem(wanted_, problem);
+  if (!problem.empty()) return poses->set_problem(wanted_, {problem, false});
+  root_known_ = true;
 
-  kinematics_->place_joints(q_, &joints_);
   const auto& joints = kinematics_->joints();
-  std::vector<std::string> joint_problems(joints.size());
+  std::vector<PoseProblem> joint_problems(joints.size());
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (joints_.known[j]) continue;
     const std::string why =
@@ -62,7 +66,8 @@ void StatedPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
                        kinematics_->bodies()[joints[j].child], now, timeout_, &joints_.X_PC[j]);
     joints_.known[j] = why.empty();
     if (!why.empty()) {
-      joint_problems[j] = "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
+      joint_problems[j].text =
+          "joint '" + joints[j].name + "' is not stated, and not known now: " + why;
     }
   }
   placer_.place(joints_, X_FR_, wanted_, joint_problems, poses);

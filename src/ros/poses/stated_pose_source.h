@@ -1,7 +1,6 @@
 #pragma once
 
 #include <sensor_msgs/JointState.h>
-#include <tf2/buffer_core.h>
 
 #include <memory>
 #include <string>
@@ -10,6 +9,7 @@
 #include "ist_proximity/robot/kinematics.h"
 #include "ros/poses/link_placer.h"
 #include "ros/poses/pose_source.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -22,7 +22,7 @@ class StatedPoseSource : public PoseSource {
   /// @param fixed_frame  frame F
   /// @param links        names
   /// @param timeout      [s] allowed age of transforms
-  StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const tf2::BufferCore& buffer,
+  StatedPoseSource(std::shared_ptr<const Kinematics> kinematics, const TransformBuffer& buffer,
                    const std::string& fixed_frame, const std::vector<std::string>& links,
                    double timeout);
 
@@ -38,6 +38,7 @@ class StatedPoseSource : public PoseSource {
   // Results of the last look_up().
   const JointPoses& joints() const { return joints_; }
   const Eigen::Isometry3d& X_FR() const { return X_FR_; }  ///< root link -> fixed frame
+  bool is_root_known() const { return root_known_; }       ///< whether joints() and X_FR() hold
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
@@ -46,7 +47,7 @@ class StatedPoseSource : public PoseSource {
 
  private:
   std::shared_ptr<const Kinematics> kinematics_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   std::string fixed_frame_;
   LinkPlacer placer_;
   std::vector<bool> wanted_;
@@ -54,6 +55,7 @@ class StatedPoseSource : public PoseSource {
   std::vector<double> q_;  ///< by joint; NaN where it is left out
   JointPoses joints_;
   Eigen::Isometry3d X_FR_ = Eigen::Isometry3d::Identity();
+  bool root_known_ = false;
 };
 
 }  // namespace ist

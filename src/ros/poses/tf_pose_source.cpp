@@ -4,11 +4,12 @@
 
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
+#include "ros/common/text.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
 
-TfPoseSource::TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
+TfPoseSource::TfPoseSource(const TransformBuffer& buffer, std::string fixed_frame,
                            std::vector<std::string> link_frames, std::vector<bool> wanted,
                            double timeout)
     : buffer_(buffer),
@@ -18,34 +19,51 @@ TfPoseSource::TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_fram
       timeout_(timeout) {}
 
 bool TfPoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* stamp,
-                          std::string* problem) {
+                          PoseProblem* problem) {
+  const std::string& frame = frames_[link];
   Eigen::Isometry3d ignored;
-  *problem = ist::look_up(buffer_, fixed_frame_, frames_[link], ros::Time(), &ignored, stamp);
-  if (!problem->empty()) return false;
-  if (stamp->isZero()) return true;
-  const double age = seconds_between(*stamp, now);
-  if (age <= timeout_) return true;
-  *problem = too_old(fixed_frame_, frames_[link], age, timeout_);
+  problem->text = ist::look_up(buffer_, fixed_frame_, frame, ros::Time(), &ignored, stamp);
+  if (problem->empty()) {
+    problem->text = buffer_.dispute(fixed_frame_, frame);
+    problem->explained = !problem->empty();
+    if (problem->explained) return false;
+    if (stamp->isZero()) return true;
+    const double age = seconds_between(buffer_.counts_from(fixed_frame_, frame, *stamp), now);
+    if (age <= timeout_) return true;
+    problem->text = too_old(fixed_frame_, frame, age, timeout_);
+  }
+  const std::string cause = buffer_.why_refused(fixed_frame_, frame);
+  problem->explained = !cause.empty();
+  if (problem->explained) problem->text += ": " + cause;
   return false;
 }
 
 void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   const std::size_t n = frames_.size();
+  const ros::Time last = poses->stamp;
   poses->reset(now, n);
-  if (now.isZero()) return poses->set_problem(wanted_, "the ROS clock has not started");
+  if (now.isZero()) return poses->set_problem(wanted_, {"the ROS clock has not started", true});
 
   // The instant is never later than now, even if transforms are stamped ahead of the clock.
+  ros::Time instant = now;
+  std::vector<ros::Time> stamps(n);
   for (std::size_t i = 0; i < n; ++i) {
     if (!wanted_[i]) continue;
-    ros::Time stamp;
-    poses->known[i] = newest(i, now, &stamp, &poses->problems[i]);
-    if (poses->known[i] && !stamp.isZero()) poses->stamp = std::min(poses->stamp, stamp);
+    poses->known[i] = newest(i, now, &stamps[i], &poses->problems[i]);
+    if (poses->known[i] && !stamps[i].isZero()) instant = std::min(instant, stamps[i]);
   }
+  poses->stamp = std::max(instant, last);
   for (std::size_t i = 0; i < n; ++i) {
     if (!poses->known[i]) continue;
-    poses->problems[i] =
-        ist::look_up(buffer_, fixed_frame_, frames_[i], poses->stamp, &poses->X_FL[i]);
-    poses->known[i] = poses->problems[i].empty();
+    PoseProblem& problem = poses->problems[i];
+    if (!stamps[i].isZero() && stamps[i] < poses->stamp) {
+      problem = {format_text("its newest pose is from %.3f s before the last answer",
+                             seconds_between(stamps[i], poses->stamp)),
+                 true};
+    } else {
+      problem.text = ist::look_up(buffer_, fixed_frame_, frames_[i], poses->stamp, &poses->X_FL[i]);
+    }
+    poses->known[i] = problem.empty();
   }
 }
 

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <tf2/buffer_core.h>
-
 #include <string>
 #include <vector>
 
 #include "ros/poses/pose_source.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -13,8 +12,10 @@ namespace ist {
 ///
 /// All poses belong to one instant, the newest at which every fresh link is known; mixed instants
 /// would tear a moving arm apart. A link whose newest transform is older than the timeout is
-/// unknown and does not hold back the others. Static links are known at any instant. The buffer may
-/// be fed at the same time.
+/// unknown and does not hold back the others; its age counts from the receipt of transforms that
+/// were stamped ahead of the clock. A link whose pose two publishers state differently is unknown.
+/// Static links are known at any instant. The instant never goes back: a link that comes late is
+/// unknown until it has caught up. The buffer may be fed at the same time.
 class TfPoseSource : public PoseSource {
  public:
   /// @param buffer        outlives this
@@ -22,7 +23,7 @@ class TfPoseSource : public PoseSource {
   /// @param link_frames   by link
   /// @param wanted        by link: false leaves it unknown, without a problem
   /// @param timeout       [s]
-  TfPoseSource(const tf2::BufferCore& buffer, std::string fixed_frame,
+  TfPoseSource(const TransformBuffer& buffer, std::string fixed_frame,
                std::vector<std::string> link_frames, std::vector<bool> wanted, double timeout);
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
@@ -33,9 +34,9 @@ class TfPoseSource : public PoseSource {
  private:
   std::string find_prefixed_frame() const;
   /// Finds the newest instant of one link; false and a sentence when there is none that is fresh.
-  bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, std::string* problem);
+  bool newest(std::size_t link, const ros::Time& now, ros::Time* stamp, PoseProblem* problem);
 
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   std::string fixed_frame_;
   std::vector<std::string> frames_;
   std::vector<bool> wanted_;

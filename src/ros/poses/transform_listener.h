@@ -1,29 +1,29 @@
 #pragma once
 
 #include <ros/node_handle.h>
-#include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <chrono>
 #include <mutex>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "ros/common/callback_thread.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
 /// Fills a tf buffer from /tf and /tf_static, in a thread of its own.
 ///
-/// It differs from tf2_ros::TransformListener in that it rejects transforms that are stamped far
-/// ahead of the clock. When the clock jumps back (a bag starts over), a transform from before the
-/// jump can come in after it; the buffer would take it for the newest and refuse the present ones
-/// as too old (seen with a 12 s bag in a loop: no poses for seconds).
+/// It differs from tf2_ros::TransformListener in that it rejects transforms that tf2 would refuse,
+/// with a reason (see TransformBuffer), and those that are stamped far ahead of the clock. When the
+/// clock jumps back (a bag starts over), a transform from before the jump can come in after it; the
+/// buffer would take it for the newest and refuse the present ones as too old (seen with a 12 s bag
+/// in a loop: no poses for seconds).
 class TransformListener {
  public:
   /// @param buffer  outlives this
-  TransformListener(tf2::BufferCore* buffer, ros::NodeHandle nh);
+  TransformListener(TransformBuffer* buffer, ros::NodeHandle nh);
   ~TransformListener();
   TransformListener(const TransformListener&) = delete;
   TransformListener& operator=(const TransformListener&) = delete;
@@ -35,23 +35,21 @@ class TransformListener {
   /// Ignores transforms of these frames from now on, because joint states supply them. Thread safe.
   void ignore(const std::vector<std::string>& child_frames);
 
-  /// A sentence about a transform that was rejected during the last second; empty when none was.
+  /// A sentence about a transform that was rejected, or stamped ahead of the clock, during the last
+  /// second; empty when there was none.
   /// Thread safe.
   std::string problem() const;
 
  private:
-  void receive(const tf2_msgs::TFMessage& message, bool is_static);
+  void receive(const tf2_msgs::TFMessage& message, const std::string& publisher, bool is_static);
   bool is_ignored(const std::string& child_frame) const;
-  void reject(const geometry_msgs::TransformStamped& transform, double ahead);
 
-  tf2::BufferCore& buffer_;
+  TransformBuffer& buffer_;
   CallbackThread thread_;
   ros::Subscriber moving_, static_;
 
   mutable std::mutex mutex_;
   ros::Time last_now_;
-  std::string problem_;
-  std::chrono::steady_clock::time_point problem_time_;
   std::set<std::string> ignored_;
 };
 

@@ -10,6 +10,9 @@
 namespace ist {
 namespace {
 
+// [m] The queries compute in float, which resolves a millimetre there.
+constexpr double kMaxDistance = 1e4;
+
 bool has_slash(const std::string& frame) { return !frame.empty() && frame[0] == '/'; }
 
 /// Removes the full stop and the space at the end of tf2's sentences, so that others can follow.
@@ -39,13 +42,20 @@ std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
   } catch (const std::exception& error) {  // an exception of tf2, or a duration that overflows
     return "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error.what());
   }
-  const std::string fault = to_isometry(transform.transform, X_FT);
+  Eigen::Isometry3d X;
+  const std::string fault = to_isometry(transform.transform, &X);
+  if (fault.empty() && !(X.translation().norm() <= kMaxDistance)) {
+    return "transform from '" + frame + "' to '" + fixed +
+           format_text("': it is %.6g m long, allowed is %.6g m", X.translation().norm(),
+                       kMaxDistance);
+  }
   if (!fault.empty()) return "transform from '" + frame + "' to '" + fixed + "': " + fault;
+  *X_FT = X;
   if (stamp) *stamp = transform.header.stamp;
   return "";
 }
 
-std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fixed,
+std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
                            Eigen::Isometry3d* X_FT) {
   std::string problem;
@@ -54,9 +64,14 @@ std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fix
   ros::Time stamp;
   Eigen::Isometry3d X;
   problem = look_up(buffer, fixed, frame, ros::Time(), &X, &stamp);
+  if (problem.empty()) problem = buffer.dispute(fixed, frame);
   if (!problem.empty()) return problem;
-  const double age = stamp.isZero() ? 0.0 : seconds_between(stamp, now);
-  if (age > max_age) return too_old(fixed, frame, age, max_age);
+  const double age =
+      stamp.isZero() ? 0.0 : seconds_between(buffer.counts_from(fixed, frame, stamp), now);
+  if (age > max_age) {
+    const std::string cause = buffer.why_refused(fixed, frame);
+    return too_old(fixed, frame, age, max_age) + (cause.empty() ? "" : ": " + cause);
+  }
   *X_FT = X;
   return "";
 }

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <string>
 
+#include "ros/poses/transform_buffer.h"
+
 namespace ist {
 
 // Lookups in tf that never wait and never throw. An absent transform gives a sentence, never an
@@ -27,8 +29,9 @@ std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
 bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem);
 
-/// Looks up the newest pose, which must not be more than `max_age` [s] older than `now`.
-std::string look_up_newest(const tf2::BufferCore& buffer, const std::string& fixed,
+/// Looks up the newest pose, which must not be more than `max_age` [s] older than `now`. The age of
+/// transforms that were stamped ahead of the clock counts from their receipt.
+std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
                            Eigen::Isometry3d* X_FT);
 

@@ -5,6 +5,9 @@
 #include <exception>
 #include <limits>
 
+#include "ros/common/memory.h"
+#include "ros/output/message_invariants.h"
+
 namespace ist {
 
 using ist_proximity::ProximityArray;
@@ -12,6 +15,9 @@ using ist_proximity::ProximityArray;
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
+// An answer with more states takes megabytes.
+constexpr std::size_t kManyStates = 1000;
+constexpr std::chrono::seconds kReturnMemoryFor(5);  // a slow client reads the answer meanwhile
 
 /// Checks the times of a motion.
 /// @returns empty, or what is wrong with them
@@ -22,7 +28,8 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
            " states: a motion needs one time per state, and two states";
   }
   for (std::size_t i = 0; i < states; ++i) {
-    if (!std::isfinite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) {
+    if (!std::isfinite(times[i]) ||
+        (i > 0 && !(times[i] > times[i - 1] && std::isfinite(times[i] - times[i - 1])))) {
       return "times[" + std::to_string(i) + "] is " + std::to_string(times[i]) +
              ": times have to be finite and to rise";
     }
@@ -33,12 +40,12 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 }  // namespace
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
-                           const CloudSources& sources, const tf2::BufferCore& buffer,
+                           const CloudSources& sources, const TransformBuffer& buffer,
                            std::function<LiveConfig()> live)
     : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
-  thread_.start("ist query");
+  thread_.start("ist query", [this] { return_memory(); });
 }
 
 QueryService::~QueryService() {
@@ -51,6 +58,23 @@ void QueryService::set_model(std::shared_ptr<const ModelState> model) {
   newest_model_ = std::move(model);
 }
 
+/// Bounds the time and the memory of a request.
+std::string QueryService::check_size(std::size_t states) const {
+  const auto links = static_cast<std::size_t>(std::count(chosen_.begin(), chosen_.end(), true));
+  const auto max = static_cast<std::size_t>(config_.max_query_answers);
+  if (states <= max / std::max<std::size_t>(links, 1)) return "";
+  return std::to_string(states) + " states for " + std::to_string(links) + " links are more than " +
+         std::to_string(max) +
+         " answers (~query/max_answers): ask in several requests, or for fewer links";
+}
+
+void QueryService::return_memory() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now > return_memory_until_ || now < next_return_) return;
+  next_return_ = now + std::chrono::seconds(1);
+  return_free_memory();
+}
+
 bool QueryService::answer(Service::Request& request, Service::Response& response) {
   try {
     response.message = run(request, &response);
@@ -58,6 +82,9 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   } catch (const std::exception& error) {  // no memory for a huge request
     response.success = false;
     response.message = error.what();
+  }
+  if (request.states.size() > kManyStates) {
+    return_memory_until_ = std::chrono::steady_clock::now() + kReturnMemoryFor;
   }
   if (!response.success) {
     response.results.clear();
@@ -120,6 +147,7 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   std::string problem = check_times(request.times, request.states.size());
   if (problem.empty()) problem = take_model();
   if (problem.empty()) problem = choose_links(request.links);
+  if (problem.empty()) problem = check_size(request.states.size());
   if (!problem.empty()) return problem;
 
   LiveConfig live = live_();
@@ -134,6 +162,8 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     ProximityArray& result = response->results.back();
     cycle_->forget();  // the configurations are no motion, so there is no speed between them
     cycle_->run(ros::Time::now(), sources_, live, &result, &ignored);
+    assert_invariants(result,
+                      {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
@@ -153,7 +183,8 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   std::vector<bool> wanted = cycle_->measurable();
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     const std::size_t link = model_->monitored[i];
-    wanted[link] = wanted[link] && chosen_[i];
+    // Without the root link's pose, nothing is known of the motion.
+    wanted[link] = wanted[link] && chosen_[i] && poses_->is_root_known();
   }
   std::vector<double> first;
   first.reserve(wanted.size());

@@ -2,8 +2,9 @@
 
 #include <ist_proximity/QueryProximity.h>
 #include <ros/node_handle.h>
-#include <tf2/buffer_core.h>
 
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -21,13 +22,14 @@
 namespace ist {
 
 /// Answers ~query in a thread of its own with a query of its own, so that requests never delay the
-/// cycle. ~query/deadline does not apply here.
+/// cycle. ~query/deadline does not apply here; ~query/max_answers bounds a request's time and
+/// memory.
 class QueryService {
  public:
   /// @param sources, buffer  outlive this
   /// @param live             gives the present configuration; called from the service's thread
   QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
-               const tf2::BufferCore& buffer, std::function<LiveConfig()> live);
+               const TransformBuffer& buffer, std::function<LiveConfig()> live);
   ~QueryService();
   QueryService(const QueryService&) = delete;
   QueryService& operator=(const QueryService&) = delete;
@@ -45,10 +47,12 @@ class QueryService {
                                 Service::Response* response);
   std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
+  std::string check_size(std::size_t states) const;
+  void return_memory();
 
   const ServerConfig config_;
   const CloudSources& sources_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   const std::function<LiveConfig()> live_;
   CallbackThread thread_;
   ros::ServiceServer service_;
@@ -62,6 +66,9 @@ class QueryService {
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
   std::vector<bool> chosen_;  ///< by monitored link
+  /// Until then, memory of a large answer is returned to the system: roscpp frees it after
+  /// answer().
+  std::chrono::steady_clock::time_point return_memory_until_, next_return_;
 };
 
 }  // namespace ist

@@ -8,9 +8,12 @@
 #include <cmath>
 
 #include "ist_proximity/geometry/error.h"
+#include "ros/common/exceptions.h"
+#include "ros/common/publish.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/output/message_conversion.h"
+#include "ros/output/message_invariants.h"
 #include "ros/poses/make_pose_source.h"
 #include "ros/status/status.h"
 
@@ -20,7 +23,7 @@ using ist_proximity::ProximityArray;
 using Clock = std::chrono::steady_clock;
 
 SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
-                             const ServerConfig& config, const tf2::BufferCore& buffer,
+                             const ServerConfig& config, const TransformBuffer& buffer,
                              JointStateListener* joints, std::function<LiveConfig()> live)
     : config_(config), nh_(nh), buffer_(buffer), joints_(joints), live_(std::move(live)) {
   publisher_ = private_nh.advertise<ProximityArray>("self_proximity", 10);
@@ -45,9 +48,30 @@ void SelfProximity::run() {
   while (true) {
     next = std::max(next + period, Clock::now());
     if (!stop_signal_.sleep_until(next)) return;
-    take_model();
-    if (model_) publish_once();
+    const std::string fault = exception_of([this] {
+      take_model();
+      if (model_) publish_once();
+    });
+    if (!fault.empty()) publish_failure(fault);
   }
+}
+
+/// Says that an exception has ended a cycle, and that nothing is known. The next one is run as
+/// usual.
+void SelfProximity::publish_failure(const std::string& fault) {
+  ROS_ERROR_STREAM_THROTTLE(
+      5.0, "link against link: a cycle failed, and all links are UNKNOWN: " << fault);
+  exception_of([&] {  // there may be no memory even for that
+    ProximityArray message;
+    message.header.stamp = ros::Time::now();
+    message.status = ProximityArray::MODEL_ERROR;
+    message.status_text = "the last cycle failed: " + fault;
+    if (model_) {
+      message.header.frame_id = fixed_frame_of(*model_, config_);
+      for (const std::string& link : model_->links) message.links.push_back(unknown_link(link));
+    }
+    publisher_.publish(message);
+  });
 }
 
 void SelfProximity::take_model() {
@@ -169,19 +193,23 @@ Wrench SelfProximity::penetration(std::size_t link, const LinkProximity& answer)
 
 void SelfProximity::publish_once() {
   const ros::Time now = ros::Time::now();
-  if (now < last_now_) speeds_.assign(speeds_.size(), ClosingSpeed());
+  if (now < last_now_) {
+    speeds_.assign(speeds_.size(), ClosingSpeed());
+    last_stamp_ = poses_.stamp = ros::Time();
+  }
   last_now_ = now;
   const auto message = boost::make_shared<ProximityArray>();
+  const LiveConfig live = live_();
   StatusInput input;
   input.clock_runs = !now.isZero();
   input.model_problem =
       model_->problem.empty() && !model_->kinematics ? no_kinematics(*model_) : model_->problem;
   message->header.frame_id = fixed_frame_of(*model_, config_);
-  message->header.stamp = now;
+  message->header.stamp = std::max(now, last_stamp_);
   if (query_) {
+    poses_.stamp = last_stamp_;
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
-    const LiveConfig live = live_();
     query_->set_config(live.query);
     query_->run(poses_.X_FL, poses_.known, &results_);
     compute_wrenches(live);
@@ -191,7 +219,7 @@ void SelfProximity::publish_once() {
       if (!link.usable()) input.link_errors.push_back(link.error);
       if (!poses_.problems[i].empty()) {
         input.pose_problems.push_back("link '" + link.name +
-                                      "' has no pose: " + poses_.problems[i]);
+                                      "' has no pose: " + poses_.problems[i].text);
       }
       add_link(i, message.get());
     }
@@ -200,10 +228,14 @@ void SelfProximity::publish_once() {
   } else {
     for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
   }
+  last_stamp_ = message->header.stamp;
+  input.pose_doubts = poses_.doubts;
   const Status status = overall_status(input, now.toSec());
   message->status = status.code;
   message->status_text = status.text;
-  publisher_.publish(message);
+  assert_invariants(*message,
+                    {ros::Time::now(), config_.query.max_distance, live.query.margin, false});
+  publish_message(publisher_, message);
 }
 
 void SelfProximity::add_link(std::size_t link, ProximityArray* message) {

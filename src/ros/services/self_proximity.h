@@ -3,7 +3,6 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
-#include <tf2/buffer_core.h>
 
 #include <functional>
 #include <memory>
@@ -19,6 +18,7 @@
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/pose_source.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -33,7 +33,7 @@ class SelfProximity {
   /// @param joints   outlives this; null: link poses come from the buffer
   /// @param live     gives the present configuration; called from the thread
   SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
-                const tf2::BufferCore& buffer, JointStateListener* joints,
+                const TransformBuffer& buffer, JointStateListener* joints,
                 std::function<LiveConfig()> live);
   ~SelfProximity();
   SelfProximity(const SelfProximity&) = delete;
@@ -45,6 +45,7 @@ class SelfProximity {
  private:
   void run();
   void publish_once();
+  void publish_failure(const std::string& fault);
   void take_model();
   std::vector<LinkPair> choose_pairs() const;
   NamePairs ignored_pairs() const;
@@ -55,7 +56,7 @@ class SelfProximity {
 
   const ServerConfig config_;
   ros::NodeHandle nh_;
-  const tf2::BufferCore& buffer_;
+  const TransformBuffer& buffer_;
   JointStateListener* const joints_;
   const std::function<LiveConfig()> live_;
   ros::Publisher publisher_;
@@ -69,7 +70,7 @@ class SelfProximity {
   std::unique_ptr<SelfQuery> query_;  ///< null without a model or its kinematics
   std::unique_ptr<PoseSource> pose_source_;
   std::vector<ClosingSpeed> speeds_;  ///< by link of the robot
-  ros::Time last_now_;
+  ros::Time last_now_, last_stamp_;
   StampedLinkPoses poses_;
   std::vector<PairProximity> results_;
   std::vector<Wrench> wrenches_;  ///< by pair: the wrench on its first link

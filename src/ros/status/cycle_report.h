@@ -31,6 +31,7 @@ struct CycleReport {
   std::vector<SourceReport> sources;
   std::vector<Status> source_statuses;  ///< by source
   std::vector<std::string> pose_problems;
+  std::string parameter_problem;                 ///< LiveParameters::problem()
   std::string transform_problem;                 ///< a transform that the tf listener rejected
   std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;

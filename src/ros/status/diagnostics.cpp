@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "ros/common/text.h"
+#include "ros/poses/clock_skew.h"
 #include "ros/status/diagnostic_values.h"
 
 namespace ist {
@@ -41,8 +42,10 @@ void add_source_counts(const SourceReport& source, double rate, double now,
   add_value("publishers", source.publishers, status);
   add_value("messages received", source.messages, status);
   if (!source.is_file) add_value("rate", format_text("%.1f Hz", rate), status);
+  if (source.ahead > 0.0) add_value("stamps ahead", milliseconds(source.ahead), status);
   add_value("dropped: unusable", source.unusable, status);
   add_value("dropped: out of order", source.out_of_order, status);
+  add_value("new starts: stamps went back", source.restarts, status);
   add_value("dropped: overtaken by a newer one", source.overtaken, status);
   add_value("shown on ~filtered_cloud", source.shown, status);
   if (!std::isnan(source.blind_skin)) {
@@ -50,7 +53,7 @@ void add_source_counts(const SourceReport& source, double rate, double now,
   }
   if (source.has_snapshot) {
     if (!source.is_file)
-      add_value("age", format_text("%.3f s", now - source.stamp.toSec()), status);
+      add_value("age", format_text("%.3f s", now - source.counts_from.toSec()), status);
     add_value("points received", source.counts.received, status);
     add_value("points used", source.counts.used, status);
     add_value("points on the robot", source.counts.on_robot, status);
@@ -76,6 +79,12 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceReport& 
           &status);
   } else if (!source.problem.empty()) {
     raise(DiagnosticStatus::WARN, "the newest " + source.noun + " is not in use: " + source.problem,
+          &status);
+  }
+  if (source.ahead >= kToldSkew) {
+    raise(DiagnosticStatus::WARN,
+          format_text("its stamps are %.3f s ahead of the clock", source.ahead) +
+              ": its age counts from its receipt; compare the clocks of sensor and node",
           &status);
   }
   const std::string doubt = doubt_of_self_filter(source);
@@ -124,6 +133,12 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
     raise(DiagnosticStatus::WARN, "the rate is lower than " + wanted + ": the machine is too busy",
           &status);
   }
+  if (!report.parameter_problem.empty()) {
+    raise(DiagnosticStatus::WARN, report.parameter_problem, &status);
+  }
+  add_value("live parameters",
+            report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,
+            &status);
   add_value("rate", format_text("%.1f Hz", rate), &status);
   add_value(wanted, format_text("%.1f Hz", wanted_rate), &status);
   add_value("deadlines missed", report.deadlines_missed, &status);

@@ -2,6 +2,7 @@
 
 #include <diagnostic_msgs/DiagnosticArray.h>
 
+#include "ros/common/publish.h"
 #include "ros/status/diagnostics.h"
 
 namespace ist {
@@ -41,7 +42,7 @@ void DiagnosticsPublisher::publish(const CycleReport& report, const ModelState& 
   message.status.push_back(
       query_diagnostics(node_, report, rate_since(report.cycles, last_cycles_), wanted_rate));
   message.status.push_back(model_diagnostics(node_, model, contacts, contacts_wanted_));
-  publisher_.publish(message);
+  publish_message(publisher_, message);
 
   last_time_ = now;
   last_cycles_ = report.cycles;

@@ -17,8 +17,9 @@ std::vector<std::string> missing_poses(const RobotModel& robot,
     if (poses.problems[i].empty()) continue;
     const std::string name = quoted(robot.links[i].name);
     if (sentences.empty()) {
-      sentences.push_back("link " + name + " has no pose: " + poses.problems[i] +
-                          (source ? "; " + source->hint() : ""));
+      const bool needs_hint = source && !poses.problems[i].explained;
+      sentences.push_back("link " + name + " has no pose: " + poses.problems[i].text +
+                          (needs_hint ? "; " + source->hint() : ""));
     } else {
       others.push_back(name);
     }

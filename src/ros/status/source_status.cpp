@@ -1,5 +1,6 @@
 #include <ist_proximity/ProximityArray.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "ros/common/text.h"
@@ -34,6 +35,11 @@ Status file_status(const SourceReport& source) {
 }
 
 Status without_messages(const SourceReport& source) {
+  if (source.working > 1.0) {
+    return {ProximityArray::NO_CLOUD, title(source) + ": the first " + source.noun +
+                                          " has been read for " + seconds(source.working) +
+                                          " so far"};
+  }
   const std::string cause = source.publishers == 0
                                 ? ", nobody publishes a " + source.type +
                                       " there; start the sensor's driver, or set or remap the topic"
@@ -41,8 +47,37 @@ Status without_messages(const SourceReport& source) {
   return {ProximityArray::NO_CLOUD, title(source) + ": nothing received yet" + cause};
 }
 
+/// The share of the timeout from which the time to read and ingest a message is why it is stale.
+constexpr double kSlow = 0.5;
+
+/// Names an ingest that is slower than the source's timeout allows; else empty.
+std::string slow_ingest(const SourceReport& source) {
+  const std::string advice =
+      ": too long for its timeout; send smaller ones, lower max_range, switch noise_filter off, or "
+      "raise ~" +
+      source.timeout_parameter;
+  if (source.working > kSlow * source.timeout) {
+    return ": the last " + source.noun + " has been read and indexed for " +
+           seconds(source.working) + " so far" + advice;
+  }
+  if (source.last_work > kSlow * source.timeout) {
+    const std::string points =
+        source.has_snapshot ? " (" + std::to_string(source.counts.received) + " points)" : "";
+    return ": it takes " + seconds(source.last_work) + " to read and index a " + source.noun +
+           points + advice;
+  }
+  return "";
+}
+
+/// The reason of a source that is stale: what was wrong with the last message, or its ingest.
+std::string cause_of_staleness(const SourceReport& source) {
+  const std::string slow = slow_ingest(source);
+  const bool is_working = source.working > kSlow * source.timeout;
+  return is_working || source.problem.empty() ? slow : because(source.problem);
+}
+
 Status stale(const SourceReport& source, double age) {
-  std::string cause = because(source.problem);
+  std::string cause = cause_of_staleness(source);
   if (cause.empty() && source.noun == "map") {
     cause = "; is it latched, and sent once? Then its timeout should be .inf";
   } else if (cause.empty()) {
@@ -64,14 +99,14 @@ Status source_status(const SourceReport& source, double now) {
   const double newest_age = now - source.newest;
   if (newest_age > source.timeout) return stale(source, newest_age);
   if (!source.has_snapshot) {
-    return {ProximityArray::NO_CLOUD,
-            title(source) + ": no " + source.noun + " could be used yet" + because(source.problem)};
+    return {ProximityArray::NO_CLOUD, title(source) + ": no " + source.noun + " could be used yet" +
+                                          cause_of_staleness(source)};
   }
-  const double age = now - source.stamp.toSec();
+  const double age = now - source.counts_from.toSec();
   if (age > source.timeout) {
     return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
                                              " is " + seconds(age) + " old, allowed is " +
-                                             allowed(source) + because(source.problem)};
+                                             allowed(source) + cause_of_staleness(source)};
   }
   if (source.counts.saw_nothing()) {
     return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +

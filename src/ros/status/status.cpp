@@ -120,6 +120,7 @@ Status overall_status(const StatusInput& input, double now) {
                   "places where points were dropped as outside the region of interest: obstacles "
                   "there are not known; state the true limits in the URDF");
   }
+  sentences.add(ProximityArray::DEGRADED, input.pose_doubts);
   if (sentences.empty()) return {ProximityArray::OK, ""};
   Status status = sentences.status();
   if (!input.clock_runs) {

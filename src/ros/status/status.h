@@ -28,6 +28,7 @@ struct StatusInput {
   std::vector<SourceReport> sources;
   std::vector<Status> source_statuses;     ///< by source
   std::vector<std::string> pose_problems;  ///< one sentence each
+  std::vector<std::string> pose_doubts;    ///< poses that are known, and hardly true
   bool deadline_passed = false;
   bool outside_region = false;  ///< a link is farther out than the joint limits allow
   bool clock_runs = true;       ///< false: simulated time, and nothing on /clock yet

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "hard_cases/scene.h"
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/robot/robot_model.h"
+
+/// Motions during which the nearest link keeps a given distance.
+namespace ist::benchmark {
+
+/// A robot without the links that stand still, and parts of a motion of it.
+struct MovingRobot {
+  std::string name;
+  RobotDescription robot;
+  /// Link poses, 1 ms apart. Any number is a part of the motion; they are spread over it.
+  std::function<std::vector<Poses>(std::size_t part)> part;
+};
+
+/// The Panda with its visual and with its collision meshes, on the recorded motion.
+std::vector<MovingRobot> pandas(const std::filesystem::path& data);
+/// The demo arm, on a motion of all its joints, and stretched out level with the table.
+std::vector<MovingRobot> demo_arms();
+
+/// [1/m] A Kinect's noise along the ray, over the depth squared (Khoshelham and Elberink 2012).
+constexpr double kKinectNoise = 1.425e-3;
+
+/// The frame as the sensor's next image of a still scene: Gaussian noise along the ray, of standard
+/// deviation noise * z^2.
+/// @param noise  [1/m]
+Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng);
+
+/// The Panda with its visual meshes, on parts of the recorded motion, among the recorded frames.
+std::vector<HardScene> recorded_scenes(const std::filesystem::path& data,
+                                       const std::string& cache_directory);
+
+/// Raises or lowers the robot at each step so that its nearest link is `distance` [m] from the
+/// cloud; negative: that deep inside. The result ends where no height does that near the last one.
+std::vector<Poses> kept_at(double distance, const std::vector<Poses>& motion,
+                           const std::shared_ptr<const RobotModel>& model,
+                           const CloudSnapshot& cloud);
+
+}  // namespace ist::benchmark

@@ -1,0 +1,175 @@
+#include "ros/output/message_invariants.h"
+
+#include <Eigen/Core>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#ifndef NDEBUG
+#include <ros/console.h>
+
+#include <cstdlib>
+#endif
+
+#include "ros/common/eigen_conversion.h"
+#include "ros/poses/clock_skew.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+using LinkMessage = ist_proximity::LinkProximity;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+constexpr double kRounding = 1e-6;  // relative to the values involved
+
+template <typename Derived>
+bool all_nan(const Eigen::MatrixBase<Derived>& v) {
+  return v.array().isNaN().all();
+}
+
+/// Collects the first statement that does not hold.
+class Check {
+ public:
+  explicit Check(std::string title) : title_(std::move(title)) {}
+
+  template <typename Value>
+  void that(bool holds, const char* what, const Value& value) {
+    if (holds || !broken_.empty()) return;
+    std::ostringstream text;
+    text << title_ << what << ", but it is " << value;
+    broken_ = text.str();
+  }
+  const std::string& broken() const { return broken_; }
+
+ private:
+  std::string title_, broken_;
+};
+
+/// A link's vectors.
+struct Vectors {
+  explicit Vectors(const LinkMessage& link)
+      : point(to_vector(link.point_on_link)),
+        local(to_vector(link.point_on_link_local)),
+        obstacle(to_vector(link.point_on_obstacle)),
+        direction(to_vector(link.direction)) {
+    repulsion << to_vector(link.repulsion), to_vector(link.repulsion_torque);
+    penetration << to_vector(link.penetration.force), to_vector(link.penetration.torque);
+  }
+  Eigen::Vector3d point, local, obstacle, direction;
+  Vector6 repulsion, penetration;
+};
+
+void check_nothing_near(const LinkMessage& link, const Vectors& v, Check* check) {
+  check->that(all_nan(v.point) && all_nan(v.local) && all_nan(v.obstacle) && all_nan(v.direction),
+              "points and direction have to be NaN", v.point.transpose());
+  check->that(link.source.empty(), "source has to be empty", link.source);
+  check->that(std::isnan(link.closing_speed), "closing_speed has to be NaN", link.closing_speed);
+}
+
+void check_measured(const LinkMessage& link, const Vectors& v, const InvariantInput& input,
+                    Check* check) {
+  const bool in_contact = link.state == LinkMessage::CONTACT;
+  check->that(std::isfinite(link.distance), "distance has to be finite", link.distance);
+  check->that(in_contact ? link.distance < 0.0 : link.distance >= 0.0,
+              "the sign of distance has to be the state's", link.distance);
+  const double largest = link.distance - input.margin + kRounding * std::abs(link.distance);
+  check->that(link.lower_bound <= largest, "lower_bound has to be distance - margin at most",
+              link.lower_bound);
+  check->that(v.point.allFinite() && v.local.allFinite() && v.obstacle.allFinite(),
+              "points have to be finite", v.point.transpose());
+  check->that(std::abs(v.direction.norm() - 1.0) < kRounding, "direction has to be a unit vector",
+              v.direction.transpose());
+  const Eigen::Vector3d error = v.point - v.obstacle - link.distance * v.direction;
+  check->that(error.norm() <= kRounding * (1.0 + v.point.norm() + v.obstacle.norm()),
+              "points have to lie along direction, distance apart", error.norm());
+  check->that(!link.source.empty(), "source has to be named", "empty");
+  const bool is_known = v.penetration.allFinite();
+  check->that(is_known || all_nan(v.penetration), "penetration has to be known or not",
+              v.penetration.transpose());
+  check->that(in_contact || !is_known || v.penetration.isZero(0.0),
+              "penetration has to be 0 outside contact", v.penetration.transpose());
+}
+
+void check_closing(const LinkMessage& link, Check* check) {
+  check->that(((link.closing_unknown & LinkMessage::ROBOT_UNKNOWN) != 0) ==
+                  std::isnan(link.closing_speed_robot),
+              "closing_unknown has to say whether closing_speed_robot is NaN",
+              link.closing_speed_robot);
+  check->that(((link.closing_unknown & LinkMessage::OBSTACLES_UNKNOWN) != 0) ==
+                  std::isnan(link.closing_speed_obstacles),
+              "closing_unknown has to say whether closing_speed_obstacles is NaN",
+              link.closing_speed_obstacles);
+  check->that(!(link.time_to_contact < 0.0), "time_to_contact must not be negative",
+              link.time_to_contact);
+}
+
+std::string check_link(const LinkMessage& link, const InvariantInput& input) {
+  Check check("link '" + link.link + "' in state " + std::to_string(link.state) + ": ");
+  const Vectors v(link);
+  check_closing(link, &check);
+  switch (link.state) {
+    case LinkMessage::UNKNOWN:
+      check.that(std::isnan(link.distance), "distance has to be NaN", link.distance);
+      check.that(link.lower_bound == -std::numeric_limits<double>::infinity(),
+                 "lower_bound has to be -inf", link.lower_bound);
+      check.that(all_nan(v.repulsion) && all_nan(v.penetration),
+                 "repulsion and penetration have to be NaN", v.repulsion.transpose());
+      check_nothing_near(link, v, &check);
+      break;
+    case LinkMessage::CLEAR:
+      check.that(link.distance == std::numeric_limits<double>::infinity(),
+                 "distance has to be +inf", link.distance);
+      check.that(link.lower_bound >= input.max_distance, "lower_bound has to be max_distance",
+                 link.lower_bound);
+      check.that(v.penetration.isZero(0.0), "penetration has to be 0", v.penetration.transpose());
+      check_nothing_near(link, v, &check);
+      break;
+    case LinkMessage::NEAR:
+    case LinkMessage::CONTACT:
+      check_measured(link, v, input, &check);
+      break;
+    default:
+      check.that(false, "the state has to be one of the constants", int{link.state});
+  }
+  if (link.state != LinkMessage::UNKNOWN) {
+    check.that(input.has_repulsion ? v.repulsion.allFinite() : all_nan(v.repulsion),
+               "repulsion has to be finite where it is computed", v.repulsion.transpose());
+  }
+  return check.broken();
+}
+
+}  // namespace
+
+std::string broken_invariant(const ProximityArray& message, const InvariantInput& input) {
+  Check check("the message: ");
+  check.that((message.status == ProximityArray::OK) == message.status_text.empty(),
+             "status_text has to be empty where the status is OK, and only there",
+             "'" + message.status_text + "'");
+  check.that(message.status <= ProximityArray::MODEL_ERROR,
+             "the status has to be one of the constants", int{message.status});
+  check.that(message.header.stamp.toSec() <= input.now.toSec() + kClockResolution + kRounding,
+             "header.stamp must not be in the future", message.header.stamp);
+  check.that(message.computation_time >= 0.0, "computation_time must not be negative",
+             message.computation_time);
+  if (!check.broken().empty()) return check.broken();
+  for (const LinkMessage& link : message.links) {
+    const std::string broken = check_link(link, input);
+    if (!broken.empty()) return broken;
+  }
+  return "";
+}
+
+void assert_invariants(const ProximityArray& message, const InvariantInput& input) {
+#ifndef NDEBUG
+  const std::string broken = broken_invariant(message, input);
+  if (broken.empty()) return;
+  ROS_FATAL_STREAM("a message breaks its contract: " << broken << "\n" << message);
+  std::abort();
+#else
+  (void)message;
+  (void)input;
+#endif
+}
+
+}  // namespace ist

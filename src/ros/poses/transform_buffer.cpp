@@ -1,0 +1,233 @@
+#include "ros/poses/transform_buffer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "ros/common/eigen_conversion.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
+#include "ros/poses/clock_skew.h"
+
+namespace ist {
+namespace {
+
+constexpr std::chrono::seconds kMemory(1);
+constexpr std::size_t kMaxFrames = 10000;  // a limit of memory; robots have some hundred
+constexpr std::size_t kMaxDepth = 1000;    // tf's own
+
+PublisherTrack::Values values_of(const geometry_msgs::Transform& transform) {
+  const auto& p = transform.translation;
+  const auto& q = transform.rotation;
+  PublisherTrack::Values values;
+  values << p.x, p.y, p.z, q.x, q.y, q.z, q.w;
+  return values;
+}
+
+std::string title(const geometry_msgs::TransformStamped& transform) {
+  return "the transform from '" + without_slash(transform.child_frame_id) + "' to '" +
+         without_slash(transform.header.frame_id) + "' ";
+}
+
+}  // namespace
+
+std::string TransformBuffer::check(const geometry_msgs::TransformStamped& transform, bool is_static,
+                                   const ros::Time& now) const {
+  const std::string child = without_slash(transform.child_frame_id);
+  const std::string parent = without_slash(transform.header.frame_id);
+  if (child.empty() || parent.empty()) return "names no frame";
+  if (child == parent) return "leads from a frame to itself";
+  Eigen::Isometry3d ignored;
+  const std::string fault = to_isometry(transform.transform, &ignored);
+  if (!fault.empty()) return "is not used: " + fault;
+  if (is_static) return "";
+  if (transform.header.stamp.isZero()) {
+    return "has no stamp (0) and is not used: the publisher must set header.stamp";
+  }
+  const double ahead = seconds_between(now, transform.header.stamp);
+  if (ahead > kMaxAhead) {
+    return format_text("is stamped %.2f s in the future and not used: compare the clocks", ahead);
+  }
+  return "";
+}
+
+std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& transform,
+                                    const std::string& fault) {
+  const std::string sentence = title(transform) + fault;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_refusal_ = sentence;
+  last_refusal_time_ = Clock::now();
+  const std::string child = without_slash(transform.child_frame_id);
+  const auto found = records_.find(child);
+  if (found == records_.end() && records_.size() >= kMaxFrames) return sentence;
+  Record& record = found == records_.end() ? records_[child] : found->second;
+  record.parent = without_slash(transform.header.frame_id);
+  record.refusal = sentence;
+  record.refusal_time = last_refusal_time_;
+  return sentence;
+}
+
+std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transform,
+                                 const std::string& publisher, bool is_static,
+                                 const ros::Time& now) {
+  const std::string fault = check(transform, is_static, now);
+  if (!fault.empty()) return refuse(transform, fault);
+  if (!is_static) {
+    const std::string child = without_slash(transform.child_frame_id);
+    const ros::Time& stamp = transform.header.stamp;
+    std::unique_lock<std::mutex> lock(mutex_);
+    const auto found = records_.find(child);
+    if (found == records_.end() && records_.size() >= kMaxFrames) {
+      lock.unlock();
+      return refuse(transform, format_text("is not used: there are %zu frames", kMaxFrames));
+    }
+    Record& record = found == records_.end() ? records_[child] : found->second;
+    note_publisher(transform, publisher, &record);
+    record.parent = without_slash(transform.header.frame_id);
+    // tf2 would log these: sent twice, or older than what it keeps.
+    if (stamp == record.newest) return "";
+    const double behind = seconds_between(stamp, record.newest);
+    if (!record.newest.isZero() && behind > getCacheLength().toSec()) {
+      lock.unlock();
+      return refuse(transform,
+                    format_text("is not used: its stamp is %.2f s behind that of another "
+                                "one; are there two publishers, with two clocks?",
+                                behind));
+    }
+    if (stamp > record.newest) {
+      record.newest = stamp;
+      record.received = now;
+      record.ahead = seconds_between(now, stamp);
+      any_ahead_ = any_ahead_ || record.ahead > kClockResolution;
+      if (record.ahead >= kToldSkew) record.ahead_time = skew_time_ = Clock::now();
+      record.refusal.clear();
+    }
+  }
+  std::string problem;
+  try {
+    if (setTransform(transform, publisher, is_static)) return "";
+    problem = "is not used: tf refuses it";
+  } catch (const std::exception& error) {
+    problem = std::string("is not used: ") + error.what();
+  }
+  return refuse(transform, problem);
+}
+
+/// The caller holds mutex_.
+void TransformBuffer::note_publisher(const geometry_msgs::TransformStamped& transform,
+                                     const std::string& publisher, Record* record) {
+  std::string other;
+  PublisherTrack::Values there;
+  const PublisherTrack::Values here = values_of(transform.transform);
+  if (!record->track.add(publisher, transform.header.stamp, here, &other, &there)) return;
+  const double apart = (here - there).head<3>().norm();
+  record->dispute = title(transform) + "has two publishers that disagree, " + other + " and " +
+                    publisher + format_text(": they are %.3f m apart; stop one of them", apart);
+  record->dispute_time = dispute_time_ = Clock::now();
+}
+
+void TransformBuffer::clear() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  tf2::BufferCore::clear();
+  records_.clear();
+  any_ahead_ = false;
+}
+
+std::string TransformBuffer::last_refusal() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return Clock::now() - last_refusal_time_ < kMemory ? last_refusal_ : std::string();
+}
+
+std::string TransformBuffer::ahead() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto now = Clock::now();
+  if (now - skew_time_ > kMemory) return "";
+  const std::pair<const std::string, Record>* farthest = nullptr;
+  for (const auto& entry : records_) {
+    if (entry.second.ahead < kToldSkew || now - entry.second.ahead_time > kMemory) continue;
+    if (!farthest || entry.second.ahead > farthest->second.ahead) farthest = &entry;
+  }
+  if (!farthest) return "";
+  return "the transform from '" + farthest->first + "' to '" + farthest->second.parent +
+         format_text("' is stamped %.3f s ahead of the clock", farthest->second.ahead) +
+         ": its age counts from its receipt; compare the clocks";
+}
+
+/// The frames from `frame` up to `end` or to the root, `end` excluded. The caller holds mutex_.
+/// @returns whether `end` was reached
+bool TransformBuffer::way_up(const std::string& end, const std::string& frame,
+                             std::vector<std::string>* way) const {
+  way->clear();
+  std::string at = frame, parent;
+  while (at != end && !at.empty() && way->size() < kMaxDepth) {
+    way->push_back(at);
+    const auto record = records_.find(at);
+    if (_getParent(at, ros::Time(), parent)) {
+      at = parent;
+    } else if (record != records_.end()) {
+      at = record->second.parent;  // every transform has been refused
+    } else {
+      break;
+    }
+  }
+  return at == end;
+}
+
+/// The child frames of all transforms between two frames. The caller holds mutex_.
+std::vector<std::string> TransformBuffer::between(const std::string& fixed_frame,
+                                                  const std::string& frame) const {
+  const std::string fixed = without_slash(fixed_frame), other = without_slash(frame);
+  std::vector<std::string> way, from_fixed;
+  if (way_up(fixed, other, &way)) return way;
+  if (way_up(other, fixed, &from_fixed)) return from_fixed;
+  // The transforms above the frame that both are below do not matter.
+  while (!way.empty() && !from_fixed.empty() && way.back() == from_fixed.back()) {
+    way.pop_back();
+    from_fixed.pop_back();
+  }
+  way.insert(way.end(), from_fixed.begin(), from_fixed.end());
+  return way;
+}
+
+std::string TransformBuffer::why_refused(const std::string& fixed, const std::string& frame) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto now = Clock::now();
+  if (now - last_refusal_time_ > kMemory) return "";
+  for (const std::string& child : between(fixed, frame)) {
+    const auto record = records_.find(child);
+    if (record == records_.end() || record->second.refusal.empty()) continue;
+    if (now - record->second.refusal_time < kMemory) return record->second.refusal;
+  }
+  return "";
+}
+
+std::string TransformBuffer::dispute(const std::string& fixed, const std::string& frame) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto now = Clock::now();
+  if (now - dispute_time_ > kMemory) return "";
+  for (const std::string& child : between(fixed, frame)) {
+    const auto record = records_.find(child);
+    if (record == records_.end() || record->second.dispute.empty()) continue;
+    if (now - record->second.dispute_time < kMemory) return record->second.dispute;
+  }
+  return "";
+}
+
+ros::Time TransformBuffer::counts_from(const std::string& fixed, const std::string& frame,
+                                       const ros::Time& stamp) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ros::Time from = stamp;
+  if (!any_ahead_) return from;
+  for (const std::string& child : between(fixed, frame)) {
+    const auto record = records_.find(child);
+    if (record == records_.end() || record->second.ahead <= kClockResolution) {
+      continue;
+    }
+    from = std::min(from, record->second.received);
+  }
+  return from;
+}
+
+}  // namespace ist

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <geometry_msgs/TransformStamped.h>
+#include <ros/time.h>
+#include <tf2/buffer_core.h>
+
+#include <chrono>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "ros/poses/publisher_track.h"
+
+namespace ist {
+
+/// A tf buffer that checks transforms before tf2 does, and remembers what was wrong with them.
+///
+/// tf2 logs every transform that it refuses, and nobody can ask it afterwards why a frame has no
+/// fresh pose. Here the reason stays for a second after the last refusal, and goes to the status.
+/// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
+/// counts from their receipt, and which frames two publishers state differently. Thread safe.
+class TransformBuffer : public tf2::BufferCore {
+ public:
+  /// @param cache_time  how long transforms are kept
+  explicit TransformBuffer(const ros::Duration& cache_time) : tf2::BufferCore(cache_time) {}
+
+  /// Adds a transform, unless it is refused: numbers that are no rotation or not finite, no frame
+  /// names, no stamp, a stamp more than a second ahead of the clock.
+  /// @param publisher  name of the node that sent it
+  /// @param now        the ROS clock's time
+  /// @returns empty, or a sentence that says why the transform is not used
+  std::string add(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
+                  bool is_static, const ros::Time& now);
+
+  /// Forgets everything but static transforms.
+  void clear();
+
+  /// The last refusal of the last second; empty when there was none.
+  std::string last_refusal() const;
+  /// A sentence on the transform that is farthest ahead of the clock, where that is 50 ms or more;
+  /// empty when there was none in the last second.
+  std::string ahead() const;
+
+  /// Why transforms between a frame and another above it have been refused in the last second;
+  /// empty when none was.
+  /// @param fixed  where the way up ends, if it is on the way
+  std::string why_refused(const std::string& fixed, const std::string& frame) const;
+
+  /// Says that two publishers state a transform between two frames differently; empty when that has
+  /// not happened in the last second.
+  std::string dispute(const std::string& fixed, const std::string& frame) const;
+
+  /// The instant from which the age of a pose counts: its stamp, or the receipt of a transform
+  /// between the two frames that was stamped ahead of the clock.
+  ros::Time counts_from(const std::string& fixed, const std::string& frame,
+                        const ros::Time& stamp) const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// What is known of the transforms of one child frame.
+  struct Record {
+    std::string parent;  ///< of the last transform, used or refused
+    ros::Time newest;    ///< stamp of the newest transform
+    double ahead = 0.0;  ///< [s] of the newest one's stamp at its receipt; may be negative
+    ros::Time received;  ///< receipt of the newest transform
+    Clock::time_point ahead_time;
+    std::string refusal;
+    Clock::time_point refusal_time;
+    PublisherTrack track;
+    std::string dispute;
+    Clock::time_point dispute_time;
+  };
+
+  std::string check(const geometry_msgs::TransformStamped& transform, bool is_static,
+                    const ros::Time& now) const;
+  std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& fault);
+  void note_publisher(const geometry_msgs::TransformStamped& transform,
+                      const std::string& publisher, Record* record);
+  bool way_up(const std::string& end, const std::string& frame,
+              std::vector<std::string>* way) const;
+  std::vector<std::string> between(const std::string& fixed, const std::string& frame) const;
+
+  mutable std::mutex mutex_;                         // guards the members below
+  std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash
+  std::string last_refusal_;
+  Clock::time_point last_refusal_time_, skew_time_, dispute_time_;
+  bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
+};
+
+}  // namespace ist

@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""Faults of simulated time: the clock jumps forward and back."""
+
+import sys
+import time
+
+import faults
+import proximity_testing as pt
+import rospy
+from clock_test import SimulatedClock
+from faults import PERIOD
+from proximity_testing import ProximityArray
+
+
+# [s] in which a loaded machine brings the clock's next tick to the node.
+DELIVERY = 1.0
+
+
+class FaultsClockTest(faults.FaultTest):
+    def setUp(self):
+        self.clock = SimulatedClock()
+        self.clock.start()
+        pt.wait_until(lambda: not rospy.Time.now().is_zero(), "the clock")
+        super().setUp()
+
+    def tearDown(self):
+        super().tearDown()
+        self.clock.stop()
+
+    def jump(self, node, seconds):
+        """No cloud from shortly before the jump until the node has said what it thinks of it."""
+        self.sensor.pause(node)
+        self.tf.paused = True
+        begin = len(node.messages)
+        self.clock.jump(seconds)
+        self.clock.tick()
+        since = time.monotonic()
+        message = node.wait_for(
+            lambda m: not self.known(m, ("ball_link", "box_link")), "nothing known", start=begin
+        )
+        received = next(t for t, m in zip(node.times, node.messages) if m is message)
+        limit = PERIOD
+        self.assertLess(received - since, limit + self.slack(node, since, received) + DELIVERY)
+        reaction = 1e3 * max(0.0, min(limit, received - since))
+        self.tf.paused = False
+        again = time.monotonic()
+        self.sensor.resume()
+        return message, reaction, self.recover(node, again), limit
+
+    def test_forward(self):
+        node = self.start()
+        message, reaction, recovery, limit = self.jump(node, 10.0)
+        self.record("/clock jumps forward", "by 10 s, with use_sim_time", message, reaction,
+                    "with the next inputs", recovery, limit)
+
+    def test_back(self):
+        node = self.start()
+        message, reaction, recovery, limit = self.jump(node, -10.0)
+        self.record("/clock jumps back", "by 10 s, with use_sim_time", message, reaction,
+                    "with the next inputs", recovery, limit)
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("faults_clock_test")
+    rostest.rosrun("ist_proximity", "faults_clock_test", FaultsClockTest, sys.argv)

@@ -1,0 +1,391 @@
+#!/usr/bin/env python3
+"""Faults of joint states, tf and clocks: what the node says, how soon, and how it recovers.
+
+Run with other arguments, this program is a second publisher: two nodes cannot be in one process.
+"""
+
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from joint_states_test import ARM, arm_poses, joint_state, motion
+from proximity_testing import ProximityArray
+from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
+
+STILL = {"turn": 0.3, "slide": 0.5}
+PERIOD = 0.01  # [s] of the joint states
+SLACK = 0.3  # [s] that a busy machine may add
+
+
+def run_rival(kind, namespace):
+    """Publishes once the node listens, until it is killed."""
+    rospy.init_node("rival")
+    if kind == "tf":
+        publisher = rospy.Publisher(namespace + "/tf", TFMessage, queue_size=10)
+    else:
+        publisher = rospy.Publisher(namespace + "/joint_states", JointState, queue_size=10)
+    pt.wait_until(lambda: publisher.get_num_connections() > 0, "the node")
+    if kind == "names":
+        names = ["joint_%d" % i for i in range(1000000)]
+        publisher.publish(JointState(name=names, position=[0.0] * len(names)))
+        time.sleep(30.0)  # the node reads on
+    rate = rospy.Rate(50)
+    while not rospy.is_shutdown():
+        if kind == "tf":
+            X = pt.transform((0.0, 0.0, 0.2))
+            publisher.publish(
+                [pt.transform_message("base", "ball_link", X, rospy.Time.now())]
+            )
+        else:
+            publisher.publish(joint_state({"turn": 1.0}))
+        rate.sleep()
+
+
+class PoseFaultsTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.publisher = rospy.Publisher(
+            self.namespace + "/joint_states", JointState, queue_size=100
+        )
+        self.world = pt.World(self.namespace)
+        self.node, self.rival = None, None
+        self.change = lambda message: message  # of each joint state before it is sent
+        self.received = []  # (time of receipt, message)
+        self.good = rospy.Time(0)  # stamp of the last joint state that is as it should be
+
+    def tearDown(self):
+        self.world.stop()
+        if self.rival:
+            self.rival.kill()
+            self.rival.wait()
+        if self.node:
+            for _, message in self.received:
+                pt.check_invariants(self, message, 2.0)
+            stamps = [message.header.stamp for _, message in self.received]
+            self.assertEqual(stamps, sorted(stamps))
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, urdf=ARM, **parameters):
+        parameters.setdefault("pose_source", "joint_states")
+        parameters.setdefault("max_distance", 2.0)
+        parameters.setdefault("self_filter", False)
+        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
+        self.node.subscribe(
+            "proximity", ProximityArray, lambda m: self.received.append((rospy.Time.now(), m))
+        )
+        publisher = self.world.cloud_publisher
+        self.clouds = self.world.repeat(
+            20, lambda: publisher.publish(pt.cloud([[0.6, 0.6, 0.6]], "base"))
+        )
+        return self.node
+
+    def start_joints(self, moving=True):
+        def send():
+            stamp = rospy.Time.now()
+            message = joint_state(motion(stamp.to_sec()) if moving else STILL, stamp)
+            changed = self.change(message)
+            if changed is not None:
+                if changed is message:
+                    self.good = stamp
+                self.publisher.publish(changed)
+
+        return self.world.repeat(1.0 / PERIOD, send)
+
+    def start_rival(self, kind):
+        self.rival = subprocess.Popen(
+            [sys.executable, __file__, "rival", kind, self.namespace, "__name:=rival_" + kind]
+        )
+
+    def first(self, status, after):
+        """Returns the time at which the first message with a status came after another time."""
+
+        def times():
+            return [t for t, m in list(self.received) if m.status == status and t > after]
+
+        pt.wait_until(times, "status %d" % status)
+        return min(times())
+
+    def wait_for_diagnostic(self, name, words):
+        self.node.wait_until(
+            lambda: name in self.node.diagnostics and words in self.node.diagnostics[name].message,
+            words,
+        )
+
+    def disturb(self, change, words, limit):
+        """Changes the joint states; returns the messages until the node names the fault.
+
+        No message after that of `limit` [s] says OK, and none before is about a later instant than
+        the last good joint state.
+        """
+        self.node.wait_for_status(ProximityArray.OK)
+        begin = len(self.node.messages)
+        self.change = change
+        pt.wait_until(lambda: rospy.Time.now() > self.good + rospy.Duration(2 * PERIOD), "a change")
+        good = self.good
+        message = self.node.wait_for_status(ProximityArray.NO_POSE, words, start=begin)
+        told = self.first(ProximityArray.NO_POSE, good)
+        print("%s: %.0f ms" % (words, 1e3 * (told - good).to_sec()))
+        self.assertLess((told - good).to_sec(), limit + SLACK)
+        count = len(self.node.messages)
+        self.node.wait_for(lambda m: len(self.node.messages) > count + 5, "some more")
+        for t, m in self.received:
+            if m.status == ProximityArray.OK and t > good:
+                self.assertLessEqual(m.header.stamp, good + rospy.Duration(limit))
+        return message
+
+    def recover(self):
+        self.change = lambda message: message
+        self.node.wait_for_status(ProximityArray.OK)
+
+    def test_refused_joint(self):
+        """A joint whose newest sample is refused while the others move is told at once."""
+        node = self.start()
+        self.start_joints()
+
+        def change_turn(q):
+            def change(message):
+                message.position = [q if n == "turn" else p for n, p in zip(message.name, message.position)]
+                return JointState(message.header, message.name, message.position, [], [])
+
+            return change
+
+        message = self.disturb(change_turn(np.nan), "joint 'turn' is NaN", PERIOD)
+        self.assertNotIn("does everything that moves joints publish", message.status_text)
+        self.assertIn("older than that of joint 'slide'", message.status_text)
+        self.recover()
+        self.disturb(change_turn(1e12), "'turn' is 1e+12 rad: allowed is up to", PERIOD)
+        self.recover()
+
+        def twice(message):
+            header, name, position = message.header, message.name, message.position
+            return JointState(header, name + ["turn"], position + [position[0] + 1.0], [], [])
+
+        self.disturb(twice, "joint 'turn' is stated twice in a message", PERIOD)
+        self.recover()
+
+        def without_slide(message):
+            keep = message.name.index("turn")
+            return JointState(message.header, ["turn"], [message.position[keep]], [], [])
+
+        # One and a half times the usual spacing is allowed, and the spacing is not even.
+        message = self.disturb(without_slide, "joint 'slide'", 4 * PERIOD)
+        self.assertIn("older than that of joint 'turn'; its samples come every", message.status_text)
+        self.recover()
+
+        # Far outside its limits, by a wrong unit.
+        def in_millimetres(message):
+            position = [500.0 if n == "slide" else p for n, p in zip(message.name, message.position)]
+            return JointState(message.header, message.name, position, [], [])
+
+        self.change = in_millimetres
+        node.wait_for_status(ProximityArray.DEGRADED, "joint 'slide' is at 500, far outside")
+        self.recover()
+
+    def test_refused_messages(self):
+        """Joint states that come and cannot be used: the text has the reason, not a dead publisher."""
+        self.start(pose_timeout=0.2)
+        self.start_joints(moving=False)
+
+        def changed(**fields):
+            def change(message):
+                copy = JointState(message.header, message.name, message.position, [], [])
+                if "stamp" in fields:
+                    copy.header.stamp = fields["stamp"]()
+                copy.position = fields.get("position", copy.position)
+                return copy
+
+            return change
+
+        for words, change in (
+            ("2 names and 1 positions", changed(position=[1.0])),
+            ("has no stamp (0)", changed(stamp=lambda: rospy.Time(0))),
+            ("100.00 s in the future", changed(stamp=lambda: rospy.Time.now() + rospy.Duration(100))),
+            ("is NaN or infinite", changed(position=[np.nan, np.nan])),
+        ):
+            message = self.disturb(change, words, 0.2)
+            self.assertNotIn("does everything that moves joints publish", message.status_text)
+            self.recover()
+        message = self.disturb(lambda message: None, "is 0.2", 0.2)
+        self.assertIn("does everything that moves joints publish", message.status_text)
+
+    def check_ahead(self, stop, status, timeout):
+        """Stamps lie in no future, and ages count from receipt."""
+        node = self.node
+        node.wait_for_status(ProximityArray.OK)
+        begin = len(self.received)
+        node.wait_for(lambda m: len(self.received) > begin + 50, "messages")
+        for t, m in self.received:
+            self.assertLess((m.header.stamp - t).to_sec(), 0.0, m.status_text)
+            for source in m.sources:
+                counted = m.header.stamp.to_sec() - source.age  # NaN before the first cloud
+                self.assertFalse(counted > t.to_sec() + 0.001, source)
+        stop()
+        stopped = rospy.Time.now()
+        node.wait_for_status(status)
+        told = self.first(status, stopped)
+        print("%d: %.0f ms after the last input" % (status, 1e3 * (told - stopped).to_sec()))
+        self.assertLess((told - stopped).to_sec(), timeout + SLACK)
+
+    def test_joint_states_ahead(self):
+        node = self.start(pose_timeout=0.3)
+
+        def ahead(message):
+            message.header.stamp += rospy.Duration(0.8)
+            return message
+
+        self.change = ahead
+        joints = self.start_joints()
+        node.wait_for_status(ProximityArray.OK)
+        self.wait_for_diagnostic("pose", "ahead of the clock")
+        self.check_ahead(joints.stop, ProximityArray.NO_POSE, 0.3)
+        self.assertIn("ahead of the clock", node.log())
+        # A clock that is right again is no old one.
+        self.change = lambda message: message
+        self.start_joints()
+        started = rospy.Time.now()
+        node.wait_for_status(ProximityArray.OK)
+        self.assertLess((rospy.Time.now() - started).to_sec(), SLACK)
+
+    def test_tf_ahead(self):
+        node = self.start(pt.urdf(), pose_source="tf", pose_timeout=0.3)
+        poses = {"ball_link": pt.transform(), "box_link": pt.transform((0, 1, 0))}
+
+        def send():
+            stamp = rospy.Time.now() + rospy.Duration(0.8)
+            self.world.publish_transforms(
+                [pt.transform_message("base", name, X, stamp) for name, X in poses.items()]
+            )
+
+        tf = self.world.repeat(50, send)
+        node.wait_for_status(ProximityArray.OK)
+        self.wait_for_diagnostic("pose", "ahead of the clock")
+        self.check_ahead(tf.stop, ProximityArray.NO_POSE, 0.3)
+
+    def test_clouds_ahead(self):
+        """Joint states are ahead too, as tf has to know the robot when a cloud was taken."""
+        node = self.start(cloud_timeout=0.4)
+        self.clouds.stop()
+        publisher = self.world.cloud_publisher
+
+        def send():
+            stamp = rospy.Time.now() + rospy.Duration(0.25)
+            publisher.publish(pt.cloud([[0.6, 0.6, 0.6]], "base", stamp))
+
+        clouds = self.world.repeat(20, send)
+        self.start_joints()
+        node.wait_for_status(ProximityArray.OK)
+        self.wait_for_diagnostic("input cloud", "ahead of the clock")
+        self.check_ahead(clouds.stop, ProximityArray.STALE_CLOUD, 0.4)
+
+    def test_refused_transforms(self):
+        """The text has the reason, and the log one line in five seconds."""
+        node = self.start(pt.urdf(), pose_source="tf", pose_timeout=0.2)
+        self.world.stand(box=pt.transform((0, 0.8, 0)))
+        tf = self.world.start_tf()
+        node.wait_for_status(ProximityArray.OK)
+
+        def send(change):
+            message = pt.transform_message("base", "ball_link", pt.transform(), rospy.Time.now())
+            change(message)
+            self.world.publish_transforms([message])
+
+        def not_finite(message):
+            message.transform.translation.x = np.nan
+
+        def not_unit(message):
+            message.transform.rotation.w = 1.1
+
+        for change, words in (
+            (not_finite, "it holds NaN or infinity"),
+            (not_unit, "its quaternion has length 1.1"),
+            (lambda m: setattr(m.header, "stamp", rospy.Time(0)), "has no stamp (0)"),
+        ):
+            tf.paused = True
+            repeater = self.world.repeat(100, lambda change=change: send(change))
+            message = node.wait_for_status(ProximityArray.NO_POSE, words)
+            self.assertIn("the transform from 'ball_link' to 'base'", message.status_text)
+            self.assertNotIn("is robot_state_publisher running", message.status_text)
+            begin = len(node.messages)
+            node.wait_for(lambda m: len(node.messages) > begin + 50, "some more")
+            repeater.stop()
+            tf.paused = False
+            node.wait_for_status(ProximityArray.OK)
+        node._log.seek(0)
+        lines = node._log.read().decode().splitlines()
+        about_tf = [line for line in lines if "ball_link" in line or "TF_" in line or "tf2" in line]
+        self.assertLess(len(about_tf), 10, "\n".join(about_tf))
+
+    def test_rival_of_joint_states(self):
+        node = self.start()
+        self.start_joints(moving=False)
+        node.wait_for_status(ProximityArray.OK)
+        self.start_rival("joints")
+        message = node.wait_for_status(ProximityArray.NO_POSE, "has two publishers that disagree")
+        self.assertIn("joint 'turn'", message.status_text)
+        self.assertIn("/rival_joints says 1.000", message.status_text.replace(" and /", " /"))
+        begin = len(node.messages)
+        node.wait_for(lambda m: len(node.messages) > begin + 100, "some more")
+        for m in node.messages[begin:]:
+            self.assertEqual(m.status, ProximityArray.NO_POSE)
+        self.rival.kill()
+        node.wait_for_status(ProximityArray.OK)
+
+    def test_rival_of_tf(self):
+        node = self.start(pt.urdf(), pose_source="tf")
+        self.world.stand(box=pt.transform((0, 0.8, 0))).start_tf()
+        node.wait_for_status(ProximityArray.OK)
+        self.start_rival("tf")
+        message = node.wait_for_status(ProximityArray.NO_POSE, "has two publishers that disagree")
+        self.assertIn("/rival_tf", message.status_text)
+        self.assertIn("they are 0.200 m apart", message.status_text)
+        self.assertNotEqual(pt.link(message, "box_link").state, 0)  # the other link is known
+        self.rival.kill()
+        node.wait_for_status(ProximityArray.OK)
+
+    def test_many_names(self):
+        """A message with a million names does not stop the output."""
+        node = self.start()
+        self.start_joints(moving=False)
+        node.wait_for_status(ProximityArray.OK)
+        begin = len(self.received)
+        self.start_rival("names")
+        node.wait_until(
+            lambda: node.diagnostic("pose", "positions that cannot be used") == "1000000", "the refusal"
+        )
+        node.wait_for(lambda m: len(self.received) > begin + 100, "messages after it")
+        times = [t.to_sec() for t, _ in self.received[begin:]]
+        print("the longest pause: %.0f ms" % (1e3 * np.diff(times).max()))
+        self.assertLess(np.diff(times).max(), 0.1 + SLACK)
+        self.assertEqual({m.status for _, m in self.received[begin:]}, {ProximityArray.OK})
+
+    def test_slow_ingest(self):
+        """Clouds that take longer to be taken in than they live: the text says so."""
+        node = self.start(**{"cloud_timeout": 0.2, "noise_filter/radius": 0.2})
+        self.start_joints(moving=False)
+        self.clouds.stop()
+        points = np.random.default_rng(1).uniform(-1, 1, (100000, 3))
+        message = pt.cloud(points, "base")
+        publisher = self.world.cloud_publisher
+
+        def send():
+            message.header.stamp = rospy.Time.now()
+            publisher.publish(message)
+
+        self.world.repeat(10, send)
+        answer = node.wait_for_status(ProximityArray.STALE_CLOUD, "too long for its timeout")
+        self.assertIn("raise ~cloud_timeout", answer.status_text)
+
+
+if __name__ == "__main__":
+    if "rival" in sys.argv:
+        run_rival(*sys.argv[2:4])
+        sys.exit()
+    import rostest
+
+    rospy.init_node("pose_faults_test")
+    rostest.rosrun("ist_proximity", "pose_faults_test", PoseFaultsTest, sys.argv)

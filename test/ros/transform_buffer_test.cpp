@@ -1,0 +1,118 @@
+#include "ros/poses/transform_buffer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "ros/poses/publisher_track.h"
+
+namespace ist {
+namespace {
+
+geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child,
+                                          double stamp, double x = 0.0) {
+  geometry_msgs::TransformStamped message;
+  message.header.frame_id = parent;
+  message.child_frame_id = child;
+  message.header.stamp = ros::Time(stamp);
+  message.transform.translation.x = x;
+  message.transform.rotation.w = 1.0;
+  return message;
+}
+
+TEST(TransformBuffer, refusesWithTheReason) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  const ros::Time now(100.0);
+  EXPECT_EQ(buffer.add(transform("world", "base", 99.9), "/a", false, now), "");
+  EXPECT_EQ(buffer.why_refused("world", "hand"), "");
+
+  geometry_msgs::TransformStamped bad = transform("base", "arm", 99.9);
+  bad.transform.translation.y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(buffer.add(bad, "/a", false, now).find("NaN or infinity"), std::string::npos);
+  bad = transform("base", "arm", 99.9);
+  bad.transform.rotation.w = 0.9;
+  EXPECT_NE(buffer.add(bad, "/a", false, now).find("length 0.9"), std::string::npos);
+  EXPECT_NE(buffer.add(transform("base", "arm", 0.0), "/a", false, now).find("no stamp"),
+            std::string::npos);
+  EXPECT_NE(buffer.add(transform("base", "arm", 101.5), "/a", false, now).find("1.50 s in the f"),
+            std::string::npos);
+  EXPECT_NE(buffer.add(transform("base", "base", 99.9), "/a", false, now).find("itself"),
+            std::string::npos);
+  EXPECT_NE(buffer.add(transform("", "arm", 99.9), "/a", false, now).find("no frame"),
+            std::string::npos);
+  EXPECT_NE(buffer.add(transform("world", "base", 80.0), "/a", false, now).find("19.90 s behind"),
+            std::string::npos);
+  // The reason is found for what hangs on the frame, although it has never had a pose.
+  EXPECT_EQ(buffer.add(transform("arm", "hand", 99.9), "/a", false, now), "");
+  bad = transform("base", "arm", 99.95);
+  bad.transform.rotation.w = 0.9;
+  buffer.add(bad, "/a", false, now);
+  EXPECT_NE(buffer.why_refused("world", "hand").find("from 'arm' to 'base'"), std::string::npos);
+  EXPECT_EQ(buffer.why_refused("arm", "hand"), "");
+  // A good transform ends it.
+  EXPECT_EQ(buffer.add(transform("base", "arm", 99.96), "/a", false, now), "");
+  EXPECT_EQ(buffer.why_refused("arm", "base"), "");
+}
+
+TEST(TransformBuffer, agesCountFromReceipt) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  buffer.add(transform("world", "base", 99.99), "/a", false, ros::Time(100.0));
+  EXPECT_EQ(buffer.counts_from("world", "arm", ros::Time(99.99)), ros::Time(99.99));
+  EXPECT_EQ(buffer.ahead(), "");
+  buffer.add(transform("base", "arm", 100.8), "/b", false, ros::Time(100.0));
+  buffer.add(transform("arm", "hand", 100.81), "/a", false, ros::Time(100.81));
+  EXPECT_NE(buffer.ahead().find("'arm' to 'base' is stamped 0.800 s ahead"), std::string::npos);
+  EXPECT_EQ(buffer.counts_from("base", "hand", ros::Time(100.8)), ros::Time(100.0));
+  EXPECT_EQ(buffer.counts_from("hand", "base", ros::Time(100.8)), ros::Time(100.0));
+  // Transforms that are not between the two frames do not matter.
+  EXPECT_EQ(buffer.counts_from("arm", "hand", ros::Time(100.81)), ros::Time(100.81));
+  EXPECT_EQ(buffer.counts_from("world", "base", ros::Time(99.99)), ros::Time(99.99));
+}
+
+TEST(TransformBuffer, namesDisagreeingPublishers) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  for (int i = 0; i < 5; ++i) {
+    const double t = 100.0 + 0.02 * i;
+    buffer.add(transform("base", "arm", t, 0.1 * i), "/a", false, ros::Time(t));
+    buffer.add(transform("base", "arm", t + 0.01, 0.1 * i + 0.05), "/same", false, ros::Time(t));
+  }
+  EXPECT_EQ(buffer.dispute("base", "arm"), "") << "they state one motion";
+  for (int i = 0; i < 3; ++i) {
+    const double t = 101.0 + 0.02 * i;
+    buffer.add(transform("base", "arm", t, 0.5), "/a", false, ros::Time(t));
+    buffer.add(transform("base", "arm", t + 0.01, 0.8), "/other", false, ros::Time(t));
+  }
+  const std::string text = buffer.dispute("base", "arm");
+  EXPECT_NE(text.find("/other"), std::string::npos) << text;
+  EXPECT_NE(text.find("0.300 m apart"), std::string::npos) << text;
+  EXPECT_EQ(buffer.dispute("world", "base"), "");
+}
+
+// One publisher never disagrees with itself, and one that takes over does not either.
+TEST(PublisherTrack, oneAfterAnother) {
+  PublisherTrack track;
+  std::string other;
+  PublisherTrack::Values values = PublisherTrack::Values::Zero(), others;
+  for (int i = 0; i < 100; ++i) {
+    values[0] = i % 2;
+    EXPECT_FALSE(track.add("/a", ros::Time(100.0 + 0.01 * i), values, &other, &others));
+  }
+  for (int i = 0; i < 100; ++i) {
+    values[0] = 5.0 + std::sin(i);
+    EXPECT_FALSE(track.add("/b", ros::Time(101.5 + 0.01 * i), values, &other, &others));
+  }
+  // The same stamp, and other values.
+  values[0] += 0.02;
+  EXPECT_TRUE(track.add("/c", ros::Time(101.5 + 0.99), values, &other, &others));
+  EXPECT_EQ(other, "/b");
+  // A quaternion and its negative agree.
+  PublisherTrack turned;
+  values << 0, 0, 0, 0, 0, 0, 1;
+  EXPECT_FALSE(turned.add("/a", ros::Time(100.0), values, &other, &others));
+  EXPECT_FALSE(turned.add("/b", ros::Time(100.0), -values, &other, &others));
+}
+
+}  // namespace
+}  // namespace ist
