@@ -1,5 +1,6 @@
 // The description that a cloud gives of its own bytes: check_layout() lets pass what can be read.
 // Covers: src/cloud/format/cloud_layout.cpp src/cloud/format/point_reader.h
+// Longest input: 600
 
 #include <cmath>
 #include <cstddef>
@@ -33,13 +34,59 @@ ist::RawField field(ByteReader* in) {
   return field;
 }
 
-ist::CloudLayout layout_from(ByteReader* in) {
+ist::CloudLayout any_layout(ByteReader* in) {
   ist::CloudLayout layout;
   for (std::size_t i = in->below(6); i > 0; --i) layout.fields.push_back(field(in));
   layout.width = size(in);
   layout.height = size(in);
   layout.point_step = size(in);
   layout.row_step = size(in);
+  return layout;
+}
+
+// A layout that fits the data, but for one or two members.
+ist::CloudLayout nearly_valid_layout(ByteReader* in) {
+  ist::CloudLayout layout;
+  const bool is_double = in->flag();
+  const std::uint32_t number = is_double ? 8 : 4;
+  std::uint32_t offset = 0;
+  for (const char* name : {"x", "y", "z", "rgb"}) {
+    offset += static_cast<std::uint32_t>(in->below(3));
+    layout.fields.push_back({name, offset, static_cast<std::uint8_t>(is_double ? 8 : 7), 1});
+    offset += number;
+  }
+  layout.width = 1 + static_cast<std::uint32_t>(in->below(3));
+  layout.height = 1 + static_cast<std::uint32_t>(in->below(3));
+  layout.point_step = offset + static_cast<std::uint32_t>(in->below(3));
+  layout.row_step = layout.width * layout.point_step + static_cast<std::uint32_t>(in->below(3));
+  for (std::size_t i = in->below(3); i > 0; --i) {
+    switch (in->below(6)) {
+      case 0:
+        layout.width = size(in);
+        break;
+      case 1:
+        layout.height = size(in);
+        break;
+      case 2:
+        layout.point_step = size(in);
+        break;
+      case 3:
+        layout.row_step = size(in);
+        break;
+      case 4:
+        layout.fields[in->below(4)] = field(in);
+        break;
+      default:
+        layout.fields.erase(layout.fields.begin() +
+                            static_cast<std::ptrdiff_t>(in->below(layout.fields.size())));
+    }
+    if (layout.fields.size() < 4) break;
+  }
+  return layout;
+}
+
+ist::CloudLayout layout_from(ByteReader* in) {
+  ist::CloudLayout layout = in->byte() < 80 ? any_layout(in) : nearly_valid_layout(in);
   layout.is_bigendian = in->flag();
   layout.data = in->left() > 0 ? in->rest() : nullptr;
   layout.data_size = in->left();

@@ -170,17 +170,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const ist::ParameterError& error) {
     FUZZ_CHECK(error.what()[0] == '~', "no parameter named: %s", error.what());
   }
-  try {
-    std::vector<ist::Tunable> tunables;
-    const ist::LiveConfig live = ist::parse_live(tree, 1.0, &tunables);
-    check_query(live.query);
-    check_repulsion(live.repulsion, 1.0);
-    for (const ist::Tunable& tunable : tunables) {
-      FUZZ_CHECK(tunable.kind == ist::Tunable::Kind::kBool || tunable.range.contains(tunable.value),
-                 "%s is %g", tunable.name.c_str(), tunable.value);
-    }
-  } catch (const ist::ParameterError& error) {
-    FUZZ_CHECK(error.what()[0] == '~', "no parameter named: %s", error.what());
+  // What the tree lacks, or has wrong, keeps the last value.
+  ist::LiveConfig last;
+  last.query.margin = 0.05;
+  const ist::LiveReading live = ist::parse_live(tree, last);
+  check_query(live.config.query);
+  check_repulsion(live.config.repulsion, last.query.max_distance);
+  FUZZ_CHECK(live.found.size() == live.tunables.size(), "%zu tunables", live.tunables.size());
+  for (std::size_t i = 0; i < live.tunables.size(); ++i) {
+    const ist::Tunable& tunable = live.tunables[i];
+    FUZZ_CHECK(tunable.kind == ist::Tunable::Kind::kBool || tunable.range.contains(tunable.value),
+               "%s is %g", tunable.name.c_str(), tunable.value);
+    FUZZ_CHECK(tunable.name != "query/margin" || live.found[i] || tunable.value == 0.05,
+               "the margin was lost: %g", tunable.value);
   }
   return 0;
 }
