@@ -27,18 +27,22 @@ Outcome pack(const Shape& shape, const PackingConfig& config, double time_limit,
              Packing* packing) {
   const std::string key = packing_key(shape, config);
   std::string warning;
-  if (std::optional<Packing> cached = cache.load(key, &warning)) {
-    *packing = std::move(*cached);
-    return Outcome::kDone;
-  }
-  *from_cache = false;
-  const auto start = Clock::now();
+  auto start = Clock::now();
   bool is_cancelled = false, is_late = false;
-  *packing = pack_element(shape, config, [&](double) {
+  const PackingProgress goes_on = [&](double) {
     is_cancelled = is_cancelled || (cancelled && cancelled());
     is_late = is_late || seconds_since(start) > time_limit;
     return !is_cancelled && !is_late;
-  });
+  };
+  if (std::optional<Packing> cached = cache.load(key, shape, config, goes_on, &warning)) {
+    *packing = std::move(*cached);
+    return Outcome::kDone;
+  }
+  if (is_cancelled) return Outcome::kCancelled;
+  *from_cache = false;
+  start = Clock::now();
+  is_late = false;
+  *packing = pack_element(shape, config, goes_on);
   if (is_cancelled) return Outcome::kCancelled;
   // How far it got depends on the machine, so the cache does not keep it.
   if (is_late) return Outcome::kLate;

@@ -4,11 +4,11 @@
 
 namespace ist {
 
-/// Checks the lists of indices in a Collada file, which assimp 5 reads without end where one holds
-/// anything but whole numbers: one letter, or a decimal point, and memory grows until there is
-/// none.
+/// Checks what assimp 5 takes on trust in a Collada file, and does not survive: indices that are no
+/// whole numbers (memory grows until there is none), accessors that read past their array (it
+/// crashes) and fewer lists of indices than announced (it ends the program).
 /// @param bytes  the file
-/// @returns an empty string, or what is wrong with the file ("holds ... "). A file that is no XML
+/// @returns an empty string, or what is wrong with the file ("holds ..."). A file that is no XML
 /// has
 ///          no fault here; assimp reports it.
 std::string collada_fault(const std::string& bytes);

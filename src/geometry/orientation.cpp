@@ -97,9 +97,12 @@ class Nesting {
   const TriangleBvh& surface(std::size_t shell) {
     const auto found = surfaces_.find(shell);
     if (found != surfaces_.end()) return found->second;
-    TriangleMesh part;
-    part.vertices = mesh_.vertices;
-    for (const std::size_t t : shells_[shell]) part.triangles.push_back(mesh_.triangles[t]);
+    TriangleMesh part;  // with its own corners alone: a mesh may have ten thousand shells
+    for (const std::size_t t : shells_[shell]) {
+      const auto first = static_cast<std::uint32_t>(part.vertices.size());
+      for (int k = 0; k < 3; ++k) part.vertices.push_back(mesh_.corner(t, k));
+      part.triangles.push_back({first, first + 1, first + 2});
+    }
     return surfaces_.emplace(shell, TriangleBvh(part)).first->second;
   }
 

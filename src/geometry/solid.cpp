@@ -6,14 +6,25 @@
 
 #include "geometry/primitive_distance.h"
 #include "geometry/solid_element.h"
+#include "internal/geometry/limits.h"
+#include "internal/geometry/solid_queries.h"
+#include "ist_proximity/geometry/error.h"
 
 namespace ist {
 
-Solid::Solid(const LinkGeometry& geometry) {
+Solid::Solid(const LinkGeometry& geometry) : Solid(make_solid(geometry, {})) {}
+
+Solid make_solid(const LinkGeometry& geometry, const std::function<bool()>& cancelled) {
   std::vector<SolidElement> elements;
   elements.reserve(geometry.size());
-  for (const GeometryElement& source : geometry) elements.emplace_back(source);
-  elements_ = std::make_shared<const std::vector<SolidElement>>(std::move(elements));
+  for (const GeometryElement& source : geometry) {
+    const std::string fault = element_fault(source);
+    if (!fault.empty()) throw ModelError(source.source + ": " + fault);
+    elements.emplace_back(source, cancelled);
+  }
+  Solid solid;
+  solid.elements_ = std::make_shared<const std::vector<SolidElement>>(std::move(elements));
+  return solid;
 }
 
 SignedDistance Solid::signed_distance(const Eigen::Vector3d& p_L) const {

@@ -33,11 +33,12 @@ Eigen::Vector3d normal_at_touch(const TriangleBvh& bvh, const Eigen::Vector3d& f
 
 }  // namespace
 
-SolidElement::SolidElement(const GeometryElement& source)
+SolidElement::SolidElement(const GeometryElement& source, const CancelRequest& cancelled)
     : primitive(TriangleMesh{}), X_LE(source.X_LE), X_EL(source.X_LE.inverse()) {
   if (const auto* mesh = std::get_if<TriangleMesh>(&source.shape)) {
-    bvh = TriangleBvh(*mesh);
+    bvh = TriangleBvh(*mesh, cancelled);
     normals = face_normals(*mesh);
+    throw_if(cancelled);
     is_closed = is_closed_mesh(*mesh);
     return;
   }

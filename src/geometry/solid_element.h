@@ -11,7 +11,8 @@ namespace ist {
 
 /// One element of a solid, as queries need it.
 struct SolidElement {
-  explicit SolidElement(const GeometryElement& source);
+  /// @throws Cancelled
+  SolidElement(const GeometryElement& source, const CancelRequest& cancelled);
 
   bool is_mesh() const { return bvh.size() > 0; }
 

@@ -15,7 +15,9 @@ constexpr float kBeta = 6.0F;
 
 }  // namespace
 
-TriangleBvh::TriangleBvh(const TriangleMesh& mesh) { TriangleBvhBuilder(mesh, this).run(); }
+TriangleBvh::TriangleBvh(const TriangleMesh& mesh, const CancelRequest& cancelled) {
+  TriangleBvhBuilder(mesh, cancelled, this).run();
+}
 
 TriangleBvh::View TriangleBvh::view() const {
   return {boxes_.data(),

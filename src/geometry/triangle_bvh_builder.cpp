@@ -48,6 +48,8 @@ void TriangleBvhBuilder::run() {
 
 // Splits at the median along the longest axis of the centroids' box.
 std::uint32_t TriangleBvhBuilder::split(const Range& range) {
+  constexpr std::uint32_t kAskFrom = 4096;  // triangles; smaller parts take microseconds
+  if (range.second - range.first >= kAskFrom) throw_if(cancelled_);
   std::vector<TriangleBvh::Triangle>& triangles = bvh_.triangles_;
   Eigen::AlignedBox3d box;
   for (std::uint32_t t = range.first; t < range.second; ++t) box.extend(centroid(triangles[t]));

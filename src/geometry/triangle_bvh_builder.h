@@ -9,7 +9,9 @@ namespace ist {
 /// Builds an 8-wide hierarchy from the root down, by three levels of median splits per node.
 class TriangleBvhBuilder {
  public:
-  TriangleBvhBuilder(const TriangleMesh& mesh, TriangleBvh* bvh) : mesh_(mesh), bvh_(*bvh) {}
+  TriangleBvhBuilder(const TriangleMesh& mesh, const CancelRequest& cancelled, TriangleBvh* bvh)
+      : mesh_(mesh), cancelled_(cancelled), bvh_(*bvh) {}
+  /// @throws Cancelled
   void run();
 
  private:
@@ -23,6 +25,7 @@ class TriangleBvhBuilder {
   void set_moments(const Range& range, TriangleBvh::Moments* moments, std::size_t slot) const;
 
   const TriangleMesh& mesh_;
+  const CancelRequest& cancelled_;
   TriangleBvh& bvh_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };

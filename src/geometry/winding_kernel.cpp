@@ -171,7 +171,9 @@ double Sum(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta)
     const std::int32_t index = stack.pop();
     alignas(64) float near[kWidth];
     AddExpansions(bvh.moments[index], p, beta * beta, far_sums, near);
-    for (std::size_t k = 0; k < kWidth; ++k) {
+    // Unused slots have no child: a NaN, which makes them near, must not lead back to the root.
+    const auto count = static_cast<std::size_t>(bvh.boxes[index].count);
+    for (std::size_t k = 0; k < count; ++k) {
       if (near[k] == 0.0F) continue;
       const std::int32_t child = bvh.boxes[index].child[k];
       if (child < 0) {

@@ -35,17 +35,21 @@ void HoleObstacles::search_caps(const TriangleMesh& caps) {
   };
   std::vector<Entry> sorted;
   sorted.reserve(caps.triangles.size());
-  for (std::size_t t = 0; t < caps.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < caps.triangles.size() && keeps_on(); ++t) {
     const Cap cap{caps.corner(t, 0), caps.corner(t, 1), caps.corner(t, 2)};
     sorted.push_back({cap, distance_to_mesh(cap.centroid())});
   }
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const Entry& x, const Entry& y) { return x.distance > y.distance; });
-  for (const Entry& entry : sorted) search_cap(entry.cap);
+  for (const Entry& entry : sorted) {
+    if (!keeps_on()) return;
+    search_cap(entry.cap);
+  }
 }
 
 // Adds obstacles until they cover the cap, dividing it where that is needed.
 void HoleObstacles::search_cap(const Cap& cap) {
+  if (!keeps_on()) return;
   const Eigen::Vector3d y = cap.centroid();
   const double size = std::max({(cap.a - y).norm(), (cap.b - y).norm(), (cap.c - y).norm()});
   const ClosestPoint closest = bvh_.closest(y);

@@ -50,14 +50,15 @@ std::array<Eigen::Vector3d, kDirections> make_directions() {
 
 }  // namespace
 
-HoleObstacles::HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance)
-    : bvh_(bvh), tolerance_(tolerance) {
+HoleObstacles::HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance,
+                             PackingWatch* watch)
+    : bvh_(bvh), watch_(*watch), tolerance_(tolerance) {
   const std::vector<OpenEdge> open = open_edges(mesh);
   if (open.empty()) return;
   TriangleMesh edges;
   edges.vertices = mesh.vertices;
   for (const OpenEdge& edge : open) edges.triangles.push_back({edge.from, edge.to, edge.to});
-  edges_ = TriangleBvh(edges);
+  edges_ = TriangleBvh(edges, [this] { return !keeps_on(); });
   search_caps(hole_caps(mesh, open));
 }
 
@@ -109,6 +110,7 @@ bool HoleObstacles::admits(const Eigen::Vector3d& center, double radius) {
   Eigen::Vector3d nearest = kRays[0];
   OpeningPoint opening;
   for (std::size_t i = 0; i < kRays.size() && !opening; ++i) {
+    if (!keeps_on()) return false;
     opening = opening_along(center, radius, kRays[i], &margin);
     if (margin < min_margin) nearest = kRays[i];
     min_margin = std::min(min_margin, margin);
@@ -131,7 +133,7 @@ HoleObstacles::OpeningPoint HoleObstacles::opening_near(const Eigen::Vector3d& c
     const Eigen::Vector3d u = ray.unitOrthogonal(), v = ray.cross(u);
     Eigen::Vector3d best = ray;
     double best_margin = margin;
-    for (int i = 0; i < kTurns; ++i) {
+    for (int i = 0; i < kTurns && keeps_on(); ++i) {
       const double angle = 2.0 * M_PI * i / kTurns;
       const Eigen::Vector3d turned =
           (ray + turn * (std::cos(angle) * u + std::sin(angle) * v)).normalized();

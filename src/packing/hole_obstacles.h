@@ -5,6 +5,7 @@
 
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/shapes.h"
+#include "packing_watch.h"
 #include "sphere_search.h"
 
 namespace ist {
@@ -30,7 +31,9 @@ class HoleObstacles {
  public:
   /// @param bvh        of the mesh; must outlive this
   /// @param tolerance  [m] how much larger than necessary an obstacle may be; > 0
-  HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance);
+  /// @param watch      must outlive this; when it stops, the search ends and obstacles are missing
+  HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance,
+                PackingWatch* watch);
 
   struct Obstacle {
     Eigen::Vector3d center;
@@ -46,6 +49,8 @@ class HoleObstacles {
 
   bool is_closed() const { return edges_.size() == 0; }
   std::size_t sphere_count() const { return spheres_.size(); }
+  /// False when the packing has to stop; what is found from then on is not used.
+  bool keeps_on() const { return watch_.keeps_on(); }
 
  private:
   struct Cap {  ///< a triangle that closes a hole, or a part of one
@@ -72,6 +77,7 @@ class HoleObstacles {
   void add_obstacle(const Eigen::Vector3d& opening);
 
   const TriangleBvh& bvh_;
+  PackingWatch& watch_;
   double tolerance_;
   TriangleBvh edges_;  ///< boundary edges as triangles without area: obstacles of radius tolerance_
   SphereSearch spheres_;       ///< obstacles

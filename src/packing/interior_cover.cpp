@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "internal/geometry/boundary_edges.h"
 #include "sphere_search.h"
 
 namespace ist {
@@ -18,6 +19,12 @@ constexpr double kHoleCoverRadius = 0.5;
 // at most this share of the wanted gap.
 constexpr double kMaxUnclearSize = 0.25;
 constexpr double kWindingError = 0.01;
+
+// cover_interior() covers every interior cell of half its target size with a sphere. A cell that is
+// smaller than this share of the target and not covered shows that the packing is another one.
+constexpr double kMinCheckedSize = 0.1;
+// Cells that a check visits at most: about 20 s.
+constexpr std::size_t kMaxCheckedCells = 10000000;
 
 // A cell is clipped where that takes away at least this share of its half width.
 constexpr double kMinClip = 0.2;
@@ -57,24 +64,15 @@ int clip_box(const Eigen::Vector3d& center, const Eigen::Vector3d& half, const E
   return static_cast<int>(count);
 }
 
-class InteriorCover {
+// An octree over the mesh's box. Cells are divided until they are outside, covered by a sphere,
+// covered by the surface, or done as the derived class has it.
+class InteriorOctree {
  public:
-  InteriorCover(const TriangleBvh& bvh, const MedialSphereFinder& finder,
-                const PackingConfig& config, SphereSearch* spheres, Packing* packing)
-      : bvh_(bvh),
-        finder_(finder),
-        config_(config),
-        // The interior need not be covered more tightly than the surface.
-        target_(std::max(config.max_error, packing->certificate.max_gap)),
-        spheres_(*spheres),
-        packing_(*packing) {
-    for (const InnerSphere& sphere : packing_.spheres)
-      search_.add(sphere.center, sphere.cover_radius);
-  }
+  InteriorOctree(const InteriorOctree&) = delete;
+  InteriorOctree& operator=(const InteriorOctree&) = delete;
 
-  bool run(const PackingProgress& progress) {
-    progress_ = progress;
-    packing_.certificate.interior_gap = target_;
+  // False when it was stopped.
+  bool run() {
     const Eigen::AlignedBox3d box = bvh_.bounds();
     if (box.sizes().minCoeff() <= 0.0) return true;  // flat: no interior
     // Nearly cubic cells, for a long thin link too.
@@ -90,24 +88,35 @@ class InteriorCover {
           const Eigen::Vector3d cell(2.0 * i + 1.0, 2.0 * j + 1.0, 2.0 * k + 1.0);
           visit(box.min() + cell.cwiseProduct(quarter), quarter, 0);
         }
-        done_ = static_cast<double>(i * m.y() + j + 1) / (m.x() * m.y());
-        if (stopped_ || (progress && !progress(done_))) return false;
+        if (!watch_.report(static_cast<double>(i * m.y() + j + 1) / (m.x() * m.y()))) return false;
       }
     }
     return true;
   }
 
- private:
-  // Asked within cells, too: a single cell takes long where a link is large against max_error.
-  bool is_stopped() {
-    constexpr int kStopInterval = 1024;
-    if (!stopped_ && ++visits_ % kStopInterval == 0 && progress_) stopped_ = !progress_(done_);
-    return stopped_;
-  }
+ protected:
+  InteriorOctree(const TriangleBvh& bvh, bool is_closed, double target, PackingWatch* watch)
+      : bvh_(bvh), is_closed_(is_closed), target_(target), watch_(*watch) {}
+  ~InteriorOctree() = default;
 
+  // What becomes of an interior cell that no sphere and no surface covers. False: it must be
+  // divided.
+  // @param match  the sphere that covers it best
+  virtual bool is_done(const Eigen::Vector3d& center, double circumradius, CellKind kind,
+                       const SphereSearch::Match& match) = 0;
+
+  const TriangleBvh& bvh_;
+  const bool is_closed_;
+  const double target_;  // [m] wanted gap
+  PackingWatch& watch_;
+  SphereSearch search_;      // cover spheres
+  bool is_decided_ = false;  // nothing more need be looked at
+
+ private:
   // Covers the interior points of a cell, dividing it where that is needed.
   void visit(const Eigen::Vector3d& center, const Eigen::Vector3d& half, std::uint32_t hint) {
-    if (is_stopped()) return;
+    if (is_decided_ || !watch_.keeps_on())
+      return;  // a single cell takes long in a link that is large
     std::array<Eigen::Vector3d, 8> corners;
     for (std::size_t k = 0; k < 8; ++k) corners[k] = box_corner(center, half, k);
     const SphereSearch::Match match = search_.best(corners.data(), 8, hint, 0, target_);
@@ -125,7 +134,7 @@ class InteriorCover {
     const bool is_interior =
         kind == CellKind::kInside ||
         (kind == CellKind::kUnclear && circumradius <= kMaxUnclearSize * target_);
-    if (is_interior && is_done_with_sphere(center, circumradius, kind, match)) return;
+    if (is_interior && is_done(center, circumradius, kind, match)) return;
     for (const Eigen::Vector3d& corner : corners) {
       visit(0.5 * (center + corner), 0.5 * half, match.sphere);
     }
@@ -136,7 +145,7 @@ class InteriorCover {
   // the sphere's centre.
   bool is_covered_below(const Eigen::Vector3d& center, const Eigen::Vector3d& half,
                         const Eigen::Vector3d& q, const SphereSearch::Match& match) const {
-    if (!finder_.is_closed()) return false;
+    if (!is_closed_) return false;
     const Eigen::Vector3d from_sphere = center - search_.center(match.sphere), from_q = center - q;
     const double side = from_q.dot(from_sphere) > 0.0 ? 1.0 : -1.0;
     return is_covered_along(side * from_q, center, half, match) ||
@@ -164,10 +173,50 @@ class InteriorCover {
            search_.best(vertices.data(), count, match.sphere, 0, target_).cost <= target_;
   }
 
+  // A cell that no triangle touches is on the side of its centre. In an open mesh the winding
+  // number changes smoothly instead: it is harmonic off the mesh, and Harnack's inequality bounds
+  // its rise from the centre to the cell's corners.
+  CellKind classify(const Eigen::Vector3d& center, double circumradius, double distance) const {
+    if (distance <= circumradius) return CellKind::kAtSurface;
+    if (is_closed_) {
+      return bvh_.is_inside(center) ? CellKind::kInside : CellKind::kOutside;
+    }
+    const double q = circumradius / distance;
+    const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
+    const double quick = bvh_.quick_winding_number(center);
+    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) {
+      return CellKind::kOutside;
+    }
+    const double w = bvh_.winding_number(center);
+    if (std::max(w + kWindingError, 0.0) * rise < 0.5) return CellKind::kOutside;
+    return w > 0.5 ? CellKind::kInside : CellKind::kUnclear;
+  }
+};
+
+// Adds a sphere where a cell is not covered.
+class InteriorCover final : public InteriorOctree {
+ public:
+  InteriorCover(const TriangleBvh& bvh, const MedialSphereFinder& finder,
+                const PackingConfig& config, PackingWatch* watch, SphereSearch* spheres,
+                Packing* packing)
+      // The interior need not be covered more tightly than the surface.
+      : InteriorOctree(bvh, finder.is_closed(),
+                       std::max(config.max_error, packing->certificate.max_gap), watch),
+        finder_(finder),
+        config_(config),
+        spheres_(*spheres),
+        packing_(*packing) {
+    for (const InnerSphere& sphere : packing_.spheres) {
+      search_.add(sphere.center, sphere.cover_radius);
+    }
+    packing_.certificate.interior_gap = target_;
+  }
+
+ private:
   // Adds a sphere about the cell's centre if the centre is not covered well. False: the cell must
   // be divided. True: no further sphere is allowed, and the cell's gap is in the certificate.
-  bool is_done_with_sphere(const Eigen::Vector3d& center, double circumradius, CellKind kind,
-                           const SphereSearch::Match& match) {
+  bool is_done(const Eigen::Vector3d& center, double circumradius, CellKind kind,
+               const SphereSearch::Match& match) override {
     const double gap = search_.best(&center, 1, match.sphere, 0, 0.5 * target_).cost;
     if (gap <= 0.5 * target_ && 2.0 * circumradius > 0.5 * target_) return false;
     if (packing_.spheres.size() >= static_cast<std::size_t>(config_.max_spheres)) {
@@ -186,44 +235,47 @@ class InteriorCover {
     return false;
   }
 
-  // A cell that no triangle touches is on the side of its centre. In an open mesh the winding
-  // number changes smoothly instead: it is harmonic off the mesh, and Harnack's inequality bounds
-  // its rise from the centre to the cell's corners.
-  CellKind classify(const Eigen::Vector3d& center, double circumradius, double distance) const {
-    if (distance <= circumradius) return CellKind::kAtSurface;
-    if (finder_.is_closed()) {
-      return bvh_.is_inside(center) ? CellKind::kInside : CellKind::kOutside;
-    }
-    const double q = circumradius / distance;
-    const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
-    const double quick = bvh_.quick_winding_number(center);
-    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) {
-      return CellKind::kOutside;
-    }
-    const double w = bvh_.winding_number(center);
-    if (std::max(w + kWindingError, 0.0) * rise < 0.5) return CellKind::kOutside;
-    return w > 0.5 ? CellKind::kInside : CellKind::kUnclear;
-  }
-
-  const TriangleBvh& bvh_;
   const MedialSphereFinder& finder_;
   const PackingConfig& config_;
-  const double target_;  // [m] wanted gap
   SphereSearch& spheres_;
   Packing& packing_;
-  SphereSearch search_;  // cover spheres
-  PackingProgress progress_;
-  double done_ = 0.0;
-  int visits_ = 0;
-  bool stopped_ = false;
+};
+
+// Finds a cell that a packing should have covered.
+class InteriorCheck final : public InteriorOctree {
+ public:
+  InteriorCheck(const TriangleMesh& mesh, const TriangleBvh& bvh, const Packing& packing,
+                double deviation, double gap, PackingWatch* watch)
+      : InteriorOctree(bvh, is_closed_mesh(mesh), gap, watch) {
+    for (const InnerSphere& sphere : packing.spheres) {
+      search_.add(sphere.center, sphere.cover_radius - deviation);
+    }
+  }
+
+  bool is_covered() { return run() && !is_decided_; }
+
+ private:
+  bool is_done(const Eigen::Vector3d&, double circumradius, CellKind,
+               const SphereSearch::Match&) override {
+    const bool is_small = circumradius <= kMinCheckedSize * target_;
+    is_decided_ = is_small || ++cells_ > kMaxCheckedCells;
+    return is_decided_;
+  }
+
+  std::size_t cells_ = 0;
 };
 
 }  // namespace
 
 bool cover_interior(const TriangleBvh& bvh, const MedialSphereFinder& finder,
-                    const PackingConfig& config, const PackingProgress& progress,
-                    SphereSearch* spheres, Packing* packing) {
-  return InteriorCover(bvh, finder, config, spheres, packing).run(progress);
+                    const PackingConfig& config, PackingWatch* watch, SphereSearch* spheres,
+                    Packing* packing) {
+  return InteriorCover(bvh, finder, config, watch, spheres, packing).run();
+}
+
+bool is_interior_covered(const TriangleMesh& mesh, const TriangleBvh& bvh, const Packing& packing,
+                         double deviation, double gap, PackingWatch* watch) {
+  return InteriorCheck(mesh, bvh, packing, deviation, gap, watch).is_covered();
 }
 
 }  // namespace ist

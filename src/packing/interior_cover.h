@@ -3,6 +3,7 @@
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/packing/packing.h"
 #include "medial_sphere.h"
+#include "packing_watch.h"
 
 namespace ist {
 
@@ -18,9 +19,16 @@ namespace ist {
 /// @param packing  certified by SurfaceCover; spheres are added. `interior_gap` becomes max_error,
 ///                 or max_gap where that is larger, or more still where max_spheres leaves cells
 ///                 uncovered
-/// @returns false when `progress` stopped it: nothing is proven of the interior then
+/// @returns false when `watch` stopped it: nothing is proven of the interior then
 bool cover_interior(const TriangleBvh& bvh, const MedialSphereFinder& finder,
-                    const PackingConfig& config, const PackingProgress& progress,
-                    SphereSearch* spheres, Packing* packing);
+                    const PackingConfig& config, PackingWatch* watch, SphereSearch* spheres,
+                    Packing* packing);
+
+/// Whether no point inside the mesh is farther than `gap` [m] from the cover spheres, shown by the
+/// same octree. A packing whose `interior_gap` is from cover_interior() passes. False also when the
+/// search takes too long, or `watch` stops it.
+/// @param deviation  [m] taken off every cover radius
+bool is_interior_covered(const TriangleMesh& mesh, const TriangleBvh& bvh, const Packing& packing,
+                         double deviation, double gap, PackingWatch* watch);
 
 }  // namespace ist

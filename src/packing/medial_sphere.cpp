@@ -103,6 +103,7 @@ MedialSphere MedialSphereFinder::near_surface(const Eigen::Vector3d& s,
   MedialSphere best = nothing;
   // A gap larger than the part's thickness can lead to its other side; a smaller gap follows.
   for (int i = 0; i < kMaxGaps && best.radius == 0.0 && gap >= depth; ++i, gap *= 0.4) {
+    if (!holes_.keeps_on()) return nothing;
     for (const double side : {-1.0, 1.0}) {
       if (side < 0.0 ? !behind : !before) continue;
       const MedialSphere sphere = best_direction(s, side * normal, gap);

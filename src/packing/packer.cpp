@@ -4,12 +4,17 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "hole_obstacles.h"
 #include "interior_cover.h"
+#include "internal/geometry/cancelled.h"
+#include "internal/geometry/limits.h"
 #include "internal/geometry/tessellation.h"
 #include "ist_proximity/geometry/error.h"
 #include "medial_sphere.h"
+#include "packed_mesh.h"
+#include "packing_watch.h"
 #include "surface_cover.h"
 #include "volume_filler.h"
 
@@ -30,37 +35,21 @@ constexpr double kMinHoleTolerance = 1e-3;
 // About the share of the time that the surface takes; the interior takes the rest.
 constexpr double kSurfaceShare = 0.6;
 
-// Progress of a step that goes from `from` to `to` of the whole.
-PackingProgress share_of(const PackingProgress& progress, double from, double to) {
-  if (!progress) return {};
-  return [progress, from, to](double done) { return progress(from + (to - from) * done); };
+void check(const Shape& shape) {
+  const std::string fault = shape_fault(shape);
+  if (!fault.empty()) throw ModelError(fault);
 }
 
-void check_mesh(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const std::uint32_t v : mesh.triangles[t]) {
-      if (v >= mesh.vertices.size()) {
-        throw ModelError("triangle " + std::to_string(t) + " names vertex " + std::to_string(v) +
-                         " of " + std::to_string(mesh.vertices.size()));
-      }
-      if (!mesh.vertices[v].allFinite()) {
-        throw ModelError("a corner of triangle " + std::to_string(t) + " is not finite");
-      }
-    }
-  }
-}
-
-Packing pack_tessellated(const Tessellation& tessellation, const PackingConfig& config,
-                         const PackingProgress& progress) {
+Packing pack_inscribed(const PackedMesh& inscribed, const PackingConfig& config,
+                       const PackingProgress& progress) {
   PackingConfig inner = config;
-  inner.max_error = config.max_error - tessellation.deviation;
-  Packing packing = pack_mesh(tessellation.mesh, inner, progress);
-  for (InnerSphere& sphere : packing.spheres) sphere.cover_radius += tessellation.deviation;
+  inner.max_error = config.max_error - inscribed.deviation;
+  Packing packing = pack_mesh(inscribed.mesh, inner, progress);
+  for (InnerSphere& sphere : packing.spheres) sphere.cover_radius += inscribed.deviation;
   PackingCertificate& certificate = packing.certificate;
-  certificate.max_gap += tessellation.deviation;
-  certificate.mean_gap += tessellation.deviation;
-  certificate.interior_gap += tessellation.deviation;
+  certificate.max_gap += inscribed.deviation;
+  certificate.mean_gap += inscribed.deviation;
+  certificate.interior_gap += inscribed.deviation;
   certificate.reached = certificate.max_gap <= config.max_error;
   return packing;
 }
@@ -73,53 +62,82 @@ Packing pack_sphere(const Sphere& sphere) {
   return packing;
 }
 
-}  // namespace
+// The coarsest packing: a point of the surface whose cover sphere holds the mesh. It stands where
+// packing was stopped before it had a better one.
+Packing single_cover_sphere(const TriangleMesh& mesh) {
+  const Eigen::Vector3d& center = mesh.corner(0, 0);
+  double radius = 0.0, area = 0.0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Eigen::Vector3d &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
+    for (const Eigen::Vector3d& corner : {a, b, c}) {
+      radius = std::max(radius, (corner - center).norm());
+    }
+    area += 0.5 * (b - a).cross(c - a).norm();
+  }
+  radius *= 1.0 + 1e-12;  // rounding
+  Packing packing;
+  packing.spheres.push_back({center, 0.0, radius});
+  packing.certificate = {radius, radius, radius, area, area, false};
+  return packing;
+}
 
-Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
-                  const PackingProgress& progress) {
-  check_mesh(mesh);
-  bool stopped = false;
-  const PackingProgress watched = [&](double done) {
-    stopped = stopped || (progress && !progress(done));
-    return !stopped;
-  };
-  const TriangleBvh bvh(mesh);
+Packing pack_watched(const TriangleMesh& mesh, const PackingConfig& config, PackingWatch* watch) {
+  const TriangleBvh bvh(mesh, [&] { return !watch->keeps_on(); });
   const double size = bvh.bounds().sizes().norm();
   HoleObstacles holes(mesh, bvh,
-                      std::max(kHoleTolerance * config.max_error, kMinHoleTolerance * size));
+                      std::max(kHoleTolerance * config.max_error, kMinHoleTolerance * size), watch);
   SphereSearch spheres;
   const bool may_overlap = config.order == PackingOrder::kMedial;
   const MedialSphereFinder finder(bvh, &holes, may_overlap ? nullptr : &spheres);
   std::optional<VolumeFiller> filler;
-  if (!may_overlap) {
-    filler.emplace(bvh, finder, spheres, kMinFillRadius * config.max_error);
-    filler->stop_with(watched);
-  }
-  SurfaceCover cover(mesh, finder, &spheres);
-  cover.refine(config, filler ? &*filler : nullptr, share_of(watched, 0.0, kSurfaceShare));
-  if (!stopped) cover.tighten_certificate();
+  if (!may_overlap) filler.emplace(bvh, finder, spheres, kMinFillRadius * config.max_error);
+  SurfaceCover cover(mesh, finder, &spheres, watch);
+  watch->begin_part(0.0, kSurfaceShare);
+  if (watch->stopped() || !cover.refine(config, filler ? &*filler : nullptr)) throw Cancelled();
+  cover.tighten_certificate(config);
   Packing packing;
   cover.certify(&packing);
-  const PackingProgress rest = share_of(watched, kSurfaceShare, 1.0);
-  if (stopped || !cover_interior(bvh, finder, config, rest, &spheres, &packing)) {
+  watch->begin_part(kSurfaceShare, 1.0);
+  if (watch->stopped() || !cover_interior(bvh, finder, config, watch, &spheres, &packing)) {
     packing.certificate.interior_gap = size;
   }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;
-  watched(1.0);
+  watch->report(1.0);
   return packing;
+}
+
+}  // namespace
+
+Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
+                  const PackingProgress& progress) {
+  if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
+  check(mesh);
+  PackingWatch watch(progress);
+  try {
+    return pack_watched(mesh, config, &watch);
+  } catch (const Cancelled&) {
+    return single_cover_sphere(mesh);
+  }
 }
 
 Packing pack_element(const Shape& shape, const PackingConfig& config,
                      const PackingProgress& progress) {
+  if (!std::holds_alternative<TriangleMesh>(shape)) check(shape);
   if (const auto* sphere = std::get_if<Sphere>(&shape)) return pack_sphere(*sphere);
-  if (const auto* box = std::get_if<Box>(&shape)) {
-    return pack_tessellated(tessellate(*box), config, progress);
+  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) {
+    return pack_mesh(*mesh, config, progress);
   }
-  if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
-    return pack_tessellated(tessellate(*cylinder, kTessellationShare * config.max_error), config,
-                            progress);
-  }
-  return pack_mesh(std::get<TriangleMesh>(shape), config, progress);
+  return pack_inscribed(packed_mesh(shape, config), config, progress);
+}
+
+PackedMesh packed_mesh(const Shape& shape, const PackingConfig& config) {
+  if (std::holds_alternative<Sphere>(shape)) return {};
+  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) return {*mesh, 0.0};
+  const auto* box = std::get_if<Box>(&shape);
+  Tessellation tessellation =
+      box != nullptr ? tessellate(*box)
+                     : tessellate(std::get<Cylinder>(shape), kTessellationShare * config.max_error);
+  return {std::move(tessellation.mesh), tessellation.deviation};
 }
 
 }  // namespace ist

@@ -9,16 +9,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
+#include "internal/geometry/regular_file.h"
+#include "internal/packing/packing_check.h"
 #include "packing_file.h"
 
 namespace ist {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::streamoff kMaxFileSize = 1LL << 32;
 
 // Writes and syncs a new file, so that after the rename it is complete even if the power fails.
 // Returns why it could not be done, or an empty string.
@@ -62,29 +61,40 @@ std::string PackingCache::path(const std::string& key) const {
   return (fs::path(directory_) / (key + ".istpack")).string();
 }
 
-std::optional<Packing> PackingCache::load(const std::string& key, std::string* warning) const {
+namespace {
+
+std::string not_used(const std::string& file_name, const std::string& problem) {
+  return "packing cache file '" + file_name + "' is not used: " + problem;
+}
+
+}  // namespace
+
+std::optional<Packing> PackingCache::load_unchecked(const std::string& key, std::size_t max_spheres,
+                                                    std::string* warning) const {
   if (directory_.empty()) return std::nullopt;
   const std::string file_name = path(key);
   std::error_code error;
   if (!fs::exists(file_name, error) && !error) return std::nullopt;
-  std::string problem, bytes;
-  // The opened file's size, since another process may replace the file meanwhile.
-  std::ifstream file(file_name, std::ios::binary | std::ios::ate);
-  const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
-  if (size < 0 || !fs::is_regular_file(file_name, error)) {
-    problem = "it cannot be read";
-  } else if (size > kMaxFileSize) {
-    problem = "it is absurdly large";
-  } else {
-    bytes.resize(static_cast<std::size_t>(size));
-    file.seekg(0);
-    file.read(bytes.data(), size);
-    if (!file) problem = "it cannot be read";
-  }
+  std::string bytes;
+  std::string problem = read_regular_file(file_name, packing_file_size(max_spheres), &bytes);
+  if (!problem.empty()) problem = "it " + problem;
   Packing packing;
   if (problem.empty()) problem = parse_packing(bytes, key, &packing);
   if (problem.empty()) return packing;
-  *warning = "packing cache file '" + file_name + "' is not used: " + problem;
+  *warning = not_used(file_name, problem);
+  return std::nullopt;
+}
+
+std::optional<Packing> PackingCache::load(const std::string& key, const Shape& shape,
+                                          const PackingConfig& config,
+                                          const PackingProgress& progress,
+                                          std::string* warning) const {
+  std::optional<Packing> packing =
+      load_unchecked(key, static_cast<std::size_t>(config.max_spheres), warning);
+  if (!packing) return std::nullopt;
+  const std::string fault = packing_fault(shape, config, *packing, progress);
+  if (fault.empty()) return packing;
+  *warning = not_used(path(key), fault);
   return std::nullopt;
 }
 

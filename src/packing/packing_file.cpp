@@ -32,9 +32,13 @@ bool is_sound(const InnerSphere& sphere) {
 
 }  // namespace
 
+std::size_t packing_file_size(std::size_t spheres) {
+  return kHeaderSize + kSphereSize * spheres + kChecksumSize;
+}
+
 std::string serialize_packing(const std::string& key, const Packing& packing) {
   ByteWriter out;
-  out.reserve(kHeaderSize + kSphereSize * packing.spheres.size() + kChecksumSize);
+  out.reserve(packing_file_size(packing.spheres.size()));
   out.raw(kMagic, sizeof(kMagic));
   out.u32(kFormatVersion);
   out.raw(key.data(), key.size());

@@ -10,6 +10,9 @@ namespace ist {
 /// The number of characters of a packing's key.
 constexpr std::size_t kPackingKeySize = 32;
 
+/// How long the file of a packing of so many spheres is.
+std::size_t packing_file_size(std::size_t spheres);
+
 /// The bytes of a packing's file.
 /// @param key  kPackingKeySize characters
 std::string serialize_packing(const std::string& key, const Packing& packing);

@@ -25,15 +25,18 @@ constexpr double kTight = 0.8;
 // The same share, when no more spheres are added: how near the certificate is to the true gap.
 constexpr double kCertificateTight = 0.95;
 constexpr std::size_t kMaxCertificateSteps = 1000000;
+// Patches that a packing may have besides its triangles: for each sphere that is allowed (a Panda's
+// links need 12 to 52 at errors of 0.5 to 5 mm); at the least; and at the most, which is 1 GB.
+constexpr std::size_t kPatchesPerSphere = 100, kMinPatches = 100000, kMaxPatches = 8000000;
 
 }  // namespace
 
 SurfaceCover::SurfaceCover(const TriangleMesh& mesh, const MedialSphereFinder& finder,
-                           SphereSearch* search)
-    : mesh_(mesh), finder_(finder), search_(*search) {
+                           SphereSearch* search, PackingWatch* watch)
+    : mesh_(mesh), finder_(finder), search_(*search), watch_(*watch) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
-  min_edge_ = 1e-7 * box.sizes().norm();
+  min_edge_ = kMinPatchEdge * box.sizes().norm();
 }
 
 Eigen::Vector3d SurfaceCover::normal(std::uint32_t t) const {
@@ -54,7 +57,7 @@ bool SurfaceCover::fill(double min_radius, VolumeFiller* filler) {
 // Searches again while holes refuse what is found; the last resort is the surface point s itself.
 template <class Search>
 MedialSphere SurfaceCover::admitted(const Eigen::Vector3d& s, const Search& search) const {
-  for (int i = 0; i < kMaxTries; ++i) {
+  for (int i = 0; i < kMaxTries && watch_.keeps_on(); ++i) {
     MedialSphere sphere = search();
     if (finder_.is_closed() || sphere.radius <= 0.0 || finder_.admits(sphere)) return sphere;
   }
@@ -81,12 +84,14 @@ void SurfaceCover::add_first_sphere(VolumeFiller* filler) {
   add_sphere(admitted(middle, [&] { return finder_.near_surface(middle, normal(largest), gap); }));
 }
 
-void SurfaceCover::cover_triangles() {
+// Gives every triangle its sphere; false when it was stopped.
+bool SurfaceCover::cover_triangles() {
   // Unused capacity costs no memory until it is touched; growing would hold all patches twice.
   patches_.reserve(2 * mesh_.triangles.size());
   heap_.reserve(2 * mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-    Patch patch{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}, 0.0, 0, 0, t};
+    if (!watch_.keeps_on()) return false;
+    Patch patch{{{mesh_.corner(t, 0), mesh_.corner(t, 1), mesh_.corner(t, 2)}}, 0.0, 0, 0, t};
     const SphereSearch::Match match = search_.best(patch.corner, 3, 0);
     patch.upper_bound = match.cost;
     patch.sphere = match.sphere;
@@ -95,6 +100,13 @@ void SurfaceCover::cover_triangles() {
     heap_.push_back({patch.upper_bound, t});
   }
   std::make_heap(heap_.begin(), heap_.end(), UpperBoundLess());
+  return true;
+}
+
+std::size_t SurfaceCover::max_patches(const TriangleMesh& mesh, const PackingConfig& config) {
+  return 2 * mesh.triangles.size() +
+         std::clamp(kPatchesPerSphere * static_cast<std::size_t>(config.max_spheres), kMinPatches,
+                    kMaxPatches);
 }
 
 void SurfaceCover::add_sphere(const MedialSphere& sphere) {
@@ -125,21 +137,23 @@ bool SurfaceCover::tighten(Patch* patch) const {
   return true;
 }
 
-void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* filler,
-                          const PackingProgress& progress) {
+bool SurfaceCover::refine(const PackingConfig& config, VolumeFiller* filler) {
   add_first_sphere(filler);
-  cover_triangles();
+  if (!cover_triangles()) return false;
+  const std::size_t most = max_patches(mesh_, config);
   // In the order of volume, a sphere that fills a space always comes first. Else it does if its
   // radius is at least the largest bound.
   const double radius_share = config.order == PackingOrder::kVolume ? 0.0 : 1.0;
   double largest_bound = std::max(heap_.front().upper_bound, config.max_error);
   for (int step = 0; heap_.front().upper_bound > config.max_error; ++step) {
-    if (progress && step % kProgressInterval == 0) {
+    if (step % kProgressInterval == 0) {
       // The number of spheres grows about with the inverse of the gap.
       largest_bound = std::min(largest_bound, heap_.front().upper_bound);
-      if (!progress(std::min(1.0, config.max_error / largest_bound))) return;
+      watch_.report(std::min(1.0, config.max_error / largest_bound));
     }
-    if (spheres_.size() >= static_cast<std::size_t>(config.max_spheres)) return;
+    if (!watch_.keeps_on()) break;
+    if (spheres_.size() >= static_cast<std::size_t>(config.max_spheres)) break;
+    if (patches_.size() >= most) break;
     const std::uint32_t index = pop();
     Patch& patch = patches_[index];
     if (tighten(&patch) || fill(radius_share * patch.upper_bound, filler)) {
@@ -148,6 +162,7 @@ void SurfaceCover::refine(const PackingConfig& config, VolumeFiller* filler,
       split_or_add_sphere(index, config.max_error);
     }
   }
+  return true;
 }
 
 // The largest gap at some points of the patch: a lower bound of the patch's gap.
@@ -167,18 +182,12 @@ double SurfaceCover::sampled_gap(const Patch& patch, Eigen::Vector3d* worst_poin
   return worst_gap;
 }
 
-double SurfaceCover::longest_edge(const Patch& patch) {
-  return std::max({(patch.corner[0] - patch.corner[1]).norm(),
-                   (patch.corner[1] - patch.corner[2]).norm(),
-                   (patch.corner[2] - patch.corner[0]).norm()});
-}
-
 void SurfaceCover::split_or_add_sphere(std::uint32_t index, double max_error) {
   const Patch& patch = patches_[index];
   Eigen::Vector3d worst_point;
   const double worst_gap = sampled_gap(patch, &worst_point);
   if (worst_gap < std::max(kTight * patch.upper_bound, 0.98 * max_error) &&
-      longest_edge(patch) > min_edge_) {
+      patch.longest_edge() > min_edge_) {
     split(index);
     return;
   }
@@ -212,9 +221,11 @@ MedialSphere SurfaceCover::candidate(const Eigen::Vector3d& s, std::uint32_t tri
   return distance(largest) <= kMaxGapShare * gap ? largest : best;
 }
 
-void SurfaceCover::tighten_certificate() {
+void SurfaceCover::tighten_certificate(const PackingConfig& config) {
+  const std::size_t most = max_patches(mesh_, config);
   double lower_bound = 0.0;  // [m] of the largest gap
-  for (std::size_t i = 0; i < kMaxCertificateSteps; ++i) {
+  for (std::size_t i = 0; i < kMaxCertificateSteps && patches_.size() < most; ++i) {
+    if (!watch_.keeps_on()) return;
     const std::uint32_t index = pop();
     Patch& patch = patches_[index];
     if (tighten(&patch)) {
@@ -224,7 +235,7 @@ void SurfaceCover::tighten_certificate() {
     Eigen::Vector3d worst_point;
     lower_bound = std::max(lower_bound, sampled_gap(patch, &worst_point));
     const bool is_tight = kCertificateTight * patch.upper_bound <= lower_bound;
-    if (is_tight || longest_edge(patch) <= min_edge_) {
+    if (is_tight || patch.longest_edge() <= min_edge_) {
       push(index);
       return;
     }
@@ -232,24 +243,11 @@ void SurfaceCover::tighten_certificate() {
   }
 }
 
-// Bisects the longest edge: two patches that cover the old one without overlap.
+// Two patches that cover the old one without overlap take its place.
 void SurfaceCover::split(std::uint32_t index) {
-  const Patch patch = patches_[index];
-  int longest = 0;
-  double length_sq = -1.0;
-  for (int k = 0; k < 3; ++k) {
-    const double edge_sq = (patch.corner[k] - patch.corner[(k + 1) % 3]).squaredNorm();
-    if (edge_sq > length_sq) {
-      length_sq = edge_sq;
-      longest = k;
-    }
-  }
-  const int a = longest, b = (longest + 1) % 3;
-  const Eigen::Vector3d middle = 0.5 * (patch.corner[a] + patch.corner[b]);
   const auto added = static_cast<std::uint32_t>(patches_.size());
-  patches_.push_back(patch);
-  patches_[index].corner[a] = middle;
-  patches_[added].corner[b] = middle;
+  patches_.push_back(patches_[index]);
+  static_cast<SurfacePatch&>(patches_[added]) = patches_[index].split_off_half();
   for (const std::uint32_t half : {index, added}) {
     patches_[half].accounted = 0;  // another sphere may cover the smaller patch better
     // The old patch's bound holds for its parts, too, whatever the search finds.
@@ -267,13 +265,12 @@ void SurfaceCover::certify(Packing* packing) {
   PackingCertificate& certificate = packing->certificate;
   double weighted = 0.0;
   for (Patch& patch : patches_) {
-    tighten(&patch);
+    if (watch_.keeps_on()) tighten(&patch);  // the old bound holds, too
     InnerSphere& sphere = packing->spheres[patch.sphere];
     const double gap = std::max(0.0, patch.upper_bound);
     sphere.cover_radius = std::max(sphere.cover_radius, sphere.radius + gap);
     certificate.max_gap = std::max(certificate.max_gap, gap);
-    const double area =
-        0.5 * (patch.corner[1] - patch.corner[0]).cross(patch.corner[2] - patch.corner[0]).norm();
+    const double area = patch.area();
     certificate.surface_area += area;
     weighted += area * gap;
     if (sphere.radius == 0.0) certificate.unreachable_area += area;

@@ -12,8 +12,6 @@ namespace {
 constexpr double kEnough = 0.9;
 // A prototype starts where the cell is small against the clearance: a finer start climbs no higher.
 constexpr double kStartSize = 0.5;
-// Steps of a search between two calls of the progress callback.
-constexpr std::uint32_t kStopInterval = 64;
 // Prototypes refused because of holes, one by one and in all. A mesh that is nothing but holes has
 // no interior to fill.
 constexpr int kMaxRefusals = 2;
@@ -144,7 +142,7 @@ std::optional<MedialSphere> VolumeFiller::take_prototype() {
 }
 
 bool VolumeFiller::is_stopped() {
-  if (!stopped_ && ++steps_ % kStopInterval == 0 && progress_) stopped_ = !progress_(0.0);
+  stopped_ = stopped_ || cells_.size() > kMaxCells || !finder_.holes().keeps_on();
   return stopped_;
 }
 

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "internal/geometry/triangle_bvh.h"
@@ -20,17 +19,19 @@ namespace ist {
 /// Branch and bound over an octree decides where prototypes start. Clearance has the Lipschitz
 /// constant 1, so the clearance at a cell's centre plus the cell's circumradius is an upper bound
 /// of the clearance in the cell. The sphere found has at least nine tenths of the largest radius.
+/// The search ends for good when the packing has to stop, or at kMaxCells cells.
 class VolumeFiller {
  public:
+  /// Cells of the octree, at most: 0.3 GB. They run out where the mesh is millions of times as long
+  /// as `min_radius`.
+  static constexpr std::size_t kMaxCells = 4000000;
+
   /// All references must outlive this.
   /// @param finder      knows the spheres in `spheres` as taken
   /// @param spheres     the packing so far; the caller adds to it
   /// @param min_radius  [m] smaller spheres are not looked for
   VolumeFiller(const TriangleBvh& bvh, const MedialSphereFinder& finder,
                const SphereSearch& spheres, double min_radius);
-
-  /// The search ends when `progress`, which is called every now and then, returns false.
-  void stop_with(PackingProgress progress) { progress_ = std::move(progress); }
 
   /// Returns the next sphere, which the caller must add to `spheres`; nothing when no sphere of
   /// radius `at_least` [m] fits.
@@ -81,8 +82,6 @@ class VolumeFiller {
   const double min_radius_;
   std::vector<Cell> cells_;            // max-heap by upper bound
   std::vector<Prototype> prototypes_;  // max-heap by radius
-  PackingProgress progress_;
-  std::uint32_t steps_ = 0;
   int refusals_ = 0;
   bool stopped_ = false;
 };

@@ -11,36 +11,26 @@
 namespace ist {
 namespace {
 
-/// Joints between two bodies of the tree.
-std::vector<std::size_t> path(const Kinematics& kinematics, std::size_t a, std::size_t b) {
-  std::vector<std::size_t> joints;
-  while (a != b) {  // a body's number is above its parent's
-    std::size_t& deeper = a > b ? a : b;
-    joints.push_back(deeper - 1);
-    deeper = kinematics.joints()[deeper - 1].parent;
+/// By body: what decides whether two bodies with geometry are rigidly connected, or adjacent (one
+/// is an ancestor of the other, with no body that has geometry between them).
+struct Neighbours {
+  Neighbours(const Kinematics& kinematics, const std::vector<bool>& has_geometry)
+      : rigid_group(has_geometry.size(), 0), ancestor(has_geometry.size(), 0) {
+    for (const Kinematics::Joint& joint : kinematics.joints()) {  // a parent comes before its child
+      const bool is_fixed = joint.type == JointType::kFixed;
+      rigid_group[joint.child] = is_fixed ? rigid_group[joint.parent] : joint.child;
+      ancestor[joint.child] = has_geometry[joint.parent] ? joint.parent : ancestor[joint.parent];
+    }
   }
-  return joints;
-}
 
-/// Whether two bodies are rigidly connected, or adjacent: one is an ancestor of the other, with no
-/// body that has geometry between them.
-bool never_collide(const Kinematics& kinematics, const std::vector<bool>& has_geometry,
-                   std::size_t a, std::size_t b) {
-  bool is_rigid = true, is_ancestor = false;
-  std::vector<std::size_t> between;
-  for (const std::size_t j : path(kinematics, a, b)) {
-    const Kinematics::Joint& joint = kinematics.joints()[j];
-    is_rigid = is_rigid && joint.type == JointType::kFixed;
-    is_ancestor = is_ancestor || joint.parent == std::min(a, b);
-    between.push_back(joint.parent);
-    between.push_back(joint.child);
+  bool never_collide(std::size_t a, std::size_t b) const {
+    const auto [above, below] = std::minmax(a, b);  // a body's number is above its parent's
+    return rigid_group[a] == rigid_group[b] || ancestor[below] == above;
   }
-  const bool is_adjacent =
-      is_ancestor && std::none_of(between.begin(), between.end(), [&](std::size_t body) {
-        return body != a && body != b && has_geometry[body];
-      });
-  return is_rigid || is_adjacent;
-}
+
+  std::vector<std::size_t> rigid_group;  ///< the body nearest to the root that fixed joints lead to
+  std::vector<std::size_t> ancestor;  ///< the nearest with geometry; the root where there is none
+};
 
 bool names(const NamePairs& pairs, const std::string& a, const std::string& b) {
   return std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
@@ -59,14 +49,14 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
     body_of_link.push_back(kinematics.find_body(link.name));
     if (body_of_link.back()) has_geometry[*body_of_link.back()] = true;
   }
+  const Neighbours neighbours(kinematics, has_geometry);
   const auto usable = [&](std::size_t i) {
     return wanted[i] && model.links[i].usable() && body_of_link[i].has_value();
   };
   std::vector<LinkPair> pairs;
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     for (std::size_t k = i + 1; usable(i) && k < model.links.size(); ++k) {
-      if (!usable(k) ||
-          never_collide(kinematics, has_geometry, *body_of_link[i], *body_of_link[k]) ||
+      if (!usable(k) || neighbours.never_collide(*body_of_link[i], *body_of_link[k]) ||
           names(ignored, model.links[i].name, model.links[k].name)) {
         continue;
       }

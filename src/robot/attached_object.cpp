@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "internal/geometry/limits.h"
 #include "ist_proximity/geometry/error.h"
 
 namespace ist {
 namespace {
 
 LinkDescription& link_to_carry(const AttachedObject& object, RobotDescription* robot) {
-  const std::string who = "object '" + object.name + "'";
+  const std::string who = "object '" + printable(object.name) + "'";
   for (LinkDescription& link : robot->links) {
     if (link.name != object.link) continue;
     if (link.error.empty()) return link;
@@ -18,7 +19,7 @@ LinkDescription& link_to_carry(const AttachedObject& object, RobotDescription* r
   auto& bare = robot->links_without_geometry;
   const auto found = std::find(bare.begin(), bare.end(), object.link);
   if (found == bare.end()) {
-    throw ModelError(who + " cannot be attached: link '" + object.link +
+    throw ModelError(who + " cannot be attached: link '" + printable(object.link) +
                      "' is not in the URDF of robot '" + robot->name + "'");
   }
   bare.erase(found);

@@ -4,9 +4,10 @@
 #include <cassert>
 #include <cmath>
 #include <map>
-#include <set>
+#include <sstream>
 #include <string>
 
+#include "internal/geometry/limits.h"
 #include "ist_proximity/geometry/error.h"
 
 namespace ist {
@@ -19,6 +20,12 @@ bool has_position(JointType type) {
 
 std::string title(const std::string& joint) { return "joint '" + joint + "'"; }
 
+std::string number(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
 Kinematics::Joint make_joint(const JointDescription& description, std::size_t parent,
                              std::size_t index) {
   Kinematics::Joint joint;
@@ -30,6 +37,8 @@ Kinematics::Joint make_joint(const JointDescription& description, std::size_t pa
   if (!joint.X_PJ.matrix().allFinite()) {
     throw ModelError(title(joint.name) + ": its <origin> is not finite");
   }
+  const std::string fault = position_fault("its <origin>", joint.X_PJ.translation());
+  if (!fault.empty()) throw ModelError(title(joint.name) + ": " + fault);
   joint.axis = description.axis;
   if (has_position(joint.type)) {
     const double length = description.axis.norm();
@@ -71,52 +80,74 @@ void Kinematics::add_tree(const RobotDescription& description) {
       bodies_.push_back(entry->second->child_link);
     }
   }
+  for (std::size_t i = 0; i < bodies_.size(); ++i) body_of_name_.insert({bodies_[i], i});
+  for (std::size_t i = 0; i < joints_.size(); ++i) joint_of_name_.insert({joints_[i].name, i});
   assert(joints_.size() == description.joints.size() && "parse_urdf has checked that it is a tree");
 }
 
+/// A joint that another joint follows may follow one itself. Each joint is resolved once, from the
+/// end of its chain back, so that long chains take no longer than short ones.
 void Kinematics::resolve_mimics(const RobotDescription& description) {
-  std::map<std::string, const JointDescription*> by_name;
+  std::unordered_map<std::string, const JointDescription*> by_name;
   for (const JointDescription& joint : description.joints) by_name[joint.name] = &joint;
-  for (Joint& joint : joints_) {
-    if (!has_position(joint.type)) continue;
-    std::set<std::string> visited;
-    const JointDescription* at = by_name.at(joint.name);
-    while (at->mimic) {
-      const Mimic& mimic = *at->mimic;
-      if (!visited.insert(at->name).second) {
-        throw ModelError(title(joint.name) + " follows joints that mimic one another in a ring");
+  std::vector<bool> is_resolved(joints_.size(), false), is_in_chain(joints_.size(), false);
+  for (std::size_t first = 0; first < joints_.size(); ++first) {
+    if (!has_position(joints_[first].type)) continue;
+    std::vector<std::size_t> chain;
+    std::size_t at = first;
+    for (; !is_resolved[at] && by_name.at(joints_[at].name)->mimic; at = chain.back()) {
+      if (is_in_chain[at]) {
+        throw ModelError(title(joints_[first].name) +
+                         " follows joints that mimic one another in a ring");
       }
-      if (!std::isfinite(mimic.multiplier) || !std::isfinite(mimic.offset)) {
-        throw ModelError(title(at->name) + ": multiplier or offset of its <mimic> is not finite");
-      }
-      const auto next = by_name.find(mimic.joint);
-      if (next == by_name.end()) {
-        throw ModelError(title(at->name) + " mimics " + title(mimic.joint) +
-                         ", which is not in the URDF");
-      }
-      if (!has_position(next->second->type)) {
-        throw ModelError(title(at->name) + " mimics " + title(mimic.joint) +
-                         ", which has no position: it is fixed, planar or floating");
-      }
-      joint.offset += joint.multiplier * mimic.offset;
-      joint.multiplier *= mimic.multiplier;
-      at = next->second;
+      is_in_chain[at] = true;
+      chain.push_back(at);
+      chain.push_back(followed_joint(*by_name.at(joints_[at].name)));
     }
-    joint.source = *find_joint(at->name);
+    is_resolved[at] = true;
+    // `chain` holds pairs of a joint and the one that it follows.
+    for (std::size_t k = chain.size(); k > 0; k -= 2) {
+      Joint& joint = joints_[chain[k - 2]];
+      const Joint& source = joints_[chain[k - 1]];
+      const Mimic& mimic = *by_name.at(joint.name)->mimic;
+      joint.source = source.source;
+      joint.multiplier = mimic.multiplier * source.multiplier;
+      joint.offset = mimic.multiplier * source.offset + mimic.offset;
+      is_resolved[chain[k - 2]] = true;
+    }
   }
 }
 
+/// The joint that this one mimics.
+std::size_t Kinematics::followed_joint(const JointDescription& joint) const {
+  const Mimic& mimic = *joint.mimic;
+  if (!(std::abs(mimic.multiplier) <= kMaxScale) || !(std::abs(mimic.offset) <= kMaxLength)) {
+    throw ModelError(title(joint.name) + ": multiplier " + number(mimic.multiplier) +
+                     " or offset " + number(mimic.offset) +
+                     " of its <mimic> is not finite or larger than 10000");
+  }
+  const std::optional<std::size_t> followed = find_joint(mimic.joint);
+  if (!followed) {
+    throw ModelError(title(joint.name) + " mimics " + title(printable(mimic.joint)) +
+                     ", which is not in the URDF");
+  }
+  if (!has_position(joints_[*followed].type)) {
+    throw ModelError(title(joint.name) + " mimics " + title(mimic.joint) +
+                     ", which has no position: it is fixed, planar or floating");
+  }
+  return *followed;
+}
+
 std::optional<std::size_t> Kinematics::find_body(const std::string& name) const {
-  const auto found = std::find(bodies_.begin(), bodies_.end(), name);
-  if (found == bodies_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - bodies_.begin());
+  const auto found = body_of_name_.find(name);
+  if (found == body_of_name_.end()) return std::nullopt;
+  return found->second;
 }
 
 std::optional<std::size_t> Kinematics::find_joint(const std::string& name) const {
-  const auto found = std::find_if(joints_.begin(), joints_.end(),
-                                  [&](const Joint& joint) { return joint.name == name; });
-  if (found == joints_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - joints_.begin());
+  const auto found = joint_of_name_.find(name);
+  if (found == joint_of_name_.end()) return std::nullopt;
+  return found->second;
 }
 
 Eigen::Isometry3d Kinematics::joint_pose(std::size_t joint, double q) const {
@@ -141,6 +172,7 @@ void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) c
     const bool fixed = joint.type == JointType::kFixed;
     const double position = fixed ? 0.0 : joint.multiplier * q[joint.source] + joint.offset;
     if (!std::isfinite(position)) continue;
+    if (joint.type == JointType::kPrismatic && std::abs(position) > kMaxLength) continue;
     poses->X_PC[j] = joint_pose(j, position);
     poses->known[j] = true;
   }

@@ -12,6 +12,7 @@
 #include <sstream>
 #include <vector>
 
+#include "internal/geometry/limits.h"
 #include "ist_proximity/geometry/error.h"
 
 namespace ist {
@@ -139,14 +140,34 @@ bool starts_with(const std::string& text, const std::string& prefix) {
 }
 
 [[noreturn]] void fail(const std::string& uri, const std::string& what) {
-  throw ModelError("mesh URI '" + uri + "' " + what);
+  throw ModelError("mesh URI '" + printable(uri) + "' " + what);
+}
+
+std::string decoded_path(const std::string& uri, const std::string& encoded) {
+  const std::string path = percent_decoded(encoded);
+  if (path.find('\0') != std::string::npos) fail(uri, "holds the character 0, written as %00");
+  return path;
+}
+
+// Whether '..' leads above the folder that a path starts from, at the end or in between: what is
+// above a package is none of its files.
+bool leaves_folder(const std::string& path) {
+  int depth = 0;
+  for (const fs::path& part : fs::path(path).relative_path()) {
+    if (part == "..") --depth;
+    if (!part.empty() && part != "." && part != "..") ++depth;
+    if (depth < 0) return true;
+  }
+  return false;
 }
 
 std::string resolve_package_uri(const std::string& uri, const PackageFinder& find_package) {
   const std::string rest = uri.substr(std::string("package://").size());
   const std::size_t slash = rest.find('/');
   const std::string package = rest.substr(0, slash);
-  if (package.empty()) fail(uri, "names no package; write package://PACKAGE/PATH");
+  if (package.empty() || package == "." || package == "..") {
+    fail(uri, "names no package; write package://PACKAGE/PATH");
+  }
   if (slash == std::string::npos || slash + 1 == rest.size()) {
     fail(uri, "names no file in the package; write package://PACKAGE/PATH");
   }
@@ -156,7 +177,11 @@ std::string resolve_package_uri(const std::string& uri, const PackageFinder& fin
                   "', which is not found; source the workspace that holds it or add its folder to "
                   "ROS_PACKAGE_PATH");
   }
-  return folder + percent_decoded(rest.substr(slash));
+  const std::string path = decoded_path(uri, rest.substr(slash));
+  if (leaves_folder(path)) {
+    fail(uri, "leads out of package '" + package + "' by '..'; name a file in the package");
+  }
+  return folder + path;
 }
 
 std::string resolve_file_uri(const std::string& uri) {
@@ -171,7 +196,7 @@ std::string resolve_file_uri(const std::string& uri) {
     path = slash == std::string::npos ? "" : path.substr(slash);
   }
   if (path.size() < 2 || path[0] != '/') fail(uri, "names no file; write file:///PATH");
-  return percent_decoded(path);
+  return decoded_path(uri, path);
 }
 
 }  // namespace

@@ -40,14 +40,23 @@ bool PackingJobs::run(int threads) {
 }
 
 void PackingJobs::work() {
-  for (std::size_t index; take(&index);) pack(index);
+  for (std::size_t index; take(&index);) {
+    pack(index);
+    finish(index);
+  }
 }
 
 bool PackingJobs::take(std::size_t* index) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (stopped_ || next_ == order_.size()) return false;
   *index = order_[next_++];
+  at_work_.push_back(*index);
   return true;
+}
+
+void PackingJobs::finish(std::size_t index) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  at_work_.erase(std::find(at_work_.begin(), at_work_.end(), index));
 }
 
 void PackingJobs::pack(std::size_t index) {
@@ -56,11 +65,13 @@ void PackingJobs::pack(std::size_t index) {
   const auto start = std::chrono::steady_clock::now();
   bool stopped = false;
   try {
-    std::optional<Packing> cached = cache_.load(job.key, &job.load_warning);
+    std::optional<Packing> cached = cache_.load(
+        job.key, *job.shape, job.config,
+        [&](double) { return !(stopped = stopped || !report(index, 0.0)); }, &job.load_warning);
     job.from_cache = cached.has_value();
     if (job.from_cache) {
       job.packing = std::move(*cached);
-    } else {
+    } else if (!stopped) {
       job.packing = pack_element(*job.shape, job.config, [&](double fraction) {
         stopped = stopped || !report(index, fraction);
         return !stopped;
@@ -84,7 +95,8 @@ bool PackingJobs::report(std::size_t index, double fraction) {
     all += jobs_[i].work;
   }
   try {
-    stopped_ = !report_(jobs_[index], done / all);
+    // Another thread may be in a long phase of a link that was begun before this one.
+    stopped_ = !report_(jobs_[at_work_.front()], done / all);
   } catch (...) {
     failure_ = std::current_exception();
     stopped_ = true;

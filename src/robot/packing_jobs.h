@@ -31,8 +31,8 @@ struct PackingJob {
 /// Packs shapes on several threads, the most work first, through the cache.
 class PackingJobs {
  public:
-  /// Called from any thread, one call at a time: the job at work, and how much of all is done
-  /// (0 to 1). Returning false stops everything soon.
+  /// Called from any thread, one call at a time: the job that has been at work longest, and how
+  /// much of all is done (0 to 1). Returning false stops everything soon.
   using Report = std::function<bool(const PackingJob& job, double fraction)>;
 
   PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cache, Report report);
@@ -46,6 +46,7 @@ class PackingJobs {
   void pack(std::size_t index);
   bool report(std::size_t index, double fraction);
   bool take(std::size_t* index);
+  void finish(std::size_t index);
 
   std::vector<PackingJob>& jobs_;
   const PackingCache& cache_;
@@ -54,7 +55,8 @@ class PackingJobs {
 
   std::mutex mutex_;  // guards all below
   std::size_t next_ = 0;
-  std::vector<double> done_;  // by job, 0 to 1
+  std::vector<double> done_;          // by job, 0 to 1
+  std::vector<std::size_t> at_work_;  // jobs in the order in which they were begun
   bool stopped_ = false;
   std::exception_ptr failure_;
 };

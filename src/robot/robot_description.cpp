@@ -5,10 +5,11 @@
 
 #include <cmath>
 #include <map>
-#include <sstream>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "internal/geometry/limits.h"
 #include "internal/geometry/mesh_io.h"
 #include "internal/robot/package_resolver.h"
 #include "internal/robot/urdfdom_parser.h"
@@ -22,15 +23,19 @@ const tinyxml2::XMLElement& robot_element(const std::string& urdf_xml,
   if (urdf_xml.find_first_not_of(" \t\r\n") == std::string::npos) {
     throw ModelError("robot description is empty; load a URDF into it");
   }
+  if (urdf_xml.size() > kMaxDescriptionSize) {
+    throw ModelError("robot description has " + std::to_string(urdf_xml.size()) +
+                     " bytes; allowed are at most " + std::to_string(kMaxDescriptionSize));
+  }
   if (document->Parse(urdf_xml.c_str(), urdf_xml.size()) != tinyxml2::XML_SUCCESS) {
     throw ModelError(std::string("robot description is not well-formed XML: ") +
-                     document->ErrorStr());
+                     printable(document->ErrorStr()));
   }
   const tinyxml2::XMLElement* root = document->RootElement();
   if (root == nullptr) throw ModelError("robot description is no URDF: it holds no element");
   if (root->Name() != std::string("robot")) {
     throw ModelError(std::string("robot description is no URDF: its root element is <") +
-                     root->Name() + ">, not <robot>");
+                     printable(root->Name()) + ">, not <robot>");
   }
   for (const auto* child = root->FirstChildElement(); child != nullptr;
        child = child->NextSiblingElement()) {
@@ -72,14 +77,62 @@ void check_tree(const tinyxml2::XMLElement& robot) {
                      name(other->second) + "' and of joint '" + name(joint) +
                      "'; a link may have one parent");
   }
+  // Every walk upwards ends at a link that an earlier walk has passed, so each joint is met once.
+  std::set<std::string> reaches_root;
   for (const auto& [link, joint] : joint_above) {
-    std::string above = link_attribute(*joint, "parent");
-    for (std::size_t steps = 0; joint_above.count(above) > 0; ++steps) {
-      if (above == link || steps > joint_above.size()) {
-        throw ModelError("robot description is no tree: the joints above link '" + link +
+    std::set<std::string> walk;
+    std::string at = link;
+    while (joint_above.count(at) > 0 && reaches_root.count(at) == 0) {
+      if (!walk.insert(at).second) {
+        throw ModelError("robot description is no tree: the joints above link '" + at +
                          "' form a ring");
       }
-      above = link_attribute(*joint_above.at(above), "parent");
+      at = link_attribute(*joint_above.at(at), "parent");
+    }
+    reaches_root.merge(walk);
+  }
+}
+
+// Names go into messages, topics and logs.
+void check_name(const tinyxml2::XMLElement& element) {
+  const char* text = element.Attribute("name");
+  if (text == nullptr || *text == '\0') {
+    if (element.Name() != std::string("link")) return;  // urdfdom reports the others
+    throw ModelError("robot description has a <link> without a name (line " +
+                     std::to_string(element.GetLineNum()) + ")");
+  }
+  const std::string fault = name_fault(text);
+  if (fault.empty()) return;
+  throw ModelError("robot description: the name of a <" + std::string(element.Name()) + "> (line " +
+                   std::to_string(element.GetLineNum()) + ") " + fault);
+}
+
+std::size_t count_children(const tinyxml2::XMLElement& robot, const char* tag) {
+  std::size_t count = 0;
+  for (const auto* child = robot.FirstChildElement(tag); child != nullptr;
+       child = child->NextSiblingElement(tag)) {
+    check_name(*child);
+    ++count;
+  }
+  return count;
+}
+
+std::size_t count_elements(const tinyxml2::XMLElement& link, const char* tag) {
+  std::size_t count = 0;
+  for (const auto* child = link.FirstChildElement(tag); child != nullptr;
+       child = child->NextSiblingElement(tag)) {
+    ++count;
+  }
+  return count;
+}
+
+void check_names_and_counts(const tinyxml2::XMLElement& robot) {
+  check_name(robot);
+  for (const char* tag : {"link", "joint"}) {
+    const std::size_t count = count_children(robot, tag);
+    if (count > kMaxLinks) {
+      throw ModelError("robot description has " + std::to_string(count) + " " + tag +
+                       "s; allowed are at most " + std::to_string(kMaxLinks));
     }
   }
 }
@@ -94,11 +147,6 @@ urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot)
   for (const auto* child = robot.FirstChildElement(); child != nullptr;
        child = child->NextSiblingElement()) {
     if (child->Name() == std::string("link")) {
-      const char* name = child->Attribute("name");
-      if (name == nullptr || *name == '\0') {
-        throw ModelError("robot description has a <link> without a name (line " +
-                         std::to_string(child->GetLineNum()) + ")");
-      }
       tinyxml2::XMLElement* link = skeleton.NewElement("link");
       root->InsertEndChild(link);
       copy_attributes(*child, link);
@@ -113,38 +161,35 @@ urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot)
   throw ModelError("robot description is no valid URDF: " + reasons);
 }
 
-void check_size(const char* what, double value) {
-  if (std::isfinite(value) && value > 0.0) return;
-  std::ostringstream text;
-  text << "its " << what << " is " << value << " m; it must be > 0";
-  throw ModelError(text.str());
-}
+// What reading a mesh needs besides its element.
+struct MeshReader {
+  const PackageFinder& find_package;
+  const ReadingProgress& progress;
+  std::string link;
 
-Shape to_shape(const urdf::Geometry& geometry, const PackageFinder& find_package) {
+  TriangleMesh read(const urdf::Mesh& mesh) const {
+    const auto cancelled = [&] { return progress && !progress(link, printable(mesh.filename)); };
+    throw_if(cancelled);
+    return load_mesh(resolve_uri(mesh.filename, find_package),
+                     {mesh.scale.x, mesh.scale.y, mesh.scale.z}, cancelled);
+  }
+};
+
+Shape to_shape(const urdf::Geometry& geometry, const MeshReader& reader) {
   switch (geometry.type) {
     case urdf::Geometry::BOX: {
       const urdf::Vector3& size = static_cast<const urdf::Box&>(geometry).dim;
-      check_size("size along x", size.x);
-      check_size("size along y", size.y);
-      check_size("size along z", size.z);
       return Box{{size.x, size.y, size.z}};
     }
     case urdf::Geometry::CYLINDER: {
       const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
-      check_size("radius", cylinder.radius);
-      check_size("length", cylinder.length);
       return Cylinder{cylinder.radius, cylinder.length};
     }
     case urdf::Geometry::SPHERE: {
-      const double radius = static_cast<const urdf::Sphere&>(geometry).radius;
-      check_size("radius", radius);
-      return Sphere{radius};
+      return Sphere{static_cast<const urdf::Sphere&>(geometry).radius};
     }
-    case urdf::Geometry::MESH: {
-      const auto& mesh = static_cast<const urdf::Mesh&>(geometry);
-      return load_mesh(resolve_uri(mesh.filename, find_package),
-                       {mesh.scale.x, mesh.scale.y, mesh.scale.z});
-    }
+    case urdf::Geometry::MESH:
+      return reader.read(static_cast<const urdf::Mesh&>(geometry));
     default:  // newer versions of urdfdom know more shapes
       throw ModelError("its shape is not supported; use box, cylinder, sphere or mesh");
   }
@@ -186,8 +231,9 @@ JointDescription to_joint(const urdf::Joint& joint) {
   result.axis << joint.axis.x, joint.axis.y, joint.axis.z;
   if (joint.limits &&
       (joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::PRISMATIC)) {
-    result.lower = joint.limits->lower;
-    result.upper = joint.limits->upper;
+    // Limits farther out than any position counts are none.
+    if (std::abs(joint.limits->lower) <= kMaxLength) result.lower = joint.limits->lower;
+    if (std::abs(joint.limits->upper) <= kMaxLength) result.upper = joint.limits->upper;
   }
   if (joint.mimic) {
     result.mimic = Mimic{joint.mimic->joint_name, joint.mimic->multiplier, joint.mimic->offset};
@@ -196,7 +242,7 @@ JointDescription to_joint(const urdf::Joint& joint) {
 }
 
 // Lets urdfdom parse a <collision> or <visual>, alone in a robot of one link.
-GeometryElement parse_element(const tinyxml2::XMLElement& xml, const PackageFinder& find_package) {
+GeometryElement parse_element(const tinyxml2::XMLElement& xml, const MeshReader& reader) {
   tinyxml2::XMLDocument document;
   document.Parse("<robot name='r'><link name='l'/></robot>");
   tinyxml2::XMLNode* copy = xml.DeepClone(&document);
@@ -225,7 +271,11 @@ GeometryElement parse_element(const tinyxml2::XMLElement& xml, const PackageFind
   GeometryElement element;
   element.X_LE = to_isometry(origin);
   if (!element.X_LE.matrix().allFinite()) throw ModelError("its <origin> is not finite");
-  element.shape = to_shape(*geometry, find_package);
+  const std::string misplaced = position_fault("its <origin>", element.X_LE.translation());
+  if (!misplaced.empty()) throw ModelError(misplaced);
+  element.shape = to_shape(*geometry, reader);
+  const std::string misshapen = shape_fault(element.shape);
+  if (!misshapen.empty()) throw ModelError(misshapen);
   return element;
 }
 
@@ -235,20 +285,22 @@ std::string source_name(const tinyxml2::XMLElement& xml) {
   const auto* shape = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
   if (shape == nullptr) return "no shape";
   const char* file = shape->Attribute("filename");
-  return file != nullptr && *file != '\0' ? file : shape->Name();
+  return printable(file != nullptr && *file != '\0' ? file : shape->Name());
 }
 
-void parse_geometry(const tinyxml2::XMLElement& link_xml, const char* tag,
-                    const PackageFinder& find_package, LinkDescription* link) {
+void parse_geometry(const tinyxml2::XMLElement& link_xml, const char* tag, const MeshReader& reader,
+                    LinkDescription* link) {
+  constexpr std::size_t kMaxErrorSize = 2000;  // a message is meant to be read
   int number = 0;
   for (const auto* xml = link_xml.FirstChildElement(tag); xml != nullptr;
        xml = xml->NextSiblingElement(tag)) {
     ++number;
     const std::string source = source_name(*xml);
     try {
-      link->geometry.push_back(parse_element(*xml, find_package));
+      link->geometry.push_back(parse_element(*xml, reader));
       link->geometry.back().source = source;
     } catch (const ModelError& error) {
+      if (link->error.size() > kMaxErrorSize) continue;
       link->error += link->error.empty() ? "link '" + link->name + "', " : "; and ";
       link->error += std::string(tag) + " element " + std::to_string(number) + " (" + source +
                      "): " + error.what();
@@ -259,10 +311,13 @@ void parse_geometry(const tinyxml2::XMLElement& link_xml, const char* tag,
 
 }  // namespace
 
-RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
-                            const PackageFinder& find_package) {
+namespace {
+
+RobotDescription parse(const std::string& urdf_xml, GeometrySource source,
+                       const PackageFinder& find_package, const ReadingProgress& progress) {
   tinyxml2::XMLDocument document;
   const tinyxml2::XMLElement& robot = robot_element(urdf_xml, &document);
+  check_names_and_counts(robot);
   check_tree(robot);
   const urdf::ModelInterfaceSharedPtr model = parse_structure(robot);
 
@@ -270,6 +325,7 @@ RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
   description.name = model->getName();
   description.root_link = model->getRoot()->name;
   for (const auto& [name, joint] : model->joints_) description.joints.push_back(to_joint(*joint));
+  std::size_t elements = 0;
   for (const auto* xml = robot.FirstChildElement("link"); xml != nullptr;
        xml = xml->NextSiblingElement("link")) {
     LinkDescription link;
@@ -284,10 +340,27 @@ RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
       description.links_without_geometry.push_back(link.name);
       continue;
     }
-    parse_geometry(*xml, use_visual ? "visual" : "collision", find_package, &link);
+    const char* tag = use_visual ? "visual" : "collision";
+    elements += count_elements(*xml, tag);
+    if (elements > kMaxElements) {
+      throw ModelError("robot description has more than " + std::to_string(kMaxElements) +
+                       " elements with geometry; the limit is reached at link '" + link.name + "'");
+    }
+    parse_geometry(*xml, tag, {find_package, progress, link.name}, &link);
     description.links.push_back(std::move(link));
   }
   return description;
+}
+
+}  // namespace
+
+RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
+                            const PackageFinder& find_package, const ReadingProgress& progress) {
+  try {
+    return parse(urdf_xml, source, find_package, progress);
+  } catch (const Cancelled&) {
+    throw ModelError("reading of the robot description was cancelled");
+  }
 }
 
 }  // namespace ist

@@ -6,8 +6,13 @@
 #include <cstdio>
 #include <map>
 #include <sstream>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
+#include "internal/geometry/cancelled.h"
+#include "internal/geometry/limits.h"
+#include "internal/geometry/solid_queries.h"
 #include "internal/packing/packing_cache.h"
 #include "internal/robot/link_packing.h"
 #include "ist_proximity/geometry/error.h"
@@ -26,10 +31,6 @@ void check_config(const PackingConfig& config) {
   if (!text.str().empty()) throw ModelError(text.str());
 }
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 // A link to monitor; without a description it stays UNKNOWN, with `error`.
 struct MonitoredLink {
   std::string name;
@@ -38,19 +39,36 @@ struct MonitoredLink {
   std::vector<std::size_t> jobs;  // one per element
 };
 
-MonitoredLink monitored(const RobotDescription& robot, const std::string& name) {
+// The links of a description by name.
+struct LinkIndex {
+  explicit LinkIndex(const RobotDescription& robot)
+      : without_geometry(robot.links_without_geometry.begin(), robot.links_without_geometry.end()) {
+    for (const LinkDescription& link : robot.links) with_geometry.insert({link.name, &link});
+  }
+  std::unordered_map<std::string, const LinkDescription*> with_geometry;
+  std::unordered_set<std::string> without_geometry;
+};
+
+MonitoredLink monitored(const RobotDescription& robot, const LinkIndex& index,
+                        const std::string& name) {
   MonitoredLink link;
   link.name = name;
-  for (const LinkDescription& description : robot.links) {
-    if (description.name != name) continue;
-    link.description = &description;
-    link.error = description.error;
-    if (link.error.empty() && description.geometry.empty()) {
+  const auto found = index.with_geometry.find(name);
+  if (found != index.with_geometry.end()) {
+    link.description = found->second;
+    link.error = link.description->error;
+    if (link.error.empty() && link.description->geometry.empty()) {
       link.error = "link '" + name + "' has no geometry";
+    }
+    for (const GeometryElement& element : link.description->geometry) {
+      const std::string fault = link.error.empty() ? element_fault(element) : "";
+      if (!fault.empty()) {
+        link.error = "link '" + name + "', element '" + element.source + "': " + fault;
+      }
     }
     return link;
   }
-  if (contains(robot.links_without_geometry, name)) {
+  if (index.without_geometry.count(name) > 0) {
     link.error = "link '" + name +
                  "' is to be monitored and has no geometry; give it a <collision> element or take "
                  "it from the list of links";
@@ -64,23 +82,25 @@ MonitoredLink monitored(const RobotDescription& robot, const std::string& name) 
 // The monitored links in the URDF's order; names that it lacks come last.
 std::vector<MonitoredLink> select_links(const RobotDescription& robot,
                                         const std::vector<std::string>& wanted) {
+  const LinkIndex index(robot);
   std::vector<std::string> known = robot.link_order;
   if (known.empty()) {
     for (const LinkDescription& link : robot.links) known.push_back(link.name);
     known.insert(known.end(), robot.links_without_geometry.begin(),
                  robot.links_without_geometry.end());
   }
-  std::vector<std::string> names;
-  for (const std::string& name : known) {
-    const bool without_geometry = contains(robot.links_without_geometry, name);
-    if (wanted.empty() ? !without_geometry : contains(wanted, name)) names.push_back(name);
-  }
-  for (const std::string& name : wanted) {
-    if (!contains(names, name)) names.push_back(name);
-  }
+  const std::unordered_set<std::string> wanted_names(wanted.begin(), wanted.end());
+  std::unordered_set<std::string> chosen;
   std::vector<MonitoredLink> links;
-  links.reserve(names.size());
-  for (const std::string& name : names) links.push_back(monitored(robot, name));
+  const auto choose = [&](const std::string& name) {
+    if (chosen.insert(name).second) links.push_back(monitored(robot, index, name));
+  };
+  for (const std::string& name : known) {
+    const bool is_wanted =
+        wanted.empty() ? index.without_geometry.count(name) == 0 : wanted_names.count(name) > 0;
+    if (is_wanted) choose(name);
+  }
+  for (const std::string& name : wanted) choose(name);
   return links;
 }
 
@@ -112,7 +132,7 @@ std::vector<PackingJob> make_jobs(const PackingConfig& config, std::vector<Monit
 }
 
 LinkModel assemble(const MonitoredLink& link, const std::vector<PackingJob>& jobs,
-                   const TreeConfig& tree) {
+                   const TreeConfig& tree, const CancelRequest& cancelled) {
   LinkModel model;
   model.name = link.name;
   model.error = link.error;
@@ -134,7 +154,8 @@ LinkModel assemble(const MonitoredLink& link, const std::vector<PackingJob>& job
   }
   model.packing = combine(geometry, packings);
   model.tree = InnerSphereTree(model.packing, tree);
-  model.solid = Solid(geometry);
+  throw_if(cancelled);
+  model.solid = make_solid(geometry, cancelled);
   return model;
 }
 
@@ -194,9 +215,13 @@ std::shared_ptr<const RobotModel> build_robot_model(const RobotDescription& desc
   const auto model = std::make_shared<RobotModel>();
   model->name = description.name;
   model->root_link = description.root_link;
-  for (const MonitoredLink& link : links) {
-    if (cancelled()) return nullptr;
-    model->links.push_back(assemble(link, jobs, config.tree));
+  try {
+    for (const MonitoredLink& link : links) {
+      throw_if(cancelled);
+      model->links.push_back(assemble(link, jobs, config.tree, cancelled));
+    }
+  } catch (const Cancelled&) {
+    return nullptr;
   }
   warn(links, jobs, *model, config.packing, callbacks.warning);
   return model;

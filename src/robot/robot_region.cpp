@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "internal/geometry/limits.h"
+
 namespace ist {
 namespace {
 
@@ -19,7 +21,7 @@ double largest_offset(const Kinematics& kinematics, const Kinematics::Joint& joi
   const Kinematics::Joint& source = kinematics.joints()[joint.source];
   const auto slide = [&](double q) { return std::abs(joint.multiplier * q + joint.offset); };
   const double farthest = std::max(slide(source.lower), slide(source.upper));
-  return to_joint + (std::isnan(farthest) ? kInfinity : farthest);
+  return farthest <= kMaxLength ? to_joint + farthest : kInfinity;  // it may be NaN
 }
 
 }  // namespace

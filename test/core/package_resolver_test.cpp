@@ -59,7 +59,7 @@ void expect_says(const std::string& text, const std::string& part) {
 
 TEST(ResolveUri, resolvesPackagesFilesAndPaths) {
   EXPECT_EQ(resolve_uri("package://robot/meshes/a.stl", one_package), "/share/robot/meshes/a.stl");
-  EXPECT_EQ(resolve_uri("package://robot/../b.stl", one_package), "/share/robot/../b.stl");
+  EXPECT_EQ(resolve_uri("package://robot/a/../b.stl", one_package), "/share/robot/a/../b.stl");
   EXPECT_EQ(resolve_uri("file:///tmp/a.stl", one_package), "/tmp/a.stl");
   EXPECT_EQ(resolve_uri("file://localhost/tmp/a.stl", one_package), "/tmp/a.stl");
   EXPECT_EQ(resolve_uri("file:/tmp/a.stl", one_package), "/tmp/a.stl");
@@ -90,6 +90,20 @@ TEST(ResolveUri, saysWhatIsWrong) {
   expect_says(error_of("file://"), "no file");
   expect_says(error_of("file:///"), "no file");
   expect_says(error_of("file:a.stl"), "no file");
+}
+
+// `..` would open any file of the machine by a URI that looks like a package's.
+TEST(ResolveUri, refusesPathsThatLeadOutOfThePackage) {
+  for (const char* path : {"../b.stl", "a/../../b.stl", "%2e%2e/b.stl", "%2E./b.stl", "..%2fb.stl",
+                           "a/../..//etc/passwd", "./../x", "a/.././../x/robot/b.stl", ".."}) {
+    expect_says(error_of("package://robot/" + std::string(path)), "leads out of package 'robot'");
+  }
+  expect_says(error_of("package://../etc/passwd"), "no package");
+  expect_says(error_of("package://robot/a%00.stl"), "character 0");
+  expect_says(error_of("file:///tmp/a%00.stl"), "character 0");
+  EXPECT_EQ(resolve_uri("package://robot/..a/b..stl", one_package), "/share/robot/..a/b..stl");
+  // The message may go to a terminal and into a topic.
+  expect_says(error_of("package://arm/\x1b[2J\n\xff.stl"), "'package://arm/?[2J??.stl'");
 }
 
 class EnvironmentPackages : public testing::Test {

@@ -13,6 +13,7 @@
 
 #include "geometry/orientation.h"
 #include "internal/packing/packer.h"
+#include "internal/packing/packing_check.h"
 #include "ist_proximity/geometry/error.h"
 #include "support/accuracy.h"
 #include "support/hostile_meshes.h"
@@ -94,6 +95,7 @@ std::string outcome(const test::HostileMesh& hostile) {
     EXPECT_TRUE(packing.certificate.reached);
     EXPECT_LE(packing.certificate.max_gap, hostile.max_error);
     check(mesh, packing);
+    EXPECT_EQ(packing_fault(mesh, config, packing), "") << "the cache would refuse it";
     const PackingCertificate& certificate = packing.certificate;
     const double sheet_share = certificate.surface_area > 0.0
                                    ? certificate.unreachable_area / certificate.surface_area

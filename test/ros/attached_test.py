@@ -1,7 +1,12 @@
 #!/usr/bin/env python3
 """Attached objects: in their link's distances and out of the cloud, until they are detached."""
 
+import contextlib
+import os
 import sys
+import tempfile
+import threading
+import time
 import unittest
 
 import numpy as np
@@ -86,8 +91,9 @@ class AttachedTest(unittest.TestCase):
         )
 
         # The tool stays attached when the model is loaded again.
+        begin = len(node.messages)
         self.assertTrue(node.reload().success)
-        node.wait_for_status(ProximityArray.MODEL_ERROR, start=0)
+        node.wait_for_status(ProximityArray.MODEL_ERROR, start=begin)
         self.wait_for_ball(0.2 - TOOL_RADIUS, 200)
         self.detach_well("tool")
         self.wait_for_ball(without, 0)
@@ -112,6 +118,22 @@ class AttachedTest(unittest.TestCase):
             "needed are 3": {"shape": AttachObjectRequest.BOX, "dimensions": [0.1]},
             "dimensions holds -1 m": {"dimensions": [-1.0]},
             "shape is 9": {"shape": 9},
+            "dimensions holds 1e+300 m; allowed is more than 0 and at most 10000 m": {
+                "shape": AttachObjectRequest.BOX,
+                "dimensions": [0.1, 0.1, 1e300],
+            },
+            "dimensions holds 1e+39 m": {"dimensions": [1e39]},
+            "pose is at (1e+160 0 0) m": {"at": (1e160, 0, 0)},
+            "has the scale (1 1 1e+06)": {
+                "shape": AttachObjectRequest.MESH,
+                "mesh": "package://ist_proximity/demo/meshes/shoulder_fork.stl",
+                "dimensions": [1, 1, 1e6],
+            },
+            "leads out of package 'ist_proximity'": {
+                "shape": AttachObjectRequest.MESH,
+                "mesh": "package://ist_proximity/%2e%2e/../etc/passwd",
+            },
+            "holds the control character 10": {"name": "a\nb"},
             "its quaternion has length 0": {"orientation": Quaternion()},
             "it holds NaN": {"at": (np.nan, 0, 0)},
             "missing.stl": {"shape": AttachObjectRequest.MESH, "mesh": "/missing.stl"},
@@ -144,6 +166,63 @@ class AttachedTest(unittest.TestCase):
         self.detach_well("can")
         self.detach_well("tool")
         node.wait_for(lambda m: m.status == 0 and len(m.links) == 1, "the ball's link gone")
+
+    def test_a_fifo_is_no_mesh(self):
+        """Opening it waited for a writer for good, and SIGINT did not end the node."""
+        self.start().wait_for_status(ProximityArray.OK)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "pipe.stl")
+            os.mkfifo(path)
+            begin = time.time()
+            answer = self.attach(shape=AttachObjectRequest.MESH, mesh=path)
+            self.assertLess(time.time() - begin, 2.0)
+        self.assertFalse(answer.success)
+        self.assertIn("is no regular file but a FIFO", answer.message)
+
+    def start_long_attaching(self):
+        """Attaches an object whose packing takes minutes; its answer will be in self.answer."""
+        # The ball is packed at once, because it is a sphere; a self-filter would need the box, too.
+        node = self.start(
+            links=["ball_link"],
+            self_filter=False,
+            packing={"max_error": 0.0001, "max_spheres": 1000000},
+        )
+        node.wait_for_status(ProximityArray.OK)
+        self.answer = None
+
+        def attach():
+            with contextlib.suppress(rospy.ServiceException):  # the node ends meanwhile
+                self.answer = self.attach(
+                    shape=AttachObjectRequest.CYLINDER, dimensions=[0.5, 1.0]
+                )
+
+        thread = threading.Thread(target=attach, daemon=True)
+        thread.start()
+        time.sleep(2.0)
+        self.assertTrue(thread.is_alive(), self.answer)
+        return thread
+
+    def test_detaching_and_reloading_cancel_attaching(self):
+        thread = self.start_long_attaching()
+        count = len(self.node.messages)
+        time.sleep(0.5)
+        self.assertGreater(len(self.node.messages), count + 10, "the cycle goes on")
+        begin = time.time()
+        self.detach_well("tool")
+        thread.join(2.0)
+        self.assertLess(time.time() - begin, 2.0)
+        self.assertFalse(self.answer.success)
+        self.assertIn("was detached while it was being attached", self.answer.message)
+        self.attach_well(name="ball")  # the service is free again
+        self.detach_well("ball")
+
+    def test_shutdown_cancels_attaching(self):
+        thread = self.start_long_attaching()
+        begin = time.time()
+        self.assertEqual(self.node.stop(), 0)
+        self.assertLess(time.time() - begin, 3.0)
+        thread.join(5.0)
+        self.assertFalse(thread.is_alive())
 
 
 if __name__ == "__main__":

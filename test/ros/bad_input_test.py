@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 import unittest
 
 import numpy as np
@@ -284,6 +285,34 @@ class BadModelTest(unittest.TestCase):
                 "vertex 0 1 0\nendloop\nendfacet\nendsolid t\n"
             )
         self.check_one_bad_link('<mesh filename="file://%s" scale="1 0 1"/>' % path, ["scale"])
+
+    def test_fifo_as_mesh(self):
+        """Opening it waits for a writer: the model was never loaded, for a reason that was wrong."""
+        path = os.path.join(self.folder, "pipe.stl")
+        os.mkfifo(path)
+        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["no regular file but a FIFO"])
+
+    def test_huge_sizes(self):
+        for shape in ('<box size="1e300 1 1"/>', '<cylinder radius="1" length="1e39"/>'):
+            self.check_one_bad_link(shape, ["m; allowed is more than 0 and at most 10000 m"])
+            self.assertEqual(self.node.stop(), 0)
+
+    def test_large_mesh_is_told_and_does_not_hold_up_the_end(self):
+        """While a mesh is read or packed, the status names it and its link; SIGINT ends the node."""
+        path = os.path.join(self.folder, "large.stl")
+        count = 1000000
+        facets = np.zeros(count, [("numbers", "<f4", 12), ("spare", "<u2")])
+        facets["numbers"][:, 3:] = np.random.default_rng(1).uniform(-0.5, 0.5, (count, 9))
+        with open(path, "wb") as f:
+            f.write(b" " * 80 + np.uint32(count).tobytes() + facets.tobytes())
+        node = self.start(pt.urdf(box='<mesh filename="file://%s"/>' % path))
+        words = "reading mesh 'file://%s' of link 'box_link'" % path
+        node.wait_for_status(ProximityArray.MODEL_ERROR, words, start=0)
+        node.wait_for_status(ProximityArray.MODEL_ERROR, "packing link 'box_link'", start=0, timeout=60)
+        time.sleep(0.5)
+        begin = time.time()
+        self.assertEqual(node.stop(), 0)
+        self.assertLess(time.time() - begin, 3.0)
 
     def test_mesh_that_appears(self):
         """A mesh is missing at first; ~reload_model reads it once it is there."""

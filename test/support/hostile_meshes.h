@@ -188,6 +188,7 @@ inline std::vector<HostileMesh> hostile_meshes() {
       {"1 mm wide", scaled(sphere, 0.005), 0.0001},
       {"100 m wide", scaled(sphere, 500.0), 2.0},
       {"1 km from the origin", shifted(sphere, {1000.0, 0, 0}), k5mm},
+      {"almost 10 km from the origin", shifted(sphere, {-9999.0, 9999.0, 0}), k5mm},
       {"1000 km from the origin", shifted(sphere, {0, 1e6, 0}), k5mm},
       {"no triangle", TriangleMesh{}, k5mm},
       {"a corner that is NaN", {{{0, 0, 0}, {NAN, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, k5mm},

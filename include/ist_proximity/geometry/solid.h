@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -33,6 +34,7 @@ class Solid {
  public:
   Solid() = default;
   /// The union of the elements of a link. Builds a hierarchy for each mesh.
+  /// @throws ModelError when a size, a corner or a position is not finite, or larger than 10 km
   explicit Solid(const LinkGeometry& geometry);
 
   /// Signed distance of a point.
@@ -55,6 +57,7 @@ class Solid {
  private:
   /// The library's own queries (distance to a box, penetration depth, support) read the elements.
   friend const std::vector<SolidElement>& elements_of(const Solid& solid);
+  friend Solid make_solid(const LinkGeometry& geometry, const std::function<bool()>& cancelled);
 
   std::shared_ptr<const std::vector<SolidElement>> elements_;  // null: none
 };

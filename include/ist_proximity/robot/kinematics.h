@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "ist_proximity/geometry/span.h"
@@ -92,9 +93,11 @@ class Kinematics {
  private:
   void add_tree(const RobotDescription& description);
   void resolve_mimics(const RobotDescription& description);
+  std::size_t followed_joint(const JointDescription& joint) const;
 
   std::vector<std::string> bodies_;
   std::vector<Joint> joints_;
+  std::unordered_map<std::string, std::size_t> body_of_name_, joint_of_name_;
 };
 
 /// Linear velocity [m/s] over angular velocity [rad/s], per joint.

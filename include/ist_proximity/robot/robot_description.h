@@ -67,12 +67,20 @@ using PackageFinder = std::function<std::string(const std::string& package)>;
 /// ROS.
 PackageFinder environment_package_finder();
 
+/// Called before a mesh is read, with the names of its link and its file, and every few
+/// milliseconds while it is read. Returning false ends the reading of the URDF.
+using ReadingProgress = std::function<bool(const std::string& link, const std::string& mesh)>;
+
 /// Reads a URDF (urdfdom) and the meshes it names (assimp).
 ///
-/// A link whose geometry is faulty stays in `links` with its `error`; the others are read.
+/// A link whose geometry is faulty stays in `links` with its `error`; the others are read. Lengths,
+/// positions and scales are at most 10 km (10000), mesh files at most 256 MB.
+/// @param progress  may be empty
 /// @throws ModelError when the text is no URDF: empty, not XML, no `<robot>`, no link, joints that
-///         form no tree.
+///         form no tree; names that hold control characters; more than 5000 links; or when
+///         `progress` ended it
 RobotDescription parse_urdf(const std::string& urdf_xml, GeometrySource source,
-                            const PackageFinder& find_package);
+                            const PackageFinder& find_package,
+                            const ReadingProgress& progress = {});
 
 }  // namespace ist

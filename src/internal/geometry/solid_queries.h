@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <functional>
 #include <limits>
 
 #include "internal/geometry/box_distance.h"
@@ -9,6 +10,10 @@
 
 /// The library's own queries of a Solid. They are thread safe and allocate nothing.
 namespace ist {
+
+/// The same as Solid(geometry), which takes seconds for a million triangles.
+/// @throws ModelError, Cancelled
+Solid make_solid(const LinkGeometry& geometry, const std::function<bool()>& cancelled);
 
 /// The distance of a point that is known to be outside: no inside test is made.
 /// @param max_distance    [m] a solid that is not nearer than this has `distance` = inf

@@ -9,6 +9,7 @@
 
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/box_distance.h"
+#include "internal/geometry/cancelled.h"
 #include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
@@ -30,7 +31,10 @@ class TriangleBvh {
  public:
   TriangleBvh() = default;
   /// Copies the corners. Triangles without area are kept: the edge of a flap is surface too.
-  explicit TriangleBvh(const TriangleMesh& mesh);
+  explicit TriangleBvh(const TriangleMesh& mesh) : TriangleBvh(mesh, CancelRequest()) {}
+  /// The same; building a million triangles takes about a second.
+  /// @throws Cancelled
+  TriangleBvh(const TriangleMesh& mesh, const CancelRequest& cancelled);
 
   /// The closest point of the surface within `max_distance_sq` [m^2] of p_M, exact in double.
   /// @param outward_hint_M  unit vector, roughly the direction from the closest point to p_M; it

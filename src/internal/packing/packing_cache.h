@@ -23,9 +23,19 @@ class PackingCache {
   /// @param directory  created when needed; empty turns the cache off
   explicit PackingCache(std::string directory) : directory_(std::move(directory)) {}
 
-  /// The stored packing, or nothing.
-  /// @param warning  set to one sentence when there is a file that cannot be used
-  std::optional<Packing> load(const std::string& key, std::string* warning) const;
+  /// The stored packing of this shape, or nothing. It is checked against the shape
+  /// (packing_fault()): a file that is damaged or forged in whatever way is not used.
+  /// @param key       packing_key(shape, config)
+  /// @param progress  as for packing_fault()
+  /// @param warning   set to one sentence when there is a file that cannot be used
+  std::optional<Packing> load(const std::string& key, const Shape& shape,
+                              const PackingConfig& config, const PackingProgress& progress,
+                              std::string* warning) const;
+
+  /// The same without looking at a shape: the file is well-formed, and its numbers may be wrong.
+  /// @param max_spheres  files with more are not read
+  std::optional<Packing> load_unchecked(const std::string& key, std::size_t max_spheres,
+                                        std::string* warning) const;
 
   /// Stores a packing.
   /// @param warning  set to one sentence when the file cannot be written

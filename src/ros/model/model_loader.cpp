@@ -157,6 +157,7 @@ void ModelLoader::load_once() {
   try {
     load(urdf);
   } catch (const std::exception& error) {  // ModelError, or no memory
+    if (cancelled()) return;
     rejected_ = urdf;
     state.phase = ModelState::Phase::kFailed;
     state.problem = std::string("the robot's URDF in '") + config_.robot_description +
@@ -228,7 +229,10 @@ RobotDescription ModelLoader::carry_over_objects(ModelState* state) {
 void ModelLoader::load(const std::string& urdf) {
   ModelState state;
   state.description = std::make_shared<const RobotDescription>(
-      parse_urdf(urdf, config_.geometry, environment_package_finder()));
+      parse_urdf(urdf, config_.geometry, environment_package_finder(),
+                 [this](const std::string& link, const std::string& mesh) {
+                   return show_reading(link, mesh);
+                 }));
   warn_of_visual_fallback(*state.description);
   const RobotDescription description = carry_over_objects(&state);
 
@@ -256,6 +260,16 @@ void ModelLoader::load(const std::string& urdf) {
   set_state(std::move(state));
 }
 
+/// Shows which mesh is being read: a large one, or one on a slow disk, takes long.
+/// @returns false when reading has to stop
+bool ModelLoader::show_reading(const std::string& link, const std::string& mesh) {
+  ModelState state;
+  state.phase = ModelState::Phase::kReading;
+  state.problem = "reading mesh '" + mesh + "' of link '" + link + "'";
+  if (state.problem != this->state()->problem) set_state(std::move(state));
+  return !cancelled();
+}
+
 /// Packs the links, or takes them from the cache, and reports the progress.
 /// @returns false when cancelled
 bool ModelLoader::build(const RobotDescription& description, ModelState* state) {
@@ -271,8 +285,10 @@ bool ModelLoader::build(const RobotDescription& description, ModelState* state) 
   callbacks.progress = [&](const ModelProgress& progress) {
     const std::lock_guard<std::mutex> lock(report_mutex);
     report.update(progress);
-    state->problem = ProgressReport::sentence(progress);
     state->fraction = progress.fraction;
+    const std::string sentence = ProgressReport::sentence(progress);
+    if (sentence == state->problem) return;  // a new state is work for all parts of the node
+    state->problem = sentence;
     set_state(*state);
   };
   state->robot =

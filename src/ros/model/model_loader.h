@@ -3,13 +3,17 @@
 #include <ros/node_handle.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
+#include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "internal/geometry/cancelled.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
@@ -36,12 +40,25 @@ class ModelLoader {
   /// @returns a sentence about what happens now
   std::string reload(bool* found);
 
+  /// Attached objects, at most: each is packed, and measured by every query.
+  static constexpr std::size_t kMaxObjects = 100;
+  /// How long attaching an object may take, reading and packing it included.
+  static constexpr std::chrono::seconds kMaxAttachTime{30};
+
+  /// Makes the object to attach. True of the request ends its work.
+  /// @throws ModelError, Cancelled
+  using ObjectReader = std::function<AttachedObject(const CancelRequest&)>;
+
   /// Makes an object a part of its link, or removes it again. The old model stays in use until the
   /// new one replaces it, which happens before the function returns. Attached objects survive
-  /// reload() as long as their link does.
+  /// reload() as long as their link does. attach() is cancelled by detach() of the same name, by
+  /// reload(), by end_changes() and after kMaxAttachTime.
   /// @returns empty on success, else the reason; then nothing has changed
-  std::string attach(const AttachedObject& object);
+  std::string attach(const std::string& name, const ObjectReader& read);
   std::string detach(const std::string& name);
+
+  /// Ends attach() and detach(), now and from now on.
+  void end_changes();
 
  private:
   void run();
@@ -51,8 +68,13 @@ class ModelLoader {
   bool fetch_urdf(std::string* urdf, std::string* problem) const;
   void load(const std::string& urdf);
   bool build(const RobotDescription& description, ModelState* state);
+  std::string attach_read(const std::string& name, const ObjectReader& read);
   std::string change_objects(const std::shared_ptr<const ModelState>& state,
                              std::vector<AttachedObject> objects, const std::string& link);
+  void begin_change(const std::string& name);
+  bool change_cancelled() const;
+  std::string why_cancelled() const;
+  bool show_reading(const std::string& link, const std::string& mesh);
   RobotModelConfig model_config(const RobotDescription& description,
                                 const std::vector<AttachedObject>& objects) const;
   void finish(const RobotDescription& description, ModelState* state) const;
@@ -71,6 +93,10 @@ class ModelLoader {
   std::atomic<bool> stop_{false}, reload_{false};
   std::vector<AttachedObject> objects_;  ///< guarded by mutex_
   std::mutex change_mutex_;              ///< orders changes of objects
+  std::string changing_;                 ///< the object that is being attached; guarded by mutex_
+  std::atomic<bool> change_revoked_{false};  ///< the same object was detached meanwhile
+  std::atomic<bool> changes_ended_{false};
+  std::chrono::steady_clock::time_point change_deadline_;  ///< guarded by change_mutex_
   std::thread thread_;
 };
 

@@ -1,6 +1,6 @@
 #include "ros/model/model_state.h"
 
-#include <algorithm>
+#include <unordered_set>
 
 #include "ros/common/frame_name.h"
 
@@ -28,20 +28,16 @@ std::vector<bool> wanted_links(const ModelState& model) {
 
 std::vector<std::string> monitored_links(const RobotDescription& description,
                                          const std::vector<std::string>& wanted) {
+  std::unordered_set<std::string> candidates(wanted.begin(), wanted.end());
+  if (wanted.empty()) {
+    for (const LinkDescription& link : description.links) candidates.insert(link.name);
+  }
   std::vector<std::string> names;
-  const auto is_wanted = [&](const std::string& name) {
-    return wanted.empty() || std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+  const auto choose = [&](const std::string& name) {
+    if (candidates.erase(name) > 0) names.push_back(name);
   };
-  const auto has_geometry = [&](const std::string& name) {
-    return std::any_of(description.links.begin(), description.links.end(),
-                       [&](const LinkDescription& link) { return link.name == name; });
-  };
-  for (const std::string& name : description.link_order) {
-    if (is_wanted(name) && (!wanted.empty() || has_geometry(name))) names.push_back(name);
-  }
-  for (const std::string& name : wanted) {  // not in the URDF
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
+  for (const std::string& name : description.link_order) choose(name);
+  for (const std::string& name : wanted) choose(name);  // not in the URDF
   return names;
 }
 

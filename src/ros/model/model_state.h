@@ -17,6 +17,7 @@ struct ModelState {
   enum class Phase {
     kWaiting,  ///< robot_description is not set
     kFailed,   ///< robot_description is set and holds no URDF
+    kReading,  ///< robot_description is set, and its meshes are being read
     kPacking,
     kReady,
   };

@@ -1,16 +1,27 @@
 #include "ros/services/model_services.h"
 
-#include <exception>
-
 #include "ist_proximity/robot/robot_description.h"
 #include "ros/services/object_conversion.h"
 
 namespace ist {
 
 ModelServices::ModelServices(ros::NodeHandle private_nh, ModelLoader* loader) : loader_(*loader) {
+  private_nh.setCallbackQueue(thread_.queue());
   reload_service_ = private_nh.advertiseService("reload_model", &ModelServices::reload, this);
-  attach_service_ = private_nh.advertiseService("attach_object", &ModelServices::attach, this);
   detach_service_ = private_nh.advertiseService("detach_object", &ModelServices::detach, this);
+  private_nh.setCallbackQueue(attach_thread_.queue());
+  attach_service_ = private_nh.advertiseService("attach_object", &ModelServices::attach, this);
+  thread_.start("ist services");
+  attach_thread_.start("ist attach");
+}
+
+ModelServices::~ModelServices() {
+  loader_.end_changes();
+  attach_thread_.stop();
+  thread_.stop();
+  attach_service_.shutdown();
+  reload_service_.shutdown();
+  detach_service_.shutdown();
 }
 
 bool ModelServices::reload(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
@@ -22,11 +33,9 @@ bool ModelServices::reload(std_srvs::Trigger::Request&, std_srvs::Trigger::Respo
 
 bool ModelServices::attach(ist_proximity::AttachObject::Request& request,
                            ist_proximity::AttachObject::Response& response) {
-  try {
-    response.message = loader_.attach(to_object(request, environment_package_finder()));
-  } catch (const std::exception& error) {  // ModelError, or no memory
-    response.message = error.what();
-  }
+  response.message = loader_.attach(request.name, [&](const CancelRequest& cancelled) {
+    return to_object(request, environment_package_finder(), cancelled);
+  });
   response.success = response.message.empty();
   if (response.success) {
     response.message = "'" + request.name + "' is now part of link '" + request.link + "'";

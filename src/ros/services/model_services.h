@@ -6,16 +6,22 @@
 #include <ros/service_server.h>
 #include <std_srvs/Trigger.h>
 
+#include "ros/common/callback_thread.h"
 #include "ros/model/model_loader.h"
 
 namespace ist {
 
 /// Answers the services that change the robot's model: ~reload_model, ~attach_object and
-/// ~detach_object. They are called from the callback queue of the node handle.
+/// ~detach_object, in threads of their own. Attaching has a thread for itself, because it takes
+/// long and because detaching or reloading cancels it.
 class ModelServices {
  public:
   /// @param loader  outlives this
   ModelServices(ros::NodeHandle private_nh, ModelLoader* loader);
+  /// Cancels what is under way.
+  ~ModelServices();
+  ModelServices(const ModelServices&) = delete;
+  ModelServices& operator=(const ModelServices&) = delete;
 
  private:
   bool reload(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -25,6 +31,7 @@ class ModelServices {
               ist_proximity::DetachObject::Response& response);
 
   ModelLoader& loader_;
+  CallbackThread thread_, attach_thread_;
   ros::ServiceServer reload_service_, attach_service_, detach_service_;
 };
 

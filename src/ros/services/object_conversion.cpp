@@ -1,10 +1,10 @@
 #include "ros/services/object_conversion.h"
 
-#include <cmath>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "internal/geometry/limits.h"
 #include "internal/geometry/mesh_io.h"
 #include "internal/robot/package_resolver.h"
 #include "ist_proximity/geometry/error.h"
@@ -23,14 +23,16 @@ std::vector<double> sizes(const Request& request, std::size_t count, const char*
     throw ModelError(text.str());
   }
   for (const double size : request.dimensions) {
-    if (std::isfinite(size) && size > 0.0) continue;
-    text << "dimensions holds " << size << " m; allowed is more than 0 (" << what << ")";
+    if (size > 0.0 && size <= kMaxLength) continue;
+    text << "dimensions holds " << size << " m; allowed is more than 0 and at most " << kMaxLength
+         << " m (" << what << ")";
     throw ModelError(text.str());
   }
   return request.dimensions;
 }
 
-Shape to_shape(const Request& request, const PackageFinder& find_package) {
+Shape to_shape(const Request& request, const PackageFinder& find_package,
+               const CancelRequest& cancelled) {
   switch (request.shape) {
     case Request::BOX: {
       const std::vector<double> size = sizes(request, 3, "size along x, y, z");
@@ -48,7 +50,7 @@ Shape to_shape(const Request& request, const PackageFinder& find_package) {
         if (request.dimensions.size() != 3) throw ModelError("dimensions: 3 scales are needed");
         scale << request.dimensions[0], request.dimensions[1], request.dimensions[2];
       }
-      return load_mesh(resolve_uri(request.mesh, find_package), scale);
+      return load_mesh(resolve_uri(request.mesh, find_package), scale, cancelled);
     }
     default:
       throw ModelError("shape is " + std::to_string(request.shape) +
@@ -58,8 +60,10 @@ Shape to_shape(const Request& request, const PackageFinder& find_package) {
 
 }  // namespace
 
-AttachedObject to_object(const Request& request, const PackageFinder& find_package) {
-  if (request.name.empty()) throw ModelError("name is empty; the object needs one");
+AttachedObject to_object(const Request& request, const PackageFinder& find_package,
+                         const CancelRequest& cancelled) {
+  const std::string unnamed = name_fault(request.name);
+  if (!unnamed.empty()) throw ModelError("name " + unnamed + "; the object needs one");
   AttachedObject object;
   object.name = request.name;
   object.link = request.link;
@@ -68,7 +72,9 @@ AttachedObject to_object(const Request& request, const PackageFinder& find_packa
   X_LE.rotation = request.pose.orientation;
   const std::string fault = to_isometry(X_LE, &object.element.X_LE);
   if (!fault.empty()) throw ModelError("pose: " + fault);
-  object.element.shape = to_shape(request, find_package);
+  const std::string misplaced = position_fault("pose", object.element.X_LE.translation());
+  if (!misplaced.empty()) throw ModelError(misplaced);
+  object.element.shape = to_shape(request, find_package, cancelled);
   object.element.source = "attached object '" + request.name + "'";
   return object;
 }

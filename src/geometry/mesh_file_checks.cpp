@@ -1,0 +1,111 @@
+#include "geometry/mesh_file_checks.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <sstream>
+
+namespace ist {
+namespace {
+
+constexpr std::array<const char*, 5> kFormats = {"stl", "dae", "obj", "ply", "off"};
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// Whether the last statement of a piece of STL text ends a solid.
+bool ends_solid(std::string text) {
+  std::replace(text.begin(), text.end(), '\r', '\n');
+  bool ends = false;
+  std::istringstream lines(lower_case(text));
+  for (std::string line; std::getline(lines, line);) {
+    std::string word, next;
+    std::istringstream(line) >> word >> next;
+    if (word == "endsolid" || (word == "end" && next == "solid")) ends = true;
+    if (word == "solid" || word == "facet" || word == "vertex") ends = false;
+  }
+  return ends;
+}
+
+std::string too_many(double count, const std::string& what, std::size_t bytes) {
+  if (count <= static_cast<double>(bytes)) return "";
+  std::ostringstream text;
+  text << "announces " << count << " " << what << " in a file of " << bytes
+       << " bytes; it is damaged, export or download it again";
+  return text.str();
+}
+
+// Lines "element vertex 1000000000".
+std::string ply_fault(const std::string& head, std::size_t size) {
+  std::istringstream lines(head);
+  for (std::string line; std::getline(lines, line) && line.rfind("end_header", 0) != 0;) {
+    std::istringstream words(line);
+    std::string keyword, name;
+    double count = 0.0;
+    if (!(words >> keyword >> name >> count) || keyword != "element") continue;
+    const std::string fault = too_many(count, "elements '" + name + "'", size);
+    if (!fault.empty()) return fault;
+  }
+  return "";
+}
+
+// "OFF", then the numbers of vertices, faces and edges, with comments in between.
+std::string off_fault(const std::string& head, std::size_t size) {
+  std::istringstream lines(head);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line.substr(0, line.find('#')));
+    for (std::string word; words >> word;) {
+      std::istringstream number(word);
+      double count = 0.0;
+      if (!(number >> count)) continue;
+      const std::string fault = too_many(count, "vertices or faces", size);
+      if (!fault.empty()) return fault;
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string mesh_format(const std::string& path) {
+  const std::string extension = lower_case(std::filesystem::path(path).extension().string());
+  return extension.empty() ? extension : extension.substr(1);
+}
+
+std::string format_fault(const std::string& format) {
+  std::string known;
+  for (const char* name : kFormats) {
+    if (format == name) return "";
+    known += (known.empty() ? "" : ", ") + std::string(name);
+  }
+  return "cannot be read as a mesh: its name ends in '." + format + "'; known are " + known;
+}
+
+std::string stl_end_fault(const std::string& bytes) {
+  constexpr std::size_t kBinaryHead = 84, kBinaryFacet = 50, kTail = 4096;
+  if (bytes.compare(0, 5, "solid") != 0) return "";
+  if (bytes.size() >= kBinaryHead) {  // binary files may begin with "solid", too
+    std::uint32_t facets = 0;
+    std::memcpy(&facets, &bytes[kBinaryHead - sizeof facets], sizeof facets);
+    if (bytes.size() == kBinaryHead + kBinaryFacet * std::size_t{facets}) return "";
+  }
+  if (ends_solid(bytes.substr(bytes.size() - std::min(kTail, bytes.size())))) return "";
+  return "is cut off: an STL file that begins with 'solid' ends with 'endsolid'; export or "
+         "download it again";
+}
+
+std::string declared_size_fault(const std::string& format, const std::string& bytes) {
+  constexpr std::size_t kHead = 65536;
+  const std::string head = bytes.substr(0, kHead);
+  if (format == "ply") return ply_fault(head, bytes.size());
+  if (format == "off") return off_fault(head.substr(0, 512), bytes.size());
+  return "";
+}
+
+}  // namespace ist

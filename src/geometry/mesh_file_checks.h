@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+/// Checks of a mesh file's bytes before assimp reads them. Each returns an empty string, or what is
+/// wrong with the file: the predicate of a sentence, such as "is cut off".
+namespace ist {
+
+/// "stl" for "LINK.STL".
+std::string mesh_format(const std::string& path);
+
+/// Assimp reads some forty formats, most of which robots do not use and nobody checks. The others
+/// are refused.
+std::string format_fault(const std::string& format);
+
+/// A text STL file must end with 'endsolid': assimp accepts half a file, and half a link would be
+/// an unsafe link.
+std::string stl_end_fault(const std::string& bytes);
+
+/// PLY and OFF files begin with the numbers of their elements, for which assimp takes memory before
+/// it reads them. A file cannot hold more elements than bytes.
+std::string declared_size_fault(const std::string& format, const std::string& bytes);
+
+}  // namespace ist
