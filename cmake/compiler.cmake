@@ -32,3 +32,21 @@ if(IST_PROXIMITY_SANITIZE)
   string(APPEND CMAKE_EXE_LINKER_FLAGS " -fsanitize=${IST_PROXIMITY_SANITIZE}")
   string(APPEND CMAKE_SHARED_LINKER_FLAGS " -fsanitize=${IST_PROXIMITY_SANITIZE}")
 endif()
+
+# libFuzzer's build (scripts/fuzz): every source counts what it runs, for the search and for llvm-cov.
+if(IST_PROXIMITY_FUZZ)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "IST_PROXIMITY_FUZZ needs clang, for libFuzzer: "
+      "-DCMAKE_CXX_COMPILER=clang++, or cmake --preset fuzz")
+  endif()
+  set(fuzz_sanitizers address,undefined)
+  add_compile_options(
+    -fsanitize=fuzzer-no-link,${fuzz_sanitizers} -fno-sanitize-recover=all
+    -fno-sanitize=null,object-size,vptr -fno-omit-frame-pointer
+    -fprofile-instr-generate -fcoverage-mapping)
+  # One copy of the SIMD code beside the baseline; tests compare the instruction sets.
+  add_compile_definitions(_GLIBCXX_ASSERTIONS
+    "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL)")
+  string(APPEND CMAKE_EXE_LINKER_FLAGS " -fsanitize=${fuzz_sanitizers} -fprofile-instr-generate")
+  string(APPEND CMAKE_SHARED_LINKER_FLAGS " -fsanitize=${fuzz_sanitizers} -fprofile-instr-generate")
+endif()

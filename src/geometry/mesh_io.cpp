@@ -13,6 +13,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "geometry/collada_check.h"
 #include "geometry/mesh_file_checks.h"
 #include "geometry/mesh_import.h"
 #include "geometry/orientation.h"
@@ -37,7 +38,8 @@ std::string read_mesh_file(const std::string& path, const CancelRequest& cancell
   if (bytes.empty()) fail(path, "is empty (0 bytes); export or download it again");
   const std::string format = mesh_format(path);
   for (const std::string& damage : {format_fault(format), declared_size_fault(format, bytes),
-                                    format == "stl" ? stl_end_fault(bytes) : std::string()}) {
+                                    format == "stl" ? stl_end_fault(bytes) : std::string(),
+                                    format == "dae" ? collada_fault(bytes) : std::string()}) {
     if (!damage.empty()) fail(path, damage);
   }
   return bytes;

@@ -151,8 +151,9 @@ void TriangleBvhBuilder::set_slab(const Range& range, TriangleBvh::Slabs* slabs,
   for (std::uint32_t t = range.first; t < range.second; ++t)
     mean += area_normal(bvh_.triangles_[t]);
   const double largest = mean.cwiseAbs().maxCoeff();
-  if (!(largest > 0.0)) return;
-  const Eigen::Vector3d direction = (kLength / mean.norm() * mean).array().round();
+  if (!(largest > 0.0) || !std::isfinite(largest)) return;
+  // The squares of an area below 1e-154 m^2 are 0.
+  const Eigen::Vector3d direction = (kLength * (mean / largest).normalized()).array().round();
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (std::uint32_t t = range.first; t < range.second; ++t) {
     const TriangleBvh::Triangle& triangle = bvh_.triangles_[t];

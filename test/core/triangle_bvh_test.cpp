@@ -185,5 +185,19 @@ TEST(TriangleBvh, TrianglesWithoutAreaAreSurfaceToo) {
   EXPECT_DOUBLE_EQ(bvh.winding_number({0.7, 0.3, 0}), 0.0);
 }
 
+// The normal of an area of 1e-200 m^2 has the squared length 0. Divided by it, the direction of the
+// slab was NaN, and became an integer: undefined, as clang's sanitizer found (a fuzzed URDF with a
+// box of 1e-299 m); with GCC it was 0 by luck, which means no slab.
+TEST(TriangleBvh, AreasWhoseSquareIsZeroAreSurfaceToo) {
+  for (const double width : {1e-100, 1e-154, 1e-160, 1e-200, 1e-299, 1e-310}) {
+    const TriangleMesh sliver{{{0, 0, 0}, {width, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    const TriangleBvh bvh(sliver);
+    for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.3, 0.5, 0), Eigen::Vector3d(0, 0.5, -0.3)}) {
+      EXPECT_NEAR(bvh.closest(p).distance_sq, 0.09, 1e-12) << width;
+      EXPECT_LE(bvh.closest(p).lower_bound, 0.3) << width;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ist

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+namespace ist {
+
+/// Checks what assimp 5 takes on trust in a Collada file, and does not survive: indices that are no
+/// whole numbers (memory grows until there is none), accessors that read past their array (it
+/// crashes) and fewer lists of indices than announced (it ends the program).
+/// @param bytes  the file
+/// @returns an empty string, or what is wrong with the file ("holds ..."). A file that is no XML
+/// has
+///          no fault here; assimp reports it.
+std::string collada_fault(const std::string& bytes);
+
+}  // namespace ist

@@ -1,0 +1,51 @@
+// The worst cases that the adversarial search (benchmark/adversarial_search.cpp) has found:
+// whatever a promise says holds for them, too.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "support/adversarial_case.h"
+
+namespace ist {
+namespace {
+
+// Lines of a promise and a genome; lines that begin with # say what was found.
+std::vector<std::pair<std::string, std::string>> kept_cases() {
+  std::ifstream file(std::string(IST_PROXIMITY_SOURCE_DIR) + "/test/support/adversarial_cases.txt");
+  std::vector<std::pair<std::string, std::string>> cases;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    std::istringstream words(line);
+    cases.emplace_back();
+    words >> cases.back().first >> cases.back().second;
+  }
+  return cases;
+}
+
+TEST(AdversarialCases, KeepEveryPromise) {
+  const auto cases = kept_cases();
+  ASSERT_FALSE(cases.empty());
+  for (const auto& [promise, text] : cases) {
+    SCOPED_TRACE(promise + " " + text);
+    const test::Genome genome = test::genome_from(text);
+    ASSERT_EQ(genome.size(), test::kGenomeSize);
+    const test::Violations found = test::judge(test::AdversarialCase(genome, nullptr));
+    for (std::size_t i = 0; i < test::Violations::kCount; ++i) {
+      EXPECT_LE(found.excess[i], 0.0) << test::Violations::kNames[i];
+    }
+  }
+}
+
+TEST(AdversarialCases, GenomesAreKeptAsText) {
+  test::Genome genome;
+  for (int i = 0; i < 70000; i += 999) genome.push_back(static_cast<std::uint16_t>(i));
+  EXPECT_EQ(test::genome_from(test::to_text(genome)), genome);
+}
+
+}  // namespace
+}  // namespace ist
