@@ -52,6 +52,7 @@ endif()
 foreach(source IN LISTS fuzz_sources)
   get_filename_component(name ${source} NAME_WE)
   set(target fuzz_${name})
+  #catkin_lint: ignore_once uninstalled_target
   add_executable(${target} ${source})
   target_link_libraries(${target} PRIVATE fuzz_support)
   if(source MATCHES "fuzz/ros/")

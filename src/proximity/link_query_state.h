@@ -74,7 +74,7 @@ struct LinkCoherence {
   } last;
   /// The last complete answer: it is the same for the same question.
   struct {
-    SceneId scene = kUnknownScene;  ///< unknown: there is none
+    SceneId scene = kUnknownScene;                           ///< unknown: there is none
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< as it was asked
     QueryConfig config;
     SearchResult result;

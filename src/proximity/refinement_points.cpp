@@ -111,8 +111,7 @@ void PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ
                                  search.range() + search.rounding, max_distance});
   double lower_bound;
   const SignedDistance exact =
-      distance_outside(link_.context.solid(), p_LQ, limit, direction_L,
-                       0.0, &lower_bound);
+      distance_outside(link_.context.solid(), p_LQ, limit, direction_L, 0.0, &lower_bound);
   link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
                              id.key(), p_LQ, lower_bound);
   if (lower_bound < exact.distance) {
