@@ -65,6 +65,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.rounding = search.max_coordinate = search.index_error = 0.0;
   search.is_complete = false;
   search.measured = 0;
+  search.is_counted = false;
   search.first_bound = -kInfinity;
   search.is_answered = scene != kUnknownScene && answered.scene == scene &&
                        other_links == kInfinity && is_same_question(answered.config, config) &&
@@ -84,7 +85,10 @@ void LinkQuery::tighten(const QueryConfig& config) {
 
 bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   LinkSearch& search = link_.search;
-  if (search.is_answered) return true;
+  if (search.is_answered) {
+    count_outside_region();
+    return true;
+  }
   if (is_settled(clouds)) {
     keep_answer();
     return true;
@@ -97,10 +101,8 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
-  if (!is_inside_regions()) {
-    search.prune(search.region_bound);
-    ++search.statistics->outside_region;
-  }
+  count_outside_region();
+  if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;
   for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL,
@@ -115,6 +117,14 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
     take_kept_bound();
   }
   return search.is_complete;
+}
+
+// A link counts once in a query, however often it is run.
+void LinkQuery::count_outside_region() {
+  LinkSearch& search = link_.search;
+  if (search.is_counted || is_inside_regions()) return;
+  search.is_counted = true;
+  ++search.statistics->outside_region;
 }
 
 // A search that the deadline stopped proves no less than what was proven before.

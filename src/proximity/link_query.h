@@ -61,6 +61,7 @@ class LinkQuery {
   void look_ahead();
   void keep_bound();
   void keep_answer();
+  void count_outside_region();
   void take_kept_bound();
   double answer_error(double distance) const;
   double extent() const;  ///< [m] no point of the link is farther from its origin

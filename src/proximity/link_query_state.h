@@ -106,6 +106,7 @@ struct LinkSearch : SearchResult {
   QueryStatistics* statistics = nullptr;
 
   bool is_answered = false;  ///< the question was the last one
+  bool is_counted = false;   ///< in the statistics, as outside the regions
   double first_bound = 0.0;  ///< [m] proven before tighten()
   BoxBounds box_bounds;
   VisitedSet visited;      ///< obstacles of the index at work that were refined
