@@ -60,7 +60,10 @@ std::string look_up_newest(const TransformBuffer& buffer, const std::string& fix
                            Eigen::Isometry3d* X_FT) {
   std::string problem;
   // An exception in every cycle would cost more than this question.
-  if (!is_known(buffer, fixed, frame, ros::Time(), &problem)) return problem;
+  if (!is_known(buffer, fixed, frame, ros::Time(), &problem)) {
+    const std::string cause = buffer.why_refused(fixed, frame);
+    return cause.empty() ? problem : problem + ": " + cause;
+  }
   ros::Time stamp;
   Eigen::Isometry3d X;
   problem = look_up(buffer, fixed, frame, ros::Time(), &X, &stamp);
