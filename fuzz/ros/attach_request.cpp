@@ -61,7 +61,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (request.mesh.find('/') == 0 || request.mesh.find("file:") == 0) return 0;
   try {
     const ist::AttachedObject object =
-        ist::to_object(request, [](const std::string&) { return std::string(); });
+        ist::to_object(request, [](const std::string&) { return std::string(); }, {});
     FUZZ_CHECK(!object.name.empty(), "no name");
     FUZZ_CHECK(ist::is_rigid(object.element.X_LE, 1e-3), "the pose is not rigid");
     const double least = std::visit(Size(), object.element.shape);
