@@ -13,8 +13,8 @@ namespace ist {
 ///
 /// Voids are measured on a grid of 60000 cells in the link's box, of which those at a surface count
 /// in part: good to about a percent for the whole link. Where spheres of different elements
-/// overlap, each counts with the weight w = V / sum(lens) of its own volume: together no more than
-/// their union, since the mean of 1/n is at least 1 over the mean of n.
+/// overlap, each counts with the part of it that is in its power cell, by the same grid: together
+/// they count as their union.
 struct PowerCells {
   /// @param spheres  with radius > 0, at least one
   /// @param box      about the link, its frame

@@ -263,6 +263,7 @@ class ClosestPointSearch {
     result_.point = q;
     result_.distance_sq = exact_sq;
     result_.triangle = triangle.index;
+    result_.slot = static_cast<std::uint32_t>(&triangle - bvh_.triangles);
     UpdatePruneBound();
     if (exact_sq > 0.0) SetOutward((p_ - q) / std::sqrt(exact_sq));
   }

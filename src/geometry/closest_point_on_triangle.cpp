@@ -11,6 +11,8 @@ namespace {
 
 // Squared sine of the angle between two edges below which their normal is not certain.
 constexpr double kLeastSineSq = 0.25;
+// Smaller squares have lost digits: they are near the least number that double has.
+constexpr double kLeastSquare = 1e-280;
 // Triangles with less height than this share of their length have no plane.
 constexpr double kNoArea = 1e-12;
 
@@ -60,7 +62,9 @@ Eigen::Vector3d closest_point_on_triangle(const Eigen::Vector3d& p, const Eigen:
                                           const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, n = ab.cross(ac);
   const double ab_sq = ab.squaredNorm(), ac_sq = ac.squaredNorm(), n_sq = n.squaredNorm();
-  if (!(n_sq > kLeastSineSq * ab_sq * ac_sq)) return closest_on_sliver(p, a, b, c);
+  if (!(n_sq > kLeastSineSq * ab_sq * ac_sq) || n_sq < kLeastSquare) {
+    return closest_on_sliver(p, a, b, c);
+  }
   const double along_ab = ab.dot(ap), along_ac = ac.dot(ap);
   if (along_ab <= 0.0 && along_ac <= 0.0) return a;
   // Barycentric coordinates of the corners, times n.n.

@@ -41,7 +41,16 @@ ClosestPoint TriangleBvh::closest(const Eigen::Vector3d& p_M, double max_distanc
 }
 
 double TriangleBvh::support(const Eigen::Vector3d& n_M, double tolerance, double at_least) const {
-  return triangles_.empty() ? at_least : find_support(view(), n_M, tolerance, at_least);
+  return triangles_.empty() ? at_least : find_support(view(), n_M, nullptr, tolerance, at_least);
+}
+
+double TriangleBvh::support_in_sphere(const Eigen::Vector3d& center_M, double radius,
+                                      const Eigen::Vector3d& n_M, double tolerance,
+                                      double at_least) const {
+  if (triangles_.empty()) return at_least;
+  const SupportSphere sphere{center_M, radius};
+  const double at_center = n_M.dot(center_M);
+  return find_support(view(), n_M, &sphere, tolerance, at_least + at_center) - at_center;
 }
 
 double TriangleBvh::winding_number(const Eigen::Vector3d& p_M) const {

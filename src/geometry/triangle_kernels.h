@@ -14,8 +14,15 @@ void find_closest(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, doub
                   const Eigen::Vector3d& outward_hint_M, double early_out_sq, double tolerance,
                   ClosestPoint* closest);
 
-/// The kernel of TriangleBvh::support.
-double find_support(const TriangleBvh::View& bvh, const Eigen::Vector3d& n_M, double tolerance,
-                    double at_least);
+/// A sphere that restricts a support function to the surface within it, in the mesh's frame [m].
+struct SupportSphere {
+  Eigen::Vector3d center;
+  double radius;
+};
+
+/// The kernel of TriangleBvh::support and support_in_sphere.
+/// @param sphere  null: the whole surface
+double find_support(const TriangleBvh::View& bvh, const Eigen::Vector3d& n_M,
+                    const SupportSphere* sphere, double tolerance, double at_least);
 
 }  // namespace ist

@@ -164,7 +164,7 @@ class InteriorOctree {
     if (!(n.squaredNorm() > 0.5)) return false;  // no direction
     const double half_width = n.cwiseAbs().dot(half);
     const double limit = (1.0 - kMinClip) * half_width + target_;
-    const double support = bvh_.support_in_sphere(center, radius, n, limit);
+    const double support = bvh_.support_in_sphere(center, radius, n);
     if (!(support <= limit) || support < -radius) return false;
     if (bvh_.is_inside(center + 0.5 * (support + radius) * n)) return false;
     std::array<Eigen::Vector3d, kMaxVertices> vertices;

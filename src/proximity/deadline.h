@@ -16,6 +16,9 @@ class Deadline {
                std::chrono::duration<double>(std::min(seconds, kLongest)));
   }
 
+  /// Whether passed() has been true.
+  bool has_passed() const { return passed_; }
+
   /// Once true, always true.
   bool passed() {
     if (limited_ && !passed_) passed_ = std::chrono::steady_clock::now() >= end_;

@@ -7,6 +7,7 @@
 #include "internal/bvh/bounding_sphere.h"
 #include "internal/bvh/traversal_stack.h"
 #include "proximity/depth_search.h"
+#include "proximity/refinement.h"
 
 namespace ist {
 namespace {
@@ -99,20 +100,30 @@ class PointDepthSearch {
   // the traversal has refined them. Cells of the grid are measured only near the link.
   double lower_bound(const Eigen::Vector3d& center_L, double radius) {
     SignedDistanceGrid& grid = link_.context.grid;
-    SignedDistanceGrid::Sample sample;
-    const bool is_known = grid.find(center_L, &sample);
-    if (is_known) {
-      const double bound = sample.lower_bound - radius - kRounding;
+    SignedDistanceGrid::Cell* cell = grid.find(center_L);
+    if (cell != nullptr) {
+      const double bound = grid_bound(cell, center_L, radius);
       if (bound >= search_.prune_bound()) return bound;
     }
     if (link_.context.tree().cover_distance_exceeds(center_L, outside_distance() + radius)) {
       return kInfinity;
     }
-    if (!is_known) {
-      ++search_.statistics->exact_evaluations;
-      sample = grid.measure(center_L);
-    }
-    return sample.lower_bound - radius - kRounding;
+    if (cell == nullptr) cell = grid.measure(center_L);
+    return cell == nullptr ? -kInfinity : grid_bound(cell, center_L, radius);
+  }
+
+  // [m] No point of a sphere has a smaller signed distance, by a cell of the grid.
+  double grid_bound(SignedDistanceGrid::Cell* cell, const Eigen::Vector3d& center_L,
+                    double radius) const {
+    const SignedDistanceGrid& grid = link_.context.grid;
+    // No plane tells inside from outside near holes.
+    const double bound =
+        link_.context.solid().is_closed()
+            ? grid.bound(cell, {center_L, radius}, search_.prune_bound()).signed_distance
+            : grid.floor_bound(*cell, center_L, radius);
+    return bound >= search_.prune_bound()
+               ? bound
+               : std::max(bound, grid.depth_bound(*cell, center_L, radius));
   }
 
   // Each point that is measured bounds its neighbours, so few of the sixteen have to be.
@@ -131,7 +142,7 @@ class PointDepthSearch {
     }
   }
 
-  void load(std::int32_t tile_index, double tile_bound, Tile* tile) const {
+  void load(std::int32_t tile_index, double tile_bound, Tile* tile) {
     PointTile scratch;
     const PointTile& points = obstacles_.bvh->tile(static_cast<std::size_t>(tile_index), &scratch);
     tile->count = points.count;
@@ -141,9 +152,9 @@ class PointDepthSearch {
       tile->p_LQ[i] = obstacles_.X_LO * tile->p_OQ[i];
       tile->lower_bound[i] = tile_bound;
       tile->is_open[i] = true;
-      SignedDistanceGrid::Sample sample;
-      if (link_.context.grid.find(tile->p_LQ[i], &sample)) {
-        tile->lower_bound[i] = std::max(tile_bound, sample.lower_bound);
+      SignedDistanceGrid::Cell* cell = link_.context.grid.find(tile->p_LQ[i]);
+      if (cell != nullptr) {
+        tile->lower_bound[i] = std::max(tile_bound, grid_bound(cell, tile->p_LQ[i], 0.0));
       }
     }
     for (int k = 0; k < tile->count; ++k) {
@@ -160,11 +171,17 @@ class PointDepthSearch {
     const auto i = static_cast<std::size_t>(id.lane);
     const Eigen::Vector3d& p_LQ = tile->p_LQ[i];
     if (link_.context.tree().cover_distance_exceeds(p_LQ, outside_distance())) return;
-    ++search_.statistics->exact_evaluations;
-    SignedDistanceGrid::Sample sample;
-    link_.context.grid.find(p_LQ, &sample);
-    const PointDepth depth =
-        point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), sample.near);
+    NearSurface::Side side = NearSurface::Side::kUnknown;
+    if (search_.prune_bound() <= 0.0) {
+      side = PointRefinement(obstacles_, &link_).side(id, p_LQ);
+      if (side == NearSurface::Side::kOutside) return search_.prune(0.0);
+    }
+    search_.count_exact();
+    SignedDistanceGrid::Cell* cell = link_.context.grid.find(p_LQ);
+    NearSurface near =
+        cell == nullptr ? NearSurface() : link_.context.grid.near_surface(cell, p_LQ);
+    if (side != NearSurface::Side::kUnknown) near.side = side;
+    const PointDepth depth = point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), near);
     link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kSigned,
                                id.key(), p_LQ, depth.floor);
     if (depth.exact.distance < kInfinity) {

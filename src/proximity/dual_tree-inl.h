@@ -27,7 +27,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // kReopened down) and is expanded again.
 constexpr std::int32_t kNoParent = -1, kReopened = -2;
 
-constexpr std::uint64_t kDeadlineInterval = 16;  // node pairs between two looks at the clock
+constexpr std::uint64_t kDeadlineInterval = 8;  // node pairs between two looks at the clock
 
 // A sphere leaf and a tile, for the visitor.
 template <class Tile>
@@ -44,6 +44,7 @@ struct LeafPair {
 //   float Limit() const;                      pairs whose bound is not below it are pruned
 //   bool IsSettled() const;                   nothing that is left can matter
 //   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the deadline has passed
+//   float BoundOfBox(const Pair&);            a bound that prunes the pair, or -inf
 //   float Visit(const LeafPair<Tile>&);       returns the least lower bound of the tile's points
 //   float pruned_bound                        [m] least bound of what it pruned itself
 template <class Visitor, class Bvh>
@@ -95,6 +96,12 @@ class DualTree {
         Prune(pair.bound);
         while (!stack_.empty()) Prune(stack_.pop().bound);
         return;
+      }
+      const float bound_of_box = visitor_.BoundOfBox(pair);
+      if (bound_of_box > pair.bound) {
+        Prune(bound_of_box);
+        if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, bound_of_box);
+        continue;
       }
       Expand(pair);
     }

@@ -57,6 +57,13 @@ class RefiningVisitor {
     return node_pairs % kDeadlineInterval == 0 && policy_.deadline_passed();
   }
 
+  // A bound of the pair's box for the whole link, if it makes the pair prunable; else -inf.
+  HWY_INLINE float BoundOfBox(const Pair& pair) {
+    if (pair.box_slot < 0) return -std::numeric_limits<float>::infinity();
+    const float bound = policy_.bound_box(pair.box_slot, pair.box, pair.min, pair.max);
+    return bound >= prune_bound_ ? bound : -std::numeric_limits<float>::infinity();
+  }
+
   template <class Tile>
   HWY_INLINE float Visit(const LeafPair<Tile>& pair) {
     const BoxTag d;
@@ -132,9 +139,10 @@ class RefiningVisitor {
   }
 
   HWY_INLINE void RefinePoint(std::int32_t tile, int k, float bound) {
-    if (bound <= in_.inside_bound) {
+    const bool is_near = bound <= in_.inside_bound;
+    if (is_near && !policy_.is_outside(tile, k)) {
       may_be_inside_ = true;
-    } else if (bound < prune_bound_) {
+    } else if (is_near || bound < prune_bound_) {
       const float prune_bound = policy_.refine(tile, k, bound);
       if (prune_bound < prune_bound_) {
         prune_bound_ = prune_bound;
@@ -161,6 +169,7 @@ class InnerVisitor {
   float Limit() const { return std::min(prune_bound_, nearest_.distance); }
   bool IsSettled() const { return false; }
   bool Stops(std::uint64_t /*node_pairs*/, PlaneFrame* /*planes*/) const { return false; }
+  static float BoundOfBox(const Pair& /*pair*/) { return -std::numeric_limits<float>::infinity(); }
 
   template <class Tile>
   HWY_INLINE float Visit(const LeafPair<Tile>& pair) {

@@ -45,9 +45,12 @@ struct DualTreeResult {
 /// inside are only noted. A refinement returns the new prune bound, which never rises.
 ///
 /// A refinement policy has
-///   float refine(std::int32_t tile, int lane, float lower_bound);   // returns the prune bound
-///   bool update_planes(SupportingPlanes* planes);                   // true: they have changed
-///   bool deadline_passed();
+///   float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max);
+///                  // lower bound of all obstacles in a box of the BVH; -inf: may be inside
+///   bool is_outside(std::int32_t tile, int lane);                   // proven, where it may be
+///   inside float refine(std::int32_t tile, int lane, float lower_bound);   // returns the prune
+///   bound bool update_planes(SupportingPlanes* planes);                   // true: they have
+///   changed bool deadline_passed();
 /// PointRefinement and BoxRefinement are the two there are (refinement.h).
 DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input, PointRefinement* policy);
 DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxRefinement* policy);

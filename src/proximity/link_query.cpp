@@ -23,12 +23,34 @@ constexpr double kRounding = 1e-12;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
+bool is_same_question(const QueryConfig& a, const QueryConfig& b) {
+  return a.max_distance == b.max_distance && a.tolerance == b.tolerance && a.margin == b.margin &&
+         a.relative_tolerance == b.relative_tolerance;
+}
+
+// The child whose box is nearest to a place.
+int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
+  int nearest = 0;
+  double least_sq = kInfinity;
+  for (int k = 0; k < node.count; ++k) {
+    const Eigen::AlignedBox3d box(Eigen::Vector3d(node.min_x[k], node.min_y[k], node.min_z[k]),
+                                  Eigen::Vector3d(node.max_x[k], node.max_y[k], node.max_z[k]));
+    const double distance_sq = box.squaredExteriorDistance(p_O);
+    if (!(distance_sq < least_sq)) continue;
+    least_sq = distance_sq;
+    nearest = k;
+  }
+  return nearest;
+}
+
 }  // namespace
 
 void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryConfig& config,
                       double other_links, QueryStatistics* statistics) {
   LinkSearch& search = link_.search;
+  const auto& answered = link_.kept.answered;
   const RigidPose rigid = nearest_rigid(X_FL);
+  search.X_FL_given = X_FL;
   search.X_FL = rigid.X;
   search.drift = rigid.drift;
   search.scene = scene;
@@ -42,20 +64,45 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.pruned_bound = -link_.context.tree().radius();
   search.rounding = search.max_coordinate = search.index_error = 0.0;
   search.is_complete = false;
+  search.measured = 0;
+  search.is_counted = false;
+  search.first_bound = -kInfinity;
+  search.is_answered = scene != kUnknownScene && answered.scene == scene &&
+                       other_links == kInfinity && is_same_question(answered.config, config) &&
+                       answered.X_FL.matrix() == X_FL.matrix();
+  if (search.is_answered) static_cast<SearchResult&>(search) = answered.result;
+}
+
+void LinkQuery::tighten(const QueryConfig& config) {
+  LinkSearch& search = link_.search;
+  if (search.is_answered) return;
+  search.config = config;
+  search.first_bound = search.lower_bound();
+  search.refined_bound = kInfinity;
+  search.pruned_bound = -link_.context.tree().radius();
+  search.is_complete = false;
 }
 
 bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
-  if (is_settled(clouds)) return true;
-  if (deadline->passed()) return false;
   LinkSearch& search = link_.search;
+  if (search.is_answered) {
+    count_outside_region();
+    return true;
+  }
+  if (is_settled(clouds)) {
+    keep_answer();
+    return true;
+  }
+  if (deadline->passed()) {
+    take_kept_bound();
+    return false;
+  }
   search.deadline = deadline;
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
-  if (!is_inside_regions()) {
-    search.prune(search.region_bound);
-    ++search.statistics->outside_region;
-  }
+  count_outside_region();
+  if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;
   for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL,
@@ -63,8 +110,47 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   }
   if (stopped) search.prune(-link_.context.tree().radius());  // indices that were not reached
   search.is_complete = !stopped;
-  if (search.is_complete) keep_bound();
+  if (search.is_complete) {
+    keep_bound();
+    keep_answer();
+  } else {
+    take_kept_bound();
+  }
   return search.is_complete;
+}
+
+// A link counts once in a query, however often it is run.
+void LinkQuery::count_outside_region() {
+  LinkSearch& search = link_.search;
+  if (search.is_counted || is_inside_regions()) return;
+  search.is_counted = true;
+  ++search.statistics->outside_region;
+}
+
+// A search that the deadline stopped proves no less than what was proven before.
+void LinkQuery::take_kept_bound() {
+  LinkSearch& search = link_.search;
+  const LinkBound& kept = link_.kept.bound;
+  const double coherent = search.closest.exact.distance > 0.0
+                              ? std::min(kept.at(search.scene, search.X_FL), search.region_bound)
+                              : -kInfinity;
+  const double bound = std::max(coherent, search.first_bound);
+  if (!(bound > search.lower_bound())) return;
+  search.pruned_bound = std::max(search.pruned_bound, bound);
+  search.refined_bound = std::max(search.refined_bound, bound);
+  search.max_coordinate =
+      std::max(search.max_coordinate,
+               kept.max_coordinate() + kept.displacement_to(search.scene, search.X_FL));
+}
+
+void LinkQuery::keep_answer() {
+  const LinkSearch& search = link_.search;
+  auto& answered = link_.kept.answered;
+  const bool is_whole = search.other_links == kInfinity;
+  answered.scene = is_whole ? search.scene : kUnknownScene;
+  answered.X_FL = search.X_FL_given;
+  answered.config = search.config;
+  answered.result = search;
 }
 
 // The four steps for one index: upper bound, search (which refines what survives its bounds),
@@ -89,6 +175,7 @@ bool LinkQuery::run(const Obstacles& obstacles) {
 // Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
 // point of the link to the last answer's obstacle is still a point of the link.
 void LinkQuery::warm_start(SnapshotSpan clouds) {
+  if (link_.search.is_answered) return;
   const auto& last = link_.kept.last;
   const auto measure_last = [&](const auto& obstacles) {
     if (last.build_id == 0 || obstacles.bvh->build_id() != last.build_id) return;
@@ -98,7 +185,39 @@ void LinkQuery::warm_start(SnapshotSpan clouds) {
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_last);
   }
+  if (distance() < kInfinity) return;
+  // A new cloud has about the same obstacle about the same place.
+  const Eigen::Vector3d p_FQ =
+      last.has_place ? last.p_FCo : link_.search.X_FL * link_.context.tree().center();
+  const auto measure_near = [&](const auto& obstacles) { measure_near_place(obstacles, p_FQ); };
+  for (std::size_t i = 0; i < clouds.size(); ++i) {
+    for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_near);
+  }
 }
+
+// Measures an obstacle that is near a place, though perhaps not the nearest.
+void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ) {
+  const Eigen::Vector3d p_OQ = obstacles.X_FO.inverse() * p_FQ;
+  std::int32_t child = obstacles.bvh->root();
+  while (child >= 0) {
+    const BoxNode& node = obstacles.bvh->nodes()[static_cast<std::size_t>(child)];
+    child = node.child[nearest_child(node, p_OQ)];
+  }
+  enter(obstacles);
+  PointTile scratch;
+  const PointTile& tile = obstacles.bvh->tile(static_cast<std::size_t>(~child), &scratch);
+  int nearest = 0;
+  for (int k = 1; k < tile.count; ++k) {
+    if ((tile.point(k) - p_OQ).squaredNorm() < (tile.point(nearest) - p_OQ).squaredNorm()) {
+      nearest = k;
+    }
+  }
+  PointRefinement(obstacles, &link_).measure({~child, nearest});
+}
+
+// Boxes have an upper bound of their own.
+void LinkQuery::measure_near_place(const BoxObstacles& /*obstacles*/,
+                                   const Eigen::Vector3d& /*p_FQ*/) {}
 
 void LinkQuery::measure_again(const PointObstacles& obstacles) {
   const auto& last = link_.kept.last;
@@ -146,6 +265,7 @@ template <class Obstacles>
 DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
   search.visited.clear();
+  search.box_bounds.clear();
   auto input = dual_tree_input(obstacles);
   input.front = link_.kept.fronts.find(obstacles.bvh->build_id());
   if (input.front != nullptr) {
@@ -278,6 +398,8 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   last.build_id = closest.is_box ? cloud.boxes->build_id() : cloud.index.build_id();
   last.id = closest.id;
   last.p_LCl = closest.exact.witness;
+  last.p_FCo = closest.p_FCo;
+  last.has_place = true;
   result->state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = distance;
   // Points that could be nearer have coordinates no larger than this one's bound.

@@ -28,8 +28,13 @@ class LinkQuery {
   void begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryConfig& config,
              double other_links, QueryStatistics* statistics);
 
-  /// Measures the last answer's obstacle at the new pose, where it is still in the scene.
+  /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a
+  /// point that is near to where it was.
   void warm_start(SnapshotSpan clouds);
+
+  /// Asks again for what begin() has asked, with other tolerances; what run() has found since is
+  /// the upper bound.
+  void tighten(const QueryConfig& config);
 
   /// @returns false: the deadline passed first; what is known by then still holds
   bool run(SnapshotSpan clouds, Deadline* deadline);
@@ -55,6 +60,9 @@ class LinkQuery {
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
   void keep_bound();
+  void keep_answer();
+  void count_outside_region();
+  void take_kept_bound();
   double answer_error(double distance) const;
   double extent() const;  ///< [m] no point of the link is farther from its origin
 
@@ -62,6 +70,8 @@ class LinkQuery {
   bool run(const Obstacles& obstacles);
   template <class Obstacles>
   void enter(const Obstacles& obstacles);
+  void measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ);
+  void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);
   void measure_again(const BoxObstacles& obstacles);
   void upper_bound(const PointObstacles& obstacles);

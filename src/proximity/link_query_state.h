@@ -8,6 +8,7 @@
 
 #include "internal/geometry/float_rounding.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "proximity/box_bounds.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
@@ -32,6 +33,29 @@ struct LinkContext {
   const Solid& solid() const { return model->solid; }
 };
 
+/// The closest obstacle that a query has found, measured exactly.
+struct ClosestObstacle {
+  SignedDistance exact;  ///< link frame; `distance` is the upper bound, inf: none was found
+  Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
+  std::int32_t source = -1;
+  ObstacleId id;
+  bool is_box = false;
+};
+
+/// What a query has found.
+struct SearchResult {
+  ClosestObstacle closest;
+  double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured
+  double refined_bound = 0.0;   ///< [m] the same of what was measured, to within the tolerance
+  double cover_bound = 0.0;     ///< [m] no point is nearer to the clipped cover spheres
+  double region_bound = 0.0;    ///< [m] no point outside the regions of interest is nearer
+  double rounding = 0.0;        ///< [m] largest error of a lower bound of the traversals
+  double max_coordinate = 0.0;  ///< [m] of the link in the frames of the indices
+  double drift = 0.0;           ///< of the pose as given, see RigidPose
+  double index_error = 0.0;     ///< [m] by the poses of maps as given, within range
+  bool is_complete = false;     ///< nothing that matters was left
+};
+
 /// The part that is kept from one query to the next. It speeds queries up and never changes what an
 /// answer promises.
 struct LinkCoherence {
@@ -45,24 +69,25 @@ struct LinkCoherence {
     std::uint64_t build_id = 0;  ///< of its index; 0: there was no answer
     ObstacleId id;
     Eigen::Vector3d p_LCl = Eigen::Vector3d::Zero();  ///< [m] closest point of the link
+    bool has_place = false;                           ///< whether p_FCo is that of some answer
+    Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
   } last;
+  /// The last complete answer: it is the same for the same question.
+  struct {
+    SceneId scene = kUnknownScene;                           ///< unknown: there is none
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< as it was asked
+    QueryConfig config;
+    SearchResult result;
+  } answered;
   SupportCache supports;
   Eigen::Vector3d plane_normal_L = Eigen::Vector3d::Zero();  ///< of `supports`; zero: none yet
 
   void forget() {
     last.build_id = 0;
+    answered.scene = kUnknownScene;
     bound.forget();
     fronts.forget();
   }
-};
-
-/// The closest obstacle that a query has found, measured exactly.
-struct ClosestObstacle {
-  SignedDistance exact;  ///< link frame; `distance` is the upper bound, inf: none was found
-  Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
-  std::int32_t source = -1;
-  ObstacleId id;
-  bool is_box = false;
 };
 
 /// The state of one query.
@@ -70,28 +95,23 @@ struct ClosestObstacle {
 /// Branch and bound: `closest` holds the upper bound, and whatever is not measured exactly leaves
 /// its lower bound in `pruned_bound`. So at any time no obstacle has a smaller signed distance than
 /// lower_bound().
-struct LinkSearch {
+struct LinkSearch : SearchResult {
   // The question.
-  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< a rotation in double
+  Eigen::Isometry3d X_FL_given = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< the same, a rotation in double
   SceneId scene = kUnknownScene;
   QueryConfig config;
   double other_links = 0.0;  ///< [m] upper bound of other links, below which this one matters only
   Deadline* deadline = nullptr;
   QueryStatistics* statistics = nullptr;
 
-  // The answer so far.
-  ClosestObstacle closest;
-  double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured
-  double refined_bound = 0.0;   ///< [m] the same of what was measured, to within the tolerance
-  double cover_bound = 0.0;     ///< [m] no point is nearer to the clipped cover spheres
-  double region_bound = 0.0;    ///< [m] no point outside the regions of interest is nearer
-  double rounding = 0.0;        ///< [m] largest error of a lower bound of the traversals
-  double max_coordinate = 0.0;  ///< [m] of the link in the frames of the indices
-  double drift = 0.0;           ///< of the pose as given, see RigidPose
-  double index_error = 0.0;     ///< [m] by the poses of maps as given, within range
-  bool is_complete = false;     ///< nothing that matters was left
-  VisitedSet visited;           ///< obstacles of the index at work that were refined
-  int box_cells_left = 0;       ///< into which overlapping boxes may still be divided
+  bool is_answered = false;  ///< the question was the last one
+  bool is_counted = false;   ///< in the statistics, as outside the regions
+  double first_bound = 0.0;  ///< [m] proven before tighten()
+  BoxBounds box_bounds;
+  VisitedSet visited;      ///< obstacles of the index at work that were refined
+  int measured = 0;        ///< points
+  int box_cells_left = 0;  ///< into which overlapping boxes may still be divided
 
   /// [m] Beyond it nothing matters.
   double range() const { return config.max_distance + config.margin + rounding; }
@@ -108,6 +128,10 @@ struct LinkSearch {
   /// [m] The same for lower bounds in float.
   float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }
 
+  void count_exact() {
+    ++measured;
+    ++statistics->exact_evaluations;
+  }
   void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }
 
   /// [m] No obstacle has a smaller signed distance; inf where none is in range.

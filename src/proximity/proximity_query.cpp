@@ -1,5 +1,6 @@
 #include "ist_proximity/proximity/proximity_query.h"
 
+#include <algorithm>
 #include <cassert>
 #include <limits>
 
@@ -28,14 +29,34 @@ struct ProximityQuery::Impl {
       : model(std::move(robot)), config(query_config) {
     links.reserve(model->links.size());
     for (const LinkModel& link : model->links) links.emplace_back(link);
+    order.reserve(links.size());
   }
 
   bool can_query(std::size_t i, const std::vector<bool>& known, bool has_clouds) const {
     return has_clouds && known[i] && model->links[i].usable() && !model->links[i].tree.empty();
   }
 
+  // A query that has a deadline first asks every link to within half of its distance, which takes
+  // little time, so that no link is left without a bound.
+  QueryConfig first_config() const {
+    QueryConfig first = config;
+    if (config.deadline > 0.0) first.relative_tolerance = std::max(0.5, config.relative_tolerance);
+    return first;
+  }
+
+  // The links in `order` are sorted by what is proven then: those that may be nearest come first.
+  void run_coarsely(SnapshotSpan clouds, Deadline* deadline) {
+    for (const std::size_t i : order) links[i].run(clouds, deadline);
+    std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+      return links[a].proven_bound() < links[b].proven_bound();
+    });
+    if (deadline->passed()) return;
+    for (const std::size_t i : order) links[i].tighten(config);
+  }
+
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
+  std::vector<std::size_t> order;  // of the links that are asked
   std::vector<LinkQuery> links;
   SceneTracker scene;
   std::size_t last_nearest = 0;  // link that the last run_minimum() found
@@ -58,20 +79,23 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   const SceneId scene = impl_->scene.identify(clouds);
   // All warm starts precede the first traversal, so that every link has an answer if the deadline
   // passes.
-  for (std::size_t i = 0; i < count; ++i) {
-    if (impl_->can_query(i, known, !clouds.empty())) {
-      impl_->links[i].begin(X_FL[i], scene, impl_->config, kInfinity, &impl_->statistics);
-      impl_->links[i].warm_start(clouds);
-    }
-  }
-  bool complete = true;
+  std::vector<std::size_t>& order = impl_->order;
+  order.clear();
   for (std::size_t i = 0; i < count; ++i) {
     if (!impl_->can_query(i, known, !clouds.empty())) {
       (*results)[i].reset();
       impl_->links[i].forget();
       continue;
     }
-    complete = impl_->links[i].run(clouds, &deadline) && complete;
+    order.push_back(i);
+    impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity, &impl_->statistics);
+    impl_->links[i].warm_start(clouds);
+  }
+  if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
+  const bool is_stopped = deadline.has_passed();
+  bool complete = !is_stopped;
+  for (const std::size_t i : order) {
+    if (!is_stopped) complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
   }
   return complete;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "internal/geometry/solid_queries.h"
+#include "proximity/dual_tree.h"
 #include "proximity/link_query_state.h"
 
 namespace ist {
@@ -17,6 +18,18 @@ class PointRefinement {
   PointRefinement(const PointObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
 
+  /// Whether the link's grid proves a point to be outside, whose cover distance does not.
+  /// [m] No point in a box of the BVH is nearer, and none inside; -inf: not known.
+  /// @param slot   names the box in the BVH
+  /// @param child  node, or tile if negative, that the box holds
+  float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max);
+  bool is_outside(std::int32_t tile, int lane) {
+    const ObstacleId id{tile, lane};
+    return side(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id)) == Side::kOutside;
+  }
+  using Side = NearSurface::Side;
+  /// On which side of the link's surface a point is; unknown after the deadline.
+  Side side(ObstacleId id, const Eigen::Vector3d& p_LQ);
   /// Measures a point that is outside the link, unless it was measured in this traversal or a kept
   /// bound proves that it does not matter.
   /// @param lower_bound  [m] by the clipped cover spheres
@@ -33,6 +46,7 @@ class PointRefinement {
  private:
   void measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
                        double max_distance, const Eigen::Vector3d& direction_L);
+  SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
 
   const PointObstacles& obstacles_;
   LinkQueryState& link_;
@@ -46,6 +60,12 @@ class BoxRefinement {
   BoxRefinement(const BoxObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
 
+  static float bound_box(std::int32_t /*slot*/, std::int32_t /*child*/, const float* /*min*/,
+                         const float* /*max*/) {
+    return -std::numeric_limits<float>::infinity();
+  }
+  /// The depth search decides which boxes are outside.
+  static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return false; }
   /// Does for a box what PointRefinement::refine() does for a point.
   float refine(std::int32_t tile, int lane, float lower_bound);
   bool update_planes(SupportingPlanes* planes);

@@ -2,13 +2,15 @@
 
 #include <algorithm>
 
+#include "internal/geometry/float_rounding.h"
 #include "proximity/refinement.h"
 
 namespace ist {
 namespace {
 
-// The share of the tolerance that the distance of one point may take.
-constexpr double kPointShare = 0.25;
+// A query of a link measures cells of its grid when it has measured so many points.
+constexpr int kMeasuredBeforeCells = 32;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -17,19 +19,73 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   search.cover_bound =
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
   const ObstacleId id{tile, lane};
-  if (!search.visited.insert(id.key())) return search.traversal_prune_bound();
+  const bool is_late = deadline_passed();
+  if (!is_late && !search.visited.insert(id.key())) return search.traversal_prune_bound();
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
   const double kept = link_.kept.distances.find(obstacles_.bvh->build_id(),
                                                 DistanceCache::Quantity::kUnsigned, id.key(), p_LQ);
-  if (kept >= search.prune_bound()) {
-    search.prune(kept);
+  const double bound = std::max(kept, grid_bound({p_LQ}, search.prune_bound()).surface_distance);
+  if (bound >= search.prune_bound()) {
+    search.prune(bound);
+  } else if (is_late) {
+    // The bound is that of one part of the link; the others are in pairs of their own.
+    search.prune(static_cast<double>(lower_bound) - search.rounding);
   } else {
-    const bool has_closest =
-        search.closest.exact.distance < std::numeric_limits<double>::infinity();
-    measure_outside(id, p_OQ, p_LQ, std::numeric_limits<double>::infinity(),
+    const bool has_closest = search.closest.exact.distance < kInfinity;
+    measure_outside(id, p_OQ, p_LQ, kInfinity,
                     has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L);
   }
   return search.traversal_prune_bound();
+}
+
+float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const float* min,
+                                 const float* max) {
+  constexpr float kNone = -std::numeric_limits<float>::infinity();
+  LinkSearch& search = link_.search;
+  if (search.measured < kMeasuredBeforeCells || !link_.context.solid().is_closed()) return kNone;
+  const Eigen::Vector3d low(min[0], min[1], min[2]), high(max[0], max[1], max[2]);
+  SignedDistanceGrid::Part part;
+  part.half = 0.5 * (high - low);
+  part.radius = part.half.norm();
+  if (part.radius > link_.context.grid.plane_radius()) return kNone;
+  float* known = search.box_bounds.find(slot);
+  if (known != nullptr) return *known;
+  const Eigen::Matrix3d R_LO = obstacles_.X_LO.linear();
+  part.R_LO = &R_LO;
+  part.center_O = 0.5 * (low + high);
+  part.center_L = obstacles_.X_LO * part.center_O;
+  PointTile scratch;
+  if (child < 0) part.points = &obstacles_.bvh->tile(static_cast<std::size_t>(~child), &scratch);
+  const SignedDistanceGrid::Bound bound = grid_bound(part, search.prune_bound());
+  return search.box_bounds.insert(slot,
+                                  bound.is_outside ? round_down(bound.signed_distance) : kNone);
+}
+
+// The winding number is asked last. It is not asked after the deadline.
+PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ) {
+  const SignedDistanceGrid::Bound bound = grid_bound({p_LQ}, kInfinity);
+  if (bound.is_outside) return Side::kOutside;
+  DistanceCache& kept = link_.kept.distances;
+  const auto quantity = DistanceCache::Quantity::kOutside;
+  const std::uint64_t build_id = obstacles_.bvh->build_id();
+  if (kept.find(build_id, quantity, id.key(), p_LQ) > 0.0) return Side::kOutside;
+  if (deadline_passed()) return Side::kUnknown;
+  link_.search.count_exact();
+  if (link_.context.solid().is_inside(p_LQ)) return Side::kInside;
+  if (link_.context.solid().is_closed() && bound.surface_distance > 0.0) {
+    kept.store(build_id, quantity, id.key(), p_LQ, bound.surface_distance);
+  }
+  return Side::kOutside;
+}
+
+// A cell costs as much as a few points: where few have to be measured, it does not pay.
+SignedDistanceGrid::Bound PointRefinement::grid_bound(const SignedDistanceGrid::Part& part,
+                                                      double enough) {
+  SignedDistanceGrid& grid = link_.context.grid;
+  SignedDistanceGrid::Cell* cell = link_.search.measured < kMeasuredBeforeCells
+                                       ? grid.find(part.center_L)
+                                       : grid.measure(part.center_L);
+  return cell == nullptr ? SignedDistanceGrid::Bound() : grid.bound(cell, part, enough);
 }
 
 bool PointRefinement::update_planes(SupportingPlanes* planes) {
@@ -42,7 +98,7 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
   if (tree.cover_distance_exceeds(p_LQ, tree.interior_gap())) {
     return measure_outside(id, p_OQ, p_LQ, max_distance, link_.kept.plane_normal_L);
   }
-  ++link_.search.statistics->exact_evaluations;
+  link_.search.count_exact();
   link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
 }
 
@@ -50,13 +106,12 @@ void PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ
                                       const Eigen::Vector3d& p_LQ, double max_distance,
                                       const Eigen::Vector3d& direction_L) {
   LinkSearch& search = link_.search;
-  ++search.statistics->exact_evaluations;
+  search.count_exact();
   const double limit = std::min({search.closest.exact.distance, search.other_links,
                                  search.range() + search.rounding, max_distance});
   double lower_bound;
   const SignedDistance exact =
-      distance_outside(link_.context.solid(), p_LQ, limit, direction_L,
-                       kPointShare * search.config.tolerance, &lower_bound);
+      distance_outside(link_.context.solid(), p_LQ, limit, direction_L, 0.0, &lower_bound);
   link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
                              id.key(), p_LQ, lower_bound);
   if (lower_bound < exact.distance) {

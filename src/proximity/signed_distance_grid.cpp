@@ -13,70 +13,159 @@ namespace {
 constexpr double kStored = 1e-6;
 // [m] More than double loses in the distance of two places of a link.
 constexpr double kRounding = 1e-12;
+// Cells along the radius of a link.
+constexpr double kCellsPerRadius = 16.0;
+constexpr double kMinCell = 1e-3;  // [m]
+// Cells to either side of the origin that a key can tell apart.
+constexpr double kMaxIndex = 1048575.0;
+// The radius in which a cell's plane holds, in edges of a cell: half a diagonal is 0.87.
+constexpr double kPlaneRadius = 1.5;
+// Cells farther from the surface than so many of these radii have no plane.
+constexpr double kPlaneDistance = 3.0;
+// The share of that radius by which a plane may be too high.
+constexpr double kPlaneTolerance = 0.01;
+// A plane that cuts off less of the sphere about C, as a share of its radius, says little.
+constexpr double kHighestPlane = 0.9;
 
 }  // namespace
 
 SignedDistanceGrid::SignedDistanceGrid(const LinkModel& link)
     : solid_(&link.solid),
       is_one_mesh_(is_one_mesh(link.solid)),
-      has_holes_(!link.solid.is_closed()) {
-  const Eigen::AlignedBox3d box = bounding_box(link);
-  const Eigen::Vector3d sizes = box.sizes();
-  const auto cells = [&](int axis) {
-    return std::max(1, static_cast<int>(std::min(std::ceil(sizes[axis] / size_),
-                                                 static_cast<double>(kMaxCells))));
-  };
-  size_ = std::max(1e-4, sizes.maxCoeff() / static_cast<double>(kMaxCells));
-  for (;; size_ *= 1.1) {
-    count_ = {cells(0), cells(1), cells(2)};
-    const double all = static_cast<double>(count_[0]) * count_[1] * count_[2];
-    if (all <= static_cast<double>(kMaxCells)) break;
-  }
-  per_size_ = 1.0 / size_;
-  box_ = {box.min(), box.min() + size_ * Eigen::Vector3d(count_[0], count_[1], count_[2])};
-  values_.assign(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]) *
-                     static_cast<std::size_t>(count_[2]),
-                 kUnknown);
-}
+      is_closed_(link.solid.is_closed()),
+      origin_(link.tree.center()),
+      size_(std::max(link.tree.radius() / kCellsPerRadius, kMinCell)),
+      per_size_(1.0 / size_),
+      plane_radius_(kPlaneRadius * size_),
+      cells_(kCells) {}
 
-// A place outside the box is in the nearest cell. Written so that NaN is in the first one.
-SignedDistanceGrid::Cell SignedDistanceGrid::cell(const Eigen::Vector3d& p_LQ) const {
-  const Eigen::Array3d at = per_size_ * (p_LQ - box_.min()).array();
-  Eigen::Array3i i;
+// Written so that NaN has no key.
+std::uint64_t SignedDistanceGrid::key(const Eigen::Vector3d& p_LQ, Eigen::Vector3d* center) const {
+  const Eigen::Array3d at = (per_size_ * (p_LQ - origin_)).array();
+  std::uint64_t key = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const int last = count_[axis] - 1;
-    i[axis] = at[axis] > 0.0 ? (at[axis] < last ? static_cast<int>(at[axis]) : last) : 0;
+    if (!(std::abs(at[axis]) < kMaxIndex)) return 0;
+    const double i = std::floor(at[axis]);
+    (*center)[axis] = origin_[axis] + size_ * (i + 0.5);
+    key = key << 21U | static_cast<std::uint64_t>(i + kMaxIndex + 1.0);
   }
-  return {static_cast<std::size_t>(i[0] + count_[0] * (i[1] + count_[1] * i[2])),
-          box_.min() + size_ * (i.cast<double>() + 0.5).matrix()};
+  return key;
 }
 
-SignedDistanceGrid::Sample SignedDistanceGrid::sample(const Eigen::Vector3d& p_LQ,
-                                                      const Cell& cell) const {
-  const auto floor = static_cast<double>(values_[cell.index]);
-  const double distance = (p_LQ - cell.center).norm() + kRounding;
-  Sample sample{floor - distance, {}};
-  if (!is_one_mesh_) return sample;
-  sample.near.within = (1.0 + kStored) * std::abs(floor) + distance;
-  if (!has_holes_ && distance < (1.0 - kStored) * std::abs(floor)) {
-    sample.near.side = floor < 0.0 ? NearSurface::Side::kInside : NearSurface::Side::kOutside;
+SignedDistanceGrid::Cell* SignedDistanceGrid::find(const Eigen::Vector3d& p_LQ) {
+  Eigen::Vector3d center;
+  const std::uint64_t wanted = key(p_LQ, &center);
+  Cell& cell = cells_[slot(wanted)];
+  return wanted != 0 && cell.key == wanted ? &cell : nullptr;
+}
+
+SignedDistanceGrid::Cell* SignedDistanceGrid::measure(const Eigen::Vector3d& p_LQ) {
+  Eigen::Vector3d center;
+  const std::uint64_t wanted = key(p_LQ, &center);
+  if (wanted == 0) return nullptr;
+  Cell& cell = cells_[slot(wanted)];
+  if (cell.key != wanted) {
+    cell = Cell();
+    cell.key = wanted;
+    cell.center = center;
+    fill(&cell);
   }
-  return sample;
+  return &cell;
 }
 
-bool SignedDistanceGrid::find(const Eigen::Vector3d& p_LQ, Sample* sample) const {
-  if (!box_.contains(p_LQ)) return false;
-  const Cell cell = this->cell(p_LQ);
-  if (!(values_[cell.index] < kUnknown)) return false;
-  *sample = this->sample(p_LQ, cell);
-  return true;
+void SignedDistanceGrid::fill(Cell* cell) const {
+  const PointDepth depth = point_depth(*solid_, cell->center, -1.0);
+  cell->floor = round_down(depth.floor);
+  cell->triangle = depth.triangle;
+  cell->normal = depth.exact.normal.cast<float>();
+  cell->witness =
+      round_down(cell->normal.cast<double>().dot(depth.exact.witness - cell->center) - kRounding);
+  // Far from the link, or without a surface, a plane bounds no better than the distance.
+  cell->has_plane = !(std::abs(depth.exact.distance) < kPlaneDistance * plane_radius_);
 }
 
-SignedDistanceGrid::Sample SignedDistanceGrid::measure(const Eigen::Vector3d& p_LQ) {
-  const Cell cell = this->cell(p_LQ);
-  float& value = values_[cell.index];
-  if (!(value < kUnknown)) value = round_down(point_depth(*solid_, cell.center, -1.0).floor);
-  return sample(p_LQ, cell);
+// The surface that is closest to any place in the plane's radius is within two of them and the
+// distance of C.
+void SignedDistanceGrid::find_plane(Cell* cell) const {
+  cell->has_plane = true;
+  const auto floor = static_cast<double>(cell->floor);
+  const double radius = (1.0 + kStored) * std::abs(floor) + 2.0 * plane_radius_ + kRounding;
+  const Eigen::Vector3d normal = cell->normal.cast<double>();
+  const double plane = surface_support_in_sphere(*solid_, cell->center, radius, normal,
+                                                 kPlaneTolerance * plane_radius_, cell->witness) +
+                       kStored * radius;
+  if (!(plane < kHighestPlane * radius)) return;
+  cell->plane = round_up(plane);
+  // No surface is in the part of the sphere above the plane: one place is outside if all are.
+  const double place = 0.5 * (std::max(plane, 0.0) + radius);
+  cell->is_outside_above_plane = is_closed_ && !solid_->is_inside(cell->center + place * normal);
+}
+
+double SignedDistanceGrid::Part::extent_against(const Eigen::Vector3d& n_L) const {
+  if (R_LO == nullptr) return radius * n_L.norm();
+  const Eigen::Vector3d n_O = R_LO->transpose() * n_L;
+  if (points == nullptr) return n_O.cwiseAbs().dot(half);
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kPointWidth; ++k) {  // so many, for SIMD
+    const double along = n_O.x() * static_cast<double>(points->x[k]) +
+                         n_O.y() * static_cast<double>(points->y[k]) +
+                         n_O.z() * static_cast<double>(points->z[k]);
+    least = k < points->count && along < least ? along : least;
+  }
+  return n_O.dot(center_O) - least;
+}
+
+double SignedDistanceGrid::floor_bound(const Cell& cell, const Eigen::Vector3d& center_L,
+                                       double radius) const {
+  return static_cast<double>(cell.floor) - (center_L - cell.center).norm() - radius - kRounding;
+}
+
+SignedDistanceGrid::Bound SignedDistanceGrid::bound(Cell* cell, const Part& part,
+                                                    double enough) const {
+  const Eigen::Vector3d from_C = part.center_L - cell->center;
+  const double distance = from_C.norm() + part.radius + kRounding;
+  const auto floor = static_cast<double>(cell->floor);
+  Bound bound;
+  bound.signed_distance = floor - distance;
+  if (is_one_mesh_ || floor > 0.0) {
+    bound.surface_distance = std::max((1.0 - kStored) * std::abs(floor) - distance, 0.0);
+  }
+  bound.is_outside = is_closed_ && bound.signed_distance > 0.0;
+  const double by_floor = is_closed_ ? bound.signed_distance : bound.surface_distance;
+  if (distance > plane_radius_ || by_floor >= enough) return bound;
+  if (!cell->has_plane) find_plane(cell);
+  const Eigen::Vector3d normal = cell->normal.cast<double>();
+  const double above = normal.dot(from_C) - part.extent_against(normal) -
+                       static_cast<double>(cell->plane) - kStored * distance;
+  if (!(above > 0.0)) return bound;
+  bound.surface_distance = std::max(bound.surface_distance, above);
+  if (cell->is_outside_above_plane) {
+    bound.is_outside = true;
+    bound.signed_distance = std::max(bound.signed_distance, above);
+  }
+  return bound;
+}
+
+double SignedDistanceGrid::depth_bound(const Cell& cell, const Eigen::Vector3d& center_L,
+                                       double radius) const {
+  if (cell.triangle == kNoTriangle) return -std::numeric_limits<double>::infinity();
+  return -(1.0 + kStored) * distance_to_triangle(*solid_, cell.triangle, center_L) - radius -
+         kRounding;
+}
+
+NearSurface SignedDistanceGrid::near_surface(Cell* cell, const Eigen::Vector3d& p_LQ) const {
+  NearSurface near;
+  if (!is_one_mesh_) return near;
+  const double distance = (p_LQ - cell->center).norm() + kRounding;
+  const auto floor = static_cast<double>(cell->floor);
+  near.within =
+      std::min((1.0 + kStored) * std::abs(floor) + distance, -depth_bound(*cell, p_LQ, 0.0));
+  if (bound(cell, {p_LQ}, std::numeric_limits<double>::infinity()).is_outside) {
+    near.side = NearSurface::Side::kOutside;
+  } else if (is_closed_ && floor < 0.0 && distance < (1.0 - kStored) * -floor) {
+    near.side = NearSurface::Side::kInside;
+  }
+  return near;
 }
 
 }  // namespace ist

@@ -3,50 +3,104 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
+#include "internal/cloud/point_tile.h"
 #include "internal/geometry/solid_queries.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
 
-/// Signed distances of a link on a grid about it. Each cell is measured at its centre when it is
-/// first asked for, and kept: the values belong to the link alone, so they hold at every pose and
-/// for every cloud. A signed distance changes by no more than the distance between two places, so a
-/// cell's value bounds it at every place nearby. Memory is allocated once. One thread.
+/// Signed distances of a link about it, on a grid whose cells are measured when they are first
+/// needed and kept: they belong to the link alone, so they hold at every pose and for every cloud.
+///
+/// A cell bounds the signed distance of the places near its centre C in three ways:
+///  - It changes by no more than the distance between two places (it is 1-Lipschitz).
+///  - A local supporting plane, across the direction of the surface point closest to C, has all of
+///    the surface near C on one side. The surface is no nearer to a place on the other side than
+///    the plane is; and if the link is a closed solid, such places are all outside, or none is.
+///  - The triangle that is closest to C is no deeper than the surface.
+/// The error of the first is the distance from C, that of the others falls with its square where
+/// the surface is smooth.
+///
+/// Cells are held in a direct-mapped table: a cell whose place another one needs is measured again.
+/// Memory is allocated once. One thread.
 class SignedDistanceGrid {
  public:
   explicit SignedDistanceGrid(const LinkModel& link);
 
-  struct Sample {
-    double lower_bound = 0.0;  ///< [m] PointDepth::floor at the place, at least
-    NearSurface near;          ///< what is known of the surface about the place
+  /// A part of space: a place, a sphere, or a box and the points that are in it.
+  struct Part {
+    Eigen::Vector3d center_L;                        ///< [m]
+    double radius = 0.0;                             ///< [m] of a bounding sphere about the centre
+    const Eigen::Matrix3d* R_LO = nullptr;           ///< of the box; null: a sphere
+    Eigen::Vector3d half = Eigen::Vector3d::Zero();  ///< [m] half edges of the box, in O
+    const PointTile* points = nullptr;               ///< null: all of the box
+    Eigen::Vector3d center_O = Eigen::Vector3d::Zero();  ///< [m]
+
+    /// [m] How far it extends from the centre against a direction.
+    double extent_against(const Eigen::Vector3d& n_L) const;
   };
 
-  /// The sample of a place in a cell that has been measured. False: there is none.
-  bool find(const Eigen::Vector3d& p_LQ, Sample* sample) const;
-  /// Measures the place's cell if it has not been. A place outside the grid is bounded by the
-  /// nearest cell, loosely.
-  Sample measure(const Eigen::Vector3d& p_LQ);
+  /// A bound of all places of a part of space.
+  struct Bound {
+    /// [m] No place has a smaller signed distance, in the sense of PointDepth::floor.
+    double signed_distance = -std::numeric_limits<double>::infinity();
+    /// [m] The surface is no nearer to any place.
+    double surface_distance = 0.0;
+    /// Whether every place is outside.
+    bool is_outside = false;
+  };
 
-  static constexpr std::size_t kMaxCells = 32768;
+  struct Cell;
+
+  /// The cell of a place, if it has been measured; null otherwise, and for a place that is not
+  /// finite or too far from the link.
+  Cell* find(const Eigen::Vector3d& p_LQ);
+  /// Measures the place's cell if it has not been. Null as above.
+  Cell* measure(const Eigen::Vector3d& p_LQ);
+
+  /// The bound of a part by a cell, which may be any.
+  /// @param enough  [m] a bound of the surface's distance that needs no better; inf: the best
+  Bound bound(Cell* cell, const Part& part, double enough) const;
+  /// [m] No place in the sphere has a smaller signed distance. The cell's plane is not used.
+  double floor_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
+  /// [m] No place in the sphere is deeper than minus this, by the cell's triangle; -inf: unknown.
+  double depth_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
+  /// Bounds of where the surface is about a place.
+  /// [m] Larger parts are bounded by no plane.
+  double plane_radius() const { return plane_radius_; }
+  NearSurface near_surface(Cell* cell, const Eigen::Vector3d& p_LQ) const;
+
+  struct Cell {
+    std::uint64_t key = 0;  ///< of the place in the grid; 0: not measured
+    Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< [m] C, link frame
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< outward, at the closest point
+    float witness = 0.0F;                              ///< [m] from C to that point along normal
+    float floor = 0.0F;                                ///< [m] PointDepth::floor at C
+    float plane = std::numeric_limits<float>::max();   ///< [m] from C to the plane along normal
+    std::uint32_t triangle = kNoTriangle;              ///< of a solid that is one mesh
+    bool has_plane = false;                            ///< whether the plane was looked for
+    bool is_outside_above_plane = false;               ///< every place there that the plane bounds
+  };
 
  private:
-  struct Cell {
-    std::size_t index;
-    Eigen::Vector3d center;  ///< [m] link frame
-  };
-  static constexpr float kUnknown = 1e30F;
+  static constexpr std::size_t kCells = 8192;
+  static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
 
-  Cell cell(const Eigen::Vector3d& p_LQ) const;
-  Sample sample(const Eigen::Vector3d& p_LQ, const Cell& cell) const;
+  std::uint64_t key(const Eigen::Vector3d& p_LQ, Eigen::Vector3d* center) const;
+  static std::size_t slot(std::uint64_t key) { return (key * 0x9E3779B97F4A7C15ULL) >> 51U; }
+  void fill(Cell* cell) const;
+  void find_plane(Cell* cell) const;
 
   const Solid* solid_;
-  bool is_one_mesh_, has_holes_;
-  Eigen::AlignedBox3d box_;  ///< of all cells, link frame
-  double size_, per_size_;   ///< [m] edge of a cell, and 1 / edge
-  Eigen::Array3i count_;
-  std::vector<float> values_;  ///< [m] PointDepth::floor
+  bool is_one_mesh_, is_closed_;
+  Eigen::Vector3d origin_;  ///< [m] link frame
+  double size_, per_size_;  ///< [m] edge of a cell, and 1 / edge
+  double plane_radius_;     ///< [m] of the sphere about C where the plane holds
+  std::vector<Cell> cells_;
 };
 
 }  // namespace ist

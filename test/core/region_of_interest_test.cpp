@@ -212,5 +212,35 @@ TEST(RegionOfInterest, BoundsHoldForDiscardedPoints) {
   EXPECT_GT(cut, 0);
 }
 
+// The same question is answered without a search: it must still be told that a link is outside.
+// With another region it is another question.
+TEST(RegionOfInterest, CountsInAnswersThatAreRepeated) {
+  const auto model = test::make_model({test::icosphere(0.08, 2)}, 0.005);
+  CloudSnapshot cloud = test::make_snapshot({{1.0, 0.0, 0.0}});
+  cloud.region.radius = 1.1;
+  QueryConfig config;
+  config.max_distance = 0.5;
+  for (const double deadline : {0.0, 10.0}) {
+    config.deadline = deadline;
+    ProximityQuery query(model, config);
+    const std::vector<Eigen::Isometry3d> X_FL(
+        1, Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.9, 0.0)));
+    std::vector<LinkProximity> first, again;
+    ASSERT_TRUE(query.run(X_FL, {true}, {&cloud}, &first));
+    EXPECT_EQ(query.statistics().outside_region, 1U);
+    EXPECT_EQ(first[0].state, LinkState::kUnknown);
+    ASSERT_TRUE(query.run(X_FL, {true}, {&cloud}, &again));
+    EXPECT_EQ(query.statistics().outside_region, 1U);
+    EXPECT_EQ(again[0].state, LinkState::kUnknown);
+    CloudSnapshot whole = cloud;
+    whole.region = RegionOfInterest();
+    ASSERT_TRUE(query.run(X_FL, {true}, {&whole}, &again));
+    EXPECT_EQ(query.statistics().outside_region, 0U);
+    EXPECT_EQ(again[0].state, LinkState::kClear);
+    ASSERT_TRUE(query.run(X_FL, {true}, {&cloud}, &again));
+    EXPECT_EQ(again[0].state, LinkState::kUnknown);
+  }
+}
+
 }  // namespace
 }  // namespace ist

@@ -1,4 +1,4 @@
-// The lower bounds of a grid of signed distances, against the link itself.
+// The bounds of a grid of signed distances, against the link itself.
 
 #include "proximity/signed_distance_grid.h"
 
@@ -14,71 +14,154 @@
 namespace ist {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 std::vector<Shape> shapes() {
-  return {Box{{0.2, 0.1, 0.3}},
-          Cylinder{0.05, 0.25},
-          test::l_shape(0.2, 0.05),
-          test::torus(0.1, 0.03, 12, 6),
-          test::open_box({0.15, 0.1, 0.2}),
+  return {Box{{0.2, 0.1, 0.3}},          Cylinder{0.05, 0.25},    test::l_shape(0.2, 0.05),
+          test::torus(0.1, 0.03, 12, 6), test::icosphere(0.1, 3), test::open_box({0.15, 0.1, 0.2}),
           test::thin_plate(0.2, 0.004)};
+}
+
+// How often the bounds were worth something.
+struct Counts {
+  int outside = 0, sides = 0, close = 0, close_depth = 0;
+};
+
+// All that a cell says of a place, against the truth.
+void expect_bounds(const LinkModel& link, SignedDistanceGrid* grid, const Eigen::Vector3d& p_L,
+                   Counts* counts) {
+  SignedDistanceGrid::Cell* cell = grid->measure(p_L);
+  ASSERT_NE(cell, nullptr);
+  const SignedDistanceGrid::Bound bound = grid->bound(cell, {p_L}, kInfinity);
+  const PointDepth truth = point_depth(link.solid, p_L, -1.0);
+  const double signed_distance = truth.exact.distance;
+  ASSERT_LE(bound.signed_distance, signed_distance);
+  ASSERT_LE(grid->floor_bound(*cell, p_L, 0.0), truth.floor);
+  if (signed_distance > 0.0) ASSERT_LE(bound.surface_distance, signed_distance);
+  if (bound.is_outside) ASSERT_GE(signed_distance, 0.0);
+  ASSERT_LE(grid->depth_bound(*cell, p_L, 0.0), signed_distance);
+  counts->outside += bound.is_outside ? 1 : 0;
+  counts->close += signed_distance > 0.0 && bound.surface_distance > signed_distance - 1e-3 ? 1 : 0;
+  if (!is_one_mesh(link.solid)) return;
+  ASSERT_LE(bound.surface_distance, std::abs(signed_distance));
+  counts->close_depth +=
+      signed_distance < 0.0 && grid->depth_bound(*cell, p_L, 0.0) > signed_distance - 1e-3 ? 1 : 0;
+  const NearSurface near = grid->near_surface(cell, p_L);
+  ASSERT_GE(near.within, std::abs(signed_distance));
+  if (near.side != NearSurface::Side::kUnknown) {
+    ASSERT_EQ(near.side == NearSurface::Side::kInside, signed_distance < 0.0);
+    ++counts->sides;
+  }
+  // Hints do not change the depth.
+  const PointDepth hinted = point_depth(link.solid, p_L, -1.0, near);
+  ASSERT_EQ(hinted.exact.distance, signed_distance);
+  ASSERT_EQ(hinted.floor, truth.floor);
 }
 
 TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
   const test::Trial trial(shapes(), 0.005);
   test::Rng rng(93);
   for (const LinkModel& link : trial.model().links) {
+    SCOPED_TRACE(link.name);
     SignedDistanceGrid grid(link);
-    int known = 0, sides = 0, close = 0;
+    Counts counts;
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
-    for (int i = 0; i < 6000; ++i) {
+    for (int i = 0; i < 8000; ++i) {
       // Most points are near the last one, and some are far from the link.
       if (i % 4 == 0) {
         p = link.tree.center() +
-            test::random_vector(&rng, i % 40 == 0 ? 5.0 : 0.5 * link.tree.radius());
+            test::random_vector(&rng, i % 40 == 0 ? 5.0 : 0.7 * link.tree.radius());
       } else {
         p += test::random_vector(&rng, 2e-4);
       }
-      SignedDistanceGrid::Sample found;
-      known += grid.find(p, &found) ? 1 : 0;
-      found = grid.measure(p);
-      const PointDepth truth = point_depth(link.solid, p, -1.0);
-      ASSERT_LE(found.lower_bound, truth.floor + 1e-12);
-      ASSERT_LE(found.lower_bound, truth.exact.distance + 1e-12);
-      close += found.lower_bound > truth.floor - 0.02 ? 1 : 0;
-      if (!is_one_mesh(link.solid)) continue;
-      ASSERT_GE(found.near.within, std::abs(truth.exact.distance) - 1e-12);
-      const bool is_inside = truth.exact.distance < 0.0;
-      if (found.near.side != NearSurface::Side::kUnknown) {
-        ASSERT_EQ(found.near.side == NearSurface::Side::kInside, is_inside);
-        ++sides;
-      }
-      // The hint from the grid does not change the depth.
-      const PointDepth hinted = point_depth(link.solid, p, -1.0, found.near);
-      ASSERT_EQ(hinted.exact.distance, truth.exact.distance);
-      ASSERT_EQ(hinted.floor, truth.floor);
+      ASSERT_NO_FATAL_FAILURE(expect_bounds(link, &grid, p, &counts));
     }
-    EXPECT_GT(known, 300);
-    EXPECT_GT(close, 1000);
-    if (is_one_mesh(link.solid)) EXPECT_EQ(sides > 0, link.solid.is_closed());
+    EXPECT_GT(counts.close, 300);
+    EXPECT_EQ(counts.outside > 300, link.solid.is_closed());
+    if (is_one_mesh(link.solid)) {
+      EXPECT_EQ(counts.sides > 300, link.solid.is_closed());
+      EXPECT_GT(counts.close_depth, 30);
+    }
   }
 }
 
-// A sample is the same before and after its cell is measured. A point that is not finite has no
-// cell.
+// Points that are a little above a surface, near its edges too: where signs and planes may fail.
+TEST(SignedDistanceGrid, HoldsNearTheSurface) {
+  const test::Trial trial(shapes(), 0.005);
+  test::Rng rng(94);
+  for (const LinkModel& link : trial.model().links) {
+    SCOPED_TRACE(link.name);
+    SignedDistanceGrid grid(link);
+    Counts counts;
+    for (int i = 0; i < 4000; ++i) {
+      const Eigen::Vector3d p = link.tree.center() + test::random_vector(&rng, link.tree.radius());
+      const SignedDistance from = link.solid.signed_distance(p);
+      const double height =
+          std::pow(10.0, -1.0 - 8.0 * (i % 100) / 100.0) * (i % 2 == 0 ? 0.1 : -0.1);
+      ASSERT_NO_FATAL_FAILURE(
+          expect_bounds(link, &grid, from.witness + height * from.normal, &counts));
+    }
+  }
+}
+
+// The bound of a sphere, of a box and of the points of a tile holds for each of their places.
+TEST(SignedDistanceGrid, BoundsPartsOfSpace) {
+  const test::Trial trial(shapes(), 0.005);
+  test::Rng rng(95);
+  int outside = 0;
+  for (const LinkModel& link : trial.model().links) {
+    SCOPED_TRACE(link.name);
+    SignedDistanceGrid grid(link);
+    for (int i = 0; i < 3000; ++i) {
+      const Eigen::Isometry3d X_LO = test::random_pose(&rng, 0.1);
+      const Eigen::Matrix3d R_LO = X_LO.linear();
+      SignedDistanceGrid::Part part;
+      part.center_L = link.tree.center() + test::random_vector(&rng, 0.7 * link.tree.radius());
+      part.half = test::random_vector(&rng, 0.3 * grid.plane_radius()).cwiseAbs();
+      part.radius = part.half.norm();
+      part.R_LO = &R_LO;
+      part.center_O = X_LO.inverse() * part.center_L;
+      PointTile tile{};
+      for (tile.count = 0; tile.count < 1 + i % kPointWidth; ++tile.count) {
+        const Eigen::Vector3d p_O =
+            part.center_O + 0.99 * part.half.cwiseProduct(test::random_vector(&rng, 1.0));
+        tile.x[tile.count] = static_cast<float>(p_O.x());
+        tile.y[tile.count] = static_cast<float>(p_O.y());
+        tile.z[tile.count] = static_cast<float>(p_O.z());
+      }
+      if (i % 2 == 0) part.points = &tile;
+      SignedDistanceGrid::Cell* cell = grid.measure(part.center_L);
+      const SignedDistanceGrid::Bound bound = grid.bound(cell, part, kInfinity);
+      outside += bound.is_outside ? 1 : 0;
+      for (int k = 0; k < tile.count; ++k) {
+        const double truth = link.solid.signed_distance(X_LO * tile.point(k)).distance;
+        // A float point of the tile may be a little outside its box.
+        ASSERT_LE(bound.signed_distance, truth + (i % 2 == 0 ? 1e-12 : 1e-7));
+        if (bound.is_outside) ASSERT_GE(truth, 0.0);
+        if (truth > 0.0) ASSERT_LE(bound.surface_distance, truth + (i % 2 == 0 ? 1e-12 : 1e-7));
+      }
+    }
+  }
+  EXPECT_GT(outside, 2000);
+}
+
+// A bound is the same before and after its cell is measured. A place that is not finite, or very
+// far from the link, has no cell.
 TEST(SignedDistanceGrid, HoldsOnlyMeasuredCells) {
   const test::Trial trial(shapes(), 0.005);
   const LinkModel& link = trial.model().links[2];
   SignedDistanceGrid grid(link);
   const Eigen::Vector3d p = link.tree.center();
-  SignedDistanceGrid::Sample found;
-  EXPECT_FALSE(grid.find(p, &found));
-  const double measured = grid.measure(p).lower_bound;
-  ASSERT_TRUE(grid.find(p, &found));
-  EXPECT_EQ(found.lower_bound, measured);
-  EXPECT_FALSE(grid.find(p + Eigen::Vector3d(10, 0, 0), &found));
+  EXPECT_EQ(grid.find(p), nullptr);
+  SignedDistanceGrid::Cell* cell = grid.measure(p);
+  ASSERT_NE(cell, nullptr);
+  EXPECT_EQ(grid.find(p), cell);
+  EXPECT_EQ(grid.find(p + Eigen::Vector3d(10, 0, 0)), nullptr);
+  EXPECT_EQ(grid.measure(p + Eigen::Vector3d(1e9, 0, 0)), nullptr);
   const double none = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(grid.find({none, 0, 0}, &found));
-  EXPECT_TRUE(std::isnan(grid.measure({0, none, 0}).lower_bound));
+  EXPECT_EQ(grid.find({none, 0, 0}), nullptr);
+  EXPECT_EQ(grid.measure({0, none, 0}), nullptr);
+  EXPECT_EQ(grid.measure({0, 0, kInfinity}), nullptr);
 }
 
 }  // namespace

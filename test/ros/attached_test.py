@@ -123,7 +123,7 @@ class AttachedTest(unittest.TestCase):
                 "dimensions": [0.1, 0.1, 1e300],
             },
             "dimensions holds 1e+39 m": {"dimensions": [1e39]},
-            "pose is at (1e+160 0 0) m": {"at": (1e160, 0, 0)},
+            "pose: it is at (1e+160, 0, 0) m": {"at": (1e160, 0, 0)},
             "has the scale (1 1 1e+06)": {
                 "shape": AttachObjectRequest.MESH,
                 "mesh": "package://ist_proximity/demo/meshes/shoulder_fork.stl",

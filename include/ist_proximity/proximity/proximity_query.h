@@ -65,9 +65,13 @@ struct QueryStatistics {
 /// Distances from the links of a robot to point clouds.
 ///
 /// Branch and bound: a dual-tree traversal of each link's Inner Sphere Tree and the BVH of every
-/// cloud prunes pairs by lower bounds. Obstacles that remain are measured against the exact
-/// geometry until `tolerance` is met, so `distance` is that of one obstacle point, to within a
-/// quarter of the tolerance. A depth search then measures the points that may be inside the link.
+/// cloud prunes pairs by lower bounds. Near the link, a grid of signed distances bounds what is
+/// left of boxes and points. Obstacles that remain are measured against the exact geometry until
+/// `tolerance` is met, so `distance` is exactly that of one obstacle point. A depth search then
+/// measures the points that may be inside the link.
+///
+/// With a deadline, every link is first asked to within half of its distance, and then, the one
+/// that may be nearest first, to within the tolerance: so no link is left without a bound.
 ///
 /// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
 /// gives the next query its first upper bound (warm start). While the snapshots stay the same,
@@ -75,8 +79,8 @@ struct QueryStatistics {
 /// (temporal coherence). Neither changes the bounds and states that an answer guarantees, and poses
 /// may jump.
 ///
-/// Working memory is about 200 kB a link: up to 128 kB of signed distances about the link, 32 kB of
-/// BVTT fronts, 24 kB of distances of points, 4 kB of visited obstacles, and 40 bytes for each node
+/// Working memory is about 650 kB a link: 512 kB of signed distances about the link, 96 kB of
+/// distances of points, 32 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node
 /// of its tree.
 class ProximityQuery {
  public:

@@ -19,6 +19,7 @@ struct ClosestPoint {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< [m] in the frame of the query point
   double distance_sq = std::numeric_limits<double>::infinity();  ///< [m^2] inf: none in range
   std::uint32_t triangle = 0;  ///< index into the mesh, valid when distance_sq is finite
+  std::uint32_t slot = 0;      ///< the same for TriangleBvh::triangle()
   /// [m] lower bound of the distance to the surface; 0 where the search ended early
   double lower_bound = 0.0;
 };
@@ -65,11 +66,14 @@ class TriangleBvh {
   /// [m] An upper bound of the support of the surface within a sphere, measured from the sphere's
   /// centre: no point x of the surface in the sphere has a larger n.(x - center). A triangle counts
   /// as no more than the disc that its plane cuts out of the sphere.
-  /// @param n_M    unit
-  /// @param limit  [m] larger results are returned as inf, which is found sooner
-  /// @returns -inf where no surface is in the sphere
+  /// @param n_M        unit
+  /// @param tolerance  [m] the result may be this much too large, which is found sooner
+  /// @param at_least   [m] a lower bound of the support, if one is known; nothing smaller is
+  ///                   returned
+  /// @returns `at_least` where no surface is in the sphere
   double support_in_sphere(const Eigen::Vector3d& center_M, double radius,
-                           const Eigen::Vector3d& n_M, double limit) const;
+                           const Eigen::Vector3d& n_M, double tolerance = 0.0,
+                           double at_least = -std::numeric_limits<double>::infinity()) const;
 
   /// The generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. It is computed by a hierarchical expansion of second order (Barill et al.
@@ -130,6 +134,9 @@ class TriangleBvh {
     Eigen::Vector3d a, b, c;
     std::uint32_t index;  ///< in the mesh
   };
+
+  /// A triangle by its place in the hierarchy.
+  const Triangle& triangle(std::uint32_t slot) const { return triangles_[slot]; }
 
   /// The arrays that the SIMD kernels read.
   struct View {

@@ -15,7 +15,8 @@ class DistanceCache {
   /// The distance of a point that an entry bounds.
   enum class Quantity : std::uint8_t {
     kUnsigned,  ///< to the surface, for a point outside
-    kSigned     ///< PointDepth::floor
+    kSigned,    ///< PointDepth::floor
+    kOutside    ///< to the nearest place that may be inside, for a point outside
   };
 
   DistanceCache() : entries_(kEntries) {}
@@ -37,9 +38,9 @@ class DistanceCache {
     double lower_bound = 0.0;
     Eigen::Vector3d p_LQ = Eigen::Vector3d::Zero();
   };
-  static constexpr std::size_t kEntries = 512;
+  static constexpr std::size_t kEntries = 2048;
   static std::size_t slot(Quantity quantity, std::uint32_t key) {
-    return ((key + (static_cast<std::uint32_t>(quantity) << 30U)) * 2654435761U) >> 23U;
+    return ((key + (static_cast<std::uint32_t>(quantity) << 29U)) * 2654435761U) >> 21U;
   }
 
   std::vector<Entry> entries_;

@@ -15,7 +15,7 @@ using SceneId = std::uint64_t;
 constexpr SceneId kUnknownScene = 0;
 
 /// Tells whether the clouds of a query are those of the query before, by the build ids of their
-/// indices and the poses of their maps. One thread.
+/// indices, the poses of their maps and the regions of interest. One thread.
 class SceneTracker {
  public:
   /// @returns the same id from call to call as long as all clouds stay the same; kUnknownScene
@@ -27,6 +27,7 @@ class SceneTracker {
   struct Cloud {
     std::uint64_t points = 0, boxes = 0;  ///< build ids; 0: there are none
     Eigen::Matrix<double, 3, 4> X_FM = Eigen::Matrix<double, 3, 4>::Zero();  ///< of the boxes
+    RegionOfInterest region;
   };
   static constexpr std::size_t kMaxClouds = 16;
   static Cloud identity(const CloudSnapshot& cloud);

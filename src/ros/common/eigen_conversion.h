@@ -5,11 +5,12 @@
 #include <Eigen/Geometry>
 #include <string>
 
+#include "internal/geometry/limits.h"
+
 namespace ist {
 
-/// The farthest that a frame may be from another one that it is placed in [m]. Robots and the maps
-/// that they move in are smaller, and float still resolves 1 mm there.
-constexpr double kMaxPosition = 1e4;
+/// The farthest that a frame may be from another one that it is placed in [m].
+constexpr double kMaxPosition = kMaxLength;
 
 /// Converts a message's transform. The length of its quaternion may differ from 1 by rounding
 /// (1e-3); the result is a rotation. Positions beyond kMaxPosition are refused.

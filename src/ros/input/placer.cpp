@@ -42,7 +42,9 @@ std::string Placer::missing_transform(const Measurement& measurement,
   const std::vector<ros::Time> instants = measurement.instants();
   std::string problem;
   for (const ros::Time& time : {instants.front(), instants.back()}) {
-    if (!is_known(buffer_, target.fixed_frame, sensor, time, &problem)) return problem;
+    if (is_known(buffer_, target.fixed_frame, sensor, time, &problem)) continue;
+    const std::string cause = buffer_.why_refused(target.fixed_frame, sensor);
+    return cause.empty() ? problem : problem + ": " + cause;
   }
   if (!self_filter_) return "";
   for (const ros::Time& time : {instants.front(), instants.back()}) {

@@ -53,8 +53,9 @@ constexpr double kSlow = 0.5;
 /// Names an ingest that is slower than the source's timeout allows; else empty.
 std::string slow_ingest(const SourceReport& source) {
   const std::string advice =
-      ": too long for its timeout; send smaller ones, lower max_range, switch noise_filter off, or "
-      "raise ~" +
+      ": too long for its timeout; send smaller ones, lower max_range, switch the noise filter "
+      "off, "
+      "or raise ~" +
       source.timeout_parameter;
   if (source.working > kSlow * source.timeout) {
     return ": the last " + source.noun + " has been read and indexed for " +
