@@ -49,7 +49,7 @@ std::string ply_fault(const std::string& head, std::size_t size) {
     std::string keyword, name;
     double count = 0.0;
     if (!(words >> keyword >> name >> count) || keyword != "element") continue;
-    const std::string fault = too_many(count, "elements '" + name + "'", size);
+    std::string fault = too_many(count, "elements '" + name + "'", size);
     if (!fault.empty()) return fault;
   }
   return "";
@@ -64,7 +64,7 @@ std::string off_fault(const std::string& head, std::size_t size) {
       std::istringstream number(word);
       double count = 0.0;
       if (!(number >> count)) continue;
-      const std::string fault = too_many(count, "vertices or faces", size);
+      std::string fault = too_many(count, "vertices or faces", size);
       if (!fault.empty()) return fault;
     }
   }

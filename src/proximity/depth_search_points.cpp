@@ -13,8 +13,6 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// [m] More than double loses where distances are compared.
-constexpr double kRounding = 1e-12;
 
 // Branch and bound over the boxes of an index. The signed distance falls by no more than the
 // distance between two points (but for holes, see PointDepth), so what the link's grid of signed

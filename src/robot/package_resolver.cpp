@@ -144,7 +144,7 @@ bool starts_with(const std::string& text, const std::string& prefix) {
 }
 
 std::string decoded_path(const std::string& uri, const std::string& encoded) {
-  const std::string path = percent_decoded(encoded);
+  std::string path = percent_decoded(encoded);
   if (path.find('\0') != std::string::npos) fail(uri, "holds the character 0, written as %00");
   return path;
 }
