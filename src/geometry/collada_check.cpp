@@ -114,7 +114,14 @@ class Check : public tinyxml2::XMLVisitor {
 
 std::string collada_fault(const std::string& bytes) {
   tinyxml2::XMLDocument document;
-  if (document.Parse(bytes.data(), bytes.size()) != tinyxml2::XML_SUCCESS) return {};
+  const tinyxml2::XMLError error = document.Parse(bytes.data(), bytes.size());
+  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) return {};  // load_mesh() says that
+  // Assimp would read on: its own XML reader takes what is not well-formed.
+  if (error != tinyxml2::XML_SUCCESS) {
+    return std::string("cannot be read as a mesh (XML that is not well-formed: ") +
+           document.ErrorName() + ", line " + std::to_string(document.ErrorLineNum()) +
+           "); export or download it again";
+  }
   Check check;
   document.Accept(&check);
   return check.fault();

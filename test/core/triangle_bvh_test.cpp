@@ -187,7 +187,8 @@ TEST(TriangleBvh, TrianglesWithoutAreaAreSurfaceToo) {
 
 // The normal of an area of 1e-200 m^2 has the squared length 0. Divided by it, the direction of the
 // slab was NaN, and became an integer: undefined, as clang's sanitizer found (a fuzzed URDF with a
-// box of 1e-299 m); with GCC it was 0 by luck, which means no slab.
+// box of 1e-299 m); with GCC it was 0 by luck, which means no slab. At 1e-160 m the quotient of two
+// squares had lost its digits: a distance 3.3 um too long, and so was its lower bound.
 TEST(TriangleBvh, AreasWhoseSquareIsZeroAreSurfaceToo) {
   for (const double width : {1e-100, 1e-154, 1e-160, 1e-200, 1e-299, 1e-310}) {
     const TriangleMesh sliver{{{0, 0, 0}, {width, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
