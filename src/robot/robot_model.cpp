@@ -63,7 +63,8 @@ MonitoredLink monitored(const RobotDescription& robot, const LinkIndex& index,
     for (const GeometryElement& element : link.description->geometry) {
       const std::string fault = link.error.empty() ? element_fault(element) : "";
       if (!fault.empty()) {
-        link.error = "link '" + name + "', element '" + element.source + "': " + fault;
+        link.error = "link '" + name + "', element '";
+        link.error.append(element.source).append("': ").append(fault);
       }
     }
     return link;

@@ -288,7 +288,7 @@ bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
 /// holds change_mutex_.
 /// @param change  values by name in the group; may be empty
 /// @returns false when the parameter server does not answer; then nothing changes
-bool LiveParameters::apply(const std::string& group, XmlRpc::XmlRpcValue change) {
+bool LiveParameters::apply(const std::string& group, const XmlRpc::XmlRpcValue& change) {
   if (!read_server()) return false;
   if (change.valid()) {
     XmlRpc::XmlRpcValue tree;
@@ -300,8 +300,10 @@ bool LiveParameters::apply(const std::string& group, XmlRpc::XmlRpcValue change)
       return true;  // the response holds the values in use
     }
     for (const auto& [name, value] : change) {
-      if (!write(private_nh_.resolveName(group + "/" + name), value)) {
-        set_problem("the parameter server does not take ~" + group + "/" + name);
+      std::string path = group;
+      path.append("/").append(name);
+      if (!write(private_nh_.resolveName(path), value)) {
+        set_problem("the parameter server does not take ~" + path);
         return false;
       }
     }

@@ -60,7 +60,7 @@ class LiveParameters {
   bool read_server();
   bool set(Group* group, const dynamic_reconfigure::Reconfigure::Request& request,
            dynamic_reconfigure::Reconfigure::Response& response);
-  bool apply(const std::string& group, XmlRpc::XmlRpcValue change);
+  bool apply(const std::string& group, const XmlRpc::XmlRpcValue& change);
   void take(const LiveReading& reading);
   std::string lost_names() const;
   void set_problem(const std::string& problem);

@@ -34,7 +34,8 @@ std::string StatedPoseSource::state(const sensor_msgs::JointState& configuration
     }
     const std::string fault =
         why_not_a_position(kinematics_->joints()[*joint], configuration.position[i]);
-    if (!fault.empty()) return "the position of " + title + " " + fault;
+    if (!fault.empty())
+      return std::string("the position of ").append(title).append(" ").append(fault);
     if (!std::isnan(q[*joint])) return title + " is stated twice";
     q[*joint] = configuration.position[i];
   }

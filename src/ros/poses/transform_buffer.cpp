@@ -55,7 +55,7 @@ std::string TransformBuffer::check(const geometry_msgs::TransformStamped& transf
 
 std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& transform,
                                     const std::string& fault) {
-  const std::string sentence = title(transform) + fault;
+  std::string sentence = title(transform) + fault;
   const std::lock_guard<std::mutex> lock(mutex_);
   last_refusal_ = sentence;
   last_refusal_time_ = Clock::now();
