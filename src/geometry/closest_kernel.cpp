@@ -58,9 +58,9 @@ HWY_INLINE V SegmentSq(D d, const Vec3<V>& e, const Vec3<V>& v) {
   return Dot3(r, r);
 }
 
-// What is certain of a triangle whose normal is not: no point of it is farther from its edges than
-// the radius of its inscribed circle, half its height at most. So its squared distance is no less
-// than that to its edges minus the square of that radius.
+// A lower bound of a triangle's squared distance that needs no normal. No point of the triangle is
+// farther from its edges than the radius of its inscribed circle, half its height at most. So its
+// squared distance is no less than that to its edges minus the square of that radius.
 template <class D, class V>
 HWY_INLINE V LeastFromEdges(D d, V edges, V n_sq, V longest_sq, float rounding) {
   const V half_height = hn::Mul(hn::Set(d, 0.5F), hn::Sqrt(hn::Div(n_sq, longest_sq)));

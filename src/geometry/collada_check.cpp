@@ -63,7 +63,7 @@ class Check : public tinyxml2::XMLVisitor {
              "): the file is damaged, export or download it again";
   }
 
-  // What an accessor reads lies in its source's array; assimp reads past the end.
+  // Checks that an accessor reads no more than its source's array holds; assimp reads past the end.
   void check_accessor(const XMLElement& element) {
     const XMLElement* source =
         element.Parent()->Parent() != nullptr ? element.Parent()->Parent()->ToElement() : nullptr;

@@ -99,7 +99,7 @@ class InteriorOctree {
       : bvh_(bvh), is_closed_(is_closed), target_(target), watch_(*watch) {}
   ~InteriorOctree() = default;
 
-  // What becomes of an interior cell that no sphere and no surface covers. False: it must be
+  // Decides about an interior cell that no sphere and no surface covers. False: the cell must be
   // divided.
   // @param match  the sphere that covers it best
   virtual bool is_done(const Eigen::Vector3d& center, double circumradius, CellKind kind,

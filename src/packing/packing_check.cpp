@@ -22,8 +22,8 @@
 namespace ist {
 namespace {
 
-// What rounding may change, as a share of the mesh's size and place. Packer and check compute the
-// same numbers in the same way, so that next to nothing is needed.
+// The change by rounding that is allowed, as a share of the mesh's size and place. Packer and check
+// compute the same numbers in the same way, so that next to nothing is needed.
 constexpr double kRounding = 1e-12;
 
 std::string millimetres(double metres) {

@@ -23,6 +23,7 @@
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "support/errors.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
@@ -38,19 +39,8 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-void expect_says(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
-}
-
-template <class Call>
-std::string error_of(const Call& call) {
-  try {
-    call();
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
+using test::error_of;
+using test::expect_says;
 
 std::string mesh_error(const std::string& path) {
   return error_of([&] { load_mesh(path); });

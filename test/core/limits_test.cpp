@@ -17,6 +17,7 @@
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "support/errors.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
 #include "support/temp_dir.h"
@@ -33,19 +34,8 @@ const double kTooLarge[] = {1.0001e4,
                             std::numeric_limits<double>::infinity(),
                             std::numeric_limits<double>::quiet_NaN()};
 
-void expect_says(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
-}
-
-template <class Call>
-std::string error_of(const Call& call) {
-  try {
-    call();
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
+using test::error_of;
+using test::expect_says;
 
 std::string number(double value) {
   std::ostringstream text;

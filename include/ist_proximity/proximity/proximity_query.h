@@ -70,8 +70,9 @@ struct QueryStatistics {
 /// `tolerance` is met, so `distance` is exactly that of one obstacle point. A depth search then
 /// measures the points that may be inside the link.
 ///
-/// With a deadline, every link is first asked to within half of its distance, and then, the one
-/// that may be nearest first, to within the tolerance: so no link is left without a bound.
+/// A query that has a deadline asks every link twice: first to within half of its distance, and
+/// then to within the tolerance, the link that may be nearest first. So no link is left without a
+/// bound.
 ///
 /// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
 /// gives the next query its first upper bound (warm start). While the snapshots stay the same,
