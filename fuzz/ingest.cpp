@@ -178,10 +178,17 @@ void check_counts(const ist::IngestCounts& n, const ist::RawCloud& raw, const Ex
 }
 
 // The grid of the thinned cloud is coarser than asked for where there would be more than 2^30
-// voxels from its origin to a point (voxel_thinning.cpp).
+// voxels from its origin to a point (voxel_grid.cpp).
 void check_thinned(const ist::CloudSnapshot& snapshot,
                    const std::map<std::uint32_t, Eigen::Vector3d>& points) {
-  const std::map<std::uint32_t, Eigen::Vector3d> thinned = stored(snapshot.coarse);
+  const std::map<std::uint32_t, Eigen::Vector3d> thinned =
+      ist::test::thinned_points_of(snapshot.index);
+  std::size_t in_tiles = 0;
+  for (const ist::ThinnedTile& tile : ist::test::thinned_tiles_of(snapshot.index)) {
+    in_tiles += static_cast<std::size_t>(tile.count);
+  }
+  FUZZ_CHECK(in_tiles == thinned.size(), "%zu of %zu thinned points differ", thinned.size(),
+             in_tiles);
   FUZZ_CHECK(thinned.size() <= points.size() && thinned.empty() == points.empty(),
              "%zu points thinned to %zu", points.size(), thinned.size());
   double farthest = 0.0;
