@@ -30,8 +30,8 @@ void check(const IngestConfig& config) {
           "more than min_range");
   require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
           "self_filter_padding", config.self_filter_padding, "0 or more");
-  require(config.thinning > 0.0 && std::isfinite(config.thinning), "thinning", config.thinning,
-          "more than 0");
+  require(config.thinning >= kSmallestVoxel && std::isfinite(config.thinning), "thinning",
+          config.thinning, "1e-9 or more");
   require(config.max_points > 0, "max_points", 0.0, "1 or more");
 }
 

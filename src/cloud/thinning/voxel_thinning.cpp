@@ -1,7 +1,7 @@
 #include "cloud/thinning/voxel_thinning.h"
 
-#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <tuple>
 
 #include "cloud/thinning/voxel_kernel.h"
@@ -10,7 +10,6 @@ namespace ist {
 namespace {
 
 constexpr std::size_t kSmallestTable = 64;  // a power of two, as all of them
-constexpr double kMostVoxels = 1 << 30;     // from the origin to either side
 
 // The place of the origin within its voxel along an axis, in voxels.
 float offset_in_voxel(double origin, double edge) {
@@ -18,12 +17,17 @@ float offset_in_voxel(double origin, double edge) {
   return static_cast<float>(voxels - std::floor(voxels));
 }
 
-// The edge of a voxel [m]: larger than asked for where there would be more than two billion voxels
-// across, whose numbers do not fit.
-double fitting_edge(double edge, const PointBvh& all) {
-  if (all.empty()) return edge;
-  const float extent = all.bounds().min().cwiseAbs().cwiseMax(all.bounds().max().cwiseAbs()).norm();
-  return std::max(edge, static_cast<double>(extent) / kMostVoxels);
+// The integer of a voxel's number along an axis, which is a whole float. Numbers from 2^30 on have
+// the integers of their bits, which are larger: no two numbers share one, however far a point is,
+// and the edge of a voxel depends on no point.
+std::int32_t as_integer(float number) {
+  constexpr float kPlain = 1 << 30;
+  const float size = std::abs(number);
+  if (size < kPlain) return static_cast<std::int32_t>(number);
+  std::int32_t bits = 0;
+  static_assert(sizeof bits == sizeof size, "a float has 32 bits");
+  std::memcpy(&bits, &size, sizeof bits);
+  return number < 0.0F ? -bits : bits;
 }
 
 VoxelGrid make_grid(const Eigen::Matrix3d& R_FO, const Eigen::Vector3d& origin, double edge) {
@@ -52,7 +56,7 @@ void VoxelThinning::run(const PointBvh& all, double voxel_size, PointBvhBuilder*
   recent_.fill(0);
   const Eigen::Matrix3d& R_FO = all.X_FO().linear();
   const Eigen::Vector3d& origin = all.X_FO().translation();
-  const VoxelGrid grid = make_grid(R_FO, origin, fitting_edge(voxel_size, all));
+  const VoxelGrid grid = make_grid(R_FO, origin, voxel_size);
   TileVoxels voxels;
   PointTile scratch;
   for (std::size_t number = 0; number < all.tile_count(); ++number) {
@@ -60,9 +64,7 @@ void VoxelThinning::run(const PointBvh& all, double voxel_size, PointBvhBuilder*
     const std::size_t count = find_voxels(grid, tile, &voxels);
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t k = voxels.nearest[i];
-      const Voxel voxel{static_cast<std::int32_t>(voxels.x[k]),
-                        static_cast<std::int32_t>(voxels.y[k]),
-                        static_cast<std::int32_t>(voxels.z[k])};
+      const Voxel voxel{as_integer(voxels.x[k]), as_integer(voxels.y[k]), as_integer(voxels.z[k])};
       if (is_beaten(voxel, voxels.offset_sq[k])) continue;
       add({voxel, voxels.offset_sq[k], tile.x[k], tile.y[k], tile.z[k], tile.id[k]});
     }

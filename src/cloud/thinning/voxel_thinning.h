@@ -10,18 +10,21 @@
 
 namespace ist {
 
+/// [m] Edge of a voxel. The numbers of voxels stay finite in float at any range.
+constexpr double kSmallestVoxel = 1e-9;
+
 /// Keeps one point of each occupied voxel of a grid that is aligned to the fixed frame: the one
 /// nearest to the voxel's centre, so that the choice does not depend on the order of the points and
 /// changes little as they move. Keeps its memory. Not thread safe.
 class VoxelThinning {
  public:
   /// @param all         the points to thin
-  /// @param voxel_size  [m] > 0, edge of a voxel
+  /// @param voxel_size  [m] at least kSmallestVoxel, edge of a voxel
   /// @param thinned     overwritten: the same origin and ids, along the fixed frame's axes
   void run(const PointBvh& all, double voxel_size, PointBvhBuilder* builder, PointBvh* thinned);
 
  private:
-  /// Numbers of a voxel along each axis, from the origin.
+  /// Numbers of a voxel along each axis, from the origin, each as an integer of its own.
   struct Voxel {
     std::int32_t x, y, z;
     bool operator==(const Voxel& other) const {
