@@ -101,6 +101,7 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
+  search.descent_steps_left = kMaxDescentSteps;
   count_outside_region();
   if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;

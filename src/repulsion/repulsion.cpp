@@ -96,7 +96,8 @@ Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
 RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_FL,
                                   SnapshotSpan clouds, const LinkProximity& proximity,
                                   const RepulsionConfig& config) const {
-  if (proximity.state == LinkState::kUnknown) return RepulsiveWrench::unknown();
+  const bool has_link = link < spheres_->by_link.size();
+  if (proximity.state == LinkState::kUnknown || !has_link) return RepulsiveWrench::unknown();
   const double strength = repulsion_strength(proximity, config);
   if (!(strength > 0.0)) return {};
 

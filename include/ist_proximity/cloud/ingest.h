@@ -64,7 +64,7 @@ struct IngestConfig {
   /// Give the cloud a thinned one; without it repulsion and contact volumes see no points. It costs
   /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
-  double thinning = 0.01;  ///< [m] > 0: edge of a voxel of the thinned cloud
+  double thinning = 0.01;  ///< [m] at least 1e-9: edge of a voxel of the thinned cloud
   /// >= 1: a cloud of more points is refused. This bounds time and memory of one cloud: five
   /// million points take about 3 s and 700 MB where neighbours in the message lie anywhere in
   /// space.
