@@ -7,12 +7,12 @@
 #include <type_traits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/box_bounds.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
-#include "proximity/deadline.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
 #include "proximity/supporting_planes.h"

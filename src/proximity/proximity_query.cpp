@@ -10,6 +10,9 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// [m] A finished lower bound may be this much lower than the tolerance asks for: 0.2 um by rounding
+// for each metre of coordinates, of which there are no more than ten in a robot's work.
+constexpr double kBoundError = 2e-6;
 
 }  // namespace
 
@@ -57,6 +60,16 @@ struct ProximityQuery::Impl {
     for (const std::size_t i : order) links[i].tighten(config);
   }
 
+  // Counts a link that a deadline left with wider bounds than were asked for.
+  void count_unfinished(const LinkProximity& result) {
+    if (result.state == LinkState::kClear) return;
+    const double width = result.distance - result.lower_bound - config.margin;
+    const double asked = std::max(config.tolerance, config.relative_tolerance * result.distance);
+    if (width <= asked + kBoundError) return;  // false for NaN: UNKNOWN
+    ++statistics.unfinished;
+    if (width > statistics.widest) statistics.widest = width;
+  }
+
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
   std::vector<std::size_t> order;  // of the links that are asked
@@ -99,6 +112,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   for (const std::size_t i : order) {
     if (!is_stopped) complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
+    if (!complete) impl_->count_unfinished((*results)[i]);
   }
   return complete;
 }
