@@ -13,6 +13,7 @@
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
+#include "proximity/coherence/node_bounds.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
 #include "proximity/supporting_planes.h"
@@ -59,9 +60,10 @@ struct SearchResult {
 /// The part that is kept from one query to the next. It speeds queries up and never changes what an
 /// answer promises.
 struct LinkCoherence {
-  explicit LinkCoherence(const LinkModel& link) : bound(link), supports(link.tree) {}
+  explicit LinkCoherence(const LinkModel& link) : bound(link), nodes(link), supports(link.tree) {}
 
   LinkBound bound;
+  NodeBounds nodes;
   BvttFronts fronts;
   DistanceCache distances;
   /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
@@ -86,6 +88,7 @@ struct LinkCoherence {
     last.build_id = 0;
     answered.scene = kUnknownScene;
     bound.forget();
+    nodes.forget();
     fronts.forget();
   }
 };

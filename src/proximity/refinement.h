@@ -42,10 +42,13 @@ class PointRefinement {
   /// Measures a point that may be inside.
   /// @param max_distance  [m] what its distance is known not to exceed, or does not matter beyond
   void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
+  /// Measures a point that is known to be outside.
+  /// @param max_distance  as above
+  /// @returns [m] a lower bound of its distance
+  double measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
+                         double max_distance = std::numeric_limits<double>::infinity());
 
  private:
-  void measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
-                       double max_distance, const Eigen::Vector3d& direction_L);
   SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
 
   const PointObstacles& obstacles_;
