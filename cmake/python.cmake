@@ -22,7 +22,11 @@ else()
   set(python_output ${CMAKE_CURRENT_BINARY_DIR}/python/ist_proximity)
   set(python_destination lib/python3/dist-packages/ist_proximity)
 endif()
-configure_file(python/ist_proximity/__init__.py ${python_output}/__init__.py COPYONLY)
+file(GLOB_RECURSE python_modules CONFIGURE_DEPENDS
+  RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}/python/ist_proximity python/ist_proximity/*.py)
+foreach(module IN LISTS python_modules)
+  configure_file(python/ist_proximity/${module} ${python_output}/${module} COPYONLY)
+endforeach()
 
 file(GLOB python_sources CONFIGURE_DEPENDS src/python/*.cpp)
 pybind11_add_module(ist_proximity_python MODULE NO_EXTRAS ${python_sources})
@@ -33,8 +37,14 @@ set_target_properties(ist_proximity_python PROPERTIES
   LIBRARY_OUTPUT_DIRECTORY ${python_output}
   INSTALL_RPATH "$ORIGIN/../../..;$ORIGIN/../../../${CMAKE_LIBRARY_ARCHITECTURE}")
 install(TARGETS ist_proximity_python LIBRARY DESTINATION ${python_destination})
-if(NOT catkin_FOUND)
-  install(FILES python/ist_proximity/__init__.py DESTINATION ${python_destination})
+if(catkin_FOUND)
+  # The generated messages' rule installs the modules, which are in one folder with them.
+  catkin_install_python(PROGRAMS scripts/proximity_report
+    DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+else()
+  install(DIRECTORY python/ist_proximity/ DESTINATION ${python_destination}
+    FILES_MATCHING PATTERN "*.py")
+  install(PROGRAMS scripts/proximity_report DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
 # Its tests, with pytest.

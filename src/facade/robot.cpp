@@ -9,6 +9,7 @@
 
 #include "internal/geometry/limits.h"
 #include "internal/geometry/regular_file.h"
+#include "internal/robot/mesh_size.h"
 #include "internal/robot/robot_bytes.h"
 #include "ist_proximity/geometry/error.h"
 #include "query_pool.h"
@@ -109,6 +110,11 @@ Robot::Robot(const std::string& urdf, const RobotConfig& config) {
     return !config.callbacks.cancelled || !config.callbacks.cancelled();
   };
   parts.description = parse_urdf(text, config.geometry, finder, may_go_on);
+  if (config.callbacks.warning) {
+    for (const std::string& doubt : doubtful_sizes(parts.description, config.links)) {
+      config.callbacks.warning(doubt);
+    }
+  }
   RobotModelConfig model_config;
   model_config.packing = config.packing;
   model_config.cache_directory = config.cache_directory;

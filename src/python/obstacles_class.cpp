@@ -127,6 +127,10 @@ void define_obstacles(py::module_* module) {
             return result;
           },
           "Numbers of points by what was done with them")
+      .def_property_readonly(
+          "ingest_time",
+          [](const PyObstacles& one) { return one.obstacles.snapshot().ingest_time; },
+          "[s] time that filtering and indexing took")
       .def("__repr__",
            [](const PyObstacles& one) {
              return "<ist_proximity.Obstacles of " + std::to_string(one.obstacles.size()) +

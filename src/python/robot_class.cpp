@@ -16,6 +16,7 @@
 #include "arrays.h"
 #include "ist_proximity/facade/robot.h"
 #include "obstacles_class.h"
+#include "robot_measures.h"
 
 namespace ist::python {
 namespace {
@@ -239,31 +240,6 @@ py::object link_poses(const Robot& robot, const py::object& q) {
   });
 }
 
-/// One dictionary for each link.
-py::list packing(const Robot& robot) {
-  py::list links;
-  for (const LinkModel& link : robot.model()->links) {
-    const std::vector<InnerSphere>& spheres = link.packing.spheres;
-    const auto count = static_cast<py::ssize_t>(spheres.size());
-    py::dict one;
-    one["link"] = link.name;
-    one["error"] = link.error;
-    one["centers"] = make_vectors({count}, [&](std::size_t i) { return spheres[i].center; });
-    one["radii"] = make_array<double>({count}, [&](std::size_t i) { return spheres[i].radius; });
-    one["max_gap"] = link.packing.certificate.max_gap;
-    one["mean_gap"] = link.packing.certificate.mean_gap;
-    one["surface_area"] = link.packing.certificate.surface_area;
-    one["unreachable_area"] = link.packing.certificate.unreachable_area;
-    one["reached"] = link.packing.certificate.reached;
-    one["triangles"] = link.solid.triangle_count();
-    one["is_closed"] = link.usable() && link.solid.is_closed();
-    one["packing_time"] = link.packing_time;
-    one["from_cache"] = link.from_cache;
-    links.append(one);
-  }
-  return links;
-}
-
 template <class... Arguments>
 void define_query(py::class_<Robot>* type, const char* name, Arguments&&... rest) {
   const QueryConfig defaults;
@@ -284,6 +260,9 @@ void define_robot(py::module_* module) {
            py::arg("links") = std::vector<std::string>(), py::arg("cache_directory") = "",
            py::arg("progress") = py::none(), py::arg("warning") = py::none())
       .def_property_readonly("name", &Robot::name, "name of the robot in the URDF")
+      .def_property_readonly(
+          "root_link", [](const Robot& robot) { return robot.description().root_link; },
+          "name of the root link, whose frame all points and poses are in")
       .def_property_readonly("links", &Robot::links, "names of the links, in the order of answers")
       .def_property_readonly("joints", &Robot::joints, "names of the joints, in the order of q")
       .def_property_readonly(
@@ -298,9 +277,10 @@ void define_robot(py::module_* module) {
           "link_poses", &link_poses, py::arg("q"),
           "Forward kinematics: (links, 4, 4) or (n, links, 4, 4), link frame -> root link's frame; "
           "nan where it is not known.")
-      .def_property_readonly("packing", &packing,
-                             "for each link a dictionary: spheres in the link's frame (centers "
-                             "(n, 3), radii (n,) [m]), max_gap [m], and more")
+      .def_property_readonly(
+          "links_without_geometry",
+          [](const Robot& robot) { return robot.description().links_without_geometry; },
+          "names of the other links of the URDF")
       .def("__repr__",
            [](const Robot& robot) {
              return "<ist_proximity.Robot '" + robot.name() +
@@ -330,6 +310,7 @@ void define_robot(py::module_* module) {
                           "nan is UNKNOWN.")
                    .c_str(),
                py::arg("poses"));
+  define_measures(&type);
 }
 
 }  // namespace ist::python
