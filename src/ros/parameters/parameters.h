@@ -34,6 +34,12 @@ struct SelfCollisionConfig {
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
 };
 
+/// Limits of ~attach_object.
+struct AttachConfig {
+  int max_objects = 100;  ///< attached at a time: each is packed, and measured by every query; >= 0
+  double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
+};
+
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
@@ -53,6 +59,7 @@ struct ServerConfig {
   ContactConfig contacts;
   PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
+  AttachConfig attach;
   std::vector<SourceConfig> sources;
 };
 
