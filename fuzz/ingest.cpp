@@ -180,7 +180,14 @@ void check_counts(const ist::IngestCounts& n, const ist::RawCloud& raw, const Ex
 // Near each point there is a thinned one, wherever the other points are.
 void check_thinned(const ist::CloudSnapshot& snapshot,
                    const std::map<std::uint32_t, Eigen::Vector3d>& points) {
-  const std::map<std::uint32_t, Eigen::Vector3d> thinned = stored(snapshot.coarse);
+  const std::map<std::uint32_t, Eigen::Vector3d> thinned =
+      ist::test::thinned_points_of(snapshot.index);
+  std::size_t in_tiles = 0;
+  for (const ist::ThinnedTile& tile : ist::test::thinned_tiles_of(snapshot.index)) {
+    in_tiles += static_cast<std::size_t>(tile.count);
+  }
+  FUZZ_CHECK(in_tiles == thinned.size(), "%zu of %zu thinned points differ", thinned.size(),
+             in_tiles);
   FUZZ_CHECK(thinned.size() <= points.size() && thinned.empty() == points.empty(),
              "%zu points thinned to %zu", points.size(), thinned.size());
   const double edge = snapshot.thinning;

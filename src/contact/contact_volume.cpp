@@ -42,6 +42,26 @@ void visit_tiles(const Index& index, const MayTouch& may_touch, const Visit& vis
   }
 }
 
+// Calls visit(tile) for the thinned tiles near those nodes whose bounding sphere `may_touch`.
+template <typename MayTouch, typename Visit>
+void visit_tiles(const ThinnedCloud& cloud, const MayTouch& may_touch, const Visit& visit) {
+  if (cloud.empty()) return;
+  ThinnedNode buffer;
+  TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
+  stack.push(cloud.root());
+  while (!stack.empty()) {
+    const std::int32_t child = stack.pop();
+    const BoxNode& node = cloud.nodes()[static_cast<std::size_t>(child)];
+    if (ThinnedCloud::is_leaf(node)) {
+      for (const ThinnedTile& tile : cloud.tiles(child, &buffer)) visit(tile);
+      continue;
+    }
+    for (int k = 0; k < node.count; ++k) {
+      if (may_touch(bounding_sphere(node, k))) stack.push(node.child[k]);
+    }
+  }
+}
+
 // Sums the contact volume of one link with obstacles.
 class LinkContact {
  public:
@@ -49,10 +69,11 @@ class LinkContact {
       : link_(link), geometry_(geometry) {}
 
   void add_points(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF, SnapshotSpan clouds) {
-    const Eigen::Isometry3d &X_FO = cloud.coarse.X_FO(), X_LO = X_LF * X_FO;
+    const ThinnedCloud thinned = cloud.index.bvh().thinned();
+    const Eigen::Isometry3d &X_FO = thinned.X_FO(), X_LO = X_LF * X_FO;
     const double radius = point_sphere_radius(cloud);
     visit_tiles(
-        cloud.coarse.bvh(),
+        thinned,
         [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const PointTile& tile) {
           for (int k = 0; k < tile.count; ++k) {

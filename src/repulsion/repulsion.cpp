@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/cloud/point_bvh.h"
 #include "internal/geometry/relative_pose.h"
 #include "repulsion/blend_kernel.h"
 #include "repulsion/coarse_spheres.h"
@@ -28,22 +29,21 @@ PosedSpheres posed(const std::vector<SphereGroup>& groups, const Eigen::Isometry
   return spheres;
 }
 
-// Calls visit(index, spheres, R_FO, grid) for each thinned cloud and each map: the link's spheres
-// are in the frame O of the index, and the grid is the one that the cloud was thinned to.
+// Calls visit(index, spheres, R_FO) for each thinned cloud and each map: the link's spheres are in
+// the frame O of the index.
 template <typename Visit>
 void for_each_index(SnapshotSpan clouds, const std::vector<SphereGroup>& groups,
                     const Eigen::Isometry3d& X_FL, const Visit& visit) {
-  const ThinningGrid no_grid(Eigen::Vector3d::Zero(), 1.0);
   for (const CloudSnapshot* cloud : clouds) {
     if (cloud == nullptr) continue;
-    if (!cloud->coarse.empty()) {
-      const Eigen::Isometry3d& X_FO = cloud->coarse.X_FO();
-      visit(cloud->coarse.bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(),
-            ThinningGrid(X_FO.translation(), cloud->thinning));
+    const ThinnedCloud thinned = cloud->index.bvh().thinned();
+    if (!thinned.empty()) {
+      const Eigen::Isometry3d& X_FO = thinned.X_FO();
+      visit(thinned, posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear());
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     const Eigen::Isometry3d X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
-    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
+    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear());
   }
 }
 
@@ -104,8 +104,9 @@ RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_F
   const std::vector<SphereGroup>& groups = spheres_->by_link[link];
   float nearest = std::numeric_limits<float>::infinity();
   for_each_index(clouds, groups, X_FL,
-                 [&nearest](const auto& index, const PosedSpheres& spheres, const auto&,
-                            const auto&) { nearest = nearest_pair(index, spheres, nearest); });
+                 [&nearest](const auto& index, const PosedSpheres& spheres, const auto&) {
+                   nearest = nearest_pair(index, spheres, nearest);
+                 });
   const double length = config.gain * strength;
   if (!std::isfinite(nearest)) {
     const Eigen::Vector3d arm = proximity.p_FCl - X_FL.translation();
@@ -114,9 +115,8 @@ RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_F
   Total total{proximity.direction, {}, 0.0};
   const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
   for_each_index(clouds, groups, X_FL,
-                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO,
-                     const ThinningGrid& grid) {
-                   total.add(blend_pairs(index, spheres, {nearest, smoothing, grid}), R_FO);
+                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO) {
+                   total.add(blend_pairs(index, spheres, {nearest, smoothing}), R_FO);
                  });
   return scaled(total.wrench, length / total.weight);
 }
