@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -22,6 +23,7 @@ class Stub : public Measurement {
 std::shared_ptr<const Measurement> stub(double after, std::size_t bytes = 1) {
   std_msgs::Header header;
   header.stamp = ros::Time(kStart + after);
+  ros::Time::init();
   ros::Time::setNow(header.stamp);
   return std::make_shared<Stub>(header, bytes);
 }
@@ -51,7 +53,7 @@ Outcome run(double rate, double late, std::size_t bytes) {
     queue.drop_overdue(ros::Time(kStart + now), 1.0);
     const std::size_t ready = queue.newest_ready([&](const Measurement& measurement) {
       ++outcome.asked;
-      return measurement.header().stamp.toSec() - kStart <= now - late;
+      return measurement.header().stamp.toSec() - kStart <= now - late + 1e-6;
     });
     if (ready == queue.size()) continue;
     ++outcome.used;
