@@ -10,6 +10,7 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "support/allocations.h"
+#include "support/meshes.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -35,6 +36,7 @@ RobotModel coarse_robot() {
   model.links.push_back(link_of("box", Box{{0.3, 0.2, 0.1}}, 0.02));
   model.links.push_back(link_of("cylinder", Cylinder{0.08, 0.4}, 0.02));
   model.links.push_back(link_of("sphere", Sphere{0.12}, 0.02));
+  model.links.push_back(link_of("mesh", test::l_shape(0.3, 0.12), 0.02));
   return model;
 }
 

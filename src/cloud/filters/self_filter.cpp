@@ -18,6 +18,16 @@ std::uint32_t all_of(const PointTile& tile) {
   return (1U << static_cast<std::uint32_t>(tile.count)) - 1U;
 }
 
+// Bit k: the id of the point in slot k is one of [first, last].
+std::uint32_t slots_within(const PointTile& tile, std::uint32_t first, std::uint32_t last) {
+  std::uint32_t mask = 0;
+  for (std::int32_t k = 0; k < tile.count; ++k) {
+    const bool is_within = tile.id[k] >= first && tile.id[k] <= last;
+    mask |= static_cast<std::uint32_t>(is_within) << static_cast<std::uint32_t>(k);
+  }
+  return mask;
+}
+
 }  // namespace
 
 void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO,
@@ -38,6 +48,8 @@ void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3
     link.rounding = static_cast<float>(kRounding * (size + X_OL.translation().norm()));
     link.clear_distance = static_cast<float>(clear_distance) + link.rounding;
     link.padded_radius = static_cast<float>(tree.radius()) + link.clear_distance;
+    link.first_point = posed.first_point;
+    link.last_point = posed.last_point;
     links_.push_back(link);
   }
 }
@@ -59,27 +71,36 @@ bool SelfFilter::may_drop(const PaddedBox& box) const {
 std::uint32_t SelfFilter::points_on_robot(const PointTile& tile, const PaddedBox& box) const {
   const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
   const float radius = 0.5F * box.diagonal();
+  const auto [first, last] = std::minmax_element(tile.id, tile.id + tile.count);
   std::uint32_t mask = 0;
   for (const Link& link : links_) {
+    if (*last < link.first_point || *first > link.last_point) continue;
     if (!may_touch(link, center, radius)) continue;
-    mask |= points_on_link(link, tile, center.cast<double>(), static_cast<double>(radius));
+    const bool all = *first >= link.first_point && *last <= link.last_point;
+    const std::uint32_t measured =
+        all ? all_of(tile) : slots_within(tile, link.first_point, link.last_point);
+    mask |= points_on_link(link, tile, measured & ~mask, center.cast<double>(),
+                           static_cast<double>(radius));
     if (mask == all_of(tile)) break;
   }
   return mask;
 }
 
+// @param measured  bits of the points that are asked about
 std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile,
-                                         const Eigen::Vector3d& center_O, double radius) const {
+                                         std::uint32_t measured, const Eigen::Vector3d& center_O,
+                                         double radius) const {
   switch (test_spheres(link, link.X_LO * center_O, radius)) {
     case Verdict::kClear:
       return 0;
     case Verdict::kOnLink:
-      return all_of(tile);
+      return measured;
     case Verdict::kUndecided:
       break;
   }
   std::uint32_t mask = 0;
   for (std::int32_t k = 0; k < tile.count; ++k) {
+    if ((measured >> static_cast<std::uint32_t>(k) & 1U) == 0) continue;
     const Eigen::Vector3f p_O(tile.x[k], tile.y[k], tile.z[k]);
     const Eigen::Vector3d p_L = link.X_LO * p_O.cast<double>();
     const Verdict verdict = test_spheres(link, p_L, 0.0);

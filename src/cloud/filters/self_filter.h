@@ -20,7 +20,8 @@ namespace ist {
 /// open, too. Keeps its memory. Not thread safe.
 class SelfFilter {
  public:
-  /// @param solids   the robot's links, at one or several instants; viewed until the next call
+  /// @param solids   the robot's links, at one or several instants; viewed until the next call. A
+  ///                 point is compared with those that it was measured at
   /// @param X_FO     frame of the points -> fixed frame
   /// @param padding  [m] >= 0
   void set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO, double padding);
@@ -44,17 +45,18 @@ class SelfFilter {
   struct Link {
     const InnerSphereTree* tree;
     const Solid* solid;
-    Eigen::Isometry3d X_LO;    ///< frame of the points -> link frame
-    Eigen::Vector3f center_O;  ///< [m] of the link's bounding sphere
-    float padded_radius;       ///< [m] of the bounding sphere, and the clear distance
-    float rounding;            ///< [m] more than what float rounds off
-    float clear_distance;      ///< [m] a cover distance above it proves a point clear
+    Eigen::Isometry3d X_LO;                 ///< frame of the points -> link frame
+    Eigen::Vector3f center_O;               ///< [m] of the link's bounding sphere
+    float padded_radius;                    ///< [m] of the bounding sphere, and the clear distance
+    float rounding;                         ///< [m] more than what float rounds off
+    float clear_distance;                   ///< [m] a cover distance above it proves a point clear
+    std::uint32_t first_point, last_point;  ///< ids of the points that the pose is for
   };
 
   static bool may_touch(const Link& link, const Eigen::Vector3f& center_O, float radius);
   Verdict test_spheres(const Link& link, const Eigen::Vector3d& center_L, double radius) const;
   bool test_geometry(const Link& link, const Eigen::Vector3d& p_L) const;
-  std::uint32_t points_on_link(const Link& link, const PointTile& tile,
+  std::uint32_t points_on_link(const Link& link, const PointTile& tile, std::uint32_t measured,
                                const Eigen::Vector3d& center_O, double radius) const;
 
   double padding_ = 0.0;

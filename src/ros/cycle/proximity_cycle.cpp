@@ -157,8 +157,9 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
   for (std::size_t i = 0; i < selection_.selected().size(); ++i) {
     const SourceSnapshot* snapshot = selection_.selected()[i];
     if (!snapshot) continue;
-    const std::string unfiltered = unfiltered_links(robot_, model_->monitored, poses_, *snapshot,
-                                                    status_input_.sources[i].name);
+    const std::string unfiltered =
+        unfiltered_links(robot_, model_->monitored, poses_, pose_source_.get(), *snapshot,
+                         status_input_.sources[i].name);
     if (!unfiltered.empty()) problems.push_back(unfiltered);
   }
   status_input_.pose_doubts = poses_.doubts;

@@ -28,7 +28,7 @@ class CloudMeasurement : public Measurement {
   /// @param noise  null: no noise filter
   CloudMeasurement(const sensor_msgs::PointCloud2ConstPtr& message, const RawCloud& raw,
                    std::shared_ptr<NoiseFilter> noise)
-      : Measurement(message->header), raw_(raw), noise_(std::move(noise)) {
+      : Measurement(message->header, message->data.size()), raw_(raw), noise_(std::move(noise)) {
     raw_.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
   }
 

@@ -87,6 +87,11 @@ void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
 }
 
+void read_attach(ParameterReader* reader, AttachConfig* config) {
+  reader->read("attach/max_objects", Range::non_negative("", 1e4), &config->max_objects);
+  reader->read("attach/max_time", Range::positive("s", 3600.0), &config->max_time);
+}
+
 }  // namespace
 
 std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& private_nh) {
@@ -113,7 +118,8 @@ double deadline_of(double parameter, double period) {
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);
   ServerConfig config;
-  for (const char* group : {"query", "repulsion", "penetration", "packing", "self_collision"}) {
+  for (const char* group :
+       {"query", "repulsion", "penetration", "packing", "self_collision", "attach"}) {
     reader.children(group);  // adds an error unless it is a dictionary
   }
   read_poses(&reader, &config);
@@ -129,6 +135,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
   read_self_collision(&reader, &config.self_collision);
+  read_attach(&reader, &config.attach);
 
   if (!reader.errors().empty()) throw ParameterError(join(reader.errors(), "\n"));
   const std::vector<std::string> unknown = reader.unknown();

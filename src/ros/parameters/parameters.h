@@ -46,6 +46,12 @@ QueryConfig default_query();
 /// @param period     [s] from one cycle to the next
 double deadline_of(double parameter, double period);
 
+/// Limits of ~attach_object.
+struct AttachConfig {
+  int max_objects = 100;  ///< attached at a time: each is packed, and measured by every query; >= 0
+  double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
+};
+
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
@@ -65,6 +71,7 @@ struct ServerConfig {
   ContactConfig contacts;
   PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
+  AttachConfig attach;
   std::vector<SourceConfig> sources;
 };
 
