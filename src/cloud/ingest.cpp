@@ -13,6 +13,7 @@
 #include "cloud/index/unorganized_cloud.h"
 #include "internal/cloud/largest_range.h"
 #include "internal/cloud/point_bvh.h"
+#include "internal/cloud/voxel_grid.h"
 
 namespace ist {
 namespace {
@@ -30,8 +31,8 @@ void check(const IngestConfig& config) {
           "more than min_range");
   require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
           "self_filter_padding", config.self_filter_padding, "0 or more");
-  require(config.thinning > 0.0 && std::isfinite(config.thinning), "thinning", config.thinning,
-          "more than 0");
+  require(config.thinning >= kSmallestVoxel && std::isfinite(config.thinning), "thinning",
+          config.thinning, "1e-9 or more");
   require(config.max_points > 0, "max_points", 0.0, "1 or more");
 }
 

@@ -20,10 +20,11 @@ namespace HWY_NAMESPACE {
 namespace blend {
 
 template <class Index>
-HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, float limit) {
+HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, float limit,
+                             Deadline* deadline) {
   PosedLink link;
   Pose(spheres, &link);
-  VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
+  VisitTiles(index, link, limit, deadline, [&](const auto& tile, std::uint32_t groups) {
     for (; groups != 0; groups &= groups - 1) {
       const PosedGroup& group = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(groups)];
       limit = std::min(limit, Nearest(tile, 0, tile.count, group));
@@ -115,14 +116,15 @@ HWY_INLINE PairSums Total(const SphereSums& sums, const PosedGroup& group) {
 }
 
 template <class Index>
-HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, const Band& band) {
+HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, const Band& band,
+                               Deadline* deadline) {
   PosedLink link;
   Pose(spheres, &link);
   std::array<SphereSums, kMaxGroups> sums;
   const float limit = band.nearest + band.smoothing;
   alignas(64) float weights[kWidth];
   std::fill_n(weights, kWidth, 1.0F);
-  VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
+  VisitTiles(index, link, limit, deadline, [&](const auto& tile, std::uint32_t groups) {
     if constexpr (std::is_same_v<Index, ThinnedCloud>) CellWeights(tile, weights);
     for (; groups != 0; groups &= groups - 1) {
       const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
@@ -137,17 +139,21 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, 
 }  // namespace blend
 
 // HWY_EXPORT asks for these here.
-float NearestPointPair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit) {
-  return blend::NearestPair(cloud, spheres, limit);
+float NearestPointPair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
+                       Deadline* deadline) {
+  return blend::NearestPair(cloud, spheres, limit, deadline);
 }
-float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float limit) {
-  return blend::NearestPair(index, spheres, limit);
+float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
+                     Deadline* deadline) {
+  return blend::NearestPair(index, spheres, limit, deadline);
 }
-PairSums BlendPointPairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band) {
-  return blend::BlendPairs(cloud, spheres, band);
+PairSums BlendPointPairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
+                         Deadline* deadline) {
+  return blend::BlendPairs(cloud, spheres, band, deadline);
 }
-PairSums BlendBoxPairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band) {
-  return blend::BlendPairs(index, spheres, band);
+PairSums BlendBoxPairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
+                       Deadline* deadline) {
+  return blend::BlendPairs(index, spheres, band, deadline);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -172,22 +178,28 @@ void PairSums::add(const PairSums& other) {
   }
 }
 
-float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit) {
-  return cloud.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestPointPair)(cloud, spheres, limit);
+float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline) {
+  if (cloud.empty()) return limit;
+  return HWY_DYNAMIC_DISPATCH(NearestPointPair)(cloud, spheres, limit, deadline);
 }
 
-float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit) {
-  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestBoxPair)(index, spheres, limit);
+float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline) {
+  if (index.empty()) return limit;
+  return HWY_DYNAMIC_DISPATCH(NearestBoxPair)(index, spheres, limit, deadline);
 }
 
-PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band) {
+PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline) {
   if (cloud.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(cloud, spheres, band);
+  return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(cloud, spheres, band, deadline);
 }
 
-PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band) {
+PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline) {
   if (index.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band);
+  return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band, deadline);
 }
 
 }  // namespace ist

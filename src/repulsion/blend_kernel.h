@@ -5,6 +5,7 @@
 
 #include "internal/cloud/box_bvh.h"
 #include "internal/cloud/thinned_cloud.h"
+#include "internal/proximity/deadline.h"
 #include "repulsion/coarse_spheres.h"
 
 namespace ist {
@@ -31,9 +32,11 @@ struct PairSums {
 };
 
 /// [m] The smallest distance of a pair, negative where a point is in a sphere; `limit` where no
-/// pair is nearer than that.
-float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit);
-float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit);
+/// pair is nearer than that. Once the deadline has passed, the result may be too large.
+float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline);
+float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline);
 
 /// The pairs that count, and how much.
 struct Band {
@@ -49,8 +52,10 @@ constexpr float kLeastCellWeight = 0.01F;
 constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
 
 /// The sums over all pairs nearer than nearest + smoothing; w = (1 - (d - nearest) / smoothing)^2
-/// times the points' weight.
-PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band);
-PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band);
+/// times the points' weight. Once the deadline has passed, pairs are missing.
+PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline);
+PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline);
 
 }  // namespace ist

@@ -28,6 +28,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 static_assert(kSphereGroupWidth == kPointWidth);
 constexpr auto kWidth = static_cast<std::size_t>(kSphereGroupWidth);
 constexpr std::size_t kMaxGroups = kCoarseSpheres / kWidth;
+// Nodes and tiles that are visited between two looks at the clock: some microseconds.
+constexpr std::uint32_t kStepsBetweenLooks = 16;
 using Tag = hn::CappedTag<float, kWidth>;
 using V = hn::Vec<Tag>;
 
@@ -208,16 +210,17 @@ struct TileBuffer<ThinnedCloud> {
 
 // Calls visit(tile, groups) for the tiles that may hold a point nearer to a sphere's surface than
 // `limit`, depth first, the nearest child first; bit g of `groups`: to a sphere of group g. `visit`
-// may lower the limit.
+// may lower the limit. Ends early once the deadline has passed.
 template <class Index, class Visit>
 HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const float& limit,
-                           const Visit& visit) {
+                           Deadline* deadline, const Visit& visit) {
   TileBuffer<Index> buffer;
   TraversalStack<Entry, stack_capacity(kMaxBoxLevels, kWidth)> stack;
   stack.push({index.root(), (1U << link.count) - 1U, -kFarAway});
   while (!stack.empty()) {
     const Entry entry = stack.pop();
     if (!(entry.bound < limit)) continue;
+    if (deadline->passed_now_and_then(kStepsBetweenLooks)) return;
     if constexpr (!std::is_same_v<Index, ThinnedCloud>) {
       if (entry.child < 0) {
         visit(index.tile(static_cast<std::size_t>(~entry.child), &buffer.tile), entry.groups);

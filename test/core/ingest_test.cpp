@@ -761,13 +761,44 @@ TEST(Thinning, gridStaysWhenTheSensorMoves) {
   EXPECT_EQ(thinned({0, 0, 0}), thinned({0.25, -7.5, 3.75}));
 }
 
-TEST(Thinning, voxelsGrowUntilTheyCanBeNumbered) {
+// A grid that has to number all voxels from its origin to a point at 1e9 m in 30 bits has voxels of
+// 0.93 m: the wall below was thinned to a few points.
+void check_far_point(double far) {
   IngestConfig config = without_limits();
-  config.thinning = 1e-6;
+  config.thinning = 0.01;
+  Points points;
+  for (int i = -50; i < 50; ++i) {
+    for (int k = -50; k < 50; ++k) {
+      const Eigen::Vector3d centre(0.01 * i + 0.005, 0.01 * k + 0.005, 0.205);
+      points.push_back(centre);
+      points.push_back(centre + Eigen::Vector3d(0.002, -0.003, 0.001));
+    }
+  }
+  const auto near = test::thinned_points_of(ingest(points, config, float64()).index);
+  ASSERT_EQ(near.size(), 10000U);
+  points.emplace_back(0.6 * far, -0.8 * far, 0.0);
+  points.emplace_back(-0.6 * far, 0.8 * far, 0.0);
+  const CloudSnapshot snapshot = ingest(points, config, float64());
+  ASSERT_EQ(snapshot.counts.used, 20002U);
+  const auto all = test::thinned_points_of(snapshot.index);
+  EXPECT_EQ(all.size(), 10002U) << "points at " << far << " m";
+  for (const auto& [id, p] : near) EXPECT_EQ(all.count(id), 1U) << "point " << id;
+  EXPECT_EQ(snapshot.thinning, 0.01);
+}
+
+TEST(Thinning, pointsFarAwayChangeNothingForTheOthers) {
+  for (const double far : {1e3, 1.07e7, 1.1e7, 1e9}) {
+    test::for_each_instruction_set([far] { check_far_point(far); });
+  }
+}
+
+TEST(Thinning, twoPointsAreTwoVoxelsAtTheFinestEdge) {
+  IngestConfig config = without_limits();
+  config.thinning = 1e-9;
   const CloudSnapshot snapshot =
-      ingest({{1e8, 0, 0}, {-1e8, 0, 0}, {0, 0, 1}, {0, 0, 1.000001}}, config, float64());
+      ingest({{1e9, 0, 0}, {-1e9, 0, 0}, {0, 0, 1}, {0, 0, 1.000001}}, config, float64());
   EXPECT_EQ(snapshot.counts.used, 4U);
-  EXPECT_EQ(test::thinned_points_of(snapshot.index).size(), 3U);
+  EXPECT_EQ(test::thinned_points_of(snapshot.index).size(), 4U);
 }
 
 }  // namespace

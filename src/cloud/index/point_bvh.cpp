@@ -26,7 +26,7 @@ PointBvh& PointBvh::operator=(const PointBvh& other) {
 
 void PointBvh::set_thinning(double voxel_size) {
   is_thinned_ = true;
-  grid_ = VoxelGrid(X_FO_, bounds_, voxel_size);
+  grid_ = VoxelGrid(X_FO_, voxel_size);
   thinned_.reset(nodes_.size(), tiles_.size());
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <tuple>
 
@@ -21,6 +22,19 @@ using Lanes = Eigen::Array<float, kLanes, 1>;
 using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
 using Slots = Eigen::Array<float, kBoxWidth, 1>;
 using SlotMap = Eigen::Map<const Slots, Eigen::Aligned16>;
+
+// The integer of a voxel's number along an axis, which is a whole float. Numbers from 2^30 on have
+// the integers of their bits, which are larger: no two numbers share one, however far a point is,
+// and the edge of a voxel depends on no point.
+std::int32_t as_integer(float number) {
+  constexpr float kPlain = 1 << 30;
+  const float size = std::abs(number);
+  if (size < kPlain) return static_cast<std::int32_t>(number);
+  std::int32_t bits = 0;
+  static_assert(sizeof bits == sizeof size, "a float has 32 bits");
+  std::memcpy(&bits, &size, sizeof bits);
+  return number < 0.0F ? -bits : bits;
+}
 
 void write_unused(ThinnedTile* tile) {
   for (int k = tile->count; k < kPointWidth; ++k) {
@@ -62,8 +76,8 @@ void NodeThinning::for_each_candidate(const PointTile& tile, const Visit& visit)
   const std::size_t count = find_voxels(grid_, tile, &voxels);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t k = voxels.nearest[i];
-    visit(Candidate{{static_cast<std::int32_t>(voxels.x[k]), static_cast<std::int32_t>(voxels.y[k]),
-                     static_cast<std::int32_t>(voxels.z[k])},
+    visit(Candidate{{as_integer(voxels.x[k]), as_integer(voxels.y[k]), as_integer(voxels.z[k])},
+                    {voxels.x[k], voxels.y[k], voxels.z[k]},
                     voxels.offset_sq[k],
                     tile.x[k],
                     tile.y[k],
@@ -107,7 +121,6 @@ void NodeThinning::add(const Candidate& candidate) {
 
 // The places that are no farther from the centre of a candidate's voxel than itself.
 void NodeThinning::set_spheres() {
-  const double rounding = kRounding * (grid_.extent + grid_.edge);
   std::fill_n(min_, 3, std::numeric_limits<float>::max());
   std::fill_n(max_, 3, std::numeric_limits<float>::lowest());
   for (std::size_t i = 0; i < count_; ++i) {
@@ -119,8 +132,11 @@ void NodeThinning::set_spheres() {
       const double place = static_cast<double>(r[0]) * p[0] + static_cast<double>(r[1]) * p[1] +
                            static_cast<double>(r[2]) * p[2] +
                            static_cast<double>(grid_.offset[axis]);
-      to_center[axis] = c.voxel[axis] + 0.5 - place;
+      to_center[axis] = static_cast<double>(c.number[axis]) + 0.5 - place;
     }
+    // Rivals are near, so their coordinates are as large.
+    const double rounding =
+        kRounding * (std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]) + 2.0 * grid_.edge);
     const double radius = grid_.edge * std::sqrt(static_cast<double>(c.offset_sq)) + rounding;
     float* const center[3] = {x_.data(), y_.data(), z_.data()};
     for (int k = 0; k < 3; ++k) {

@@ -32,7 +32,8 @@ class NodeThinning {
   static constexpr std::uint16_t kEmpty = 0xFFFF;
 
   struct Candidate {
-    std::int32_t voxel[3];  // numbers along each axis, from the origin
+    std::int32_t voxel[3];  // numbers along each axis, from the origin, each as an integer
+    float number[3];        // the same as they are
     float offset_sq;        // squared distance to the voxel's centre, in voxels
     float x, y, z;          // [m] in O
     std::uint32_t id;
