@@ -132,6 +132,29 @@ ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
 ist_proximity_peer(dynamic_edt dynamicEDT3D/dynamicEDTOctomap.h dynamicedt3d octomap octomath)
 
+# The cost of a camera, beside some of them. The robot's own points are dropped with CGAL's hulls.
+target_sources(benchmark_camera PRIVATE
+  benchmark/peers/flat.cpp
+  benchmark/peers/image_pyramid.cpp
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
+if(IST_PROXIMITY_cgal_INCLUDE_DIR AND IST_PROXIMITY_gmp_LIBRARY)
+  target_sources(benchmark_camera PRIVATE benchmark/peers/body_filter.cpp)
+  set_source_files_properties(benchmark/peers/body_filter.cpp PROPERTIES COMPILE_OPTIONS -w)
+  target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_CGAL)
+  target_link_libraries(benchmark_camera PRIVATE ${IST_PROXIMITY_gmp_LIBRARY})
+endif()
+if(IST_PROXIMITY_embree_INCLUDE_DIR AND IST_PROXIMITY_embree3_LIBRARY)
+  target_sources(benchmark_camera PRIVATE benchmark/peers/embree.cpp)
+  target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_EMBREE)
+  target_link_libraries(benchmark_camera PRIVATE ${IST_PROXIMITY_embree3_LIBRARY})
+endif()
+if(IST_PROXIMITY_nanoflann_INCLUDE_DIR)
+  target_sources(benchmark_camera PRIVATE benchmark/peers/nanoflann.cpp)
+  target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_NANOFLANN)
+endif()
+
 # Through ROS: they need a roscore while they run.
 if(catkin_FOUND)
   file(GLOB ros_benchmark_sources CONFIGURE_DEPENDS benchmark/ros/*.cpp)

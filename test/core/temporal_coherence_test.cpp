@@ -348,8 +348,8 @@ TEST(CoherentQueries, BoundsHoldWhenAMapMoves) {
 }
 
 // A bound kept from another pose may say that nothing is deeper than the tolerance. Where the last
-// obstacle touches the link at exactly 0, that does not settle the query: another one may be inside.
-// All numbers are multiples of 2^-12 m, so that touch is exact.
+// obstacle touches the link at exactly 0, that does not settle the query: another one may be
+// inside. All numbers are multiples of 2^-12 m, so that touch is exact.
 TEST(CoherentQueries, ATouchDoesNotHideAPointInside) {
   test::Rng rng(65);
   const auto model = test::make_model({Box{{0.25, 0.25, 0.25}}}, 0.01);
