@@ -221,6 +221,7 @@ void ProximityServer::Impl::run_cycle() {
   const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
     if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
   };
+  spheres_.show_nearness(*message, config_.query.max_distance);
   if (results_.publish(message, fill_joint_repulsion)) {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     ++report_.markers_drawn;
@@ -296,6 +297,7 @@ void ProximityServer::Impl::publish_diagnostics() {
     report = report_;
   }
   report.parameter_problem = live_.problem();
+  report.parameters_without_effect = live_.without_effect();
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);
