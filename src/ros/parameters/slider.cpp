@@ -17,7 +17,7 @@ constexpr Entry kEntries[] = {
     {"query/tolerance", 0.05,
      "Largest difference between distance and lower_bound; 0: exact. Larger is faster."},
     {"query/deadline", 0.05,
-     "Time after which a query ends with wider bounds (status DEGRADED); 0: none."},
+     "Time after which a query ends with wider bounds; negative: a share of the period; 0: none."},
     {"query/margin", 0.2,
      "Taken off every lower_bound, for sensor noise, calibration and latency."},
     {"repulsion/influence_distance", 0.0,  // ~max_distance
