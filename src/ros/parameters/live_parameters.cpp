@@ -235,7 +235,7 @@ bool LiveParameters::read_server() {
 
 /// Says which parameters were changed without effect. The caller holds change_mutex_.
 void LiveParameters::note_startup_changes(const XmlRpc::XmlRpcValue& tree) {
-  const std::string changes = startup_.changes(tree);
+  const std::string changes = startup_.changes(tree, tunables_);
   {
     const std::lock_guard<std::mutex> lock(live_mutex_);
     if (changes == without_effect_) return;

@@ -12,12 +12,6 @@ namespace {
 using XmlRpc::XmlRpcValue;
 using Values = std::map<std::string, std::string>;
 
-// Names whose parameters may change at any time. Some of ~query and ~penetration may not.
-const std::set<std::string> kLive = {"query/tolerance",       "query/deadline",
-                                     "query/margin",          "repulsion/influence_distance",
-                                     "repulsion/gain",        "repulsion/smoothing",
-                                     "repulsion/filter_time", "penetration/stiffness"};
-
 // Values of one parameter are compared and shown as text.
 std::string text_of(const XmlRpcValue& value) {
   std::ostringstream text;
@@ -25,22 +19,25 @@ std::string text_of(const XmlRpcValue& value) {
   return text.str();
 }
 
-void collect(const XmlRpcValue& value, const std::string& name, Values* values) {
+void collect(const XmlRpcValue& value, const std::string& name, const std::set<std::string>& live,
+             Values* values) {
   if (value.getType() == XmlRpcValue::TypeStruct) {
     XmlRpcValue members = value;  // its iterators are not const
     for (auto& [key, member] : members) {
-      collect(member, name.empty() ? key : name + "/" + key, values);
+      collect(member, name.empty() ? key : name + "/" + key, live, values);
     }
-  } else if (!name.empty() && value.valid() && kLive.count(name) == 0) {
+  } else if (!name.empty() && value.valid() && live.count(name) == 0) {
     (*values)[name] = text_of(value);
   }
 }
 
 }  // namespace
 
-std::string StartupParameters::changes(const XmlRpcValue& tree) {
+std::string StartupParameters::changes(const XmlRpcValue& tree, const std::vector<Tunable>& live) {
+  std::set<std::string> names;
+  for (const Tunable& tunable : live) names.insert(tunable.name);
   Values now;
-  if (tree.valid()) collect(tree, "", &now);
+  if (tree.valid()) collect(tree, "", names, &now);
   if (!has_begun_) {
     has_begun_ = true;
     in_use_ = std::move(now);

@@ -4,6 +4,9 @@
 
 #include <map>
 #include <string>
+#include <vector>
+
+#include "ros/parameters/parameter_reader.h"
 
 namespace ist {
 
@@ -12,9 +15,10 @@ class StartupParameters {
  public:
   /// @param tree  the private namespace, as fetch_parameters() returns it. The first call's values
   ///              are those in use
+  /// @param live  parameters that may change at any time
   /// @returns a sentence with each value that has changed or come since; empty when none has. What
   ///          is gone from the server is not named: it is still in use
-  std::string changes(const XmlRpc::XmlRpcValue& tree);
+  std::string changes(const XmlRpc::XmlRpcValue& tree, const std::vector<Tunable>& live);
 
  private:
   std::map<std::string, std::string> in_use_;  ///< by name
