@@ -94,6 +94,10 @@ target_sources(benchmark_modes PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp
   benchmark/peers/synthetic.cpp)
+target_sources(benchmark_noise_filter PRIVATE
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
 # ist_proximity_peer(NAME HEADER [LIBRARY...]): compiles benchmark/peers/NAME.cpp where they are.
 function(ist_proximity_peer name header)
   find_path(IST_PROXIMITY_${name}_INCLUDE_DIR ${header})
@@ -127,6 +131,15 @@ find_path(IST_PROXIMITY_pcl_INCLUDE_DIR pcl/kdtree/kdtree_flann.h
 set_source_files_properties(benchmark/peers/pcl.cpp PROPERTIES
   INCLUDE_DIRECTORIES "${IST_PROXIMITY_pcl_INCLUDE_DIR}")
 ist_proximity_peer(pcl pcl/kdtree/kdtree_flann.h pcl_kdtree pcl_octree pcl_common)
+# What the noise filter is measured beside.
+find_library(IST_PROXIMITY_pcl_filters_LIBRARY pcl_filters)
+mark_as_advanced(IST_PROXIMITY_pcl_filters_LIBRARY)
+if(IST_PROXIMITY_pcl_INCLUDE_DIR AND IST_PROXIMITY_pcl_filters_LIBRARY)
+  target_compile_definitions(benchmark_noise_filter PRIVATE IST_PROXIMITY_HAS_PCL_FILTERS)
+  target_include_directories(benchmark_noise_filter SYSTEM PRIVATE ${IST_PROXIMITY_pcl_INCLUDE_DIR})
+  target_link_libraries(benchmark_noise_filter PRIVATE
+    ${IST_PROXIMITY_pcl_filters_LIBRARY} ${IST_PROXIMITY_pcl_common_LIBRARY})
+endif()
 ist_proximity_peer(embree embree3/rtcore.h embree3)
 ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)

@@ -229,6 +229,7 @@ void ProximityServer::Impl::run_cycle() {
     if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
   };
   Stopwatch watch;
+  spheres_.show_nearness(*message, config_.query.max_distance);
   const bool drawn = results_.publish(message, fill_joint_repulsion);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
@@ -305,6 +306,7 @@ void ProximityServer::Impl::publish_diagnostics() {
     report_.worst_deadline = DeadlineCost();
   }
   report.parameter_problem = live_.problem();
+  report.parameters_without_effect = live_.without_effect();
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);

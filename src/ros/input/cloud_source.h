@@ -18,6 +18,7 @@
 #include "ros/input/placer.h"
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
+#include "ros/input/topic_advice.h"
 #include "ros/parameters/source_config.h"
 #include "ros/poses/transform_buffer.h"
 
@@ -97,7 +98,7 @@ class CloudSource {
   const TransformBuffer& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
-  ros::Subscriber subscriber_;
+  Subscription subscription_;
   SnapshotExchange exchange_;
   SourceState state_;
 
@@ -116,6 +117,8 @@ class CloudSource {
   std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
   bool waits_for_tf_ = false;                          ///< the reported problem is that wait
   PublisherCount publisher_count_;
+  TopicAdvice topic_advice_;
+  bool has_received_ = false;
   std::atomic<bool> running_{true};
   std::thread thread_;
 };

@@ -254,9 +254,8 @@ void ModelLoader::load(const std::string& urdf) {
   if (!build(description, &state)) return;  // cancelled
   finish(description, &state);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  ROS_INFO("model of '%s' ready after %.1f s: %zu links monitored, %zu packed",
-           description.name.c_str(), took.count(), state.monitored.size(),
-           state.robot->links.size());
+  ROS_INFO("model of '%s' ready after %.1f s: %s", description.name.c_str(), took.count(),
+           link_counts(state).c_str());
   set_state(std::move(state));
 }
 

@@ -46,6 +46,7 @@ struct CycleReport {
   std::vector<Status> source_statuses;  ///< by source
   std::vector<std::string> pose_problems;
   std::string parameter_problem;                 ///< LiveParameters::problem()
+  std::string parameters_without_effect;         ///< LiveParameters::without_effect()
   std::string transform_problem;                 ///< a transform that the tf listener rejected
   std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;
