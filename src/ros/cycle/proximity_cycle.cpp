@@ -111,7 +111,7 @@ void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* messag
                                     result, config.repulsion);
     message->links.push_back(to_message(
         robot_.links[i].name, result, pushes_[i], penetration(i, config),
-        speeds_[i].update(message->header.stamp, result, X_FL, nearest), nearest.source));
+        speeds_[i].update(message->header.stamp.toSec(), result, X_FL, nearest), nearest.source));
   }
 }
 

@@ -39,6 +39,10 @@ struct CycleReport {
   std::size_t cycles = 0;            ///< since the start, with or without a model
   CycleTimes times;                  ///< of cycles with a model
   std::size_t deadlines_missed = 0;  ///< cycles whose query was cut short, since the start
+  double min_distance = 0.0;         ///< [m] as on ~min_distance; NaN: not known
+  std::string speed_scale;           ///< the scale, the rule and the link; empty: not enabled
+  std::string counted_links;         ///< which links do not count in both, and why
+  std::string counted_problem;       ///< what is wrong with names of links that are configured
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 };
 
