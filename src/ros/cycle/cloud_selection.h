@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ros/input/cloud_source.h"
-#include "ros/output/closing_speed.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -54,6 +54,7 @@ class CloudSelection {
   std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< used with Reader::kOther
   std::vector<const CloudSnapshot*> clouds_;
   std::vector<std::string> cloud_names_;  ///< by cloud: the name of its source
+  std::vector<bool> cloud_stands_still_;  ///< by cloud: its source never goes stale
   ros::Time oldest_stamp_;
 };
 

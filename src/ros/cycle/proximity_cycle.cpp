@@ -176,7 +176,8 @@ void ProximityCycle::fill_links(ProximityArray* message) {
     const ClosingSpeed::Nearest nearest = selection_.nearest(result);
     message->links.push_back(to_message(
         robot_.links[i].name, result, pushes_[i], wrenches_[i],
-        speeds_[i].update(message->header.stamp, result, poses_.X_FL[i], nearest), nearest.source));
+        speeds_[i].update(message->header.stamp.toSec(), result, poses_.X_FL[i], nearest),
+        nearest.source));
   }
 }
 

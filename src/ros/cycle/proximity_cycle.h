@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/input/cloud_source.h"
 #include "ros/model/model_state.h"
-#include "ros/output/closing_speed.h"
 #include "ros/output/joint_repulsion.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/pose_source.h"
