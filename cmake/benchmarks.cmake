@@ -132,7 +132,7 @@ ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
 ist_proximity_peer(dynamic_edt dynamicEDT3D/dynamicEDTOctomap.h dynamicedt3d octomap octomath)
 
-# Through ROS: they need a roscore while they run.
+# The node's parts, with ROS; latency needs a roscore while it runs.
 if(catkin_FOUND)
   file(GLOB ros_benchmark_sources CONFIGURE_DEPENDS benchmark/ros/*.cpp)
   foreach(source IN LISTS ros_benchmark_sources)
@@ -150,4 +150,8 @@ if(catkin_FOUND)
       OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
     add_dependencies(benchmarks benchmark_${name})
   endforeach()
+  target_sources(benchmark_cycle PRIVATE
+    benchmark/peers/kinect.cpp
+    benchmark/peers/scene.cpp
+    benchmark/peers/synthetic.cpp)
 endif()

@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <limits>
-#include <string>
 
 #include "ist_proximity/proximity/proximity_query.h"
 
@@ -27,7 +26,7 @@ class ClosingSpeed {
  public:
   /// The cloud that holds the nearest point.
   struct Nearest {
-    std::string source;            ///< name; empty: no point is near
+    int source = -1;               ///< its number; -1: no point is near
     std::uint64_t generation = 0;  ///< differs for each cloud of the source
     double stamp = 0.0;            ///< [s] acquisition time
   };

@@ -244,8 +244,8 @@ void SelfProximity::add_link(std::size_t link, ProximityArray* message) {
   const LinkProximity answer = nearest(link, &other);
   const RobotModel& robot = *model_->robot;
   const std::string& other_name = robot.links[other].name;
-  ClosingRates closing =
-      speeds_[link].update(poses_.stamp, answer, poses_.X_FL[link], {other_name, 0, 0.0});
+  ClosingRates closing = speeds_[link].update(poses_.stamp, answer, poses_.X_FL[link],
+                                              {static_cast<int>(other), 0, 0.0});
   closing.robot = ClosingRates::kNaN;  // both links move, so the speed has no parts
   message->links.push_back(to_message(robot.links[link].name, answer, RepulsiveWrench::unknown(),
                                       penetration(link, answer), closing, other_name));
