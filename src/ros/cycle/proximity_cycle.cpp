@@ -47,6 +47,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
   status_input_.model_problem = model_->problem;
+  for (std::size_t i = 0; i < robot_.links.size(); ++i) blends_.emplace_back(robot_, i);
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
     if (!link.usable()) status_input_.link_errors.push_back(link.error);
@@ -131,7 +132,8 @@ void ProximityCycle::compute_pushes(const LiveConfig& config, TimePoint end) {
   for (const std::size_t i : urgent_) {
     const LinkProximity& result = results_[i];
     const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
-    RepulsiveWrench raw = repulsion_.wrench(i, X_FL, clouds, result, config.repulsion, end);
+    RepulsiveWrench raw =
+        blends_[i].update(repulsion_, X_FL, clouds, result, config.repulsion, end);
     std::uint64_t key = obstacles;
     if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
       raw = nearest_repulsion(X_FL, result, config.repulsion);
@@ -208,6 +210,7 @@ Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config, T
 void ProximityCycle::forget() {
   speeds_.assign(speeds_.size(), ClosingSpeed());
   filters_.assign(filters_.size(), RepulsionFilter());
+  for (KeptRepulsion& blend : blends_) blend.forget();
   poses_.stamp = ros::Time();
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/input/obstacle_source.h"
@@ -85,6 +86,7 @@ class ProximityCycle {
   CloudSelection selection_;
   ProximityQuery query_;
   Repulsion repulsion_;
+  std::vector<KeptRepulsion> blends_;     ///< by link of the robot
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot
   std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
   JointRepulsion joint_repulsion_;
