@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
 #include "contact/contact_spheres.h"
 #include "contact/inner_sphere_depth.h"
@@ -14,6 +15,7 @@
 #include "internal/bvh/traversal_stack.h"
 #include "internal/cloud/box_bvh.h"
 #include "internal/cloud/point_bvh.h"
+#include "internal/cloud/thinned_cloud.h"
 #include "internal/proximity/deadline.h"
 
 namespace ist {
@@ -34,22 +36,45 @@ struct Entry {
   double share;
 };
 
-// Calls visit(tile) for the tiles of points or boxes whose bounding sphere `may_touch`, until the
-// deadline.
+// The tiles of points or boxes of an entry, if it has no children that are nodes.
+// @returns whether it is such an entry; visit(tile) was called for each tile then
+template <typename Index, typename Buffer, typename Visit>
+bool visit_leaf(const Index& index, std::int32_t child, Buffer* buffer, const Visit& visit) {
+  if constexpr (std::is_same_v<Index, ThinnedCloud>) {
+    if (!ThinnedCloud::is_leaf(index.nodes()[static_cast<std::size_t>(child)])) return false;
+    for (const ThinnedTile& tile : index.tiles(child, buffer)) visit(tile);
+  } else {
+    if (child >= 0) return false;
+    visit(index.tile(static_cast<std::size_t>(~child), buffer));
+  }
+  return true;
+}
+
+template <typename Index>
+struct TileBuffer {
+  typename Index::Tile tiles;
+};
+template <>
+struct TileBuffer<ThinnedCloud> {
+  ThinnedNode tiles;
+};
+
+// Calls visit(tile) for the tiles of thinned points or boxes whose bounding sphere `may_touch`, or
+// that of their node, until the deadline.
 // @returns the share of the index that was visited; the children that may touch divide their
 //          parent's share
 template <typename Index, typename MayTouch, typename Visit>
 double visit_tiles(const Index& index, Deadline* deadline, const MayTouch& may_touch,
                    const Visit& visit) {
-  typename Index::Tile buffer;
+  if (index.empty()) return 1.0;
+  TileBuffer<Index> buffer;
   TraversalStack<Entry, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
   stack.push({index.root(), 1.0});
   double left = 1.0;
   while (!stack.empty()) {
     if (deadline->passed()) return std::min(1.0 - left, kNearlyAll);
     const Entry entry = stack.pop();
-    if (entry.child < 0) {
-      visit(index.tile(static_cast<std::size_t>(~entry.child), &buffer));
+    if (visit_leaf(index, entry.child, &buffer.tiles, visit)) {
       if (deadline->has_passed()) return std::min(1.0 - left, kNearlyAll);
       left -= entry.share;
       continue;
@@ -77,10 +102,11 @@ class LinkContact {
   /// @returns the share of the cloud that is summed
   double add_points(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF,
                     SnapshotSpan clouds) {
-    const Eigen::Isometry3d &X_FO = cloud.coarse.X_FO(), X_LO = X_LF * X_FO;
+    const ThinnedCloud thinned = cloud.index.bvh().thinned();
+    const Eigen::Isometry3d &X_FO = thinned.X_FO(), X_LO = X_LF * X_FO;
     const double radius = point_sphere_radius(cloud);
     return visit_tiles(
-        cloud.coarse.bvh(), &deadline_,
+        thinned, &deadline_,
         [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const PointTile& tile) {
           for (int k = 0; k < tile.count && !deadline_.passed(); ++k) {
@@ -175,7 +201,7 @@ ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geome
   const Eigen::Isometry3d X_LF = X_FL.inverse();
   double known = 0.0, indices = 0.0;
   for (const CloudSnapshot* cloud : clouds) {
-    if (!cloud->coarse.empty()) {
+    if (!cloud->index.bvh().thinned().empty()) {
       known += contact.add_points(*cloud, X_LF, clouds);
       ++indices;
     }

@@ -5,8 +5,10 @@
 #include <limits>
 #include <type_traits>
 
+#include "proximity/depth_search.h"
 #include "proximity/dual_tree.h"
 #include "proximity/refinement.h"
+#include "proximity/single_tree_search.h"
 
 namespace ist {
 namespace {
@@ -20,6 +22,8 @@ constexpr double kFloatError = 1e-6;
 constexpr double kPointError = 1.1e-7;
 // [m] More than double loses where distances are compared.
 constexpr double kRounding = 1e-12;
+// A link that is nearer than so many interior gaps is searched with signed distances.
+constexpr double kNearInGaps = 2.0;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
@@ -104,6 +108,7 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
+  search.descent_steps_left = kMaxDescentSteps;
   count_outside_region();
   if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;
@@ -162,9 +167,10 @@ void LinkQuery::keep_answer() {
 template <class Obstacles>
 bool LinkQuery::run(const Obstacles& obstacles) {
   enter(obstacles);
+  if (is_near(obstacles)) return search_near(obstacles);
   upper_bound(obstacles);
   const DualTreeResult found = search(obstacles);
-  if (found.may_be_inside && !found.stopped) search_depth(obstacles, &link_);
+  if (found.may_be_inside && !found.stopped) search_inside(obstacles);
   const bool stopped = found.stopped || link_.search.deadline->passed();
   if (stopped) measure_closest(obstacles);
   // A pair that was left may hold a point inside.
@@ -174,6 +180,27 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   }
   return !stopped;
 }
+
+// Whether the link is so near to an obstacle that cover spheres bound little.
+bool LinkQuery::is_near(const PointObstacles& /*obstacles*/) const {
+  const double distance = link_.search.closest.exact.distance;
+  return distance < (link_.context.solid().is_closed()
+                         ? kNearInGaps * link_.context.tree().interior_gap()
+                         : 0.0);
+}
+bool LinkQuery::is_near(const BoxObstacles& /*obstacles*/) { return false; }
+
+// All steps in one, near the link.
+bool LinkQuery::search_near(const PointObstacles& obstacles) {
+  if (!link_.context.solid().is_closed()) link_.search.cover_bound = -kInfinity;
+  return search_single_tree(obstacles, &link_);
+}
+bool LinkQuery::search_near(const BoxObstacles& /*obstacles*/) { return true; }
+
+void LinkQuery::search_inside(const PointObstacles& obstacles) {
+  search_single_tree(obstacles, &link_);
+}
+void LinkQuery::search_inside(const BoxObstacles& obstacles) { search_depth(obstacles, &link_); }
 
 // Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
 // point of the link to the last answer's obstacle is still a point of the link.

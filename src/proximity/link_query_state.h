@@ -13,6 +13,7 @@
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
+#include "proximity/coherence/node_bounds.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
 #include "proximity/supporting_planes.h"
@@ -59,9 +60,10 @@ struct SearchResult {
 /// The part that is kept from one query to the next. It speeds queries up and never changes what an
 /// answer promises.
 struct LinkCoherence {
-  explicit LinkCoherence(const LinkModel& link) : bound(link), supports(link.tree) {}
+  explicit LinkCoherence(const LinkModel& link) : bound(link), nodes(link), supports(link.tree) {}
 
   LinkBound bound;
+  NodeBounds nodes;
   BvttFronts fronts;
   DistanceCache distances;
   /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
@@ -86,6 +88,7 @@ struct LinkCoherence {
     last.build_id = 0;
     answered.scene = kUnknownScene;
     bound.forget();
+    nodes.forget();
     fronts.forget();
   }
 };
@@ -109,9 +112,10 @@ struct LinkSearch : SearchResult {
   bool is_counted = false;   ///< in the statistics, as outside the regions
   double first_bound = 0.0;  ///< [m] proven before tighten()
   BoxBounds box_bounds;
-  VisitedSet visited;      ///< obstacles of the index at work that were refined
-  int measured = 0;        ///< points
-  int box_cells_left = 0;  ///< into which overlapping boxes may still be divided
+  VisitedSet visited;          ///< obstacles of the index at work that were refined
+  int measured = 0;            ///< points
+  int box_cells_left = 0;      ///< into which overlapping boxes may still be divided
+  int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
 
   /// [m] Beyond it nothing matters.
   double range() const { return config.max_distance + config.margin + rounding; }

@@ -31,9 +31,7 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
     // The bound is that of one part of the link; the others are in pairs of their own.
     search.prune(static_cast<double>(lower_bound) - search.rounding);
   } else {
-    const bool has_closest = search.closest.exact.distance < kInfinity;
-    measure_outside(id, p_OQ, p_LQ, kInfinity,
-                    has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L);
+    measure_outside(id, p_OQ, p_LQ);
   }
   return search.traversal_prune_bound();
 }
@@ -96,28 +94,31 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
   const InnerSphereTree& tree = link_.context.tree();
   if (tree.cover_distance_exceeds(p_LQ, tree.interior_gap())) {
-    return measure_outside(id, p_OQ, p_LQ, max_distance, link_.kept.plane_normal_L);
+    measure_outside(id, p_OQ, p_LQ, max_distance);
+    return;
   }
   link_.search.count_exact();
   link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
 }
 
-void PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,
-                                      const Eigen::Vector3d& p_LQ, double max_distance,
-                                      const Eigen::Vector3d& direction_L) {
+double PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,
+                                        const Eigen::Vector3d& p_LQ, double max_distance) {
   LinkSearch& search = link_.search;
   search.count_exact();
   const double limit = std::min({search.closest.exact.distance, search.other_links,
                                  search.range() + search.rounding, max_distance});
+  const bool has_closest = search.closest.exact.distance < kInfinity;
   double lower_bound;
-  const SignedDistance exact =
-      distance_outside(link_.context.solid(), p_LQ, limit, direction_L, 0.0, &lower_bound);
+  const SignedDistance exact = distance_outside(
+      link_.context.solid(), p_LQ, limit,
+      has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L, 0.0, &lower_bound);
   link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
                              id.key(), p_LQ, lower_bound);
   if (lower_bound < exact.distance) {
     search.refined_bound = std::min(search.refined_bound, lower_bound);
   }
   search.offer(exact, p_OQ, obstacles_, id);
+  return lower_bound;
 }
 
 }  // namespace ist

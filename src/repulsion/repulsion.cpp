@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/cloud/point_bvh.h"
 #include "internal/geometry/relative_pose.h"
 #include "repulsion/blend_kernel.h"
 #include "repulsion/coarse_spheres.h"
@@ -28,22 +29,21 @@ PosedSpheres posed(const std::vector<SphereGroup>& groups, const Eigen::Isometry
   return spheres;
 }
 
-// Calls visit(index, spheres, R_FO, grid) for each thinned cloud and each map: the link's spheres
-// are in the frame O of the index, and the grid is the one that the cloud was thinned to.
+// Calls visit(index, spheres, R_FO) for each thinned cloud and each map: the link's spheres are in
+// the frame O of the index.
 template <typename Visit>
 void for_each_index(SnapshotSpan clouds, const std::vector<SphereGroup>& groups,
                     const Eigen::Isometry3d& X_FL, const Visit& visit) {
-  const ThinningGrid no_grid(Eigen::Vector3d::Zero(), 1.0);
   for (const CloudSnapshot* cloud : clouds) {
     if (cloud == nullptr) continue;
-    if (!cloud->coarse.empty()) {
-      const Eigen::Isometry3d& X_FO = cloud->coarse.X_FO();
-      visit(cloud->coarse.bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(),
-            ThinningGrid(X_FO.translation(), cloud->thinning));
+    const ThinnedCloud thinned = cloud->index.bvh().thinned();
+    if (!thinned.empty()) {
+      const Eigen::Isometry3d& X_FO = thinned.X_FO();
+      visit(thinned, posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear());
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     const Eigen::Isometry3d X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
-    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
+    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear());
   }
 }
 
@@ -105,7 +105,8 @@ Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
 RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_FL,
                                   SnapshotSpan clouds, const LinkProximity& proximity,
                                   const RepulsionConfig& config, TimePoint end) const {
-  if (proximity.state == LinkState::kUnknown) return RepulsiveWrench::unknown();
+  const bool has_link = link < spheres_->by_link.size();
+  if (proximity.state == LinkState::kUnknown || !has_link) return RepulsiveWrench::unknown();
   const double strength = repulsion_strength(proximity, config);
   if (!(strength > 0.0)) return {};
   Deadline deadline(end);
@@ -114,7 +115,7 @@ RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_F
   const std::vector<SphereGroup>& groups = spheres_->by_link[link];
   float nearest = std::numeric_limits<float>::infinity();
   for_each_index(clouds, groups, X_FL,
-                 [&](const auto& index, const PosedSpheres& spheres, const auto&, const auto&) {
+                 [&](const auto& index, const PosedSpheres& spheres, const auto&) {
                    nearest = nearest_pair(index, spheres, nearest, &deadline);
                  });
   if (deadline.has_passed()) return RepulsiveWrench::unknown();
@@ -123,10 +124,8 @@ RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_F
   Total total{proximity.direction, {}, 0.0};
   const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
   for_each_index(clouds, groups, X_FL,
-                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO,
-                     const ThinningGrid& grid) {
-                   const Band band{nearest, smoothing, grid};
-                   total.add(blend_pairs(index, spheres, band, &deadline), R_FO);
+                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO) {
+                   total.add(blend_pairs(index, spheres, {nearest, smoothing}, &deadline), R_FO);
                  });
   if (deadline.has_passed()) return RepulsiveWrench::unknown();
   return scaled(total.wrench, length / total.weight);

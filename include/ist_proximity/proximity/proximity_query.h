@@ -101,7 +101,8 @@ class ProximityQuery {
 
   /// @param X_FL    by link: link frame -> fixed frame, rigid to 1e-6 (see is_rigid); ignored
   ///                where `known` is false
-  /// @param known   by link: false makes the link UNKNOWN
+  /// @param known   by link: false makes the link UNKNOWN. Where it or X_FL has another size than
+  ///                the model's links, every link is UNKNOWN
   /// @param clouds  the snapshots of all usable sources; none makes every link UNKNOWN
   /// @param results one per link, overwritten
   /// @returns false when the deadline passed before every link met its tolerance
@@ -115,7 +116,7 @@ class ProximityQuery {
                    SnapshotSpan clouds, RobotProximity* result);
 
   /// One link only.
-  /// @param link  index in the model
+  /// @param link  index in the model; UNKNOWN when there is none
   /// @returns as run()
   bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                 LinkProximity* result);
