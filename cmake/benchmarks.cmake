@@ -168,7 +168,7 @@ if(IST_PROXIMITY_nanoflann_INCLUDE_DIR)
   target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_NANOFLANN)
 endif()
 
-# Through ROS: they need a roscore while they run.
+# The node's parts, with ROS; latency needs a roscore while it runs.
 if(catkin_FOUND)
   file(GLOB ros_benchmark_sources CONFIGURE_DEPENDS benchmark/ros/*.cpp)
   foreach(source IN LISTS ros_benchmark_sources)
@@ -186,4 +186,8 @@ if(catkin_FOUND)
       OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
     add_dependencies(benchmarks benchmark_${name})
   endforeach()
+  target_sources(benchmark_cycle PRIVATE
+    benchmark/peers/kinect.cpp
+    benchmark/peers/scene.cpp
+    benchmark/peers/synthetic.cpp)
 endif()

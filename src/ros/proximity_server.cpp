@@ -25,6 +25,7 @@
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
 #include "ros/output/message_invariants.h"
+#include "ros/output/message_pool.h"
 #include "ros/output/result_publisher.h"
 #include "ros/output/sphere_publisher.h"
 #include "ros/parameters/live_parameters.h"
@@ -108,6 +109,7 @@ class ProximityServer::Impl {
   // Used by the cycle thread alone.
   std::shared_ptr<const ModelState> model_;
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
+  MessagePool<ist_proximity::ProximityArray> messages_;
   double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
   CountedLinks counted_;
   bool root_stands_still_ = false;  ///< in a fixed frame that the URDF lacks
@@ -219,23 +221,24 @@ void ProximityServer::Impl::run_cycle() {
   take_model();
   notice_standing_root();
   spheres_.repeat_when_due();
-  const auto message = boost::make_shared<ist_proximity::ProximityArray>();
+  const auto message = messages_.take();
   const std::string transform_problem = listener_.problem();
   LiveConfig live = live_config();
   live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
+  if (cycle_) cycle_->run(now, sources_, live, transform_problem, message.get());
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, live, message.get(), &report_);
+      cycle_->report(*message, &report_);
     } else {
       fill_without_model(*model_, config_, std::max(now, last_stamp_), sources_, message.get(),
                          &report_);
     }
-    last_stamp_ = message->header.stamp;
     ++report_.cycles;
   }
+  last_stamp_ = message->header.stamp;
   assert_invariants(*message,
                     {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
   const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {

@@ -63,6 +63,8 @@ struct CycleReport {
   std::string counted_problem;       ///< what is wrong with names of links that are configured
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 
+  /// Takes the sources, the problems of poses and the status.
+  void take(const StatusInput& input, const Status& decided);
   /// Adds the times that a message tells.
   void add_times(const ist_proximity::ProximityArray& message);
 };
