@@ -66,6 +66,7 @@ class ProximityServer::Impl {
   void publish_failure(const std::string& fault);
   void notice_clock_jump(const ros::Time& now);
   void take_model();
+  void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
   void run_diagnostics();
   void publish_diagnostics();
@@ -95,7 +96,8 @@ class ProximityServer::Impl {
   // Used by the cycle thread alone.
   std::shared_ptr<const ModelState> model_;
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
-  double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
+  double margin_ = 0.0;         ///< ~query/margin that the regions of interest are made with
+  double region_radius_ = 0.0;  ///< [m] the largest of this robot
   ros::Time last_now_;
   ros::Time last_stamp_;  ///< of the last ~proximity
 
@@ -242,7 +244,9 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
 void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
+  if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
   model_ = std::move(model);
+  region_radius_ = 0.0;
   if (model_->phase == ModelState::Phase::kReady) {
     cycle_ = std::make_unique<ProximityCycle>(
         model_, config_,
@@ -264,6 +268,15 @@ void ProximityServer::Impl::take_model() {
   set_source_targets(live_.get().query);
 }
 
+/// Hands finer packings of the same robot to all parts, which go on with what they know.
+void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model) {
+  model_ = std::move(model);
+  cycle_->refine(model_);
+  query_service_->set_model(model_);
+  if (self_proximity_) self_proximity_->set_model(model_);
+  set_source_targets(live_.get().query);
+}
+
 /// Tells the sources the model, the fixed frame and the region of interest.
 void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
@@ -274,6 +287,8 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   if (computes_poses && model_->robot && model_->kinematics) {
     region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
                                 query.max_distance + query.margin);
+    // Clouds that were cropped before serve finer packings, too.
+    region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
@@ -296,6 +311,7 @@ void ProximityServer::Impl::publish_diagnostics() {
     report = report_;
   }
   report.parameter_problem = live_.problem();
+  spheres_.show_finer(*loader_.state());
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);

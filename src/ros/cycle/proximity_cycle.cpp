@@ -16,6 +16,7 @@ using ist_proximity::ProximityArray;
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
                                std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader)
     : model_(std::move(model)),
+      packed_(model_->robot),
       robot_(*model_->robot),
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
@@ -48,6 +49,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && poses_.known[i];
   status_input_.deadline_passed =
       !query_.run(poses_.X_FL, known, clouds, &results_) && !clouds.empty();
+  note_usage(config);
   status_input_.outside_region = query_.statistics().outside_region > 0;
 
   message->header.stamp = poses_.stamp;
@@ -122,10 +124,31 @@ Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) c
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
   if (is_known) {
-    volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], selection_.clouds());
+    volume = contact_volume(packed_->links[link], *body, poses_.X_FL[link], selection_.clouds());
   }
   return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
                             config.penetration);
+}
+
+/// Tells the background packing what the links need.
+void ProximityCycle::note_usage(const LiveConfig& config) {
+  if (!model_->usage) return;
+  for (const std::size_t i : model_->monitored) {
+    const bool is_near = results_[i].state >= LinkState::kNear &&
+                         results_[i].lower_bound < config.repulsion.influence_distance;
+    model_->usage->note_query(i, query_.link_statistics()[i], is_near);
+  }
+}
+
+void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
+  for (std::size_t i = 0; i < filters_.size(); ++i) {
+    if (model->robot->links[i].packing_id != packed_->links[i].packing_id) {
+      filters_[i].expect_jump();
+    }
+  }
+  packed_ = model->robot;
+  query_.set_model(packed_);
+  repulsion_ = model->repulsion ? *model->repulsion : Repulsion(packed_);
 }
 
 void ProximityCycle::forget() {

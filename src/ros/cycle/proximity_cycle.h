@@ -42,6 +42,11 @@ class ProximityCycle {
   /// repulsion's filter and the stamps start again.
   void forget();
 
+  /// Takes finer packings of the same robot. Nothing that is known is lost: filters, speeds and
+  /// the query's bounds go on.
+  /// @param model  see is_refinement()
+  void refine(const std::shared_ptr<const ModelState>& model);
+
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
 
@@ -56,12 +61,14 @@ class ProximityCycle {
                             ist_proximity::JointRepulsion* message);
 
  private:
+  void note_usage(const LiveConfig& config);
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
   void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
   Wrench penetration(std::size_t link, const LiveConfig& config) const;
 
-  std::shared_ptr<const ModelState> model_;
+  const std::shared_ptr<const ModelState> model_;
+  std::shared_ptr<const RobotModel> packed_;  ///< the same robot with the newest packings
   const RobotModel& robot_;
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;

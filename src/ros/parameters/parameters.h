@@ -34,6 +34,13 @@ struct SelfCollisionConfig {
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
 };
 
+/// The links whose volumes are packed for `penetration`.
+enum class ContactsWanted {
+  kAuto,  ///< those that something has come within the influence distance of
+  kAll,   ///< all, from the start
+  kNone
+};
+
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
@@ -49,7 +56,7 @@ struct ServerConfig {
   QueryConfig query;
   int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
   RepulsionConfig repulsion;
-  bool contacts_wanted = true;  ///< ~penetration/enabled
+  ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   ContactConfig contacts;
   PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
