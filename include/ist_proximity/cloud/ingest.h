@@ -61,9 +61,10 @@ struct IngestConfig {
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
-  /// Make the thinned cloud; without it repulsion and contact volumes see no points.
+  /// Give the cloud a thinned one; without it repulsion and contact volumes see no points. It costs
+  /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
-  double thinning = 0.01;  ///< [m] > 0: edge of a voxel of the thinned cloud
+  double thinning = 0.01;  ///< [m] at least 1e-9: edge of a voxel of the thinned cloud
   /// >= 1: a cloud of more points is refused. This bounds time and memory of one cloud: five
   /// million points take about 3 s and 700 MB where neighbours in the message lie anywhere in
   /// space.
