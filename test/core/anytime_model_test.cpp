@@ -7,13 +7,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
+#include <fstream>
 #include <limits>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
+#include "support/data_dir.h"
 #include "support/demo_arm.h"
+#include "support/long_chain.h"
 #include "support/random_links.h"
 #include "support/temp_dir.h"
 #include "support/trial.h"
@@ -205,6 +210,50 @@ TEST(AnytimeModel, tellsALimitThatWasReachedAtTheEndOnly) {
   EXPECT_FALSE(model->robot()->links[0].packing.certificate.reached);
   ASSERT_EQ(warnings.size(), 1U);
   EXPECT_NE(warnings[0].find("max_spheres (60)"), std::string::npos) << warnings[0];
+}
+
+double processor_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// From the text of the URDF to a model that answers: half a second on two cores. Processor time is
+// measured, which other load on the machine hardly changes.
+void expect_ready_soon(const std::string& urdf, GeometrySource source, const std::string& folder) {
+  if (test::kSanitized) GTEST_SKIP() << "sanitizers are slow";
+  constexpr double kSeconds = 0.5, kCores = 2.0;
+  const double begin = processor_seconds();
+  const auto robot = std::make_shared<const RobotDescription>(
+      parse_urdf(urdf, source, [&](const std::string& /*package*/) { return folder; }));
+  RobotModelConfig config = config_to(kMaxError);
+  config.threads = static_cast<int>(kCores);
+  const auto first = AnytimeModel::build(robot, config, Stage::kFirst);
+  const double took = processor_seconds() - begin;
+  for (const LinkModel& link : first->robot()->links) EXPECT_TRUE(link.usable()) << link.error;
+  RecordProperty("processor_time_ms", static_cast<int>(1e3 * took));
+  EXPECT_LE(took, kSeconds * kCores);
+}
+
+TEST(AnytimeModel, isReadyInHalfASecondOnTwoCores) {
+  const std::string folder = IST_PROXIMITY_SOURCE_DIR;
+  std::stringstream text;
+  text << std::ifstream(folder + "/demo/demo_arm.urdf").rdbuf();
+  expect_ready_soon(text.str(), GeometrySource::kCollision, folder);
+}
+
+TEST(AnytimeModel, aRobotOfFortyLinksIsReadyInHalfASecond) {
+  expect_ready_soon(test::long_chain_urdf(40), GeometrySource::kCollision,
+                    IST_PROXIMITY_SOURCE_DIR);
+}
+
+TEST(AnytimeModel, thePandaIsReadyInHalfASecond) {
+  const auto data = test::data_dir();
+  if (!data) GTEST_SKIP() << test::kNoData;
+  const std::string package = test::franka_package(*data);
+  std::stringstream text;
+  text << std::ifstream(package + "/robots/panda.urdf").rdbuf();
+  expect_ready_soon(text.str(), GeometrySource::kVisual, package);
 }
 
 TEST(AnytimeModel, canBeCancelledAtEveryStep) {
