@@ -45,6 +45,7 @@ target_sources(benchmark_repulsion PRIVATE
   benchmark/repulsion/scene.cpp)
 
 target_sources(benchmark_packing PRIVATE
+  benchmark/packing/anytime.cpp
   benchmark/packing/certificate.cpp
   benchmark/packing/gaps.cpp
   benchmark/packing/growth.cpp

@@ -78,6 +78,7 @@ class ProximityServer::Impl {
   void take_model();
   void choose_counted_links();
   void notice_standing_root();
+  void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
   void run_diagnostics();
   void publish_diagnostics();
@@ -114,6 +115,7 @@ class ProximityServer::Impl {
   CountedLinks counted_;
   bool root_stands_still_ = false;  ///< in a fixed frame that the URDF lacks
   Clock::time_point next_root_check_;
+  double region_radius_ = 0.0;  ///< [m] the largest of this robot
   ros::Time last_now_;
   ros::Time last_stamp_;  ///< of the last ~proximity
 
@@ -271,7 +273,9 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
 void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
+  if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
   model_ = std::move(model);
+  region_radius_ = 0.0;
   if (model_->phase == ModelState::Phase::kReady) {
     cycle_ = std::make_unique<ProximityCycle>(
         model_, config_,
@@ -336,6 +340,15 @@ void ProximityServer::Impl::notice_standing_root() {
   choose_counted_links();
 }
 
+/// Hands finer packings of the same robot to all parts, which go on with what they know.
+void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model) {
+  model_ = std::move(model);
+  cycle_->refine(model_);
+  query_service_->set_model(model_);
+  if (self_proximity_) self_proximity_->set_model(model_);
+  set_source_targets(live_.get().query);
+}
+
 /// Tells the sources the model, the fixed frame and the region of interest.
 void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
@@ -346,6 +359,8 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   if (computes_poses && model_->robot && model_->kinematics) {
     region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
                                 query.max_distance + query.margin);
+    // Clouds that were cropped before serve finer packings, too.
+    region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
@@ -370,6 +385,7 @@ void ProximityServer::Impl::publish_diagnostics() {
   }
   report.parameter_problem = live_.problem();
   report.parameters_without_effect = live_.without_effect();
+  spheres_.show_finer(*loader_.state());
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);

@@ -151,7 +151,10 @@ void CloudSource::take_target() {
     waiting_.clear();
     if (!config_.is_permanent()) last_map_.reset();
   }
-  if (newest.generation != target_.generation || newest.model != target_.model) {
+  const bool is_same_robot =
+      newest.model == target_.model ||
+      (newest.model && target_.model && same_geometry(*newest.model, *target_.model));
+  if (newest.generation != target_.generation || !is_same_robot) {
     in_use_ = ros::Time();
     map_is_new_ = last_map_ != nullptr;
     placer_.begin_target();

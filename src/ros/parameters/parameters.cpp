@@ -73,7 +73,11 @@ void read_penetration(ParameterReader* reader, PenetrationConfig* penetration) {
 }
 
 void read_contacts(ParameterReader* reader, ServerConfig* config) {
-  reader->read("penetration/enabled", &config->contacts_wanted);
+  std::string wanted = "auto";
+  reader->read_switch("penetration/enabled", &wanted);
+  config->contacts_wanted = wanted == "true"    ? ContactsWanted::kAll
+                            : wanted == "false" ? ContactsWanted::kNone
+                                                : ContactsWanted::kAuto;
   reader->read("penetration/max_error", Range::positive("m", 1.0),
                &config->contacts.packing.max_error);
   reader->read("penetration/max_spheres", Range{"", 1.0, 1e5},

@@ -36,6 +36,13 @@ struct SelfCollisionConfig {
   bool in_minimum = false;             ///< its links count in ~min_distance and ~speed_scale
 };
 
+/// The links whose volumes are packed for `penetration`.
+enum class ContactsWanted {
+  kAuto,  ///< those that something has come within the influence distance of
+  kAll,   ///< all, from the start
+  kNone
+};
+
 /// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
 /// may take half of the time until the next one, so that no scene makes answers late.
 constexpr double kDefaultDeadline = -0.5;
@@ -69,7 +76,7 @@ struct ServerConfig {
   QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
   int max_query_answers = 100000;       ///< states times links of one ~query: 60 MB; > 0
   RepulsionConfig repulsion;
-  bool contacts_wanted = true;  ///< ~penetration/enabled
+  ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   ContactConfig contacts;
   PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
