@@ -70,7 +70,28 @@ void Bounds(const SurfaceBvh::Node& node, const OrientedBox& box, float* bounds)
   }
 }
 
+void Supports(const SurfaceBvh::Node& node, const float* n, float* supports) {
+  const FloatTag d;
+  const V n_lanes[3] = {hn::Set(d, n[0]), hn::Set(d, n[1]), hn::Set(d, n[2])};
+  for (std::size_t k = 0; k < SurfaceBvh::kWidth; k += hn::Lanes(d)) {
+    const auto along = [&](const float(*rows)[SurfaceBvh::kWidth]) {
+      return hn::MulAdd(hn::Load(d, rows[0] + k), n_lanes[0],
+                        hn::MulAdd(hn::Load(d, rows[1] + k), n_lanes[1],
+                                   hn::Mul(hn::Load(d, rows[2] + k), n_lanes[2])));
+    };
+    V sum = along(node.center);
+    for (int i = 0; i < 3; ++i) {
+      sum = hn::MulAdd(hn::Abs(along(node.axis[i])), hn::Load(d, node.half[i] + k), sum);
+    }
+    hn::Store(sum, d, supports + k);
+  }
+}
+
 }  // namespace oriented_box
+
+void OrientedBoxSupports(const SurfaceBvh::Node& node, const float* n, float* supports) {
+  oriented_box::Supports(node, n, supports);
+}
 
 void OrientedBoxBounds(const SurfaceBvh::Node& node, const OrientedBox& box, float* bounds) {
   oriented_box::Bounds(node, box, bounds);
@@ -84,10 +105,16 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(OrientedBoxBounds);
+HWY_EXPORT(OrientedBoxSupports);
 
 void oriented_box_bounds(const SurfaceBvh::Node& node, const OrientedBox& box,
                          float bounds[SurfaceBvh::kWidth]) {
   HWY_DYNAMIC_DISPATCH(OrientedBoxBounds)(node, box, bounds);
+}
+
+void oriented_box_supports(const SurfaceBvh::Node& node, const float n[3],
+                           float supports[SurfaceBvh::kWidth]) {
+  HWY_DYNAMIC_DISPATCH(OrientedBoxSupports)(node, n, supports);
 }
 
 }  // namespace ist

@@ -172,9 +172,9 @@ void SurfaceBvh::build() {
       const Eigen::Vector3d n = Eigen::Vector3d::Unit(axis);
       Eigen::Vector3d p = Eigen::Vector3d::Zero();
       p = bounds_.isEmpty() ? part.a : bounds_.center();
-      p[axis] = support(part, n);
+      p[axis] = ist::support(part, n);
       bounds_.extend(p);
-      p[axis] = -support(part, -n);
+      p[axis] = -ist::support(part, -n);
       bounds_.extend(p);
     }
   }
@@ -267,6 +267,41 @@ void SurfaceBvh::set_box(const Range& range, Node* node, int slot) const {
     }
   }
   node->radius[slot] = round_up(best.half.norm() * (1.0 + 1e-6));
+}
+
+// Branch and bound: float decides which parts are measured in double.
+double SurfaceBvh::support(const Eigen::Vector3d& n_L) const {
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  if (parts_.empty()) return -kInf;
+  const double rounding = 2e-6 * extent_;
+  const Eigen::Vector3f n = n_L.cast<float>();
+  struct Entry {
+    double bound;
+    std::int32_t child;
+  };
+  TraversalStack<Entry, stack_capacity(kMaxLevels, kWidth)> stack;
+  stack.push({kInf, nodes_[0].child[0]});
+  double largest = -kInf;
+  while (!stack.empty()) {
+    const Entry entry = stack.pop();
+    if (entry.bound <= largest) continue;
+    if (entry.child < 0) {
+      const ConvexPart& part = parts_[static_cast<std::size_t>(~entry.child)];
+      largest = std::max(largest, ist::support(part, n_L));
+      continue;
+    }
+    const Node& node = nodes_[static_cast<std::size_t>(entry.child)];
+    alignas(32) float supports[kWidth];
+    oriented_box_supports(node, n.data(), supports);
+    const std::size_t first = stack.size();
+    for (int k = 0; k < node.count; ++k) {
+      const double bound = static_cast<double>(supports[k]) + rounding;
+      if (bound > largest) {
+        stack.push_greatest_on_top<&Entry::bound>(first, {bound, node.child[k]});
+      }
+    }
+  }
+  return largest;
 }
 
 }  // namespace ist

@@ -134,6 +134,7 @@ void LinkPairQuery::measure_depth(std::vector<LinkPairSearch::Entry>* queue) {
   of_b.run(kDepthSteps);
   keep_deepest(of_b, false);
   if (!(depth_distance_ < 0.0)) search_from_touch();
+  if (!(depth_distance_ < 0.0)) search_along_parts();
   depth_bound_ = std::max(depth_bound_, -std::max(surface_a_.depth_limit, surface_b_.depth_limit));
   depth_bound_ = std::min(depth_bound_, depth_distance_);
 }
@@ -163,6 +164,29 @@ void LinkPairQuery::search_from_touch() {
         q_B -= (to_a.distance + depth) * (X_BA_.linear() * to_a.normal);
       } else {
         q_B -= (to_b.distance + depth) * to_b.normal;
+      }
+    }
+  }
+}
+
+// Where a triangle passes through the other link, some of its corners lead inward from there.
+void LinkPairQuery::search_along_parts() {
+  constexpr double kLast = 1e-7;  // share of the way to a corner
+  const Eigen::Vector3d touch_B = surfaces_.closest().on_q;
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  const ConvexPart parts[] = {surfaces_.part_a(), surfaces_.part_b()};
+  for (int i = 0; i < 2; ++i) {
+    if (parts[i].kind != ConvexPart::Kind::kTriangle) continue;
+    for (const Eigen::Vector3d& corner : {parts[i].a, parts[i].b, parts[i].c}) {
+      for (double share = 1.0; share > kLast; share *= 0.25) {
+        const Eigen::Vector3d q_B = touch_B + share * (corner - touch_B);
+        const SignedDistance found =
+            i == 0 ? b_.solid.signed_distance(q_B) : a_.solid.signed_distance(X_AB * q_B);
+        if (!(found.distance < depth_distance_)) continue;
+        depth_distance_ = found.distance;
+        on_a_ = i == 0 ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
+        on_b_ = i == 0 ? found.witness : q_B;
+        direction_ = i == 0 ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
       }
     }
   }

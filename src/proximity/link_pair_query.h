@@ -43,6 +43,7 @@ class LinkPairQuery {
   void measure_depth(std::vector<LinkPairSearch::Entry>* queue);
   void keep_deepest(const LinkPairSearch& search, bool of_a);
   void search_from_touch();
+  void search_along_parts();
   double pose_uncertainty(double distance) const;
 
   const LinkModel &a_, &b_;

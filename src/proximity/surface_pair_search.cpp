@@ -23,6 +23,9 @@ constexpr double kJump = 0.02;
 // A query of so many pairs meets ties, such as parallel faces. From then on bounds that are as
 // near as the rounding of boxes count as equal.
 constexpr int kManyPairs = 4096;
+// The plane between the closest points is tried after so many pairs, and when twice as many more
+// have been looked at.
+constexpr int kFirstPlane = 12;
 
 constexpr std::size_t kStackCapacity =
     stack_capacity(2 * SurfaceBvh::kMaxLevels, SurfaceBvh::kWidth);
@@ -62,7 +65,7 @@ SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, s
 void SurfacePairSearch::start_anew() {
   front_.clear();
   measured_.clear();
-  path_ = 0.0;
+  path_ = plane_path_ = plane_bound_ = 0.0;
   if (!a_.empty() && !b_.empty()) {
     front_.push_back({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
   }
@@ -78,10 +81,14 @@ void SurfacePairSearch::move_to(const Eigen::Isometry3d& X_BA, double displaceme
   const double scale = X_BA.translation().norm() + a_.extent() + b_.extent();
   rounding_ = kBoxRounding * scale;
   exact_rounding_ = 2.0 * kLostInLength * scale;
-  looked_at_ = 0;
+  // A front that costs more than to start anew has become too fine for what is near now.
+  if (is_new_) cost_of_new_ = looked_at_;
+  const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
   const bool is_crowded = 4 * (front_.size() + measured_.size()) > 3 * capacity_;
-  const bool is_new = !(displacement <= kJump) || is_crowded;
-  if (is_new) {
+  is_new_ = !(displacement <= kJump) || is_worn || is_crowded;
+  looked_at_ = next_plane_ = 0;
+  plane_tried_ = 0.0;
+  if (is_new_) {
     start_anew();
   } else {
     keep_measured();
@@ -109,7 +116,8 @@ void SurfacePairSearch::rebase_path() {
   // A key that was below the path by now proves nothing.
   for (Entry& entry : front_) entry.key = entry.key > path_ ? entry.key - path_ : kUnproven;
   std::make_heap(front_.begin(), front_.end());
-  path_ = 0.0;
+  plane_bound_ -= path_ - plane_path_;
+  path_ = plane_path_ = 0.0;
 }
 
 double SurfacePairSearch::bound_of(const Entry& entry) const {
@@ -120,11 +128,14 @@ double SurfacePairSearch::lower_bound() const {
   double bound = closest_.distance;
   if (!front_.empty()) bound = std::min(bound, bound_of(front_.front()));
   for (const Entry& entry : measured_) bound = std::min(bound, bound_of(entry));
-  return std::max(bound, 0.0);
+  const double by_plane = plane_bound_ - (path_ - plane_path_) * (1.0 + 1e-14);
+  return std::max({bound, std::min(by_plane, closest_.distance), 0.0});
 }
 
 double SurfacePairSearch::tolerance_at(double distance) const {
-  const double tolerance = std::max(goal_.tolerance, goal_.relative_tolerance * distance);
+  const double resolved = 1e-12 * distance + 4.0 * exact_rounding_;
+  const double tolerance =
+      std::max({goal_.tolerance, goal_.relative_tolerance * distance, resolved});
   return looked_at_ > kManyPairs ? std::max(tolerance, 2.0 * rounding_) : tolerance;
 }
 
@@ -200,6 +211,10 @@ double SurfacePairSearch::measure(const Pair& pair) {
   return std::max(found.lower_bound - exact_rounding_, 0.0);
 }
 
+ConvexPart SurfacePairSearch::part_a() const { return posed(part_of(a_, witness_a_), X_BA_); }
+
+const ConvexPart& SurfacePairSearch::part_b() const { return part_of(b_, witness_b_); }
+
 // Finds an upper bound: from the roots on, always the child with the least bound.
 void SurfacePairSearch::descend() {
   Pair pair{-1.0, SurfaceBvh::kRoot, SurfaceBvh::kRoot};
@@ -218,6 +233,22 @@ void SurfacePairSearch::push(const Entry& entry) {
   std::push_heap(front_.begin(), front_.end());
 }
 
+// The distance of the surfaces along the line through the closest points, if these have changed.
+void SurfacePairSearch::prove_by_plane() {
+  next_plane_ = 2 * looked_at_ + kFirstPlane;
+  if (!(closest_.distance > 1e-9 && closest_.distance < goal_.range)) return;
+  if (plane_tried_ == closest_.distance) return;
+  plane_tried_ = closest_.distance;
+  const Eigen::Vector3d n_B = (closest_.on_p - closest_.on_q) / closest_.distance;
+  const Eigen::Vector3d n_A = X_BA_.linear().transpose() * n_B;
+  const double below = b_.support(n_B);
+  const double above = n_B.dot(X_BA_.translation()) - a_.support(-n_A);
+  const double bound = above - below - exact_rounding_;
+  if (bound < plane_bound_ - (path_ - plane_path_)) return;
+  plane_bound_ = bound;
+  plane_path_ = path_;
+}
+
 bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   goal_ = goal;
   update_prune_bound();
@@ -225,6 +256,8 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
     const Entry entry = front_.front();
     if (!is_wanted(bound_of(entry))) return true;
     if (*steps <= 0) return false;
+    if (looked_at_ >= next_plane_) prove_by_plane();
+    if (!is_wanted(plane_bound_ - (path_ - plane_path_) * (1.0 + 1e-14))) return true;
     std::pop_heap(front_.begin(), front_.end());
     front_.pop_back();
     if (front_.size() + measured_.size() + SurfaceBvh::kWidth > capacity_) {

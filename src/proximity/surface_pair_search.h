@@ -18,7 +18,9 @@ namespace ist {
 /// The pairs that were pruned or measured stay in a queue, the BVTT front. Each has the bound that
 /// was proven for it and the path length at which it was: no point of A moves farther in B's frame
 /// than the path grows. So a bound holds later, less the path since, and a pair is looked at again
-/// only when its slack is used up (an event of expiry). The closest parts found last give the first
+/// only when its slack is used up (an event of expiry). Where the links lie on both sides of a
+/// plane between the closest points, as convex bodies do, their supports prove the distance at
+/// once. The closest parts found last give the first
 /// upper bound at a new pose. Where the queue is full, pairs are searched depth first, which needs
 /// no memory but a bounded stack: nothing is allocated after construction.
 class SurfacePairSearch {
@@ -66,6 +68,9 @@ class SurfacePairSearch {
   double lower_bound() const;
   /// The closest points found: on_p is on A and on_q on B, in B's frame.
   const ConvexDistance& closest() const { return closest_; }
+  /// The parts that they are on, in B's frame; there must be any.
+  ConvexPart part_a() const;
+  const ConvexPart& part_b() const;
   /// [m] Bounds of parts that were measured may be wrong by this much.
   double rounding() const { return exact_rounding_; }
 
@@ -96,6 +101,7 @@ class SurfacePairSearch {
   double bound(double measured, const Pair& pair) const;
   double measure(const Pair& pair);
   void descend();
+  void prove_by_plane();
   void visit(const Entry& entry, int* steps);
   void visit_depth_first(const Entry& entry, int* steps);
   void push(const Entry& entry);
@@ -112,7 +118,13 @@ class SurfacePairSearch {
   double rounding_ = 0.0, exact_rounding_ = 0.0;  // [m] of boxes and of parts
   Goal goal_;
   double prune_bound_ = 0.0;
-  int looked_at_ = 0;  // pairs, at this pose
+  int looked_at_ = 0;         // pairs, at this pose
+  bool is_new_ = true;        // the front was started at this pose
+  int cost_of_new_ = 0;       // pairs that were looked at when the front was started
+  double plane_bound_ = 0.0;  // [m] of both surfaces, by the plane between the closest points
+  double plane_path_ = 0.0;   // [m] where it was proven
+  int next_plane_ = 0;        // when looked_at_ is this, the plane is tried
+  double plane_tried_ = 0.0;  // [m] the distance for which the plane was tried last
   bool has_witness_ = false;
   SurfaceBvh::Slot witness_a_ = 0, witness_b_ = 0;
   ConvexDistance closest_;

@@ -49,7 +49,8 @@ class SurfaceBvh {
   /// [m] No point of a part is farther from L's origin.
   double extent() const { return extent_; }
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< of all parts, in L
-  std::size_t node_count() const { return nodes_.size(); }
+  /// [m] The support function: the largest n.x of all points, in double. @param n_L  unit
+  double support(const Eigen::Vector3d& n_L) const;
 
   /// Levels of nodes, at most: the root's, and one for each division of 2^32 parts by eight.
   static constexpr std::size_t kMaxLevels = 12;
@@ -80,5 +81,9 @@ struct OrientedBox {
 /// all coordinates and sizes involved.
 void oriented_box_bounds(const SurfaceBvh::Node& node, const OrientedBox& box,
                          float bounds[SurfaceBvh::kWidth]);
+
+/// Upper bounds [m] of the supports n.x of a node's children; the error is that of float.
+void oriented_box_supports(const SurfaceBvh::Node& node, const float n[3],
+                           float supports[SurfaceBvh::kWidth]);
 
 }  // namespace ist
