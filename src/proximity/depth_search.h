@@ -7,6 +7,8 @@ namespace ist {
 /// Into so many parts a link's query may divide the boxes that overlap it; fewer for meshes with
 /// holes, where parts bound little (Solid::distance_floor).
 constexpr int kMaxBoxCells = 256, kMaxBoxCellsWithHoles = kMaxBoxCells / 8;
+/// So many points a link's query may measure to find one inside where boxes seem only to touch it.
+constexpr int kMaxDescentSteps = 128;
 
 /// Searches the deepest point of solid boxes inside the link, after the dual-tree traversal has
 /// refined what is outside: the obstacle is every point of a box. Unsigned distances do not prune

@@ -29,9 +29,11 @@ constexpr double kSameCrowd = 1.5;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
-bool is_same_question(const QueryConfig& a, const QueryConfig& b) {
-  return a.max_distance == b.max_distance && a.tolerance == b.tolerance && a.margin == b.margin &&
-         a.relative_tolerance == b.relative_tolerance;
+// Whether what was answered for one question is an answer to another: it has to be as exact.
+bool answers(const QueryConfig& answered, const QueryConfig& asked) {
+  return answered.max_distance == asked.max_distance && answered.margin == asked.margin &&
+         answered.tolerance <= asked.tolerance &&
+         answered.relative_tolerance <= asked.relative_tolerance;
 }
 
 // The child whose box is nearest to a place.
@@ -74,14 +76,15 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.is_counted = false;
   search.first_bound = -kInfinity;
   search.is_answered = scene != kUnknownScene && answered.scene == scene &&
-                       other_links == kInfinity && is_same_question(answered.config, config) &&
+                       other_links == kInfinity && answers(answered.config, config) &&
                        answered.X_FL.matrix() == X_FL.matrix();
   if (search.is_answered) static_cast<SearchResult&>(search) = answered.result;
 }
 
 void LinkQuery::tighten(const QueryConfig& config) {
   LinkSearch& search = link_.search;
-  if (search.is_answered) return;
+  if (search.is_answered && answers(link_.kept.answered.config, config)) return;
+  search.is_answered = false;
   search.config = config;
   search.first_bound = search.lower_bound();
   search.refined_bound = kInfinity;
@@ -109,6 +112,7 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
+  search.descent_steps_left = kMaxDescentSteps;
   count_outside_region();
   if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;

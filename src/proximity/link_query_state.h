@@ -8,13 +8,13 @@
 #include <type_traits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/box_bounds.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
 #include "proximity/coherence/node_bounds.h"
-#include "proximity/deadline.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
 #include "proximity/supporting_planes.h"
@@ -116,10 +116,11 @@ struct LinkSearch : SearchResult {
   bool is_counted = false;   ///< in the statistics, as outside the regions
   double first_bound = 0.0;  ///< [m] proven before tighten()
   BoxBounds box_bounds;
-  VisitedSet visited;      ///< obstacles of the index at work that were refined
-  int measured = 0;        ///< points
-  int refined = 0;         ///< points, in the dual-tree traversal at work
-  int box_cells_left = 0;  ///< into which overlapping boxes may still be divided
+  VisitedSet visited;          ///< obstacles of the index at work that were refined
+  int measured = 0;            ///< points
+  int refined = 0;             ///< points, in the dual-tree traversal at work
+  int box_cells_left = 0;      ///< into which overlapping boxes may still be divided
+  int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
 
   /// [m] Beyond it nothing matters.
   double range() const { return config.max_distance + config.margin + rounding; }

@@ -1,7 +1,6 @@
 #include "ist_proximity/proximity/proximity_query.h"
 
 #include <algorithm>
-#include <cassert>
 #include <limits>
 
 #include "proximity/coherence/scene_tracker.h"
@@ -11,6 +10,9 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// [m] A finished lower bound may be this much lower than the tolerance asks for: 0.2 um by rounding
+// for each metre of coordinates, of which there are no more than ten in a robot's work.
+constexpr double kBoundError = 2e-6;
 
 }  // namespace
 
@@ -32,8 +34,12 @@ struct ProximityQuery::Impl {
     order.reserve(links.size());
   }
 
-  bool can_query(std::size_t i, const std::vector<bool>& known, bool has_clouds) const {
-    return has_clouds && known[i] && model->links[i].usable() && !model->links[i].tree.empty();
+  // Whether a link can be asked at all: there are clouds, and a pose for each link of this model.
+  bool can_query(std::size_t i, Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+                 SnapshotSpan clouds) const {
+    const bool fits = X_FL.size() == links.size() && known.size() == links.size();
+    return fits && !clouds.empty() && known[i] && model->links[i].usable() &&
+           !model->links[i].tree.empty();
   }
 
   // A query that has a deadline first asks every link to within half of its distance, which takes
@@ -54,6 +60,16 @@ struct ProximityQuery::Impl {
     for (const std::size_t i : order) links[i].tighten(config);
   }
 
+  // Counts a link that a deadline left with wider bounds than were asked for.
+  void count_unfinished(const LinkProximity& result) {
+    if (result.state == LinkState::kClear) return;
+    const double width = result.distance - result.lower_bound - config.margin;
+    const double asked = std::max(config.tolerance, config.relative_tolerance * result.distance);
+    if (width <= asked + kBoundError) return;  // false for NaN: UNKNOWN
+    ++statistics.unfinished;
+    if (width > statistics.widest) statistics.widest = width;
+  }
+
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
   std::vector<std::size_t> order;  // of the links that are asked
@@ -72,7 +88,6 @@ ProximityQuery& ProximityQuery::operator=(ProximityQuery&&) noexcept = default;
 bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                          SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   const std::size_t count = impl_->links.size();
-  assert(X_FL.size() == count && known.size() == count);
   results->resize(count);
   impl_->statistics = {};
   Deadline deadline(impl_->config.deadline);
@@ -82,7 +97,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   std::vector<std::size_t>& order = impl_->order;
   order.clear();
   for (std::size_t i = 0; i < count; ++i) {
-    if (!impl_->can_query(i, known, !clouds.empty())) {
+    if (!impl_->can_query(i, X_FL, known, clouds)) {
       (*results)[i].reset();
       impl_->links[i].forget();
       continue;
@@ -97,6 +112,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   for (const std::size_t i : order) {
     if (!is_stopped) complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
+    if (!complete) impl_->count_unfinished((*results)[i]);
   }
   return complete;
 }
@@ -104,7 +120,6 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
 bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                                  SnapshotSpan clouds, RobotProximity* result) {
   const std::size_t count = impl_->links.size();
-  assert(X_FL.size() == count && known.size() == count);
   impl_->statistics = {};
   *result = RobotProximity();
   result->all_known = true;
@@ -117,7 +132,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = k == 0 ? first : k <= first ? k - 1 : k;
-    if (!impl_->can_query(i, known, !clouds.empty())) {
+    if (!impl_->can_query(i, X_FL, known, clouds)) {
       result->all_known = false;
       continue;
     }
@@ -147,8 +162,11 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
 
 bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                               LinkProximity* result) {
-  assert(link < impl_->links.size());
   impl_->statistics = {};
+  if (link >= impl_->links.size()) {
+    result->reset();
+    return true;
+  }
   const LinkModel& model = impl_->model->links[link];
   if (clouds.empty() || !model.usable() || model.tree.empty()) {
     result->reset();

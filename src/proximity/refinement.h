@@ -92,6 +92,9 @@ class BoxRefinement {
 
  private:
   void measure_outside(ObstacleId id);
+  /// Looks for a point of a box that is inside the link, from one that both have in common, while
+  /// none is known.
+  void descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ, ObstacleId id);
 
   const BoxObstacles& obstacles_;
   LinkQueryState& link_;

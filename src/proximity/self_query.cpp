@@ -1,7 +1,6 @@
 #include "ist_proximity/proximity/self_query.h"
 
 #include <algorithm>
-#include <cassert>
 #include <limits>
 
 #include "internal/geometry/relative_pose.h"
@@ -114,10 +113,10 @@ void SelfQuery::Impl::run(const LinkPair& pair, Span<const Eigen::Isometry3d> X_
 void SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                     std::vector<PairProximity>* results) {
   const auto& links = impl_->model->links;
-  assert(X_FL.size() == links.size() && known.size() == links.size());
+  const bool fits = X_FL.size() == links.size() && known.size() == links.size();
   results->resize(impl_->pairs.size());
   const auto can_query = [&](std::size_t i) {
-    return known[i] && links[i].usable() && !links[i].tree.empty();
+    return fits && i < links.size() && known[i] && links[i].usable() && !links[i].tree.empty();
   };
   for (std::size_t i = 0; i < impl_->pairs.size(); ++i) {
     const LinkPair& pair = impl_->pairs[i];

@@ -15,6 +15,7 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stop_signal.h"
+#include "ros/common/stopwatch.h"
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
@@ -30,6 +31,7 @@
 #include "ros/poses/make_pose_source.h"
 #include "ros/poses/transform_buffer.h"
 #include "ros/poses/transform_listener.h"
+#include "ros/poses/usual_period.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
@@ -42,6 +44,7 @@ using Clock = std::chrono::steady_clock;
 
 // A cycle runs at least this often with pose_source joint_states.
 constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
+constexpr double kLongestPeriod = 0.1;  // [s] the same
 
 }  // namespace
 
@@ -70,6 +73,7 @@ class ProximityServer::Impl {
   void run_diagnostics();
   void publish_diagnostics();
   LiveConfig live_config() const;
+  double period() const;
 
   const ServerConfig config_;
   ros::NodeHandle nh_, private_nh_;
@@ -87,6 +91,7 @@ class ProximityServer::Impl {
   StopSignal cycle_signal_;  ///< joint states are its events
   StopSignal diagnostics_signal_;
   std::atomic<std::uint64_t> joint_states_received_{0};
+  UsualPeriod joint_state_period_{kLongestPeriod};
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   std::mutex report_mutex_;
@@ -125,6 +130,7 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
       ++joint_states_received_;
+      joint_state_period_.note(Clock::now());
       cycle_signal_.notify();
     });
   }
@@ -202,7 +208,8 @@ void ProximityServer::Impl::run_cycle() {
   spheres_.repeat_when_due();
   const auto message = boost::make_shared<ist_proximity::ProximityArray>();
   const std::string transform_problem = listener_.problem();
-  const LiveConfig live = live_config();
+  LiveConfig live = live_config();
+  live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
@@ -221,10 +228,11 @@ void ProximityServer::Impl::run_cycle() {
   const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
     if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
   };
-  if (results_.publish(message, fill_joint_repulsion)) {
-    const std::lock_guard<std::mutex> lock(report_mutex_);
-    ++report_.markers_drawn;
-  }
+  Stopwatch watch;
+  const bool drawn = results_.publish(message, fill_joint_repulsion);
+  const std::lock_guard<std::mutex> lock(report_mutex_);
+  if (drawn) ++report_.markers_drawn;
+  if (cycle_) report_.parts[kPartPublish].add(watch.lap());
 }
 
 /// Tells the parts that do not notice a backward jump of the clock themselves.
@@ -294,11 +302,17 @@ void ProximityServer::Impl::publish_diagnostics() {
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report = report_;
+    report_.worst_deadline = DeadlineCost();
   }
   report.parameter_problem = live_.problem();
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);
+}
+
+/// [s] From one cycle to the next.
+double ProximityServer::Impl::period() const {
+  return joint_states_ ? joint_state_period_.seconds() : 1.0 / config_.rate;
 }
 
 LiveConfig ProximityServer::Impl::live_config() const {

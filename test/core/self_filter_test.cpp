@@ -175,7 +175,7 @@ TEST(SelfFilter, removesEveryPointOfTheSurface) {
   const CloudSnapshot snapshot = ingest(points, robot, config_with(0.02));
   EXPECT_EQ(snapshot.counts.on_robot, points.size());
   EXPECT_TRUE(snapshot.index.empty());
-  EXPECT_TRUE(snapshot.coarse.empty());
+  EXPECT_TRUE(snapshot.index.bvh().thinned().empty());
   EXPECT_FALSE(snapshot.counts.saw_nothing());
 }
 

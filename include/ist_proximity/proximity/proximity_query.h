@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -10,6 +11,9 @@
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
+
+/// An instant at which a computation ends, whatever is left to do; max(): never.
+using TimePoint = std::chrono::steady_clock::time_point;
 
 /// How a query answers.
 struct QueryConfig {
@@ -60,6 +64,10 @@ struct QueryStatistics {
   std::uint64_t leaf_pairs = 0;         ///< pairs of sphere leaf and tile of obstacles
   std::uint64_t exact_evaluations = 0;  ///< points measured against the link's exact geometry
   std::uint64_t outside_region = 0;     ///< links whose range ends outside a cloud's region
+  std::uint64_t unfinished = 0;         ///< links that a deadline left wider than the tolerance
+  /// [m] Largest distance - lower_bound, margin aside, of the unfinished links whose state is
+  /// known.
+  double widest = 0.0;
 };
 
 /// Distances from the links of a robot to point clouds.
@@ -94,7 +102,8 @@ class ProximityQuery {
 
   /// @param X_FL    by link: link frame -> fixed frame, rigid to 1e-6 (see is_rigid); ignored
   ///                where `known` is false
-  /// @param known   by link: false makes the link UNKNOWN
+  /// @param known   by link: false makes the link UNKNOWN. Where it or X_FL has another size than
+  ///                the model's links, every link is UNKNOWN
   /// @param clouds  the snapshots of all usable sources; none makes every link UNKNOWN
   /// @param results one per link, overwritten
   /// @returns false when the deadline passed before every link met its tolerance
@@ -108,7 +117,7 @@ class ProximityQuery {
                    SnapshotSpan clouds, RobotProximity* result);
 
   /// One link only.
-  /// @param link  index in the model
+  /// @param link  index in the model; UNKNOWN when there is none
   /// @returns as run()
   bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                 LinkProximity* result);

@@ -65,7 +65,8 @@ class SelfQuery {
   SelfQuery& operator=(SelfQuery&&) noexcept;
 
   /// @param X_FL     by link: link frame -> fixed frame, rigid
-  /// @param known    by link: false makes its pairs UNKNOWN
+  /// @param known    by link: false makes its pairs UNKNOWN. Where it or X_FL has another size than
+  ///                 the model's links, every pair is UNKNOWN
   /// @param results  one per pair, overwritten
   void run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
            std::vector<PairProximity>* results);

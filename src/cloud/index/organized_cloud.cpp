@@ -19,8 +19,8 @@ namespace {
 // Whether pixels can be read from the message as four floats each, the coordinates first.
 bool holds_floats(const RawCloud& cloud) {
   const auto is_aligned = [](std::size_t bytes) { return bytes % sizeof(float) == 0; };
-  return !cloud.is_double && !cloud.swap_bytes && cloud.y == cloud.x + sizeof(float) &&
-         cloud.z == cloud.x + 2 * sizeof(float) &&
+  return cloud.depth == DepthType::kNone && !cloud.is_double && !cloud.swap_bytes &&
+         cloud.y == cloud.x + sizeof(float) && cloud.z == cloud.x + 2 * sizeof(float) &&
          cloud.x + 4 * sizeof(float) <= cloud.point_step && is_aligned(cloud.point_step) &&
          is_aligned(cloud.row_step) &&
          is_aligned(reinterpret_cast<std::uintptr_t>(cloud.data) + cloud.x);
@@ -128,6 +128,10 @@ class OrganizedReader {
   BlockPixels copied() {
     std::fill_n(copy_, 4 * kBlockSide * kBlockSide, std::numeric_limits<float>::quiet_NaN());
     for (std::size_t row = 0; row < rows(); ++row) {
+      if (cloud_.depth != DepthType::kNone) {
+        copy_depths(row);
+        continue;
+      }
       for (std::size_t column = 0; column < columns(); ++column) {
         const Eigen::Vector3d p = point_at(cloud_, row_ + row, column_ + column);
         float* to = copied_pixel(row, column);
@@ -135,6 +139,16 @@ class OrganizedReader {
       }
     }
     return {copy_, 4, 4 * kBlockSide};
+  }
+  void copy_depths(std::size_t row) {
+    double x[kBlockSide], y[kBlockSide], z[kBlockSide];
+    read_depth_pixels(cloud_, row_ + row, column_, columns(), x, y, z);
+    for (std::size_t column = 0; column < columns(); ++column) {
+      float* to = copied_pixel(row, column);
+      to[0] = static_cast<float>(x[column]);
+      to[1] = static_cast<float>(y[column]);
+      to[2] = static_cast<float>(z[column]);
+    }
   }
   float* copied_pixel(std::size_t row, std::size_t column) {
     return copy_ + 4 * (kBlockSide * row + column);

@@ -14,6 +14,7 @@ using Sample = std::array<CloudPoint, PointCells::kSample>;
 // The same cloud as a single row, where its rows follow each other without padding or it is a
 // single column: full batches are read faster.
 RawCloud flattened(RawCloud cloud) {
+  if (cloud.depth != DepthType::kNone) return cloud;  // each row has its own rays
   if (cloud.width == 1) {
     cloud.point_step = cloud.row_step;
   } else if (cloud.row_step != cloud.width * cloud.point_step) {

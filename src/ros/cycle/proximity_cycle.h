@@ -22,6 +22,9 @@
 
 namespace ist {
 
+/// The shares of a cycle's deadline at which distances and repulsion have to be there.
+constexpr double kQueryShare = 0.6, kRepulsionShare = 0.8;
+
 /// Turns link poses and clouds into one ProximityArray per cycle, for one robot model. It uses the
 /// newest data and never waits. One thread.
 class ProximityCycle {
@@ -33,8 +36,13 @@ class ProximityCycle {
 
   /// @param now      the ROS clock's time
   /// @param message  overwritten
+  /// @param config   query.deadline is in seconds here, from known poses on: distances take
+  /// kQueryShare
+  ///                 of it at most, repulsion ends at kRepulsionShare, and contact volumes at the
+  ///                 deadline. Repulsion that is late is that of the link's nearest point, volumes
+  ///                 that are late are NaN, and the status says so
   /// @param report   its transform_problem is read; sources, poses and status are overwritten, and
-  ///                 the computation time is added
+  ///                 the times are added
   void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
            ist_proximity::ProximityArray* message, CycleReport* report);
 
@@ -58,8 +66,12 @@ class ProximityCycle {
  private:
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
-  void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
-  Wrench penetration(std::size_t link, const LiveConfig& config) const;
+  void run_query(const LiveConfig& config, TimePoint begin);
+  void find_urgent_links();
+  void compute_pushes(const LiveConfig& config, TimePoint end);
+  void compute_wrenches(const LiveConfig& config, TimePoint end);
+  Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
+  void fill_links(ist_proximity::ProximityArray* message);
 
   std::shared_ptr<const ModelState> model_;
   const RobotModel& robot_;
@@ -78,6 +90,8 @@ class ProximityCycle {
   StatusInput status_input_;
   std::vector<LinkProximity> results_;   ///< by link of the robot
   std::vector<RepulsiveWrench> pushes_;  ///< by link of the robot, filtered
+  std::vector<Wrench> wrenches_;         ///< by link of the robot
+  std::vector<std::size_t> urgent_;      ///< monitored links, the least lower bound first
 };
 
 }  // namespace ist

@@ -61,7 +61,8 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
 
 void read_query(ParameterReader* reader, QueryConfig* query) {
   reader->read("query/tolerance", Range::non_negative("m", 1.0), &query->tolerance);
-  reader->read("query/deadline", Range::non_negative("s", 10.0), &query->deadline);
+  // From the whole period to 10 s.
+  reader->read("query/deadline", Range{"s", -1.0, 10.0}, &query->deadline);
   reader->read("query/margin", Range::non_negative("m", 1.0), &query->margin);
 }
 
@@ -97,6 +98,16 @@ std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& priva
   if (ros::param::get(private_nh.getNamespace(), tree)) return tree;
   if (!ros::master::check()) return std::nullopt;
   return XmlRpc::XmlRpcValue();
+}
+
+QueryConfig default_query() {
+  QueryConfig query;
+  query.deadline = kDefaultDeadline;
+  return query;
+}
+
+double deadline_of(double parameter, double period) {
+  return parameter < 0.0 ? -parameter * period : parameter;
 }
 
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {

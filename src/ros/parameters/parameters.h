@@ -34,6 +34,18 @@ struct SelfCollisionConfig {
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
 };
 
+/// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
+/// may take half of the time until the next one, so that no scene makes answers late.
+constexpr double kDefaultDeadline = -0.5;
+
+/// How the node's queries answer by default: as the core's, but with a deadline.
+QueryConfig default_query();
+
+/// [s] The deadline of a cycle; 0: none.
+/// @param parameter  ~query/deadline
+/// @param period     [s] from one cycle to the next
+double deadline_of(double parameter, double period);
+
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
 struct ServerConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
@@ -46,8 +58,8 @@ struct ServerConfig {
   double rate = 100.0;  ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
-  QueryConfig query;
-  int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
+  QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
+  int max_query_answers = 100000;       ///< states times links of one ~query: 60 MB; > 0
   RepulsionConfig repulsion;
   bool contacts_wanted = true;  ///< ~penetration/enabled
   ContactConfig contacts;
@@ -75,7 +87,8 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 
 /// Parameters that may change while the node runs.
 struct LiveConfig {
-  QueryConfig query;  ///< its max_distance is as it was at the start
+  /// Its max_distance is as it was at the start; its deadline is the parameter, see deadline_of().
+  QueryConfig query = default_query();
   RepulsionConfig repulsion;
   PenetrationConfig penetration;
   /// The contact bodies that are packed so far; may be null. This is no parameter.

@@ -199,7 +199,8 @@ void SelfProximity::publish_once() {
   }
   last_now_ = now;
   const auto message = boost::make_shared<ProximityArray>();
-  const LiveConfig live = live_();
+  LiveConfig live = live_();
+  live.query.deadline = deadline_of(live.query.deadline, 1.0 / config_.self_collision.rate);
   StatusInput input;
   input.clock_runs = !now.isZero();
   input.model_problem =

@@ -1,5 +1,6 @@
 #include "ros/status/diagnostics.h"
 
+#include <array>
 #include <cmath>
 
 #include "ros/common/text.h"
@@ -63,6 +64,27 @@ void add_source_counts(const SourceReport& source, double rate, double now,
     add_value("points NaN", source.counts.not_a_number, status);
     add_value("points infinite", source.counts.infinite, status);
     add_value("time to ingest", milliseconds(source.ingest_time), status);
+  }
+}
+
+/// Adds the deadline, and the worst that it has cost since the last diagnostics.
+void add_deadline(const CycleReport& report, DiagnosticStatus* status) {
+  const DeadlineCost& worst = report.worst_deadline;
+  add_value("deadline", report.deadline > 0.0 ? milliseconds(report.deadline) : "none", status);
+  add_value("deadlines missed", report.deadlines_missed, status);
+  add_value("links unfinished, most of a cycle", worst.unfinished, status);
+  add_value("widest bounds of unfinished links", millimetres(worst.widest), status);
+  add_value("links with unblended repulsion, most of a cycle", worst.unblended, status);
+  add_value("links without penetration, most of a cycle", worst.no_penetration, status);
+}
+
+void add_parts(const CycleReport& report, DiagnosticStatus* status) {
+  const std::array<const char*, kCycleParts> names = {"poses",       "query",   "repulsion",
+                                                      "penetration", "message", "publishing"};
+  for (std::size_t i = 0; i < kCycleParts; ++i) {
+    const std::string name = std::string("time of ") + names[i];
+    add_value(name + ", median", milliseconds(report.parts[i].quantile(0.5)), status);
+    add_value(name + ", 99th percentile", milliseconds(report.parts[i].quantile(0.99)), status);
   }
 }
 
@@ -141,11 +163,12 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
             &status);
   add_value("rate", format_text("%.1f Hz", rate), &status);
   add_value(wanted, format_text("%.1f Hz", wanted_rate), &status);
-  add_value("deadlines missed", report.deadlines_missed, &status);
+  add_deadline(report, &status);
   add_value("markers drawn", report.markers_drawn, &status);
   add_value("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
   add_value("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)),
             &status);
+  add_parts(report, &status);
   return status;
 }
 
