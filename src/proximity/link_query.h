@@ -77,6 +77,7 @@ class LinkQuery {
   void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);
   void measure_again(const BoxObstacles& obstacles);
+  bool is_crowded(const DualTreeResult& found) const;
   bool is_near(const PointObstacles& obstacles) const;
   static bool is_near(const BoxObstacles& obstacles);
   bool search_near(const PointObstacles& obstacles);
