@@ -119,9 +119,11 @@ if(catkin_FOUND AND TARGET ist_proximity_ros)
   foreach(source IN LISTS ros_test_sources)
     get_filename_component(test ${source} NAME_WE)
     add_executable(${test} EXCLUDE_FROM_ALL ${source})
-    target_include_directories(${test} PRIVATE src)
+    target_include_directories(${test} PRIVATE src test)
     target_include_directories(${test} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
     target_link_libraries(${test} PRIVATE ist_proximity_ros GTest::GTest GTest::Main)
+    target_compile_definitions(${test} PRIVATE
+      IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
     set_target_properties(${test} PROPERTIES
       RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
     add_dependencies(tests ${test})

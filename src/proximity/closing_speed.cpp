@@ -131,7 +131,7 @@ void ClosingSpeed::remember(const Pose& now) {
   newer_ = now;
 }
 
-ClosingSpeed::Track* ClosingSpeed::find_track(const std::string& source) {
+ClosingSpeed::Track* ClosingSpeed::find_track(int source) {
   Track* oldest = &tracks_[0];
   for (Track& track : tracks_) {
     if (track.used > 0 && track.source == source) {

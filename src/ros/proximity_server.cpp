@@ -25,6 +25,7 @@
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
 #include "ros/output/message_invariants.h"
+#include "ros/output/message_pool.h"
 #include "ros/output/result_publisher.h"
 #include "ros/output/sphere_publisher.h"
 #include "ros/parameters/live_parameters.h"
@@ -77,6 +78,7 @@ class ProximityServer::Impl {
   void take_model();
   void choose_counted_links();
   void notice_standing_root();
+  void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
   void run_diagnostics();
   void publish_diagnostics();
@@ -108,10 +110,12 @@ class ProximityServer::Impl {
   // Used by the cycle thread alone.
   std::shared_ptr<const ModelState> model_;
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
+  MessagePool<ist_proximity::ProximityArray> messages_;
   double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
   CountedLinks counted_;
   bool root_stands_still_ = false;  ///< in a fixed frame that the URDF lacks
   Clock::time_point next_root_check_;
+  double region_radius_ = 0.0;  ///< [m] the largest of this robot
   ros::Time last_now_;
   ros::Time last_stamp_;  ///< of the last ~proximity
 
@@ -219,29 +223,31 @@ void ProximityServer::Impl::run_cycle() {
   take_model();
   notice_standing_root();
   spheres_.repeat_when_due();
-  const auto message = boost::make_shared<ist_proximity::ProximityArray>();
+  const auto message = messages_.take();
   const std::string transform_problem = listener_.problem();
   LiveConfig live = live_config();
   live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
+  if (cycle_) cycle_->run(now, sources_, live, transform_problem, message.get());
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, live, message.get(), &report_);
+      cycle_->report(*message, &report_);
     } else {
       fill_without_model(*model_, config_, std::max(now, last_stamp_), sources_, message.get(),
                          &report_);
     }
-    last_stamp_ = message->header.stamp;
     ++report_.cycles;
   }
+  last_stamp_ = message->header.stamp;
   assert_invariants(*message,
                     {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
   const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
     if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
   };
   Stopwatch watch;
+  spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
   const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
   const std::lock_guard<std::mutex> lock(report_mutex_);
@@ -267,7 +273,9 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
 void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
+  if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
   model_ = std::move(model);
+  region_radius_ = 0.0;
   if (model_->phase == ModelState::Phase::kReady) {
     cycle_ = std::make_unique<ProximityCycle>(
         model_, config_,
@@ -332,6 +340,15 @@ void ProximityServer::Impl::notice_standing_root() {
   choose_counted_links();
 }
 
+/// Hands finer packings of the same robot to all parts, which go on with what they know.
+void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model) {
+  model_ = std::move(model);
+  cycle_->refine(model_);
+  query_service_->set_model(model_);
+  if (self_proximity_) self_proximity_->set_model(model_);
+  set_source_targets(live_.get().query);
+}
+
 /// Tells the sources the model, the fixed frame and the region of interest.
 void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
@@ -342,6 +359,8 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   if (computes_poses && model_->robot && model_->kinematics) {
     region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
                                 query.max_distance + query.margin);
+    // Clouds that were cropped before serve finer packings, too.
+    region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
@@ -365,6 +384,8 @@ void ProximityServer::Impl::publish_diagnostics() {
     report_.worst_deadline = DeadlineCost();
   }
   report.parameter_problem = live_.problem();
+  report.parameters_without_effect = live_.without_effect();
+  spheres_.show_finer(*loader_.state());
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);

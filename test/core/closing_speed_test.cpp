@@ -27,6 +27,9 @@ namespace {
 constexpr double kCloudPeriod = 1.0 / 30.0;  // [s]
 
 // An answer with the obstacle at a distance along x.
+// Numbers of sources.
+constexpr int kFront = 0, kBack = 1, kLaser = 2;
+
 LinkProximity answer_at(double distance) {
   LinkProximity result;
   result.state = LinkState::kNear;
@@ -40,7 +43,7 @@ LinkProximity answer_at(double distance) {
 // Feeds a standing link with one distance per cloud, four messages each.
 class OneSource {
  public:
-  ClosingRates cloud(double distance, const char* source = "front") {
+  ClosingRates cloud(double distance, int source = kFront) {
     ++generation_;
     const double stamp = time_;
     ClosingRates rates;
@@ -70,12 +73,12 @@ TEST(ClosingSpeed, AnotherSourceMakesNoSpeed) {
   test::Rng rng(1);
   for (int i = 0; i < 400; ++i) {
     const bool front = rng() % 2 == 0;
-    link.cloud(front ? 0.191 : 0.171, front ? "front" : "back");
+    link.cloud(front ? 0.191 : 0.171, front ? kFront : kBack);
   }
   EXPECT_EQ(link.finite, 0) << "of " << link.messages;
   EXPECT_LT(link.unknown, 60);  // until each camera's fourth cloud
   // A source that was not the nearest before is not known at first.
-  const ClosingRates rates = link.cloud(0.1, "laser");
+  const ClosingRates rates = link.cloud(0.1, kLaser);
   EXPECT_TRUE(std::isnan(rates.obstacles) && std::isnan(rates.total));
   EXPECT_TRUE(std::isnan(rates.time_to_contact));
   EXPECT_NEAR(rates.robot, 0.0, 1e-12);
@@ -179,9 +182,8 @@ class Watch {
       const auto camera = static_cast<std::size_t>(std::max(answers[i].source, 0));
       const CloudSnapshot& cloud = perception.snapshots()[camera];
       const auto generation = static_cast<std::uint64_t>(1e4 * cloud.stamp);
-      rates[i] =
-          speeds[i].update(world->time(), answers[i], X_FL[i],
-                           {world->cameras()[camera].config().name, generation, cloud.stamp});
+      rates[i] = speeds[i].update(world->time(), answers[i], X_FL[i],
+                                  {static_cast<int>(camera), generation, cloud.stamp});
     }
     return rates;
   }

@@ -73,7 +73,7 @@ WRONG = [
                 "scan": {"type": "sensor_msgs/LaserScan", "max_range": "far"},
                 "map": {"type": "octomap_msgs/Octomap", "self_filter": True, "timeout": 0},
                 "file": {"type": "octomap_msgs/Octomap", "file": "room.bt", "topic": "room"},
-                "odd": {"type": "sensor_msgs/Image", "timeout": 0, "required": 1},
+                "odd": {"type": "sensor_msgs/Imu", "timeout": 0, "required": 1},
                 "range": {"min_range": 2.0, "max_range": 1.0},
                 "padding": {"self_filter_padding": -0.01, "topic": ""},
                 "flat": 3,

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <string>
 
 #include "ist_proximity/proximity/proximity_query.h"
 
@@ -62,12 +61,12 @@ class ApproachEstimate {
 };
 
 /// Computes the closing rates of one link from its successive answers. One thread; allocates
-/// nothing once the names of the sources have been met.
+/// nothing.
 class ClosingSpeed {
  public:
   /// The cloud that holds the nearest point.
   struct Nearest {
-    std::string source;            ///< name; empty: no point is near
+    int source = -1;               ///< its number; -1: no point is near
     std::uint64_t generation = 0;  ///< differs for each cloud of the source
     double stamp = 0.0;            ///< [s] acquisition time
     bool stands_still = false;     ///< the source's points are stated not to move, as a map file's
@@ -95,7 +94,7 @@ class ClosingSpeed {
     double distance = ClosingRates::kNaN;  ///< [m]
   };
   struct Track {
-    std::string source;
+    int source = -1;
     std::uint64_t generation = 0;
     std::uint64_t used = 0;  ///< larger: used later
     bool stands_still = false;
@@ -104,12 +103,12 @@ class ClosingSpeed {
 
   const Pose* reference(double time) const;
   void remember(const Pose& now);
-  Track* find_track(const std::string& source);
+  Track* find_track(int source);
   double obstacle_speed(const Pose& now, const LinkProximity& result, const Nearest& nearest);
 
   Pose newer_, older_;  ///< two poses at least 20 ms apart
   Pose latest_;
-  std::string latest_source_;
+  int latest_source_ = -1;
   std::uint64_t latest_generation_ = 0;
   double retreat_ = 0.0;  ///< [m] how far the link alone has gone from obstacles
   std::uint64_t uses_ = 0;

@@ -13,6 +13,7 @@
 
 #include "ros/common/stop_signal.h"
 #include "ros/parameters/parameters.h"
+#include "ros/parameters/startup_parameters.h"
 
 namespace ist {
 
@@ -45,6 +46,9 @@ class LiveParameters {
   /// Why values stay in use that the parameter server does not hold; empty when there are none.
   std::string problem() const;
 
+  /// Which parameters were changed on the server that are read at the start only; empty: none.
+  std::string without_effect() const;
+
  private:
   using Clock = std::chrono::steady_clock;
   /// The topics and the service of one dynamic_reconfigure server.
@@ -63,6 +67,7 @@ class LiveParameters {
            dynamic_reconfigure::Reconfigure::Response& response);
   bool apply(const std::string& group, const XmlRpc::XmlRpcValue& change);
   void take(const LiveReading& reading);
+  void note_startup_changes(const XmlRpc::XmlRpcValue& tree);
   std::string lost_names() const;
   void set_problem(const std::string& problem);
   void publish_updates();
@@ -73,12 +78,14 @@ class LiveParameters {
   std::vector<Tunable> tunables_;
   std::vector<bool> configured_;  ///< by tunable: it has been on the parameter server
   std::vector<bool> lost_;        ///< by tunable: it was there and is not any more
+  StartupParameters startup_;
   std::string logged_problem_;
   Clock::time_point logged_time_;
 
   mutable std::mutex live_mutex_;  ///< guards the members below
   LiveConfig live_;
   std::string problem_;
+  std::string without_effect_;
   Clock::time_point asked_;  ///< when the server was asked that has not answered yet; else 0
 
   StopSignal stop_signal_;

@@ -73,7 +73,11 @@ void read_penetration(ParameterReader* reader, PenetrationConfig* penetration) {
 }
 
 void read_contacts(ParameterReader* reader, ServerConfig* config) {
-  reader->read("penetration/enabled", &config->contacts_wanted);
+  std::string wanted = "auto";
+  reader->read_switch("penetration/enabled", &wanted);
+  config->contacts_wanted = wanted == "true"    ? ContactsWanted::kAll
+                            : wanted == "false" ? ContactsWanted::kNone
+                                                : ContactsWanted::kAuto;
   reader->read("penetration/max_error", Range::positive("m", 1.0),
                &config->contacts.packing.max_error);
   reader->read("penetration/max_spheres", Range{"", 1.0, 1e5},
@@ -87,6 +91,11 @@ void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/ignore", &config->ignore);
   reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
   reader->read("self_collision/in_minimum", &config->in_minimum);
+}
+
+void read_attach(ParameterReader* reader, AttachConfig* config) {
+  reader->read("attach/max_objects", Range::non_negative("", 1e4), &config->max_objects);
+  reader->read("attach/max_time", Range::positive("s", 3600.0), &config->max_time);
 }
 
 }  // namespace
@@ -116,7 +125,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   ParameterReader reader(tree);
   ServerConfig config;
   for (const char* group : {"query", "repulsion", "penetration", "packing", "self_collision",
-                            "min_distance", "speed_scale"}) {
+                            "attach", "min_distance", "speed_scale"}) {
     reader.children(group);  // adds an error unless it is a dictionary
   }
   read_poses(&reader, &config);
@@ -132,6 +141,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
   read_self_collision(&reader, &config.self_collision);
+  read_attach(&reader, &config.attach);
   if (config.self_collision.in_minimum && !config.self_collision.enabled) {
     warnings->push_back("~self_collision/in_minimum has no effect without ~self_collision/enabled");
   }

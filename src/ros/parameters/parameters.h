@@ -36,6 +36,13 @@ struct SelfCollisionConfig {
   bool in_minimum = false;             ///< its links count in ~min_distance and ~speed_scale
 };
 
+/// The links whose volumes are packed for `penetration`.
+enum class ContactsWanted {
+  kAuto,  ///< those that something has come within the influence distance of
+  kAll,   ///< all, from the start
+  kNone
+};
+
 /// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
 /// may take half of the time until the next one, so that no scene makes answers late.
 constexpr double kDefaultDeadline = -0.5;
@@ -47,6 +54,12 @@ QueryConfig default_query();
 /// @param parameter  ~query/deadline
 /// @param period     [s] from one cycle to the next
 double deadline_of(double parameter, double period);
+
+/// Limits of ~attach_object.
+struct AttachConfig {
+  int max_objects = 100;  ///< attached at a time: each is packed, and measured by every query; >= 0
+  double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
+};
 
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
 struct ServerConfig {
@@ -63,10 +76,11 @@ struct ServerConfig {
   QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
   int max_query_answers = 100000;       ///< states times links of one ~query: 60 MB; > 0
   RepulsionConfig repulsion;
-  bool contacts_wanted = true;  ///< ~penetration/enabled
+  ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   ContactConfig contacts;
   PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
+  AttachConfig attach;
   /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.
   std::vector<std::string> ignore_links;
   bool fixed_links_count = false;  ///< ~min_distance/fixed_links: links that cannot move count too

@@ -89,10 +89,16 @@ void SelfProximity::publish_failure(const std::string& fault) {
 }
 
 void SelfProximity::take_model() {
+  bool is_refined = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (newest_model_ == model_) return;
+    is_refined = query_ && model_ && is_refinement(*model_, *newest_model_);
     model_ = newest_model_;
+  }
+  if (is_refined) {
+    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query);
+    return;
   }
   query_.reset();
   if (!model_->robot || !model_->kinematics) return;
@@ -179,6 +185,7 @@ void SelfProximity::compute_wrenches(const LiveConfig& live) {
   for (std::size_t i = 0; i < results_.size(); ++i) {
     if (results_[i].state != LinkState::kContact) continue;
     const LinkPair& pair = query_->pairs()[i];
+    for (const std::size_t link : {pair.first, pair.second}) model_->usage->note_near(link);
     const ContactGeometry* first = find_contact_geometry(live.contacts.get(), robot, pair.first);
     const ContactGeometry* second = find_contact_geometry(live.contacts.get(), robot, pair.second);
     const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
