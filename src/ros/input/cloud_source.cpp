@@ -45,13 +45,14 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
       filtered_(filtered),
       state_(config, config.file.empty() ? nh.resolveName(config.topic) : config.file),
       placer_(config, buffer),
-      ingest_(ingest_config(config)) {
+      ingest_(ingest_config(config)),
+      topic_advice_(nh.resolveName(config.topic), message_type(config.type), filtered.getTopic()) {
   nh.setCallbackQueue(&queue_);
   if (config.file.empty()) {
     const auto begin = [this] {
       if (is_map_) state_.begin_work();  // others are read in no time
     };
-    subscriber_ = subscribe(config, &nh, begin, [this](const Received& received) {
+    subscription_ = subscribe(config, &nh, begin, [this](const Received& received) {
       if (is_map_) state_.end_work();
       guard([&] { receive(received); });
     });
@@ -62,7 +63,8 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
 CloudSource::~CloudSource() {
   running_ = false;
   thread_.join();
-  subscriber_.shutdown();
+  subscription_.messages.shutdown();
+  subscription_.camera_info.shutdown();
 }
 
 void CloudSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
@@ -131,9 +133,14 @@ void CloudSource::read_file() {
 }
 
 void CloudSource::count_publishers() {
-  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
+  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscription_.messages);
   if (!publishers) return;
-  state_.update([&](SourceReport* report) { report->publishers = *publishers; });
+  std::optional<std::string> advice;
+  if (!has_received_) advice = topic_advice_.ask();
+  state_.update([&](SourceReport* report) {
+    report->publishers = *publishers;
+    if (advice) report->advice = *advice;
+  });
 }
 
 /// Takes the newest target, and drops measurements of another model or from before the clock's
@@ -144,7 +151,10 @@ void CloudSource::take_target() {
     waiting_.clear();
     if (!config_.is_permanent()) last_map_.reset();
   }
-  if (newest.generation != target_.generation || newest.model != target_.model) {
+  const bool is_same_robot =
+      newest.model == target_.model ||
+      (newest.model && target_.model && same_geometry(*newest.model, *target_.model));
+  if (newest.generation != target_.generation || !is_same_robot) {
     in_use_ = ros::Time();
     map_is_new_ = last_map_ != nullptr;
     placer_.begin_target();
@@ -160,6 +170,7 @@ void CloudSource::drop_overdue() {
 }
 
 void CloudSource::receive(const Received& received) {
+  has_received_ = true;
   take_target();
   drop_overdue();
   const ros::Time& stamp = received.header.stamp;
@@ -187,6 +198,7 @@ void CloudSource::receive(const Received& received) {
     }
     // The wait of other messages for tf remains a problem until one is used or this one is old.
     if (!waits_for_tf_ || ahead < -config_.timeout) report->problem.clear();
+    report->doubt = received.doubt;
     if (problem.empty()) return;
     report->problem = problem;
     ++report->unusable;

@@ -71,6 +71,7 @@ struct Received {
   std_msgs::Header header;
   std::string fault;
   std::shared_ptr<const Measurement> measurement;
+  std::string doubt = {};  ///< a sentence about a message that is used all the same
 };
 using Receiver = std::function<void(const Received&)>;
 /// Called before a message is read, which takes long for a large map.
@@ -79,9 +80,15 @@ using ReadingBegins = std::function<void()>;
 /// The configuration of a source's Ingest. The range limits of scans apply to beams instead.
 IngestConfig ingest_config(const SourceConfig& config);
 
+/// The topics of a source.
+struct Subscription {
+  ros::Subscriber messages;
+  ros::Subscriber camera_info;  ///< of depth images
+};
+
 /// Subscribes to the source's topic with its message type.
 /// @param begin, receive  called from the callback queue of the node handle
-ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh,
-                          const ReadingBegins& begin, const Receiver& receive);
+Subscription subscribe(const SourceConfig& config, ros::NodeHandle* nh, const ReadingBegins& begin,
+                       const Receiver& receive);
 
 }  // namespace ist

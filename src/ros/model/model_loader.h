@@ -21,8 +21,10 @@
 namespace ist {
 
 /// Makes the robot's model in a thread of its own: it waits for robot_description on the parameter
-/// server, reads the URDF, and packs its links or takes them from the cache. After a text that is
-/// no URDF it reads again as soon as the parameter changes. All members are thread safe.
+/// server, reads the URDF, and packs its links coarsely or takes them from the cache. After a text
+/// that is no URDF it reads again as soon as the parameter changes. Another thread, of the lowest
+/// priority, packs more finely the links that are near something or costly, for as long as that
+/// pays. All members are thread safe.
 class ModelLoader {
  public:
   /// @param nh  namespace in which, and above which, `config.robot_description` is searched
@@ -63,7 +65,7 @@ class ModelLoader {
   std::string waiting_for_description() const;
   bool fetch_urdf(std::string* urdf, std::string* problem) const;
   void load(const std::string& urdf);
-  bool build(const RobotDescription& description, ModelState* state);
+  bool build(const std::shared_ptr<const RobotDescription>& description, ModelState* state);
   std::string attach_read(const std::string& name, const ObjectReader& read);
   std::string detach_from(const std::shared_ptr<const ModelState>& state, const std::string& name);
   std::optional<std::string> detach_while_loading(const std::string& name);
@@ -80,6 +82,11 @@ class ModelLoader {
   RobotDescription carry_over_objects(ModelState* state);
   void set_state(ModelState state);
   void wait();
+  void run_refinement();
+  bool refine_once();
+  std::optional<std::size_t> link_to_refine(const ModelState& state);
+  void take_packings(const ModelState& base, const AnytimeModel::Ptr& refined,
+                     const std::vector<std::string>& warnings);
   bool cancelled() const { return stop_ || reload_; }
 
   const ServerConfig config_;
@@ -96,7 +103,13 @@ class ModelLoader {
   std::atomic<bool> change_revoked_{false};  ///< the same object was detached meanwhile
   std::atomic<bool> changes_ended_{false};
   std::chrono::steady_clock::time_point change_deadline_;  ///< guarded by change_mutex_
-  std::thread thread_;
+
+  // Used by the refining thread alone.
+  std::vector<LinkUsage::Need> needs_;  ///< by link, lately
+  std::shared_ptr<LinkUsage> needs_of_;
+  std::vector<std::shared_ptr<const ModelState>> retired_;
+
+  std::thread thread_, refining_thread_;
 };
 
 }  // namespace ist

@@ -148,10 +148,12 @@ std::string ModelLoader::change_objects(const std::shared_ptr<const ModelState>&
   callbacks.cancelled = [this] { return change_cancelled(); };
   callbacks.warning = [&](const std::string& warning) { ROS_WARN_STREAM(warning); };
   try {
-    const RobotDescription description = with_objects(*state->description, next.objects);
-    next.robot = rebuild_link(*state->robot, description, link,
-                              model_config(description, next.objects), callbacks);
-    if (next.robot) finish(description, &next);
+    const auto description =
+        std::make_shared<const RobotDescription>(with_objects(*state->description, next.objects));
+    next.anytime = state->anytime->with_link(description, link,
+                                             model_config(*description, next.objects), callbacks);
+    next.robot = next.anytime ? next.anytime->robot() : nullptr;
+    if (next.robot) finish(*description, &next);
   } catch (const ModelError& error) {
     return error.what();
   }
