@@ -10,6 +10,7 @@ import rospy
 from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter, StrParameter
 from proximity_testing import ProximityArray
+from std_msgs.msg import Float64
 
 
 class ReconfigureTest(unittest.TestCase):
@@ -122,6 +123,35 @@ class ReconfigureTest(unittest.TestCase):
             )
         self.node.wait_until(lambda: "~query/tolerance is -1 m" in self.node.log(), "the refusal")
         self.ball("as before", lambda ball: abs(ball.distance - ball.lower_bound - 0.02) < 0.0011)
+
+    def test_speed_scale(self):
+        """Distances change at once; values that do not go together change nothing."""
+        scales = []
+        self.node.subscribe("speed_scale", Float64, lambda m: scales.append(m.data))
+        # The bound is 0.2 m less the margin and the tolerance, between 0.1 and 0.3 m.
+        self.node.wait_until(lambda: scales and abs(scales[-1] - 0.4) < 0.01, "a scale of 0.4")
+        group = self.client("speed_scale")
+        group.update_configuration({"stop_distance": 0.0, "free_distance": 0.18})
+        self.node.wait_until(lambda: scales[-1] > 0.98, "full speed")
+        name = self.node.name + "/speed_scale"
+        self.assertAlmostEqual(rospy.get_param(name + "/free_distance"), 0.18)
+        service = group._set_service
+        answer = service(Config(doubles=[DoubleParameter("stop_distance", 0.4)])).config
+        self.assertAlmostEqual({d.name: d.value for d in answer.doubles}["stop_distance"], 0.0)
+        rospy.set_param(name + "/stop_distance", 0.4)  # more than free_distance
+        self.node.wait_until(
+            lambda: "must be less than ~speed_scale/free_distance, 0.18 m" in self.node.log(), "why"
+        )
+        self.assertGreater(scales[-1], 0.98)
+        rospy.set_param(name + "/stop_distance", 0.17)
+        self.node.wait_until(lambda: scales[-1] < 0.99, "the new distance")
+        separation = self.client("speed_scale/separation")
+        separation.update_configuration({"enabled": True, "stopping_time": 0.1})
+        self.node.wait_until(lambda: scales[-1] == 0.0, "a walking person 0.18 m away")
+        rospy.set_param(name + "/links", {"ball_link": {"stop_distance": 0.01}})
+        self.node.wait_until(
+            lambda: "was not set at the start: restart the node" in self.node.log(), "a word on it"
+        )
 
     def margin_stays(self, words, margin):
         """The ball's lower bound stays that of the margin for two readings of the server."""

@@ -9,9 +9,9 @@ namespace {
 
 class CloudMeasurement : public Measurement {
  public:
-  CloudMeasurement(const std_msgs::Header& header, const RawCloud& points,
+  CloudMeasurement(const std_msgs::Header& header, const RawCloud& points, std::size_t bytes,
                    std::shared_ptr<NoiseFilter> noise)
-      : Measurement(header), points_(points), noise_(std::move(noise)) {}
+      : Measurement(header, bytes), points_(points), noise_(std::move(noise)) {}
 
   void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
     const auto begin = std::chrono::steady_clock::now();
@@ -33,9 +33,9 @@ class CloudMeasurement : public Measurement {
 }  // namespace
 
 std::shared_ptr<const Measurement> make_cloud_measurement(
-    const std_msgs::Header& header, const RawCloud& points,
+    const std_msgs::Header& header, const RawCloud& points, std::size_t bytes,
     const std::shared_ptr<NoiseFilter>& noise) {
-  return std::make_shared<CloudMeasurement>(header, points, noise);
+  return std::make_shared<CloudMeasurement>(header, points, bytes, noise);
 }
 
 Received read_cloud(const sensor_msgs::PointCloud2ConstPtr& message, std::size_t max_points,
@@ -44,7 +44,8 @@ Received read_cloud(const sensor_msgs::PointCloud2ConstPtr& message, std::size_t
   const std::string fault = view_cloud(*message, max_points, &raw);
   if (!fault.empty()) return {message->header, "malformed cloud: " + fault, nullptr};
   raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
-  return {message->header, "", make_cloud_measurement(message->header, raw, noise)};
+  return {message->header, "",
+          make_cloud_measurement(message->header, raw, message->data.size(), noise)};
 }
 
 }  // namespace ist

@@ -11,9 +11,10 @@ namespace ist {
 
 /// Points of one instant: a cloud, or the pixels of a depth image.
 /// @param points  keep their message alive
+/// @param bytes   of that message
 /// @param noise   null: no noise filter
 std::shared_ptr<const Measurement> make_cloud_measurement(
-    const std_msgs::Header& header, const RawCloud& points,
+    const std_msgs::Header& header, const RawCloud& points, std::size_t bytes,
     const std::shared_ptr<NoiseFilter>& noise);
 
 /// Reads a PointCloud2.

@@ -95,7 +95,8 @@ Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera
   fault = check_depth_image(image, camera.rays(), &raw, max_points);
   if (!fault.empty()) return {header, "malformed image: " + fault, nullptr};
   raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
-  return {header, "", make_cloud_measurement(header, raw, noise), camera.doubt()};
+  return {header, "", make_cloud_measurement(header, raw, message->data.size(), noise),
+          camera.doubt()};
 }
 
 }  // namespace ist

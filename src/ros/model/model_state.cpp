@@ -6,6 +6,11 @@
 
 namespace ist {
 
+bool is_refinement(const ModelState& before, const ModelState& after) {
+  return before.phase == ModelState::Phase::kReady && after.phase == ModelState::Phase::kReady &&
+         before.robot && after.robot && same_geometry(*before.robot, *after.robot);
+}
+
 std::string no_kinematics(const ModelState& model) {
   return "link poses cannot be computed from the URDF: " + model.kinematics_problem;
 }

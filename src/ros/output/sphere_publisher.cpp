@@ -31,6 +31,22 @@ SpherePublisher::SpherePublisher(ros::NodeHandle private_nh)
     : publisher_(private_nh.advertise<visualization_msgs::MarkerArray>("spheres", 1, true)) {}
 
 void SpherePublisher::show(const ModelState& model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  draw(model);
+}
+
+void SpherePublisher::show_finer(const ModelState& model) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (model.robot == shown_robot_ || !model.robot || !shown_robot_ ||
+      !same_geometry(*model.robot, *shown_robot_)) {
+    return;  // another model is shown by the cycle
+  }
+  draw(model);
+}
+
+/// The caller holds mutex_.
+void SpherePublisher::draw(const ModelState& model) {
+  shown_robot_ = model.robot;
   if (!shown_.markers.empty()) publish_message(publisher_, deleted(shown_));
   shown_.markers.clear();
   shades_.clear();
@@ -41,7 +57,8 @@ void SpherePublisher::show(const ModelState& model) {
 
 void SpherePublisher::show_nearness(const ist_proximity::ProximityArray& proximity,
                                     double max_distance) {
-  if (shown_.markers.empty() || publisher_.getNumSubscribers() == 0) return;
+  const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+  if (!lock || shown_.markers.empty() || publisher_.getNumSubscribers() == 0) return;
   const auto now = Clock::now();
   if (now < next_shades_) return;
   std::vector<int> shades;
@@ -64,11 +81,14 @@ void SpherePublisher::show_nearness(const ist_proximity::ProximityArray& proximi
 }
 
 void SpherePublisher::repeat_after_clock_jump() {
+  const std::lock_guard<std::mutex> lock(mutex_);
   repeat_delay_ = kFirstDelay;
   next_repeat_ = Clock::now() + repeat_delay_;
 }
 
 void SpherePublisher::repeat_when_due() {
+  const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+  if (!lock) return;
   if (Clock::now() < next_repeat_) return;
   publish_message(publisher_, shown_);
   repeat_delay_ *= 2;

@@ -6,19 +6,26 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include <chrono>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "ros/model/model_state.h"
 
 namespace ist {
 
-/// Publishes the packing's spheres on ~spheres, latched. One thread.
+/// Publishes the packing's spheres on ~spheres, latched. Thread safe; the cycle does not wait for
+/// other threads.
 class SpherePublisher {
  public:
   explicit SpherePublisher(ros::NodeHandle private_nh);
 
   /// Shows the monitored links of a model; none while it is not ready.
   void show(const ModelState& model);
+
+  /// Shows the finer packings of a model that is shown already, if there are any. It is called by a
+  /// slow thread, whose rate bounds how often the markers change.
+  void show_finer(const ModelState& model);
 
   /// Colours the links' spheres by nearness, as ~markers are, at most twice a second. Only where a
   /// link's colour has changed and somebody listens, because all spheres are sent again.
@@ -32,9 +39,13 @@ class SpherePublisher {
   void repeat_when_due();
 
  private:
+  void draw(const ModelState& model);
+
   using Clock = std::chrono::steady_clock;
 
   ros::Publisher publisher_;
+  std::mutex mutex_;                               // guards all below
+  std::shared_ptr<const RobotModel> shown_robot_;  ///< null: none is shown
   visualization_msgs::MarkerArray shown_;
   Clock::time_point next_repeat_ = Clock::time_point::max();
   std::chrono::seconds repeat_delay_{0};

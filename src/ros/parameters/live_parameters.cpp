@@ -23,11 +23,28 @@ using dynamic_reconfigure::Reconfigure;
 
 constexpr char kOnlyGroup[] = "Default";
 
-/// Gives the part of a tunable's name after "GROUP/"; empty for a tunable of another group.
+constexpr const char* kGroups[] = {"query", "repulsion", "penetration", "speed_scale",
+                                   "speed_scale/separation"};
+
+/// Gives the part of a tunable's name after "GROUP/"; empty for a tunable of another group, and of
+/// one below.
 std::string name_within(const std::string& group, const Tunable& tunable) {
   const std::string prefix = group + "/";
-  return tunable.name.compare(0, prefix.size(), prefix) == 0 ? tunable.name.substr(prefix.size())
-                                                             : std::string();
+  const bool is_below = tunable.name.compare(0, prefix.size(), prefix) == 0 &&
+                        tunable.name.find('/', prefix.size()) == std::string::npos;
+  return is_below ? tunable.name.substr(prefix.size()) : std::string();
+}
+
+/// A tree that holds a value at a path with slashes.
+XmlRpc::XmlRpcValue at_path(const std::string& path, const XmlRpc::XmlRpcValue& value) {
+  XmlRpc::XmlRpcValue tree;
+  const std::size_t slash = path.find('/');
+  if (slash == std::string::npos) {
+    tree[path] = value;
+  } else {
+    tree[path.substr(0, slash)] = at_path(path.substr(slash + 1), value);
+  }
+  return tree;
 }
 
 template <class Parameter, class Value>
@@ -101,7 +118,8 @@ ConfigDescription describe(const std::string& group, const std::vector<Tunable>&
   return description;
 }
 
-constexpr char kKept[] = "the last valid ~query, ~repulsion and ~penetration stay in use: ";
+constexpr char kKept[] =
+    "the last valid ~query, ~repulsion, ~penetration and ~speed_scale stay in use: ";
 constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
 /// Names the first member of a request that is no parameter of the group.
@@ -138,17 +156,20 @@ bool same(const Config& a, const Config& b) {
 }  // namespace
 
 LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config)
-    : private_nh_(private_nh), live_{config.query, config.repulsion, config.penetration, nullptr} {
+    : private_nh_(private_nh),
+      live_{config.query, config.repulsion, config.penetration, config.speed_scale, nullptr} {
   {
     const std::lock_guard<std::mutex> lock(change_mutex_);
     LiveConfig defaults;
     defaults.query.max_distance = config.query.max_distance;
+    defaults.speed_scale = fitted_to(defaults.speed_scale, config.query.max_distance);
+    defaults.speed_scale.links = config.speed_scale.links;
     tunables_ = parse_live(XmlRpc::XmlRpcValue(), defaults).tunables;  // names, ranges, defaults
     const std::vector<Tunable> in_use = parse_live(XmlRpc::XmlRpcValue(), live_).tunables;
     for (std::size_t i = 0; i < tunables_.size(); ++i) tunables_[i].value = in_use[i].value;
     configured_.assign(tunables_.size(), false);
     lost_ = configured_;
-    for (const char* name : {"query", "repulsion", "penetration"}) advertise(name);
+    for (const char* name : kGroups) advertise(name);
   }
   read_again();
   thread_ = std::thread(&LiveParameters::run, this);
@@ -312,9 +333,7 @@ bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
 bool LiveParameters::apply(const std::string& group, const XmlRpc::XmlRpcValue& change) {
   if (!read_server()) return false;
   if (change.valid()) {
-    XmlRpc::XmlRpcValue tree;
-    tree[group] = change;
-    const LiveReading reading = parse_live(tree, get());
+    const LiveReading reading = parse_live(at_path(group, change), get());
     if (!reading.errors.empty()) {
       ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
       publish_updates();

@@ -17,10 +17,11 @@
 
 namespace ist {
 
-/// Parameters that may change while the node runs: ~query/*, ~repulsion/* and
-/// ~penetration/stiffness. They change on the parameter server, which is read again once a second
-/// in a thread of its own, or through dynamic_reconfigure, in one group for each of the three names
-/// (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`).
+/// Parameters that may change while the node runs: ~query/*, ~repulsion/*,
+/// ~penetration/stiffness and ~speed_scale/*. They change on the parameter server, which is read
+/// again once a second in a thread of its own, or through dynamic_reconfigure, in one group for
+/// each of these names and for ~speed_scale/separation (rqt_reconfigure; `rosrun
+/// dynamic_reconfigure dynparam set ~query ...`). Distances of single links have no group.
 ///
 /// Every value stays in use until a valid one replaces it, whatever happens to the parameter
 /// server: no answer, a master that restarts, names that are deleted, values that are wrong.

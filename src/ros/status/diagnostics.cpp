@@ -163,6 +163,16 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   if (!report.parameters_without_effect.empty()) {
     raise(DiagnosticStatus::WARN, report.parameters_without_effect, &status);
   }
+  if (!report.counted_problem.empty()) {
+    raise(DiagnosticStatus::WARN, report.counted_problem, &status);
+  }
+  add_value("min_distance",
+            std::isnan(report.min_distance) ? "not known" : millimetres(report.min_distance),
+            &status);
+  if (!report.speed_scale.empty()) add_value("speed_scale", report.speed_scale, &status);
+  if (!report.counted_links.empty()) {
+    add_value("links left out", report.counted_links, &status);
+  }
   add_value("live parameters",
             report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,
             &status);
