@@ -24,6 +24,8 @@ constexpr double kPointError = 1.1e-7;
 constexpr double kRounding = 1e-12;
 // A link that is nearer than so many interior gaps is searched with signed distances.
 constexpr double kNearInGaps = 2.0;
+// So does one at a distance that is about that of the last crowded search, by this factor.
+constexpr double kSameCrowd = 1.5;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
@@ -105,6 +107,8 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
     return false;
   }
   search.deadline = deadline;
+  const double distance = search.closest.exact.distance;
+  link_.context.grid.set_distance(distance < kInfinity ? distance : 0.0);
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
@@ -161,6 +165,11 @@ void LinkQuery::keep_answer() {
   answered.result = search;
 }
 
+// Whether the dual-tree traversal gave up, though there is time.
+bool LinkQuery::is_crowded(const DualTreeResult& found) const {
+  return found.stopped && !link_.search.deadline->has_passed();
+}
+
 // The four steps for one index: upper bound, search (which refines what survives its bounds),
 // depth.
 // @returns false: the deadline passed
@@ -170,6 +179,10 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   if (is_near(obstacles)) return search_near(obstacles);
   upper_bound(obstacles);
   const DualTreeResult found = search(obstacles);
+  if (is_crowded(found)) {
+    link_.kept.crowded_at = link_.search.closest.exact.distance;
+    return search_near(obstacles);
+  }
   if (found.may_be_inside && !found.stopped) search_inside(obstacles);
   const bool stopped = found.stopped || link_.search.deadline->passed();
   if (stopped) measure_closest(obstacles);
@@ -181,18 +194,20 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   return !stopped;
 }
 
-// Whether the link is so near to an obstacle that cover spheres bound little.
+// Whether the dual-tree traversal would have to measure many points: the link is so near to an
+// obstacle that cover spheres bound little, or there were many at about this distance.
 bool LinkQuery::is_near(const PointObstacles& /*obstacles*/) const {
   const double distance = link_.search.closest.exact.distance;
-  return distance < (link_.context.solid().is_closed()
-                         ? kNearInGaps * link_.context.tree().interior_gap()
-                         : 0.0);
+  if (!link_.context.solid().is_closed()) return distance < 0.0;
+  const double crowded_at = link_.kept.crowded_at;
+  return distance < kNearInGaps * link_.context.tree().interior_gap() ||
+         (distance > crowded_at / kSameCrowd && distance < kSameCrowd * crowded_at);
 }
 bool LinkQuery::is_near(const BoxObstacles& /*obstacles*/) { return false; }
 
 // All steps in one, near the link.
 bool LinkQuery::search_near(const PointObstacles& obstacles) {
-  if (!link_.context.solid().is_closed()) link_.search.cover_bound = -kInfinity;
+  link_.search.cover_bound = link_.context.solid().is_closed() ? kInfinity : -kInfinity;
   return search_single_tree(obstacles, &link_);
 }
 bool LinkQuery::search_near(const BoxObstacles& /*obstacles*/) { return true; }
@@ -295,6 +310,7 @@ template <class Obstacles>
 DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
   search.visited.clear();
+  search.refined = 0;
   search.box_bounds.clear();
   auto input = dual_tree_input(obstacles);
   input.front = link_.kept.fronts.find(obstacles.bvh->build_id());
@@ -306,6 +322,7 @@ DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   const DualTreeResult found = search_dual_tree(input, &refinement);
   search.statistics->node_pairs += found.node_pairs;
   search.statistics->leaf_pairs += found.leaf_pairs;
+  if (is_crowded(found)) return found;  // another search follows
   search.prune(static_cast<double>(found.pruned_bound) - search.rounding);
   if (found.may_be_inside) search.cover_bound = -kInfinity;
   return found;
@@ -383,6 +400,23 @@ void LinkQuery::look_ahead() {
   if (search.other_links == kInfinity) return;
   const double ahead = kStepsAhead * link_.kept.bound.displacement_to(search.scene, search.X_FL);
   if (ahead < search.other_links) search.other_links += ahead;
+}
+
+// The grid, the distances and the bounds are about the geometry. Fronts, supports and the terms of
+// the last answer are about the tree.
+void LinkQuery::set_link(const LinkModel& link) {
+  LinkContext& context = link_.context;
+  const bool is_same = link.packing_id != 0 && link.packing_id == context.model->packing_id;
+  context.model = &link;
+  context.grid.set_solid(link.solid);
+  if (is_same) return;
+  context.displacement = DisplacementBound(link);
+  LinkCoherence& kept = link_.kept;
+  kept.bound.set_link(link);
+  kept.fronts.forget();
+  kept.answered.scene = kUnknownScene;
+  kept.supports = SupportCache(link.tree);
+  kept.plane_normal_L.setZero();
 }
 
 void LinkQuery::keep_bound() {

@@ -52,6 +52,10 @@ class LinkQuery {
            link_.search.config.max_distance + link_.search.config.margin;
   }
 
+  /// Takes the same link of another model, with the same geometry and perhaps another packing. All
+  /// that was proven of the geometry stays.
+  void set_link(const LinkModel& link);
+
   /// Forgets what was kept: the clouds of later queries may be others.
   void forget() { link_.kept.forget(); }
 
@@ -73,6 +77,7 @@ class LinkQuery {
   void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);
   void measure_again(const BoxObstacles& obstacles);
+  bool is_crowded(const DualTreeResult& found) const;
   bool is_near(const PointObstacles& obstacles) const;
   static bool is_near(const BoxObstacles& obstacles);
   bool search_near(const PointObstacles& obstacles);

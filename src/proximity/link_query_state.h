@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "internal/geometry/float_rounding.h"
@@ -74,6 +75,9 @@ struct LinkCoherence {
     bool has_place = false;                           ///< whether p_FCo is that of some answer
     Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
   } last;
+  /// [m] The distance at which too many points were about equally near for the dual-tree traversal;
+  /// inf: none.
+  double crowded_at = std::numeric_limits<double>::infinity();
   /// The last complete answer: it is the same for the same question.
   struct {
     SceneId scene = kUnknownScene;                           ///< unknown: there is none
@@ -114,6 +118,7 @@ struct LinkSearch : SearchResult {
   BoxBounds box_bounds;
   VisitedSet visited;          ///< obstacles of the index at work that were refined
   int measured = 0;            ///< points
+  int refined = 0;             ///< points, in the dual-tree traversal at work
   int box_cells_left = 0;      ///< into which overlapping boxes may still be divided
   int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
 

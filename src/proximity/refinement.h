@@ -38,6 +38,8 @@ class PointRefinement {
   /// Calls update_supporting_planes().
   bool update_planes(SupportingPlanes* planes);
   bool deadline_passed() { return link_.search.deadline->passed(); }
+  /// Whether so many points are about equally near that the single-tree traversal is better.
+  bool is_crowded(std::uint64_t node_pairs) const;
 
   /// Measures a point that may be inside.
   /// @param max_distance  [m] what its distance is known not to exceed, or does not matter beyond
@@ -67,6 +69,7 @@ class BoxRefinement {
                          const float* /*max*/) {
     return -std::numeric_limits<float>::infinity();
   }
+  static bool is_crowded(std::uint64_t /*node_pairs*/) { return false; }
   /// The depth search decides which boxes are outside.
   static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return false; }
   /// Does for a box what PointRefinement::refine() does for a point.

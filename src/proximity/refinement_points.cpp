@@ -10,12 +10,17 @@ namespace {
 
 // A query of a link measures cells of its grid when it has measured so many points.
 constexpr int kMeasuredBeforeCells = 32;
+// Points that are refined, and node pairs that are expanded, before a search counts as crowded. The
+// bounds that the single-tree traversal keeps serve longer where there is a tolerance.
+constexpr int kCrowdedPoints = 1024, kCrowdedPointsExact = 4096;
+constexpr std::uint64_t kCrowdedPairs = 4096;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
 float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   LinkSearch& search = link_.search;
+  ++search.refined;
   search.cover_bound =
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
   const ObstacleId id{tile, lane};
@@ -34,6 +39,14 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
     measure_outside(id, p_OQ, p_LQ);
   }
   return search.traversal_prune_bound();
+}
+
+bool PointRefinement::is_crowded(std::uint64_t node_pairs) const {
+  const LinkSearch& search = link_.search;
+  if (search.measured < kMeasuredBeforeCells || !link_.context.solid().is_closed()) return false;
+  const bool is_exact = search.config.tolerance == 0.0 && search.config.relative_tolerance == 0.0;
+  return node_pairs > kCrowdedPairs ||
+         search.refined > (is_exact ? kCrowdedPointsExact : kCrowdedPoints);
 }
 
 float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const float* min,

@@ -17,6 +17,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Boxes that are larger than so many of a cell's planes get no cell of their own.
 constexpr double kLargestBox = 2.0;
 
+// [m] The link's supporting plane may be this much too far.
+constexpr double kPlaneSlack = 1e-5;
+// [m] Rounding of a height above it, for each metre that the link is large.
+constexpr double kPlaneRounding = 1e-12;
+
 // The signed distance falls by no more than the distance between two points (but for holes, see
 // PointDepth), so what the link's grid of signed distances holds near a box's centre bounds the
 // whole box.
@@ -34,6 +39,7 @@ class SingleTreeSearch {
 
   bool run() {
     kept_.begin(obstacles_.bvh->build_id(), obstacles_.X_OL, link_.context.displacement);
+    set_plane();
     push(obstacles_.bvh->root());
     while (true) {
       Frame& frame = stack_[size_ - 1];
@@ -127,6 +133,25 @@ class SingleTreeSearch {
     }
   }
 
+  // The supporting plane of the whole link across the direction of the closest obstacle: a flat
+  // scene is above it.
+  void set_plane() {
+    const SignedDistance& closest = search_.closest.exact;
+    if (!is_closed_ || !(closest.distance > 0.0 && closest.distance < kInfinity)) return;
+    plane_normal_L_ = closest.normal;
+    plane_height_ = support(link_.context.solid(), closest.normal, kPlaneSlack,
+                            closest.normal.dot(closest.witness)) +
+                    kPlaneRounding * (1.0 + tree_.center().norm() + tree_.radius());
+  }
+
+  // [m] No point of a part has a smaller signed distance, by that plane.
+  double plane_bound(const SignedDistanceGrid::Part& part) const {
+    if (plane_height_ == kInfinity) return -kInfinity;
+    const double above =
+        plane_normal_L_.dot(part.center_L) - part.extent_against(plane_normal_L_) - plane_height_;
+    return above > 0.0 ? above : -kInfinity;
+  }
+
   // Begins with the bounds that are kept.
   void enter(std::int32_t child, int count, Frame* frame) {
     frame->child = child;
@@ -154,6 +179,8 @@ class SingleTreeSearch {
     if (node.child[k] < 0) {
       part.points = &obstacles_.bvh->tile(static_cast<std::size_t>(~node.child[k]), &scratch);
     }
+    const double above = plane_bound(part);
+    if (above >= search_.prune_bound()) return bound(above, kInfinity);
     SignedDistanceGrid::Cell* cell = grid_.find(part.center_L);
     if (cell != nullptr) {
       const double floor = grid_bound(cell, part);
@@ -201,6 +228,8 @@ class SingleTreeSearch {
       p_LQ_[i] = obstacles_.X_LO * p_OQ_[i];
       tile_.raise(i, tile_bound);
       if (tile_.now[i] >= search_.prune_bound()) continue;
+      tile_.raise(i, bound(plane_bound({p_LQ_[i]}), kInfinity));
+      if (tile_.now[i] >= search_.prune_bound()) continue;
       SignedDistanceGrid::Cell* cell = grid_.find(p_LQ_[i]);
       if (cell != nullptr) tile_.raise(i, bound(grid_bound(cell, {p_LQ_[i]}), kInfinity));
     }
@@ -217,6 +246,7 @@ class SingleTreeSearch {
   void take(ObstacleId id, double floor) {
     const auto i = static_cast<std::size_t>(id.lane);
     tile_.set(i, bound(floor, kInfinity));
+    if (!(floor > search_.prune_bound())) return;
     for (std::size_t j = 0; j < static_cast<std::size_t>(tile_.count); ++j) {
       if (j != i) tile_.raise(j, bound(floor - (p_LQ_[j] - p_LQ_[i]).norm(), kInfinity));
     }
@@ -261,6 +291,8 @@ class SingleTreeSearch {
   const InnerSphereTree& tree_;
   const Eigen::Matrix3d R_LO_;
   const bool is_closed_;
+  Eigen::Vector3d plane_normal_L_ = Eigen::Vector3d::Zero();
+  double plane_height_ = kInfinity;  // [m] of the supporting plane; inf: there is none
   bool is_stopped_ = false;
   std::array<Frame, kMaxBoxLevels> stack_;
   std::size_t size_ = 0;

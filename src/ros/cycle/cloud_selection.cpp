@@ -1,6 +1,7 @@
 #include "ros/cycle/cloud_selection.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "ist_proximity/repulsion/repulsion.h"
 
@@ -31,6 +32,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
 
   clouds_.clear();
   cloud_sources_.clear();
+  cloud_stands_still_.clear();
   oldest_stamp_ = ros::Time();
   const bool usable = clouds_usable(*status);
   for (std::size_t i = 0; i < selected_.size(); ++i) {
@@ -38,6 +40,8 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
     if (!selected_[i]) continue;
     clouds_.push_back(&selected_[i]->cloud);
     cloud_sources_.push_back(static_cast<int>(i));
+    cloud_stands_still_.push_back(status->sources[i].is_file ||
+                                  std::isinf(status->sources[i].timeout));
     const ros::Time& stamp = selected_[i]->stamp;
     if (status->sources[i].is_file) continue;
     if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
@@ -55,7 +59,8 @@ const SourceSnapshot* CloudSelection::newest(ObstacleSource* source,
 ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
   const auto cloud = static_cast<std::size_t>(answer.source);
   if (answer.source < 0 || cloud >= clouds_.size()) return {};
-  return {cloud_sources_[cloud], obstacles_key({clouds_[cloud]}), clouds_[cloud]->stamp};
+  return {cloud_sources_[cloud], obstacles_key({clouds_[cloud]}), clouds_[cloud]->stamp,
+          cloud_stands_still_[cloud]};
 }
 
 int CloudSelection::source_of(const LinkProximity& answer) const {

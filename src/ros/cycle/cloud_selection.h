@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ros/input/obstacle_source.h"
-#include "ros/output/closing_speed.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -57,7 +57,8 @@ class CloudSelection {
   std::vector<const SourceSnapshot*> selected_;
   std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< used with Reader::kOther
   std::vector<const CloudSnapshot*> clouds_;
-  std::vector<int> cloud_sources_;  ///< by cloud: the number of its source
+  std::vector<int> cloud_sources_;        ///< by cloud: the number of its source
+  std::vector<bool> cloud_stands_still_;  ///< by cloud: its source never goes stale
   ros::Time oldest_stamp_;
 };
 

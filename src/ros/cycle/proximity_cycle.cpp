@@ -31,6 +31,7 @@ TimePoint end_of(double deadline, double share, TimePoint begin) {
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
                                std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader)
     : model_(std::move(model)),
+      packed_(model_->robot),
       robot_(*model_->robot),
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
@@ -112,6 +113,7 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   known_ = measurable_;
   for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
   query_.run(poses_.X_FL, known_, selection_.clouds(), &results_);
+  note_usage(config);
   const QueryStatistics& statistics = query_.statistics();
   status_input_.outside_region = statistics.outside_region > 0;
   status_input_.deadline.unfinished = statistics.unfinished;
@@ -164,8 +166,9 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
   for (std::size_t i = 0; i < selection_.selected().size(); ++i) {
     const SourceSnapshot* snapshot = selection_.selected()[i];
     if (!snapshot) continue;
-    const std::string unfiltered = unfiltered_links(robot_, model_->monitored, poses_, *snapshot,
-                                                    status_input_.sources[i].name);
+    const std::string unfiltered =
+        unfiltered_links(robot_, model_->monitored, poses_, pose_source_.get(), *snapshot,
+                         status_input_.sources[i].name);
     if (!unfiltered.empty()) problems.push_back(unfiltered);
   }
   status_input_.pose_doubts = poses_.doubts;
@@ -183,7 +186,7 @@ void ProximityCycle::fill_links(ProximityArray* message) {
     const LinkProximity& result = results_[i];
     const int source = selection_.source_of(result);
     assign_link(robot_.links[i].name, result, pushes_[i], wrenches_[i],
-                speeds_[i].update(message->header.stamp, result, poses_.X_FL[i],
+                speeds_[i].update(message->header.stamp.toSec(), result, poses_.X_FL[i],
                                   selection_.nearest(result)),
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
@@ -198,13 +201,36 @@ Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config, T
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
   if (is_known) {
-    volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], selection_.clouds(), end);
+    volume =
+        contact_volume(packed_->links[link], *body, poses_.X_FL[link], selection_.clouds(), end);
     DeadlineCost& cost = status_input_.deadline;
     if (volume.known < 1.0) ++cost.no_penetration;
     cost.least_known = std::min(cost.least_known, volume.known);
   }
   return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
                             config.penetration);
+}
+
+/// Tells the background packing what the links need.
+void ProximityCycle::note_usage(const LiveConfig& config) {
+  if (!model_->usage) return;
+  for (const std::size_t i : model_->monitored) {
+    const bool is_near = results_[i].state >= LinkState::kNear &&
+                         results_[i].lower_bound < config.repulsion.influence_distance;
+    model_->usage->note_query(i, query_.link_statistics()[i], is_near);
+  }
+}
+
+void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
+  for (std::size_t i = 0; i < filters_.size(); ++i) {
+    if (model->robot->links[i].packing_id != packed_->links[i].packing_id) {
+      filters_[i].expect_jump();
+      blends_[i] = KeptRepulsion(*model->robot, i);
+    }
+  }
+  packed_ = model->robot;
+  query_.set_model(packed_);
+  repulsion_ = model->repulsion ? *model->repulsion : Repulsion(packed_);
 }
 
 void ProximityCycle::forget() {

@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
-#include "ros/output/closing_speed.h"
 #include "ros/output/joint_repulsion.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/pose_source.h"
@@ -55,6 +55,11 @@ class ProximityCycle {
   /// repulsion's filter and the stamps start again.
   void forget();
 
+  /// Takes finer packings of the same robot. Nothing that is known is lost: filters, speeds and
+  /// the query's bounds go on.
+  /// @param model  see is_refinement()
+  void refine(const std::shared_ptr<const ModelState>& model);
+
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
 
@@ -69,6 +74,7 @@ class ProximityCycle {
                             ist_proximity::JointRepulsion* message);
 
  private:
+  void note_usage(const LiveConfig& config);
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
   void run_query(const LiveConfig& config, TimePoint begin);
@@ -78,7 +84,8 @@ class ProximityCycle {
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
   void fill_links(ist_proximity::ProximityArray* message);
 
-  std::shared_ptr<const ModelState> model_;
+  const std::shared_ptr<const ModelState> model_;
+  std::shared_ptr<const RobotModel> packed_;  ///< the same robot with the newest packings
   const RobotModel& robot_;
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;

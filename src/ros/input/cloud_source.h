@@ -5,7 +5,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -14,10 +13,12 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ros/common/publisher_count.h"
 #include "ros/input/measurement.h"
+#include "ros/input/measurement_queue.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/input/placer.h"
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
+#include "ros/input/topic_advice.h"
 #include "ros/parameters/source_config.h"
 #include "ros/poses/transform_buffer.h"
 
@@ -28,7 +29,8 @@ namespace ist {
 ///
 /// A cloud waits until tf knows the poses of its sensor and, for the self-filter, of the links at
 /// the cloud's own stamp; a scan waits until the time of its last beam. The newest measurement that
-/// is ready is used, and older ones are dropped. Links whose transforms have stopped are not waited
+/// is ready is used, and older ones are dropped. What waits is bounded by the timeout and by memory
+/// (see MeasurementQueue). Links whose transforms have stopped are not waited
 /// for (see Placer).
 ///
 /// Messages are used in the order of their stamps. Where stamps go back (the sensor's driver or the
@@ -84,7 +86,7 @@ class CloudSource : public ObstacleSource {
   const TransformBuffer& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
-  ros::Subscriber subscriber_;
+  Subscription subscription_;
   SnapshotExchange exchange_;
   SourceState state_;
 
@@ -96,13 +98,15 @@ class CloudSource : public ObstacleSource {
   SourceTarget target_;
   Placer placer_;
   Ingest ingest_;
-  std::deque<MeasurementPtr> waiting_;  ///< ordered by stamp
+  MeasurementQueue waiting_;
   MeasurementPtr last_map_;
   bool map_is_new_ = false;  ///< last_map_ is not in use with this model yet
   ros::Time in_use_;         ///< stamp of the newest snapshot of this generation
   std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
   bool waits_for_tf_ = false;                          ///< the reported problem is that wait
   PublisherCount publisher_count_;
+  TopicAdvice topic_advice_;
+  bool has_received_ = false;
   std::atomic<bool> running_{true};
   std::thread thread_;
 };

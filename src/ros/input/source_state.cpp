@@ -35,7 +35,7 @@ bool SourceState::is_current(const SourceSnapshot* snapshot,
                              const std::shared_ptr<const RobotModel>& model) {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  return snapshot && model && snapshot->model == model &&
+  return snapshot && snapshot->model && model && same_geometry(*snapshot->model, *model) &&
          (snapshot->generation == target_.generation ||
           (snapshot->generation != 0 && is_permanent_));
 }

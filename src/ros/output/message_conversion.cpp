@@ -79,17 +79,22 @@ void assign_source(const SourceReport& source, const Status& status, const ros::
   message->points_on_robot = counts.on_robot;
 }
 
-double min_distance(const ProximityArray& message) {
-  if (message.links.empty() ||
-      (message.status != ProximityArray::OK && message.status != ProximityArray::DEGRADED)) {
-    return kNaN;
-  }
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const LinkMessage& link : message.links) {
+bool lacks_clouds(const ProximityArray& message) {
+  return message.status == ProximityArray::NO_CLOUD ||
+         message.status == ProximityArray::STALE_CLOUD;
+}
+
+double min_distance(const ProximityArray& message, const std::vector<bool>& counts) {
+  if (lacks_clouds(message)) return kNaN;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double smallest = kInfinity;
+  for (std::size_t i = 0; i < message.links.size(); ++i) {
+    const LinkMessage& link = message.links[i];
+    if (counts.size() == message.links.size() && !counts[i]) continue;
     if (link.state == LinkMessage::UNKNOWN) return kNaN;
     smallest = std::min(smallest, link.lower_bound);
   }
-  return smallest;
+  return smallest == kInfinity ? kNaN : smallest;
 }
 
 }  // namespace ist

@@ -115,7 +115,12 @@ std::string QueryService::take_model() {
   }
   if (!model->kinematics) return no_kinematics(*model);
   if (model == model_) return "";
+  const bool is_refined = cycle_ && model_ && is_refinement(*model_, *model);
   model_ = std::move(model);
+  if (is_refined) {
+    cycle_->refine(model_);
+    return "";
+  }
   auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
                                                   fixed_frame_of(*model_, config_),
                                                   link_names(*model_->robot), config_.pose_timeout);
