@@ -40,6 +40,7 @@ SolidElement::SolidElement(const GeometryElement& source, const CancelRequest& c
     normals = face_normals(*mesh);
     throw_if(cancelled);
     is_closed = is_closed_mesh(*mesh);
+    if (!is_closed) open_edges = OpenEdgeBlocks(*mesh);
     return;
   }
   primitive = source.shape;
