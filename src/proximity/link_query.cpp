@@ -402,6 +402,23 @@ void LinkQuery::look_ahead() {
   if (ahead < search.other_links) search.other_links += ahead;
 }
 
+// The grid, the distances and the bounds are about the geometry. Fronts, supports and the terms of
+// the last answer are about the tree.
+void LinkQuery::set_link(const LinkModel& link) {
+  LinkContext& context = link_.context;
+  const bool is_same = link.packing_id != 0 && link.packing_id == context.model->packing_id;
+  context.model = &link;
+  context.grid.set_solid(link.solid);
+  if (is_same) return;
+  context.displacement = DisplacementBound(link);
+  LinkCoherence& kept = link_.kept;
+  kept.bound.set_link(link);
+  kept.fronts.forget();
+  kept.answered.scene = kUnknownScene;
+  kept.supports = SupportCache(link.tree);
+  kept.plane_normal_L.setZero();
+}
+
 void LinkQuery::keep_bound() {
   const LinkSearch& search = link_.search;
   double bound = search.lower_bound() - search.index_error;

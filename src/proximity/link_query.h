@@ -52,6 +52,10 @@ class LinkQuery {
            link_.search.config.max_distance + link_.search.config.margin;
   }
 
+  /// Takes the same link of another model, with the same geometry and perhaps another packing. All
+  /// that was proven of the geometry stays.
+  void set_link(const LinkModel& link);
+
   /// Forgets what was kept: the clouds of later queries may be others.
   void forget() { link_.kept.forget(); }
 

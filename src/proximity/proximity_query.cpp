@@ -32,6 +32,16 @@ struct ProximityQuery::Impl {
     links.reserve(model->links.size());
     for (const LinkModel& link : model->links) links.emplace_back(link);
     order.reserve(links.size());
+    link_statistics.resize(links.size());
+  }
+
+  void add_up_statistics() {
+    for (const QueryStatistics& link : link_statistics) {
+      statistics.node_pairs += link.node_pairs;
+      statistics.leaf_pairs += link.leaf_pairs;
+      statistics.exact_evaluations += link.exact_evaluations;
+      statistics.outside_region += link.outside_region;
+    }
   }
 
   // Whether a link can be asked at all: there are clouds, and a pose for each link of this model.
@@ -77,6 +87,7 @@ struct ProximityQuery::Impl {
   SceneTracker scene;
   std::size_t last_nearest = 0;  // link that the last run_minimum() found
   QueryStatistics statistics;
+  std::vector<QueryStatistics> link_statistics;
 };
 
 ProximityQuery::ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config)
@@ -96,6 +107,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   // passes.
   std::vector<std::size_t>& order = impl_->order;
   order.clear();
+  std::fill(impl_->link_statistics.begin(), impl_->link_statistics.end(), QueryStatistics());
   for (std::size_t i = 0; i < count; ++i) {
     if (!impl_->can_query(i, X_FL, known, clouds)) {
       (*results)[i].reset();
@@ -103,7 +115,8 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
       continue;
     }
     order.push_back(i);
-    impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity, &impl_->statistics);
+    impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity,
+                          &impl_->link_statistics[i]);
     impl_->links[i].warm_start(clouds);
   }
   if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
@@ -114,6 +127,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
     impl_->links[i].answer(clouds, &(*results)[i]);
     if (!complete) impl_->count_unfinished((*results)[i]);
   }
+  impl_->add_up_statistics();
   return complete;
 }
 
@@ -182,9 +196,18 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
   return complete;
 }
 
+void ProximityQuery::set_model(std::shared_ptr<const RobotModel> model) {
+  assert(same_geometry(*model, *impl_->model));
+  for (std::size_t i = 0; i < impl_->links.size(); ++i) impl_->links[i].set_link(model->links[i]);
+  impl_->model = std::move(model);
+}
+
 void ProximityQuery::set_config(const QueryConfig& config) { impl_->config = config; }
 const QueryConfig& ProximityQuery::config() const { return impl_->config; }
 const QueryStatistics& ProximityQuery::statistics() const { return impl_->statistics; }
+const std::vector<QueryStatistics>& ProximityQuery::link_statistics() const {
+  return impl_->link_statistics;
+}
 const RobotModel& ProximityQuery::model() const { return *impl_->model; }
 
 bool is_rigid(const Eigen::Isometry3d& X, double tolerance) {

@@ -34,6 +34,9 @@ class SignedDistanceGrid {
  public:
   explicit SignedDistanceGrid(const LinkModel& link);
 
+  /// Takes another copy of the same solid; what was measured stays.
+  void set_solid(const Solid& solid) { solid_ = &solid; }
+
   /// A part of space: a place, a sphere, or a box and the points that are in it.
   struct Part {
     Eigen::Vector3d center_L;                        ///< [m]

@@ -122,11 +122,19 @@ class ProximityQuery {
   bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                 LinkProximity* result);
 
+  /// Takes a model that differs from the present one in packings alone (see same_geometry()).
+  /// Whatever was proven or measured stays: bounds, exact distances, the answer to start from. A
+  /// link with another packing_id only forgets its BVTT fronts, which name nodes of its old tree.
+  /// Allocates the scratch memory of such links' trees, 40 bytes a node.
+  void set_model(std::shared_ptr<const RobotModel> model);
+
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
   const QueryConfig& config() const;          ///< settings of the next run()
   const QueryStatistics& statistics() const;  ///< of the last run()
-  const RobotModel& model() const;            ///< the one given to the constructor
+  /// The same by link: what each of them cost.
+  const std::vector<QueryStatistics>& link_statistics() const;
+  const RobotModel& model() const;  ///< the one given to the constructor
 
  private:
   struct Impl;

@@ -117,6 +117,10 @@ class RepulsionFilter {
   RepulsiveWrench update(double time, std::uint64_t obstacles, const RepulsiveWrench& raw,
                          const LinkProximity& proximity, const RepulsionConfig& config);
 
+  /// The change at the next update() is spread like that of a new cloud, because the link's spheres
+  /// are others.
+  void expect_jump() { obstacles_ = ~obstacles_; }
+
   /// The next update() is the first.
   void reset() { *this = RepulsionFilter(); }
 

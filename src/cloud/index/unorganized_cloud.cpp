@@ -44,7 +44,7 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sampl
 }  // namespace
 
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
+                              SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
                               IngestCounts* counts) {
   const RawCloud points = flattened(cloud);
   Sample sample;
@@ -66,8 +66,11 @@ std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
     builder->build(crop.X_FO, {}, {}, bvh);
   } else {
     builder->build(
-        crop.X_FO, on_robot->as_filter(),
-        [on_robot](const PaddedBox& box) { return on_robot->may_drop(box); }, bvh);
+        crop.X_FO,
+        [on_robot](const PointTile& tile, const PaddedBox& box) {
+          return on_robot->points_on_robot(tile, box);
+        },
+        [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); }, bvh);
   }
   return kept;
 }
