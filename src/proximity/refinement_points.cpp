@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/outside_margin.h"
 #include "proximity/refinement.h"
 
 namespace ist {
@@ -82,10 +83,13 @@ PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d
   if (kept.find(build_id, quantity, id.key(), p_LQ) > 0.0) return Side::kOutside;
   if (deadline_passed()) return Side::kUnknown;
   link_.search.count_exact();
-  if (link_.context.solid().is_inside(p_LQ)) return Side::kInside;
-  if (link_.context.solid().is_closed() && bound.surface_distance > 0.0) {
-    kept.store(build_id, quantity, id.key(), p_LQ, bound.surface_distance);
-  }
+  const Solid& solid = link_.context.solid();
+  const OutsideMargin found =
+      solid.is_closed() || !is_one_mesh(solid)
+          ? OutsideMargin{solid.is_inside(p_LQ), solid.is_closed() ? bound.surface_distance : 0.0}
+          : outside_margin(solid, p_LQ, bound.surface_distance);
+  if (found.is_inside) return Side::kInside;
+  if (found.margin > 0.0) kept.store(build_id, quantity, id.key(), p_LQ, found.margin);
   return Side::kOutside;
 }
 

@@ -8,6 +8,7 @@
 
 #include "internal/bvh/bounding_sphere.h"
 #include "internal/bvh/traversal_stack.h"
+#include "internal/geometry/outside_margin.h"
 #include "proximity/refinement.h"
 
 namespace ist {
@@ -35,7 +36,8 @@ class SingleTreeSearch {
         grid_(link->context.grid),
         tree_(link->context.tree()),
         R_LO_(obstacles.X_LO.linear()),
-        is_closed_(link->context.solid().is_closed()) {}
+        is_closed_(link->context.solid().is_closed()),
+        is_one_mesh_(is_one_mesh(link->context.solid())) {}
 
   bool run() {
     kept_.begin(obstacles_.bvh->build_id(), obstacles_.X_OL, link_.context.displacement);
@@ -264,9 +266,7 @@ class SingleTreeSearch {
     } else {
       const Bound outside = cover_bound(p_LQ, 0.0);
       if (outside.now == kInfinity) return tile_.set(i, outside);
-      if (search_.prune_bound() == 0.0 && is_outside(p_LQ)) {
-        return tile_.set(i, {0.0, -kInfinity, kInfinity});
-      }
+      if (search_.prune_bound() <= 0.0 && take_outside(i, cell, &near)) return;
     }
     search_.count_exact();
     const PointDepth depth = point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), near);
@@ -276,9 +276,19 @@ class SingleTreeSearch {
     tile_.now[i] = is_known ? depth.exact.distance : std::max(depth.floor, search_.prune_bound());
   }
 
-  bool is_outside(const Eigen::Vector3d& p_LQ) {
+  // Takes a point that is outside a mesh with holes, and how far about it that lasts. Where it may
+  // be that near to the surface, its depth is small enough in any case, which is found sooner.
+  bool take_outside(std::size_t i, SignedDistanceGrid::Cell* cell, NearSurface* near) {
+    if (!is_one_mesh_ || cell == nullptr) return false;
+    const double distance = grid_.bound(cell, {p_LQ_[i]}, kInfinity).surface_distance;
+    if (distance <= -search_.prune_bound() && search_.prune_bound() < 0.0) return false;
     search_.count_exact();
-    return !link_.context.solid().is_inside(p_LQ);
+    const OutsideMargin found = outside_margin(link_.context.solid(), p_LQ_[i], distance);
+    near->side = found.is_inside ? NearSurface::Side::kInside : NearSurface::Side::kOutside;
+    if (found.is_inside) return false;
+    tile_.set(i, found.margin > 0.0 ? Bound{0.0, kInfinity, found.margin}
+                                    : Bound{0.0, -kInfinity, kInfinity});
+    return true;
   }
 
   static constexpr double kMargin = 2e-3;  // [m] of what is proven to be outside, if it is cheap
@@ -290,7 +300,7 @@ class SingleTreeSearch {
   SignedDistanceGrid& grid_;
   const InnerSphereTree& tree_;
   const Eigen::Matrix3d R_LO_;
-  const bool is_closed_;
+  const bool is_closed_, is_one_mesh_;
   Eigen::Vector3d plane_normal_L_ = Eigen::Vector3d::Zero();
   double plane_height_ = kInfinity;  // [m] of the supporting plane; inf: there is none
   bool is_stopped_ = false;

@@ -15,8 +15,7 @@ namespace ist {
 /// Bounds of the points below each child of a BVH node, or of each point of a tile, for a whole
 /// link. Every such point has one of two properties:
 ///  - its signed distance is at least `floor`, in the sense of PointDepth::floor;
-///  - it is outside the link, and its cover distance exceeds what the inside of a mesh with holes
-///    may have by `outside` > 0.
+///  - it is outside the link, and so is every place that is nearer to it than `outside` > 0.
 /// Where no point has the one or the other property, its bound is inf. Closed links need the first
 /// only. -inf: nothing is known.
 struct ChildBounds {

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "ist_proximity/geometry/solid.h"
+
+namespace ist {
+
+/// Whether a point is inside a solid that is one mesh with holes, and how far around a point
+/// outside no place is inside.
+///
+/// Off the surface the winding number w is smooth, and its gradient is an integral along the open
+/// edges alone (the law of Biot and Savart, for the solid angle of a surface):
+///   |grad w| <= sum over open edges of length / (4 pi distance^2).
+/// So while the surface is farther, w stays below 1/2 for some way from a point outside, and longer
+/// the farther the holes are. Thread safe; allocates nothing.
+struct OutsideMargin {
+  bool is_inside = false;
+  /// [m] Every place nearer than this is outside; 0: unknown. No more than the surface's distance.
+  double margin = 0.0;
+};
+
+/// @param surface_distance  [m] a lower bound of the distance of p_L to the surface
+OutsideMargin outside_margin(const Solid& solid, const Eigen::Vector3d& p_L,
+                             double surface_distance);
+
+}  // namespace ist
