@@ -91,7 +91,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   const bool organized = is_organized(cloud, crop);
   set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
 
-  const SelfFilter* on_robot = nullptr;
+  SelfFilter* on_robot = nullptr;
   if (config.self_filter && !robot.empty()) {
     impl_->self_filter.set_poses(robot, crop.X_FO, config.self_filter_padding);
     on_robot = &impl_->self_filter;

@@ -23,10 +23,10 @@ LinkPairSearch::LinkPairSearch(const LinkModel& a, const LinkModel& b,
       has_holes_(!a.solid.is_closed() || !b.solid.is_closed()),
       queue_(*queue) {}
 
-void LinkPairSearch::run() {
+void LinkPairSearch::run(int max_steps) {
   queue_.clear();
   push(a_.tree.center(), a_.tree.radius(), 0);
-  while (!queue_.empty() && queue_.front().bound < prune_bound()) {
+  while (!queue_.empty() && queue_.front().bound < prune_bound() && max_steps-- > 0) {
     std::pop_heap(queue_.begin(), queue_.end());
     const std::int32_t child = queue_.back().child;
     queue_.pop_back();

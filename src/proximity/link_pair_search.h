@@ -12,8 +12,9 @@
 
 namespace ist {
 
-/// The smallest signed distance of the points of a link A to a link B: best-first branch and bound
-/// in A's tree for the lower bound, alternating projections for the upper bound. See SelfQuery.
+/// How deep two links that are in contact are in one another: the smallest signed distance of the
+/// points of a link A to a link B, by best-first branch and bound in A's tree for the lower bound
+/// and alternating projections for the upper bound.
 class LinkPairSearch {
  public:
   /// A part of A's tree that is still to be visited.
@@ -28,7 +29,8 @@ class LinkPairSearch {
   LinkPairSearch(const LinkModel& a, const LinkModel& b, const Eigen::Isometry3d& X_BA,
                  const QueryConfig& config, std::vector<Entry>* queue);
 
-  void run();
+  /// @param max_steps  parts and spheres that may be visited; the bounds of the others count
+  void run(int max_steps);
 
   double lower_bound() const { return lower_bound_; }                ///< [m]
   double distance() const { return closest_.distance; }              ///< [m] upper bound

@@ -4,9 +4,19 @@
 #include <limits>
 
 #include "internal/geometry/relative_pose.h"
-#include "proximity/link_pair_search.h"
+#include "internal/proximity/deadline.h"
+#include "proximity/link_pair_query.h"
+#include "proximity/link_surface.h"
 
 namespace ist {
+namespace {
+
+// Pairs of boxes that a pair of links looks at before the clock is read: some tens of microseconds.
+constexpr int kSlice = 256;
+
+bool can_query(const LinkModel& link) { return link.usable() && !link.tree.empty(); }
+
+}  // namespace
 
 void PairProximity::reset() {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -14,19 +24,51 @@ void PairProximity::reset() {
   distance = kNaN;
   lower_bound = -std::numeric_limits<double>::infinity();
   p_FCa = p_FCb = direction = Eigen::Vector3d::Constant(kNaN);
+  finished = true;
 }
 
 struct SelfQuery::Impl {
-  LinkPairSearch search(std::size_t a, std::size_t b, Span<const Eigen::Isometry3d> X_FL);
-  double error(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL, double distance) const;
-  void run(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL, PairProximity* result);
+  // A pair that is not finished.
+  struct Waiting {
+    double bound;
+    std::size_t pair;
+    bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
+  };
+
+  void prepare();
+  bool finish(std::size_t pair, int steps);
+  bool finish_by(Deadline* deadline);
 
   std::shared_ptr<const RobotModel> model;
   std::vector<LinkPair> pairs;
   QueryConfig config;
-  QueryConfig range;  // the search looks farther by the margin, which bounds have taken off
-  std::vector<LinkPairSearch::Entry> queue;
+  SelfQueryStatistics statistics;
+  std::vector<std::unique_ptr<LinkSurface>> surfaces;   // by link; null where no pair needs it
+  std::vector<std::unique_ptr<LinkPairQuery>> queries;  // by pair; null where a link is unusable
+  std::vector<RigidPose> X_FL;                          // by link
+  std::vector<Waiting> queue;                           // a heap
+  std::vector<LinkPairSearch::Entry> depth_queue;       // scratch
 };
+
+void SelfQuery::Impl::prepare() {
+  const auto& links = model->links;
+  surfaces.resize(links.size());
+  X_FL.resize(links.size());
+  std::size_t entries = 0;
+  for (const LinkPair& pair : pairs) {
+    queries.emplace_back();
+    if (std::max(pair.first, pair.second) >= links.size()) continue;
+    if (!can_query(links[pair.first]) || !can_query(links[pair.second])) continue;
+    for (const std::size_t i : {pair.first, pair.second}) {
+      if (!surfaces[i]) surfaces[i] = std::make_unique<LinkSurface>(links[i]);
+      entries = std::max(entries, (links[i].tree.nodes().size() + 1) * kSphereWidth);
+    }
+    queries.back() = std::make_unique<LinkPairQuery>(links[pair.first], links[pair.second],
+                                                     *surfaces[pair.first], *surfaces[pair.second]);
+  }
+  queue.reserve(pairs.size());
+  depth_queue.reserve(entries);
+}
 
 SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
                      const QueryConfig& config)
@@ -34,6 +76,7 @@ SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPa
   impl_->model = std::move(model);
   impl_->pairs = std::move(pairs);
   impl_->config = config;
+  impl_->prepare();
 }
 SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;
@@ -43,88 +86,61 @@ void SelfQuery::set_config(const QueryConfig& config) { impl_->config = config; 
 
 const std::vector<LinkPair>& SelfQuery::pairs() const { return impl_->pairs; }
 
-namespace {
+const SelfQueryStatistics& SelfQuery::statistics() const { return impl_->statistics; }
 
-// Keeps the witnesses of a search if they are nearer.
-// @param X_FB  pose of the link that the search calls B
-// @param sign  1 when that is the second link of the pair, -1 when it is the first
-void report(const LinkPairSearch& search, const Eigen::Isometry3d& X_FB, double sign,
-            PairProximity* result) {
-  if (search.distance() >= result->distance) return;
-  result->distance = search.distance();
-  result->p_FCa = X_FB * (sign > 0.0 ? search.p_BCa() : search.p_BCb());
-  result->p_FCb = X_FB * (sign > 0.0 ? search.p_BCb() : search.p_BCa());
-  result->direction = sign * (X_FB.linear() * search.normal_B());
+bool SelfQuery::Impl::finish(std::size_t pair, int steps) {
+  int left = steps;
+  const bool finished = queries[pair]->advance(&left, &depth_queue);
+  statistics.steps += static_cast<std::uint64_t>(steps - left);
+  return finished;
 }
 
-}  // namespace
-
-LinkPairSearch SelfQuery::Impl::search(std::size_t a, std::size_t b,
-                                       Span<const Eigen::Isometry3d> X_FL) {
-  LinkPairSearch result(model->links[a], model->links[b],
-                        relative_pose(nearest_rigid(X_FL[b]).X, nearest_rigid(X_FL[a]).X), range,
-                        &queue);
-  result.run();
-  return result;
-}
-
-// [m] The error of a pair's distance by poses that are not quite rigid.
-double SelfQuery::Impl::error(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL,
-                              double distance) const {
-  const auto extent = [&](std::size_t i) {
-    const InnerSphereTree& tree = model->links[i].tree;
-    return tree.center().norm() + tree.radius();
-  };
-  const auto drift = [&](std::size_t i) { return nearest_rigid(X_FL[i]).drift; };
-  return pose_error(drift(pair.first) + drift(pair.second),
-                    extent(pair.first) + extent(pair.second), distance);
-}
-
-void SelfQuery::Impl::run(const LinkPair& pair, Span<const Eigen::Isometry3d> X_FL,
-                          PairProximity* result) {
-  range = config;
-  range.max_distance += config.margin;
-  range.max_distance += error(pair, X_FL, range.max_distance);
-  // The link with the smaller gap gives the tighter bound; apart, one direction is as good as the
-  // other.
-  const auto gap = [&](std::size_t i) { return model->links[i].packing.certificate.max_gap; };
-  const bool swapped = gap(pair.second) < gap(pair.first);
-  const std::size_t a = swapped ? pair.second : pair.first;
-  const std::size_t b = swapped ? pair.first : pair.second;
-  const double sign = swapped ? -1.0 : 1.0;
-  const LinkPairSearch of_a = search(a, b, X_FL);
-  double lower = of_a.lower_bound();
-  result->distance = std::numeric_limits<double>::infinity();
-  if (lower >= range.max_distance) {
-    result->state = LinkState::kClear;
-    result->lower_bound = config.max_distance;
-    return;
+// The pair with the least bound goes on, until all are finished or the time is over.
+bool SelfQuery::Impl::finish_by(Deadline* deadline) {
+  while (!queue.empty() && !deadline->passed()) {
+    std::pop_heap(queue.begin(), queue.end());
+    const std::size_t pair = queue.back().pair;
+    queue.pop_back();
+    if (finish(pair, kSlice)) continue;
+    queue.push_back({queries[pair]->lower_bound(), pair});
+    std::push_heap(queue.begin(), queue.end());
   }
-  report(of_a, X_FL[b], sign, result);
-  if (lower <= 0.0) {
-    const LinkPairSearch of_b = search(b, a, X_FL);
-    lower = std::min(lower, of_b.lower_bound());
-    report(of_b, X_FL[a], -sign, result);
-  }
-  result->state = result->distance < 0.0 ? LinkState::kContact : LinkState::kNear;
-  result->lower_bound = lower - error(pair, X_FL, lower) - config.margin;
+  return queue.empty();
 }
 
-void SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+bool SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                     std::vector<PairProximity>* results) {
-  const auto& links = impl_->model->links;
-  const bool fits = X_FL.size() == links.size() && known.size() == links.size();
-  results->resize(impl_->pairs.size());
-  const auto can_query = [&](std::size_t i) {
-    return fits && i < links.size() && known[i] && links[i].usable() && !links[i].tree.empty();
-  };
-  for (std::size_t i = 0; i < impl_->pairs.size(); ++i) {
-    const LinkPair& pair = impl_->pairs[i];
-    (*results)[i].reset();
-    if (can_query(pair.first) && can_query(pair.second)) {
-      impl_->run(pair, X_FL, &(*results)[i]);
-    }
+  Impl& impl = *impl_;
+  results->resize(impl.pairs.size());
+  for (PairProximity& result : *results) result.reset();
+  if (X_FL.size() != impl.model->links.size() || known.size() != X_FL.size()) return true;
+  Deadline deadline(impl.config.deadline);
+  impl.statistics = {};
+  for (std::size_t i = 0; i < X_FL.size(); ++i) {
+    if (known[i]) impl.X_FL[i] = nearest_rigid(X_FL[i]);
   }
+  const auto can_run = [&](std::size_t pair) {
+    return impl.queries[pair] && known[impl.pairs[pair].first] && known[impl.pairs[pair].second];
+  };
+  impl.queue.clear();
+  for (std::size_t i = 0; i < impl.pairs.size(); ++i) {
+    if (!can_run(i)) continue;
+    const LinkPair& pair = impl.pairs[i];
+    impl.queries[i]->move_to(impl.X_FL[pair.first], impl.X_FL[pair.second], impl.config);
+    const std::uint64_t before = impl.statistics.steps;
+    if (impl.config.deadline > 0.0) {
+      impl.queue.push_back({impl.queries[i]->lower_bound(), i});
+    } else {
+      impl.finish(i, std::numeric_limits<int>::max());
+    }
+    impl.statistics.pairs_searched += impl.statistics.steps > before ? 1 : 0;
+  }
+  std::make_heap(impl.queue.begin(), impl.queue.end());
+  const bool all = impl.finish_by(&deadline);
+  for (std::size_t i = 0; i < impl.pairs.size(); ++i) {
+    if (can_run(i)) impl.queries[i]->report(&(*results)[i]);
+  }
+  return all;
 }
 
 }  // namespace ist

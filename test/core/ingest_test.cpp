@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "support/instruction_sets.h"
+#include "support/scene.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -335,6 +336,21 @@ void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F) {
   if (!boxes.empty()) {
     ASSERT_TRUE(boxes.back().isApprox(index.bounds(), 0.0F));
   }
+}
+
+// Tiles that the self-filter has taken points from have new boxes. One that is smaller than its
+// points makes queries pass them by.
+TEST(Ingest, boxesHoldWhatTheSelfFilterLeaves) {
+  const auto model = test::make_model({Sphere{0.5}}, 0.02);
+  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
+  const Message message(random_points(20000, 1.0, 4), {});
+  IngestConfig config = without_limits();
+  config.self_filter = true;
+  CloudSnapshot snapshot;
+  Ingest(config).run(message.raw, pose(0.2, 0.0, 0.0), {solid}, 0.0, &snapshot);
+  EXPECT_GT(snapshot.counts.on_robot, 500U);
+  EXPECT_GT(snapshot.counts.used, 10000U);
+  expect_hierarchy(snapshot.index);
 }
 
 // The two indices have different frames, so their points are rounded to float differently.

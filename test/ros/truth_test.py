@@ -352,12 +352,15 @@ class TruthTest(unittest.TestCase):
         self.assertEqual(pt.states(message), [LinkProximity.NEAR, LinkProximity.CLEAR])
 
         names = {"distance", "point_on_link", "point_on_obstacle", "repulsion", "text"}
-        node.wait_until(lambda: {ns for ns, _ in markers} == names, "all markers of one link")
+        of_links = lambda: {key for key in markers if key[0] != "nearest"}  # noqa: E731
+        node.wait_until(lambda: {ns for ns, _ in of_links()} == names, "all markers of one link")
         line = markers[("distance", 0)]
         self.assertEqual(line.header.frame_id, "base")
         ends = [pt.vector(p) for p in line.points]
         self.assertAlmostEqual(np.linalg.norm(ends[0] - ends[1]), 0.25, 4)
-        self.assertEqual({i for _, i in markers}, {0})
+        self.assertEqual({i for _, i in of_links()}, {0})
+        self.assertEqual({i for ns, i in markers if ns == "nearest"}, {0, 1, 2})
+        self.assertRegex(markers[("nearest", 0)].text, r"^0\.250 m\nball_link")
 
         node.wait_until(lambda: spheres, "~spheres")
         first = [m for m in spheres[0].markers if m.ns == "ball_link"]
@@ -374,7 +377,10 @@ class TruthTest(unittest.TestCase):
             lambda m: pt.states(m) == [LinkProximity.CLEAR] * 2 and m.status == 0, "CLEAR"
         )
         self.assertEqual(message.sources[0].points_used, 0)
-        node.wait_until(lambda: deleted == set(markers), "DELETE for every marker")
+        # The large number says that nothing is near; every other marker goes.
+        kept = {("nearest", 0)}
+        node.wait_until(lambda: deleted == set(markers) - kept, "DELETE for every other marker")
+        node.wait_until(lambda: markers[("nearest", 0)].text == "> 0.30 m", "the number")
 
     def test_formats(self):
         """float64, the other byte order and a frame with a slash give the same distances."""

@@ -73,10 +73,11 @@ struct QueryStatistics {
 /// Distances from the links of a robot to point clouds.
 ///
 /// Branch and bound: a dual-tree traversal of each link's Inner Sphere Tree and the BVH of every
-/// cloud prunes pairs by lower bounds. Near the link, a grid of signed distances bounds what is
-/// left of boxes and points. Obstacles that remain are measured against the exact geometry until
-/// `tolerance` is met, so `distance` is exactly that of one obstacle point. A depth search then
-/// measures the points that may be inside the link.
+/// cloud prunes pairs by lower bounds; obstacles that remain are measured against the exact
+/// geometry until `tolerance` is met, so `distance` is exactly that of one obstacle point. Near the
+/// link and inside, and where very many points are about equally near, a traversal of the BVH alone
+/// takes over: a grid of signed distances about the link bounds boxes and points for the whole
+/// link.
 ///
 /// A query that has a deadline asks every link twice: first to within half of its distance, and
 /// then to within the tolerance, the link that may be nearest first. So no link is left without a
@@ -88,9 +89,9 @@ struct QueryStatistics {
 /// (temporal coherence). Neither changes the bounds and states that an answer guarantees, and poses
 /// may jump.
 ///
-/// Working memory is about 650 kB a link: 512 kB of signed distances about the link, 96 kB of
-/// distances of points, 32 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node
-/// of its tree.
+/// Working memory is about 670 kB a link: 320 kB of signed distances about the link, 220 kB of
+/// bounds of boxes and points (150 kB more for a mesh with holes), 96 kB of distances of points,
+/// 32 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node of its tree.
 class ProximityQuery {
  public:
   /// @param model  shared with the caller; not null

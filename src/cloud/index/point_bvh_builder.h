@@ -89,7 +89,8 @@ class PointBvhBuilder {
   void for_each_slice(std::size_t n, std::size_t part, const Visit& visit) const;
   void add_batch(const Filters& filters);
   void add_clear_tiles(std::size_t begin, std::size_t end);
-  void add_filtered_tiles(std::size_t begin, std::size_t end, const PointFilter& drop);
+  void add_filtered_tiles(std::size_t begin, std::size_t end, const Filters& filters);
+  static bool may_drop_any(const Filters& filters, const PaddedBox& box);
   void end_cell();
 
   PointCells cells_;

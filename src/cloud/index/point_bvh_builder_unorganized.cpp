@@ -91,7 +91,7 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
   for (std::size_t i = 0; i < count; i += kWidth) {
     BoxNode& boxes = batch_.boxes[i / kWidth];
     boxes.count = static_cast<std::int32_t>(std::min(count - i, kWidth));
-    if (filters.drop && (!filters.may_drop || filters.may_drop(bounds_of(boxes)))) is_clear = false;
+    is_clear = is_clear && !may_drop_any(filters, bounds_of(boxes));
   }
   if (!is_clear) {
     filtered_.reserve(TileBatch::kMost);
@@ -104,7 +104,7 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
     if (is_clear) {
       add_clear_tiles(begin, end);
     } else {
-      add_filtered_tiles(begin, end, filters.drop);
+      add_filtered_tiles(begin, end, filters);
     }
     end_group();
   }
@@ -121,11 +121,22 @@ void PointBvhBuilder::add_clear_tiles(std::size_t begin, std::size_t end) {
 
 // Tiles that the filter empties move all that follow.
 void PointBvhBuilder::add_filtered_tiles(std::size_t begin, std::size_t end,
-                                         const PointFilter& drop) {
+                                         const Filters& filters) {
+  static const PointFilter kDropNone;
+  const auto box_of_tile = [this](std::size_t i) {
+    return box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth));
+  };
+  PaddedBox all = box_of_tile(begin);
+  for (std::size_t i = begin + 1; i < end; ++i) all.extend(box_of_tile(i));
+  const bool is_clear = !may_drop_any(filters, all);
   for (std::size_t i = begin; i < end; ++i) {
     *next_tiles(1) = filtered_[i];
-    add_tile(box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth)), drop);
+    add_tile(box_of_tile(i), is_clear ? kDropNone : filters.drop);
   }
+}
+
+bool PointBvhBuilder::may_drop_any(const Filters& filters, const PaddedBox& box) {
+  return filters.drop && (!filters.may_drop || filters.may_drop(box));
 }
 
 void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,

@@ -25,8 +25,10 @@ Eigen::AlignedBox3d bounding_box(const LinkModel& link) {
   return box.isEmpty() ? Eigen::AlignedBox3d(Eigen::Vector3d::Zero()) : box;
 }
 
-DisplacementBound::DisplacementBound(const LinkModel& link) {
-  const Eigen::AlignedBox3d box = bounding_box(link);
+DisplacementBound::DisplacementBound(const LinkModel& link)
+    : DisplacementBound(bounding_box(link)) {}
+
+DisplacementBound::DisplacementBound(const Eigen::AlignedBox3d& box) {
   center_ = box.center();
   half_ = 0.5 * box.sizes();
   extent_ = center_.norm() + half_.norm();

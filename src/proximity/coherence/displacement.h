@@ -50,6 +50,8 @@ Eigen::AlignedBox3d bounding_box(const LinkModel& link);
 class DisplacementBound {
  public:
   explicit DisplacementBound(const LinkModel& link);
+  /// For the points of a box in the link's frame.
+  explicit DisplacementBound(const Eigen::AlignedBox3d& box);
 
   /// [m] No point of the link, nor of what it encloses, moves farther between the two poses;
   /// rounding included. NaN where either pose is not finite. Thread safe.

@@ -42,10 +42,13 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
       joint_repulsion_(*model_),
+      wanted_(wanted_links(*model_)),
+      measurable_(wanted_),
       results_(robot_.links.size()),
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
   status_input_.model_problem = model_->problem;
+  for (std::size_t i = 0; i < robot_.links.size(); ++i) blends_.emplace_back(robot_, i);
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
     if (!link.usable()) status_input_.link_errors.push_back(link.error);
@@ -53,22 +56,25 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
 }
 
 void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
-                         const LiveConfig& config, ProximityArray* message, CycleReport* report) {
+                         const LiveConfig& config, const std::string& transform_problem,
+                         ProximityArray* message) {
   Stopwatch watch;
+  now_ = now;
+  deadline_ = config.query.deadline;
   look_up_poses(now);
   message->poses_time = watch.lap();
   const TimePoint begin = Stopwatch::Clock::now();
   status_input_.deadline = DeadlineCost();
   selection_.update(now, sources, model_->robot, poses_.stamp, pose_timeout_, &status_input_);
-  describe_pose_problems(report->transform_problem);
+  describe_pose_problems(transform_problem);
   const double preparation = watch.lap();
 
   run_query(config, begin);
   message->query_time = watch.lap();
   find_urgent_links();
-  compute_pushes(config, end_of(config.query.deadline, kRepulsionShare, begin));
+  compute_pushes(config, end_of(deadline_, kRepulsionShare, begin));
   message->repulsion_time = watch.lap();
-  compute_wrenches(config, end_of(config.query.deadline, 1.0, begin));
+  compute_wrenches(config, end_of(deadline_, 1.0, begin));
   message->penetration_time = watch.lap();
 
   message->header.stamp = poses_.stamp;
@@ -76,16 +82,20 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   message->cloud_stamp = selection_.oldest_stamp();
   message->unfinished = static_cast<std::uint32_t>(status_input_.deadline.unfinished);
   fill_links(message);
-  fill_status(status_input_, now, message, report);
+  status_ = overall_status(status_input_, now.toSec());
+  fill_status(status_input_, status_, message);
   message->message_time = preparation + watch.lap();
   message->computation_time = message->query_time + message->repulsion_time +
                               message->penetration_time + message->message_time;
+}
 
+void ProximityCycle::report(const ProximityArray& message, CycleReport* report) const {
+  report->take(status_input_, status_);
   report->links_monitored = model_->monitored.size();
   report->links_known = poses_.count_known();
-  report->pose_age = seconds_between(poses_.stamp, now);
-  report->deadline = config.query.deadline;
-  report->add_times(*message);
+  report->pose_age = seconds_between(poses_.stamp, now_);
+  report->deadline = deadline_;
+  report->add_times(message);
   if (status_input_.deadline.any()) ++report->deadlines_missed;
   report->worst_deadline.add(status_input_.deadline);
 }
@@ -98,9 +108,11 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
     query.deadline = std::max(left.count(), kLeastDeadline);
   }
   query_.set_config(query);
-  std::vector<bool> known = measurable();
-  for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && poses_.known[i];
-  query_.run(poses_.X_FL, known, selection_.clouds(), &results_);
+  measurable_ = wanted_;
+  selection_.exclude_unfiltered(&measurable_);
+  known_ = measurable_;
+  for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
+  query_.run(poses_.X_FL, known_, selection_.clouds(), &results_);
   note_usage(config);
   const QueryStatistics& statistics = query_.statistics();
   status_input_.outside_region = statistics.outside_region > 0;
@@ -122,7 +134,8 @@ void ProximityCycle::compute_pushes(const LiveConfig& config, TimePoint end) {
   for (const std::size_t i : urgent_) {
     const LinkProximity& result = results_[i];
     const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
-    RepulsiveWrench raw = repulsion_.wrench(i, X_FL, clouds, result, config.repulsion, end);
+    RepulsiveWrench raw =
+        blends_[i].update(repulsion_, X_FL, clouds, result, config.repulsion, end);
     std::uint64_t key = obstacles;
     if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
       raw = nearest_repulsion(X_FL, result, config.repulsion);
@@ -137,18 +150,12 @@ void ProximityCycle::compute_wrenches(const LiveConfig& config, TimePoint end) {
   for (const std::size_t i : urgent_) wrenches_[i] = penetration(i, config, end);
 }
 
-std::vector<bool> ProximityCycle::measurable() const {
-  std::vector<bool> measurable = wanted_links(*model_);
-  selection_.exclude_unfiltered(&measurable);
-  return measurable;
-}
-
 void ProximityCycle::look_up_poses(const ros::Time& now) {
   if (pose_source_) {
     pose_source_->look_up(now, &poses_);
   } else {
     poses_.reset(now, robot_.links.size());
-    poses_.set_problem(wanted_links(*model_), {no_kinematics(*model_), false});
+    poses_.set_problem(wanted_, {no_kinematics(*model_), false});
   }
   status_input_.clock_runs = !now.isZero();
 }
@@ -159,8 +166,9 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
   for (std::size_t i = 0; i < selection_.selected().size(); ++i) {
     const SourceSnapshot* snapshot = selection_.selected()[i];
     if (!snapshot) continue;
-    const std::string unfiltered = unfiltered_links(robot_, model_->monitored, poses_, *snapshot,
-                                                    status_input_.sources[i].name);
+    const std::string unfiltered =
+        unfiltered_links(robot_, model_->monitored, poses_, pose_source_.get(), *snapshot,
+                         status_input_.sources[i].name);
     if (!unfiltered.empty()) problems.push_back(unfiltered);
   }
   status_input_.pose_doubts = poses_.doubts;
@@ -171,13 +179,17 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
 }
 
 void ProximityCycle::fill_links(ProximityArray* message) {
-  message->links.clear();
-  for (const std::size_t i : model_->monitored) {
+  const std::string nowhere;
+  message->links.resize(model_->monitored.size());
+  for (std::size_t k = 0; k < message->links.size(); ++k) {
+    const std::size_t i = model_->monitored[k];
     const LinkProximity& result = results_[i];
-    const ClosingSpeed::Nearest nearest = selection_.nearest(result);
-    message->links.push_back(to_message(
-        robot_.links[i].name, result, pushes_[i], wrenches_[i],
-        speeds_[i].update(message->header.stamp, result, poses_.X_FL[i], nearest), nearest.source));
+    const int source = selection_.source_of(result);
+    assign_link(robot_.links[i].name, result, pushes_[i], wrenches_[i],
+                speeds_[i].update(message->header.stamp.toSec(), result, poses_.X_FL[i],
+                                  selection_.nearest(result)),
+                source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
+                &message->links[k]);
   }
 }
 
@@ -213,6 +225,7 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     if (model->robot->links[i].packing_id != packed_->links[i].packing_id) {
       filters_[i].expect_jump();
+      blends_[i] = KeptRepulsion(*model->robot, i);
     }
   }
   packed_ = model->robot;
@@ -223,6 +236,7 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
 void ProximityCycle::forget() {
   speeds_.assign(speeds_.size(), ClosingSpeed());
   filters_.assign(filters_.size(), RepulsionFilter());
+  for (KeptRepulsion& blend : blends_) blend.forget();
   poses_.stamp = ros::Time();
 }
 

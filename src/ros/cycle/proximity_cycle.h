@@ -8,12 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
-#include "ros/input/cloud_source.h"
+#include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
-#include "ros/output/closing_speed.h"
 #include "ros/output/joint_repulsion.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/pose_source.h"
@@ -35,16 +36,20 @@ class ProximityCycle {
                  std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader);
 
   /// @param now      the ROS clock's time
-  /// @param message  overwritten
+  /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
+  ///                 before costs no allocation
   /// @param config   query.deadline is in seconds here, from known poses on: distances take
   /// kQueryShare
   ///                 of it at most, repulsion ends at kRepulsionShare, and contact volumes at the
   ///                 deadline. Repulsion that is late is that of the link's nearest point, volumes
   ///                 that are late are NaN, and the status says so
-  /// @param report   its transform_problem is read; sources, poses and status are overwritten, and
-  ///                 the times are added
+  /// @param transform_problem  what tf's listener has to say; empty: nothing
   void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
-           ist_proximity::ProximityArray* message, CycleReport* report);
+           const std::string& transform_problem, ist_proximity::ProximityArray* message);
+
+  /// Writes what the last run() found: sources, poses, status and deadline; the times are added.
+  /// @param message  of that run()
+  void report(const ist_proximity::ProximityArray& message, CycleReport* report) const;
 
   /// Forgets the last cycles after a jump of the clock: no speed is computed across it, and the
   /// repulsion's filter and the stamps start again.
@@ -61,7 +66,7 @@ class ProximityCycle {
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
-  std::vector<bool> measurable() const;
+  const std::vector<bool>& measurable() const { return measurable_; }
 
   /// Gives the repulsion of the last run() as joint efforts.
   /// @param proximity  the message of that run()
@@ -88,11 +93,18 @@ class ProximityCycle {
   CloudSelection selection_;
   ProximityQuery query_;
   Repulsion repulsion_;
+  std::vector<KeptRepulsion> blends_;     ///< by link of the robot
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot
   std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
   JointRepulsion joint_repulsion_;
 
+  std::vector<bool> wanted_;  ///< by link of the robot: see wanted_links()
+
   // Valid for one cycle.
+  ros::Time now_;
+  double deadline_ = 0.0;  ///< [s] 0: none
+  Status status_{0, ""};
+  std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
   StatusInput status_input_;
   std::vector<LinkProximity> results_;   ///< by link of the robot

@@ -40,16 +40,15 @@ bool SourceState::is_current(const SourceSnapshot* snapshot,
           (snapshot->generation != 0 && is_permanent_));
 }
 
-SourceReport SourceState::report() {
+void SourceState::report(SourceReport* report) {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  SourceReport report = report_;
+  *report = report_;
   if (work_since_ != kNoWork) {
-    report.working = std::chrono::duration<double>(Clock::now() - work_since_).count();
+    report->working = std::chrono::duration<double>(Clock::now() - work_since_).count();
   }
-  if (!placing_problem_.empty()) report.problem = placing_problem_;
-  if (!file_problem_.empty()) report.problem = file_problem_;
-  return report;
+  if (!placing_problem_.empty()) report->problem = placing_problem_;
+  if (!file_problem_.empty()) report->problem = file_problem_;
 }
 
 void SourceState::set_problem(const std::string& problem, bool dropped) {

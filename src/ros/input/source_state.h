@@ -44,8 +44,8 @@ class SourceState {
   /// jump.
   bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
 
-  /// Everything but the members about the cloud in use.
-  SourceReport report();
+  /// Everything but the members about the cloud in use; see ObstacleSource::report().
+  void report(SourceReport* report);
   /// Changes the report under the lock.
   template <typename Change>
   void update(const Change& change) {

@@ -263,10 +263,9 @@ void ModelLoader::load(const std::string& urdf) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   const auto coarse = std::count_if(state.robot->links.begin(), state.robot->links.end(),
                                     [](const LinkModel& link) { return !link.is_final; });
-  ROS_INFO(
-      "model of '%s' ready after %.2f s: %zu links monitored, %zu packed, %zu of them coarsely",
-      description.name.c_str(), took.count(), state.monitored.size(), state.robot->links.size(),
-      static_cast<std::size_t>(coarse));
+  ROS_INFO("model of '%s' ready after %.2f s: %s; %zu packed coarsely so far",
+           description.name.c_str(), took.count(), link_counts(state).c_str(),
+           static_cast<std::size_t>(coarse));
   set_state(std::move(state));
 }
 

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstddef>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -43,11 +42,6 @@ class ModelLoader {
   /// @returns a sentence about what happens now
   std::string reload(bool* found);
 
-  /// Attached objects, at most: each is packed, and measured by every query.
-  static constexpr std::size_t kMaxObjects = 100;
-  /// How long attaching an object may take, reading and packing it included.
-  static constexpr std::chrono::seconds kMaxAttachTime{30};
-
   /// Makes the object to attach. True of the request ends its work.
   /// @throws ModelError, Cancelled
   using ObjectReader = std::function<AttachedObject(const CancelRequest&)>;
@@ -55,7 +49,8 @@ class ModelLoader {
   /// Makes an object a part of its link, or removes it again. The old model stays in use until the
   /// new one replaces it, which happens before the function returns. Attached objects survive
   /// reload() as long as their link does. attach() is cancelled by detach() of the same name, by
-  /// reload(), by end_changes() and after kMaxAttachTime.
+  /// reload(), by end_changes() and after ~attach/max_time. detach() works at any time: a model
+  /// that is being loaded is loaded again without the object.
   /// @returns empty on success, else the reason; then nothing has changed
   std::string attach(const std::string& name, const ObjectReader& read);
   std::string detach(const std::string& name);
@@ -72,6 +67,9 @@ class ModelLoader {
   void load(const std::string& urdf);
   bool build(const std::shared_ptr<const RobotDescription>& description, ModelState* state);
   std::string attach_read(const std::string& name, const ObjectReader& read);
+  std::string detach_from(const std::shared_ptr<const ModelState>& state, const std::string& name);
+  std::optional<std::string> detach_while_loading(const std::string& name);
+  void begin_deadline();
   std::string change_objects(const std::shared_ptr<const ModelState>& state,
                              std::vector<AttachedObject> objects, const std::string& link);
   void begin_change(const std::string& name);

@@ -46,4 +46,21 @@ std::vector<std::string> monitored_links(const RobotDescription& description,
   return names;
 }
 
+std::string link_counts(const ModelState& state) {
+  std::size_t monitored = 0, packed = 0;
+  for (const LinkModel& link : state.robot->links) packed += link.usable() ? 1 : 0;
+  for (const std::size_t i : state.monitored) {
+    monitored += state.robot->links[i].usable() ? 1 : 0;
+  }
+  const std::size_t broken = state.monitored.size() - monitored;
+  std::string text = std::to_string(monitored) + " links monitored";
+  if (broken > 0) {
+    text += ", " + std::to_string(broken) + " UNKNOWN (its geometry cannot be used: see above)";
+  }
+  if (packed > monitored) {
+    text += ", " + std::to_string(packed - monitored) + " more packed for the self-filter";
+  }
+  return text;
+}
+
 }  // namespace ist

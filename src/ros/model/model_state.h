@@ -67,4 +67,8 @@ std::vector<bool> wanted_links(const ModelState& model);
 std::vector<std::string> monitored_links(const RobotDescription& description,
                                          const std::vector<std::string>& wanted);
 
+/// Counts the links of a model that is ready: those that are answered, those whose geometry cannot
+/// be read, and those that only the self-filter needs.
+std::string link_counts(const ModelState& state);
+
 }  // namespace ist

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ist_proximity/ProximityArray.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -7,6 +8,7 @@
 #include <chrono>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "ros/model/model_state.h"
 
@@ -25,6 +27,11 @@ class SpherePublisher {
   /// slow thread, whose rate bounds how often the markers change.
   void show_finer(const ModelState& model);
 
+  /// Colours the links' spheres by nearness, as ~markers are, at most twice a second. Only where a
+  /// link's colour has changed and somebody listens, because all spheres are sent again.
+  /// @param max_distance  [m]
+  void show_nearness(const ist_proximity::ProximityArray& proximity, double max_distance);
+
   /// Must be called when the ROS clock has jumped back. rviz then forgets all markers some time
   /// later, latched or not, so they are published again after 1, 3 and 7 seconds.
   void repeat_after_clock_jump();
@@ -42,6 +49,8 @@ class SpherePublisher {
   visualization_msgs::MarkerArray shown_;
   Clock::time_point next_repeat_ = Clock::time_point::max();
   std::chrono::seconds repeat_delay_{0};
+  std::vector<int> shades_;  ///< by link of the message: what is shown
+  Clock::time_point next_shades_;
 };
 
 }  // namespace ist

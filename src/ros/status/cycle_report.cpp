@@ -22,6 +22,13 @@ double CycleTimes::quantile(double q) const {
   return sorted[std::min(rank, sorted.size() - 1)];
 }
 
+void CycleReport::take(const StatusInput& input, const Status& decided) {
+  status = decided;
+  sources = input.sources;
+  source_statuses = input.source_statuses;
+  pose_problems = input.pose_problems;
+}
+
 void CycleReport::add_times(const ist_proximity::ProximityArray& message) {
   times.add(message.computation_time);
   parts[kPartPoses].add(message.poses_time);

@@ -46,6 +46,7 @@ struct CycleReport {
   std::vector<Status> source_statuses;  ///< by source
   std::vector<std::string> pose_problems;
   std::string parameter_problem;                 ///< LiveParameters::problem()
+  std::string parameters_without_effect;         ///< LiveParameters::without_effect()
   std::string transform_problem;                 ///< a transform that the tf listener rejected
   std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;
@@ -56,8 +57,14 @@ struct CycleReport {
   double deadline = 0.0;                      ///< [s] of the last cycle; 0: none
   std::size_t deadlines_missed = 0;  ///< cycles that the deadline cut short, since the start
   DeadlineCost worst_deadline;       ///< since the last diagnostics
+  double min_distance = 0.0;         ///< [m] as on ~min_distance; NaN: not known
+  std::string speed_scale;           ///< the scale, the rule and the link; empty: not enabled
+  std::string counted_links;         ///< which links do not count in both, and why
+  std::string counted_problem;       ///< what is wrong with names of links that are configured
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 
+  /// Takes the sources, the problems of poses and the status.
+  void take(const StatusInput& input, const Status& decided);
   /// Adds the times that a message tells.
   void add_times(const ist_proximity::ProximityArray& message);
 };

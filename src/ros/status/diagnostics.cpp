@@ -29,8 +29,9 @@ std::string doubt_of_self_filter(const SourceReport& source) {
            "self_filter_padding";
   }
   // A laser scanner may never see the robot, so this concerns clouds only.
-  if (counts.on_robot == 0 && source.noun == "cloud") {
-    return "no point of the cloud is on the robot: if the sensor sees the robot, its transform or "
+  if (counts.on_robot == 0 && (source.noun == "cloud" || source.noun == "image")) {
+    return "no point of the " + source.noun +
+           " is on the robot: if the sensor sees the robot, its transform or "
            "the URDF is wrong; if it does not, set self_filter: false";
   }
   return "";
@@ -109,6 +110,7 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceReport& 
               ": its age counts from its receipt; compare the clocks of sensor and node",
           &status);
   }
+  if (!source.doubt.empty()) raise(DiagnosticStatus::WARN, source.doubt, &status);
   const std::string doubt = doubt_of_self_filter(source);
   if (!doubt.empty()) raise(DiagnosticStatus::WARN, doubt, &status);
   add_source_counts(source, rate, now, &status);
@@ -157,6 +159,19 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   }
   if (!report.parameter_problem.empty()) {
     raise(DiagnosticStatus::WARN, report.parameter_problem, &status);
+  }
+  if (!report.parameters_without_effect.empty()) {
+    raise(DiagnosticStatus::WARN, report.parameters_without_effect, &status);
+  }
+  if (!report.counted_problem.empty()) {
+    raise(DiagnosticStatus::WARN, report.counted_problem, &status);
+  }
+  add_value("min_distance",
+            std::isnan(report.min_distance) ? "not known" : millimetres(report.min_distance),
+            &status);
+  if (!report.speed_scale.empty()) add_value("speed_scale", report.speed_scale, &status);
+  if (!report.counted_links.empty()) {
+    add_value("links left out", report.counted_links, &status);
   }
   add_value("live parameters",
             report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,

@@ -94,6 +94,7 @@ std::string links(std::size_t count) {
 
 /// Adds what a deadline has cost.
 void add_deadline(const DeadlineCost& cost, Sentences* sentences) {
+  if (!cost.any()) return;
   const std::string passed = "~query/deadline passed before ";
   if (cost.unfinished > 0) {
     const std::string width =
@@ -138,7 +139,15 @@ bool clouds_usable(const StatusInput& input) {
   return any;
 }
 
+bool StatusInput::is_fine() const {
+  return model_problem.empty() && link_errors.empty() && pose_problems.empty() &&
+         pose_doubts.empty() && !deadline.any() && !outside_region &&
+         std::all_of(source_statuses.begin(), source_statuses.end(),
+                     [](const Status& status) { return status.ok(); });
+}
+
 Status overall_status(const StatusInput& input, double now) {
+  if (input.is_fine()) return {ProximityArray::OK, ""};
   Sentences sentences;
   if (!input.model_problem.empty()) sentences.add(ProximityArray::MODEL_ERROR, input.model_problem);
   sentences.add(ProximityArray::MODEL_ERROR, input.link_errors);

@@ -46,6 +46,9 @@ struct StatusInput {
   DeadlineCost deadline;
   bool outside_region = false;  ///< a link is farther out than the joint limits allow
   bool clock_runs = true;       ///< false: simulated time, and nothing on /clock yet
+
+  /// Whether nothing is wrong, so that nothing has to be said.
+  bool is_fine() const;
 };
 
 /// Whether queries may use clouds: every required source is usable, and at least one source is. A

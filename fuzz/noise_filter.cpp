@@ -1,11 +1,12 @@
 // The noise filter: points stay where they are and in their order; those that it drops become NaN,
 // as many as it says, and only where they have too few neighbours within the range.
 //
-// Covers: src/ros/input/noise_filter.cpp
+// Covers: src/cloud/noise/noise_filter.cpp
 // Longest input: 600
 
-#include "ros/input/noise_filter.h"
+#include "internal/cloud/noise_filter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,6 +22,7 @@ namespace {
 using ist::fuzz::ByteReader;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kLargestRange = 1e9;  // [m] farther points are as good as infinite
 
 // Neighbours of point i within the radius, itself not counted.
 int neighbours(const std::vector<double>& xyz, std::size_t i, double radius, double max_range) {
@@ -37,7 +39,6 @@ int neighbours(const std::vector<double>& xyz, std::size_t i, double radius, dou
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  if (!ist::has_noise_filter()) return 0;
   ByteReader in(data, size);
   ist::NoiseFilterConfig config;
   config.radius = in.between(1e-3, 0.5);
@@ -66,10 +67,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const Eigen::Vector3d before = ist::point_at(raw, 0, i), after = ist::point_at(kept, 0, i);
     if (before.allFinite() && after.array().isNaN().all()) {
       ++now_nan;
-      const int count = neighbours(xyz, i, 0.999 * config.radius, max_range);
-      FUZZ_CHECK(before.norm() <= max_range && (before.norm() > 1e3 || count < config.neighbors),
+      const int count = neighbours(xyz, i, (1.0 - 1e-12) * config.radius, max_range);
+      FUZZ_CHECK(before.norm() <= max_range && count < config.neighbors,
                  "point %zu with %d neighbours is dropped", i, count);
       continue;
+    }
+    if (before.allFinite() && before.norm() <= (1.0 - 1e-12) * std::min(max_range, kLargestRange)) {
+      const int count = neighbours(xyz, i, (1.0 + 1e-12) * config.radius, max_range);
+      FUZZ_CHECK(count >= config.neighbors, "point %zu with %d neighbours is kept", i, count);
     }
     for (int k = 0; k < 3; ++k) {
       FUZZ_CHECK(after[k] == before[k] || (std::isnan(after[k]) && std::isnan(before[k])),

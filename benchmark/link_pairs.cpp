@@ -1,0 +1,341 @@
+// Link against link beside FCL: the Panda's visual and collision meshes and the demo arm. Random
+// configurations, and a motion at 1 kHz; ties; and a check by brute force. With a document, writes
+// its tables there.
+//
+// Needs the test data: IST_PROXIMITY_DATA, or ../shared/data. Usage: link_pairs [DOCUMENT]
+// [configurations]
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "document.h"
+#include "ist_proximity/proximity/self_query.h"
+#include "ist_proximity/robot/link_poses.h"
+#include "support.h"
+#include "support/data_dir.h"
+#include "support/demo_arm.h"
+#include "support/link_pair_oracle.h"
+#include "support/meshes.h"
+#include "support/scene.h"
+#include "truth_scenes.h"
+#ifdef IST_PROXIMITY_HAS_FCL
+#include <fcl/fcl.h>
+#endif
+
+namespace {
+
+using ist::LinkPair;
+using ist::LinkState;
+using ist::PairProximity;
+using ist::benchmark::quantile;
+
+struct Robot {
+  std::string name;
+  ist::RobotDescription description;
+  std::shared_ptr<const ist::RobotModel> model;
+  std::shared_ptr<const ist::Kinematics> kinematics;
+  std::vector<LinkPair> pairs;
+  std::vector<std::vector<ist::test::Corners3<double>>> triangles;  // by link
+  bool is_meshes = true;  // no cylinders and spheres, which FCL and the oracle would not measure
+
+  std::vector<double> random_position(ist::test::Rng* rng) const {
+    std::vector<double> q;
+    for (const auto& joint : kinematics->joints()) {
+      const double low = std::max(joint.lower, -3.1), high = std::min(joint.upper, 3.1);
+      q.push_back(joint.is_free() ? ist::test::uniform(rng, low, high) : 0.0);
+    }
+    return q;
+  }
+};
+
+Robot make_robot(std::string name, ist::RobotDescription description) {
+  Robot robot;
+  robot.name = std::move(name);
+  robot.description = std::move(description);
+  ist::RobotModelConfig config;
+  config.packing.max_error = 0.01;
+  robot.model = ist::build_robot_model(robot.description, config);
+  robot.kinematics = std::make_shared<const ist::Kinematics>(robot.description);
+  const std::vector<bool> all(robot.model->links.size(), true);
+  robot.pairs = ist::self_collision_pairs(*robot.model, *robot.kinematics, all, {});
+  for (const ist::LinkModel& link : robot.model->links) {
+    for (const ist::LinkDescription& described : robot.description.links) {
+      if (described.name != link.name) continue;
+      robot.triangles.push_back(ist::test::triangles_of(described.geometry));
+      for (const ist::GeometryElement& element : described.geometry) {
+        robot.is_meshes = robot.is_meshes &&
+                          !std::holds_alternative<ist::Cylinder>(element.shape) &&
+                          !std::holds_alternative<ist::Sphere>(element.shape);
+      }
+    }
+  }
+  return robot;
+}
+
+Robot panda(const std::filesystem::path& data, ist::GeometrySource source, std::string name) {
+  const std::string package = ist::test::franka_package(data);
+  std::ifstream file(package + "/robots/panda.urdf");
+  std::stringstream text;
+  text << file.rdbuf();
+  return make_robot(std::move(name), ist::parse_urdf(text.str(), source,
+                                                     [&](const std::string&) { return package; }));
+}
+
+#ifdef IST_PROXIMITY_HAS_FCL
+class Peer {
+ public:
+  explicit Peer(const Robot& robot) : pairs_(robot.pairs) {
+    for (const auto& triangles : robot.triangles) {
+      std::vector<Eigen::Vector3d> vertices;
+      std::vector<fcl::Triangle> faces;
+      for (const auto& t : triangles) {
+        const std::size_t first = vertices.size();
+        vertices.insert(vertices.end(), t.p, t.p + 3);
+        faces.emplace_back(first, first + 1, first + 2);
+      }
+      models_.push_back(std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>());
+      models_.back()->beginModel();
+      models_.back()->addSubModel(vertices, faces);
+      models_.back()->endModel();
+    }
+  }
+  double run(const std::vector<Eigen::Isometry3d>& X_FL) {
+    double least = 1e9;
+    for (const LinkPair& pair : pairs_) {
+      fcl::DistanceRequestd request;
+      request.enable_nearest_points = true;
+      fcl::DistanceResultd result;
+      least = std::min(
+          least, fcl::distance(models_[pair.first].get(), X_FL[pair.first],
+                               models_[pair.second].get(), X_FL[pair.second], request, result));
+    }
+    return least;
+  }
+
+ private:
+  std::vector<LinkPair> pairs_;
+  std::vector<std::shared_ptr<fcl::BVHModel<fcl::OBBRSSd>>> models_;
+};
+#endif
+
+std::string ratio(double peer, double ours) {
+  char text[64] = "-";
+  if (peer > 0.0) std::snprintf(text, sizeof text, "%.0f", peer / ours);
+  return text;
+}
+
+// Times of all pairs: ours to 1 mm, ours exact, and FCL's.
+std::string measure_time(const Robot& robot, int random_count) {
+  ist::test::Rng rng(7);
+  ist::ForwardKinematics forward(*robot.model, robot.kinematics);
+  std::vector<PairProximity> results;
+  std::string rows;
+  for (const bool is_motion : {false, true}) {
+    std::vector<double> ours[2], peers, searched, steps;
+    std::vector<std::unique_ptr<ist::SelfQuery>> queries;
+    for (const double tolerance : {0.001, 0.0}) {
+      ist::QueryConfig config;
+      config.max_distance = 10.0;
+      config.tolerance = tolerance;
+      queries.push_back(std::make_unique<ist::SelfQuery>(robot.model, robot.pairs, config));
+    }
+#ifdef IST_PROXIMITY_HAS_FCL
+    Peer peer(robot);
+#endif
+    ist::benchmark::ThreadTimer timer;
+    std::vector<double> q = robot.random_position(&rng), to = robot.random_position(&rng);
+    const int count = is_motion ? 1000 : random_count;
+    for (int i = 0; i < count; ++i) {
+      if (!is_motion) q = robot.random_position(&rng);
+      // Towards another configuration, each joint at up to 0.5 rad/s.
+      for (std::size_t j = 0; is_motion && j < q.size(); ++j) {
+        q[j] += 5e-4 * std::tanh(4.0 * (to[j] - q[j]));
+      }
+      const ist::LinkPoses& poses = forward.run(q);
+      for (std::size_t k = 0; k < 2; ++k) {
+        timer.lap();
+        queries[k]->run(poses.X_FL, poses.known, &results);
+        ours[k].push_back(timer.lap());
+        if (k == 0) {
+          searched.push_back(100.0 * static_cast<double>(queries[k]->statistics().pairs_searched) /
+                             static_cast<double>(robot.pairs.size()));
+          steps.push_back(static_cast<double>(queries[k]->statistics().steps));
+        }
+      }
+#ifdef IST_PROXIMITY_HAS_FCL
+      if (robot.is_meshes && (!is_motion || i % 20 == 0)) {
+        timer.lap();
+        peer.run(poses.X_FL);
+        peers.push_back(timer.lap());
+      }
+#endif
+    }
+    const double of_peer = quantile(peers, 0.5);
+    char row[256];
+    std::snprintf(row, sizeof row,
+                  "| %s, %zu pairs | %s | %.0f | %.0f | %.0f | %s | %s | %.0f | %.0f |\n",
+                  robot.name.c_str(), robot.pairs.size(), is_motion ? "1 kHz motion" : "random",
+                  quantile(ours[0], 0.5), quantile(ours[1], 0.5), of_peer,
+                  ratio(of_peer, quantile(ours[0], 0.5)).c_str(),
+                  ratio(of_peer, quantile(ours[1], 0.5)).c_str(), ist::benchmark::mean(searched),
+                  ist::benchmark::mean(steps));
+    rows += row;
+    std::printf("%s", row);
+    std::fflush(stdout);
+  }
+  return rows;
+}
+
+// Answers beside brute force.
+std::string measure_accuracy(const Robot& robot, int configurations) {
+  std::vector<ist::test::TriangleGroups> groups;
+  for (const auto& triangles : robot.triangles) groups.emplace_back(triangles);
+  std::string rows;
+  for (const double tolerance : {0.0, 0.001, 0.005}) {
+    ist::test::Rng rng(8);
+    ist::ForwardKinematics forward(*robot.model, robot.kinematics);
+    ist::QueryConfig config;
+    config.max_distance = 10.0;
+    config.tolerance = tolerance;
+    ist::SelfQuery query(robot.model, robot.pairs, config);
+    std::vector<PairProximity> results;
+    int near = 0, contacts = 0, violations = 0, wide = 0, in_doubt = 0;
+    double widest = 0.0, largest = 0.0;
+    for (int i = 0; i < configurations; ++i) {
+      const ist::LinkPoses& poses = forward.run(robot.random_position(&rng));
+      query.run(poses.X_FL, poses.known, &results);
+      for (std::size_t k = 0; k < results.size(); ++k) {
+        const PairProximity& r = results[k];
+        const LinkPair& pair = robot.pairs[k];
+        const double truth = groups[pair.first].distance(
+            groups[pair.second], poses.X_FL[pair.first].inverse() * poses.X_FL[pair.second]);
+        contacts += r.state == LinkState::kContact ? 1 : 0;
+        if (r.state != LinkState::kNear) continue;
+        ++near;
+        violations += r.lower_bound > truth + 1e-13 || r.distance < truth - 1e-13 ||
+                              (truth == 0.0 && r.distance > 0.0)
+                          ? 1
+                          : 0;
+        in_doubt += r.lower_bound <= 0.0 ? 1 : 0;
+        if (r.lower_bound <= 0.0) continue;
+        wide += r.distance - r.lower_bound > tolerance + 1e-5 ? 1 : 0;
+        widest = std::max(widest, r.distance - r.lower_bound);
+        largest = std::max(largest, r.distance - truth);
+      }
+    }
+    char row[256];
+    std::snprintf(row, sizeof row, "| %s | %g | %d | %d | %d | %d | %d | %.2g | %.2g |\n",
+                  robot.name.c_str(), 1e3 * tolerance, near, contacts, violations, in_doubt, wide,
+                  1e3 * widest, 1e3 * largest);
+    rows += row;
+    std::printf("%s", row);
+    std::fflush(stdout);
+  }
+  return rows;
+}
+
+// Each triangle in four.
+ist::TriangleMesh divided(const ist::TriangleMesh& mesh) {
+  ist::TriangleMesh result;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Eigen::Vector3d p[6];
+    for (int k = 0; k < 3; ++k) {
+      p[k] = mesh.corner(t, k);
+      p[3 + k] = 0.5 * (mesh.corner(t, k) + mesh.corner(t, (k + 1) % 3));
+    }
+    const auto first = static_cast<std::uint32_t>(result.vertices.size());
+    result.vertices.insert(result.vertices.end(), p, p + 6);
+    const std::uint32_t corners[4][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}};
+    for (const auto& c : corners) {
+      result.triangles.push_back({first + c[0], first + c[1], first + c[2]});
+    }
+  }
+  return result;
+}
+
+// Where thousands of triangles are equally near, to 1 mm. The first link moves to and fro by 20 um.
+std::string measure_ties() {
+  using ist::test::Rng;
+  const auto plate = [](int cells, double z) {  // a square of 0.2 m and 20 mm thickness
+    ist::TriangleMesh mesh = ist::test::box({0.2, 0.2, 0.02});
+    for (int i = 0; i < cells; ++i) mesh = divided(mesh);
+    for (Eigen::Vector3d& v : mesh.vertices) v.z() += z;
+    return mesh;
+  };
+  const auto ring = [](double radius) { return ist::test::torus(radius, 0.005, 96, 24); };
+  struct Case {
+    std::string name;
+    ist::TriangleMesh a, b;
+  };
+  ist::TriangleMesh slot = ist::test::joined(plate(4, 0.0), plate(4, 0.042));
+  const std::vector<Case> cases = {{"parallel faces", plate(5, 0.0), plate(5, 0.021)},
+                                   {"nested rings", ring(0.1), ring(0.111)},
+                                   {"finger in a slot", plate(4, 0.021), slot}};
+  std::string rows;
+  for (const Case& c : cases) {
+    const auto model = ist::test::make_model({c.a, c.b}, 0.01);
+    ist::SelfQuery query(model, {{0, 1}}, {});
+    std::vector<PairProximity> results;
+    std::vector<double> us;
+    double cold = 0.0;
+    Rng rng(9);
+    ist::benchmark::ThreadTimer timer;
+    for (int i = 0; i < 500; ++i) {
+      std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+      X_FL[0].translation() =
+          2e-5 * Eigen::Vector3d(std::sin(0.1 * i), std::cos(0.2 * i), std::sin(0.3 * i));
+      timer.lap();
+      query.run(X_FL, {true, true}, &results);
+      (i == 0 ? cold : us.emplace_back()) = timer.lap();
+    }
+    char row[256];
+    std::snprintf(row, sizeof row, "| %s, %zu and %zu triangles | %.2f | %.3f | %.3f | %.2f |\n",
+                  c.name.c_str(), c.a.triangles.size(), c.b.triangles.size(), 1e-3 * cold,
+                  1e-3 * quantile(us, 0.5), 1e-3 * quantile(us, 0.99), 1e3 * results[0].distance);
+    rows += row;
+    std::printf("%s", row);
+    std::fflush(stdout);
+  }
+  return rows;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string document = argc > 1 ? argv[1] : "";
+  const int configurations = argc > 2 ? std::atoi(argv[2]) : 2000;
+  const std::filesystem::path data = ist::benchmark::data_or_exit();
+  const std::vector<Robot> robots = {
+      panda(data, ist::GeometrySource::kVisual, "Panda, visual meshes"),
+      panda(data, ist::GeometrySource::kCollision, "Panda, collision meshes"),
+      make_robot("demo arm", ist::test::demo_robot())};
+  std::string ties =
+      "| case | first query [ms] | warm, median [ms] | warm, p99 [ms] | distance [mm] |\n"
+      "|---|---|---|---|---|\n";
+  ties += measure_ties();
+  std::string time =
+      "| robot | poses | ours to 1 mm [us] | ours exact [us] | FCL [us] | FCL / ours | FCL / exact "
+      "| pairs searched [%] | steps |\n|---|---|---|---|---|---|---|---|---|\n";
+  for (const Robot& robot : robots) time += measure_time(robot, std::min(configurations, 200));
+  std::string accuracy =
+      "| robot | tolerance [mm] | near | contacts | violations | in doubt | wider than the "
+      "tolerance "
+      "| widest [mm] | largest error [mm] |\n|---|---|---|---|---|---|---|---|---|\n";
+  for (const Robot& robot : robots) {
+    if (robot.is_meshes) accuracy += measure_accuracy(robot, configurations);
+  }
+  if (document.empty()) return 0;
+  const bool written = ist::benchmark::write_table(document, "link pairs", time) &&
+                       ist::benchmark::write_table(document, "link pair ties", ties) &&
+                       ist::benchmark::write_table(document, "link pair accuracy", accuracy);
+  return written ? 0 : 1;
+}

@@ -1,0 +1,229 @@
+#include "proximity/link_pair_query.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "internal/geometry/solid_queries.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+// Pairs of boxes that the front may hold.
+constexpr std::size_t kFrontCapacity = 1024;
+// Distances that the search for the depth may measure, in each direction.
+constexpr int kDepthSteps = 100;
+
+double extent(const LinkModel& link) { return link.tree.center().norm() + link.tree.radius(); }
+
+// [m] No point of A moves farther in B's frame, or none of B in A's, whichever is less.
+double relative_displacement(const LinkSurface& a, const LinkSurface& b,
+                             const Eigen::Isometry3d& old_X_BA, const Eigen::Isometry3d& X_BA) {
+  return std::min(a.displacement.between(old_X_BA, X_BA),
+                  b.displacement.between(old_X_BA.inverse(), X_BA.inverse()));
+}
+
+}  // namespace
+
+LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
+                             const LinkSurface& surface_b)
+    : a_(a),
+      b_(b),
+      surface_a_(surface_a),
+      surface_b_(surface_b),
+      surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity),
+      openings_a_(surface_a, surface_b),
+      openings_b_(surface_b, surface_a) {}
+
+// [m] The error of a distance by poses that are not quite rigid.
+double LinkPairQuery::pose_uncertainty(double distance) const {
+  return pose_error(drift_, extent(a_) + extent(b_), distance);
+}
+
+void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
+                            const QueryConfig& config) {
+  const Eigen::Isometry3d X_BA = relative_pose(X_FB.X, X_FA.X);
+  const double moved =
+      has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInf;
+  openings_a_.note_motion(moved);
+  openings_b_.note_motion(moved);
+  // What is apart stays apart while no point moves as far as the other surface, or an opening.
+  are_apart_ = are_apart_ && moved < surfaces_.lower_bound() && openings_a_.stays_apart() &&
+               openings_b_.stays_apart();
+  X_BA_ = X_BA;
+  X_FB_ = X_FB.X;
+  drift_ = X_FA.drift + X_FB.drift;
+  has_pose_ = true;
+  config_ = config;
+  range_ = config.max_distance + config.margin;
+  range_ += pose_uncertainty(range_);
+  surfaces_.move_to(X_BA, moved);
+  stage_ = Stage::kSurfaces;
+  are_in_contact_ = false;
+}
+
+bool LinkPairQuery::advance(int* steps, std::vector<LinkPairSearch::Entry>* queue) {
+  if (stage_ == Stage::kSurfaces) {
+    if (!surfaces_.run({range_, config_.tolerance, config_.relative_tolerance}, steps))
+      return false;
+    stage_ = Stage::kInside;
+  }
+  if (stage_ == Stage::kInside) {
+    decide_contact(steps);
+    if (are_in_contact_) measure_depth(queue);
+    stage_ = Stage::kDone;
+  }
+  return true;
+}
+
+void LinkPairQuery::decide_contact(int* steps) {
+  using Answer = OpeningSearch::Answer;
+  are_in_contact_ = surfaces_.distance() <= 0.0;
+  are_apart_ = are_apart_ && !are_in_contact_;
+  if (are_in_contact_ || are_apart_ || !(surfaces_.lower_bound() > 0.0)) return;
+  are_in_contact_ = is_inside_other();
+  if (are_in_contact_) return;
+  const Answer into_a = openings_a_.decide(X_BA_, steps);
+  const Answer into_b = openings_b_.decide(X_BA_.inverse(), steps);
+  are_in_contact_ = into_a == Answer::kInside || into_b == Answer::kInside;
+  are_apart_ = into_a == Answer::kApart && into_b == Answer::kApart;
+}
+
+// Where the surfaces are apart: whether a component of one is inside the other.
+bool LinkPairQuery::is_inside_other() const {
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  const auto holds = [](const LinkModel& link, const SurfaceBvh& surface,
+                        const Eigen::Vector3d& p) {
+    return surface.bounds().contains(p) && link.solid.is_inside(p);
+  };
+  for (const Eigen::Vector3d& p_A : surface_a_.component_points) {
+    if (holds(b_, surface_b_.surface, X_BA_ * p_A)) return true;
+  }
+  for (const Eigen::Vector3d& p_B : surface_b_.component_points) {
+    if (holds(a_, surface_a_.surface, X_AB * p_B)) return true;
+  }
+  return false;
+}
+
+// Keeps the witnesses of a search for the depth if they are deeper.
+void LinkPairQuery::keep_deepest(const LinkPairSearch& search, bool of_a) {
+  depth_bound_ = std::min(depth_bound_, search.lower_bound());
+  if (!(search.distance() < depth_distance_)) return;
+  depth_distance_ = search.distance();
+  if (of_a) {
+    on_a_ = search.p_BCa();
+    on_b_ = search.p_BCb();
+    direction_ = search.normal_B();
+  } else {  // in A's frame, and the link that is searched is B
+    on_a_ = X_BA_ * search.p_BCb();
+    on_b_ = X_BA_ * search.p_BCa();
+    direction_ = -(X_BA_.linear() * search.normal_B());
+  }
+}
+
+void LinkPairQuery::measure_depth(std::vector<LinkPairSearch::Entry>* queue) {
+  depth_bound_ = 0.0;
+  depth_distance_ = kInf;
+  QueryConfig config = config_;
+  config.max_distance = range_;
+  LinkPairSearch of_a(a_, b_, X_BA_, config, queue);
+  of_a.run(kDepthSteps);
+  keep_deepest(of_a, true);
+  LinkPairSearch of_b(b_, a_, X_BA_.inverse(), config, queue);
+  of_b.run(kDepthSteps);
+  keep_deepest(of_b, false);
+  if (!(depth_distance_ < 0.0)) search_from_touch();
+  if (!(depth_distance_ < 0.0)) search_along_parts();
+  depth_bound_ = std::max(depth_bound_, -std::max(surface_a_.depth_limit, surface_b_.depth_limit));
+  depth_bound_ = std::min(depth_bound_, depth_distance_);
+}
+
+// From a point where the surfaces meet, alternately into the one and the other: solids that merely
+// graze one another have so little in common that their spheres do not show it.
+void LinkPairQuery::search_from_touch() {
+  constexpr double kFirst = 1e-3, kLast = 1e-9;  // [m]
+  constexpr int kProjections = 8;
+  const Eigen::Vector3d touch_B = surfaces_.closest().on_q;
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  on_a_ = on_b_ = touch_B;
+  direction_ = b_.solid.signed_distance(touch_B).normal;
+  depth_distance_ = 0.0;
+  for (double depth = kFirst; depth > kLast && depth_distance_ == 0.0; depth *= 0.25) {
+    Eigen::Vector3d q_B = touch_B;
+    for (int i = 0; i < kProjections; ++i) {
+      const SignedDistance to_b = b_.solid.signed_distance(q_B);
+      const SignedDistance to_a = a_.solid.signed_distance(X_AB * q_B);
+      if (to_a.distance < 0.0 && to_b.distance < depth_distance_) {
+        depth_distance_ = to_b.distance;
+        on_a_ = q_B;
+        on_b_ = to_b.witness;
+        direction_ = to_b.normal;
+      }
+      if (to_a.distance > to_b.distance) {
+        q_B -= (to_a.distance + depth) * (X_BA_.linear() * to_a.normal);
+      } else {
+        q_B -= (to_b.distance + depth) * to_b.normal;
+      }
+    }
+  }
+}
+
+// Where a triangle passes through the other link, some of its corners lead inward from there.
+void LinkPairQuery::search_along_parts() {
+  constexpr double kLast = 1e-7;  // share of the way to a corner
+  const Eigen::Vector3d touch_B = surfaces_.closest().on_q;
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  const ConvexPart parts[] = {surfaces_.part_a(), surfaces_.part_b()};
+  for (int i = 0; i < 2; ++i) {
+    if (parts[i].kind != ConvexPart::Kind::kTriangle) continue;
+    for (const Eigen::Vector3d& corner : {parts[i].a, parts[i].b, parts[i].c}) {
+      for (double share = 1.0; share > kLast; share *= 0.25) {
+        const Eigen::Vector3d q_B = touch_B + share * (corner - touch_B);
+        const SignedDistance found =
+            i == 0 ? b_.solid.signed_distance(q_B) : a_.solid.signed_distance(X_AB * q_B);
+        if (!(found.distance < depth_distance_)) continue;
+        depth_distance_ = found.distance;
+        on_a_ = i == 0 ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
+        on_b_ = i == 0 ? found.witness : q_B;
+        direction_ = i == 0 ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
+      }
+    }
+  }
+}
+
+double LinkPairQuery::lower_bound() const {
+  if (are_in_contact_) return depth_bound_;
+  if (are_apart_) return surfaces_.lower_bound();
+  return -std::max(surface_a_.depth_limit, surface_b_.depth_limit);
+}
+
+void LinkPairQuery::report(PairProximity* result) const {
+  result->reset();
+  result->finished = stage_ == Stage::kDone;
+  const double lower = lower_bound();
+  if (lower >= range_) {
+    result->state = LinkState::kClear;
+    result->distance = kInf;
+    result->lower_bound = config_.max_distance;
+    return;
+  }
+  result->lower_bound = lower - pose_uncertainty(lower) - config_.margin;
+  if (are_in_contact_) {
+    result->state = depth_distance_ < 0.0 ? LinkState::kContact : LinkState::kNear;
+    result->distance = depth_distance_;
+    result->p_FCa = X_FB_ * on_a_;
+    result->p_FCb = X_FB_ * on_b_;
+    result->direction = X_FB_.linear() * direction_;
+    return;
+  }
+  const ConvexDistance& closest = surfaces_.closest();
+  if (!(closest.distance > 0.0 && closest.distance < kInf)) return result->reset();
+  result->state = LinkState::kNear;
+  result->distance = closest.distance;
+  result->p_FCa = X_FB_ * closest.on_p;
+  result->p_FCb = X_FB_ * closest.on_q;
+  result->direction = X_FB_.linear() * (closest.on_p - closest.on_q).normalized();
+}
+
+}  // namespace ist

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "internal/geometry/relative_pose.h"
+#include "ist_proximity/proximity/self_query.h"
+#include "proximity/link_pair_search.h"
+#include "proximity/link_surface.h"
+#include "proximity/opening_search.h"
+#include "proximity/surface_pair_search.h"
+
+namespace ist {
+
+/// The distance of two links A and B, kept from pose to pose. First the distance of their surfaces
+/// is found; where that is positive, whether one link is inside the other; where they are in
+/// contact, how deep. Nothing is allocated after construction.
+class LinkPairQuery {
+ public:
+  /// All arguments outlive this.
+  LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
+                const LinkSurface& surface_b);
+
+  /// The poses of the next steps. Bounds hold for them from here on.
+  void move_to(const RigidPose& X_FA, const RigidPose& X_FB, const QueryConfig& config);
+
+  /// Goes on until the tolerance is reached.
+  /// @param steps  how many pairs of boxes may be looked at; reduced by those that were
+  /// @param queue  scratch for depths, reserved by the caller
+  /// @returns false when the steps were used up first
+  bool advance(int* steps, std::vector<LinkPairSearch::Entry>* queue);
+
+  /// [m] Proven at this pose, whatever has been done so far; the margin is not taken off.
+  double lower_bound() const;
+  /// What is known, at any time.
+  void report(PairProximity* result) const;
+
+ private:
+  enum class Stage { kSurfaces, kInside, kDone };
+
+  void decide_contact(int* steps);
+  bool is_inside_other() const;
+  void measure_depth(std::vector<LinkPairSearch::Entry>* queue);
+  void keep_deepest(const LinkPairSearch& search, bool of_a);
+  void search_from_touch();
+  void search_along_parts();
+  double pose_uncertainty(double distance) const;
+
+  const LinkModel &a_, &b_;
+  const LinkSurface &surface_a_, &surface_b_;
+  SurfacePairSearch surfaces_;
+  OpeningSearch openings_a_, openings_b_;
+  Stage stage_ = Stage::kSurfaces;
+  bool are_apart_ = false;  // no point of one is inside the other, at this pose
+  bool are_in_contact_ = false;
+  QueryConfig config_;
+  double range_ = 0.0;  // [m] of the search: bounds lose the margin and the poses' errors later
+  double drift_ = 0.0;  // of both poses
+  Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity(), X_FB_ = Eigen::Isometry3d::Identity();
+  bool has_pose_ = false;
+  // In contact: the deepest point found, in B's frame.
+  double depth_bound_ = 0.0, depth_distance_ = 0.0;  // [m]
+  Eigen::Vector3d on_a_, on_b_, direction_;
+};
+
+}  // namespace ist

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "internal/geometry/openings.h"
+#include "internal/geometry/surface_bvh.h"
+#include "ist_proximity/robot/robot_model.h"
+#include "proximity/coherence/displacement.h"
+
+namespace ist {
+
+/// What the distances of a link to other links need, in its frame L. Immutable.
+struct LinkSurface {
+  explicit LinkSurface(const LinkModel& link);
+
+  SurfaceBvh surface;
+  Openings openings;         ///< none for closed links
+  SurfaceBvh opening_cells;  ///< over the cells of `openings`
+  /// One point of each connected component of the surface: where surfaces are apart, all of a
+  /// component is inside another link, or nothing of it.
+  std::vector<Eigen::Vector3d> component_points;
+  DisplacementBound displacement;
+  /// [m] No point inside the link is farther from its surface.
+  double depth_limit = 0.0;
+};
+
+}  // namespace ist

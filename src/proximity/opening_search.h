@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+
+#include "internal/geometry/openings.h"
+#include "proximity/link_surface.h"
+#include "proximity/surface_pair_search.h"
+
+namespace ist {
+
+/// Whether the surface of a link B passes through an opening of a link A, where no triangle of A is
+/// in its path.
+class OpeningSearch {
+ public:
+  /// Both outlive this.
+  OpeningSearch(const LinkSurface& a, const LinkSurface& b);
+
+  /// What is known at a pose.
+  enum class Answer {
+    kApart,   ///< no opening of A meets the surface of B
+    kInside,  ///< a point of B's surface is inside A
+    kUnknown  ///< not decided
+  };
+
+  /// [m] No point of A has moved farther in B's frame since the last call.
+  void note_motion(double displacement);
+  /// Whether openings and surface are apart for certain, without a search.
+  bool stays_apart() const { return clearance_ > 0.0; }
+  /// @param X_BA  frame of A -> that of B, rigid
+  /// @param steps  reduced by the pairs of boxes that were looked at
+  Answer decide(const Eigen::Isometry3d& X_BA, int* steps);
+
+ private:
+  const LinkSurface& a_;
+  const bool is_closed_;
+  SurfacePairSearch search_;
+  double clearance_ = 0.0;  // [m] lower bound of the distance of openings and surface
+  double moved_;            // [m] since the search's pose
+};
+
+}  // namespace ist

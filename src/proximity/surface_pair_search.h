@@ -1,0 +1,133 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "internal/geometry/convex_part.h"
+#include "internal/geometry/surface_bvh.h"
+
+namespace ist {
+
+/// The distance of two surfaces A and B, kept from pose to pose: branch and bound over pairs of
+/// boxes of their hierarchies, best first.
+///
+/// The pairs that were pruned or measured stay in a queue, the BVTT front. Each has the bound that
+/// was proven for it and the path length at which it was: no point of A moves farther in B's frame
+/// than the path grows. So a bound holds later, less the path since, and a pair is looked at again
+/// only when its slack is used up (an event of expiry). Where the links lie on both sides of a
+/// plane between the closest points, as convex bodies do, their supports prove the distance at
+/// once. The closest parts found last give the first
+/// upper bound at a new pose. Where the queue is full, pairs are searched depth first, which needs
+/// no memory but a bounded stack: nothing is allocated after construction.
+class SurfacePairSearch {
+ public:
+  /// @param a, b      outlive this
+  /// @param capacity  pairs that the front may hold, at least 16
+  SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity);
+
+  /// What is wanted: bounds that differ by `tolerance` at most where the surfaces are nearer than
+  /// `range`; whether they intersect is always decided.
+  struct Goal {
+    double range = std::numeric_limits<double>::infinity();  ///< [m] > 0
+    double tolerance = 0.0;                                  ///< [m]
+    double relative_tolerance = 0.0;  ///< ratio to the distance, where that is wider
+  };
+
+  /// The pose of the next runs.
+  /// @param X_BA          A's frame -> B's, rigid
+  /// @param displacement  [m] no point of A is farther from where it was in B's frame at the last
+  ///                      pose; inf: not known, everything is searched anew
+  void move_to(const Eigen::Isometry3d& X_BA, double displacement);
+
+  /// Searches until the goal is reached.
+  /// @param steps  how many pairs may be looked at; reduced by those that were
+  /// @returns false when the steps were used up first; the next call continues
+  bool run(const Goal& goal, int* steps);
+
+  /// Visits parts that intersect.
+  class Visitor {
+   public:
+    virtual ~Visitor() = default;
+    /// @param part_a  in B's frame, as part_b
+    /// @returns false to end the search
+    virtual bool visit(const ConvexPart& part_a, const ConvexPart& part_b) = 0;
+  };
+  /// Visits all pairs of parts that intersect at this pose.
+  /// @param steps  as for run()
+  /// @returns false when the visitor or the steps ended the search
+  bool visit_intersections(Visitor* visitor, int* steps);
+
+  /// [m] An upper bound at this pose, of two real points; inf: no parts have been measured; 0 or
+  /// less: the surfaces intersect.
+  double distance() const { return closest_.distance; }
+  /// [m] Proven for this pose, at any time; 0 or more.
+  double lower_bound() const;
+  /// The closest points found: on_p is on A and on_q on B, in B's frame.
+  const ConvexDistance& closest() const { return closest_; }
+  /// The parts that they are on, in B's frame; there must be any.
+  ConvexPart part_a() const;
+  const ConvexPart& part_b() const;
+  /// [m] Bounds of parts that were measured may be wrong by this much.
+  double rounding() const { return exact_rounding_; }
+
+ private:
+  struct Entry {
+    /// [m] a bound plus the path length where it was proven; below 0: none, and the larger the
+    /// boxes the nearer to 0
+    double key;
+    SurfaceBvh::Slot a, b;
+    bool operator<(const Entry& other) const { return key > other.key; }  ///< least on top
+  };
+  /// A pair and its bound at this pose.
+  struct Pair {
+    double bound;
+    SurfaceBvh::Slot a, b;
+  };
+
+  void start_anew();
+  void keep_measured();
+  void rebase_path();
+  double bound_of(const Entry& entry) const;
+  bool is_wanted(double bound) const;
+  void update_prune_bound();
+  double tolerance_at(double distance) const;
+  void set_direction();
+  bool is_leaf(const Pair& pair) const;
+  int expand(const Pair& pair, Pair children[SurfaceBvh::kWidth]);
+  double bound(double measured, const Pair& pair) const;
+  double measure(const Pair& pair);
+  void descend();
+  void prove_by_plane();
+  void visit(const Entry& entry, int* steps);
+  void visit_depth_first(const Entry& entry, int* steps);
+  void push(const Entry& entry);
+
+  const SurfaceBvh &a_, &b_;
+  const std::size_t capacity_;
+  std::vector<Entry> front_;     // a heap of pairs that were not measured at this pose
+  std::vector<Entry> measured_;  // pairs of parts that were
+  double path_ = 0.0;            // [m]
+  Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity();
+  Eigen::Matrix3f R_BA_, R_AB_;
+  Eigen::Vector3f p_BA_, p_AB_;
+  Eigen::Vector3f n_B_, n_A_;                     // unit, from B to A: that of the closest points
+  double rounding_ = 0.0, exact_rounding_ = 0.0;  // [m] of boxes and of parts
+  Goal goal_;
+  double prune_bound_ = 0.0;
+  int looked_at_ = 0;         // pairs, at this pose
+  bool is_new_ = true;        // the front was started at this pose
+  int cost_of_new_ = 0;       // pairs that were looked at when the front was started
+  double plane_bound_ = 0.0;  // [m] of both surfaces, by the plane between the closest points
+  double plane_path_ = 0.0;   // [m] where it was proven
+  int next_plane_ = 0;        // when looked_at_ is this, the plane is tried
+  double plane_tried_ = 0.0;  // [m] the distance for which the plane was tried last
+  bool has_witness_ = false;
+  SurfaceBvh::Slot witness_a_ = 0, witness_b_ = 0;
+  ConvexDistance closest_;
+};
+
+}  // namespace ist
