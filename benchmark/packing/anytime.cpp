@@ -1,5 +1,5 @@
 // Anytime models over their first minute: the first answer after the URDF, then spheres, memory and
-// the time of a query while packing goes on in a thread of the lowest priority.
+// the time of a query while packing goes on in a thread of low priority.
 
 #include <sys/resource.h>
 
@@ -85,7 +85,7 @@ class NewestModel {
 
 // Refines the links in turn until all are final.
 void refine(NewestModel* newest, const std::atomic<bool>& stop) {
-  (void)setpriority(PRIO_PROCESS, 0, 19);  // of this thread
+  (void)setpriority(PRIO_PROCESS, 0, 10);  // of this thread
   RobotModelCallbacks callbacks;
   callbacks.cancelled = [&] { return stop.load(); };
   for (bool is_final = false; !is_final && !stop;) {

@@ -98,6 +98,15 @@ double surface_support_in_sphere(const Solid& solid, const Eigen::Vector3d& cent
   return largest;
 }
 
+std::size_t memory_of(const Solid& solid) {
+  std::size_t bytes = 0;
+  for (const SolidElement& element : elements_of(solid)) {
+    bytes += sizeof element + element.bvh.memory() + element.box_sides.memory() +
+             element.normals.capacity() * sizeof(Eigen::Vector3d);
+  }
+  return bytes;
+}
+
 bool is_one_mesh(const Solid& solid) {
   const std::vector<SolidElement>& elements = elements_of(solid);
   return elements.size() == 1 && elements[0].is_mesh();

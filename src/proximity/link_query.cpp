@@ -402,8 +402,8 @@ void LinkQuery::look_ahead() {
   if (ahead < search.other_links) search.other_links += ahead;
 }
 
-// The grid, the distances and the bounds are about the geometry. Fronts, supports and the terms of
-// the last answer are about the tree.
+// The grid, the distances and the link's bound are about the geometry. Fronts, bounds by node,
+// supports and the terms of the last answer are about the tree.
 void LinkQuery::set_link(const LinkModel& link) {
   LinkContext& context = link_.context;
   const bool is_same = link.packing_id != 0 && link.packing_id == context.model->packing_id;
@@ -413,6 +413,7 @@ void LinkQuery::set_link(const LinkModel& link) {
   context.displacement = DisplacementBound(link);
   LinkCoherence& kept = link_.kept;
   kept.bound.set_link(link);
+  kept.nodes.forget();
   kept.fronts.forget();
   kept.answered.scene = kUnknownScene;
   kept.supports = SupportCache(link.tree);

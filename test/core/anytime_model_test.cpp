@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/robot/model_memory.h"
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
@@ -161,6 +162,18 @@ TEST(AnytimeModel, growsLinkByLinkToTheFinalPacking) {
       ASSERT_EQ(grown.packing.spheres[s].cover_radius, packed.packing.spheres[s].cover_radius);
     }
   }
+}
+
+// Finer spheres take memory, and the exact geometry is there once however often a link is refined.
+TEST(AnytimeModel, memoryGrowsWithTheSpheresAlone) {
+  const auto stages = growth(AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst));
+  const ModelMemory first = memory_of(*stages.front()->robot());
+  const ModelMemory last = memory_of(*stages.back()->robot());
+  EXPECT_GT(first.packings, 0U);
+  EXPECT_GT(first.trees, 0U);
+  EXPECT_GT(first.solids, 0U);
+  EXPECT_EQ(last.solids, first.solids);
+  if (!test::kSanitized) EXPECT_GT(last.packings + last.trees, first.packings + first.trees);
 }
 
 TEST(AnytimeModel, equalShapesGrowTogether) {

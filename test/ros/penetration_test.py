@@ -40,7 +40,13 @@ class PenetrationTest(unittest.TestCase):
         self.assertEqual(self.node.stop(), 0)
 
     def start(self, **parameters):
-        parameters = {"self_filter": False, "query/tolerance": 0.0, **parameters}
+        # No deadline: on a busy machine it would end queries to a tolerance of 0.
+        parameters = {
+            "self_filter": False,
+            "query/tolerance": 0.0,
+            "query/deadline": 0.0,
+            **parameters,
+        }
         self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
         self.world.start_tf()
         self.world.start_clouds()
@@ -91,6 +97,27 @@ class PenetrationTest(unittest.TestCase):
             lambda: node.diagnostic("model", "contact volumes") == "ready",
             "the volumes in the diagnostics",
         )
+
+    def test_volumes_and_finer_spheres_come_on_first_need(self):
+        """Nothing is near: coarse spheres and no volume. Then the box comes near, not in contact."""
+        self.world.poses["box_link"] = ("base", box_at(-1.5))
+        node = self.start()
+        node.wait_for_status(ProximityArray.OK)
+        node.wait_until(
+            lambda: node.diagnostic("model", "links with a volume").startswith("0 of 2"),
+            "no volumes without need",
+        )
+        self.assertTrue(node.diagnostic("model", "box_link").startswith("coarse, "))
+        count = len(node.messages)
+        self.move(-0.1)
+        node.wait_until(
+            lambda: node.diagnostic("model", "links with a volume").startswith("1 of 2"),
+            "the volume of the link that is near",
+        )
+        self.assertTrue(node.diagnostic("model", "box_link").startswith("final, "))
+        for message in node.messages[count:]:  # the swap loses nothing
+            self.assertEqual(message.status, ProximityArray.OK, message.status_text)
+        self.assertTrue(np.isfinite(wrench(self.move(0.03))).all())
 
     def test_switched_off(self):
         node = self.start(**{"penetration/enabled": False})

@@ -90,4 +90,7 @@ BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O
 /// Whether the solid is one mesh and nothing else.
 bool is_one_mesh(const Solid& solid);
 
+/// [bytes] of the elements, which copies of the solid share.
+std::size_t memory_of(const Solid& solid);
+
 }  // namespace ist

@@ -135,6 +135,13 @@ class TriangleBvh {
     std::uint32_t index;  ///< in the mesh
   };
 
+  /// [bytes] of the hierarchy and its triangles.
+  std::size_t memory() const {
+    return boxes_.capacity() * sizeof(Boxes) + slabs_.capacity() * sizeof(Slabs) +
+           moments_.capacity() * sizeof(Moments) + leaves_.capacity() * sizeof(Leaf) +
+           triangles_.capacity() * sizeof(Triangle);
+  }
+
   /// A triangle by its place in the hierarchy.
   const Triangle& triangle(std::uint32_t slot) const { return triangles_[slot]; }
 

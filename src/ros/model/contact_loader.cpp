@@ -82,7 +82,7 @@ void ContactLoader::run() {
 /// Begins a model with the bodies that are known from the last one.
 void ContactLoader::begin(const ModelState& state) {
   const RobotModel& robot = *state.robot;
-  description_ = with_objects(*state.description, state.objects);
+  model_ = state.anytime;
   keys_.assign(robot.links.size(), "");
   needed_.assign(robot.links.size(), Clock::time_point::max());
   std::map<std::string, std::shared_ptr<const ContactGeometry>> bodies;
@@ -90,7 +90,7 @@ void ContactLoader::begin(const ModelState& state) {
   contacts.robot = state.robot;
   contacts.links.resize(robot.links.size());
   for (const std::size_t i : state.monitored) {
-    const LinkDescription* link = find_link(description_, robot.links[i].name);
+    const LinkDescription* link = find_link(model_->description(), robot.links[i].name);
     if (link == nullptr || !robot.links[i].usable()) continue;
     keys_[i] = contact_geometry_key(link->geometry, link->attached, config_.contacts);
     const auto known = known_.find(keys_[i]);
@@ -122,7 +122,8 @@ bool ContactLoader::add_next(const ModelState& state) {
   std::shared_ptr<const ContactGeometry>& body = known_[keys_[*next]];
   if (!body) {
     const LinkModel& link = state.robot->links[*next];
-    body = build(*find_link(description_, link.name), link, [&] { return !is_current(state); });
+    body = build(*find_link(model_->description(), link.name), link,
+                 [&] { return !is_current(state); });
   }
   if (!body) {
     known_.erase(keys_[*next]);

@@ -61,7 +61,7 @@ class ContactLoader {
   // The thread's own.
   /// The bodies of this model and the last one by key.
   std::map<std::string, std::shared_ptr<const ContactGeometry>> known_;
-  RobotDescription description_;           ///< of this model, with attached objects
+  AnytimeModel::Ptr model_;                ///< has the description of the links
   std::vector<std::string> keys_;          ///< by link of the robot; empty: it has no body
   std::vector<Clock::time_point> needed_;  ///< by link of the robot: since when; max(): not yet
   std::thread thread_;                     ///< not running where contact volumes are not wanted

@@ -240,7 +240,8 @@ void ModelLoader::load(const std::string& urdf) {
                    return show_reading(link, mesh);
                  }));
   warn_of_visual_fallback(*state.description);
-  const auto carrying = std::make_shared<const RobotDescription>(carry_over_objects(&state));
+  auto carrying = std::make_shared<const RobotDescription>(carry_over_objects(&state));
+  if (state.objects.empty()) carrying = state.description;  // the same meshes once
   const RobotDescription& description = *carrying;
 
   state.phase = ModelState::Phase::kPacking;

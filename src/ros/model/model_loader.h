@@ -22,7 +22,7 @@ namespace ist {
 
 /// Makes the robot's model in a thread of its own: it waits for robot_description on the parameter
 /// server, reads the URDF, and packs its links coarsely or takes them from the cache. After a text
-/// that is no URDF it reads again as soon as the parameter changes. Another thread, of the lowest
+/// that is no URDF it reads again as soon as the parameter changes. Another thread, of low
 /// priority, packs more finely the links that are near something or costly, for as long as that
 /// pays. All members are thread safe.
 class ModelLoader {

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <string>
 
+#include "internal/robot/model_memory.h"
 #include "ros/common/text.h"
 #include "ros/status/diagnostic_values.h"
 #include "ros/status/diagnostics.h"
@@ -75,6 +76,8 @@ void add_link(const LinkModel& link, DiagnosticStatus* status) {
   add_value(link.name, text, status);
 }
 
+double megabytes(std::size_t bytes) { return 1e-6 * static_cast<double>(bytes); }
+
 /// Adds how far background packing has got.
 void add_packings(const ModelState& state, DiagnosticStatus* status) {
   if (!state.robot) return;
@@ -93,6 +96,13 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
                 (final < usable ? "; the others get finer spheres when it pays" : ""),
             status);
   add_value("spheres", spheres, status);
+  const ModelMemory memory = memory_of(*state.robot);
+  add_value("memory",
+            format_text("%.1f MB: ", megabytes(memory.total())) +
+                format_text("packings %.1f, ", megabytes(memory.packings)) +
+                format_text("trees %.1f, ", megabytes(memory.trees)) +
+                format_text("exact geometry %.1f", megabytes(memory.solids)),
+            status);
   add_value("largest gap", millimetres(largest_gap), status);
 }
 

@@ -1,0 +1,18 @@
+#include "internal/robot/model_memory.h"
+
+#include "internal/geometry/solid_queries.h"
+
+namespace ist {
+
+ModelMemory memory_of(const RobotModel& model) {
+  ModelMemory memory;
+  for (const LinkModel& link : model.links) {
+    memory.packings += link.packing.spheres.capacity() * sizeof(InnerSphere);
+    memory.trees += link.tree.nodes().capacity() * sizeof(SphereNode) +
+                    link.tree.leaves().capacity() * sizeof(SphereLeaf);
+    memory.solids += memory_of(link.solid);
+  }
+  return memory;
+}
+
+}  // namespace ist
