@@ -211,7 +211,7 @@ void SelfProximity::publish_once() {
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
     query_->set_config(live.query);
-    query_->run(poses_.X_FL, poses_.known, &results_);
+    input.deadline_passed = !query_->run(poses_.X_FL, poses_.known, &results_);
     compute_wrenches(live);
     message->header.stamp = poses_.stamp;
     for (const std::size_t i : model_->monitored) {
