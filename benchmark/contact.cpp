@@ -10,7 +10,7 @@
 #include <memory>
 #include <vector>
 
-#include "cloud/thinning/voxel_thinning.h"
+#include "internal/cloud/point_bvh.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
 #include "truth_scenes.h"
@@ -46,10 +46,7 @@ int main(int argc, char** argv) {
   std::vector<double> query_us, contact_us, ratios, points;
   for (const auto& scene : ist::benchmark::truth_scenes(data)) {
     ist::CloudSnapshot& cloud = *scene.cloud;
-    ist::PointBvhBuilder builder;
-    if (cloud.coarse.empty()) {
-      ist::VoxelThinning().run(cloud.index.bvh(), cloud.thinning, &builder, &cloud.coarse.bvh());
-    }
+    cloud.index.bvh().set_thinning(cloud.thinning);
     ist::ProximityQuery query(model, {});
     std::vector<ist::LinkProximity> results;
     std::size_t pose = 0;

@@ -45,6 +45,7 @@ struct Part {
   bool (*measure)(const Options&, Table*);
 };
 constexpr Part kParts[] = {{"time", time_table, measure_time},
+                           {"anytime", anytime_table, measure_anytime},
                            {"gaps", gaps_table, measure_gaps},
                            {"certificate", certificate_table, measure_certificate},
                            {"growth", growth_table, measure_growth},
@@ -52,7 +53,7 @@ constexpr Part kParts[] = {{"time", time_table, measure_time},
 
 constexpr const char* kUsage =
     "usage: packing [OPTION VALUE ...] [--update-doc] [TABLE ...]\n"
-    "TABLE: time gaps certificate growth hierarchy; all of them by default\n"
+    "TABLE: time anytime gaps certificate growth hierarchy; all of them by default\n"
     "  --links NAME,...      of the Panda, for gaps and certificate: link0 ... link7,hand,finger\n"
     "  --spheres N,...         for gaps (200,1000,5000,20000) and growth (50 ... 20000)\n"
     "  --max-errors MM,...   for time and hierarchy (5,2)\n"

@@ -50,6 +50,7 @@ target_sources(benchmark_repulsion PRIVATE
   benchmark/repulsion/scene.cpp)
 
 target_sources(benchmark_packing PRIVATE
+  benchmark/packing/anytime.cpp
   benchmark/packing/certificate.cpp
   benchmark/packing/gaps.cpp
   benchmark/packing/growth.cpp
@@ -99,6 +100,10 @@ target_sources(benchmark_modes PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp
   benchmark/peers/synthetic.cpp)
+target_sources(benchmark_noise_filter PRIVATE
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
 # ist_proximity_peer(NAME HEADER [LIBRARY...]): compiles benchmark/peers/NAME.cpp where they are.
 function(ist_proximity_peer name header)
   find_path(IST_PROXIMITY_${name}_INCLUDE_DIR ${header})
@@ -132,12 +137,44 @@ find_path(IST_PROXIMITY_pcl_INCLUDE_DIR pcl/kdtree/kdtree_flann.h
 set_source_files_properties(benchmark/peers/pcl.cpp PROPERTIES
   INCLUDE_DIRECTORIES "${IST_PROXIMITY_pcl_INCLUDE_DIR}")
 ist_proximity_peer(pcl pcl/kdtree/kdtree_flann.h pcl_kdtree pcl_octree pcl_common)
+# What the noise filter is measured beside.
+find_library(IST_PROXIMITY_pcl_filters_LIBRARY pcl_filters)
+mark_as_advanced(IST_PROXIMITY_pcl_filters_LIBRARY)
+if(IST_PROXIMITY_pcl_INCLUDE_DIR AND IST_PROXIMITY_pcl_filters_LIBRARY)
+  target_compile_definitions(benchmark_noise_filter PRIVATE IST_PROXIMITY_HAS_PCL_FILTERS)
+  target_include_directories(benchmark_noise_filter SYSTEM PRIVATE ${IST_PROXIMITY_pcl_INCLUDE_DIR})
+  target_link_libraries(benchmark_noise_filter PRIVATE
+    ${IST_PROXIMITY_pcl_filters_LIBRARY} ${IST_PROXIMITY_pcl_common_LIBRARY})
+endif()
 ist_proximity_peer(embree embree3/rtcore.h embree3)
 ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
 ist_proximity_peer(dynamic_edt dynamicEDT3D/dynamicEDTOctomap.h dynamicedt3d octomap octomath)
 
-# Through ROS: they need a roscore while they run.
+# The cost of a camera, beside some of them. The robot's own points are dropped with CGAL's hulls.
+target_sources(benchmark_camera PRIVATE
+  benchmark/peers/flat.cpp
+  benchmark/peers/image_pyramid.cpp
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp
+  benchmark/peers/synthetic.cpp)
+if(IST_PROXIMITY_cgal_INCLUDE_DIR AND IST_PROXIMITY_gmp_LIBRARY)
+  target_sources(benchmark_camera PRIVATE benchmark/peers/body_filter.cpp)
+  set_source_files_properties(benchmark/peers/body_filter.cpp PROPERTIES COMPILE_OPTIONS -w)
+  target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_CGAL)
+  target_link_libraries(benchmark_camera PRIVATE ${IST_PROXIMITY_gmp_LIBRARY})
+endif()
+if(IST_PROXIMITY_embree_INCLUDE_DIR AND IST_PROXIMITY_embree3_LIBRARY)
+  target_sources(benchmark_camera PRIVATE benchmark/peers/embree.cpp)
+  target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_EMBREE)
+  target_link_libraries(benchmark_camera PRIVATE ${IST_PROXIMITY_embree3_LIBRARY})
+endif()
+if(IST_PROXIMITY_nanoflann_INCLUDE_DIR)
+  target_sources(benchmark_camera PRIVATE benchmark/peers/nanoflann.cpp)
+  target_compile_definitions(benchmark_camera PRIVATE IST_BENCHMARK_NANOFLANN)
+endif()
+
+# The node's parts, with ROS; latency needs a roscore while it runs.
 if(catkin_FOUND)
   file(GLOB ros_benchmark_sources CONFIGURE_DEPENDS benchmark/ros/*.cpp)
   foreach(source IN LISTS ros_benchmark_sources)
@@ -155,4 +192,8 @@ if(catkin_FOUND)
       OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
     add_dependencies(benchmarks benchmark_${name})
   endforeach()
+  target_sources(benchmark_cycle PRIVATE
+    benchmark/peers/kinect.cpp
+    benchmark/peers/scene.cpp
+    benchmark/peers/synthetic.cpp)
 endif()

@@ -3,7 +3,7 @@
 # A folder's sources, and those of its rooms. Relative paths: a workspace may itself be called src/ros.
 file(GLOB core_sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}
   src/*/*.cpp src/*/*/*.cpp)
-list(FILTER core_sources EXCLUDE REGEX "^src/(nodes|ros|tools)/")
+list(FILTER core_sources EXCLUDE REGEX "^src/(nodes|python|ros|tools)/")
 
 # Packing is most of what a fuzzed query does. It takes a hundred times as long where every comparison
 # in Eigen is traced and none of its functions is inlined.

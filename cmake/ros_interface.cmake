@@ -23,7 +23,8 @@ add_message_files(DIRECTORY msg FILES
   JointRepulsion.msg
   LinkProximity.msg
   ProximityArray.msg
-  SourceStatus.msg)
+  SourceStatus.msg
+  SpeedScaleState.msg)
 add_service_files(DIRECTORY srv FILES
   AttachObject.srv
   DetachObject.srv

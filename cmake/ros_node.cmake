@@ -6,16 +6,6 @@ target_include_directories(ist_proximity_ros PRIVATE src)
 add_dependencies(ist_proximity_ros ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})
 target_link_libraries(ist_proximity_ros PUBLIC ist_proximity_core ${catkin_LIBRARIES})
 
-# The noise filter is PCL's and off by default, so PCL is optional.
-find_package(PCL QUIET COMPONENTS common filters)
-if(PCL_FOUND)
-  target_compile_definitions(ist_proximity_ros PRIVATE IST_PROXIMITY_WITH_PCL)
-  target_include_directories(ist_proximity_ros SYSTEM PRIVATE ${PCL_INCLUDE_DIRS})
-  target_link_libraries(ist_proximity_ros PRIVATE ${PCL_LIBRARIES})
-else()
-  message(STATUS "ist_proximity: PCL not found, no noise filter")
-endif()
-
 add_executable(proximity_node src/nodes/proximity_node.cpp)
 target_link_libraries(proximity_node PRIVATE ist_proximity_ros)
 
@@ -58,5 +48,5 @@ install(DIRECTORY config demo examples launch DESTINATION ${CATKIN_PACKAGE_SHARE
   USE_SOURCE_PERMISSIONS
   PATTERN __pycache__ EXCLUDE)
 # The script in the repository is not executable: rosrun would find two programs of that name.
-catkin_install_python(PROGRAMS scripts/proximity_table
+catkin_install_python(PROGRAMS scripts/proximity_table scripts/proximity_rviz
   DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})

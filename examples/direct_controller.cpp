@@ -21,6 +21,7 @@
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "ist_proximity/robot/robot_model.h"
@@ -75,6 +76,32 @@ std::vector<std::shared_ptr<const ist::ContactGeometry>> link_volumes(
   return volumes;
 }
 
+/// The scale of the task's speed: links that cannot move do not count.
+class TaskSpeed {
+ public:
+  TaskSpeed(const ist::RobotModel& model, const ist::Kinematics& kinematics)
+      : scale_(names(model)), moves_(ist::links_that_move(model, kinematics, model.root_link)) {}
+
+  double update(const std::vector<ist::LinkProximity>& answers) {
+    inputs_.clear();
+    for (const ist::LinkProximity& answer : answers) {
+      inputs_.push_back({answer.state, answer.lower_bound});
+    }
+    return scale_.update({}, inputs_, moves_, 0.0).scale;
+  }
+
+ private:
+  static std::vector<std::string> names(const ist::RobotModel& model) {
+    std::vector<std::string> names;
+    for (const ist::LinkModel& link : model.links) names.push_back(link.name);
+    return names;
+  }
+
+  ist::SpeedScale scale_;
+  std::vector<bool> moves_;  // by link
+  std::vector<ist::SpeedScaleInput> inputs_;
+};
+
 /// [N] The contact force on a link: 0 out of contact, NaN where it is not known.
 double contact_force(const ist::LinkModel& link, const ist::ContactGeometry& geometry,
                      const ist::LinkProximity& answer, const Eigen::Isometry3d& X_FL,
@@ -107,6 +134,7 @@ int run(const std::string& urdf_path) {
   const ist::Repulsion repulsion(model);
   ist::CloudSnapshot snapshot;
   std::vector<ist::LinkProximity> answers;
+  TaskSpeed task_speed(*model, arm.kinematics);
   ist::ForwardKinematics forward(*model, std::make_shared<const ist::Kinematics>(robot));
 
   std::vector<double> q(arm.kinematics.joints().size(), 0.0);
@@ -134,6 +162,7 @@ int run(const std::string& urdf_path) {
     ist::example::Reading reading;
     reading.is_ok = true;
     reading.cloud_age = now - snapshot.stamp;
+    reading.speed_scale = task_speed.update(answers);
     for (std::size_t i = 0; i < answers.size(); ++i) {
       const Eigen::Vector3d away = repulsion(i, X_FL[i], {&snapshot}, answers[i], repulsion_config);
       reading.links.push_back({*forward.body(i), answers[i].lower_bound, answers[i].p_LCl, away});

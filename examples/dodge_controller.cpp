@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "ist_proximity/robot/kinematics.h"
@@ -44,12 +43,11 @@ Eigen::VectorXd nearest_to(const Eigen::VectorXd& wanted, std::vector<Constraint
 }
 
 /// The velocity toward the goal; all joints arrive together.
-Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double smallest_bound,
+Eigen::VectorXd toward(const Eigen::VectorXd& q, const Eigen::VectorXd& goal, double speed_scale,
                        const DodgeConfig& config) {
   const Eigen::VectorXd wanted = config.task_gain * (goal - q);
-  const double share =
-      (smallest_bound - config.stop_distance) / (config.slow_distance - config.stop_distance);
-  const double speed = config.task_speed * std::clamp(share, 0.0, 1.0);
+  const double scale = speed_scale > 0.0 ? std::min(speed_scale, 1.0) : 0.0;  // 0 for NaN
+  const double speed = config.task_speed * scale;
   const double fastest = wanted.cwiseAbs().maxCoeff();
   return fastest > speed ? Eigen::VectorXd(speed / fastest * wanted) : wanted;
 }
@@ -113,7 +111,6 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
   arm.kinematics.place_bodies(joint_poses, Eigen::Isometry3d::Identity(), &bodies);
 
   std::vector<Constraint> constraints;
-  double smallest_bound = std::numeric_limits<double>::infinity();
   Jacobian J;
   for (const LinkReading& link : reading.links) {
     const double length = link.away.norm();
@@ -128,13 +125,12 @@ Eigen::VectorXd dodge(const ControlledArm& arm, const std::vector<double>& all_q
       can_move = can_move || !column.isZero();
     }
     if (!can_move) continue;
-    smallest_bound = std::min(smallest_bound, link.lower_bound);
     c.b = std::min(config.damping * (config.keep_distance - link.lower_bound), config.escape_speed);
     c.softness_sq = config.softness * config.softness;
     constraints.push_back(c);
   }
   add_joint_limits(arm, q, config, &constraints);
-  return nearest_to(toward(q, goal, smallest_bound, config), &constraints);
+  return nearest_to(toward(q, goal, reading.speed_scale, config), &constraints);
 }
 
 }  // namespace ist::example

@@ -8,7 +8,8 @@
 #include "ist_proximity/robot/kinematics.h"
 
 /// An example of a reactive controller: an arm goes to goals in joint space, slows down near
-/// obstacles and evades them. Its only inputs are `~proximity` and the joint states.
+/// obstacles and evades them. Its only inputs are `~proximity`, `~speed_scale` and the joint
+/// states.
 namespace ist::example {
 
 /// The proximity of one link: fields of ist_proximity/LinkProximity.
@@ -26,6 +27,7 @@ struct Reading {
   bool is_ok = false;        ///< status OK (or DEGRADED: the bounds hold then, too)
   double message_age = 0.0;  ///< [s] now - header.stamp
   double cloud_age = 0.0;    ///< [s] now - cloud_stamp
+  double speed_scale = 0.0;  ///< `~speed_scale`: 0 to 1; 0 when it is not known
   std::vector<LinkReading> links;
 };
 
@@ -34,9 +36,6 @@ struct DodgeConfig {
   double task_speed = 0.8;  ///< [rad/s] of the joint that has the farthest to go
   double task_gain = 2.5;   ///< [1/s] slows down before the goal
   double reached = 0.03;    ///< [rad] every joint this near to the goal: reached
-
-  double slow_distance = 0.25;  ///< [m] the task slows down from here on ...
-  double stop_distance = 0.10;  ///< [m] ... and stands still here
 
   double keep_distance = 0.18;  ///< [m] a nearer obstacle makes the link evade it
   double damping = 5.0;         ///< [1/s] speed away (toward) per metre nearer (farther) than that
@@ -66,7 +65,7 @@ struct ControlledArm {
 /// unit vector of `away`, the witness must move along n at
 ///   n . J dq >= damping * (keep_distance - d),   at most escape_speed.
 /// The result is the velocity that does so, respects the joints' limits, and is nearest to
-/// what the task wants; the task itself is slowed down by the smallest lower bound (speed and
+/// what the task wants; the task's own speed is multiplied by the speed scale (speed and
 /// separation). Zero when the surroundings are not known.
 /// @param q     [rad, m] by joint of the kinematics (NaN where a joint has none)
 /// @param goal  [rad, m] by commanded joint

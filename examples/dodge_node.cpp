@@ -1,7 +1,8 @@
-// The example controller as a node. Its only inputs are the proximity node's ~proximity and the
-// joint states.
+// The example controller as a node. Its only inputs are the proximity node's ~proximity and
+// ~speed_scale, and the joint states.
 //
 //   proximity     subscribed, ist_proximity/ProximityArray; its fixed frame is the root link
+//   speed_scale   subscribed, std_msgs/Float64: the task's speed is multiplied by it
 //   joint_states  subscribed, sensor_msgs/JointState
 //   joint_velocity_controller/command
 //                 published, std_msgs/Float64MultiArray [rad/s], by ~joints; with each
@@ -16,6 +17,7 @@
 
 #include <ros/ros.h>
 #include <sensor_msgs/JointState.h>
+#include <std_msgs/Float64.h>
 #include <std_msgs/Float64MultiArray.h>
 #include <std_msgs/String.h>
 #include <std_msgs/UInt32.h>
@@ -43,8 +45,6 @@ DodgeConfig read_config(const ros::NodeHandle& nh) {
   } kParameters[] = {{"task_speed", &DodgeConfig::task_speed},
                      {"task_gain", &DodgeConfig::task_gain},
                      {"reached", &DodgeConfig::reached},
-                     {"slow_distance", &DodgeConfig::slow_distance},
-                     {"stop_distance", &DodgeConfig::stop_distance},
                      {"keep_distance", &DodgeConfig::keep_distance},
                      {"damping", &DodgeConfig::damping},
                      {"escape_speed", &DodgeConfig::escape_speed},
@@ -60,9 +60,6 @@ DodgeConfig read_config(const ros::NodeHandle& nh) {
     if (!(value > 0.0)) {
       throw std::runtime_error(std::string("~") + parameter.name + " must be a number above 0.");
     }
-  }
-  if (config.slow_distance <= config.stop_distance) {
-    throw std::runtime_error("~slow_distance must be more than ~stop_distance.");
   }
   return config;
 }
@@ -148,6 +145,7 @@ class DodgeNode {
     const auto no_delay = ros::TransportHints().tcpNoDelay();
     joints_ = nh.subscribe("joint_states", 10, &DodgeNode::on_joints, this, no_delay);
     proximity_ = nh.subscribe("proximity", 1, &DodgeNode::on_proximity, this, no_delay);
+    scale_ = nh.subscribe("speed_scale", 1, &DodgeNode::on_speed_scale, this, no_delay);
     // The timer commands a stop when messages cease.
     timer_ = nh.createWallTimer(ros::WallDuration(0.05), &DodgeNode::on_timer, this);
   }
@@ -188,6 +186,11 @@ class DodgeNode {
     act();
   }
 
+  void on_speed_scale(const std_msgs::Float64& message) {
+    speed_scale_ = message.data;
+    scale_time_ = ros::Time::now();
+  }
+
   void on_timer(const ros::WallTimerEvent& /*event*/) {
     if ((ros::Time::now() - stamp_).toSec() > 0.5 * config_.max_message_age) act();
   }
@@ -197,6 +200,10 @@ class DodgeNode {
     reading_.message_age = stamp_.isZero() ? std::numeric_limits<double>::infinity()
                                            : (now - std::min(stamp_, joint_stamp_)).toSec();
     reading_.cloud_age = (now - cloud_stamp_).toSec();
+    // The scale has no stamp: one that has not come of late is not known.
+    const bool has_scale = !scale_time_.isZero() && now >= scale_time_ &&
+                           (now - scale_time_).toSec() <= config_.max_message_age;
+    reading_.speed_scale = has_scale ? speed_scale_ : 0.0;
     if (has_reached(arm_, q_, goals_[goal_], config_)) {
       goal_ = (goal_ + 1) % goals_.size();
       ++count_.data;
@@ -226,10 +233,11 @@ class DodgeNode {
   std::vector<double> q_;  // by joint of the kinematics
   Reading reading_;
   std::string problem_, description_;
-  ros::Time stamp_, joint_stamp_, cloud_stamp_;
+  double speed_scale_ = 0.0;
+  ros::Time stamp_, joint_stamp_, cloud_stamp_, scale_time_;
   std_msgs::UInt32 count_;
   ros::Publisher command_, state_, reached_;
-  ros::Subscriber joints_, proximity_;
+  ros::Subscriber joints_, proximity_, scale_;
   ros::WallTimer timer_;
 };
 

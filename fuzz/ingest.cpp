@@ -177,18 +177,20 @@ void check_counts(const ist::IngestCounts& n, const ist::RawCloud& raw, const Ex
              n.used, expected.used, expected.used_at_most);
 }
 
-// The grid of the thinned cloud is coarser than asked for where there would be more than 2^30
-// voxels from its origin to a point (voxel_thinning.cpp).
+// Near each point there is a thinned one, wherever the other points are.
 void check_thinned(const ist::CloudSnapshot& snapshot,
                    const std::map<std::uint32_t, Eigen::Vector3d>& points) {
-  const std::map<std::uint32_t, Eigen::Vector3d> thinned = stored(snapshot.coarse);
+  const std::map<std::uint32_t, Eigen::Vector3d> thinned =
+      ist::test::thinned_points_of(snapshot.index);
+  std::size_t in_tiles = 0;
+  for (const ist::ThinnedTile& tile : ist::test::thinned_tiles_of(snapshot.index)) {
+    in_tiles += static_cast<std::size_t>(tile.count);
+  }
+  FUZZ_CHECK(in_tiles == thinned.size(), "%zu of %zu thinned points differ", thinned.size(),
+             in_tiles);
   FUZZ_CHECK(thinned.size() <= points.size() && thinned.empty() == points.empty(),
              "%zu points thinned to %zu", points.size(), thinned.size());
-  double farthest = 0.0;
-  for (const auto& [id, p] : points) {
-    farthest = std::max(farthest, (p - snapshot.index.X_FO().translation()).norm());
-  }
-  const double edge = std::max(snapshot.thinning, 2.0 * farthest / (1 << 30));
+  const double edge = snapshot.thinning;
   for (const auto& [id, p] : points) {
     double nearest = std::numeric_limits<double>::infinity();
     for (const auto& [other, q] : thinned) nearest = std::min(nearest, (p - q).norm());

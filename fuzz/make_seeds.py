@@ -136,9 +136,27 @@ packings()
 pseudo_random("packing_cache", [200])
 pseudo_random("cloud_layout", [40, 400], 8)
 pseudo_random("laser_scan", [60, 400])
+pseudo_random("depth_image", [60, 200], 8)
 pseudo_random("ingest", [300, 3000])
 pseudo_random("triangle_bvh", [60, 160], 8)
 pseudo_random("query", [160, 500], 8)
 pseudo_random("parameters", [60, 400])
 pseudo_random("attach_request", [40, 120])
 pseudo_random("noise_filter", [60, 600])
+
+
+def depth_image(encoding, width=4, height=3):
+    """A camera of a few pixels, by P, and an image that fits it; encoding: 0 for mm, 1 for m."""
+    quarter = struct.pack("<h", 8192)
+    content = bytes([width, height, 1])
+    content += b"\0" + quarter + b"\1"  # focal length: 20 / 4 + 5
+    content += b"\0" + quarter  # centre: 8 / 4
+    content += b"\0" + quarter + b"\1" + b"\0" + quarter
+    content += bytes([63, 1, encoding, 0, 0, 0])  # all as it is, no region, fits, no padding
+    pack = "<f" if encoding == 1 else "<H"
+    depths = [0.5 * i if encoding == 1 else 500 * i for i in range(width * height)]
+    return content + b"".join(struct.pack(pack, depth) for depth in depths)
+
+
+write("depth_image", "millimetres", depth_image(0))
+write("depth_image", "metres", depth_image(1))

@@ -1,12 +1,12 @@
 // Files of the packing cache: what is read has sound numbers, and what is written is read again.
-// Covers: src/packing/packing_file.cpp src/packing/byte_stream.h
+// Covers: src/packing/packing_file.cpp src/internal/packing/byte_stream.h
 
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <string>
 
-#include "packing/byte_stream.h"
+#include "internal/packing/byte_stream.h"
 #include "packing/packing_file.h"
 #include "support/byte_reader.h"
 #include "support/check.h"

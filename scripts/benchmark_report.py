@@ -355,17 +355,36 @@ def fill(path, parts):
     path.write_text(text, encoding="utf-8")
 
 
+def sections(path):
+    """Tables in Markdown, each after a line '# NAME'."""
+    parts = {}
+    for section in path.read_text(encoding="utf-8").split("# ")[1:]:
+        name, content = section.split("\n", 1)
+        parts[f"benchmark {name}"] = content.rstrip("\n") + "\n"
+    return parts
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("peers", type=Path)
-    parser.add_argument("growth", type=Path)
-    parser.add_argument("ingest", type=Path, help="a table in Markdown")
-    parser.add_argument("modes", type=Path, help="tables in Markdown, each after a line '# NAME'")
+    parser.add_argument("--only", type=Path, metavar="TABLES",
+                        help="only these tables, in Markdown, each after a line '# NAME'")
+    parser.add_argument("peers", type=Path, nargs="?")
+    parser.add_argument("growth", type=Path, nargs="?")
+    parser.add_argument("ingest", type=Path, nargs="?", help="a table in Markdown")
+    parser.add_argument("modes", type=Path, nargs="?",
+                        help="tables in Markdown, each after a line '# NAME'")
     for name in ("commit", "machine", "date"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--readme", type=Path)
     arguments = parser.parse_args()
+    if arguments.only:
+        run = f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"
+        parts = {**sections(arguments.only), "benchmark camera run": run}
+        fill(arguments.folder / "benchmark.md", parts)
+        if arguments.readme:
+            fill(arguments.readme, parts)
+        return
 
     peers, growth = read(arguments.peers), read(arguments.growth)
     write(arguments.folder / "benchmark.csv", peers, arguments)
@@ -378,9 +397,7 @@ def main():
             parts[f"benchmark motion {name}"] = motion_table(rows)
     shown = sets["kinect"] or sets["synthetic"]
     parts["benchmark ingest"] = arguments.ingest.read_text(encoding="utf-8")
-    for section in arguments.modes.read_text(encoding="utf-8").split("# ")[1:]:
-        name, content = section.split("\n", 1)
-        parts[f"benchmark {name}"] = content
+    parts.update(sections(arguments.modes))
     parts["benchmark ratios"] = ratios(shown)
     parts["benchmark short"] = short_table(shown)
     for what, unit in (("spheres", ""), ("points", ""), ("links", ""), ("distance", " [m]")):

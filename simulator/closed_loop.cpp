@@ -16,6 +16,7 @@ constexpr double kTruthRange = 10.0;  // [m]
 example::Reading nothing_near() {
   example::Reading reading;
   reading.is_ok = true;
+  reading.speed_scale = 1.0;
   reading.links.resize(1);
   reading.links[0].lower_bound = 1.0;
   reading.links[0].p_LCl.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -67,6 +68,12 @@ class SelfWatch {
   std::vector<PairProximity> results_;
 };
 
+std::vector<std::string> link_names(const RobotModel& model) {
+  std::vector<std::string> names;
+  for (const LinkModel& link : model.links) names.push_back(link.name);
+  return names;
+}
+
 }  // namespace
 
 Perception::Perception(std::shared_ptr<const RobotModel> model, const ClosedLoopConfig& config,
@@ -76,7 +83,8 @@ Perception::Perception(std::shared_ptr<const RobotModel> model, const ClosedLoop
       snapshots_(cameras),
       seen_(cameras, false),
       query_(model_, config.query),
-      repulsion_(model_) {
+      repulsion_(model_),
+      speed_scale_(link_names(*model_)) {
   for (std::size_t i = 0; i < cameras; ++i) ingest_.emplace_back(config.ingest);
 }
 
@@ -116,14 +124,22 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
     clouds.push_back(&snapshot);
     reading.cloud_age = std::max(reading.cloud_age, world.time() - snapshot.stamp);
   }
+  scale_inputs_.clear();
+  for (const LinkProximity& result : results_) {
+    scale_inputs_.push_back({result.state, result.lower_bound});
+  }
+  const double scale =
+      speed_scale_.update(config_.speed_scale, scale_inputs_, world.arm().moved(), 0.0).scale;
+  reading.speed_scale = config_.scale_speed ? scale : 1.0;
   for (std::size_t i = 0; i < results_.size(); ++i) {
     example::LinkReading link;
     link.body = *arm.kinematics.find_body(model_->links[i].name);
     link.lower_bound = results_[i].lower_bound;
     link.p_LCl = results_[i].p_LCl;
-    link.away = config_.avoidance == Avoidance::kNearest
-                    ? results_[i].direction
-                    : repulsion_(i, X_FL_[i], clouds, results_[i], config_.repulsion);
+    if (config_.avoidance == Avoidance::kNearest) link.away = results_[i].direction;
+    if (config_.avoidance == Avoidance::kBlend) {
+      link.away = repulsion_(i, X_FL_[i], clouds, results_[i], config_.repulsion);
+    }
     reading.links.push_back(link);
   }
   return reading;
@@ -141,6 +157,7 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
 
   ClosedLoopResult result;
   result.smallest_distance = std::numeric_limits<double>::infinity();
+  result.task_time = std::numeric_limits<double>::infinity();
   std::vector<Eigen::VectorXd> accelerations;
   std::vector<double> command_steps;
   SelfWatch self(model, arm.kinematics);
@@ -153,7 +170,7 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
     if (step % config.control_period == 0) {
       const std::vector<double> q = world.arm().all_positions(world.arm().positions());
       if (has_reached(arm, q, scene.goals[goal], config.controller)) {
-        ++result.goals;
+        if (++result.goals == scene.task) result.task_time = world.time();
         goal = (goal + 1) % scene.goals.size();
       }
       const example::Reading reading = is_blind ? nothing_near() : perception.reading(world, arm);
@@ -170,6 +187,9 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
     }
     const Simulation::Truth truth = world.nearest(std::min(result.smallest_distance, kTruthRange));
     if (truth.distance < result.smallest_distance) {
+      if (truth.distance <= 0.0 && result.smallest_distance > 0.0) {
+        result.speed_at_touch = world.arm().velocities().cwiseAbs().maxCoeff();
+      }
       result.smallest_distance = truth.distance;
       result.when = world.time();
       result.link = robot.links[truth.link].name;

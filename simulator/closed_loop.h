@@ -10,6 +10,7 @@
 #include "dodge_controller.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "scene.h"
@@ -20,19 +21,23 @@ namespace ist::sim {
 /// The avoidance signal that the controller follows.
 enum class Avoidance {
   kNone,     ///< none: the task is done blindly
+  kSlow,     ///< none: the speed scale alone
   kBlend,    ///< `repulsion`
   kNearest,  ///< the nearest pair's `direction`
 };
 
 struct ClosedLoopConfig {
   Avoidance avoidance = Avoidance::kBlend;
+  bool scale_speed = true;  ///< the task's speed is multiplied by the speed scale
   bool check_self = false;  ///< measure the distances between links, too
   int control_period = 2;   ///< [simulation steps] between two queries and commands
   example::DodgeConfig controller;
   IngestConfig ingest;
   QueryConfig query;
   RepulsionConfig repulsion;
+  SpeedScaleConfig speed_scale;
   ClosedLoopConfig() {
+    speed_scale.free_distance = 0.25;    // as in config/dodge.yaml
     ingest.self_filter_padding = 0.03;   // six times the cameras' noise
     repulsion.influence_distance = 0.5;  // more than any distance the controller reacts to
   }
@@ -62,6 +67,8 @@ class Perception {
   std::vector<bool> seen_;
   ProximityQuery query_;
   Repulsion repulsion_;
+  SpeedScale speed_scale_;
+  std::vector<SpeedScaleInput> scale_inputs_;
   std::vector<LinkProximity> results_;
   std::vector<Eigen::Isometry3d> X_FL_;
 };
@@ -72,6 +79,9 @@ struct ClosedLoopResult {
   double when = 0.0;               ///< [s] of the smallest distance
   std::string link, obstacle;      ///< of the smallest distance
   int goals = 0;                   ///< number of goals reached
+  double task_time = 0.0;          ///< [s] when the task was done; inf: it was not
+  /// [rad/s] of the fastest joint at the first touch; 0 without any.
+  double speed_at_touch = 0.0;
   /// [m] Smallest lower bound of the distance of two links that may collide, every 20 ms; the
   /// controller ignores it. Inf unless `check_self` asks for it.
   double smallest_self_distance = std::numeric_limits<double>::infinity();

@@ -37,6 +37,7 @@ std::vector<std::string> panda_names();
 
 /// The tables, one function each. They return false if the table could not be made.
 bool measure_time(const Options& options, Table* table);
+bool measure_anytime(const Options& options, Table* table);
 bool measure_gaps(const Options& options, Table* table);
 bool measure_certificate(const Options& options, Table* table);
 bool measure_growth(const Options& options, Table* table);
@@ -49,6 +50,7 @@ void count_instructions(const Options& options, const std::string& scene);
 void plot_growth(const std::string& document, const std::string& path);
 
 Table time_table();
+Table anytime_table();
 Table gaps_table();
 Table certificate_table();
 Table growth_table();

@@ -45,13 +45,10 @@ Matrix3X surface_samples(const LinkGeometry& geometry, int count, std::mt19937_6
 }
 
 Matrix3X thinned_points(const CloudSnapshot& cloud) {
-  Matrix3X points(3, static_cast<Eigen::Index>(cloud.coarse.size()));
+  const auto thinned = test::thinned_points_of(cloud.index);
+  Matrix3X points(3, static_cast<Eigen::Index>(thinned.size()));
   Eigen::Index n = 0;
-  for (const PointTile& tile : test::tiles_of(cloud.coarse)) {
-    for (int k = 0; k < tile.count; ++k) {
-      points.col(n++) = cloud.coarse.X_FO() * tile.point(static_cast<int>(k));
-    }
-  }
+  for (const auto& [id, p] : thinned) points.col(n++) = p;
   return points;
 }
 

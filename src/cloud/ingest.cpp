@@ -11,8 +11,9 @@
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/scene_axes.h"
 #include "cloud/index/unorganized_cloud.h"
-#include "cloud/thinning/voxel_thinning.h"
 #include "internal/cloud/largest_range.h"
+#include "internal/cloud/point_bvh.h"
+#include "internal/cloud/voxel_grid.h"
 
 namespace ist {
 namespace {
@@ -30,8 +31,8 @@ void check(const IngestConfig& config) {
           "more than min_range");
   require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
           "self_filter_padding", config.self_filter_padding, "0 or more");
-  require(config.thinning > 0.0 && std::isfinite(config.thinning), "thinning", config.thinning,
-          "more than 0");
+  require(config.thinning >= kSmallestVoxel && std::isfinite(config.thinning), "thinning",
+          config.thinning, "1e-9 or more");
   require(config.max_points > 0, "max_points", 0.0, "1 or more");
 }
 
@@ -60,7 +61,6 @@ struct Ingest::Impl {
   RegionOfInterest region;
   PointBvhBuilder builder;
   SelfFilter self_filter;
-  VoxelThinning thinning;
 };
 
 Ingest::Ingest(const IngestConfig& config) : impl_(std::make_unique<Impl>()) {
@@ -91,7 +91,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   const bool organized = is_organized(cloud, crop);
   set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
 
-  const SelfFilter* on_robot = nullptr;
+  SelfFilter* on_robot = nullptr;
   if (config.self_filter && !robot.empty()) {
     impl_->self_filter.set_poses(robot, crop.X_FO, config.self_filter_padding);
     on_robot = &impl_->self_filter;
@@ -99,11 +99,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   IngestCounts counts;
   std::size_t kept = 0;
   if (organized) {
-    RawCloud pixels = cloud;
-    // Thinning reads all tiles: they are loaded now, while the pixels are in the cache.
-    if (config.thin) pixels.owner.reset();
-    kept =
-        index_organized(pixels, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept = index_organized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
     kept =
         index_unorganized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
@@ -115,14 +111,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
   snapshot->thinning = config.thinning;
   snapshot->region = impl_->region;
-  if (config.thin) {
-    impl_->thinning.run(snapshot->index.bvh(), config.thinning, &impl_->builder,
-                        &snapshot->coarse.bvh());
-  } else {
-    impl_->builder.start(crop.X_FO, &snapshot->coarse.bvh());
-    impl_->builder.finish();
-  }
-
+  if (config.thin) snapshot->index.bvh().set_thinning(config.thinning);
   snapshot->counts = counts;
   snapshot->stamp = stamp;
   snapshot->ingest_time =

@@ -71,7 +71,9 @@ Outcome pack_link(const LinkGeometry& geometry, std::size_t attached, const Cont
 
 const ContactGeometry* find_contact_geometry(const ContactModel* contacts, const RobotModel& robot,
                                              std::size_t link) {
-  if (contacts == nullptr || contacts->robot.get() != &robot) return nullptr;
+  if (contacts == nullptr || !contacts->robot || !same_geometry(*contacts->robot, robot)) {
+    return nullptr;
+  }
   const ContactGeometry* geometry = contacts->links[link].get();
   return geometry != nullptr && geometry->has_volume() ? geometry : nullptr;
 }

@@ -1,8 +1,10 @@
 #include "ist_proximity/contact/contact_volume.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
 #include "contact/contact_spheres.h"
 #include "contact/inner_sphere_depth.h"
@@ -13,6 +15,8 @@
 #include "internal/bvh/traversal_stack.h"
 #include "internal/cloud/box_bvh.h"
 #include "internal/cloud/point_bvh.h"
+#include "internal/cloud/thinned_cloud.h"
+#include "internal/proximity/deadline.h"
 
 namespace ist {
 namespace {
@@ -21,53 +25,105 @@ namespace {
 constexpr double kCellsPerLink = 1000.0;
 // A leaf of a map is halved no more often: 2^42 cells along each axis.
 constexpr int kMaxHalvings = 126;
+// The share that is known where time ended the sum is less than 1, whatever rounding does.
+constexpr double kNearlyAll = 0.999;
+// Cells of a leaf between two looks at the clock; each is looked up in the link's tree.
+constexpr std::uint32_t kCellsBetweenLooks = 8;
 
-// Calls visit(tile) for the tiles of points or boxes whose bounding sphere `may_touch`.
+// A node or tile that is still to be visited, and its share of the index.
+struct Entry {
+  std::int32_t child;
+  double share;
+};
+
+// The tiles of points or boxes of an entry, if it has no children that are nodes.
+// @returns whether it is such an entry; visit(tile) was called for each tile then
+template <typename Index, typename Buffer, typename Visit>
+bool visit_leaf(const Index& index, std::int32_t child, Buffer* buffer, const Visit& visit) {
+  if constexpr (std::is_same_v<Index, ThinnedCloud>) {
+    if (!ThinnedCloud::is_leaf(index.nodes()[static_cast<std::size_t>(child)])) return false;
+    for (const ThinnedTile& tile : index.tiles(child, buffer)) visit(tile);
+  } else {
+    if (child >= 0) return false;
+    visit(index.tile(static_cast<std::size_t>(~child), buffer));
+  }
+  return true;
+}
+
+template <typename Index>
+struct TileBuffer {
+  typename Index::Tile tiles;
+};
+template <>
+struct TileBuffer<ThinnedCloud> {
+  ThinnedNode tiles;
+};
+
+// Calls visit(tile) for the tiles of thinned points or boxes whose bounding sphere `may_touch`, or
+// that of their node, until the deadline.
+// @returns the share of the index that was visited; the children that may touch divide their
+//          parent's share
 template <typename Index, typename MayTouch, typename Visit>
-void visit_tiles(const Index& index, const MayTouch& may_touch, const Visit& visit) {
-  if (index.empty()) return;
-  typename Index::Tile buffer;
-  TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
-  stack.push(index.root());
+double visit_tiles(const Index& index, Deadline* deadline, const MayTouch& may_touch,
+                   const Visit& visit) {
+  if (index.empty()) return 1.0;
+  TileBuffer<Index> buffer;
+  TraversalStack<Entry, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
+  stack.push({index.root(), 1.0});
+  double left = 1.0;
   while (!stack.empty()) {
-    const std::int32_t child = stack.pop();
-    if (child < 0) {
-      visit(index.tile(static_cast<std::size_t>(~child), &buffer));
+    if (deadline->passed()) return std::min(1.0 - left, kNearlyAll);
+    const Entry entry = stack.pop();
+    if (visit_leaf(index, entry.child, &buffer.tiles, visit)) {
+      if (deadline->has_passed()) return std::min(1.0 - left, kNearlyAll);
+      left -= entry.share;
       continue;
     }
-    const BoxNode& node = index.nodes()[static_cast<std::size_t>(child)];
+    const BoxNode& node = index.nodes()[static_cast<std::size_t>(entry.child)];
+    std::array<std::int32_t, kBoxWidth> touching;
+    std::size_t count = 0;
     for (int k = 0; k < node.count; ++k) {
-      if (may_touch(bounding_sphere(node, k))) stack.push(node.child[k]);
+      if (may_touch(bounding_sphere(node, k))) touching[count++] = node.child[k];
     }
+    for (std::size_t k = 0; k < count; ++k) {
+      stack.push({touching[k], entry.share / static_cast<double>(count)});
+    }
+    if (count == 0) left -= entry.share;
   }
+  return 1.0;
 }
 
 // Sums the contact volume of one link with obstacles.
 class LinkContact {
  public:
-  LinkContact(const LinkModel& link, const ContactGeometry& geometry)
-      : link_(link), geometry_(geometry) {}
+  LinkContact(const LinkModel& link, const ContactGeometry& geometry, TimePoint end)
+      : link_(link), geometry_(geometry), deadline_(end) {}
 
-  void add_points(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF, SnapshotSpan clouds) {
-    const Eigen::Isometry3d &X_FO = cloud.coarse.X_FO(), X_LO = X_LF * X_FO;
+  /// @returns the share of the cloud that is summed
+  double add_points(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF,
+                    SnapshotSpan clouds) {
+    const ThinnedCloud thinned = cloud.index.bvh().thinned();
+    const Eigen::Isometry3d &X_FO = thinned.X_FO(), X_LO = X_LF * X_FO;
     const double radius = point_sphere_radius(cloud);
-    visit_tiles(
-        cloud.coarse.bvh(),
+    return visit_tiles(
+        thinned, &deadline_,
         [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const PointTile& tile) {
-          for (int k = 0; k < tile.count; ++k) {
+          for (int k = 0; k < tile.count && !deadline_.passed(); ++k) {
             const Eigen::Vector3d p_O = tile.point(k);
             add(X_LO * p_O, radius, [&] { return overlap_weight(X_FO * p_O, radius, clouds); });
           }
         });
   }
 
-  void add_boxes(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF) {
+  /// @returns the share of the map that is summed
+  double add_boxes(const CloudSnapshot& cloud, const Eigen::Isometry3d& X_LF) {
     const BoxBvh& index = cloud.boxes->bvh();
     const Eigen::Isometry3d X_LO = X_LF * cloud.X_FM * Eigen::Translation3d(index.origin());
     const double cell = std::max(cloud.thinning, std::cbrt(geometry_.volume / kCellsPerLink));
-    visit_tiles(
-        index, [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
+    return visit_tiles(
+        index, &deadline_,
+        [&](const BoundingSphere& box) { return may_enter(X_LO * box.center, box.radius); },
         [&](const BoxTile& tile) {
           for (int k = 0; k < tile.count; ++k) add_cells(tile.box(k), cell, X_LO, kMaxHalvings);
         });
@@ -85,6 +141,7 @@ class LinkContact {
   // Halves a leaf of a map across its longest edge, down to cells.
   void add_cells(const Eigen::AlignedBox3d& box, double cell, const Eigen::Isometry3d& X_LO,
                  int halvings) {
+    if (deadline_.passed_now_and_then(kCellsBetweenLooks)) return;
     const Eigen::Vector3d center = X_LO * box.center();
     if (!may_enter(center, 0.5 * box.sizes().norm())) return;
     Eigen::Index axis;
@@ -111,6 +168,7 @@ class LinkContact {
 
   const LinkModel& link_;
   const ContactGeometry& geometry_;
+  Deadline deadline_;
   ContactVolume sum_;
 };
 
@@ -138,14 +196,22 @@ void ContactVolume::add(const ContactVolume& other, double weight) {
 }
 
 ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geometry,
-                             const Eigen::Isometry3d& X_FL, SnapshotSpan clouds) {
-  LinkContact contact(link, geometry);
+                             const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, TimePoint end) {
+  LinkContact contact(link, geometry, end);
   const Eigen::Isometry3d X_LF = X_FL.inverse();
+  double known = 0.0, indices = 0.0;
   for (const CloudSnapshot* cloud : clouds) {
-    contact.add_points(*cloud, X_LF, clouds);
-    if (cloud->boxes != nullptr) contact.add_boxes(*cloud, X_LF);
+    if (!cloud->index.bvh().thinned().empty()) {
+      known += contact.add_points(*cloud, X_LF, clouds);
+      ++indices;
+    }
+    if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
+    known += contact.add_boxes(*cloud, X_LF);
+    ++indices;
   }
-  return contact.sum();
+  ContactVolume sum = contact.sum();
+  if (known < indices) sum.known = known / indices;
+  return sum;
 }
 
 ContactVolume contact_volume(const ContactGeometry& a, const ContactGeometry& b,

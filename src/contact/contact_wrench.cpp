@@ -43,7 +43,7 @@ Wrench penetration_wrench(const LinkProximity& proximity, const QueryConfig& que
     return Wrench::unknown();
   }
   if (proximity.state != LinkState::kContact) return Wrench::zero();
-  if (contact == nullptr) return Wrench::unknown();
+  if (contact == nullptr || contact->known < 1.0) return Wrench::unknown();
   return contact_wrench(*contact, X_FL, config);
 }
 

@@ -36,20 +36,20 @@ float lens_sum(const PointTile& tile, const Eigen::Vector3f& p, float R, float r
   return (lens.thickness.square() * lens.factor).sum();
 }
 
-// Adds those of all points of an index to `sum`.
-void add_lenses(const PointBvh& index, const Eigen::Vector3f& p, float R, float r, float* sum) {
-  if (index.empty()) return;
+// Adds those of all points of a thinned cloud to `sum`.
+void add_lenses(const ThinnedCloud& cloud, const Eigen::Vector3f& p, float R, float r, float* sum) {
+  if (cloud.empty()) return;
   const float touch_sq = (R + r) * (R + r);
-  PointTile buffer;
+  ThinnedNode buffer;
   TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
-  stack.push(index.root());
+  stack.push(cloud.root());
   while (!stack.empty()) {
     const std::int32_t child = stack.pop();
-    if (child < 0) {
-      *sum += lens_sum(index.tile(static_cast<std::size_t>(~child), &buffer), p, R, r);
+    const BoxNode& node = cloud.nodes()[static_cast<std::size_t>(child)];
+    if (ThinnedCloud::is_leaf(node)) {
+      for (const ThinnedTile& tile : cloud.tiles(child, &buffer)) *sum += lens_sum(tile, p, R, r);
       continue;
     }
-    const BoxNode& node = index.nodes()[static_cast<std::size_t>(child)];
     const Lanes squared = squared_distance(node, p);
     for (int k = 0; k < node.count; ++k) {
       if (squared[k] < touch_sq) stack.push(node.child[k]);
@@ -67,11 +67,11 @@ double overlap_weight(const Eigen::Vector3d& p_F, double radius, SnapshotSpan cl
   const auto r = static_cast<float>(radius);
   float sum = 0.0F;
   for (const CloudSnapshot* cloud : clouds) {
-    const PointBvh& index = cloud->coarse.bvh();
+    const ThinnedCloud thinned = cloud->index.bvh().thinned();
     const auto R = static_cast<float>(point_sphere_radius(*cloud));
     const Eigen::Vector3f p =
-        (index.X_FO().linear().transpose() * (p_F - index.X_FO().translation())).cast<float>();
-    add_lenses(index, p, R, r, &sum);
+        (thinned.X_FO().linear().transpose() * (p_F - thinned.X_FO().translation())).cast<float>();
+    add_lenses(thinned, p, R, r, &sum);
   }
   const float own = 16.0F * r * r * r;                   // the sphere's own volume, over pi / 12
   return static_cast<double>(own / std::max(sum, own));  // rounding could make its own lens less

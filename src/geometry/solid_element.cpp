@@ -38,8 +38,7 @@ SolidElement::SolidElement(const GeometryElement& source, const CancelRequest& c
   if (const auto* mesh = std::get_if<TriangleMesh>(&source.shape)) {
     bvh = TriangleBvh(*mesh, cancelled);
     normals = face_normals(*mesh);
-    throw_if(cancelled);
-    is_closed = is_closed_mesh(*mesh);
+    is_closed = is_closed_mesh(*mesh, cancelled);
     return;
   }
   primitive = source.shape;

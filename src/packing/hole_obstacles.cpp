@@ -53,7 +53,7 @@ std::array<Eigen::Vector3d, kDirections> make_directions() {
 HoleObstacles::HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance,
                              PackingWatch* watch)
     : bvh_(bvh), watch_(*watch), tolerance_(tolerance) {
-  const std::vector<OpenEdge> open = open_edges(mesh);
+  const std::vector<OpenEdge> open = open_edges(mesh, [this] { return !keeps_on(); });
   if (open.empty()) return;
   TriangleMesh edges;
   edges.vertices = mesh.vertices;

@@ -246,7 +246,8 @@ class InteriorCheck final : public InteriorOctree {
  public:
   InteriorCheck(const TriangleMesh& mesh, const TriangleBvh& bvh, const Packing& packing,
                 double deviation, double gap, PackingWatch* watch)
-      : InteriorOctree(bvh, is_closed_mesh(mesh), gap, watch) {
+      : InteriorOctree(bvh, is_closed_mesh(mesh, [watch] { return !watch->keeps_on(); }), gap,
+                       watch) {
     for (const InnerSphere& sphere : packing.spheres) {
       search_.add(sphere.center, sphere.cover_radius - deviation);
     }

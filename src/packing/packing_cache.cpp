@@ -39,12 +39,37 @@ std::string write_synced(const std::string& path, const std::string& bytes) {
   return problem;
 }
 
+constexpr const char* kTemporary = ".tmp";
+// Writing a packing takes seconds at most, so that a temporary file that has not changed for so
+// long has no writer any more: it was killed, here or on another machine that shares the folder.
+constexpr std::chrono::hours kStale(1);
+
 // The name is unique among processes, threads and files that crashed processes left behind.
 std::string temporary_name(const std::string& path) {
   static std::atomic<unsigned> counter{0};
   const auto now = std::chrono::system_clock::now().time_since_epoch().count();
   return path + "." + std::to_string(getpid()) + "." + std::to_string(counter++) + "." +
-         std::to_string(now) + ".tmp";
+         std::to_string(now) + kTemporary;
+}
+
+// Whether a file has a name as temporary_name() makes them.
+bool is_temporary(const fs::path& path) {
+  return path.extension() == kTemporary &&
+         path.filename().string().find(".istpack.") != std::string::npos;
+}
+
+// Removes the temporary files that writers which were killed have left in a folder. Others, and
+// files that cannot be removed, stay.
+void remove_stale(const std::string& folder) {
+  std::error_code error;
+  const auto now = fs::file_time_type::clock::now();
+  fs::directory_iterator file(folder, error);
+  for (; !error && file != fs::directory_iterator(); file.increment(error)) {
+    std::error_code ignored;
+    if (!is_temporary(file->path()) || !file->is_regular_file(ignored)) continue;
+    const auto written = fs::last_write_time(file->path(), ignored);
+    if (!ignored && now - written > kStale) fs::remove(file->path(), ignored);
+  }
 }
 
 }  // namespace
@@ -105,6 +130,7 @@ bool PackingCache::store(const std::string& key, const Packing& packing,
   const std::string temporary = temporary_name(file_name);
   std::error_code error;
   fs::create_directories(directory_, error);
+  remove_stale(directory_);
   std::string problem =
       error ? error.message() : write_synced(temporary, serialize_packing(key, packing));
   if (problem.empty()) {

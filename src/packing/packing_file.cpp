@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "byte_stream.h"
+#include "internal/packing/byte_stream.h"
 
 namespace ist {
 namespace {

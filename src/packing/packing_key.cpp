@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <variant>
 
-#include "byte_stream.h"
+#include "internal/packing/byte_stream.h"
 #include "internal/packing/packer.h"
 #include "internal/packing/packing_cache.h"
 #include "packing_file.h"

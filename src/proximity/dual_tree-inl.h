@@ -43,7 +43,7 @@ struct LeafPair {
 // A visitor has
 //   float Limit() const;                      pairs whose bound is not below it are pruned
 //   bool IsSettled() const;                   nothing that is left can matter
-//   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the deadline has passed
+//   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the search ends
 //   float BoundOfBox(const Pair&);            a bound that prunes the pair, or -inf
 //   float Visit(const LeafPair<Tile>&);       returns the least lower bound of the tile's points
 //   float pruned_bound                        [m] least bound of what it pruned itself
@@ -333,7 +333,7 @@ class DualTree {
   std::uint64_t node_pairs_ = 0, leaf_pairs_ = 0;
   bool front_is_full_ = false;
   bool is_cut_short_ = false;  // the stack was not emptied
-  bool stopped_ = false;       // by the deadline
+  bool stopped_ = false;       // by the visitor
   TraversalStack<Pair, stack_capacity(kMaxTreeLevels + kMaxBoxLevels, kBoxWidth)> stack_;
 };
 

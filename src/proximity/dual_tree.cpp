@@ -54,7 +54,8 @@ class RefiningVisitor {
       SupportingPlanes updated;
       if (policy_.update_planes(&updated)) planes->Set(updated);
     }
-    return node_pairs % kDeadlineInterval == 0 && policy_.deadline_passed();
+    return policy_.is_crowded(node_pairs) ||
+           (node_pairs % kDeadlineInterval == 0 && policy_.deadline_passed());
   }
 
   // A bound of the pair's box for the whole link, if it makes the pair prunable; else -inf.

@@ -36,7 +36,7 @@ struct DualTreeInput {
 struct DualTreeResult {
   float pruned_bound = std::numeric_limits<float>::infinity();  ///< [m] least of all pruned pairs
   bool may_be_inside = false;  ///< some point's lower bound is at most `inside_bound`
-  bool stopped = false;        ///< by the deadline; `pruned_bound` bounds what was left
+  bool stopped = false;        ///< by the policy; `pruned_bound` bounds what was left
   std::uint64_t node_pairs = 0, leaf_pairs = 0;  ///< expanded
 };
 
@@ -51,6 +51,8 @@ struct DualTreeResult {
 ///   inside float refine(std::int32_t tile, int lane, float lower_bound);   // returns the prune
 ///   bound bool update_planes(SupportingPlanes* planes);                   // true: they have
 ///   changed bool deadline_passed();
+///   bool is_crowded(std::uint64_t node_pairs);  // too many points had to be measured: the
+///   traversal is stopped
 /// PointRefinement and BoxRefinement are the two there are (refinement.h).
 DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input, PointRefinement* policy);
 DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxRefinement* policy);

@@ -5,8 +5,10 @@
 #include <limits>
 #include <type_traits>
 
+#include "proximity/depth_search.h"
 #include "proximity/dual_tree.h"
 #include "proximity/refinement.h"
+#include "proximity/single_tree_search.h"
 
 namespace ist {
 namespace {
@@ -20,12 +22,18 @@ constexpr double kFloatError = 1e-6;
 constexpr double kPointError = 1.1e-7;
 // [m] More than double loses where distances are compared.
 constexpr double kRounding = 1e-12;
+// A link that is nearer than so many interior gaps is searched with signed distances.
+constexpr double kNearInGaps = 2.0;
+// So does one at a distance that is about that of the last crowded search, by this factor.
+constexpr double kSameCrowd = 1.5;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
-bool is_same_question(const QueryConfig& a, const QueryConfig& b) {
-  return a.max_distance == b.max_distance && a.tolerance == b.tolerance && a.margin == b.margin &&
-         a.relative_tolerance == b.relative_tolerance;
+// Whether what was answered for one question is an answer to another: it has to be as exact.
+bool answers(const QueryConfig& answered, const QueryConfig& asked) {
+  return answered.max_distance == asked.max_distance && answered.margin == asked.margin &&
+         answered.tolerance <= asked.tolerance &&
+         answered.relative_tolerance <= asked.relative_tolerance;
 }
 
 // The child whose box is nearest to a place.
@@ -68,14 +76,15 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.is_counted = false;
   search.first_bound = -kInfinity;
   search.is_answered = scene != kUnknownScene && answered.scene == scene &&
-                       other_links == kInfinity && is_same_question(answered.config, config) &&
+                       other_links == kInfinity && answers(answered.config, config) &&
                        answered.X_FL.matrix() == X_FL.matrix();
   if (search.is_answered) static_cast<SearchResult&>(search) = answered.result;
 }
 
 void LinkQuery::tighten(const QueryConfig& config) {
   LinkSearch& search = link_.search;
-  if (search.is_answered) return;
+  if (search.is_answered && answers(link_.kept.answered.config, config)) return;
+  search.is_answered = false;
   search.config = config;
   search.first_bound = search.lower_bound();
   search.refined_bound = kInfinity;
@@ -98,9 +107,12 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
     return false;
   }
   search.deadline = deadline;
+  const double distance = search.closest.exact.distance;
+  link_.context.grid.set_distance(distance < kInfinity ? distance : 0.0);
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
+  search.descent_steps_left = kMaxDescentSteps;
   count_outside_region();
   if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;
@@ -153,15 +165,25 @@ void LinkQuery::keep_answer() {
   answered.result = search;
 }
 
+// Whether the dual-tree traversal gave up, though there is time.
+bool LinkQuery::is_crowded(const DualTreeResult& found) const {
+  return found.stopped && !link_.search.deadline->has_passed();
+}
+
 // The four steps for one index: upper bound, search (which refines what survives its bounds),
 // depth.
 // @returns false: the deadline passed
 template <class Obstacles>
 bool LinkQuery::run(const Obstacles& obstacles) {
   enter(obstacles);
+  if (is_near(obstacles)) return search_near(obstacles);
   upper_bound(obstacles);
   const DualTreeResult found = search(obstacles);
-  if (found.may_be_inside && !found.stopped) search_depth(obstacles, &link_);
+  if (is_crowded(found)) {
+    link_.kept.crowded_at = link_.search.closest.exact.distance;
+    return search_near(obstacles);
+  }
+  if (found.may_be_inside && !found.stopped) search_inside(obstacles);
   const bool stopped = found.stopped || link_.search.deadline->passed();
   if (stopped) measure_closest(obstacles);
   // A pair that was left may hold a point inside.
@@ -171,6 +193,29 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   }
   return !stopped;
 }
+
+// Whether the dual-tree traversal would have to measure many points: the link is so near to an
+// obstacle that cover spheres bound little, or there were many at about this distance.
+bool LinkQuery::is_near(const PointObstacles& /*obstacles*/) const {
+  const double distance = link_.search.closest.exact.distance;
+  if (!link_.context.solid().is_closed()) return distance < 0.0;
+  const double crowded_at = link_.kept.crowded_at;
+  return distance < kNearInGaps * link_.context.tree().interior_gap() ||
+         (distance > crowded_at / kSameCrowd && distance < kSameCrowd * crowded_at);
+}
+bool LinkQuery::is_near(const BoxObstacles& /*obstacles*/) { return false; }
+
+// All steps in one, near the link.
+bool LinkQuery::search_near(const PointObstacles& obstacles) {
+  link_.search.cover_bound = link_.context.solid().is_closed() ? kInfinity : -kInfinity;
+  return search_single_tree(obstacles, &link_);
+}
+bool LinkQuery::search_near(const BoxObstacles& /*obstacles*/) { return true; }
+
+void LinkQuery::search_inside(const PointObstacles& obstacles) {
+  search_single_tree(obstacles, &link_);
+}
+void LinkQuery::search_inside(const BoxObstacles& obstacles) { search_depth(obstacles, &link_); }
 
 // Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
 // point of the link to the last answer's obstacle is still a point of the link.
@@ -265,6 +310,7 @@ template <class Obstacles>
 DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
   search.visited.clear();
+  search.refined = 0;
   search.box_bounds.clear();
   auto input = dual_tree_input(obstacles);
   input.front = link_.kept.fronts.find(obstacles.bvh->build_id());
@@ -276,6 +322,7 @@ DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   const DualTreeResult found = search_dual_tree(input, &refinement);
   search.statistics->node_pairs += found.node_pairs;
   search.statistics->leaf_pairs += found.leaf_pairs;
+  if (is_crowded(found)) return found;  // another search follows
   search.prune(static_cast<double>(found.pruned_bound) - search.rounding);
   if (found.may_be_inside) search.cover_bound = -kInfinity;
   return found;
@@ -353,6 +400,23 @@ void LinkQuery::look_ahead() {
   if (search.other_links == kInfinity) return;
   const double ahead = kStepsAhead * link_.kept.bound.displacement_to(search.scene, search.X_FL);
   if (ahead < search.other_links) search.other_links += ahead;
+}
+
+// The grid, the distances and the bounds are about the geometry. Fronts, supports and the terms of
+// the last answer are about the tree.
+void LinkQuery::set_link(const LinkModel& link) {
+  LinkContext& context = link_.context;
+  const bool is_same = link.packing_id != 0 && link.packing_id == context.model->packing_id;
+  context.model = &link;
+  context.grid.set_solid(link.solid);
+  if (is_same) return;
+  context.displacement = DisplacementBound(link);
+  LinkCoherence& kept = link_.kept;
+  kept.bound.set_link(link);
+  kept.fronts.forget();
+  kept.answered.scene = kUnknownScene;
+  kept.supports = SupportCache(link.tree);
+  kept.plane_normal_L.setZero();
 }
 
 void LinkQuery::keep_bound() {

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 
-#include "proximity/depth_search.h"
 #include "proximity/dual_tree.h"
 #include "proximity/link_query_state.h"
 
@@ -53,6 +52,10 @@ class LinkQuery {
            link_.search.config.max_distance + link_.search.config.margin;
   }
 
+  /// Takes the same link of another model, with the same geometry and perhaps another packing. All
+  /// that was proven of the geometry stays.
+  void set_link(const LinkModel& link);
+
   /// Forgets what was kept: the clouds of later queries may be others.
   void forget() { link_.kept.forget(); }
 
@@ -74,6 +77,13 @@ class LinkQuery {
   void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);
   void measure_again(const BoxObstacles& obstacles);
+  bool is_crowded(const DualTreeResult& found) const;
+  bool is_near(const PointObstacles& obstacles) const;
+  static bool is_near(const BoxObstacles& obstacles);
+  bool search_near(const PointObstacles& obstacles);
+  static bool search_near(const BoxObstacles& obstacles);
+  void search_inside(const PointObstacles& obstacles);
+  void search_inside(const BoxObstacles& obstacles);
   void upper_bound(const PointObstacles& obstacles);
   void upper_bound(const BoxObstacles& obstacles);
   template <class Obstacles>

@@ -4,15 +4,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/box_bounds.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/link_bound.h"
-#include "proximity/deadline.h"
+#include "proximity/coherence/node_bounds.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
 #include "proximity/supporting_planes.h"
@@ -59,9 +61,10 @@ struct SearchResult {
 /// The part that is kept from one query to the next. It speeds queries up and never changes what an
 /// answer promises.
 struct LinkCoherence {
-  explicit LinkCoherence(const LinkModel& link) : bound(link), supports(link.tree) {}
+  explicit LinkCoherence(const LinkModel& link) : bound(link), nodes(link), supports(link.tree) {}
 
   LinkBound bound;
+  NodeBounds nodes;
   BvttFronts fronts;
   DistanceCache distances;
   /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
@@ -72,6 +75,9 @@ struct LinkCoherence {
     bool has_place = false;                           ///< whether p_FCo is that of some answer
     Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
   } last;
+  /// [m] The distance at which too many points were about equally near for the dual-tree traversal;
+  /// inf: none.
+  double crowded_at = std::numeric_limits<double>::infinity();
   /// The last complete answer: it is the same for the same question.
   struct {
     SceneId scene = kUnknownScene;                           ///< unknown: there is none
@@ -86,6 +92,7 @@ struct LinkCoherence {
     last.build_id = 0;
     answered.scene = kUnknownScene;
     bound.forget();
+    nodes.forget();
     fronts.forget();
   }
 };
@@ -109,9 +116,11 @@ struct LinkSearch : SearchResult {
   bool is_counted = false;   ///< in the statistics, as outside the regions
   double first_bound = 0.0;  ///< [m] proven before tighten()
   BoxBounds box_bounds;
-  VisitedSet visited;      ///< obstacles of the index at work that were refined
-  int measured = 0;        ///< points
-  int box_cells_left = 0;  ///< into which overlapping boxes may still be divided
+  VisitedSet visited;          ///< obstacles of the index at work that were refined
+  int measured = 0;            ///< points
+  int refined = 0;             ///< points, in the dual-tree traversal at work
+  int box_cells_left = 0;      ///< into which overlapping boxes may still be divided
+  int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
 
   /// [m] Beyond it nothing matters.
   double range() const { return config.max_distance + config.margin + rounding; }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cassert>
 #include <cstddef>
 #include <system_error>
 #include <thread>
@@ -54,9 +53,8 @@ struct ProximityBatch::Impl {
     std::copy_n(X_FL.begin() + k * links, links, worker->X_FL.begin());
   }
 
-  /// The number of configurations.
+  /// The number of configurations; a rest of poses that is none is left out.
   std::size_t count(Span<const Eigen::Isometry3d> X_FL) const {
-    assert(links == 0 ? X_FL.empty() : X_FL.size() % links == 0);
     return links == 0 ? 0 : X_FL.size() / links;
   }
 
@@ -84,6 +82,9 @@ ProximityBatch& ProximityBatch::operator=(ProximityBatch&&) noexcept = default;
 bool ProximityBatch::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                          SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   results->resize(X_FL.size());
+  for (std::size_t i = impl_->count(X_FL) * impl_->links; i < results->size(); ++i) {
+    (*results)[i].reset();
+  }
   return impl_->run(impl_->count(X_FL), [&](Impl::Worker* worker, std::size_t k) {
     impl_->load(X_FL, k, worker);
     const bool complete = worker->query.run(worker->X_FL, known, clouds, &worker->results);

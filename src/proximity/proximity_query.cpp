@@ -1,7 +1,6 @@
 #include "ist_proximity/proximity/proximity_query.h"
 
 #include <algorithm>
-#include <cassert>
 #include <limits>
 
 #include "proximity/coherence/scene_tracker.h"
@@ -11,6 +10,9 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// [m] A finished lower bound may be this much lower than the tolerance asks for: 0.2 um by rounding
+// for each metre of coordinates, of which there are no more than ten in a robot's work.
+constexpr double kBoundError = 2e-6;
 
 }  // namespace
 
@@ -30,10 +32,24 @@ struct ProximityQuery::Impl {
     links.reserve(model->links.size());
     for (const LinkModel& link : model->links) links.emplace_back(link);
     order.reserve(links.size());
+    link_statistics.resize(links.size());
   }
 
-  bool can_query(std::size_t i, const std::vector<bool>& known, bool has_clouds) const {
-    return has_clouds && known[i] && model->links[i].usable() && !model->links[i].tree.empty();
+  void add_up_statistics() {
+    for (const QueryStatistics& link : link_statistics) {
+      statistics.node_pairs += link.node_pairs;
+      statistics.leaf_pairs += link.leaf_pairs;
+      statistics.exact_evaluations += link.exact_evaluations;
+      statistics.outside_region += link.outside_region;
+    }
+  }
+
+  // Whether a link can be asked at all: there are clouds, and a pose for each link of this model.
+  bool can_query(std::size_t i, Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+                 SnapshotSpan clouds) const {
+    const bool fits = X_FL.size() == links.size() && known.size() == links.size();
+    return fits && !clouds.empty() && known[i] && model->links[i].usable() &&
+           !model->links[i].tree.empty();
   }
 
   // A query that has a deadline first asks every link to within half of its distance, which takes
@@ -54,6 +70,16 @@ struct ProximityQuery::Impl {
     for (const std::size_t i : order) links[i].tighten(config);
   }
 
+  // Counts a link that a deadline left with wider bounds than were asked for.
+  void count_unfinished(const LinkProximity& result) {
+    if (result.state == LinkState::kClear) return;
+    const double width = result.distance - result.lower_bound - config.margin;
+    const double asked = std::max(config.tolerance, config.relative_tolerance * result.distance);
+    if (width <= asked + kBoundError) return;  // false for NaN: UNKNOWN
+    ++statistics.unfinished;
+    if (width > statistics.widest) statistics.widest = width;
+  }
+
   std::shared_ptr<const RobotModel> model;
   QueryConfig config;
   std::vector<std::size_t> order;  // of the links that are asked
@@ -61,6 +87,7 @@ struct ProximityQuery::Impl {
   SceneTracker scene;
   std::size_t last_nearest = 0;  // link that the last run_minimum() found
   QueryStatistics statistics;
+  std::vector<QueryStatistics> link_statistics;
 };
 
 ProximityQuery::ProximityQuery(std::shared_ptr<const RobotModel> model, const QueryConfig& config)
@@ -72,7 +99,6 @@ ProximityQuery& ProximityQuery::operator=(ProximityQuery&&) noexcept = default;
 bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                          SnapshotSpan clouds, std::vector<LinkProximity>* results) {
   const std::size_t count = impl_->links.size();
-  assert(X_FL.size() == count && known.size() == count);
   results->resize(count);
   impl_->statistics = {};
   Deadline deadline(impl_->config.deadline);
@@ -81,14 +107,16 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   // passes.
   std::vector<std::size_t>& order = impl_->order;
   order.clear();
+  std::fill(impl_->link_statistics.begin(), impl_->link_statistics.end(), QueryStatistics());
   for (std::size_t i = 0; i < count; ++i) {
-    if (!impl_->can_query(i, known, !clouds.empty())) {
+    if (!impl_->can_query(i, X_FL, known, clouds)) {
       (*results)[i].reset();
       impl_->links[i].forget();
       continue;
     }
     order.push_back(i);
-    impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity, &impl_->statistics);
+    impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity,
+                          &impl_->link_statistics[i]);
     impl_->links[i].warm_start(clouds);
   }
   if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
@@ -97,14 +125,15 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   for (const std::size_t i : order) {
     if (!is_stopped) complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
+    if (!complete) impl_->count_unfinished((*results)[i]);
   }
+  impl_->add_up_statistics();
   return complete;
 }
 
 bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                                  SnapshotSpan clouds, RobotProximity* result) {
   const std::size_t count = impl_->links.size();
-  assert(X_FL.size() == count && known.size() == count);
   impl_->statistics = {};
   *result = RobotProximity();
   result->all_known = true;
@@ -117,7 +146,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   const std::size_t first = impl_->last_nearest;
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = k == 0 ? first : k <= first ? k - 1 : k;
-    if (!impl_->can_query(i, known, !clouds.empty())) {
+    if (!impl_->can_query(i, X_FL, known, clouds)) {
       result->all_known = false;
       continue;
     }
@@ -147,8 +176,11 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
 
 bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                               LinkProximity* result) {
-  assert(link < impl_->links.size());
   impl_->statistics = {};
+  if (link >= impl_->links.size()) {
+    result->reset();
+    return true;
+  }
   const LinkModel& model = impl_->model->links[link];
   if (clouds.empty() || !model.usable() || model.tree.empty()) {
     result->reset();
@@ -164,9 +196,18 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
   return complete;
 }
 
+void ProximityQuery::set_model(std::shared_ptr<const RobotModel> model) {
+  assert(same_geometry(*model, *impl_->model));
+  for (std::size_t i = 0; i < impl_->links.size(); ++i) impl_->links[i].set_link(model->links[i]);
+  impl_->model = std::move(model);
+}
+
 void ProximityQuery::set_config(const QueryConfig& config) { impl_->config = config; }
 const QueryConfig& ProximityQuery::config() const { return impl_->config; }
 const QueryStatistics& ProximityQuery::statistics() const { return impl_->statistics; }
+const std::vector<QueryStatistics>& ProximityQuery::link_statistics() const {
+  return impl_->link_statistics;
+}
 const RobotModel& ProximityQuery::model() const { return *impl_->model; }
 
 bool is_rigid(const Eigen::Isometry3d& X, double tolerance) {

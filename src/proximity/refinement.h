@@ -38,14 +38,19 @@ class PointRefinement {
   /// Calls update_supporting_planes().
   bool update_planes(SupportingPlanes* planes);
   bool deadline_passed() { return link_.search.deadline->passed(); }
+  /// Whether so many points are about equally near that the single-tree traversal is better.
+  bool is_crowded(std::uint64_t node_pairs) const;
 
   /// Measures a point that may be inside.
   /// @param max_distance  [m] what its distance is known not to exceed, or does not matter beyond
   void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
+  /// Measures a point that is known to be outside.
+  /// @param max_distance  as above
+  /// @returns [m] a lower bound of its distance
+  double measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
+                         double max_distance = std::numeric_limits<double>::infinity());
 
  private:
-  void measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
-                       double max_distance, const Eigen::Vector3d& direction_L);
   SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
 
   const PointObstacles& obstacles_;
@@ -64,6 +69,7 @@ class BoxRefinement {
                          const float* /*max*/) {
     return -std::numeric_limits<float>::infinity();
   }
+  static bool is_crowded(std::uint64_t /*node_pairs*/) { return false; }
   /// The depth search decides which boxes are outside.
   static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return false; }
   /// Does for a box what PointRefinement::refine() does for a point.
@@ -86,6 +92,9 @@ class BoxRefinement {
 
  private:
   void measure_outside(ObstacleId id);
+  /// Looks for a point of a box that is inside the link, from one that both have in common, while
+  /// none is known.
+  void descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ, ObstacleId id);
 
   const BoxObstacles& obstacles_;
   LinkQueryState& link_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "proximity/overlap_descent.h"
 #include "proximity/refinement.h"
 
 namespace ist {
@@ -86,6 +87,22 @@ void BoxRefinement::take_overlap(const BoxDistance& found, ObstacleId id) {
   for (const double step : kSteps) {
     take_point(clamp_to(box, found.p_OB + step * into_link), id);
     take_point(clamp_to(box, found.p_OB + step * (into_link + into_box)), id);
+  }
+  descend(box, found.p_OB, id);
+}
+
+void BoxRefinement::descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ,
+                            ObstacleId id) {
+  LinkSearch& search = link_.search;
+  OverlapDescent descent(box, p_OQ);
+  while (!descent.is_finished() && search.closest.exact.distance >= 0.0 &&
+         search.descent_steps_left > 0 && !deadline_passed()) {
+    --search.descent_steps_left;
+    ++search.statistics->exact_evaluations;
+    const Eigen::Vector3d p_OP = descent.point();
+    const SignedDistance exact = link_.context.solid().signed_distance(obstacles_.X_LO * p_OP);
+    search.offer(exact, p_OP, obstacles_, id);
+    descent.take(exact.distance, obstacles_.X_OL.linear() * exact.normal);
   }
 }
 

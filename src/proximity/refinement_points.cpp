@@ -10,12 +10,17 @@ namespace {
 
 // A query of a link measures cells of its grid when it has measured so many points.
 constexpr int kMeasuredBeforeCells = 32;
+// Points that are refined, and node pairs that are expanded, before a search counts as crowded. The
+// bounds that the single-tree traversal keeps serve longer where there is a tolerance.
+constexpr int kCrowdedPoints = 1024, kCrowdedPointsExact = 4096;
+constexpr std::uint64_t kCrowdedPairs = 4096;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
 float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   LinkSearch& search = link_.search;
+  ++search.refined;
   search.cover_bound =
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
   const ObstacleId id{tile, lane};
@@ -31,11 +36,17 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
     // The bound is that of one part of the link; the others are in pairs of their own.
     search.prune(static_cast<double>(lower_bound) - search.rounding);
   } else {
-    const bool has_closest = search.closest.exact.distance < kInfinity;
-    measure_outside(id, p_OQ, p_LQ, kInfinity,
-                    has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L);
+    measure_outside(id, p_OQ, p_LQ);
   }
   return search.traversal_prune_bound();
+}
+
+bool PointRefinement::is_crowded(std::uint64_t node_pairs) const {
+  const LinkSearch& search = link_.search;
+  if (search.measured < kMeasuredBeforeCells || !link_.context.solid().is_closed()) return false;
+  const bool is_exact = search.config.tolerance == 0.0 && search.config.relative_tolerance == 0.0;
+  return node_pairs > kCrowdedPairs ||
+         search.refined > (is_exact ? kCrowdedPointsExact : kCrowdedPoints);
 }
 
 float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const float* min,
@@ -96,28 +107,31 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
   const InnerSphereTree& tree = link_.context.tree();
   if (tree.cover_distance_exceeds(p_LQ, tree.interior_gap())) {
-    return measure_outside(id, p_OQ, p_LQ, max_distance, link_.kept.plane_normal_L);
+    measure_outside(id, p_OQ, p_LQ, max_distance);
+    return;
   }
   link_.search.count_exact();
   link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
 }
 
-void PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,
-                                      const Eigen::Vector3d& p_LQ, double max_distance,
-                                      const Eigen::Vector3d& direction_L) {
+double PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,
+                                        const Eigen::Vector3d& p_LQ, double max_distance) {
   LinkSearch& search = link_.search;
   search.count_exact();
   const double limit = std::min({search.closest.exact.distance, search.other_links,
                                  search.range() + search.rounding, max_distance});
+  const bool has_closest = search.closest.exact.distance < kInfinity;
   double lower_bound;
-  const SignedDistance exact =
-      distance_outside(link_.context.solid(), p_LQ, limit, direction_L, 0.0, &lower_bound);
+  const SignedDistance exact = distance_outside(
+      link_.context.solid(), p_LQ, limit,
+      has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L, 0.0, &lower_bound);
   link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
                              id.key(), p_LQ, lower_bound);
   if (lower_bound < exact.distance) {
     search.refined_bound = std::min(search.refined_bound, lower_bound);
   }
   search.offer(exact, p_OQ, obstacles_, id);
+  return lower_bound;
 }
 
 }  // namespace ist

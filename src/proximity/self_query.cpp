@@ -1,11 +1,11 @@
 #include "ist_proximity/proximity/self_query.h"
 
 #include <algorithm>
-#include <cassert>
 #include <limits>
 
 #include "internal/geometry/relative_pose.h"
-#include "proximity/deadline.h"
+#include "internal/geometry/solid_queries.h"
+#include "internal/proximity/deadline.h"
 #include "proximity/link_pair_query.h"
 #include "proximity/link_surface.h"
 
@@ -36,7 +36,8 @@ struct SelfQuery::Impl {
     bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
   };
 
-  void prepare();
+  void prepare(const Impl* previous);
+  std::shared_ptr<const LinkSurface> surface_of(std::size_t link, const Impl* previous) const;
   bool finish(std::size_t pair, int steps);
   bool finish_by(Deadline* deadline);
 
@@ -44,23 +45,35 @@ struct SelfQuery::Impl {
   std::vector<LinkPair> pairs;
   QueryConfig config;
   SelfQueryStatistics statistics;
-  std::vector<std::unique_ptr<LinkSurface>> surfaces;   // by link; null where no pair needs it
+  // By link; null where no pair needs it.
+  std::vector<std::shared_ptr<const LinkSurface>> surfaces;
   std::vector<std::unique_ptr<LinkPairQuery>> queries;  // by pair; null where a link is unusable
   std::vector<RigidPose> X_FL;                          // by link
   std::vector<Waiting> queue;                           // a heap
   std::vector<LinkPairSearch::Entry> depth_queue;       // scratch
 };
 
-void SelfQuery::Impl::prepare() {
+std::shared_ptr<const LinkSurface> SelfQuery::Impl::surface_of(std::size_t link,
+                                                               const Impl* previous) const {
+  const LinkModel& wanted = model->links[link];
+  if (previous != nullptr && link < previous->surfaces.size() && previous->surfaces[link] &&
+      is_same_solid(previous->model->links[link].solid, wanted.solid)) {
+    return previous->surfaces[link];
+  }
+  return std::make_shared<const LinkSurface>(wanted);
+}
+
+void SelfQuery::Impl::prepare(const Impl* previous) {
   const auto& links = model->links;
   surfaces.resize(links.size());
   X_FL.resize(links.size());
   std::size_t entries = 0;
   for (const LinkPair& pair : pairs) {
     queries.emplace_back();
+    if (std::max(pair.first, pair.second) >= links.size()) continue;
     if (!can_query(links[pair.first]) || !can_query(links[pair.second])) continue;
     for (const std::size_t i : {pair.first, pair.second}) {
-      if (!surfaces[i]) surfaces[i] = std::make_unique<LinkSurface>(links[i]);
+      if (!surfaces[i]) surfaces[i] = surface_of(i, previous);
       entries = std::max(entries, (links[i].tree.nodes().size() + 1) * kSphereWidth);
     }
     queries.back() = std::make_unique<LinkPairQuery>(links[pair.first], links[pair.second],
@@ -71,12 +84,12 @@ void SelfQuery::Impl::prepare() {
 }
 
 SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-                     const QueryConfig& config)
+                     const QueryConfig& config, const SelfQuery* previous)
     : impl_(std::make_unique<Impl>()) {
   impl_->model = std::move(model);
   impl_->pairs = std::move(pairs);
   impl_->config = config;
-  impl_->prepare();
+  impl_->prepare(previous != nullptr ? previous->impl_.get() : nullptr);
 }
 SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;
@@ -111,10 +124,11 @@ bool SelfQuery::Impl::finish_by(Deadline* deadline) {
 bool SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                     std::vector<PairProximity>* results) {
   Impl& impl = *impl_;
-  assert(X_FL.size() == impl.model->links.size() && known.size() == X_FL.size());
+  results->resize(impl.pairs.size());
+  for (PairProximity& result : *results) result.reset();
+  if (X_FL.size() != impl.model->links.size() || known.size() != X_FL.size()) return true;
   Deadline deadline(impl.config.deadline);
   impl.statistics = {};
-  results->resize(impl.pairs.size());
   for (std::size_t i = 0; i < X_FL.size(); ++i) {
     if (known[i]) impl.X_FL[i] = nearest_rigid(X_FL[i]);
   }
@@ -137,7 +151,6 @@ bool SelfQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>&
   std::make_heap(impl.queue.begin(), impl.queue.end());
   const bool all = impl.finish_by(&deadline);
   for (std::size_t i = 0; i < impl.pairs.size(); ++i) {
-    (*results)[i].reset();
     if (can_run(i)) impl.queries[i]->report(&(*results)[i]);
   }
   return all;

@@ -17,11 +17,13 @@ constexpr double kRounding = 1e-12;
 constexpr double kCellsPerRadius = 16.0;
 constexpr double kMinCell = 1e-3;  // [m]
 // Cells to either side of the origin that a key can tell apart.
-constexpr double kMaxIndex = 1048575.0;
+constexpr double kMaxIndex = 262143.0;
+// [m] What the error of a plane may be at the end of a cell, about, where the link is convex.
+constexpr double kPlaneError = 1e-3;
 // The radius in which a cell's plane holds, in edges of a cell: half a diagonal is 0.87.
 constexpr double kPlaneRadius = 1.5;
 // Cells farther from the surface than so many of these radii have no plane.
-constexpr double kPlaneDistance = 3.0;
+constexpr double kPlaneDistance = 64.0;
 // The share of that radius by which a plane may be too high.
 constexpr double kPlaneTolerance = 0.01;
 // A plane that cuts off less of the sphere about C, as a share of its radius, says little.
@@ -36,69 +38,86 @@ SignedDistanceGrid::SignedDistanceGrid(const LinkModel& link)
       origin_(link.tree.center()),
       size_(std::max(link.tree.radius() / kCellsPerRadius, kMinCell)),
       per_size_(1.0 / size_),
-      plane_radius_(kPlaneRadius * size_),
       cells_(kCells) {}
 
+double SignedDistanceGrid::plane_radius(int level) const { return kPlaneRadius * size(level); }
+
+// A place at distance d from a point has an error of t^2 / 2d at t across the plane's normal.
+void SignedDistanceGrid::set_distance(double distance) {
+  const double wanted = std::sqrt(2.0 * kPlaneError * std::max(distance, 0.0));
+  level_ = 0;
+  while (level_ < kMaxLevel && size(level_ + 1) <= wanted) ++level_;
+  per_size_ = 1.0 / size(level_);
+}
+
 // Written so that NaN has no key.
-std::uint64_t SignedDistanceGrid::key(const Eigen::Vector3d& p_LQ, Eigen::Vector3d* center) const {
+std::uint64_t SignedDistanceGrid::key(const Eigen::Vector3d& p_LQ) const {
   const Eigen::Array3d at = (per_size_ * (p_LQ - origin_)).array();
-  std::uint64_t key = 1;
+  auto key = static_cast<std::uint64_t>(level_ + 1);
   for (int axis = 0; axis < 3; ++axis) {
     if (!(std::abs(at[axis]) < kMaxIndex)) return 0;
-    const double i = std::floor(at[axis]);
-    (*center)[axis] = origin_[axis] + size_ * (i + 0.5);
-    key = key << 21U | static_cast<std::uint64_t>(i + kMaxIndex + 1.0);
+    key = key << kIndexBits | static_cast<std::uint64_t>(std::floor(at[axis]) + kMaxIndex + 1.0);
   }
   return key;
 }
 
+Eigen::Vector3d SignedDistanceGrid::center(const Cell& cell) const {
+  constexpr std::uint64_t kIndexMask = (std::uint64_t{1} << kIndexBits) - 1;
+  Eigen::Array3d index;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const std::uint64_t bits = cell.key >> ((2 - axis) * kIndexBits) & kIndexMask;
+    index[axis] = static_cast<double>(static_cast<std::int64_t>(bits)) - (kMaxIndex + 0.5);
+  }
+  return origin_ + size(level(cell)) * index.matrix();
+}
+
 SignedDistanceGrid::Cell* SignedDistanceGrid::find(const Eigen::Vector3d& p_LQ) {
-  Eigen::Vector3d center;
-  const std::uint64_t wanted = key(p_LQ, &center);
+  const std::uint64_t wanted = key(p_LQ);
   Cell& cell = cells_[slot(wanted)];
   return wanted != 0 && cell.key == wanted ? &cell : nullptr;
 }
 
 SignedDistanceGrid::Cell* SignedDistanceGrid::measure(const Eigen::Vector3d& p_LQ) {
-  Eigen::Vector3d center;
-  const std::uint64_t wanted = key(p_LQ, &center);
+  const std::uint64_t wanted = key(p_LQ);
   if (wanted == 0) return nullptr;
   Cell& cell = cells_[slot(wanted)];
   if (cell.key != wanted) {
     cell = Cell();
     cell.key = wanted;
-    cell.center = center;
     fill(&cell);
   }
   return &cell;
 }
 
 void SignedDistanceGrid::fill(Cell* cell) const {
-  const PointDepth depth = point_depth(*solid_, cell->center, -1.0);
+  const Eigen::Vector3d center = this->center(*cell);
+  const PointDepth depth = point_depth(*solid_, center, -1.0);
   cell->floor = round_down(depth.floor);
   cell->triangle = depth.triangle;
   cell->normal = depth.exact.normal.cast<float>();
   cell->witness =
-      round_down(cell->normal.cast<double>().dot(depth.exact.witness - cell->center) - kRounding);
+      round_down(cell->normal.cast<double>().dot(depth.exact.witness - center) - kRounding);
   // Far from the link, or without a surface, a plane bounds no better than the distance.
-  cell->has_plane = !(std::abs(depth.exact.distance) < kPlaneDistance * plane_radius_);
+  cell->has_plane = !(std::abs(depth.exact.distance) < kPlaneDistance * plane_radius(level(*cell)));
 }
 
 // The surface that is closest to any place in the plane's radius is within two of them and the
 // distance of C.
 void SignedDistanceGrid::find_plane(Cell* cell) const {
   cell->has_plane = true;
+  const Eigen::Vector3d center = this->center(*cell);
   const auto floor = static_cast<double>(cell->floor);
-  const double radius = (1.0 + kStored) * std::abs(floor) + 2.0 * plane_radius_ + kRounding;
+  const double plane_radius = this->plane_radius(level(*cell));
+  const double radius = (1.0 + kStored) * std::abs(floor) + 2.0 * plane_radius + kRounding;
   const Eigen::Vector3d normal = cell->normal.cast<double>();
-  const double plane = surface_support_in_sphere(*solid_, cell->center, radius, normal,
-                                                 kPlaneTolerance * plane_radius_, cell->witness) +
+  const double plane = surface_support_in_sphere(*solid_, center, radius, normal,
+                                                 kPlaneTolerance * plane_radius, cell->witness) +
                        kStored * radius;
   if (!(plane < kHighestPlane * radius)) return;
   cell->plane = round_up(plane);
   // No surface is in the part of the sphere above the plane: one place is outside if all are.
   const double place = 0.5 * (std::max(plane, 0.0) + radius);
-  cell->is_outside_above_plane = is_closed_ && !solid_->is_inside(cell->center + place * normal);
+  cell->is_outside_above_plane = is_closed_ && !solid_->is_inside(center + place * normal);
 }
 
 double SignedDistanceGrid::Part::extent_against(const Eigen::Vector3d& n_L) const {
@@ -117,12 +136,12 @@ double SignedDistanceGrid::Part::extent_against(const Eigen::Vector3d& n_L) cons
 
 double SignedDistanceGrid::floor_bound(const Cell& cell, const Eigen::Vector3d& center_L,
                                        double radius) const {
-  return static_cast<double>(cell.floor) - (center_L - cell.center).norm() - radius - kRounding;
+  return static_cast<double>(cell.floor) - (center_L - center(cell)).norm() - radius - kRounding;
 }
 
 SignedDistanceGrid::Bound SignedDistanceGrid::bound(Cell* cell, const Part& part,
                                                     double enough) const {
-  const Eigen::Vector3d from_C = part.center_L - cell->center;
+  const Eigen::Vector3d from_C = part.center_L - center(*cell);
   const double distance = from_C.norm() + part.radius + kRounding;
   const auto floor = static_cast<double>(cell->floor);
   Bound bound;
@@ -132,7 +151,7 @@ SignedDistanceGrid::Bound SignedDistanceGrid::bound(Cell* cell, const Part& part
   }
   bound.is_outside = is_closed_ && bound.signed_distance > 0.0;
   const double by_floor = is_closed_ ? bound.signed_distance : bound.surface_distance;
-  if (distance > plane_radius_ || by_floor >= enough) return bound;
+  if (distance > plane_radius(level(*cell)) || by_floor >= enough) return bound;
   if (!cell->has_plane) find_plane(cell);
   const Eigen::Vector3d normal = cell->normal.cast<double>();
   const double above = normal.dot(from_C) - part.extent_against(normal) -
@@ -156,7 +175,7 @@ double SignedDistanceGrid::depth_bound(const Cell& cell, const Eigen::Vector3d& 
 NearSurface SignedDistanceGrid::near_surface(Cell* cell, const Eigen::Vector3d& p_LQ) const {
   NearSurface near;
   if (!is_one_mesh_) return near;
-  const double distance = (p_LQ - cell->center).norm() + kRounding;
+  const double distance = (p_LQ - center(*cell)).norm() + kRounding;
   const auto floor = static_cast<double>(cell->floor);
   near.within =
       std::min((1.0 + kStored) * std::abs(floor) + distance, -depth_bound(*cell, p_LQ, 0.0));

@@ -25,11 +25,17 @@ namespace ist {
 /// The error of the first is the distance from C, that of the others falls with its square where
 /// the surface is smooth.
 ///
+/// The error of a plane also falls with the distance of the surface, so farther away cells are
+/// larger: set_distance() chooses the level.
+///
 /// Cells are held in a direct-mapped table: a cell whose place another one needs is measured again.
 /// Memory is allocated once. One thread.
 class SignedDistanceGrid {
  public:
   explicit SignedDistanceGrid(const LinkModel& link);
+
+  /// Takes another copy of the same solid; what was measured stays.
+  void set_solid(const Solid& solid) { solid_ = &solid; }
 
   /// A part of space: a place, a sphere, or a box and the points that are in it.
   struct Part {
@@ -56,6 +62,8 @@ class SignedDistanceGrid {
 
   struct Cell;
 
+  /// Chooses the size of cells for places that are about as far [m] from the link.
+  void set_distance(double distance);
   /// The cell of a place, if it has been measured; null otherwise, and for a place that is not
   /// finite or too far from the link.
   Cell* find(const Eigen::Vector3d& p_LQ);
@@ -69,14 +77,13 @@ class SignedDistanceGrid {
   double floor_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
   /// [m] No place in the sphere is deeper than minus this, by the cell's triangle; -inf: unknown.
   double depth_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
-  /// Bounds of where the surface is about a place.
   /// [m] Larger parts are bounded by no plane.
-  double plane_radius() const { return plane_radius_; }
+  double plane_radius() const { return plane_radius(level_); }
+  /// Bounds of where the surface is about a place.
   NearSurface near_surface(Cell* cell, const Eigen::Vector3d& p_LQ) const;
 
   struct Cell {
     std::uint64_t key = 0;  ///< of the place in the grid; 0: not measured
-    Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< [m] C, link frame
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< outward, at the closest point
     float witness = 0.0F;                              ///< [m] from C to that point along normal
     float floor = 0.0F;                                ///< [m] PointDepth::floor at C
@@ -89,17 +96,28 @@ class SignedDistanceGrid {
  private:
   static constexpr std::size_t kCells = 8192;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
+  static constexpr int kMaxLevel = 7;
 
-  std::uint64_t key(const Eigen::Vector3d& p_LQ, Eigen::Vector3d* center) const;
+  std::uint64_t key(const Eigen::Vector3d& p_LQ) const;
   static std::size_t slot(std::uint64_t key) { return (key * 0x9E3779B97F4A7C15ULL) >> 51U; }
+  static int level(const Cell& cell) { return static_cast<int>(cell.key >> kLevelShift) - 1; }
+  Eigen::Vector3d center(const Cell& cell) const;  ///< [m] C
+  double size(int level) const {
+    return static_cast<double>(1U << static_cast<unsigned>(level)) * size_;
+  }
+  double plane_radius(int level) const;
   void fill(Cell* cell) const;
   void find_plane(Cell* cell) const;
+
+  // A key holds the level + 1 above the three indices of a cell.
+  static constexpr unsigned kIndexBits = 19, kLevelShift = 3 * kIndexBits;
 
   const Solid* solid_;
   bool is_one_mesh_, is_closed_;
   Eigen::Vector3d origin_;  ///< [m] link frame
-  double size_, per_size_;  ///< [m] edge of a cell, and 1 / edge
-  double plane_radius_;     ///< [m] of the sphere about C where the plane holds
+  double size_;             ///< [m] edge of a cell of level 0; each level doubles it
+  int level_ = 0;           ///< of cells that are found and measured
+  double per_size_;         ///< [1/m] 1 / edge
   std::vector<Cell> cells_;
 };
 

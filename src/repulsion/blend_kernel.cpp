@@ -20,10 +20,11 @@ namespace HWY_NAMESPACE {
 namespace blend {
 
 template <class Index>
-HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, float limit) {
+HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, float limit,
+                             Deadline* deadline) {
   PosedLink link;
   Pose(spheres, &link);
-  VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
+  VisitTiles(index, link, limit, deadline, [&](const auto& tile, std::uint32_t groups) {
     for (; groups != 0; groups &= groups - 1) {
       const PosedGroup& group = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(groups)];
       limit = std::min(limit, Nearest(tile, 0, tile.count, group));
@@ -33,18 +34,11 @@ HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, fl
 }
 
 // The weight of each point: how much of its cell a surface through it covers.
-HWY_INLINE void CellWeights(const PointTile& tile, const ThinningGrid& grid, float* weights) {
+HWY_INLINE void CellWeights(const ThinnedTile& tile, float* weights) {
   const Tag d;
-  const V half = hn::Set(d, 0.5F), scale = hn::Set(d, grid.per_meter);
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
-    const auto off = [&](const float* v, float offset) {
-      const V cells = hn::MulAdd(hn::Load(d, v + k), scale, hn::Set(d, offset));
-      return hn::Sub(hn::Sub(cells, hn::Floor(cells)), half);
-    };
-    const Offset off_centre = {off(tile.x, grid.offset[0]), off(tile.y, grid.offset[1]),
-                               off(tile.z, grid.offset[2])};
     // Squared distance to the centre over that of a corner, 3/4.
-    const V part = hn::Mul(SquaredNorm(off_centre), hn::Set(d, 1.0F / kCornerSquared));
+    const V part = hn::Mul(hn::Load(d, tile.offset_sq + k), hn::Set(d, 1.0F / kCornerSquared));
     const V section = hn::Max(hn::Sub(hn::Set(d, 1.0F), part), hn::Zero(d));
     const V weight = hn::MulAdd(hn::Mul(section, section), hn::Set(d, 1.0F - kLeastCellWeight),
                                 hn::Set(d, kLeastCellWeight));
@@ -122,15 +116,16 @@ HWY_INLINE PairSums Total(const SphereSums& sums, const PosedGroup& group) {
 }
 
 template <class Index>
-HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, const Band& band) {
+HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, const Band& band,
+                               Deadline* deadline) {
   PosedLink link;
   Pose(spheres, &link);
   std::array<SphereSums, kMaxGroups> sums;
   const float limit = band.nearest + band.smoothing;
   alignas(64) float weights[kWidth];
   std::fill_n(weights, kWidth, 1.0F);
-  VisitTiles(index, link, limit, [&](const auto& tile, std::uint32_t groups) {
-    if constexpr (std::is_same_v<Index, PointBvh>) CellWeights(tile, band.grid, weights);
+  VisitTiles(index, link, limit, deadline, [&](const auto& tile, std::uint32_t groups) {
+    if constexpr (std::is_same_v<Index, ThinnedCloud>) CellWeights(tile, weights);
     for (; groups != 0; groups &= groups - 1) {
       const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
       AddTile(tile, weights, link.groups[g], band.nearest, 1.0F / band.smoothing, &sums[g]);
@@ -144,17 +139,21 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, 
 }  // namespace blend
 
 // HWY_EXPORT asks for these here.
-float NearestPointPair(const PointBvh& index, const PosedSpheres& spheres, float limit) {
-  return blend::NearestPair(index, spheres, limit);
+float NearestPointPair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
+                       Deadline* deadline) {
+  return blend::NearestPair(cloud, spheres, limit, deadline);
 }
-float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float limit) {
-  return blend::NearestPair(index, spheres, limit);
+float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
+                     Deadline* deadline) {
+  return blend::NearestPair(index, spheres, limit, deadline);
 }
-PairSums BlendPointPairs(const PointBvh& index, const PosedSpheres& spheres, const Band& band) {
-  return blend::BlendPairs(index, spheres, band);
+PairSums BlendPointPairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
+                         Deadline* deadline) {
+  return blend::BlendPairs(cloud, spheres, band, deadline);
 }
-PairSums BlendBoxPairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band) {
-  return blend::BlendPairs(index, spheres, band);
+PairSums BlendBoxPairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
+                       Deadline* deadline) {
+  return blend::BlendPairs(index, spheres, band, deadline);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -163,13 +162,6 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace ist {
-
-ThinningGrid::ThinningGrid(const Eigen::Vector3d& origin, double cell)
-    : per_meter(static_cast<float>(1.0 / cell)) {
-  for (int i = 0; i < 3; ++i) {
-    offset[i] = static_cast<float>(origin[i] / cell - std::floor(origin[i] / cell));
-  }
-}
 
 HWY_EXPORT(NearestPointPair);
 HWY_EXPORT(NearestBoxPair);
@@ -186,22 +178,28 @@ void PairSums::add(const PairSums& other) {
   }
 }
 
-float nearest_pair(const PointBvh& index, const PosedSpheres& spheres, float limit) {
-  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestPointPair)(index, spheres, limit);
+float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline) {
+  if (cloud.empty()) return limit;
+  return HWY_DYNAMIC_DISPATCH(NearestPointPair)(cloud, spheres, limit, deadline);
 }
 
-float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit) {
-  return index.empty() ? limit : HWY_DYNAMIC_DISPATCH(NearestBoxPair)(index, spheres, limit);
+float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline) {
+  if (index.empty()) return limit;
+  return HWY_DYNAMIC_DISPATCH(NearestBoxPair)(index, spheres, limit, deadline);
 }
 
-PairSums blend_pairs(const PointBvh& index, const PosedSpheres& spheres, const Band& band) {
+PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline) {
+  if (cloud.empty()) return {};
+  return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(cloud, spheres, band, deadline);
+}
+
+PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline) {
   if (index.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(index, spheres, band);
-}
-
-PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band) {
-  if (index.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band);
+  return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band, deadline);
 }
 
 }  // namespace ist

@@ -4,13 +4,14 @@
 #include <cstddef>
 
 #include "internal/cloud/box_bvh.h"
-#include "internal/cloud/point_bvh.h"
+#include "internal/cloud/thinned_cloud.h"
+#include "internal/proximity/deadline.h"
 #include "repulsion/coarse_spheres.h"
 
 namespace ist {
 
-/// A link's spheres, posed in the frame O of an index: its origin, and the axes of the fixed frame
-/// (points) or the map (boxes). A pair is a sphere and a point, or a sphere and the point of a box
+/// A link's spheres, posed in the frame O of an index: that of the points, or the map's axes at the
+/// boxes' origin. A pair is a sphere and a point, or a sphere and the point of a box
 /// that is nearest to it.
 struct PosedSpheres {
   const SphereGroup* groups = nullptr;
@@ -31,25 +32,16 @@ struct PairSums {
 };
 
 /// [m] The smallest distance of a pair, negative where a point is in a sphere; `limit` where no
-/// pair is nearer than that.
-float nearest_pair(const PointBvh& index, const PosedSpheres& spheres, float limit);
-float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit);
-
-/// The grid that a cloud was thinned to, in the frame of its index.
-struct ThinningGrid {
-  /// @param origin  [m] of the index in the fixed frame
-  /// @param cell    [m] > 0, edge
-  ThinningGrid(const Eigen::Vector3d& origin, double cell);
-
-  float per_meter;
-  float offset[3];  ///< of the origin, in cells
-};
+/// pair is nearer than that. Once the deadline has passed, the result may be too large.
+float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline);
+float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
+                   Deadline* deadline);
 
 /// The pairs that count, and how much.
 struct Band {
-  float nearest;      ///< [m] distance of the nearest pair
-  float smoothing;    ///< [m]
-  ThinningGrid grid;  ///< of the points; boxes have none
+  float nearest;    ///< [m] distance of the nearest pair
+  float smoothing;  ///< [m]
 };
 
 /// A thinned point stands for the part of a surface through it that lies within its cell: with rho
@@ -60,8 +52,10 @@ constexpr float kLeastCellWeight = 0.01F;
 constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
 
 /// The sums over all pairs nearer than nearest + smoothing; w = (1 - (d - nearest) / smoothing)^2
-/// times the points' weight.
-PairSums blend_pairs(const PointBvh& index, const PosedSpheres& spheres, const Band& band);
-PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band);
+/// times the points' weight. Once the deadline has passed, pairs are missing.
+PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline);
+PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
+                     Deadline* deadline);
 
 }  // namespace ist

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "internal/bvh/traversal_stack.h"
 #include "repulsion/blend_kernel.h"
@@ -27,6 +28,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 static_assert(kSphereGroupWidth == kPointWidth);
 constexpr auto kWidth = static_cast<std::size_t>(kSphereGroupWidth);
 constexpr std::size_t kMaxGroups = kCoarseSpheres / kWidth;
+// Nodes and tiles that are visited between two looks at the clock: some microseconds.
+constexpr std::uint32_t kStepsBetweenLooks = 16;
 using Tag = hn::CappedTag<float, kWidth>;
 using V = hn::Vec<Tag>;
 
@@ -81,7 +84,7 @@ HWY_INLINE V Gap(V low, V high, V value) {
 
 // The offsets from a point, or from the nearest point of a box, to the centres of spheres k, k + 1,
 // ...
-HWY_INLINE Offset ToSpheres(const PointTile& tile, int point, const PosedGroup& group,
+HWY_INLINE Offset ToSpheres(const ThinnedTile& tile, int point, const PosedGroup& group,
                             std::size_t k) {
   const Tag d;
   return {hn::Sub(hn::Load(d, group.x + k), hn::Set(d, tile.x[point])),
@@ -179,23 +182,58 @@ HWY_INLINE std::uint32_t FindChildren(const BoxNode& node, const PosedLink& link
   return any;
 }
 
+// Calls visit(tile, groups) for the thinned tiles of a leaf that may hold a point nearer than
+// `limit` to a sphere of these groups.
+template <class Visit>
+HWY_INLINE void VisitLeaf(const ThinnedCloud& cloud, std::int32_t leaf, const PosedLink& link,
+                          std::uint32_t groups, const float& limit, ThinnedNode* buffer,
+                          const Visit& visit) {
+  for (const ThinnedTile& tile : cloud.tiles(leaf, buffer)) {
+    std::uint32_t near = 0;
+    for (std::uint32_t rest = groups; rest != 0; rest &= rest - 1) {
+      const PosedGroup& group = link.groups[hwy::Num0BitsBelowLS1Bit_Nonzero32(rest)];
+      if (Nearest(tile.box, 0, 1, group) < limit) near |= rest & (0U - rest);
+    }
+    if (near != 0) visit(tile, near);
+  }
+}
+
+// The buffer that a traversal lends to an index.
+template <class Index>
+struct TileBuffer {
+  typename Index::Tile tile;
+};
+template <>
+struct TileBuffer<ThinnedCloud> {
+  ThinnedNode tile;
+};
+
 // Calls visit(tile, groups) for the tiles that may hold a point nearer to a sphere's surface than
 // `limit`, depth first, the nearest child first; bit g of `groups`: to a sphere of group g. `visit`
-// may lower the limit.
+// may lower the limit. Ends early once the deadline has passed.
 template <class Index, class Visit>
 HWY_INLINE void VisitTiles(const Index& index, const PosedLink& link, const float& limit,
-                           const Visit& visit) {
-  typename Index::Tile buffer;
+                           Deadline* deadline, const Visit& visit) {
+  TileBuffer<Index> buffer;
   TraversalStack<Entry, stack_capacity(kMaxBoxLevels, kWidth)> stack;
   stack.push({index.root(), (1U << link.count) - 1U, -kFarAway});
   while (!stack.empty()) {
     const Entry entry = stack.pop();
     if (!(entry.bound < limit)) continue;
-    if (entry.child < 0) {
-      visit(index.tile(static_cast<std::size_t>(~entry.child), &buffer), entry.groups);
-      continue;
+    if (deadline->passed_now_and_then(kStepsBetweenLooks)) return;
+    if constexpr (!std::is_same_v<Index, ThinnedCloud>) {
+      if (entry.child < 0) {
+        visit(index.tile(static_cast<std::size_t>(~entry.child), &buffer.tile), entry.groups);
+        continue;
+      }
     }
     const BoxNode& node = index.nodes()[static_cast<std::size_t>(entry.child)];
+    if constexpr (std::is_same_v<Index, ThinnedCloud>) {
+      if (ThinnedCloud::is_leaf(node)) {
+        VisitLeaf(index, entry.child, link, entry.groups, limit, &buffer.tile, visit);
+        continue;
+      }
+    }
     std::array<Entry, kWidth> found{};
     std::uint32_t any = FindChildren(node, link, entry.groups, limit, &found);
     const std::size_t first = stack.size();

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/cloud/point_bvh.h"
 #include "internal/geometry/relative_pose.h"
 #include "repulsion/blend_kernel.h"
 #include "repulsion/coarse_spheres.h"
@@ -28,22 +29,21 @@ PosedSpheres posed(const std::vector<SphereGroup>& groups, const Eigen::Isometry
   return spheres;
 }
 
-// Calls visit(index, spheres, R_FO, grid) for each thinned cloud and each map: the link's spheres
-// are in the frame O of the index, and the grid is the one that the cloud was thinned to.
+// Calls visit(index, spheres, R_FO) for each thinned cloud and each map: the link's spheres are in
+// the frame O of the index.
 template <typename Visit>
 void for_each_index(SnapshotSpan clouds, const std::vector<SphereGroup>& groups,
                     const Eigen::Isometry3d& X_FL, const Visit& visit) {
-  const ThinningGrid no_grid(Eigen::Vector3d::Zero(), 1.0);
   for (const CloudSnapshot* cloud : clouds) {
     if (cloud == nullptr) continue;
-    if (!cloud->coarse.empty()) {
-      const Eigen::Isometry3d& X_FO = cloud->coarse.X_FO();
-      visit(cloud->coarse.bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(),
-            ThinningGrid(X_FO.translation(), cloud->thinning));
+    const ThinnedCloud thinned = cloud->index.bvh().thinned();
+    if (!thinned.empty()) {
+      const Eigen::Isometry3d& X_FO = thinned.X_FO();
+      visit(thinned, posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear());
     }
     if (cloud->boxes == nullptr || cloud->boxes->empty()) continue;
     const Eigen::Isometry3d X_FO = cloud->X_FM * Eigen::Translation3d(cloud->boxes->origin());
-    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear(), no_grid);
+    visit(cloud->boxes->bvh(), posed(groups, relative_pose(X_FO, X_FL)), X_FO.linear());
   }
 }
 
@@ -80,6 +80,15 @@ double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig&
   return std::clamp(1.0 - proximity.distance / config.influence_distance, 0.0, 1.0);
 }
 
+RepulsiveWrench nearest_repulsion(const Eigen::Isometry3d& X_FL, const LinkProximity& proximity,
+                                  const RepulsionConfig& config) {
+  if (proximity.state == LinkState::kUnknown) return RepulsiveWrench::unknown();
+  const double strength = repulsion_strength(proximity, config);
+  if (!(strength > 0.0)) return {};
+  const Eigen::Vector3d arm = proximity.p_FCl - X_FL.translation();
+  return scaled({proximity.direction, arm.cross(proximity.direction)}, config.gain * strength);
+}
+
 struct Repulsion::Spheres {
   std::vector<std::vector<SphereGroup>> by_link;  // of at most kCoarseSpheres spheres
 };
@@ -95,28 +104,30 @@ Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
 
 RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_FL,
                                   SnapshotSpan clouds, const LinkProximity& proximity,
-                                  const RepulsionConfig& config) const {
-  if (proximity.state == LinkState::kUnknown) return RepulsiveWrench::unknown();
+                                  const RepulsionConfig& config, TimePoint end) const {
+  const bool has_link = link < spheres_->by_link.size();
+  if (proximity.state == LinkState::kUnknown || !has_link) return RepulsiveWrench::unknown();
   const double strength = repulsion_strength(proximity, config);
   if (!(strength > 0.0)) return {};
+  Deadline deadline(end);
+  if (deadline.passed()) return RepulsiveWrench::unknown();
 
   const std::vector<SphereGroup>& groups = spheres_->by_link[link];
   float nearest = std::numeric_limits<float>::infinity();
   for_each_index(clouds, groups, X_FL,
-                 [&nearest](const auto& index, const PosedSpheres& spheres, const auto&,
-                            const auto&) { nearest = nearest_pair(index, spheres, nearest); });
+                 [&](const auto& index, const PosedSpheres& spheres, const auto&) {
+                   nearest = nearest_pair(index, spheres, nearest, &deadline);
+                 });
+  if (deadline.has_passed()) return RepulsiveWrench::unknown();
   const double length = config.gain * strength;
-  if (!std::isfinite(nearest)) {
-    const Eigen::Vector3d arm = proximity.p_FCl - X_FL.translation();
-    return scaled({proximity.direction, arm.cross(proximity.direction)}, length);
-  }
+  if (!std::isfinite(nearest)) return nearest_repulsion(X_FL, proximity, config);
   Total total{proximity.direction, {}, 0.0};
   const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
   for_each_index(clouds, groups, X_FL,
-                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO,
-                     const ThinningGrid& grid) {
-                   total.add(blend_pairs(index, spheres, {nearest, smoothing, grid}), R_FO);
+                 [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO) {
+                   total.add(blend_pairs(index, spheres, {nearest, smoothing}, &deadline), R_FO);
                  });
+  if (deadline.has_passed()) return RepulsiveWrench::unknown();
   return scaled(total.wrench, length / total.weight);
 }
 

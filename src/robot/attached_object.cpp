@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "internal/bvh/build_id.h"
 #include "internal/geometry/limits.h"
 #include "ist_proximity/geometry/error.h"
 
@@ -56,6 +57,7 @@ std::shared_ptr<const RobotModel> rebuild_link(const RobotModel& model,
     return std::find(names.begin(), names.end(), link) != names.end();
   };
   auto result = std::make_shared<RobotModel>(model);
+  result->geometry_id = next_build_id();
   auto& links = result->links;
   const auto old = std::find_if(links.begin(), links.end(),
                                 [&](const LinkModel& other) { return other.name == link; });

@@ -1,6 +1,6 @@
 #include "ist_proximity/robot/kinematics.h"
 
-#include <cassert>
+#include <limits>
 
 namespace ist {
 namespace {
@@ -14,8 +14,11 @@ bool moves(const Kinematics::Joint& joint) {
 void point_jacobian(const Kinematics& kinematics, Span<const Eigen::Isometry3d> X_FB,
                     std::size_t body, const Eigen::Vector3d& p_FP, Jacobian* J) {
   const auto& joints = kinematics.joints();
-  assert(X_FB.size() == kinematics.bodies().size() && body < X_FB.size());
   J->setZero(6, static_cast<Eigen::Index>(joints.size()));
+  if (X_FB.size() != kinematics.bodies().size() || body >= X_FB.size()) {
+    J->setConstant(std::numeric_limits<double>::quiet_NaN());
+    return;
+  }
   for (std::size_t at = body; at > 0; at = joints[at - 1].parent) {
     const Kinematics::Joint& joint = joints[at - 1];
     if (!moves(joint)) continue;
@@ -33,7 +36,7 @@ void point_jacobian(const Kinematics& kinematics, Span<const Eigen::Isometry3d> 
 std::optional<std::size_t> first_body_needed(const Kinematics& kinematics,
                                              const std::vector<bool>& known, std::size_t body) {
   const auto& joints = kinematics.joints();
-  assert(known.size() == kinematics.bodies().size() && body < known.size());
+  if (known.size() != kinematics.bodies().size() || body >= known.size()) return body;
   for (std::size_t at = body; at > 0; at = joints[at - 1].parent) {
     if (!known[at] && (at == body || moves(joints[at - 1]))) return at;
   }

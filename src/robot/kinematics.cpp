@@ -163,9 +163,9 @@ Eigen::Isometry3d Kinematics::joint_pose(std::size_t joint, double q) const {
 }
 
 void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) const {
-  assert(q.size() == joints_.size());
   poses->X_PC.resize(joints_.size(), Eigen::Isometry3d::Identity());
   poses->known.assign(joints_.size(), false);
+  if (q.size() != joints_.size()) return;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const Joint& joint = joints_[j];
     if (joint.has_unstated_pose()) continue;
@@ -182,6 +182,7 @@ void Kinematics::place_bodies(const JointPoses& joints, const Eigen::Isometry3d&
                               BodyPoses* poses) const {
   poses->X_FB.resize(bodies_.size(), Eigen::Isometry3d::Identity());
   poses->known.assign(bodies_.size(), false);
+  if (joints.known.size() != joints_.size() || joints.X_PC.size() != joints_.size()) return;
   poses->X_FB[0] = X_FR;
   poses->known[0] = true;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -196,7 +197,7 @@ std::optional<std::size_t> Kinematics::first_unknown(const JointPoses& poses,
                                                      std::size_t body) const {
   std::optional<std::size_t> first;
   for (; body > 0; body = joints_[body - 1].parent) {
-    if (!poses.known[body - 1]) first = body - 1;
+    if (body > poses.known.size() || !poses.known[body - 1]) first = body - 1;
   }
   return first;
 }

@@ -3,6 +3,18 @@
 #include <utility>
 
 namespace ist {
+namespace {
+
+// By body: the first body of the group that fixed joints connect it with.
+std::vector<std::size_t> rigid_groups(const Kinematics& kinematics) {
+  std::vector<std::size_t> group(kinematics.bodies().size());
+  for (const Kinematics::Joint& joint : kinematics.joints()) {
+    group[joint.child] = joint.type == JointType::kFixed ? group[joint.parent] : joint.child;
+  }
+  return group;
+}
+
+}  // namespace
 
 ForwardKinematics::ForwardKinematics(const RobotModel& model,
                                      std::shared_ptr<const Kinematics> kinematics)
@@ -35,6 +47,19 @@ LinkPoses link_poses(const RobotModel& model, const Kinematics& kinematics,
   // The kinematics outlives this call, so the pointer does not own it.
   const std::shared_ptr<const Kinematics> view(std::shared_ptr<const Kinematics>(), &kinematics);
   return ForwardKinematics(model, view).run(q, X_FR);
+}
+
+std::vector<bool> links_that_move(const RobotModel& model, const Kinematics& kinematics,
+                                  const std::string& body) {
+  std::vector<bool> moves(model.links.size(), true);
+  const auto frame = kinematics.find_body(body);
+  if (!frame) return moves;
+  const std::vector<std::size_t> group = rigid_groups(kinematics);
+  for (std::size_t i = 0; i < moves.size(); ++i) {
+    const auto link = kinematics.find_body(model.links[i].name);
+    moves[i] = !link || group[*link] != group[*frame];
+  }
+  return moves;
 }
 
 }  // namespace ist

@@ -9,8 +9,14 @@
 #include <utility>
 
 #include "internal/packing/packer.h"
+#include "packing_stages.h"
 
 namespace ist {
+
+std::size_t thread_count(int threads) {
+  return threads > 0 ? static_cast<std::size_t>(threads)
+                     : std::max(1U, std::thread::hardware_concurrency());
+}
 
 PackingJobs::PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cache, Report report)
     : jobs_(*jobs),
@@ -24,9 +30,7 @@ PackingJobs::PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cach
 }
 
 bool PackingJobs::run(int threads) {
-  std::size_t count = threads > 0 ? static_cast<std::size_t>(threads)
-                                  : std::max(1U, std::thread::hardware_concurrency());
-  count = std::min(count, jobs_.size());
+  const std::size_t count = std::min(thread_count(threads), jobs_.size());
   std::vector<std::thread> others;
   try {
     while (others.size() + 1 < count) others.emplace_back([this] { work(); });
@@ -65,18 +69,26 @@ void PackingJobs::pack(std::size_t index) {
   const auto start = std::chrono::steady_clock::now();
   bool stopped = false;
   try {
-    std::optional<Packing> cached = cache_.load(
-        job.key, *job.shape, job.config,
-        [&](double) { return !(stopped = stopped || !report(index, 0.0)); }, &job.load_warning);
-    job.from_cache = cached.has_value();
+    std::optional<Packing> cached;
+    if (job.look_in_cache) {
+      cached = cache_.load(
+          job.key, *job.shape, job.config,
+          [&](double) { return !(stopped = stopped || !report(index, 0.0)); }, &job.load_warning);
+    }
+    job.from_cache = job.is_final = cached.has_value();
     if (job.from_cache) {
       job.packing = std::move(*cached);
     } else if (!stopped) {
-      job.packing = pack_element(*job.shape, job.config, [&](double fraction) {
+      job.packing = pack_element(*job.shape, job.stage, [&](double fraction) {
         stopped = stopped || !report(index, fraction);
         return !stopped;
       });
-      if (!stopped) cache_.store(job.key, job.packing, &job.store_warning);
+      job.is_final = is_final_stage(job.packing, job.stage, job.config);
+      PackingCertificate& certificate = job.packing.certificate;
+      job.fell_short = certificate.max_gap > job.stage.max_error &&
+                       job.stage.max_spheres == job.config.max_spheres;
+      certificate.reached = certificate.max_gap <= job.config.max_error;
+      if (!stopped && job.is_final) cache_.store(job.key, job.packing, &job.store_warning);
     }
   } catch (const std::exception& error) {
     job.error = error.what();

@@ -16,17 +16,26 @@ namespace ist {
 /// One distinct shape to pack, and the result.
 struct PackingJob {
   const Shape* shape = nullptr;
-  PackingConfig config;
-  std::string key;
+  PackingConfig config;  ///< of the final packing
+  PackingConfig stage;   ///< what is packed now where the cache does not have the final packing
+  std::string key;       ///< of the final packing
+  bool look_in_cache = true;
   std::size_t link = 0;  ///< the first link that needs it
   double work = 1.0;     ///< relative to other jobs
 
   Packing packing;
+  /// The stage has not reached its error although it had all spheres: a limit of the packing, after
+  /// which only the final stage is left.
+  bool fell_short = false;
+  bool is_final = false;  ///< `packing` is the final one; only such are kept in the cache
   bool from_cache = false;
   double time = 0.0;  ///< [s]
   std::string error;  ///< why there is no packing
   std::string load_warning, store_warning;
 };
+
+/// How many threads a setting means; 0: as many as there are cores.
+std::size_t thread_count(int threads);
 
 /// Packs shapes on several threads, the most work first, through the cache.
 class PackingJobs {

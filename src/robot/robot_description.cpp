@@ -18,6 +18,21 @@
 namespace ist {
 namespace {
 
+// The name of the first element that xacro would replace; null: there is none. xacro's elements
+// stand anywhere, and urdfdom leaves out what it does not know: a link would lose its geometry.
+const char* find_xacro(const tinyxml2::XMLElement& root) {
+  for (const tinyxml2::XMLElement* at = &root; at != nullptr;) {
+    if (std::string(at->Name()).compare(0, 6, "xacro:") == 0) return at->Name();
+    const tinyxml2::XMLElement* next = at->FirstChildElement();
+    while (next == nullptr && at != &root) {
+      next = at->NextSiblingElement();
+      if (next == nullptr) at = at->Parent()->ToElement();
+    }
+    at = next;
+  }
+  return nullptr;
+}
+
 const tinyxml2::XMLElement& robot_element(const std::string& urdf_xml,
                                           tinyxml2::XMLDocument* document) {
   if (urdf_xml.find_first_not_of(" \t\r\n") == std::string::npos) {
@@ -26,6 +41,13 @@ const tinyxml2::XMLElement& robot_element(const std::string& urdf_xml,
   if (urdf_xml.size() > kMaxDescriptionSize) {
     throw ModelError("robot description has " + std::to_string(urdf_xml.size()) +
                      " bytes; allowed are at most " + std::to_string(kMaxDescriptionSize));
+  }
+  const std::size_t first = urdf_xml.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+  if (first != std::string::npos && urdf_xml[first] != '<') {
+    throw ModelError("robot description is not well-formed XML: it begins with '" +
+                     printable(urdf_xml.substr(first, 60)) +
+                     "'; it must hold the URDF itself, not a file's name: in a launch file <param "
+                     "name=\"robot_description\" textfile=\"FILE\"/>, or command=\"xacro FILE\"");
   }
   if (document->Parse(urdf_xml.c_str(), urdf_xml.size()) != tinyxml2::XML_SUCCESS) {
     throw ModelError(std::string("robot description is not well-formed XML: ") +
@@ -37,12 +59,10 @@ const tinyxml2::XMLElement& robot_element(const std::string& urdf_xml,
     throw ModelError(std::string("robot description is no URDF: its root element is <") +
                      printable(root->Name()) + ">, not <robot>");
   }
-  for (const auto* child = root->FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    if (std::string(child->Name()).compare(0, 6, "xacro:") == 0) {
-      throw ModelError(std::string("robot description holds <") + child->Name() +
-                       ">; it must be processed by xacro first");
-    }
+  if (const char* element = find_xacro(*root)) {
+    throw ModelError("robot description holds <" + printable(element) +
+                     ">; it must be processed by xacro first: `xacro FILE > robot.urdf`, or in a "
+                     "launch file <param name=\"robot_description\" command=\"xacro FILE\"/>");
   }
   return *root;
 }

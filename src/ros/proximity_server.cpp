@@ -15,13 +15,17 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stop_signal.h"
+#include "ros/common/stopwatch.h"
+#include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
 #include "ros/model/contact_loader.h"
+#include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
 #include "ros/output/message_invariants.h"
+#include "ros/output/message_pool.h"
 #include "ros/output/result_publisher.h"
 #include "ros/output/sphere_publisher.h"
 #include "ros/parameters/live_parameters.h"
@@ -30,6 +34,8 @@
 #include "ros/poses/make_pose_source.h"
 #include "ros/poses/transform_buffer.h"
 #include "ros/poses/transform_listener.h"
+#include "ros/poses/transforms.h"
+#include "ros/poses/usual_period.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
@@ -42,6 +48,10 @@ using Clock = std::chrono::steady_clock;
 
 // A cycle runs at least this often with pose_source joint_states.
 constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
+constexpr double kLongestPeriod = 0.1;  // [s] the same
+
+// Whether the robot's root stands still is asked this often where the URDF does not say it.
+constexpr std::chrono::seconds kRootPeriod(1);
 
 }  // namespace
 
@@ -66,10 +76,14 @@ class ProximityServer::Impl {
   void publish_failure(const std::string& fault);
   void notice_clock_jump(const ros::Time& now);
   void take_model();
+  void choose_counted_links();
+  void notice_standing_root();
+  void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
   void run_diagnostics();
   void publish_diagnostics();
   LiveConfig live_config() const;
+  double period() const;
 
   const ServerConfig config_;
   ros::NodeHandle nh_, private_nh_;
@@ -87,6 +101,7 @@ class ProximityServer::Impl {
   StopSignal cycle_signal_;  ///< joint states are its events
   StopSignal diagnostics_signal_;
   std::atomic<std::uint64_t> joint_states_received_{0};
+  UsualPeriod joint_state_period_{kLongestPeriod};
   std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
 
   std::mutex report_mutex_;
@@ -95,7 +110,12 @@ class ProximityServer::Impl {
   // Used by the cycle thread alone.
   std::shared_ptr<const ModelState> model_;
   std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
+  MessagePool<ist_proximity::ProximityArray> messages_;
   double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
+  CountedLinks counted_;
+  bool root_stands_still_ = false;  ///< in a fixed frame that the URDF lacks
+  Clock::time_point next_root_check_;
+  double region_radius_ = 0.0;  ///< [m] the largest of this robot
   ros::Time last_now_;
   ros::Time last_stamp_;  ///< of the last ~proximity
 
@@ -125,6 +145,7 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
       ++joint_states_received_;
+      joint_state_period_.note(Clock::now());
       cycle_signal_.notify();
     });
   }
@@ -192,39 +213,48 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
-  results_.publish(message, [](ist_proximity::JointRepulsion*) {});
+  results_.publish(message, nullptr, live_.get().speed_scale,
+                   [](ist_proximity::JointRepulsion*) {});
 }
 
 void ProximityServer::Impl::run_cycle() {
   const ros::Time now = ros::Time::now();
   notice_clock_jump(now);
   take_model();
+  notice_standing_root();
   spheres_.repeat_when_due();
-  const auto message = boost::make_shared<ist_proximity::ProximityArray>();
+  const auto message = messages_.take();
   const std::string transform_problem = listener_.problem();
-  const LiveConfig live = live_config();
+  LiveConfig live = live_config();
+  live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
+  if (cycle_) cycle_->run(now, sources_, live, transform_problem, message.get());
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report_.transform_problem = transform_problem;
     if (cycle_) {
-      cycle_->run(now, sources_, live, message.get(), &report_);
+      cycle_->report(*message, &report_);
     } else {
       fill_without_model(*model_, config_, std::max(now, last_stamp_), sources_, message.get(),
                          &report_);
     }
-    last_stamp_ = message->header.stamp;
     ++report_.cycles;
   }
+  last_stamp_ = message->header.stamp;
   assert_invariants(*message,
                     {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
   const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
     if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
   };
-  if (results_.publish(message, fill_joint_repulsion)) {
-    const std::lock_guard<std::mutex> lock(report_mutex_);
-    ++report_.markers_drawn;
-  }
+  Stopwatch watch;
+  spheres_.show_nearness(*message, config_.query.max_distance);
+  const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
+  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
+  const std::lock_guard<std::mutex> lock(report_mutex_);
+  if (drawn) ++report_.markers_drawn;
+  if (cycle_) report_.parts[kPartPublish].add(watch.lap());
+  report_.min_distance = results_.summary().min_distance();
+  report_.speed_scale = results_.summary().summary();
 }
 
 /// Tells the parts that do not notice a backward jump of the clock themselves.
@@ -233,6 +263,7 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
   if (now < last_now_) {
     last_stamp_ = ros::Time();
     if (cycle_) cycle_->forget();
+    results_.summary().forget();
     spheres_.repeat_after_clock_jump();
   }
   last_now_ = now;
@@ -242,7 +273,9 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
 void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
+  if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
   model_ = std::move(model);
+  region_radius_ = 0.0;
   if (model_->phase == ModelState::Phase::kReady) {
     cycle_ = std::make_unique<ProximityCycle>(
         model_, config_,
@@ -262,6 +295,58 @@ void ProximityServer::Impl::take_model() {
   if (self_proximity_) self_proximity_->set_model(model_);
   spheres_.show(*model_);
   set_source_targets(live_.get().query);
+  root_stands_still_ = false;
+  next_root_check_ = Clock::time_point();
+  choose_counted_links();
+}
+
+/// Decides which links count in ~min_distance and ~speed_scale, and tells it where it is new.
+void ProximityServer::Impl::choose_counted_links() {
+  const CountedLinks before = std::move(counted_);
+  counted_ = counted_links(*model_, config_, root_stands_still_);
+  results_.summary().set_links(counted_);
+  std::string problem = counted_.problem;
+  if (model_->robot) {
+    const std::vector<std::string> missing =
+        SpeedScale(counted_.links).unknown_links(live_.get().speed_scale);
+    if (!missing.empty() && config_.speed_scale_enabled) {
+      problem += (problem.empty() ? "" : "; ") +
+                 ("~speed_scale/links names '" + join(missing, "', '")) +
+                 "', which is no monitored link: ~speed_scale stays 0";
+    }
+  }
+  const std::lock_guard<std::mutex> lock(report_mutex_);
+  if (!problem.empty() && problem != report_.counted_problem) ROS_WARN_STREAM(problem);
+  if (!counted_.explanation.empty() && counted_.explanation != before.explanation) {
+    ROS_INFO_STREAM(counted_.explanation);
+  }
+  report_.counted_problem = problem;
+  report_.counted_links = counted_.explanation;
+}
+
+/// A fixed frame outside of the URDF: the root stands still in it where tf says so for ever.
+void ProximityServer::Impl::notice_standing_root() {
+  if (!model_->robot || Clock::now() < next_root_check_) return;
+  if (!has_frame_outside(*model_, config_)) return;
+  next_root_check_ = Clock::now() + kRootPeriod;
+  Eigen::Isometry3d ignored;
+  ros::Time stamp;
+  const bool stands = look_up(buffer_, fixed_frame_of(*model_, config_), model_->root_link,
+                              ros::Time(), &ignored, &stamp)
+                          .empty() &&
+                      stamp.isZero();
+  if (stands == root_stands_still_) return;
+  root_stands_still_ = stands;
+  choose_counted_links();
+}
+
+/// Hands finer packings of the same robot to all parts, which go on with what they know.
+void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model) {
+  model_ = std::move(model);
+  cycle_->refine(model_);
+  query_service_->set_model(model_);
+  if (self_proximity_) self_proximity_->set_model(model_);
+  set_source_targets(live_.get().query);
 }
 
 /// Tells the sources the model, the fixed frame and the region of interest.
@@ -274,6 +359,8 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   if (computes_poses && model_->robot && model_->kinematics) {
     region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
                                 query.max_distance + query.margin);
+    // Clouds that were cropped before serve finer packings, too.
+    region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }
   for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
@@ -294,11 +381,19 @@ void ProximityServer::Impl::publish_diagnostics() {
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report = report_;
+    report_.worst_deadline = DeadlineCost();
   }
   report.parameter_problem = live_.problem();
+  report.parameters_without_effect = live_.without_effect();
+  spheres_.show_finer(*loader_.state());
   if (joint_states_) report.joint_states = joint_states_->report();
   diagnostics_.publish(report, *loader_.state(), contact_loader_.contacts().get(),
                        joint_states_received_);
+}
+
+/// [s] From one cycle to the next.
+double ProximityServer::Impl::period() const {
+  return joint_states_ ? joint_state_period_.seconds() : 1.0 / config_.rate;
 }
 
 LiveConfig ProximityServer::Impl::live_config() const {

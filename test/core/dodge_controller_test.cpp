@@ -25,6 +25,7 @@ class DodgeController : public ::testing::Test {
     reading.is_ok = true;
     reading.message_age = 0.005;
     reading.cloud_age = 0.1;
+    reading.speed_scale = 1.0;
     reading.links.push_back(clear());
   }
 
@@ -126,13 +127,19 @@ TEST_F(DodgeController, StepsAside) {
   EXPECT_NEAR((run() - dq).norm(), 0.0, 1e-9);
 }
 
-TEST_F(DodgeController, SlowsDownByTheSmallestBound) {
-  goal[5] += 1.0;  // turns the wrist; the obstacle is not in its way
-  reading.links = {near(config.stop_distance, {1.0, 0.0, 0.0})};
-  reading.links[0].p_LCl = {0.0, 0.0, 0.05};
-  EXPECT_NEAR(run()[5], 0.0, 0.02);
-  reading.links[0].lower_bound = config.slow_distance;
-  EXPECT_NEAR(run()[5], config.task_speed, 1e-6);
+TEST_F(DodgeController, TheSpeedScaleSlowsTheTaskAndNotTheEvasion) {
+  goal[5] += 1.0;
+  for (const double scale : {0.0, 0.3, 1.0}) {
+    reading.speed_scale = scale;
+    EXPECT_NEAR(run()[5], scale * config.task_speed, 1e-9);
+  }
+  for (const double wrong : {kNan, -1.0, 7.0}) {
+    reading.speed_scale = wrong;
+    EXPECT_NEAR(run()[5], wrong > 0.0 ? config.task_speed : 0.0, 1e-9) << wrong;
+  }
+  reading.speed_scale = 0.0;
+  reading.links = {near(0.06, {0.0, 0.0, 0.3})};
+  EXPECT_GT(speed_along(reading.links[0], run()), 0.3);
 }
 
 TEST_F(DodgeController, LinksThatCannotMoveDoNotCount) {

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "support/instruction_sets.h"
+#include "support/scene.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -140,7 +141,7 @@ Eigen::Isometry3d pose(double x, double y, double z) {
 TEST(Ingest, emptyCloud) {
   const CloudSnapshot snapshot = ingest({});
   EXPECT_TRUE(snapshot.index.empty());
-  EXPECT_TRUE(snapshot.coarse.empty());
+  EXPECT_TRUE(snapshot.index.bvh().thinned().empty());
   EXPECT_FALSE(snapshot.counts.saw_nothing())
       << "an empty cloud is a measurement without obstacles";
 }
@@ -337,6 +338,21 @@ void expect_hierarchy(const PointIndex& point_index, float slack = 0.0F) {
   }
 }
 
+// Tiles that the self-filter has taken points from have new boxes. One that is smaller than its
+// points makes queries pass them by.
+TEST(Ingest, boxesHoldWhatTheSelfFilterLeaves) {
+  const auto model = test::make_model({Sphere{0.5}}, 0.02);
+  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
+  const Message message(random_points(20000, 1.0, 4), {});
+  IngestConfig config = without_limits();
+  config.self_filter = true;
+  CloudSnapshot snapshot;
+  Ingest(config).run(message.raw, pose(0.2, 0.0, 0.0), {solid}, 0.0, &snapshot);
+  EXPECT_GT(snapshot.counts.on_robot, 500U);
+  EXPECT_GT(snapshot.counts.used, 10000U);
+  expect_hierarchy(snapshot.index);
+}
+
 // The two indices have different frames, so their points are rounded to float differently.
 void expect_same(const std::map<std::uint32_t, Eigen::Vector3d>& a,
                  const std::map<std::uint32_t, Eigen::Vector3d>& b) {
@@ -516,7 +532,7 @@ TEST(Ingest, thinnedCloudCanBeLeftOut) {
   config.thin = false;
   const CloudSnapshot snapshot = ingest(random_points(1000, 1.0, 3), config);
   EXPECT_FALSE(snapshot.index.empty());
-  EXPECT_TRUE(snapshot.coarse.empty());
+  EXPECT_TRUE(snapshot.index.bvh().thinned().empty());
 }
 
 // A sensor that tf places at 10^16 m: coordinates there are whole metres, so no bound means
@@ -590,7 +606,6 @@ TEST(Ingest, farOutliersDoNotMoveTheOrigin) {
 TEST(Ingest, originIsOnWholeMetres) {
   const CloudSnapshot snapshot = ingest(random_points(50, 1.0, 7), {}, {}, pose(1.4, -2.6, 0.2));
   EXPECT_EQ(snapshot.index.X_FO().translation(), Eigen::Vector3d(1, -3, 0));
-  EXPECT_EQ(snapshot.coarse.X_FO().translation(), snapshot.index.X_FO().translation());
 }
 
 // The formats cover every code path that reads points: float or double, organized or unorganized,
@@ -685,11 +700,9 @@ TEST(Ingest, buffersAreReused) {
   ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
   PointTile scratch;
   const PointTile* tiles = &snapshot.index.bvh().tile(0, &scratch);
-  const PointTile* coarse = &snapshot.coarse.bvh().tile(0, &scratch);
   const auto expected = points_by_id(snapshot.index);
   for (int i = 0; i < 3; ++i) ingest.run(message.raw, pose(0, 0, 0), {}, 0.0, &snapshot);
   EXPECT_EQ(&snapshot.index.bvh().tile(0, &scratch), tiles);
-  EXPECT_EQ(&snapshot.coarse.bvh().tile(0, &scratch), coarse);
   EXPECT_EQ(points_by_id(snapshot.index), expected);
 }
 
@@ -716,7 +729,7 @@ void check_cells() {
     const auto [it, is_new] = nearest.emplace(cell, candidate);
     if (!is_new) it->second = std::min(it->second, candidate);
   }
-  const auto thin = points_by_id(snapshot.coarse);
+  const auto thin = test::thinned_points_of(snapshot.index);
   EXPECT_EQ(thin.size(), nearest.size());
   for (const auto& [cell, best] : nearest) {
     ASSERT_EQ(thin.count(best.second), 1U);
@@ -735,7 +748,7 @@ TEST(Thinning, doesNotDependOnTheOrderOfPoints) {
   points.insert(points.end(), points.begin(), points.begin() + 100);  // duplicates
   const auto coordinates = [&config](const Points& cloud) {
     std::set<std::vector<double>> set;
-    for (const auto& [id, p] : points_by_id(ingest(cloud, config).coarse)) {
+    for (const auto& [id, p] : test::thinned_points_of(ingest(cloud, config).index)) {
       set.insert({p.x(), p.y(), p.z()});
     }
     return set;
@@ -755,7 +768,8 @@ TEST(Thinning, gridStaysWhenTheSensorMoves) {
     Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
     X_FS.translation() = sensor;
     std::set<std::uint32_t> ids;
-    for (const auto& [id, p] : points_by_id(ingest(points_S, config, float64(), X_FS).coarse)) {
+    for (const auto& [id, p] :
+         test::thinned_points_of(ingest(points_S, config, float64(), X_FS).index)) {
       ids.insert(id);
     }
     return ids;
@@ -763,13 +777,44 @@ TEST(Thinning, gridStaysWhenTheSensorMoves) {
   EXPECT_EQ(thinned({0, 0, 0}), thinned({0.25, -7.5, 3.75}));
 }
 
-TEST(Thinning, voxelsGrowUntilTheyCanBeNumbered) {
+// A grid that has to number all voxels from its origin to a point at 1e9 m in 30 bits has voxels of
+// 0.93 m: the wall below was thinned to a few points.
+void check_far_point(double far) {
   IngestConfig config = without_limits();
-  config.thinning = 1e-6;
+  config.thinning = 0.01;
+  Points points;
+  for (int i = -50; i < 50; ++i) {
+    for (int k = -50; k < 50; ++k) {
+      const Eigen::Vector3d centre(0.01 * i + 0.005, 0.01 * k + 0.005, 0.205);
+      points.push_back(centre);
+      points.push_back(centre + Eigen::Vector3d(0.002, -0.003, 0.001));
+    }
+  }
+  const auto near = test::thinned_points_of(ingest(points, config, float64()).index);
+  ASSERT_EQ(near.size(), 10000U);
+  points.emplace_back(0.6 * far, -0.8 * far, 0.0);
+  points.emplace_back(-0.6 * far, 0.8 * far, 0.0);
+  const CloudSnapshot snapshot = ingest(points, config, float64());
+  ASSERT_EQ(snapshot.counts.used, 20002U);
+  const auto all = test::thinned_points_of(snapshot.index);
+  EXPECT_EQ(all.size(), 10002U) << "points at " << far << " m";
+  for (const auto& [id, p] : near) EXPECT_EQ(all.count(id), 1U) << "point " << id;
+  EXPECT_EQ(snapshot.thinning, 0.01);
+}
+
+TEST(Thinning, pointsFarAwayChangeNothingForTheOthers) {
+  for (const double far : {1e3, 1.07e7, 1.1e7, 1e9}) {
+    test::for_each_instruction_set([far] { check_far_point(far); });
+  }
+}
+
+TEST(Thinning, twoPointsAreTwoVoxelsAtTheFinestEdge) {
+  IngestConfig config = without_limits();
+  config.thinning = 1e-9;
   const CloudSnapshot snapshot =
-      ingest({{1e8, 0, 0}, {-1e8, 0, 0}, {0, 0, 1}, {0, 0, 1.000001}}, config, float64());
+      ingest({{1e9, 0, 0}, {-1e9, 0, 0}, {0, 0, 1}, {0, 0, 1.000001}}, config, float64());
   EXPECT_EQ(snapshot.counts.used, 4U);
-  EXPECT_EQ(snapshot.coarse.size(), 3U);
+  EXPECT_EQ(test::thinned_points_of(snapshot.index).size(), 4U);
 }
 
 }  // namespace

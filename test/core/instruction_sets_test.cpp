@@ -148,7 +148,7 @@ TEST_F(InstructionSets, SameRepulsion) {
       std::vector<Eigen::Vector3d> points(static_cast<std::size_t>(1 + 10 * scene));
       for (Eigen::Vector3d& p : points) p = test::random_vector(&rng, 0.3);
       cloud = test::make_snapshot(points);
-      cloud.coarse = cloud.index;
+      cloud.index.bvh().set_thinning(cloud.thinning);
     } else {
       std::vector<Eigen::AlignedBox3d> boxes(static_cast<std::size_t>(1 + scene));
       for (Eigen::AlignedBox3d& box : boxes) box = test::random_leaf(&rng, 0.8, 0.02, 4);

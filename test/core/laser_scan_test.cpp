@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "support/meshes.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"
@@ -154,6 +159,69 @@ TEST(LaserScan, SelfFilterKnowsTheRobotAtEveryInstant) {
   }
   EXPECT_EQ(both.counts.on_robot, on_robot);
   EXPECT_GT(both.counts.on_robot, first.counts.on_robot);
+}
+
+// A beam is compared with where the robot was when it was measured. An obstacle is no point on the
+// robot because a link is there at another time of the scan.
+TEST(LaserScan, SelfFilterComparesABeamWithTheRobotOfItsTime) {
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  const std::vector<float> ranges(101, 1.0F);
+  ScanPoints points;
+  to_points(scan_of(ranges), 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
+  IngestConfig config = test::whole_cloud();
+  config.self_filter = true;
+  Ingest ingest(config);
+  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
+  solid.X_FL.translation().x() = 1.0;
+  for (const auto& [first, last] : {std::pair<int, int>{0, 100}, {0, 50}, {51, 100}, {48, 49}}) {
+    solid.first_point = static_cast<std::uint32_t>(first);
+    solid.last_point = static_cast<std::uint32_t>(last);
+    CloudSnapshot snapshot;
+    ingest.run(points.raw(), Eigen::Isometry3d::Identity(), {solid}, 0.0, &snapshot);
+    const auto kept = by_beam(snapshot, ranges.size());
+    for (int i = 0; i < 101; ++i) {
+      const double angle = -1.5 + 0.03 * i;
+      const Eigen::Vector3d p(std::cos(angle), std::sin(angle), 0);
+      const bool expected =
+          (p - Eigen::Vector3d::UnitX()).norm() <= 0.12 && i >= first && i <= last;
+      EXPECT_EQ(kept[static_cast<std::size_t>(i)].array().isNaN().all(), expected) << i;
+    }
+  }
+}
+
+// A scan of ten seconds has 400 instants. Its 50,000 beams were compared with every link at each of
+// them, which took 200 times as long as with one.
+TEST(LaserScan, SelfFilterOfALongScanIsBounded) {
+  const auto model = test::make_model({test::l_shape(0.4, 0.1)}, 0.005);
+  const std::vector<float> ranges(20000, 0.45F);
+  LaserScan scan = scan_of(ranges);
+  scan.angle_increment = 3.0 / 20000;
+  ScanPoints points;
+  to_points(scan, 0.0, 5.0, Eigen::Isometry3d::Identity(), &points);
+  IngestConfig config = test::whole_cloud();
+  config.self_filter = true;
+  Ingest ingest(config);
+  const auto seconds = [&](std::uint32_t poses) {
+    std::vector<PosedSolid> robot;
+    for (std::uint32_t i = 0; i < poses; ++i) {
+      PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
+      solid.X_FL.linear() =
+          Eigen::AngleAxisd(6.0 * i / poses, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      solid.first_point = i * 20000 / poses;
+      solid.last_point = (i + 1) * 20000 / poses;
+      robot.push_back(solid);
+    }
+    CloudSnapshot snapshot;
+    double least = std::numeric_limits<double>::infinity();
+    for (int run = 0; run < 3; ++run) {
+      ingest.run(points.raw(), Eigen::Isometry3d::Identity(), robot, 0.0, &snapshot);
+      least = std::min(least, snapshot.ingest_time);
+    }
+    return least;
+  };
+  const double one = seconds(1), many = seconds(400);
+  std::printf("400 poses take %.1f times as long as one (%.1f ms)\n", many / one, 1e3 * one);
+  EXPECT_LT(many, 20.0 * one);
 }
 
 TEST(CheckScan, NamesTheFaultyMember) {

@@ -124,5 +124,15 @@ TEST_F(PackRobotTest, reportsAFaultyLinkAndPacksTheOthers) {
   EXPECT_NE(said_.find("good"), std::string::npos) << said_;
 }
 
+// It said that the file "cannot be read as a mesh".
+TEST_F(PackRobotTest, xacroIsNamedAsSuch) {
+  const std::string xacro = file("arm.urdf.xacro");
+  std::ofstream(xacro) << "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" name=\"a\"/>";
+  EXPECT_NE(run(xacro), 0);
+  EXPECT_NE(said_.find("is a xacro file; expand it first: xacro '" + xacro + "' > robot.urdf"),
+            std::string::npos)
+      << said_;
+}
+
 }  // namespace
 }  // namespace ist

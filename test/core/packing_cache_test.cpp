@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -100,6 +101,34 @@ TEST_F(PackingCacheTest, storingAgainReplaces) {
   store(other);
   std::string warning;
   expect_equal(cache_.load_unchecked(kKey, kManySpheres, &warning).value(), other);
+}
+
+// A writer that is killed leaves its temporary file, which nothing ever read or removed.
+TEST_F(PackingCacheTest, storingRemovesWhatKilledWritersHaveLeft) {
+  const fs::path folder = store(sample_packing()).parent_path();
+  const auto now = fs::file_time_type::clock::now();
+  const auto add = [&](const std::string& name, std::chrono::minutes age) {
+    std::ofstream(folder / name) << "cut off";
+    fs::last_write_time(folder / name, now - age);
+  };
+  using std::chrono::minutes;
+  add(kKey + ".istpack.4711.0.1700000000.tmp", minutes(61));
+  add("another.istpack.4711.1.1700000000.tmp", minutes(60 * 24 * 400));
+  add(kKey + ".istpack.4712.0.1700000001.tmp", minutes(55));  // may still be written
+  add("notes.tmp", minutes(60 * 24));                         // not ours
+  add("another.istpack", minutes(60 * 24));
+  fs::create_directory(folder / "a.istpack.b.tmp");
+  fs::last_write_time(folder / "a.istpack.b.tmp", now - minutes(61));
+  std::string warning;
+  EXPECT_TRUE(cache_.store(kKey, sample_packing(), &warning)) << warning;
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    names.insert(entry.path().filename().string());
+  }
+  const std::set<std::string> expected = {kKey + ".istpack",
+                                          kKey + ".istpack.4712.0.1700000001.tmp", "notes.tmp",
+                                          "another.istpack", "a.istpack.b.tmp"};
+  EXPECT_EQ(names, expected);
 }
 
 TEST_F(PackingCacheTest, anAbsentFileIsNoWarning) {

@@ -47,7 +47,7 @@ CloudSnapshot cloud_of(const std::vector<Vector3d>& points, const Vector3d& orig
   }
   CloudSnapshot cloud;
   cloud.index.build(origin, x.data(), y.data(), z.data(), id.data(), x.size());
-  cloud.coarse = cloud.index;
+  cloud.index.bvh().set_thinning(cloud.thinning);
   return cloud;
 }
 
@@ -76,14 +76,11 @@ struct Weighted {
 // The thinned points of a cloud, each weighted by how much of its cell a surface through it covers.
 std::vector<Weighted> weighted_points(const CloudSnapshot& cloud) {
   std::vector<Weighted> all;
-  for (const PointTile& tile : test::tiles_of(cloud.coarse)) {
-    for (int k = 0; k < tile.count; ++k) {
-      const Vector3d p = cloud.coarse.X_FO() * tile.point(static_cast<int>(k));
-      const Vector3d cells = p / cloud.thinning;
-      const Vector3d off = cells - cells.array().floor().matrix() - Vector3d::Constant(0.5);
-      const double section = 1.0 - off.squaredNorm() / 0.75;
-      all.push_back({p, 0.01 + 0.99 * section * section});
-    }
+  for (const auto& [id, p] : test::thinned_points_of(cloud.index)) {
+    const Vector3d cells = p / cloud.thinning;
+    const Vector3d off = cells - cells.array().floor().matrix() - Vector3d::Constant(0.5);
+    const double section = 1.0 - off.squaredNorm() / 0.75;
+    all.push_back({p, 0.01 + 0.99 * section * section});
   }
   return all;
 }
@@ -350,8 +347,11 @@ TEST(Repulsion, spheresOfRadiusZeroCount) {
 TEST(Repulsion, severalCloudsAreOneObstacle) {
   const std::vector<InnerSphere> spheres = bar();
   const Repulsion repulsion(robot_of(spheres));
-  const std::vector<Vector3d> a = wall({0, 0, 0}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
-  const std::vector<Vector3d> b = wall({-0.2, 0, 0.2}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01);
+  // No point lies on the side of a voxel, and no voxel holds points of both walls.
+  const std::vector<Vector3d> a =
+      wall({0.004, 0.004, 0.004}, Vector3d::UnitX(), Vector3d::UnitY(), 0.01);
+  const std::vector<Vector3d> b =
+      wall({-0.206, 0.004, 0.204}, Vector3d::UnitY(), Vector3d::UnitZ(), 0.01);
   std::vector<Vector3d> all = a;
   all.insert(all.end(), b.begin(), b.end());
   const CloudSnapshot cloud = cloud_of(all), cloud_a = cloud_of(a, {2, 0, 1}),

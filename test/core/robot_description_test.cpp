@@ -237,6 +237,10 @@ TEST(RobotDescription, refusesTextThatIsNoUrdf) {
   expect_says(structure_error(""), "empty");
   expect_says(structure_error(" \n"), "empty");
   expect_says(structure_error("not XML"), "not well-formed");
+  // A file's name in place of its content.
+  expect_says(structure_error("/opt/robot/arm.urdf.xacro"),
+              "begins with '/opt/robot/arm.urdf.xacro'");
+  expect_says(structure_error("/opt/robot/arm.urdf.xacro"), "command=\"xacro FILE\"");
   expect_says(structure_error("<robot name=\"a\"><link name=\"b\">"), "not well-formed");
   expect_says(structure_error("<sdf/>"), "<sdf>");
   expect_says(structure_error("<?xml version=\"1.0\"?>"), "no element");
@@ -245,6 +249,10 @@ TEST(RobotDescription, refusesTextThatIsNoUrdf) {
   expect_says(structure_error(robot("<link/>")), "without a name");
   expect_says(structure_error(robot("<xacro:macro xmlns:xacro=\"x\"/><link name=\"a\"/>")),
               "xacro");
+  // urdfdom leaves out what it does not know: here the geometry of a link.
+  expect_says(structure_error(robot("<link name=\"a\"><collision><xacro:shape "
+                                    "xmlns:xacro=\"x\"/></collision></link><link name=\"b\"/>")),
+              "<xacro:shape>; it must be processed by xacro first: `xacro FILE > robot.urdf`");
   std::string deep;
   for (int i = 0; i < 100000; ++i) deep += "<a>";  // must not exhaust the stack
   expect_says(structure_error(robot(deep)), "not well-formed");

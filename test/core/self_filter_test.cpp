@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <random>
 #include <set>
 
@@ -10,6 +11,7 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "support/allocations.h"
+#include "support/meshes.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -35,6 +37,7 @@ RobotModel coarse_robot() {
   model.links.push_back(link_of("box", Box{{0.3, 0.2, 0.1}}, 0.02));
   model.links.push_back(link_of("cylinder", Cylinder{0.08, 0.4}, 0.02));
   model.links.push_back(link_of("sphere", Sphere{0.12}, 0.02));
+  model.links.push_back(link_of("mesh", test::l_shape(0.3, 0.12), 0.02));
   return model;
 }
 
@@ -175,7 +178,7 @@ TEST(SelfFilter, removesEveryPointOfTheSurface) {
   const CloudSnapshot snapshot = ingest(points, robot, config_with(0.02));
   EXPECT_EQ(snapshot.counts.on_robot, points.size());
   EXPECT_TRUE(snapshot.index.empty());
-  EXPECT_TRUE(snapshot.coarse.empty());
+  EXPECT_TRUE(snapshot.index.bvh().thinned().empty());
   EXPECT_FALSE(snapshot.counts.saw_nothing());
 }
 
@@ -207,6 +210,61 @@ TEST(SelfFilter, canBeSwitchedOff) {
   config.self_filter = false;
   EXPECT_EQ(ingest(cloud_about_the_robot(1000), posed(model), config).counts.on_robot, 0U);
   EXPECT_EQ(ingest(cloud_about_the_robot(1000), {}, config_with(0.02)).counts.on_robot, 0U);
+}
+
+// A depth image of a wall through the robot, with holes: squares of pixels are decided by their
+// boxes where that is possible. The answer is that of each point, also in the counts, and what is
+// far from the robot is not read.
+TEST(SelfFilter, anImageIsDecidedByItsBoxes) {
+  constexpr std::size_t kWidth = 320, kHeight = 240;
+  const RobotModel model = coarse_robot();
+  const PosedRobot robot = posed(model);
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  X_FS.translation() = Eigen::Vector3d(0.1, 0.2, -1.0);
+  std::mt19937 random(5);
+  std::size_t holes = 0;
+  const auto image = std::make_shared<std::vector<float>>();
+  for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
+    const float u = static_cast<float>(i % kWidth) / 160.0F - 1.0F,
+                v = static_cast<float>(i / kWidth) / 160.0F - 0.75F;
+    const bool is_hole = (u > 0.2F && u < 0.25F) || random() % 100 == 0;
+    const float depth = is_hole ? std::nanf("") : 1.1F + 0.3F * u;
+    image->insert(image->end(), {u * depth, v * depth, depth, 0.0F});
+    holes += is_hole ? 1 : 0;
+  }
+  RawCloud raw;
+  raw.data = reinterpret_cast<const std::uint8_t*>(image->data());
+  raw.width = kWidth;
+  raw.height = kHeight;
+  raw.point_step = 4 * sizeof(float);
+  raw.row_step = kWidth * raw.point_step;
+  raw.y = sizeof(float);
+  raw.z = 2 * sizeof(float);
+  raw.owner = image;
+  for (const double padding : {0.0, 0.02, 0.1}) {
+    SCOPED_TRACE(padding);
+    CloudSnapshot snapshot;
+    Ingest(config_with(padding)).run(raw, X_FS, robot.solids(), 0.0, &snapshot);
+    const IngestCounts& counts = snapshot.counts;
+    EXPECT_EQ(counts.not_a_number, holes);
+    EXPECT_EQ(counts.received, counts.not_a_number + counts.on_robot + counts.used);
+    std::size_t read = 0;
+    PointTile scratch;
+    const PointBvh& bvh = snapshot.index.bvh();
+    for (std::size_t i = 0; i < bvh.tile_count(); ++i) read += &bvh.tile(i, &scratch) != &scratch;
+    EXPECT_LT(read, bvh.tile_count() / 2) << "holes are in every sixth tile";
+    const std::set<std::uint32_t> kept = ids(snapshot.index);
+    EXPECT_EQ(counts.used, kept.size());
+    for (std::size_t i = 0; i < kWidth * kHeight; i += 3) {
+      const Eigen::Vector3f p_S(&(*image)[4 * i]);
+      if (!p_S.allFinite()) continue;
+      const double distance = exact_distance(robot, X_FS * p_S.cast<double>());
+      if (std::abs(distance - padding) < 1e-6) continue;
+      ASSERT_EQ(kept.count(static_cast<std::uint32_t>(i)) > 0, distance > padding)
+          << "pixel " << i << " at " << distance << " m";
+    }
+    EXPECT_GT(counts.on_robot, counts.received / 200);
+  }
 }
 
 // Links without a pose in the list drop no point.

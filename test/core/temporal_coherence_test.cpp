@@ -347,5 +347,43 @@ TEST(CoherentQueries, BoundsHoldWhenAMapMoves) {
   }
 }
 
+// A bound kept from another pose may say that nothing is deeper than the tolerance. Where the last
+// obstacle touches the link at exactly 0, that does not settle the query: another one may be
+// inside. All numbers are multiples of 2^-12 m, so that touch is exact.
+TEST(CoherentQueries, ATouchDoesNotHideAPointInside) {
+  test::Rng rng(65);
+  const auto model = test::make_model({Box{{0.25, 0.25, 0.25}}}, 0.01);
+  const auto steps = [&rng](int low, int high) {
+    return std::floor(test::uniform(&rng, low, high + 1)) / 4096.0;
+  };
+  int inside = 0;
+  for (int trial = 0; trial < test::scaled(1000); ++trial) {
+    Points points;
+    for (int i = 0; i < 200; ++i) {
+      points.emplace_back(0.125 + steps(0, 3), test::uniform(&rng, -0.1, 0.1),
+                          test::uniform(&rng, -0.1, 0.1));
+    }
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    QueryConfig config;
+    config.tolerance = 0.002;
+    ProximityQuery query(model, config);
+    std::vector<LinkProximity> results;
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    for (int step = 0; step < 6; ++step) {
+      X_FL.translation().x() = steps(-4, 4);
+      double truth = kInfinity;
+      for (const Eigen::Vector3d& p : points) {
+        truth = std::min(truth, p.x() - X_FL.translation().x() - 0.125);
+      }
+      query.run({X_FL}, {true}, {&cloud}, &results);
+      EXPECT_LE(results[0].lower_bound, truth);
+      if (truth > -1e-4) continue;
+      ++inside;
+      ASSERT_EQ(results[0].state, LinkState::kContact) << "trial " << trial << ", step " << step;
+    }
+  }
+  EXPECT_GT(inside, test::scaled(1000));
+}
+
 }  // namespace
 }  // namespace ist

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/geometry/closest_point_on_triangle.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
@@ -23,6 +24,18 @@ std::vector<TriangleMesh> meshes() {
           test::sheet(0.3),
           test::l_shape(0.3, 0.06),
           test::joined(test::icosphere(0.1, 2), test::box({0.3, 0.05, 0.05}))};
+}
+
+// Of any shape: a hierarchy gives the corner with the largest angle first, other callers do not. At
+// an obtuse corner, both edges can face a point whose closest point is on the farther one.
+TEST(ClosestPointOnTriangle, EqualsBruteForce) {
+  test::Rng rng(21);
+  for (int i = 0; i < 100000; ++i) {
+    const Eigen::Vector3d a = test::random_vector(&rng, 1.0), b = test::random_vector(&rng, 1.0),
+                          c = test::random_vector(&rng, 1.0), p = test::random_vector(&rng, 2.0);
+    const Eigen::Vector3d q = closest_point_on_triangle(p, a, b, c);
+    ASSERT_NEAR((p - q).norm(), test::oracle_triangle(p, a, b, c), 1e-9) << i;
+  }
 }
 
 TEST(TriangleBvh, ClosestPointEqualsBruteForce) {
@@ -176,6 +189,29 @@ TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {
       }
     }
   }
+}
+
+// The root mean square error of the expansion over points about a turned, open mesh. It is far
+// below the largest one: 4.3e-5, and 9.0e-5 without one of the terms of second order.
+TEST(TriangleBvh, WindingNumberIsExpandedToSecondOrder) {
+  test::Rng rng(12);
+  double sum_sq = 0.0;
+  int count = 0;
+  for (int i = 0; i < 30; ++i) {
+    TriangleMesh mesh = test::icosphere(0.1, 4);
+    mesh.triangles.resize(mesh.triangles.size() / 2);
+    for (Eigen::Vector3d& v : mesh.vertices) v = v.cwiseProduct(Eigen::Vector3d(1.0, 0.6, 0.3));
+    mesh = test::moved(mesh, test::random_pose(&rng, 0.0));
+    const TriangleBvh bvh(mesh);
+    for (int k = 0; k < 100; ++k, ++count) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
+      const double error = bvh.winding_number(p) - test::oracle_winding(mesh, p);
+      sum_sq += error * error;
+    }
+  }
+  const double rms = std::sqrt(sum_sq / count);
+  std::printf("winding number: root mean square error %.3g\n", rms);
+  EXPECT_LT(rms, 6e-5);
 }
 
 TEST(TriangleBvh, TrianglesWithoutAreaAreSurfaceToo) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "internal/robot/anytime_model.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/data_dir.h"
 #include "support/sanitizers.h"
@@ -64,6 +65,34 @@ TEST(Truth, BoundsHoldInEveryCase) {
   }
   EXPECT_EQ(counts.without_contact + counts.with_contact, test::scaled(2 * 6600));
   EXPECT_GT(counts.without_contact, test::scaled(2 * 5000));
+}
+
+// The model grows from its first packing to its final one, a link at a time; every tenth part of
+// the way it answers all cases of one cloud.
+TEST(Truth, HoldsAtTenPointsOfAGrowingModel) {
+  const auto data = test::data_dir();
+  if (!data) GTEST_SKIP() << test::kNoData;
+  RobotModelConfig config;
+  config.packing.max_error = test::packed_to(0.005);
+  const auto robot = std::make_shared<const RobotDescription>(test::panda_description(*data));
+  std::vector<AnytimeModel::Ptr> stages = {
+      AnytimeModel::build(robot, config, AnytimeModel::Stage::kFirst)};
+  for (std::size_t i = 0; i < test::kPandaLinks; ++i) {
+    while (!stages.back()->robot()->links[i].is_final) {
+      stages.push_back(stages.back()->refined(i));
+    }
+  }
+  constexpr std::size_t kPoints = 10;
+  const CloudSnapshot snapshot = test::truth_cloud(*data, "mosd10");
+  const std::vector<test::TruthCase> cases = test::truth_cases(*data, "mosd10", "traj");
+  Counts counts;
+  for (std::size_t k = 0; k < kPoints; ++k) {
+    const auto& stage = stages[k * (stages.size() - 1) / (kPoints - 1)];
+    SCOPED_TRACE("point " + std::to_string(k));
+    ASSERT_NO_FATAL_FAILURE(check_cases(cases, snapshot, stage->robot(), 0.001, &counts));
+  }
+  EXPECT_EQ(counts.without_contact + counts.with_contact,
+            static_cast<int>(kPoints) * test::scaled(1100));
 }
 
 }  // namespace

@@ -216,6 +216,37 @@ class AttachedTest(unittest.TestCase):
         self.attach_well(name="ball")  # the service is free again
         self.detach_well("ball")
 
+    def test_detaching_works_while_the_model_is_loaded(self):
+        """It was refused right after ~reload_model: the object came back with the new model."""
+        node = self.start()
+        without = np.linalg.norm(self.world.points, axis=1).min() - pt.BALL_RADIUS
+        for _ in range(5):
+            self.wait_for_ball(without, 0)
+            self.attach_well()
+            self.assertTrue(node.reload().success)
+            self.detach_well("tool")
+            self.assertIn("there is none at all", self.detach_object("tool").message)
+            begin = len(node.messages)
+            node.wait_for_status(ProximityArray.OK, start=begin)
+        self.wait_for_ball(without, 0)
+
+    def test_limits_are_parameters(self):
+        node = self.start(
+            links=["ball_link"],
+            self_filter=False,
+            packing={"max_error": 0.0001, "max_spheres": 1000000},
+            attach={"max_objects": 1, "max_time": 0.5},
+        )
+        node.wait_for_status(ProximityArray.OK)
+        self.attach_well(name="one")
+        self.assertIn("~attach/max_objects", self.attach(name="two").message)
+        self.detach_well("one")
+        begin = time.time()
+        answer = self.attach(shape=AttachObjectRequest.CYLINDER, dimensions=[0.5, 1.0])
+        self.assertFalse(answer.success)
+        self.assertIn("0.5 s (~attach/max_time)", answer.message)
+        self.assertLess(time.time() - begin, 3.0)
+
     def test_shutdown_cancels_attaching(self):
         thread = self.start_long_attaching()
         begin = time.time()

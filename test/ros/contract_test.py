@@ -9,7 +9,7 @@ import numpy as np
 import proximity_testing as pt
 import rosgraph
 import rospy
-from ist_proximity.msg import LinkProximity, ProximityArray, SourceStatus
+from ist_proximity.msg import LinkProximity, ProximityArray, SourceStatus, SpeedScaleState
 from ist_proximity.srv import QueryProximity
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64
@@ -30,16 +30,21 @@ FIELDS = {
         ist_proximity/LinkProximity[] links""",
     SourceStatus: """string name; uint8 status; time stamp; float64 age; uint32 points_received;
         uint32 points_used; uint32 points_on_robot""",
+    SpeedScaleState: """std_msgs/Header header; float64 scale; string link; string source;
+        float64 bound; uint8 rule; string text; float64 stop_distance; float64 free_distance""",
 }
 CONSTANTS = {
     LinkProximity: ["UNKNOWN", "CLEAR", "NEAR", "CONTACT"],
     ProximityArray: ["OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR"],
+    SpeedScaleState: ["UNKNOWN", "STOP", "SLOW", "FREE", "SEPARATION"],
 }
 # Topics below the node's name: type, and whether it is latched.
 TOPICS = {
     "proximity": (ProximityArray, False),
     "self_proximity": (ProximityArray, False),
     "min_distance": (Float64, False),
+    "speed_scale": (Float64, False),
+    "speed_scale_state": (SpeedScaleState, False),
     "markers": (MarkerArray, False),
     "spheres": (MarkerArray, True),
     "filtered_cloud": (PointCloud2, False),

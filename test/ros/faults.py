@@ -1,9 +1,10 @@
 """Faults: what was done to a node, what it said, after how many milliseconds, how it recovered.
 
-Two promises are checked at every message of every test, whatever its status:
+Three promises are checked at every message of every test, whatever its status:
   - A link is known only if the input that it rests on was sent at most its timeout, and one period
     of the messages, before. The time of sending counts, not the stamp.
   - Distance and bound are those of the cloud and of the poses that the message names by their stamps.
+  - ~speed_scale is 0 in the very cycle in which a link is not known.
 
 The period is the one that was kept: the largest time between two messages received. A loaded machine
 lengthens it; a test that counted on 10 ms would measure the machine. An absolute limit on that time
@@ -22,6 +23,7 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
+from ist_proximity.msg import SpeedScaleState
 from proximity_testing import LinkProximity, ProximityArray
 
 REPOSITORY = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..")
@@ -73,7 +75,9 @@ class TimedNode(pt.ProximityNode):
 
     def __init__(self, *args, **kwargs):
         self.times = []  # [s] of time.monotonic(), one per message
+        self.scales = []  # SpeedScaleState, one per cycle
         super().__init__(*args, **kwargs)
+        self.subscribe("speed_scale_state", SpeedScaleState, self.scales.append)
 
     def _on_message(self, message):
         self.times.append(time.monotonic())
@@ -239,6 +243,30 @@ class FaultTest(unittest.TestCase):
         for received, message in messages:
             pt.check_invariants(self, message)
             self.check_message(node, received, message)
+        self.check_scales(node)
+
+    def check_scales(self, node):
+        """The scale is above 0 only in cycles that knew every link; the header says which."""
+        known = {}  # by stamp: whether a message of it knew all links
+        for message in list(node.messages):
+            all_known = bool(message.links) and all(
+                one.state != LinkProximity.UNKNOWN for one in message.links
+            )
+            stamp = message.header.stamp.to_nsec()
+            known[stamp] = known.get(stamp, False) or all_known
+        compared = 0
+        for state in list(node.scales):
+            self.assertTrue(0.0 <= state.scale <= 1.0, state)
+            self.assertEqual(state.scale == 0.0, state.rule <= SpeedScaleState.STOP, state)
+            stamp = state.header.stamp.to_nsec()
+            if stamp not in known:
+                continue
+            compared += 1
+            if not known[stamp]:
+                self.assertEqual(state.scale, 0.0, state)
+                self.assertEqual(state.rule, SpeedScaleState.UNKNOWN, state)
+                self.assertNotEqual(state.text, "")
+        self.assertGreater(compared, 0)
 
     def check_message(self, node, received, message):
         known = [one for one in message.links if one.state != LinkProximity.UNKNOWN]

@@ -2,17 +2,47 @@
 """The launch files: two robots in one graph, two cameras, the nodelet in a camera's manager."""
 
 import os
+import re
+import subprocess
 import sys
 import unittest
 from xml.etree import ElementTree
 
 import proximity_testing as pt
+import roslaunch.config
+import roslaunch.xmlloader
 import rospy
+import yaml
 from joint_states_test import ARM, JointStatesTest, arm_poses, joint_state
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import PointCloud2
 
 LAUNCH = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "launch")
+
+
+CONFIG = os.path.join(LAUNCH, "..", "config")
+ROOT = os.path.realpath(os.path.join(LAUNCH, ".."))
+
+
+def launch_files():
+    return sorted(name for name in os.listdir(LAUNCH) if name.endswith(".launch"))
+
+
+def launch_arguments(name):
+    root = ElementTree.parse(os.path.join(LAUNCH, name)).getroot()
+    return {a.get("name") for a in root.findall("arg") if "value" not in a.attrib}
+
+
+def loaded(name, *arguments):
+    """What roslaunch would start."""
+    required = ["cloud:=cloud"] if name == "camera_manager.launch" else []
+    if required and not any(a.startswith("manager:=") and a != "manager:=" for a in arguments):
+        arguments = [a for a in arguments if a != "manager:="] + ["manager:=a_manager"]
+    config = roslaunch.config.ROSLaunchConfig()
+    loader = roslaunch.xmlloader.XmlLoader(resolve_anon=True)
+    path = os.path.join(LAUNCH, name)
+    loader.load(path, config, argv=[*required, *arguments], verbose=False)
+    return config
 
 
 class Robot:
@@ -96,11 +126,96 @@ class LaunchFilesTest(unittest.TestCase):
         self.check(robot, 0.1, "cloud")
         robot.stop()
 
+    def test_common_arguments(self):
+        """roslaunch drops arguments that a file does not know, without a word."""
+        common = launch_arguments("proximity.launch") - {"cloud"}
+        self.assertGreater(len(common), 12)
+        for name in launch_files():
+            with self.subTest(name):
+                self.assertLessEqual(common, launch_arguments(name))
+                given = ["fixed_frame:=world", "pose_source:=joint_states", "max_distance:=0.7"]
+                config = loaded(name, *given, "rviz:=true", "name:=near")
+                nodes = [n for n in config.params if n.endswith("/near/fixed_frame")]
+                self.assertEqual(len(nodes), 2 if name == "two_robots.launch" else 1)
+                for node in (n[: -len("fixed_frame")] for n in nodes):
+                    self.assertEqual(config.params[node + "fixed_frame"].value, "world")
+                    self.assertEqual(config.params[node + "pose_source"].value, "joint_states")
+                    self.assertEqual(config.params[node + "max_distance"].value, 0.7)
+                shown = [n for n in config.nodes if n.type == "proximity_rviz"]
+                self.assertEqual(len(shown), len(nodes))
+                for manager in ("", "some_manager"):
+                    config = loaded(name, "rviz:=false", "manager:=" + manager)
+                    self.assertFalse([n for n in config.nodes if "rviz" in n.type])
+
+    def test_parameters_are_cleared(self):
+        """`sources` and `fixed_frame` of another launch file stayed on the master."""
+        for name in launch_files():
+            for manager in ("", "some_manager"):
+                with self.subTest(name + manager):
+                    config = loaded(name, "name:=near", "manager:=" + manager)
+                    nodes = {n.namespace + n.name for n in config.nodes if n.name == "near"}
+                    self.assertTrue(nodes)
+                    self.assertLessEqual(nodes, {c.rstrip("/") for c in config.clear_params})
+
+    def test_rviz_needs_no_editing(self):
+        """proximity_rviz writes the node's topics, robot and fixed frame into the configuration."""
+        program = pt.find_program("ist_proximity", "proximity_rviz")
+        rospy.set_param("/shown/robot_description", ARM)
+
+        def configuration(file):
+            command = [program, "--print", "--config", os.path.join(CONFIG, file), "near"]
+            environment = dict(os.environ, ROS_NAMESPACE="/shown")
+            return yaml.safe_load(subprocess.check_output(command, env=environment))
+
+        for file in ("proximity.rviz", "demo.rviz", "dodge.rviz"):
+            manager = configuration(file)["Visualization Manager"]
+            self.assertEqual(manager["Global Options"]["Fixed Frame"], "base", file)
+            displays = manager["Displays"]
+            topics = {d.get("Marker Topic", d.get("Topic")) for d in displays}
+            self.assertLessEqual({"/shown/near/markers", "/shown/near/spheres"}, topics)
+            robots = [d["Robot Description"] for d in displays if d["Class"] == "rviz/RobotModel"]
+            self.assertEqual(robots, ["shown/robot_description"])
+        rospy.set_param("/shown/near/fixed_frame", "odom")
+        manager = configuration("proximity.rviz")["Visualization Manager"]
+        self.assertEqual(manager["Global Options"]["Fixed Frame"], "odom")
+        for display in manager["Displays"]:  # "<Fixed Frame>" of a display stays
+            if "Reference Frame" in display:
+                self.assertEqual(display["Reference Frame"], "<Fixed Frame>")
+
+    def test_what_readme_starts(self):
+        """A nodelet without a name publishes under another one than the README says."""
+        for folder, _, files in os.walk(ROOT):
+            if any(part in folder for part in ("/build", "/devel", "/.git")):
+                continue
+            for file in files:
+                if not file.endswith(".md"):
+                    continue
+                with open(os.path.join(folder, file)) as f:
+                    commands = re.findall(r"nodelet load ist_proximity/Proximity[^`\n]*", f.read())
+                for command in commands:
+                    self.assertIn("__name:=proximity", command, file)
+
+    def test_dependencies(self):
+        """What is installed for the core is declared, PCL is for benchmarks, diagnostics can be read."""
+        with open(os.path.join(ROOT, "scripts", "install_dependencies")) as f:
+            groups = dict(re.findall(r"\[(\w+)\]=\"([^\"]*)\"", f.read()))
+        package = ElementTree.parse(os.path.join(ROOT, "package.xml")).getroot()
+        declared = {depend.text for depend in package.findall("depend")}
+        other_names = {"libassimp-dev": "assimp-dev", "libcli11-dev": "cli11"}
+        other_names.update({"libeigen3-dev": "eigen", "libtinyxml2-dev": "tinyxml2"})
+        libraries = {p for p in groups["core"].split() if p.startswith("lib")}
+        self.assertIn("libhwy-dev", libraries)
+        self.assertLessEqual({other_names.get(p, p) for p in libraries}, declared)
+        self.assertIn("libpcl-dev", groups["benchmark"])
+        for name, packages in groups.items():
+            self.assertTrue(name == "benchmark" or "pcl" not in packages, name)
+        self.assertFalse([d for d in package.iter() if "pcl" in (d.text or "")])
+        self.assertIn("python3-diagnostic-msgs", groups["run"])
+
     def test_documented(self):
         """Every argument of every launch file says what it is for."""
-        files = sorted(name for name in os.listdir(LAUNCH) if name.endswith(".launch"))
-        self.assertGreaterEqual(len(files), 5)
-        for name in files:
+        self.assertGreaterEqual(len(launch_files()), 5)
+        for name in launch_files():
             for argument in ElementTree.parse(os.path.join(LAUNCH, name)).getroot().findall("arg"):
                 if "value" not in argument.attrib:
                     self.assertGreater(len(argument.get("doc", "")), 5, (name, argument.attrib))

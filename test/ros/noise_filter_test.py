@@ -76,9 +76,10 @@ class NoiseFilterTest(unittest.TestCase):
 
     def test_slower_than_timeout(self):
         """An ingest slower than the timeout is named; the driver is not said to have stopped."""
-        parameters = {"noise_filter/radius": 1.0, "noise_filter/neighbors": 1000}
-        cube = np.random.default_rng(1).uniform(-0.25, 0.25, (40000, 3)) + [0, 0, 0.7]
-        self.world.points = cube
+        # Nearly 1000 neighbors for each point: too few, so that all of them have to be looked at.
+        parameters = {"noise_filter/radius": 0.046, "noise_filter/neighbors": 1000}
+        cube = np.random.default_rng(1).uniform(-0.25, 0.25, (250000, 3))
+        self.world.points = cube + [0, 0, 0.7]
         self.start(**parameters)
         begin = len(self.node.messages)
         message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "read and indexed for")
@@ -87,7 +88,7 @@ class NoiseFilterTest(unittest.TestCase):
         self.assertIn("noise filter", message.status_text)
         for m in self.node.messages[begin:]:
             self.assertNotIn("has its driver stopped", m.status_text)
-        self.world.points = cube[:1100]
+        self.world.points = 0.02 * cube[:1100] + [0, 0, 0.7]
         self.node.wait_for_status(ProximityArray.OK)
 
     def test_off(self):

@@ -73,7 +73,7 @@ WRONG = [
                 "scan": {"type": "sensor_msgs/LaserScan", "max_range": "far"},
                 "map": {"type": "octomap_msgs/Octomap", "self_filter": True, "timeout": 0},
                 "file": {"type": "octomap_msgs/Octomap", "file": "room.bt", "topic": "room"},
-                "odd": {"type": "sensor_msgs/Image", "timeout": 0, "required": 1},
+                "odd": {"type": "sensor_msgs/Imu", "timeout": 0, "required": 1},
                 "range": {"min_range": 2.0, "max_range": 1.0},
                 "padding": {"self_filter_padding": -0.01, "topic": ""},
                 "flat": 3,
@@ -97,6 +97,45 @@ WRONG = [
         ],
     ),
     ({"sources": [1, 2]}, ["~sources"]),
+    (
+        {
+            "ignore_links": "base",
+            "min_distance/fixed_links": "no",
+            "speed_scale": {
+                "stop_distance": -0.1,
+                "hysteresis": "some",
+                "slow_scale": 1.5,
+                "links": {"ball_link": {"stop_distance": "near"}, "box_link": 3},
+                "separation": {"stopping_time": -1, "enabled": 1},
+            },
+        },
+        [
+            "~ignore_links",
+            '~min_distance/fixed_links is "no": true or false is needed',
+            "~speed_scale/stop_distance is -0.1 m: allowed is from 0",
+            '~speed_scale/hysteresis is "some"',
+            "~speed_scale/slow_scale is 1.5: allowed is from 0 to 1",
+            '~speed_scale/links/ball_link/stop_distance is "near"',
+            "~speed_scale/links/box_link is 3: a dictionary is needed",
+            "~speed_scale/separation/stopping_time is -1 s",
+            "~speed_scale/separation/enabled is 1: true or false is needed",
+        ],
+    ),
+    (
+        {
+            "speed_scale": {
+                "stop_distance": 0.5,
+                "links": {"ball_link": {"free_distance": 0.02}, "box_link": {"free_distance": 4}},
+            }
+        },
+        [
+            "~speed_scale/stop_distance is 0.5 m: it must be less than ~speed_scale/free_distance, 0.3",
+            "~speed_scale/stop_distance is 0.5 m: it must be less than "
+            "~speed_scale/links/ball_link/free_distance, 0.02 m",
+            "~speed_scale/links/box_link/free_distance is 4 m: it must not be more than ~max_distance",
+        ],
+    ),
+    ({"speed_scale": 0.5}, ["~speed_scale is 0.5: a dictionary is needed"]),
     ({"robot_description": pt.urdf()}, ["~robot_description holds a URDF: it must be the name"]),
     ({"robot_description": "the robot"}, ["the robot", "is not valid"]),
     ({"sources": {"a camera": {"timeout": 1.0}}}, ["a camera", "is not valid"]),

@@ -10,6 +10,7 @@ import rospy
 from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter, StrParameter
 from proximity_testing import ProximityArray
+from std_msgs.msg import Float64
 
 
 class ReconfigureTest(unittest.TestCase):
@@ -42,9 +43,7 @@ class ReconfigureTest(unittest.TestCase):
         self.assertAlmostEqual(query.get_configuration()["tolerance"], 0.001)
         described = {d["name"]: d for d in query.get_parameter_descriptions(timeout=30)}
         self.assertEqual(described["tolerance"]["min"], 0.0)
-        self.assertEqual(described["tolerance"]["max"], 1.0)
         self.assertAlmostEqual(described["margin"]["default"], 0.0)
-        self.assertEqual(described["margin"]["description"], "~query/margin [m]")
 
         answer = query.update_configuration({"margin": 0.05, "tolerance": 0.0})
         self.assertAlmostEqual(answer["margin"], 0.05)
@@ -59,6 +58,51 @@ class ReconfigureTest(unittest.TestCase):
         query.update_configuration({"deadline": 0.5})
         self.assertAlmostEqual(rospy.get_param(self.node.name + "/query/margin"), 0.1)
         self.ball("the other margin", lambda ball: abs(ball.lower_bound - 0.1) < 1e-4)
+
+    def test_sliders(self):
+        """Ends of sliders are what robots need: influence_distance went to 1000 m, gain to 10^6."""
+        ends = {
+            "query": {"tolerance": 0.05, "deadline": 0.05, "margin": 0.2},
+            "repulsion": {
+                "influence_distance": 0.6,  # ~max_distance
+                "gain": 5.0,
+                "smoothing": 0.5,
+                "filter_time": 1.0,
+            },
+            "penetration": {"stiffness": 1e6},
+        }
+        for group, expected in ends.items():
+            client = self.client(group)
+            described = client.get_parameter_descriptions(timeout=30)
+            self.assertEqual({d["name"]: d["max"] for d in described}, expected)
+            for one in described:
+                self.assertEqual(one["min"], -1.0 if one["name"] == "deadline" else 0.0)
+                name = "~%s/%s" % (group, one["name"])
+                self.assertRegex(one["description"], "^" + name + r"( \[.*\])?: [A-Z].{20,}\.$")
+                self.assertLessEqual(one["default"], one["max"])
+            if group == "query":  # the parameter's own range is wider
+                answer = client.update_configuration({"margin": 0.3})
+                self.assertAlmostEqual(answer["margin"], 0.3)
+
+    def test_read_at_the_start_only(self):
+        """A change that has no effect is named, with the value in use, once in the log."""
+        words = "~max_distance is 2.0, in use is 0.6"
+        rospy.set_param(self.node.name + "/max_distance", 2.0)
+        self.node.wait_until(lambda: words in self.node.log(), words)
+        self.node.wait_until(
+            lambda: words in self.node.diagnostics["query"].message, "the diagnostics"
+        )
+        self.assertIn("the node has to be restarted", self.node.log())
+        rospy.set_param(self.node.name + "/query/margin", 0.03)  # has effect
+        rospy.set_param(self.node.name + "/rate", 10.0)
+        self.node.wait_until(lambda: "~rate has been set to 10" in self.node.log(), "the rate")
+        self.assertNotIn("~query/margin", self.node.diagnostics["query"].message)
+        rospy.delete_param(self.node.name + "/rate")
+        rospy.set_param(self.node.name + "/max_distance", 0.6)
+        self.node.wait_until(
+            lambda: "restarted" not in self.node.diagnostics["query"].message, "no complaint"
+        )
+        self.assertLessEqual(self.node.log().count(words), 2)
 
     def test_refusals(self):
         """A request takes effect entirely or not at all, and the response holds the values in use."""
@@ -79,6 +123,35 @@ class ReconfigureTest(unittest.TestCase):
             )
         self.node.wait_until(lambda: "~query/tolerance is -1 m" in self.node.log(), "the refusal")
         self.ball("as before", lambda ball: abs(ball.distance - ball.lower_bound - 0.02) < 0.0011)
+
+    def test_speed_scale(self):
+        """Distances change at once; values that do not go together change nothing."""
+        scales = []
+        self.node.subscribe("speed_scale", Float64, lambda m: scales.append(m.data))
+        # The bound is 0.2 m less the margin and the tolerance, between 0.1 and 0.3 m.
+        self.node.wait_until(lambda: scales and abs(scales[-1] - 0.4) < 0.01, "a scale of 0.4")
+        group = self.client("speed_scale")
+        group.update_configuration({"stop_distance": 0.0, "free_distance": 0.18})
+        self.node.wait_until(lambda: scales[-1] > 0.98, "full speed")
+        name = self.node.name + "/speed_scale"
+        self.assertAlmostEqual(rospy.get_param(name + "/free_distance"), 0.18)
+        service = group._set_service
+        answer = service(Config(doubles=[DoubleParameter("stop_distance", 0.4)])).config
+        self.assertAlmostEqual({d.name: d.value for d in answer.doubles}["stop_distance"], 0.0)
+        rospy.set_param(name + "/stop_distance", 0.4)  # more than free_distance
+        self.node.wait_until(
+            lambda: "must be less than ~speed_scale/free_distance, 0.18 m" in self.node.log(), "why"
+        )
+        self.assertGreater(scales[-1], 0.98)
+        rospy.set_param(name + "/stop_distance", 0.17)
+        self.node.wait_until(lambda: scales[-1] < 0.99, "the new distance")
+        separation = self.client("speed_scale/separation")
+        separation.update_configuration({"enabled": True, "stopping_time": 0.1})
+        self.node.wait_until(lambda: scales[-1] == 0.0, "a walking person 0.18 m away")
+        rospy.set_param(name + "/links", {"ball_link": {"stop_distance": 0.01}})
+        self.node.wait_until(
+            lambda: "was not set at the start: restart the node" in self.node.log(), "a word on it"
+        )
 
     def margin_stays(self, words, margin):
         """The ball's lower bound stays that of the margin for two readings of the server."""

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <thread>
 
 #include "ros/poses/publisher_track.h"
 
@@ -54,6 +56,33 @@ TEST(TransformBuffer, refusesWithTheReason) {
   // A good transform ends it.
   EXPECT_EQ(buffer.add(transform("base", "arm", 99.96), "/a", false, now), "");
   EXPECT_EQ(buffer.why_refused("arm", "base"), "");
+}
+
+// A static transform is sent once. Its reason was forgotten a second after it was refused, and then
+// the status named the publisher as dead.
+TEST(TransformBuffer, refusalsOfStaticTransformsStay) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  const ros::Time now(100.0);
+  EXPECT_EQ(buffer.add(transform("world", "base", 99.9), "/a", false, now), "");
+  geometry_msgs::TransformStamped bad = transform("base", "camera", 0.0);
+  bad.transform.rotation.w = 0.9;
+  EXPECT_NE(buffer.add(bad, "/a", true, now), "");
+  geometry_msgs::TransformStamped moving = transform("base", "arm", 99.9);
+  moving.transform.rotation.w = 0.9;
+  EXPECT_NE(buffer.add(moving, "/a", false, now), "");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+  EXPECT_EQ(buffer.why_refused("world", "arm"), "");
+  EXPECT_NE(buffer.why_refused("world", "camera").find("from 'camera' to 'base'"),
+            std::string::npos);
+  EXPECT_NE(buffer.last_refusal().find("length 0.9"), std::string::npos);
+  // A jump of the clock does not make it valid, and transforms of the new time are taken.
+  buffer.clear();
+  EXPECT_NE(buffer.why_refused("world", "camera"), "");
+  EXPECT_EQ(buffer.add(transform("world", "base", 9.9), "/a", false, ros::Time(10.0)), "");
+  // A good one ends it.
+  EXPECT_EQ(buffer.add(transform("base", "camera", 0.0), "/a", true, ros::Time(10.0)), "");
+  EXPECT_EQ(buffer.why_refused("world", "camera"), "");
+  EXPECT_EQ(buffer.last_refusal(), "");
 }
 
 TEST(TransformBuffer, agesCountFromReceipt) {

@@ -110,6 +110,50 @@ class TruthTest(unittest.TestCase):
             if one.state >= LinkProximity.NEAR:
                 self.assertGreaterEqual(one.distance, truth - 1e-5)
 
+    def test_default_deadline(self):
+        """Points that are all equally near, asked exactly at 1 kHz: answers come in time, with bounds."""
+        rng = np.random.default_rng(7)
+        sphere = rng.normal(size=(200000, 3))
+        points = BALL[:3, 3] + 0.6 * sphere / np.linalg.norm(sphere, axis=1)[:, None]
+        points = points[pt.DISTANCE["box_link"](pt.apply(pt.inverse(BOX), points)) > 0.05]
+        node = self.start(points, rate=1000, **{"query/tolerance": 0.0, "self_filter": False})
+        node.wait_for(
+            lambda m: pt.link(m, "ball_link").state == LinkProximity.NEAR, "the first answer"
+        )
+        begin = len(node.messages)
+        node.wait_until(lambda: len(node.messages) > begin + 1000, "a thousand answers")
+        degraded, times = 0, []
+        for message in node.messages[begin:]:
+            times.append(message.computation_time)
+            ball = pt.link(message, "ball_link")
+            if ball.state == LinkProximity.UNKNOWN:
+                continue
+            self.assertLessEqual(ball.lower_bound, 0.5 + 1e-5)
+            self.assertGreaterEqual(ball.distance, 0.5 - 1e-5)
+            wide = [
+                one.distance - one.lower_bound > 1e-5
+                for one in message.links
+                if one.state != LinkProximity.CLEAR
+            ]
+            if message.status == ProximityArray.OK:
+                self.assertEqual((message.unfinished, sum(wide)), (0, 0), message)
+            elif message.status == ProximityArray.DEGRADED:
+                degraded += 1
+                self.assertGreaterEqual(message.unfinished, sum(wide))
+                self.assertIn("~query/deadline", message.status_text)
+            parts = message.query_time + message.repulsion_time + message.penetration_time
+            self.assertAlmostEqual(parts + message.message_time, message.computation_time, 9)
+        # Half of the period, and what the machine takes from the thread now and then.
+        self.assertLess(np.median(times), 0.0006)
+        self.assertEqual(node.diagnostic("query", "deadline"), "0.500 ms")
+        # No deadline: exact, however long it takes.
+        rospy.set_param(node.name + "/query/deadline", 0)
+        message = node.wait_for(
+            lambda m: m.status == ProximityArray.OK and m.unfinished == 0, "exact bounds"
+        )
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.5, 5)
+        node.wait_until(lambda: node.diagnostic("query", "deadline") == "none", "no deadline")
+
     def test_contact_and_vectors(self):
         """Points inside the box, one of them on its middle plane; self-filter off."""
         deep = pt.apply(BOX, pt.BOX_OFFSET + [[0.06, 0, 0], [-0.04, 0.05, 0.0]])
@@ -308,12 +352,15 @@ class TruthTest(unittest.TestCase):
         self.assertEqual(pt.states(message), [LinkProximity.NEAR, LinkProximity.CLEAR])
 
         names = {"distance", "point_on_link", "point_on_obstacle", "repulsion", "text"}
-        node.wait_until(lambda: {ns for ns, _ in markers} == names, "all markers of one link")
+        of_links = lambda: {key for key in markers if key[0] != "nearest"}  # noqa: E731
+        node.wait_until(lambda: {ns for ns, _ in of_links()} == names, "all markers of one link")
         line = markers[("distance", 0)]
         self.assertEqual(line.header.frame_id, "base")
         ends = [pt.vector(p) for p in line.points]
         self.assertAlmostEqual(np.linalg.norm(ends[0] - ends[1]), 0.25, 4)
-        self.assertEqual({i for _, i in markers}, {0})
+        self.assertEqual({i for _, i in of_links()}, {0})
+        self.assertEqual({i for ns, i in markers if ns == "nearest"}, {0, 1, 2})
+        self.assertRegex(markers[("nearest", 0)].text, r"^0\.250 m\nball_link")
 
         node.wait_until(lambda: spheres, "~spheres")
         first = [m for m in spheres[0].markers if m.ns == "ball_link"]
@@ -330,7 +377,10 @@ class TruthTest(unittest.TestCase):
             lambda m: pt.states(m) == [LinkProximity.CLEAR] * 2 and m.status == 0, "CLEAR"
         )
         self.assertEqual(message.sources[0].points_used, 0)
-        node.wait_until(lambda: deleted == set(markers), "DELETE for every marker")
+        # The large number says that nothing is near; every other marker goes.
+        kept = {("nearest", 0)}
+        node.wait_until(lambda: deleted == set(markers) - kept, "DELETE for every other marker")
+        node.wait_until(lambda: markers[("nearest", 0)].text == "> 0.30 m", "the number")
 
     def test_formats(self):
         """float64, the other byte order and a frame with a slash give the same distances."""

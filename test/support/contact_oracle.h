@@ -83,11 +83,7 @@ inline void oracle_add(const std::vector<OracleSphere>& spheres, const Eigen::Ve
 
 inline std::vector<Eigen::Vector3d> points_F(const CloudSnapshot& cloud) {
   std::vector<Eigen::Vector3d> points;
-  for (const PointTile& tile : tiles_of(cloud.coarse)) {
-    for (int k = 0; k < tile.count; ++k) {
-      points.push_back(cloud.coarse.X_FO() * tile.point(static_cast<int>(k)));
-    }
-  }
+  for (const auto& [id, p] : thinned_points_of(cloud.index)) points.push_back(p);
   return points;
 }
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <cstdint>
+#include <map>
 #include <vector>
 
 #include "internal/cloud/point_bvh.h"
@@ -15,6 +18,29 @@ inline std::vector<PointTile> tiles_of(const PointBvh& bvh) {
   return tiles;
 }
 inline std::vector<PointTile> tiles_of(const PointIndex& index) { return tiles_of(index.bvh()); }
+
+/// All tiles of a thinned cloud, whether a query has looked at them or not.
+inline std::vector<ThinnedTile> thinned_tiles_of(const PointIndex& index) {
+  const ThinnedCloud cloud = index.bvh().thinned();
+  std::vector<ThinnedTile> all;
+  if (cloud.empty()) return all;
+  ThinnedNode buffer;
+  for (std::size_t i = 0; i < cloud.nodes().size(); ++i) {
+    if (!ThinnedCloud::is_leaf(cloud.nodes()[i])) continue;
+    const auto tiles = cloud.tiles(static_cast<std::int32_t>(i), &buffer);
+    all.insert(all.end(), tiles.begin(), tiles.end());
+  }
+  return all;
+}
+
+/// The points of the thinned cloud in the fixed frame [m], by their ids.
+inline std::map<std::uint32_t, Eigen::Vector3d> thinned_points_of(const PointIndex& index) {
+  std::map<std::uint32_t, Eigen::Vector3d> points;
+  for (const ThinnedTile& tile : thinned_tiles_of(index)) {
+    for (int k = 0; k < tile.count; ++k) points[tile.id[k]] = index.X_FO() * tile.point(k);
+  }
+  return points;
+}
 
 inline bool same_points(const PointTile& a, const PointTile& b) {
   return a.count == b.count && std::equal(a.x, a.x + kPointWidth, b.x) &&

@@ -42,9 +42,8 @@ inline const char* panda_mesh(std::size_t link) {
   return kNames[link];
 }
 
-/// A model whose links are the visual meshes, in the frames of the poses.
-inline std::shared_ptr<RobotModel> panda_model(const std::filesystem::path& data,
-                                               double max_error) {
+/// The visual meshes as links, in the frames of the poses.
+inline RobotDescription panda_description(const std::filesystem::path& data) {
   RobotDescription description;
   description.name = "panda";
   for (std::size_t i = 0; i < kPandaLinks; ++i) {
@@ -56,9 +55,14 @@ inline std::shared_ptr<RobotModel> panda_model(const std::filesystem::path& data
         GeometryElement{load_mesh(file.string()), Eigen::Isometry3d::Identity(), file.string()}};
     description.links.push_back(std::move(link));
   }
+  return description;
+}
+
+inline std::shared_ptr<RobotModel> panda_model(const std::filesystem::path& data,
+                                               double max_error) {
   RobotModelConfig config;
   config.packing.max_error = packed_to(max_error);
-  return std::make_shared<RobotModel>(*build_robot_model(description, config));
+  return std::make_shared<RobotModel>(*build_robot_model(panda_description(data), config));
 }
 
 inline CloudSnapshot truth_cloud(const std::filesystem::path& data, const std::string& name) {

@@ -95,8 +95,7 @@ struct IngestCounts {
 /// One cloud or map as queries take it, immutable. A cloud consists of points in the fixed frame, a
 /// map of solid boxes in a frame of its own.
 struct CloudSnapshot {
-  PointIndex index;   ///< all points used
-  PointIndex coarse;  ///< thinned: one point per voxel; empty where IngestConfig::thin is false
+  PointIndex index;                                        ///< all points used
   double thinning = 0.01;                                  ///< [m] edge of a voxel
   RegionOfInterest region;                                 ///< points outside were discarded
   std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none

@@ -34,19 +34,29 @@ struct CloudLayout {
   std::size_t data_size = 0;           ///< [bytes]
 };
 
-/// The points of a message: where x, y and z lie in its bytes. Checked once (check_layout), so that
-/// reading needs no checks.
+/// The numbers of a depth image, one a pixel; see depth_image.h.
+enum class DepthType : std::uint8_t {
+  kNone,     ///< a cloud
+  kUint16,   ///< [mm]
+  kFloat32,  ///< [m]
+};
+struct DepthRays;
+
+/// The points of a message: where x, y and z lie in its bytes, or the rays that they lie on.
+/// Checked once (check_layout, check_depth_image), so that reading needs no checks.
 struct RawCloud {
-  const std::uint8_t* data = nullptr;  ///< the first point; not owned
-  std::size_t width = 0;               ///< points in a row
-  std::size_t height = 0;              ///< rows
-  std::size_t point_step = 0;          ///< [bytes] from a point to the next
-  std::size_t row_step = 0;            ///< [bytes] from a row to the next
-  std::size_t x = 0;                   ///< [bytes] offset of x within a point
-  std::size_t y = 0;                   ///< [bytes] offset of y within a point
-  std::size_t z = 0;                   ///< [bytes] offset of z within a point
-  bool is_double = false;              ///< float64 coordinates, else float32
-  bool swap_bytes = false;             ///< the data's byte order is not the machine's
+  const std::uint8_t* data = nullptr;     ///< the first point; not owned
+  std::size_t width = 0;                  ///< points in a row
+  std::size_t height = 0;                 ///< rows
+  std::size_t point_step = 0;             ///< [bytes] from a point to the next
+  std::size_t row_step = 0;               ///< [bytes] from a row to the next
+  std::size_t x = 0;                      ///< [bytes] offset of x within a point
+  std::size_t y = 0;                      ///< [bytes] offset of y within a point
+  std::size_t z = 0;                      ///< [bytes] offset of z within a point
+  bool is_double = false;                 ///< float64 coordinates, else float32
+  bool swap_bytes = false;                ///< the data's byte order is not the machine's
+  DepthType depth = DepthType::kNone;     ///< of a depth image, which has no x, y and z
+  std::shared_ptr<const DepthRays> rays;  ///< of a depth image's pixels
   /// `data` stays unchanged as long as this lives, so that points may be read later, when a query
   /// needs them (where no thinned cloud is made). Null: `data` is valid during the call only.
   std::shared_ptr<const void> owner;
@@ -61,9 +71,10 @@ struct IngestConfig {
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
-  /// Make the thinned cloud; without it repulsion and contact volumes see no points.
+  /// Give the cloud a thinned one; without it repulsion and contact volumes see no points. It costs
+  /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
-  double thinning = 0.01;  ///< [m] > 0: edge of a voxel of the thinned cloud
+  double thinning = 0.01;  ///< [m] at least 1e-9: edge of a voxel of the thinned cloud
   /// >= 1: a cloud of more points is refused. This bounds time and memory of one cloud: five
   /// million points take about 3 s and 700 MB where neighbours in the message lie anywhere in
   /// space.

@@ -32,8 +32,7 @@ constexpr double kLongestScan = 10.0;
 
 /// The largest scan that is used; a larger one is refused.
 struct ScanLimits {
-  /// Beams; scanners have up to 36,000 a turn. The self-filter compares each with the robot's poses
-  /// at up to 400 instants of a scan of kLongestScan, so that it bounds the time of one scan.
+  /// Beams; scanners have up to 36,000 a turn. This bounds time and memory of one scan.
   std::size_t max_beams = 50000;
 };
 

@@ -19,6 +19,10 @@ struct ContactVolume {
   Eigen::Vector3d weighted_normal = Eigen::Vector3d::Zero();  ///< [m^3] sum of V n
   Eigen::Vector3d weighted_moment = Eigen::Vector3d::Zero();  ///< [m^4] sum of p x V n
   std::size_t spheres = 0;  ///< spheres of the obstacle that share volume with the link
+  /// Share of the obstacles near the link that is summed, as the traversal divides them; 1: all,
+  /// and below 1 where time ended the sum. `volume` is a lower bound then, and the rest says
+  /// nothing.
+  double known = 1.0;
 
   /// Adds `weight` times the other's volume, normal and moment, and its number of spheres.
   /// @param other  in the same frame, about the same point
@@ -61,12 +65,14 @@ constexpr double kFullDepth = 0.5;
 /// link and points, from touch to full containment, at concentric spheres too.
 ///
 /// Allocates nothing, locks nothing, never throws. Thread safe. The work is bounded by the number
-/// of cells that a link can hold.
+/// of cells that a link can hold, and by `end`.
 /// @param X_FL    link frame -> fixed frame, rigid
 /// @param clouds  as given to ProximityQuery::run
+/// @param end     when the sum has to end; what is known by then says ContactVolume::known
 /// @returns in the link's frame, about its origin
 ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geometry,
-                             const Eigen::Isometry3d& X_FL, SnapshotSpan clouds);
+                             const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
+                             TimePoint end = TimePoint::max());
 
 /// Volume shared by two links, lens by lens; each sphere counts for its power cell. 0 where no two
 /// inner spheres overlap. n is the mean of the second link's outward field and the opposite of the
@@ -112,7 +118,8 @@ Wrench reaction(const Wrench& on_first, const Eigen::Vector3d& p_SecondFirst);
 /// whether the link is in contact. In CONTACT it is continuous from touch on, and still zero where
 /// the deepest point is less deep than the gap of the link's packing there.
 /// @param query    that the proximity was asked with
-/// @param contact  of the link, in its frame; read in CONTACT only. Null: it is not known, and the
+/// @param contact  of the link, in its frame; read in CONTACT only. Null, or not known entirely:
+/// the
 ///                 wrench is NaN in CONTACT
 /// @returns in the fixed frame, the torque about the link's origin. Thread safe.
 Wrench penetration_wrench(const LinkProximity& proximity, const QueryConfig& query,

@@ -29,7 +29,8 @@ class ProximityBatch {
   /// @param X_FL     n configurations one after the other, each with one pose per link: link frame
   ///                 -> fixed frame
   /// @param known    by link, for all configurations
-  /// @param results  n times the number of links, in the order of X_FL, overwritten
+  /// @param results  one for each of X_FL, overwritten; UNKNOWN for those at the end that are fewer
+  ///                 than a configuration
   /// @returns false when a deadline passed before every link of a configuration met its tolerance
   bool run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known, SnapshotSpan clouds,
            std::vector<LinkProximity>* results);

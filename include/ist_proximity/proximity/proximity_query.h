@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -10,6 +11,9 @@
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
+
+/// An instant at which a computation ends, whatever is left to do; max(): never.
+using TimePoint = std::chrono::steady_clock::time_point;
 
 /// How a query answers.
 struct QueryConfig {
@@ -60,15 +64,20 @@ struct QueryStatistics {
   std::uint64_t leaf_pairs = 0;         ///< pairs of sphere leaf and tile of obstacles
   std::uint64_t exact_evaluations = 0;  ///< points measured against the link's exact geometry
   std::uint64_t outside_region = 0;     ///< links whose range ends outside a cloud's region
+  std::uint64_t unfinished = 0;         ///< links that a deadline left wider than the tolerance
+  /// [m] Largest distance - lower_bound, margin aside, of the unfinished links whose state is
+  /// known.
+  double widest = 0.0;
 };
 
 /// Distances from the links of a robot to point clouds.
 ///
 /// Branch and bound: a dual-tree traversal of each link's Inner Sphere Tree and the BVH of every
-/// cloud prunes pairs by lower bounds. Near the link, a grid of signed distances bounds what is
-/// left of boxes and points. Obstacles that remain are measured against the exact geometry until
-/// `tolerance` is met, so `distance` is exactly that of one obstacle point. A depth search then
-/// measures the points that may be inside the link.
+/// cloud prunes pairs by lower bounds; obstacles that remain are measured against the exact
+/// geometry until `tolerance` is met, so `distance` is exactly that of one obstacle point. Near the
+/// link and inside, and where very many points are about equally near, a traversal of the BVH alone
+/// takes over: a grid of signed distances about the link bounds boxes and points for the whole
+/// link.
 ///
 /// A query that has a deadline asks every link twice: first to within half of its distance, and
 /// then to within the tolerance, the link that may be nearest first. So no link is left without a
@@ -80,9 +89,9 @@ struct QueryStatistics {
 /// (temporal coherence). Neither changes the bounds and states that an answer guarantees, and poses
 /// may jump.
 ///
-/// Working memory is about 650 kB a link: 512 kB of signed distances about the link, 96 kB of
-/// distances of points, 32 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node
-/// of its tree.
+/// Working memory is about 670 kB a link: 320 kB of signed distances about the link, 220 kB of
+/// bounds of boxes and points (150 kB more for a mesh with holes), 96 kB of distances of points,
+/// 32 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node of its tree.
 class ProximityQuery {
  public:
   /// @param model  shared with the caller; not null
@@ -93,7 +102,8 @@ class ProximityQuery {
 
   /// @param X_FL    by link: link frame -> fixed frame, rigid to 1e-6 (see is_rigid); ignored
   ///                where `known` is false
-  /// @param known   by link: false makes the link UNKNOWN
+  /// @param known   by link: false makes the link UNKNOWN. Where it or X_FL has another size than
+  ///                the model's links, every link is UNKNOWN
   /// @param clouds  the snapshots of all usable sources; none makes every link UNKNOWN
   /// @param results one per link, overwritten
   /// @returns false when the deadline passed before every link met its tolerance
@@ -107,16 +117,24 @@ class ProximityQuery {
                    SnapshotSpan clouds, RobotProximity* result);
 
   /// One link only.
-  /// @param link  index in the model
+  /// @param link  index in the model; UNKNOWN when there is none
   /// @returns as run()
   bool run_link(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                 LinkProximity* result);
+
+  /// Takes a model that differs from the present one in packings alone (see same_geometry()).
+  /// Whatever was proven or measured stays: bounds, exact distances, the answer to start from. A
+  /// link with another packing_id only forgets its BVTT fronts, which name nodes of its old tree.
+  /// Allocates the scratch memory of such links' trees, 40 bytes a node.
+  void set_model(std::shared_ptr<const RobotModel> model);
 
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);
   const QueryConfig& config() const;          ///< settings of the next run()
   const QueryStatistics& statistics() const;  ///< of the last run()
-  const RobotModel& model() const;            ///< the one given to the constructor
+  /// The same by link: what each of them cost.
+  const std::vector<QueryStatistics>& link_statistics() const;
+  const RobotModel& model() const;  ///< the one given to the constructor
 
  private:
   struct Impl;

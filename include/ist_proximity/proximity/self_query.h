@@ -73,14 +73,17 @@ struct SelfQueryStatistics {
 class SelfQuery {
  public:
   /// Builds a hierarchy for each link: up to a second for a million triangles.
+  /// @param previous  null, or a query whose hierarchies are shared for links of the same `solid`:
+  ///                  for a model that differs in its packings alone
   SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-            const QueryConfig& config);
+            const QueryConfig& config, const SelfQuery* previous = nullptr);
   ~SelfQuery();
   SelfQuery(SelfQuery&&) noexcept;
   SelfQuery& operator=(SelfQuery&&) noexcept;
 
   /// @param X_FL     by link: link frame -> fixed frame, rigid
-  /// @param known    by link: false makes its pairs UNKNOWN
+  /// @param known    by link: false makes its pairs UNKNOWN. Where it or X_FL has another size than
+  ///                 the model's links, every pair is UNKNOWN
   /// @param results  one per pair, overwritten; it allocates where it has not that many yet
   /// @returns false when the deadline passed before every pair met its tolerance
   bool run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,

@@ -66,10 +66,12 @@ class Repulsion {
   /// @param X_FL      link frame -> fixed frame, rigid
   /// @param clouds    as given to ProximityQuery::run
   /// @param proximity the link's answer: supplies state, distance, direction and witness
-  /// @returns zero when CLEAR, NaN when UNKNOWN
+  /// @param end       when the blend has to end, if it has not yet
+  /// @returns zero when CLEAR, NaN when UNKNOWN, and NaN when it was not computed by `end`
   /// Allocates nothing. Thread safe.
   RepulsiveWrench wrench(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
-                         const LinkProximity& proximity, const RepulsionConfig& config) const;
+                         const LinkProximity& proximity, const RepulsionConfig& config,
+                         TimePoint end = TimePoint::max()) const;
 
   /// The force alone.
   Eigen::Vector3d operator()(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
@@ -81,6 +83,11 @@ class Repulsion {
   struct Spheres;
   std::shared_ptr<const Spheres> spheres_;  ///< of all links; copies share them
 };
+
+/// The repulsive wrench of the answer's own pair of closest points alone: of the same length as the
+/// blended one, but not continuous. Zero when CLEAR, NaN when UNKNOWN.
+RepulsiveWrench nearest_repulsion(const Eigen::Isometry3d& X_FL, const LinkProximity& proximity,
+                                  const RepulsionConfig& config);
 
 /// 1 - distance / influence_distance, from 0 to 1: 0 when CLEAR or UNKNOWN, 1 in contact.
 double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig& config);
@@ -109,6 +116,10 @@ class RepulsionFilter {
   /// @param config     filter_time, gain and influence_distance are read
   RepulsiveWrench update(double time, std::uint64_t obstacles, const RepulsiveWrench& raw,
                          const LinkProximity& proximity, const RepulsionConfig& config);
+
+  /// The change at the next update() is spread like that of a new cloud, because the link's spheres
+  /// are others.
+  void expect_jump() { obstacles_ = ~obstacles_; }
 
   /// The next update() is the first.
   void reset() { *this = RepulsionFilter(); }

@@ -77,13 +77,15 @@ class Kinematics {
   Eigen::Isometry3d joint_pose(std::size_t joint, double q) const;
 
   /// Poses of all joints that positions determine.
-  /// @param q      by joint, NaN where not known; read for free joints only
+  /// @param q      by joint, NaN where not known; read for free joints only. With another size no
+  ///               joint is known
   /// @param poses  overwritten; planar and floating joints are not known
   void place_joints(const std::vector<double>& q, JointPoses* poses) const;
 
   /// Poses of all bodies. A body below a joint that is not known is not known.
-  /// @param X_FR   root body -> fixed frame
-  /// @param poses  overwritten
+  /// @param joints  of this kinematics; with other sizes no body is known
+  /// @param X_FR    root body -> fixed frame
+  /// @param poses   overwritten
   void place_bodies(const JointPoses& joints, const Eigen::Isometry3d& X_FR,
                     BodyPoses* poses) const;
 
@@ -112,6 +114,7 @@ using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 /// @param X_FB  by body (BodyPoses): body frame -> fixed frame; read for the child bodies of the
 ///              moving joints between root and `body`, see first_body_needed
 /// @param p_FP  [m] in the fixed frame
+/// @param body  with no such body, or as many poses as there are not, J is NaN
 /// @param J     overwritten; one column per joint of the kinematics. A mimic joint's motion is in
 ///              the column of the joint that it follows; columns of joints that are not free, or do
 ///              not move the body, are zero. Planar and floating joints have no column: they count

@@ -65,6 +65,12 @@ class ForwardKinematics {
   LinkPoses links_;
 };
 
+/// By link of a model: whether the link may move in the frame of a body of the URDF, because a
+/// joint that is not fixed is between them. True for links that the kinematics lacks, and for all
+/// links where it lacks the body. Thread safe.
+std::vector<bool> links_that_move(const RobotModel& model, const Kinematics& kinematics,
+                                  const std::string& body);
+
 /// The links of a robot at their poses, as Ingest takes them for its self-filter. Links of unknown
 /// pose, with an error or without spheres are left out.
 /// @param model  viewed by the result, which must not outlive it

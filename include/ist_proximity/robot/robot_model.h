@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -21,6 +22,9 @@ struct LinkModel {
   Solid solid;                ///< the exact geometry, for refinement
   bool from_cache = false;    ///< the packing was read from the cache
   double packing_time = 0.0;  ///< [s]
+  bool is_final = true;       ///< false: a finer packing may take the place of this one
+  /// Identifies `packing` and `tree`: links with the same id have the same ones. 0: not known.
+  std::uint64_t packing_id = 0;
 
   /// Whether queries can answer for the link.
   bool usable() const { return error.empty(); }
@@ -31,7 +35,13 @@ struct RobotModel {
   std::string name;              ///< the robot's name in the URDF
   std::string root_link;         ///< name of a link of the URDF, monitored or not
   std::vector<LinkModel> links;  ///< "by link" and a link's index mean its place here
+  /// The same for models that differ in packings and trees alone. 0: not known.
+  std::uint64_t geometry_id = 0;
 };
+
+/// Whether two models have the same links with the same exact geometry, in the same order: what was
+/// measured with one holds for the other.
+bool same_geometry(const RobotModel& a, const RobotModel& b);
 
 /// Progress of building the model.
 struct ModelProgress {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "ist_proximity/geometry/solid.h"
@@ -107,11 +108,14 @@ class InnerSphereTree {
 };
 
 /// One link's geometry at a pose, for whatever needs to know where a robot is but not what a robot
-/// is. The same link at several instants is as many of them.
+/// is. The same link at several instants is as many of them, each for the points that were measured
+/// about that instant.
 struct PosedSolid {
   const InnerSphereTree* tree = nullptr;  ///< in the link frame L; not owned, not null
   const Solid* solid = nullptr;           ///< exact geometry in L; not owned, not null
   Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< link frame -> fixed frame, rigid
+  /// The points of the message, by their number in it, that were measured while the link was there.
+  std::uint32_t first_point = 0, last_point = std::numeric_limits<std::uint32_t>::max();
 };
 
 }  // namespace ist

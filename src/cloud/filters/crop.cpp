@@ -36,21 +36,35 @@ struct alignas(64) SensorBatch {
 
 // Whether points are four floats each, as most drivers write them.
 bool is_four_floats(const RawCloud& cloud) {
-  return !cloud.is_double && !cloud.swap_bytes && cloud.point_step == 4 * sizeof(float) &&
-         cloud.x == 0 && cloud.y == sizeof(float) && cloud.z == 2 * sizeof(float) &&
+  return cloud.depth == DepthType::kNone && !cloud.is_double && !cloud.swap_bytes &&
+         cloud.point_step == 4 * sizeof(float) && cloud.x == 0 && cloud.y == sizeof(float) &&
+         cloud.z == 2 * sizeof(float) &&
          reinterpret_cast<std::uintptr_t>(cloud.data) % sizeof(float) == 0 &&
          cloud.row_step % sizeof(float) == 0;
 }
 
+// Neighbouring points of a row.
+struct RowPart {
+  std::size_t row, column, count;
+};
+
 // Reads some points of a row into slots from `slot` on.
 template <typename Scalar, bool kSwap>
-void load(const RawCloud& cloud, const std::uint8_t* bytes, std::size_t count, std::size_t slot,
+void load(const RawCloud& cloud, const RowPart& part, std::size_t slot,
           SensorBatch<Scalar>* batch) {
-  for (std::size_t i = slot; i < slot + count; ++i, bytes += cloud.point_step) {
+  const std::uint8_t* bytes = bytes_of(cloud, part.row, part.column);
+  for (std::size_t i = slot; i < slot + part.count; ++i, bytes += cloud.point_step) {
     batch->x[i] = read<Scalar, kSwap>(bytes + cloud.x);
     batch->y[i] = read<Scalar, kSwap>(bytes + cloud.y);
     batch->z[i] = read<Scalar, kSwap>(bytes + cloud.z);
   }
+}
+
+// The same for the pixels of a depth image.
+void load_depth(const RawCloud& image, const RowPart& part, std::size_t slot,
+                SensorBatch<double>* batch) {
+  read_depth_pixels(image, part.row, part.column, part.count, batch->x + slot, batch->y + slot,
+                    batch->z + slot);
 }
 
 // Fills slots with NaN, as if nothing was measured.
@@ -77,18 +91,19 @@ std::uint32_t count_infinite(const SensorBatch<Scalar>& batch, std::size_t count
 
 // A rectangle of a cloud. Where it has several rows, each takes kTileSide slots.
 struct Window {
-  const std::uint8_t* bytes;
+  std::size_t row, column;  // of the first point
   std::size_t rows, columns;
 };
 
-template <typename Scalar, bool kSwap>
+template <typename Scalar,
+          void (*kLoad)(const RawCloud&, const RowPart&, std::size_t, SensorBatch<Scalar>*)>
 std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropParameters& crop,
                     CropBatch* out, IngestCounts* counts) {
   SensorBatch<Scalar> batch;
   const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
   for (std::size_t row = 0; row < window.rows; ++row) {
     const std::size_t slot = row * kTileSide;
-    load<Scalar, kSwap>(cloud, window.bytes + row * cloud.row_step, window.columns, slot, &batch);
+    kLoad(cloud, {window.row + row, window.column, window.columns}, slot, &batch);
     if (row + 1 < window.rows) fill(slot + window.columns, slot + kTileSide, &batch);
   }
   fill(used, (used + 7) / 8 * 8, &batch);
@@ -107,10 +122,14 @@ std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropParam
 
 std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropParameters& crop,
                         CropBatch* batch, IngestCounts* counts) {
-  const auto function = cloud.is_double
-                            ? cloud.swap_bytes ? &crop_as<double, true> : &crop_as<double, false>
-                        : cloud.swap_bytes ? &crop_as<float, true>
-                                           : &crop_as<float, false>;
+  if (cloud.depth != DepthType::kNone) {
+    return crop_as<double, &load_depth>(cloud, window, crop, batch, counts);
+  }
+  const bool swap = cloud.swap_bytes;
+  const auto function = cloud.is_double ? swap ? &crop_as<double, &load<double, true>>
+                                               : &crop_as<double, &load<double, false>>
+                        : swap ? &crop_as<float, &load<float, true>>
+                                        : &crop_as<float, &load<float, false>>;
   return function(cloud, window, crop, batch, counts);
 }
 
@@ -138,17 +157,18 @@ std::size_t crop_points(const RawCloud& cloud, std::size_t row, std::size_t colu
     const std::ptrdiff_t kept = add_counts(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }
-  return crop_window(cloud, {bytes, 1, count}, crop, batch, counts);
+  return crop_window(cloud, {row, column, 1, count}, crop, batch, counts);
 }
 
 std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
                       const CropParameters& crop, CropBatch* batch, IngestCounts* counts) {
   constexpr std::size_t kSlots = kTileSide * kTileSide;
-  const Window window = {bytes_of(cloud, row, column), std::min(kTileSide, cloud.height - row),
+  const Window window = {row, column, std::min(kTileSide, cloud.height - row),
                          std::min(kTileSide, cloud.width - column)};
   if (is_four_floats(cloud) && window.rows == kTileSide && window.columns == kTileSide) {
-    const CropTally tally = crop_xyzw_tile(kernel_parameters(crop), floats(window.bytes),
-                                           cloud.row_step / sizeof(float), batch);
+    const CropTally tally =
+        crop_xyzw_tile(kernel_parameters(crop), floats(bytes_of(cloud, row, column)),
+                       cloud.row_step / sizeof(float), batch);
     const std::ptrdiff_t kept = add_counts(tally, counts);
     if (kept >= 0) return static_cast<std::size_t>(kept);
   }

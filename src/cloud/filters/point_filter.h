@@ -12,7 +12,8 @@ namespace ist {
 /// tile's points; unused slots of the tile are undefined.
 using PointFilter = std::function<std::uint32_t(const PointTile& tile, const PaddedBox& box)>;
 
-/// Returns whether a PointFilter may drop a point of this box.
+/// Returns whether a PointFilter may drop a point of this box. It is called before the tiles in the
+/// box are filtered.
 using BoxFilter = std::function<bool(const PaddedBox& box)>;
 
 }  // namespace ist

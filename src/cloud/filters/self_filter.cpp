@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/relative_pose.h"
@@ -18,12 +19,24 @@ std::uint32_t all_of(const PointTile& tile) {
   return (1U << static_cast<std::uint32_t>(tile.count)) - 1U;
 }
 
+// Bit k: the id of the point in slot k is one of [first, last].
+std::uint32_t slots_within(const PointTile& tile, std::uint32_t first, std::uint32_t last) {
+  std::uint32_t mask = 0;
+  for (std::int32_t k = 0; k < tile.count; ++k) {
+    const bool is_within = tile.id[k] >= first && tile.id[k] <= last;
+    mask |= static_cast<std::uint32_t>(is_within) << static_cast<std::uint32_t>(k);
+  }
+  return mask;
+}
+
 }  // namespace
 
 void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO,
                            double padding) {
   padding_ = padding;
   links_.clear();
+  group_.clear();
+  undecided_.clear();
   for (const PosedSolid& posed : solids) {
     const InnerSphereTree& tree = *posed.tree;
     if (tree.empty()) continue;
@@ -38,8 +51,12 @@ void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3
     link.rounding = static_cast<float>(kRounding * (size + X_OL.translation().norm()));
     link.clear_distance = static_cast<float>(clear_distance) + link.rounding;
     link.padded_radius = static_cast<float>(tree.radius()) + link.clear_distance;
+    link.first_point = posed.first_point;
+    link.last_point = posed.last_point;
     links_.push_back(link);
   }
+  group_.reserve(links_.size());
+  undecided_.reserve(links_.size());
 }
 
 // Whether a sphere may touch what the link claims.
@@ -48,43 +65,82 @@ bool SelfFilter::may_touch(const Link& link, const Eigen::Vector3f& center_O, fl
   return !((center_O - link.center_O).squaredNorm() > limit * limit);
 }
 
-bool SelfFilter::may_drop(const PaddedBox& box) const {
+bool SelfFilter::begin_group(const PaddedBox& box) {
   const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
   const float radius = 0.5F * box.diagonal();
-  return std::any_of(links_.begin(), links_.end(), [&center, radius](const Link& link) {
-    return may_touch(link, center, radius);
-  });
-}
-
-std::uint32_t SelfFilter::points_on_robot(const PointTile& tile, const PaddedBox& box) const {
-  const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
-  const float radius = 0.5F * box.diagonal();
-  std::uint32_t mask = 0;
+  group_.clear();
   for (const Link& link : links_) {
     if (!may_touch(link, center, radius)) continue;
-    mask |= points_on_link(link, tile, center.cast<double>(), static_cast<double>(radius));
+    // A scan has the robot at many instants, of which few are a tile's: those are tested there.
+    if (!link.is_for_all_points()) {
+      group_.push_back(&link);
+      continue;
+    }
+    const Verdict verdict = test_spheres(
+        Effort::kProveClear, link, link.X_LO * center.cast<double>(), static_cast<double>(radius));
+    if (verdict != Verdict::kClear) group_.push_back(&link);
+  }
+  return !group_.empty();
+}
+
+SelfFilter::Verdict SelfFilter::test(const PaddedBox& box) {
+  return test(box, 0, std::numeric_limits<std::uint32_t>::max());
+}
+
+// @param first, last  the least and the greatest id of a point in the box
+SelfFilter::Verdict SelfFilter::test(const PaddedBox& box, std::uint32_t first,
+                                     std::uint32_t last) {
+  const Eigen::Vector3f center = 0.5F * (box.min + box.max).head<3>();
+  const float radius = 0.5F * box.diagonal();
+  undecided_.clear();
+  for (const Link* link : group_) {
+    if (last < link->first_point || first > link->last_point) continue;
+    if (!may_touch(*link, center, radius)) continue;
+    const bool is_for_all = first >= link->first_point && last <= link->last_point;
+    const Verdict verdict = test_spheres(Effort::kDecide, *link, link->X_LO * center.cast<double>(),
+                                         static_cast<double>(radius));
+    if (verdict == Verdict::kOnRobot && is_for_all) return verdict;
+    if (verdict != Verdict::kClear) undecided_.push_back(link);
+  }
+  return undecided_.empty() ? Verdict::kClear : Verdict::kUndecided;
+}
+
+std::uint32_t SelfFilter::points_on_robot(const PointTile& tile, const PaddedBox& box) {
+  const auto [first, last] = std::minmax_element(tile.id, tile.id + tile.count);
+  switch (test(box, *first, *last)) {
+    case Verdict::kClear:
+      return 0;
+    case Verdict::kOnRobot:
+      return all_of(tile);
+    case Verdict::kUndecided:
+      break;
+  }
+  return undecided_points_on_robot(tile);
+}
+
+std::uint32_t SelfFilter::undecided_points_on_robot(const PointTile& tile) const {
+  std::uint32_t mask = 0;
+  for (const Link* link : undecided_) {
+    const std::uint32_t measured = link->is_for_all_points()
+                                       ? all_of(tile)
+                                       : slots_within(tile, link->first_point, link->last_point);
+    mask |= points_on_link(*link, tile, measured & ~mask);
     if (mask == all_of(tile)) break;
   }
   return mask;
 }
 
+// @param measured  bits of the points that are asked about
 std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile,
-                                         const Eigen::Vector3d& center_O, double radius) const {
-  switch (test_spheres(link, link.X_LO * center_O, radius)) {
-    case Verdict::kClear:
-      return 0;
-    case Verdict::kOnLink:
-      return all_of(tile);
-    case Verdict::kUndecided:
-      break;
-  }
+                                         std::uint32_t measured) const {
   std::uint32_t mask = 0;
   for (std::int32_t k = 0; k < tile.count; ++k) {
+    if ((measured >> static_cast<std::uint32_t>(k) & 1U) == 0) continue;
     const Eigen::Vector3f p_O(tile.x[k], tile.y[k], tile.z[k]);
     const Eigen::Vector3d p_L = link.X_LO * p_O.cast<double>();
-    const Verdict verdict = test_spheres(link, p_L, 0.0);
-    const bool on_robot =
-        verdict == Verdict::kOnLink || (verdict == Verdict::kUndecided && test_geometry(link, p_L));
+    const Verdict verdict = test_spheres(Effort::kDecide, link, p_L, 0.0);
+    const bool on_robot = verdict == Verdict::kOnRobot ||
+                          (verdict == Verdict::kUndecided && test_geometry(link, p_L));
     mask |= static_cast<std::uint32_t>(on_robot) << k;
   }
   return mask;
@@ -92,9 +148,9 @@ std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile
 
 // Tests all points within `radius` of a centre at once. Descends where a cover sphere may be near
 // enough, into the child that holds the centre deepest first; ends at the first inner sphere that
-// holds all of the points.
-SelfFilter::Verdict SelfFilter::test_spheres(const Link& link, const Eigen::Vector3d& center_L,
-                                             double radius) const {
+// holds all of the points, or, with kProveClear, at the first cover sphere that is near enough.
+SelfFilter::Verdict SelfFilter::test_spheres(Effort effort, const Link& link,
+                                             const Eigen::Vector3d& center_L, double radius) const {
   const InnerSphereTree& tree = *link.tree;
   const Eigen::Vector3f c = center_L.cast<float>();
   const float near = link.clear_distance + static_cast<float>(radius) * (1.0F + 1e-6F);
@@ -126,8 +182,9 @@ SelfFilter::Verdict SelfFilter::test_spheres(const Link& link, const Eigen::Vect
     const std::int32_t child = stack.pop().child;
     if (child < 0) {
       const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
-      if (within(leaf.x, leaf.y, leaf.z, leaf.inner_radius, held)) return Verdict::kOnLink;
+      if (within(leaf.x, leaf.y, leaf.z, leaf.inner_radius, held)) return Verdict::kOnRobot;
       is_undecided = is_undecided || within(leaf.x, leaf.y, leaf.z, leaf.cover_radius, near);
+      if (effort == Effort::kProveClear && is_undecided) return Verdict::kUndecided;
       continue;
     }
     const SphereNode& node = tree.nodes()[static_cast<std::size_t>(child)];

@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <limits>
 
+#include "cloud/format/byte_order.h"
+
 namespace ist {
 namespace {
 
 constexpr std::uint8_t kFloat32 = 7, kFloat64 = 8;
-
-#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-constexpr bool kMachineIsBigEndian = true;
-#else
-constexpr bool kMachineIsBigEndian = false;
-#endif
 
 std::string text(std::uint64_t value) { return std::to_string(value); }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include "cloud/format/depth_reader.h"
 #include "ist_proximity/cloud/ingest.h"
 
 /// Reads points from a message's bytes, whose layout check_layout has passed.
@@ -46,6 +47,11 @@ Eigen::Vector3d read_point(const RawCloud& cloud, const std::uint8_t* bytes) {
 
 /// A point as it is in the message, in the sensor frame [m]; not finite where nothing was measured.
 inline Eigen::Vector3d point_at(const RawCloud& cloud, std::size_t row, std::size_t column) {
+  if (cloud.depth != DepthType::kNone) {
+    Eigen::Vector3d p;
+    read_depth_pixels(cloud, row, column, 1, &p.x(), &p.y(), &p.z());
+    return p;
+  }
   const std::uint8_t* bytes = bytes_of(cloud, row, column);
   if (cloud.is_double) {
     return cloud.swap_bytes ? read_point<double, true>(cloud, bytes)

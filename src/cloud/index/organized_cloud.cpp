@@ -19,8 +19,8 @@ namespace {
 // Whether pixels can be read from the message as four floats each, the coordinates first.
 bool holds_floats(const RawCloud& cloud) {
   const auto is_aligned = [](std::size_t bytes) { return bytes % sizeof(float) == 0; };
-  return !cloud.is_double && !cloud.swap_bytes && cloud.y == cloud.x + sizeof(float) &&
-         cloud.z == cloud.x + 2 * sizeof(float) &&
+  return cloud.depth == DepthType::kNone && !cloud.is_double && !cloud.swap_bytes &&
+         cloud.y == cloud.x + sizeof(float) && cloud.z == cloud.x + 2 * sizeof(float) &&
          cloud.x + 4 * sizeof(float) <= cloud.point_step && is_aligned(cloud.point_step) &&
          is_aligned(cloud.row_step) &&
          is_aligned(reinterpret_cast<std::uintptr_t>(cloud.data) + cloud.x);
@@ -58,7 +58,7 @@ class RegionTest {
 // Reads an organized cloud block by block and hands its tiles to the builder.
 class OrganizedReader {
  public:
-  OrganizedReader(const RawCloud& cloud, const CropParameters& crop, const SelfFilter* on_robot,
+  OrganizedReader(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
                   PointBvhBuilder* builder, IngestCounts* counts)
       : cloud_(cloud),
         crop_(crop),
@@ -69,7 +69,14 @@ class OrganizedReader {
         on_robot_(on_robot),
         builder_(*builder),
         counts_(*counts) {
-    if (on_robot != nullptr) drop_ = on_robot->as_filter();
+    if (on_robot != nullptr) {
+      drop_ = [on_robot](const PointTile& tile, const PaddedBox& box) {
+        return on_robot->points_on_robot(tile, box);
+      };
+      drop_undecided_ = [on_robot](const PointTile& tile, const PaddedBox& /*box*/) {
+        return on_robot->undecided_points_on_robot(tile);
+      };
+    }
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       offset_[slot] = static_cast<std::uint32_t>(tile_row(slot) * cloud.width + tile_column(slot));
     }
@@ -105,8 +112,9 @@ class OrganizedReader {
     if (kept == 0) return;
     kept_ += kept;
     const std::uint32_t candidates = split_candidates();
-    if (state == BlockState::kAll && candidates == 0 && add_as_node()) return;
-    add_tiles(candidates);
+    const bool is_near_robot = on_robot_ != nullptr && on_robot_->begin_group(block_box());
+    if (state == BlockState::kAll && candidates == 0 && !is_near_robot && add_as_node()) return;
+    add_tiles(candidates, is_near_robot);
   }
 
   std::size_t rows() const { return std::min(kBlockSide, cloud_.height - row_); }
@@ -128,6 +136,10 @@ class OrganizedReader {
   BlockPixels copied() {
     std::fill_n(copy_, 4 * kBlockSide * kBlockSide, std::numeric_limits<float>::quiet_NaN());
     for (std::size_t row = 0; row < rows(); ++row) {
+      if (cloud_.depth != DepthType::kNone) {
+        copy_depths(row);
+        continue;
+      }
       for (std::size_t column = 0; column < columns(); ++column) {
         const Eigen::Vector3d p = point_at(cloud_, row_ + row, column_ + column);
         float* to = copied_pixel(row, column);
@@ -135,6 +147,16 @@ class OrganizedReader {
       }
     }
     return {copy_, 4, 4 * kBlockSide};
+  }
+  void copy_depths(std::size_t row) {
+    double x[kBlockSide], y[kBlockSide], z[kBlockSide];
+    read_depth_pixels(cloud_, row_ + row, column_, columns(), x, y, z);
+    for (std::size_t column = 0; column < columns(); ++column) {
+      float* to = copied_pixel(row, column);
+      to[0] = static_cast<float>(x[column]);
+      to[1] = static_cast<float>(y[column]);
+      to[2] = static_cast<float>(z[column]);
+    }
   }
   float* copied_pixel(std::size_t row, std::size_t column) {
     return copy_ + 4 * (kBlockSide * row + column);
@@ -176,7 +198,6 @@ class OrganizedReader {
   bool add_as_node() {
     const PaddedBox bounds = block_box();
     if (!are_close_together(bounds.diagonal(), block_.diagonals, kPointWidth)) return false;
-    if (on_robot_ != nullptr && on_robot_->may_drop(bounds)) return false;
     std::array<std::uint32_t, kSlots> first;
     for (std::size_t slot = 0; slot < kSlots; ++slot) first[slot] = first_pixel(slot);
     builder_.add_lazy_node(block_.boxes, first.data());
@@ -188,27 +209,31 @@ class OrganizedReader {
             {block_.max[0], block_.max[1], block_.max[2], 0.0F}};
   }
 
-  // Adds the tiles one by one.
+  // Adds the tiles one by one. Only those that have to be split, have holes, or are at the
+  // self-filter's border are read.
   // @param candidates  bit k: the tile in slot k may have to be split
-  void add_tiles(std::uint32_t candidates) {
-    const bool is_near_robot = on_robot_ != nullptr && on_robot_->may_drop(block_box());
+  void add_tiles(std::uint32_t candidates, bool is_near_robot) {
+    using Verdict = SelfFilter::Verdict;
+    static const PointFilter kDropNone;
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       const std::uint32_t kept = block_.kept[slot];
       if (kept == 0) continue;
       const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
       const bool may_split = (candidates >> slot & 1U) != 0;
-      const bool may_be_robot = is_near_robot && on_robot_->may_drop(box);
-      if (kept == kWhole && !may_split && !may_be_robot) {
+      const Verdict robot = is_near_robot ? on_robot_->test(box) : Verdict::kClear;
+      if (robot == Verdict::kOnRobot) continue;
+      if (kept == kWhole && !may_split && robot == Verdict::kClear) {
         builder_.add_lazy_tile(box, first_pixel(slot));
         continue;
       }
       if (may_split) {
         PointTile tile;
         read_kept(slot, &tile);
-        add_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box);
+        add_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box,
+                  robot == Verdict::kClear ? kDropNone : drop_);
       } else {
         read_kept(slot, builder_.next_tiles(1));
-        builder_.add_tile(box, drop_);
+        builder_.add_tile(box, robot == Verdict::kClear ? kDropNone : drop_undecided_);
       }
     }
     builder_.end_group();
@@ -253,19 +278,19 @@ class OrganizedReader {
   }
 
   // Splits points in the middle of their box's longest side as long as that is worthwhile, and adds
-  // the parts. Each
-  // split takes one point at least, so the recursion is at most fifteen calls deep.
+  // the parts. Each split takes one point at least, so the recursion is at most fifteen calls deep.
   // @param points  bit k: the point in slot k belongs
-  void add_parts(const PointTile& whole, std::uint32_t points, const PaddedBox& box) {
+  void add_parts(const PointTile& whole, std::uint32_t points, const PaddedBox& box,
+                 const PointFilter& drop) {
     const TileHalves halves = halve_tile(whole, points, box);
     if (halves.low != 0 && halves.high != 0 &&
         is_split_worthwhile(halves.low_box, halves.high_box, box)) {
-      add_parts(whole, halves.high, halves.high_box);
-      add_parts(whole, halves.low, halves.low_box);
+      add_parts(whole, halves.high, halves.high_box, drop);
+      add_parts(whole, halves.low, halves.low_box, drop);
       return;
     }
     pick_points(whole, points, builder_.next_tiles(1));
-    builder_.add_tile(box, drop_);
+    builder_.add_tile(box, drop);
   }
 
   const RawCloud& cloud_;
@@ -273,8 +298,8 @@ class OrganizedReader {
   const BlockTransform transform_, without_limits_;
   const RegionTest region_;
   const bool holds_floats_;
-  const SelfFilter* on_robot_;
-  PointFilter drop_;
+  SelfFilter* on_robot_;
+  PointFilter drop_, drop_undecided_;
   PointBvhBuilder& builder_;
   IngestCounts& counts_;
   std::array<std::uint32_t, kSlots> offset_;  // [pixels] by slot
@@ -286,9 +311,8 @@ class OrganizedReader {
 
 }  // namespace
 
-std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop,
-                            const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
-                            IngestCounts* counts) {
+std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
+                            PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts) {
   builder->start_organized(crop.X_FO, cloud, crop.X_OS, bvh);
   const std::size_t kept = OrganizedReader(cloud, crop, on_robot, builder, counts).run();
   builder->finish();

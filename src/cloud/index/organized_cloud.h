@@ -20,8 +20,7 @@ bool is_organized(const RawCloud& cloud, const CropParameters& crop);
 /// @param on_robot  null: no self-filter
 /// @param bvh  overwritten, its buffers reused
 /// @returns how many points are kept, before `on_robot` drops some
-std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop,
-                            const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
-                            IngestCounts* counts);
+std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
+                            PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts);
 
 }  // namespace ist

@@ -18,7 +18,16 @@ PointBvh& PointBvh::operator=(const PointBvh& other) {
   size_ = other.size_;
   root_ = other.root_;
   build_id_ = other.build_id_;
+  is_thinned_ = other.is_thinned_;
+  grid_ = other.grid_;
+  if (is_thinned_) thinned_.reset(nodes_.size(), tiles_.size());
   return *this;
+}
+
+void PointBvh::set_thinning(double voxel_size) {
+  is_thinned_ = true;
+  grid_ = VoxelGrid(X_FO_, voxel_size);
+  thinned_.reset(nodes_.size(), tiles_.size());
 }
 
 const PointTile& PointBvh::load(std::size_t i, PointTile* scratch) const {

@@ -56,6 +56,7 @@ void PointBvhBuilder::start(const Eigen::Isometry3d& X_FO, PointBvh* bvh) {
   bvh->size_ = 0;
   bvh->nodes_.clear();
   bvh->cloud_ = RawCloud();
+  bvh->is_thinned_ = false;
   lazy_runs_.clear();
   ungrouped_.clear();
   group_begin_ = 0;

@@ -40,10 +40,6 @@ class PointBvhBuilder {
              PointBvh* bvh);
   PointCells& cells() { return cells_; }
 
-  /// Builds over points of which neighbours in the list are mostly neighbours in space.
-  void build_in_order(const Eigen::Isometry3d& X_FO, const std::vector<CloudPoint>& points,
-                      PointBvh* bvh);
-
   /// Builds tile by tile, for callers that know which points are neighbours: start(), then
   /// next_tiles() and add_tile() for each tile, then finish(). The data must not be read before.
   void start(const Eigen::Isometry3d& X_FO, PointBvh* bvh);
@@ -87,14 +83,14 @@ class PointBvhBuilder {
   };
 
   void append_lazy(const std::uint32_t* first_pixels, std::size_t count);
-  void add_in_order(const CloudPoint* points, std::size_t n, const PointFilter& drop);
   void add_points(CloudPoint* points, CloudPoint* spare, std::size_t n, const Filters& filters);
   void slice_into_tiles(CloudPoint* points, CloudPoint* spare, std::size_t n);
   template <typename Visit>
   void for_each_slice(std::size_t n, std::size_t part, const Visit& visit) const;
   void add_batch(const Filters& filters);
   void add_clear_tiles(std::size_t begin, std::size_t end);
-  void add_filtered_tiles(std::size_t begin, std::size_t end, const PointFilter& drop);
+  void add_filtered_tiles(std::size_t begin, std::size_t end, const Filters& filters);
+  static bool may_drop_any(const Filters& filters, const PaddedBox& box);
   void end_cell();
 
   PointCells cells_;

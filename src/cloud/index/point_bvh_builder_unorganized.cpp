@@ -1,13 +1,11 @@
-// The builder for unorganized clouds: points in any order, or in an order that is mostly spatial.
+// The builder for unorganized clouds: points in any order.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "cloud/index/point_bvh_builder.h"
-#include "cloud/index/split_rule.h"
-#include "cloud/index/tile_bounds.h"
+#include "internal/bvh/padded_box.h"
 
 namespace ist {
 namespace {
@@ -15,89 +13,7 @@ namespace {
 constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
 constexpr std::size_t kEnough = 4 * kWidth;  // tiles for well filled nodes
 
-// The box of the slots where the mask is -inf; it is inf for the others.
-PaddedBox box_of(const PointTile& tile, const Lanes& mask) {
-  const LaneMap x(tile.x), y(tile.y), z(tile.z);
-  return {{x.max(mask).minCoeff(), y.max(mask).minCoeff(), z.max(mask).minCoeff(), 0.0F},
-          {x.min(-mask).maxCoeff(), y.min(-mask).maxCoeff(), z.min(-mask).maxCoeff(), 0.0F}};
-}
-
-// The mask of the first `count` slots; negated, the mask of the others.
-Lanes mask_of_first(std::int32_t count) {
-  constexpr float kIn = -std::numeric_limits<float>::infinity(), kOut = -kIn;
-  static constexpr float kMasks[2 * kPointWidth] = {kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,
-                                                    kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,  kIn,
-                                                    kOut, kOut, kOut, kOut, kOut, kOut, kOut, kOut,
-                                                    kOut, kOut, kOut, kOut, kOut, kOut, kOut, kOut};
-  return LaneMap(kMasks + kPointWidth - count);
-}
-
-// The longest step between consecutive points.
-struct Step {
-  std::int32_t to;  // slot of the point after it
-  float length_sq;  // [m^2]
-};
-
-Step longest_step(const PointTile& tile) {
-  // Fifteen steps, in two overlapping halves.
-  constexpr int kHalf = kPointWidth / 2;
-  using Half = Eigen::Array<float, kHalf, 1>;
-  using HalfMap = Eigen::Map<const Half>;
-  const auto squared_steps = [&tile](int first) {
-    const auto along = [first](const float* v) {
-      return Half((HalfMap(v + first + 1) - HalfMap(v + first)).square());
-    };
-    return Half(along(tile.x) + along(tile.y) + along(tile.z));
-  };
-  const Half front = squared_steps(0), back = squared_steps(kHalf - 1);
-  const float front_longest = front.maxCoeff(), back_longest = back.maxCoeff();
-  const bool in_front = front_longest >= back_longest;
-  const Half& half = in_front ? front : back;
-  const float longest = in_front ? front_longest : back_longest;
-  int k = 0;
-  while (k < kHalf - 1 && half[k] != longest) ++k;
-  return {k + (in_front ? 1 : kHalf), longest};
-}
-
-// Splits a tile at its longest step and keeps the points before it, as long as that is worthwhile.
-// @returns the box of those
-PaddedBox shorten(PointTile* tile) {
-  PaddedBox box = box_of(*tile);
-  while (tile->count > 1) {
-    const Step step = longest_step(*tile);
-    if (!may_split_at_step(step.length_sq, box.diagonal_sq())) break;
-    const Lanes mask = mask_of_first(step.to);
-    const PaddedBox front_box = box_of(*tile, mask), back_box = box_of(*tile, -mask);
-    if (!is_split_worthwhile(front_box, back_box, box)) break;
-    tile->count = step.to;
-    repeat_last(tile);
-    box = front_box;
-  }
-  return box;
-}
-
 }  // namespace
-
-// Adds tiles of up to sixteen consecutive points, split where those are apart.
-void PointBvhBuilder::add_in_order(const CloudPoint* points, std::size_t n,
-                                   const PointFilter& drop) {
-  while (n > 0) {
-    PointTile& tile = *next_tiles(1);
-    const std::size_t count = std::min(kWidth, n);
-    for (std::size_t k = 0; k < count; ++k) {
-      tile.x[k] = points[k].x;
-      tile.y[k] = points[k].y;
-      tile.z[k] = points[k].z;
-      tile.id[k] = points[k].id;
-    }
-    tile.count = static_cast<std::int32_t>(count);
-    repeat_last(&tile);
-    const PaddedBox box = shorten(&tile);
-    points += tile.count;
-    n -= static_cast<std::size_t>(tile.count);
-    add_tile(box, drop);
-  }
-}
 
 // Groups the tiles that are in no node yet, when there are enough to fill nodes.
 void PointBvhBuilder::end_cell() {
@@ -175,7 +91,7 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
   for (std::size_t i = 0; i < count; i += kWidth) {
     BoxNode& boxes = batch_.boxes[i / kWidth];
     boxes.count = static_cast<std::int32_t>(std::min(count - i, kWidth));
-    if (filters.drop && (!filters.may_drop || filters.may_drop(bounds_of(boxes)))) is_clear = false;
+    is_clear = is_clear && !may_drop_any(filters, bounds_of(boxes));
   }
   if (!is_clear) {
     filtered_.reserve(TileBatch::kMost);
@@ -188,7 +104,7 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
     if (is_clear) {
       add_clear_tiles(begin, end);
     } else {
-      add_filtered_tiles(begin, end, filters.drop);
+      add_filtered_tiles(begin, end, filters);
     }
     end_group();
   }
@@ -205,11 +121,22 @@ void PointBvhBuilder::add_clear_tiles(std::size_t begin, std::size_t end) {
 
 // Tiles that the filter empties move all that follow.
 void PointBvhBuilder::add_filtered_tiles(std::size_t begin, std::size_t end,
-                                         const PointFilter& drop) {
+                                         const Filters& filters) {
+  static const PointFilter kDropNone;
+  const auto box_of_tile = [this](std::size_t i) {
+    return box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth));
+  };
+  PaddedBox all = box_of_tile(begin);
+  for (std::size_t i = begin + 1; i < end; ++i) all.extend(box_of_tile(i));
+  const bool is_clear = !may_drop_any(filters, all);
   for (std::size_t i = begin; i < end; ++i) {
     *next_tiles(1) = filtered_[i];
-    add_tile(box_in(batch_.boxes[i / kWidth], static_cast<int>(i % kWidth)), drop);
+    add_tile(box_of_tile(i), is_clear ? kDropNone : filters.drop);
   }
+}
+
+bool PointBvhBuilder::may_drop_any(const Filters& filters, const PaddedBox& box) {
+  return filters.drop && (!filters.may_drop || filters.may_drop(box));
 }
 
 void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* points, std::size_t n,
@@ -236,13 +163,6 @@ void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& dr
     add_points(cell.points, spare_.data(), cell.size, {drop, may_drop});
     end_cell();
   }
-  finish();
-}
-
-void PointBvhBuilder::build_in_order(const Eigen::Isometry3d& X_FO,
-                                     const std::vector<CloudPoint>& points, PointBvh* bvh) {
-  start(X_FO, bvh);
-  add_in_order(points.data(), points.size(), {});
   finish();
 }
 

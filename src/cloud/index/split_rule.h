@@ -9,8 +9,8 @@ namespace ist {
 // The one rule for where neighbouring points are apart, as at depth discontinuities: points that
 // are apart get tiles of their own, tiles that are apart are not grouped into a node. The measure
 // is the diagonal of boxes. Whoever forms tiles proposes where to split, in the way that its order
-// of points makes cheap (between two pixels, in the middle of the longest side, at the longest
-// step); is_split_worthwhile() decides. The other functions are cheap tests that come before it.
+// of points makes cheap (between two pixels, in the middle of the longest side);
+// is_split_worthwhile() decides. The other functions are cheap tests that come before it.
 
 /// Share of the whole's diagonal below which the parts' diagonals add up when a split is
 /// worthwhile. Four by four points of a plane, halved, come to 1.6; at a depth discontinuity it is
@@ -29,15 +29,6 @@ inline bool is_split_worthwhile(const PaddedBox& low, const PaddedBox& high,
 /// The axis along which a box is longest; of equal ones the first.
 constexpr int longest_axis(float x, float y, float z) {
   return x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
-}
-
-/// Whether a split between two consecutive points may be worthwhile: the whole's diagonal is no
-/// longer than both parts' and the step between them together.
-/// @param step_sq      [m^2] squared distance of the two points
-/// @param diagonal_sq  [m^2] of the box of all points
-inline bool may_split_at_step(float step_sq, float diagonal_sq) {
-  constexpr float kShort = 0.99F * (1.0F - kSplitBelow);  // 0.99: rounding
-  return !(step_sq < kShort * kShort * diagonal_sq);
 }
 
 /// A split in the middle of the longest side is proposed only where no point lies between these

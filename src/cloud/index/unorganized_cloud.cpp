@@ -14,6 +14,7 @@ using Sample = std::array<CloudPoint, PointCells::kSample>;
 // The same cloud as a single row, where its rows follow each other without padding or it is a
 // single column: full batches are read faster.
 RawCloud flattened(RawCloud cloud) {
+  if (cloud.depth != DepthType::kNone) return cloud;  // each row has its own rays
   if (cloud.width == 1) {
     cloud.point_step = cloud.row_step;
   } else if (cloud.row_step != cloud.width * cloud.point_step) {
@@ -43,7 +44,7 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sampl
 }  // namespace
 
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
+                              SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
                               IngestCounts* counts) {
   const RawCloud points = flattened(cloud);
   Sample sample;
@@ -65,8 +66,11 @@ std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
     builder->build(crop.X_FO, {}, {}, bvh);
   } else {
     builder->build(
-        crop.X_FO, on_robot->as_filter(),
-        [on_robot](const PaddedBox& box) { return on_robot->may_drop(box); }, bvh);
+        crop.X_FO,
+        [on_robot](const PointTile& tile, const PaddedBox& box) {
+          return on_robot->points_on_robot(tile, box);
+        },
+        [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); }, bvh);
   }
   return kept;
 }

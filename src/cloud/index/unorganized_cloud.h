@@ -17,7 +17,7 @@ namespace ist {
 /// @param bvh  overwritten, its buffers reused
 /// @returns how many points are kept, before `on_robot` drops some
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              const SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
+                              SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
                               IngestCounts* counts);
 
 }  // namespace ist

@@ -16,8 +16,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using VoxelTag = hn::CappedTag<float, kPointWidth>;
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
-constexpr float kUnusedVoxel =
-    1.5e9F;  // number of unused slots: larger than all others, fits an integer
+// The number of unused slots is larger than that of any point: those are kLargestRange and more
+// away, in voxels of kSmallestVoxel, at most.
+constexpr float kUnusedVoxel = 1e30F;
 
 template <class M>
 HWY_INLINE std::uint32_t MaskBits(const M& mask) {

@@ -4,15 +4,9 @@
 #include <cstdint>
 
 #include "internal/cloud/point_tile.h"
+#include "internal/cloud/voxel_grid.h"
 
 namespace ist {
-
-/// A grid of cubic voxels along the fixed frame's axes, as seen from a frame O that lies anywhere
-/// in it. Float is enough: voxels are no less exact than the coordinates.
-struct VoxelGrid {
-  float R[9];       ///< [1/m] rotation from O to the fixed frame over a voxel's edge, row-major
-  float offset[3];  ///< O's origin, in voxels
-};
 
 /// The voxels of a tile's points.
 struct alignas(64) TileVoxels {

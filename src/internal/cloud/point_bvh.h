@@ -9,6 +9,8 @@
 #include "internal/bvh/box_node.h"
 #include "internal/cloud/lazy_tile_flags.h"
 #include "internal/cloud/point_tile.h"
+#include "internal/cloud/thinned_cloud.h"
+#include "internal/cloud/voxel_grid.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/cloud/ingest.h"
 
@@ -45,8 +47,15 @@ class PointBvh {
   Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
   std::uint64_t build_id() const { return build_id_; }    ///< 0 before the first build
 
+  /// Gives it a thinned cloud until it is built again. Not to be called while others read.
+  /// @param voxel_size  [m] > 0, edge of a voxel
+  void set_thinning(double voxel_size);
+  /// Empty unless set_thinning() was called.
+  ThinnedCloud thinned() const { return ThinnedCloud(*this); }
+
  private:
   friend class PointBvhBuilder;
+  friend class ThinnedCloud;
 
   const PointTile& load(std::size_t i, PointTile* scratch) const;
 
@@ -62,6 +71,9 @@ class PointBvh {
   std::size_t size_ = 0;
   std::int32_t root_ = -1;
   std::uint64_t build_id_ = 0;
+  bool is_thinned_ = false;
+  VoxelGrid grid_;  ///< of the thinned cloud
+  ThinnedStorage thinned_;
 };
 
 }  // namespace ist

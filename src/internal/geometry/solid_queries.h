@@ -90,4 +90,7 @@ BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O
 /// Whether the solid is one mesh and nothing else.
 bool is_one_mesh(const Solid& solid);
 
+/// Whether one is a copy of the other.
+bool is_same_solid(const Solid& one, const Solid& other);
+
 }  // namespace ist

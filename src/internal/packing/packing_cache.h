@@ -37,7 +37,7 @@ class PackingCache {
   std::optional<Packing> load_unchecked(const std::string& key, std::size_t max_spheres,
                                         std::string* warning) const;
 
-  /// Stores a packing.
+  /// Stores a packing. Removes what writers that were killed an hour ago or earlier have left.
   /// @param warning  set to one sentence when the file cannot be written
   /// @returns false when the file cannot be written
   bool store(const std::string& key, const Packing& packing, std::string* warning) const;

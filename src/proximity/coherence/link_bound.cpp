@@ -10,8 +10,18 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 LinkBound::LinkBound(const LinkModel& link)
-    : displacement_(link),
-      least_cover_distance_(!link.solid.is_closed() ? link.tree.interior_gap() : -kInfinity) {}
+    : displacement_(link), least_cover_distance_(least_cover_distance(link)) {}
+
+double LinkBound::least_cover_distance(const LinkModel& link) {
+  return link.solid.is_closed() ? -kInfinity : link.tree.interior_gap();
+}
+
+void LinkBound::set_link(const LinkModel& link) {
+  const double least = least_cover_distance(link);
+  if (least > -kInfinity) cover_distance_ += least - least_cover_distance_;
+  least_cover_distance_ = least;
+  displacement_ = DisplacementBound(link);
+}
 
 void LinkBound::prove(SceneId scene, const Eigen::Isometry3d& X_FL, double bound,
                       double cover_distance, double max_coordinate) {

@@ -23,6 +23,10 @@ class LinkBound {
              double max_coordinate);
   void forget() { scene_ = kUnknownScene; }
 
+  /// Takes another packing of the same geometry. What is proven stays: of the cover distance, how
+  /// far the link may move before a point may be inside.
+  void set_link(const LinkModel& link);
+
   /// [m] No stored point is nearer to the link at this pose; -inf: nothing is proven.
   double at(SceneId scene, const Eigen::Isometry3d& X_FL) const;
 
@@ -33,6 +37,8 @@ class LinkBound {
   double max_coordinate() const { return max_coordinate_; }
 
  private:
+  static double least_cover_distance(const LinkModel& link);
+
   DisplacementBound displacement_;
   double least_cover_distance_;  ///< [m] see stays_outside()
   SceneId scene_ = kUnknownScene;

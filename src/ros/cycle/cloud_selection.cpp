@@ -1,7 +1,7 @@
 #include "ros/cycle/cloud_selection.h"
 
 #include <algorithm>
-#include <utility>
+#include <cmath>
 
 #include "ist_proximity/repulsion/repulsion.h"
 
@@ -11,13 +11,14 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
                             const std::shared_ptr<const RobotModel>& model,
                             const ros::Time& poses_stamp, double pose_timeout,
                             StatusInput* status) {
-  status->sources.clear();
-  status->source_statuses.clear();
+  status->sources.resize(sources.size());
+  status->source_statuses.resize(sources.size());
   selected_.clear();
   held_.clear();
-  for (const auto& source : sources) {
-    const SourceSnapshot* snapshot = newest(source.get(), model, poses_stamp, pose_timeout);
-    SourceReport report = source->report();
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const SourceSnapshot* snapshot = newest(sources[i].get(), model, poses_stamp, pose_timeout);
+    SourceReport& report = status->sources[i];
+    sources[i]->report(&report);
     if (snapshot) {
       report.has_snapshot = true;
       report.stamp = snapshot->stamp;
@@ -25,27 +26,29 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       report.counts = snapshot->cloud.counts;
       report.ingest_time = snapshot->cloud.ingest_time;
     }
-    status->source_statuses.push_back(source_status(report, now.toSec()));
-    status->sources.push_back(std::move(report));
+    status->source_statuses[i] = source_status(report, now.toSec());
     selected_.push_back(snapshot);
   }
 
   clouds_.clear();
-  cloud_names_.clear();
+  cloud_sources_.clear();
+  cloud_stands_still_.clear();
   oldest_stamp_ = ros::Time();
   const bool usable = clouds_usable(*status);
   for (std::size_t i = 0; i < selected_.size(); ++i) {
     if (!usable || !status->source_statuses[i].ok()) selected_[i] = nullptr;
     if (!selected_[i]) continue;
     clouds_.push_back(&selected_[i]->cloud);
-    cloud_names_.push_back(status->sources[i].name);
+    cloud_sources_.push_back(static_cast<int>(i));
+    cloud_stands_still_.push_back(status->sources[i].is_file ||
+                                  std::isinf(status->sources[i].timeout));
     const ros::Time& stamp = selected_[i]->stamp;
     if (status->sources[i].is_file) continue;
     if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
   }
 }
 
-const SourceSnapshot* CloudSelection::newest(CloudSource* source,
+const SourceSnapshot* CloudSelection::newest(ObstacleSource* source,
                                              const std::shared_ptr<const RobotModel>& model,
                                              const ros::Time& poses_stamp, double pose_timeout) {
   if (reader_ == Reader::kOnly) return source->newest(model, poses_stamp, pose_timeout);
@@ -56,7 +59,13 @@ const SourceSnapshot* CloudSelection::newest(CloudSource* source,
 ClosingSpeed::Nearest CloudSelection::nearest(const LinkProximity& answer) const {
   const auto cloud = static_cast<std::size_t>(answer.source);
   if (answer.source < 0 || cloud >= clouds_.size()) return {};
-  return {cloud_names_[cloud], obstacles_key({clouds_[cloud]}), clouds_[cloud]->stamp};
+  return {cloud_sources_[cloud], obstacles_key({clouds_[cloud]}), clouds_[cloud]->stamp,
+          cloud_stands_still_[cloud]};
+}
+
+int CloudSelection::source_of(const LinkProximity& answer) const {
+  const auto cloud = static_cast<std::size_t>(answer.source);
+  return answer.source < 0 || cloud >= clouds_.size() ? -1 : cloud_sources_[cloud];
 }
 
 void CloudSelection::exclude_unfiltered(std::vector<bool>* links) const {

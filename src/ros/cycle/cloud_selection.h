@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ros/input/cloud_source.h"
-#include "ros/output/closing_speed.h"
+#include "ros/input/obstacle_source.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -18,7 +18,8 @@ namespace ist {
 /// Takes the newest snapshot of each source and selects those that queries may use. One thread.
 class CloudSelection {
  public:
-  /// kOnly: the one thread that calls CloudSource::newest(); kOther: shares the snapshots with it.
+  /// kOnly: the one thread that calls ObstacleSource::newest(); kOther: shares the snapshots with
+  /// it.
   enum class Reader { kOnly, kOther };
 
   explicit CloudSelection(Reader reader) : reader_(reader) {}
@@ -41,19 +42,23 @@ class CloudSelection {
   ros::Time oldest_stamp() const { return oldest_stamp_; }
   /// The selected cloud that holds the nearest point of an answer.
   ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
+  /// The number of that cloud's source; -1: no point is near.
+  int source_of(const LinkProximity& answer) const;
   /// Makes links false whose own points the self-filter left in a selected cloud: they would be
   /// found touching themselves.
   void exclude_unfiltered(std::vector<bool>* links) const;
 
  private:
-  const SourceSnapshot* newest(CloudSource* source, const std::shared_ptr<const RobotModel>& model,
+  const SourceSnapshot* newest(ObstacleSource* source,
+                               const std::shared_ptr<const RobotModel>& model,
                                const ros::Time& poses_stamp, double pose_timeout);
 
   const Reader reader_;
   std::vector<const SourceSnapshot*> selected_;
   std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< used with Reader::kOther
   std::vector<const CloudSnapshot*> clouds_;
-  std::vector<std::string> cloud_names_;  ///< by cloud: the name of its source
+  std::vector<int> cloud_sources_;        ///< by cloud: the number of its source
+  std::vector<bool> cloud_stands_still_;  ///< by cloud: its source never goes stale
   ros::Time oldest_stamp_;
 };
 

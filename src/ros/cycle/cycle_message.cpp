@@ -8,19 +8,14 @@ namespace ist {
 
 using ist_proximity::ProximityArray;
 
-void fill_status(const StatusInput& input, const ros::Time& now, ProximityArray* message,
-                 CycleReport* report) {
-  message->sources.clear();
+void fill_status(const StatusInput& input, const Status& status, ProximityArray* message) {
+  message->sources.resize(input.sources.size());
   for (std::size_t i = 0; i < input.sources.size(); ++i) {
-    message->sources.push_back(
-        to_message(input.sources[i], input.source_statuses[i], message->header.stamp));
+    assign_source(input.sources[i], input.source_statuses[i], message->header.stamp,
+                  &message->sources[i]);
   }
-  report->status = overall_status(input, now.toSec());
-  message->status = report->status.code;
-  message->status_text = report->status.text;
-  report->sources = input.sources;
-  report->source_statuses = input.source_statuses;
-  report->pose_problems = input.pose_problems;
+  message->status = status.code;
+  message->status_text = status.text;
 }
 
 void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,
@@ -29,14 +24,17 @@ void fill_without_model(const ModelState& model, const ServerConfig& config, con
   input.model_problem = model.problem;
   input.clock_runs = !now.isZero();
   for (const auto& source : sources) {
-    input.sources.push_back(source->report());
+    input.sources.emplace_back();
+    source->report(&input.sources.back());
     input.source_statuses.push_back(source_status(input.sources.back(), now.toSec()));
   }
   *message = ProximityArray();
   message->header.stamp = now;
   message->header.frame_id = fixed_frame_of(model, config);
   for (const std::string& link : model.links) message->links.push_back(unknown_link(link));
-  fill_status(input, now, message, report);
+  const Status status = overall_status(input, now.toSec());
+  fill_status(input, status, message);
+  report->take(input, status);
   report->links_monitored = model.links.size();
   report->links_known = 0;
 }

@@ -5,16 +5,16 @@
 
 #include <string>
 
-#include "ros/input/cloud_source.h"
+#include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
 #include "ros/status/cycle_report.h"
 #include "ros/status/status.h"
 
 namespace ist {
 
-/// Fills the status, its text and the sources of a message, and the same in the report.
-void fill_status(const StatusInput& input, const ros::Time& now,
-                 ist_proximity::ProximityArray* message, CycleReport* report);
+/// Fills the status, its text and the sources of a message.
+void fill_status(const StatusInput& input, const Status& status,
+                 ist_proximity::ProximityArray* message);
 
 /// Fills the whole message while there is no model: MODEL_ERROR, and every link UNKNOWN.
 void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,

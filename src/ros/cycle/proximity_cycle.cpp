@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <utility>
 
 #include "ros/common/ros_time.h"
+#include "ros/common/stopwatch.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/output/message_conversion.h"
 #include "ros/status/pose_problems.h"
@@ -13,9 +15,23 @@ namespace ist {
 
 using ist_proximity::ProximityArray;
 
+namespace {
+
+constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
+
+/// When a share of a deadline [s] has passed.
+TimePoint end_of(double deadline, double share, TimePoint begin) {
+  if (!(deadline > 0.0)) return TimePoint::max();
+  return begin + std::chrono::duration_cast<TimePoint::duration>(
+                     std::chrono::duration<double>(share * deadline));
+}
+
+}  // namespace
+
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
                                std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader)
     : model_(std::move(model)),
+      packed_(model_->robot),
       robot_(*model_->robot),
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
@@ -26,9 +42,13 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
       joint_repulsion_(*model_),
+      wanted_(wanted_links(*model_)),
+      measurable_(wanted_),
       results_(robot_.links.size()),
-      pushes_(robot_.links.size(), RepulsiveWrench::unknown()) {
+      pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
+      wrenches_(robot_.links.size(), Wrench::unknown()) {
   status_input_.model_problem = model_->problem;
+  for (std::size_t i = 0; i < robot_.links.size(); ++i) blends_.emplace_back(robot_, i);
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
     if (!link.usable()) status_input_.link_errors.push_back(link.error);
@@ -36,39 +56,98 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
 }
 
 void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
-                         const LiveConfig& config, ProximityArray* message, CycleReport* report) {
-  query_.set_config(config.query);
+                         const LiveConfig& config, const std::string& transform_problem,
+                         ProximityArray* message) {
+  Stopwatch watch;
+  now_ = now;
+  deadline_ = config.query.deadline;
   look_up_poses(now);
-  const auto begin = std::chrono::steady_clock::now();
+  message->poses_time = watch.lap();
+  const TimePoint begin = Stopwatch::Clock::now();
+  status_input_.deadline = DeadlineCost();
   selection_.update(now, sources, model_->robot, poses_.stamp, pose_timeout_, &status_input_);
-  describe_pose_problems(report->transform_problem);
+  describe_pose_problems(transform_problem);
+  const double preparation = watch.lap();
 
-  const SnapshotSpan clouds = selection_.clouds();
-  std::vector<bool> known = measurable();
-  for (std::size_t i = 0; i < known.size(); ++i) known[i] = known[i] && poses_.known[i];
-  status_input_.deadline_passed =
-      !query_.run(poses_.X_FL, known, clouds, &results_) && !clouds.empty();
-  status_input_.outside_region = query_.statistics().outside_region > 0;
+  run_query(config, begin);
+  message->query_time = watch.lap();
+  find_urgent_links();
+  compute_pushes(config, end_of(deadline_, kRepulsionShare, begin));
+  message->repulsion_time = watch.lap();
+  compute_wrenches(config, end_of(deadline_, 1.0, begin));
+  message->penetration_time = watch.lap();
 
   message->header.stamp = poses_.stamp;
   message->header.frame_id = fixed_frame_;
   message->cloud_stamp = selection_.oldest_stamp();
-  fill_links(config, message);
-  fill_status(status_input_, now, message, report);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  message->computation_time = took.count();
-
-  report->links_monitored = model_->monitored.size();
-  report->links_known = poses_.count_known();
-  report->pose_age = seconds_between(poses_.stamp, now);
-  report->times.add(took.count());
-  if (status_input_.deadline_passed) ++report->deadlines_missed;
+  message->unfinished = static_cast<std::uint32_t>(status_input_.deadline.unfinished);
+  fill_links(message);
+  status_ = overall_status(status_input_, now.toSec());
+  fill_status(status_input_, status_, message);
+  message->message_time = preparation + watch.lap();
+  message->computation_time = message->query_time + message->repulsion_time +
+                              message->penetration_time + message->message_time;
 }
 
-std::vector<bool> ProximityCycle::measurable() const {
-  std::vector<bool> measurable = wanted_links(*model_);
-  selection_.exclude_unfiltered(&measurable);
-  return measurable;
+void ProximityCycle::report(const ProximityArray& message, CycleReport* report) const {
+  report->take(status_input_, status_);
+  report->links_monitored = model_->monitored.size();
+  report->links_known = poses_.count_known();
+  report->pose_age = seconds_between(poses_.stamp, now_);
+  report->deadline = deadline_;
+  report->add_times(message);
+  if (status_input_.deadline.any()) ++report->deadlines_missed;
+  report->worst_deadline.add(status_input_.deadline);
+}
+
+void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
+  QueryConfig query = config.query;
+  if (query.deadline > 0.0) {
+    const std::chrono::duration<double> left =
+        end_of(query.deadline, kQueryShare, begin) - Stopwatch::Clock::now();
+    query.deadline = std::max(left.count(), kLeastDeadline);
+  }
+  query_.set_config(query);
+  measurable_ = wanted_;
+  selection_.exclude_unfiltered(&measurable_);
+  known_ = measurable_;
+  for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
+  query_.run(poses_.X_FL, known_, selection_.clouds(), &results_);
+  note_usage(config);
+  const QueryStatistics& statistics = query_.statistics();
+  status_input_.outside_region = statistics.outside_region > 0;
+  status_input_.deadline.unfinished = statistics.unfinished;
+  status_input_.deadline.widest = statistics.widest;
+}
+
+/// Where time ends, the links that matter most have been served.
+void ProximityCycle::find_urgent_links() {
+  urgent_.assign(model_->monitored.begin(), model_->monitored.end());
+  std::sort(urgent_.begin(), urgent_.end(), [this](std::size_t a, std::size_t b) {
+    return results_[a].lower_bound < results_[b].lower_bound;
+  });
+}
+
+void ProximityCycle::compute_pushes(const LiveConfig& config, TimePoint end) {
+  const SnapshotSpan clouds = selection_.clouds();
+  const std::uint64_t obstacles = obstacles_key(clouds);
+  for (const std::size_t i : urgent_) {
+    const LinkProximity& result = results_[i];
+    const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
+    RepulsiveWrench raw =
+        blends_[i].update(repulsion_, X_FL, clouds, result, config.repulsion, end);
+    std::uint64_t key = obstacles;
+    if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
+      raw = nearest_repulsion(X_FL, result, config.repulsion);
+      key = ~obstacles;  // the filter spreads the change as if the obstacles were others
+      ++status_input_.deadline.unblended;
+    }
+    pushes_[i] = filters_[i].update(poses_.stamp.toSec(), key, raw, result, config.repulsion);
+  }
+}
+
+void ProximityCycle::compute_wrenches(const LiveConfig& config, TimePoint end) {
+  for (const std::size_t i : urgent_) wrenches_[i] = penetration(i, config, end);
 }
 
 void ProximityCycle::look_up_poses(const ros::Time& now) {
@@ -76,7 +155,7 @@ void ProximityCycle::look_up_poses(const ros::Time& now) {
     pose_source_->look_up(now, &poses_);
   } else {
     poses_.reset(now, robot_.links.size());
-    poses_.set_problem(wanted_links(*model_), {no_kinematics(*model_), false});
+    poses_.set_problem(wanted_, {no_kinematics(*model_), false});
   }
   status_input_.clock_runs = !now.isZero();
 }
@@ -87,8 +166,9 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
   for (std::size_t i = 0; i < selection_.selected().size(); ++i) {
     const SourceSnapshot* snapshot = selection_.selected()[i];
     if (!snapshot) continue;
-    const std::string unfiltered = unfiltered_links(robot_, model_->monitored, poses_, *snapshot,
-                                                    status_input_.sources[i].name);
+    const std::string unfiltered =
+        unfiltered_links(robot_, model_->monitored, poses_, pose_source_.get(), *snapshot,
+                         status_input_.sources[i].name);
     if (!unfiltered.empty()) problems.push_back(unfiltered);
   }
   status_input_.pose_doubts = poses_.doubts;
@@ -98,39 +178,65 @@ void ProximityCycle::describe_pose_problems(const std::string& transform_problem
   if (!problems.empty() && is_new) problems.push_back(transform_problem);
 }
 
-void ProximityCycle::fill_links(const LiveConfig& config, ProximityArray* message) {
-  message->links.clear();
-  const SnapshotSpan clouds = selection_.clouds();
-  const std::uint64_t obstacles = obstacles_key(clouds);
-  for (const std::size_t i : model_->monitored) {
+void ProximityCycle::fill_links(ProximityArray* message) {
+  const std::string nowhere;
+  message->links.resize(model_->monitored.size());
+  for (std::size_t k = 0; k < message->links.size(); ++k) {
+    const std::size_t i = model_->monitored[k];
     const LinkProximity& result = results_[i];
-    const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
-    const ClosingSpeed::Nearest nearest = selection_.nearest(result);
-    pushes_[i] = filters_[i].update(message->header.stamp.toSec(), obstacles,
-                                    repulsion_.wrench(i, X_FL, clouds, result, config.repulsion),
-                                    result, config.repulsion);
-    message->links.push_back(to_message(
-        robot_.links[i].name, result, pushes_[i], penetration(i, config),
-        speeds_[i].update(message->header.stamp, result, X_FL, nearest), nearest.source));
+    const int source = selection_.source_of(result);
+    assign_link(robot_.links[i].name, result, pushes_[i], wrenches_[i],
+                speeds_[i].update(message->header.stamp.toSec(), result, poses_.X_FL[i],
+                                  selection_.nearest(result)),
+                source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
+                &message->links[k]);
   }
 }
 
-/// The wrench is unknown in contact until the link's contact body is packed.
-Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config) const {
+/// The wrench is unknown in contact until the link's contact body is packed, and where the deadline
+/// passes before all of the volume is summed.
+Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config, TimePoint end) {
   const LinkProximity& result = results_[link];
   const ContactGeometry* body = find_contact_geometry(config.contacts.get(), robot_, link);
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
   if (is_known) {
-    volume = contact_volume(robot_.links[link], *body, poses_.X_FL[link], selection_.clouds());
+    volume =
+        contact_volume(packed_->links[link], *body, poses_.X_FL[link], selection_.clouds(), end);
+    DeadlineCost& cost = status_input_.deadline;
+    if (volume.known < 1.0) ++cost.no_penetration;
+    cost.least_known = std::min(cost.least_known, volume.known);
   }
   return penetration_wrench(result, config.query, is_known ? &volume : nullptr, poses_.X_FL[link],
                             config.penetration);
 }
 
+/// Tells the background packing what the links need.
+void ProximityCycle::note_usage(const LiveConfig& config) {
+  if (!model_->usage) return;
+  for (const std::size_t i : model_->monitored) {
+    const bool is_near = results_[i].state >= LinkState::kNear &&
+                         results_[i].lower_bound < config.repulsion.influence_distance;
+    model_->usage->note_query(i, query_.link_statistics()[i], is_near);
+  }
+}
+
+void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
+  for (std::size_t i = 0; i < filters_.size(); ++i) {
+    if (model->robot->links[i].packing_id != packed_->links[i].packing_id) {
+      filters_[i].expect_jump();
+      blends_[i] = KeptRepulsion(*model->robot, i);
+    }
+  }
+  packed_ = model->robot;
+  query_.set_model(packed_);
+  repulsion_ = model->repulsion ? *model->repulsion : Repulsion(packed_);
+}
+
 void ProximityCycle::forget() {
   speeds_.assign(speeds_.size(), ClosingSpeed());
   filters_.assign(filters_.size(), RepulsionFilter());
+  for (KeptRepulsion& blend : blends_) blend.forget();
   poses_.stamp = ros::Time();
 }
 

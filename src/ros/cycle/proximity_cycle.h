@@ -8,12 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
-#include "ros/input/cloud_source.h"
+#include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
-#include "ros/output/closing_speed.h"
 #include "ros/output/joint_repulsion.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/pose_source.h"
@@ -21,6 +22,9 @@
 #include "ros/status/status.h"
 
 namespace ist {
+
+/// The shares of a cycle's deadline at which distances and repulsion have to be there.
+constexpr double kQueryShare = 0.6, kRepulsionShare = 0.8;
 
 /// Turns link poses and clouds into one ProximityArray per cycle, for one robot model. It uses the
 /// newest data and never waits. One thread.
@@ -32,15 +36,29 @@ class ProximityCycle {
                  std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader);
 
   /// @param now      the ROS clock's time
-  /// @param message  overwritten
-  /// @param report   its transform_problem is read; sources, poses and status are overwritten, and
-  ///                 the computation time is added
+  /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
+  ///                 before costs no allocation
+  /// @param config   query.deadline is in seconds here, from known poses on: distances take
+  /// kQueryShare
+  ///                 of it at most, repulsion ends at kRepulsionShare, and contact volumes at the
+  ///                 deadline. Repulsion that is late is that of the link's nearest point, volumes
+  ///                 that are late are NaN, and the status says so
+  /// @param transform_problem  what tf's listener has to say; empty: nothing
   void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
-           ist_proximity::ProximityArray* message, CycleReport* report);
+           const std::string& transform_problem, ist_proximity::ProximityArray* message);
+
+  /// Writes what the last run() found: sources, poses, status and deadline; the times are added.
+  /// @param message  of that run()
+  void report(const ist_proximity::ProximityArray& message, CycleReport* report) const;
 
   /// Forgets the last cycles after a jump of the clock: no speed is computed across it, and the
   /// repulsion's filter and the stamps start again.
   void forget();
+
+  /// Takes finer packings of the same robot. Nothing that is known is lost: filters, speeds and
+  /// the query's bounds go on.
+  /// @param model  see is_refinement()
+  void refine(const std::shared_ptr<const ModelState>& model);
 
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
@@ -48,7 +66,7 @@ class ProximityCycle {
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
-  std::vector<bool> measurable() const;
+  const std::vector<bool>& measurable() const { return measurable_; }
 
   /// Gives the repulsion of the last run() as joint efforts.
   /// @param proximity  the message of that run()
@@ -56,12 +74,18 @@ class ProximityCycle {
                             ist_proximity::JointRepulsion* message);
 
  private:
+  void note_usage(const LiveConfig& config);
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
-  void fill_links(const LiveConfig& config, ist_proximity::ProximityArray* message);
-  Wrench penetration(std::size_t link, const LiveConfig& config) const;
+  void run_query(const LiveConfig& config, TimePoint begin);
+  void find_urgent_links();
+  void compute_pushes(const LiveConfig& config, TimePoint end);
+  void compute_wrenches(const LiveConfig& config, TimePoint end);
+  Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
+  void fill_links(ist_proximity::ProximityArray* message);
 
-  std::shared_ptr<const ModelState> model_;
+  const std::shared_ptr<const ModelState> model_;
+  std::shared_ptr<const RobotModel> packed_;  ///< the same robot with the newest packings
   const RobotModel& robot_;
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;
@@ -69,15 +93,24 @@ class ProximityCycle {
   CloudSelection selection_;
   ProximityQuery query_;
   Repulsion repulsion_;
+  std::vector<KeptRepulsion> blends_;     ///< by link of the robot
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot
   std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
   JointRepulsion joint_repulsion_;
 
+  std::vector<bool> wanted_;  ///< by link of the robot: see wanted_links()
+
   // Valid for one cycle.
+  ros::Time now_;
+  double deadline_ = 0.0;  ///< [s] 0: none
+  Status status_{0, ""};
+  std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
   StatusInput status_input_;
   std::vector<LinkProximity> results_;   ///< by link of the robot
   std::vector<RepulsiveWrench> pushes_;  ///< by link of the robot, filtered
+  std::vector<Wrench> wrenches_;         ///< by link of the robot
+  std::vector<std::size_t> urgent_;      ///< monitored links, the least lower bound first
 };
 
 }  // namespace ist

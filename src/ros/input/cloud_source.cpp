@@ -19,7 +19,6 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kMaxWaiting = 10;
 // Clouds of one stream may overtake each other; stamps that go back farther are a new start. [s]
 constexpr double kMaxDisorder = 1.0;
 // Characters of a frame's name, which every status that mentions it repeats.
@@ -46,13 +45,14 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
       filtered_(filtered),
       state_(config, config.file.empty() ? nh.resolveName(config.topic) : config.file),
       placer_(config, buffer),
-      ingest_(ingest_config(config)) {
+      ingest_(ingest_config(config)),
+      topic_advice_(nh.resolveName(config.topic), message_type(config.type), filtered.getTopic()) {
   nh.setCallbackQueue(&queue_);
   if (config.file.empty()) {
     const auto begin = [this] {
       if (is_map_) state_.begin_work();  // others are read in no time
     };
-    subscriber_ = subscribe(config, &nh, begin, [this](const Received& received) {
+    subscription_ = subscribe(config, &nh, begin, [this](const Received& received) {
       if (is_map_) state_.end_work();
       guard([&] { receive(received); });
     });
@@ -63,7 +63,8 @@ CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
 CloudSource::~CloudSource() {
   running_ = false;
   thread_.join();
-  subscriber_.shutdown();
+  subscription_.messages.shutdown();
+  subscription_.camera_info.shutdown();
 }
 
 void CloudSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
@@ -132,9 +133,14 @@ void CloudSource::read_file() {
 }
 
 void CloudSource::count_publishers() {
-  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
+  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscription_.messages);
   if (!publishers) return;
-  state_.update([&](SourceReport* report) { report->publishers = *publishers; });
+  std::optional<std::string> advice;
+  if (!has_received_) advice = topic_advice_.ask();
+  state_.update([&](SourceReport* report) {
+    report->publishers = *publishers;
+    if (advice) report->advice = *advice;
+  });
 }
 
 /// Takes the newest target, and drops measurements of another model or from before the clock's
@@ -145,7 +151,10 @@ void CloudSource::take_target() {
     waiting_.clear();
     if (!config_.is_permanent()) last_map_.reset();
   }
-  if (newest.generation != target_.generation || newest.model != target_.model) {
+  const bool is_same_robot =
+      newest.model == target_.model ||
+      (newest.model && target_.model && same_geometry(*newest.model, *target_.model));
+  if (newest.generation != target_.generation || !is_same_robot) {
     in_use_ = ros::Time();
     map_is_new_ = last_map_ != nullptr;
     placer_.begin_target();
@@ -156,15 +165,12 @@ void CloudSource::take_target() {
 
 /// Drops measurements that have waited so long that they are stale.
 void CloudSource::drop_overdue() {
-  const double now = ros::Time::now().toSec();
-  while (!waiting_.empty() && (waiting_.size() > kMaxWaiting ||
-                               now - waiting_.front()->counts_from().toSec() > config_.timeout)) {
-    state_.update([](SourceReport* report) { ++report->unusable; });
-    waiting_.pop_front();
-  }
+  const std::size_t dropped = waiting_.drop_overdue(ros::Time::now(), config_.timeout);
+  if (dropped > 0) state_.update([&](SourceReport* report) { report->unusable += dropped; });
 }
 
 void CloudSource::receive(const Received& received) {
+  has_received_ = true;
   take_target();
   drop_overdue();
   const ros::Time& stamp = received.header.stamp;
@@ -192,6 +198,7 @@ void CloudSource::receive(const Received& received) {
     }
     // The wait of other messages for tf remains a problem until one is used or this one is old.
     if (!waits_for_tf_ || ahead < -config_.timeout) report->problem.clear();
+    report->doubt = received.doubt;
     if (problem.empty()) return;
     report->problem = problem;
     ++report->unusable;
@@ -204,18 +211,15 @@ void CloudSource::receive(const Received& received) {
     map_is_new_ = true;
     return;
   }
-  const auto after = std::upper_bound(waiting_.begin(), waiting_.end(), stamp,
-                                      [](const ros::Time& time, const MeasurementPtr& other) {
-                                        return time < other->header().stamp;
-                                      });
-  waiting_.insert(after, received.measurement);
+  const std::size_t dropped = waiting_.add(received.measurement);
+  if (dropped > 0) state_.update([&](SourceReport* report) { report->unusable += dropped; });
 }
 
 /// [s] How much earlier a stamp is than the newest one that is in use or waits; negative: it is
 /// later.
 double CloudSource::went_back(const ros::Time& stamp) const {
   const ros::Time newest =
-      waiting_.empty() ? in_use_ : std::max(in_use_, waiting_.back()->header().stamp);
+      waiting_.empty() ? in_use_ : std::max(in_use_, waiting_.newest().header().stamp);
   return newest.isZero() ? -1.0 : seconds_between(stamp, newest);
 }
 
@@ -270,28 +274,30 @@ std::string CloudSource::why_unusable(const Received& received) const {
 /// when the newest measurement has waited unusually long.
 void CloudSource::use_newest_ready() {
   const auto now = std::chrono::steady_clock::now();
-  if (waiting_.empty()) waits_since_ = now;
-  const std::chrono::duration<double> waits = now - waits_since_;
-  const bool is_usual = waits.count() < 0.5 * std::min(config_.timeout, 1.0);
-  for (std::size_t i = waiting_.size(); i-- > 0;) {
-    std::string problem = placer_.missing_transform(*waiting_[i], target_);
-    if (!problem.empty()) {
-      if (i + 1 == waiting_.size() && !is_usual) {
-        state_.set_problem(problem + clock_difference(*waiting_[i]), false);
-        waits_for_tf_ = true;
-      }
-      continue;
-    }
+  if (waiting_.empty()) {
     waits_since_ = now;
-    state_.begin_work();
-    problem = ingest(*waiting_[i]);
-    state_.end_work();
-    waits_for_tf_ = false;
-    state_.set_problem(problem, !problem.empty());
-    state_.update([i](SourceReport* report) { report->overtaken += i; });
-    waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(i) + 1);
     return;
   }
+  std::string wait;  // why the newest waits
+  const std::size_t i = waiting_.newest_ready([&](const Measurement& measurement) {
+    const std::string problem = placer_.missing_transform(measurement, target_);
+    if (&measurement == &waiting_.newest()) wait = problem;
+    return problem.empty();
+  });
+  const std::chrono::duration<double> waits = now - waits_since_;
+  if (!wait.empty() && waits.count() >= 0.5 * std::min(config_.timeout, 1.0)) {
+    state_.set_problem(wait + clock_difference(waiting_.newest()), false);
+    waits_for_tf_ = true;
+  }
+  if (i == waiting_.size()) return;
+  waits_since_ = now;
+  state_.begin_work();
+  const std::string problem = ingest(waiting_[i]);
+  state_.end_work();
+  waits_for_tf_ = false;
+  state_.set_problem(problem, !problem.empty());
+  state_.update([i](SourceReport* report) { report->overtaken += i; });
+  waiting_.drop_until(i);
 }
 
 void CloudSource::use_map() {

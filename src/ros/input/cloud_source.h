@@ -5,19 +5,20 @@
 
 #include <atomic>
 #include <chrono>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ros/common/publisher_count.h"
 #include "ros/input/measurement.h"
+#include "ros/input/measurement_queue.h"
+#include "ros/input/obstacle_source.h"
 #include "ros/input/placer.h"
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
+#include "ros/input/topic_advice.h"
 #include "ros/parameters/source_config.h"
 #include "ros/poses/transform_buffer.h"
 
@@ -28,7 +29,8 @@ namespace ist {
 ///
 /// A cloud waits until tf knows the poses of its sensor and, for the self-filter, of the links at
 /// the cloud's own stamp; a scan waits until the time of its last beam. The newest measurement that
-/// is ready is used, and older ones are dropped. Links whose transforms have stopped are not waited
+/// is ready is used, and older ones are dropped. What waits is bounded by the timeout and by memory
+/// (see MeasurementQueue). Links whose transforms have stopped are not waited
 /// for (see Placer).
 ///
 /// Messages are used in the order of their stamps. Where stamps go back (the sensor's driver or the
@@ -39,36 +41,24 @@ namespace ist {
 /// A map is placed when a query asks for it, at the pose of its frame at that time, so that it
 /// stays right on a robot that drives. The last map is kept for a model that is loaded later,
 /// because it may never be sent again. A map file is read once, in this thread.
-class CloudSource {
+class CloudSource : public ObstacleSource {
  public:
   /// @param nh        in the namespace that the topic is relative to
   /// @param buffer    outlives this
   /// @param filtered  publisher of what queries see, used while it has subscribers
   CloudSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
               const ros::Publisher& filtered);
-  ~CloudSource();
+  ~CloudSource() override;
   CloudSource(const CloudSource&) = delete;
   CloudSource& operator=(const CloudSource&) = delete;
 
-  /// Sets what the next clouds are transformed to, filtered with and cropped at. Thread safe.
-  /// @param model  null: clouds cannot be used
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
-                 const RegionOfInterest& region);
-
-  /// The newest snapshot made with `model` since the clock's last jump; null: none. It is valid
-  /// until the next call and never waits. One thread only. Call report() afterwards, which explains
-  /// why there is none.
-  /// @param time     a map is placed where it is then, or else at the newest instant that tf knows
-  /// @param max_age  [s] allowed age of that instant
+                 const RegionOfInterest& region) override;
   const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
-                               const ros::Time& time, double max_age);
-
-  /// The same for any other thread; valid as long as it is held.
+                               const ros::Time& time, double max_age) override;
   std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
-                                              const ros::Time& time, double max_age);
-
-  /// Everything but the members about the cloud in use. Thread safe.
-  SourceReport report() { return state_.report(); }
+                                              const ros::Time& time, double max_age) override;
+  void report(SourceReport* report) override { state_.report(report); }
 
  private:
   using MeasurementPtr = std::shared_ptr<const Measurement>;
@@ -96,7 +86,7 @@ class CloudSource {
   const TransformBuffer& buffer_;
   ros::Publisher filtered_;
   ros::CallbackQueue queue_;
-  ros::Subscriber subscriber_;
+  Subscription subscription_;
   SnapshotExchange exchange_;
   SourceState state_;
 
@@ -108,17 +98,17 @@ class CloudSource {
   SourceTarget target_;
   Placer placer_;
   Ingest ingest_;
-  std::deque<MeasurementPtr> waiting_;  ///< ordered by stamp
+  MeasurementQueue waiting_;
   MeasurementPtr last_map_;
   bool map_is_new_ = false;  ///< last_map_ is not in use with this model yet
   ros::Time in_use_;         ///< stamp of the newest snapshot of this generation
   std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
   bool waits_for_tf_ = false;                          ///< the reported problem is that wait
   PublisherCount publisher_count_;
+  TopicAdvice topic_advice_;
+  bool has_received_ = false;
   std::atomic<bool> running_{true};
   std::thread thread_;
 };
-
-using CloudSources = std::vector<std::unique_ptr<CloudSource>>;
 
 }  // namespace ist

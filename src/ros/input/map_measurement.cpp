@@ -18,7 +18,7 @@ class MapMeasurement : public Measurement {
  public:
   MapMeasurement(const std_msgs::Header& header, const Octree& octree,
                  std::chrono::steady_clock::time_point begin)
-      : Measurement(header) {
+      : Measurement(header, octree.occupied.size() * sizeof(octree.occupied[0])) {
     auto index = std::make_shared<BoxIndex>();
     index->build(octree.occupied);
     index_ = index;

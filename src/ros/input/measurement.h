@@ -7,9 +7,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -24,6 +26,8 @@ struct Placement {
   Eigen::Isometry3d X_FS_end = Eigen::Isometry3d::Identity();  ///< sensor at the last instant
   /// For the self-filter: links whose poses are known at all instants, at each of the instants.
   std::vector<PosedSolid> robot;
+  /// By element of `robot`: the first and the last instant for which it stands.
+  std::vector<std::pair<std::size_t, std::size_t>> robot_instants;
   std::vector<bool> known;  ///< by link: at every instant; empty: no self-filter
 };
 
@@ -31,8 +35,9 @@ struct Placement {
 /// turns itself into a snapshot. Immutable; it keeps the message alive.
 class Measurement {
  public:
-  explicit Measurement(const std_msgs::Header& header)
-      : header_(header), received_(ros::Time::now()) {}
+  /// @param bytes  what it keeps in memory, about
+  Measurement(const std_msgs::Header& header, std::size_t bytes)
+      : header_(header), received_(ros::Time::now()), bytes_(bytes) {}
   virtual ~Measurement() = default;
   Measurement(const Measurement&) = delete;
   Measurement& operator=(const Measurement&) = delete;
@@ -41,6 +46,8 @@ class Measurement {
   /// The instant from which its age counts: its stamp, or its receipt where the stamp was ahead of
   /// the clock.
   ros::Time counts_from() const { return std::min(header_.stamp, received_); }
+  /// What it keeps in memory, about.
+  std::size_t bytes() const { return bytes_; }
 
   /// The instants, in order, at which the poses of sensor and robot must be known, the stamp first:
   /// several for a scan, which takes its time, and none for a map, which stays in its own frame.
@@ -56,6 +63,7 @@ class Measurement {
  private:
   std_msgs::Header header_;
   ros::Time received_;
+  std::size_t bytes_;
 };
 
 /// A received message: its header, and either a sentence about its fault or a measurement.
@@ -63,6 +71,7 @@ struct Received {
   std_msgs::Header header;
   std::string fault;
   std::shared_ptr<const Measurement> measurement;
+  std::string doubt = {};  ///< a sentence about a message that is used all the same
 };
 using Receiver = std::function<void(const Received&)>;
 /// Called before a message is read, which takes long for a large map.
@@ -71,9 +80,15 @@ using ReadingBegins = std::function<void()>;
 /// The configuration of a source's Ingest. The range limits of scans apply to beams instead.
 IngestConfig ingest_config(const SourceConfig& config);
 
+/// The topics of a source.
+struct Subscription {
+  ros::Subscriber messages;
+  ros::Subscriber camera_info;  ///< of depth images
+};
+
 /// Subscribes to the source's topic with its message type.
 /// @param begin, receive  called from the callback queue of the node handle
-ros::Subscriber subscribe(const SourceConfig& config, ros::NodeHandle* nh,
-                          const ReadingBegins& begin, const Receiver& receive);
+Subscription subscribe(const SourceConfig& config, ros::NodeHandle* nh, const ReadingBegins& begin,
+                       const Receiver& receive);
 
 }  // namespace ist

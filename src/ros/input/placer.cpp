@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "ist_proximity/robot/link_poses.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/poses/transforms.h"
@@ -72,28 +71,33 @@ bool Placer::is_worth_waiting_for(const std::string& link, const std::string& fi
 }
 
 /// Adds the links whose poses are known at an instant, but for those that have not moved.
-void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, FilterPoses* last,
-                        Placement* placement) const {
+void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
+                        FilterPoses* last, Placement* placement) const {
   const auto& links = target.model->links;
-  std::vector<Eigen::Isometry3d> X_FL(links.size(), Eigen::Isometry3d::Identity());
-  std::vector<bool> known(links.size(), false);
   std::string ignored;
   for (std::size_t i = 0; i < links.size(); ++i) {
     // An exception per missing link and cloud would cost more than is_known().
-    known[i] = links[i].usable() &&
-               is_known(buffer_, target.fixed_frame, links[i].name, stamp, &ignored) &&
-               look_up(buffer_, target.fixed_frame, links[i].name, stamp, &X_FL[i]).empty();
+    Eigen::Isometry3d X_FL;
+    const bool known = links[i].usable() &&
+                       is_known(buffer_, target.fixed_frame, links[i].name, stamp, &ignored) &&
+                       look_up(buffer_, target.fixed_frame, links[i].name, stamp, &X_FL).empty();
     // A link whose pose is unknown at any instant is not filtered for certain.
-    placement->known[i] = placement->known[i] && known[i];
-    if (!known[i]) continue;
-    if (last->known[i] && stays_in_place(links[i].tree, last->X_FL[i], X_FL[i])) {
-      known[i] = false;  // it is where it was already
+    placement->known[i] = placement->known[i] && known;
+    if (!known || links[i].tree.empty()) continue;
+    if (last->known[i] && stays_in_place(links[i].tree, last->X_FL[i], X_FL)) {
+      placement->robot_instants[last->solid[i]].second = instant;  // it is where it was already
       continue;
     }
     last->known[i] = true;
-    last->X_FL[i] = X_FL[i];
+    last->X_FL[i] = X_FL;
+    last->solid[i] = placement->robot.size();
+    PosedSolid solid;
+    solid.tree = &links[i].tree;
+    solid.solid = &links[i].solid;
+    solid.X_FL = X_FL;
+    placement->robot.push_back(solid);
+    placement->robot_instants.emplace_back(instant, instant);
   }
-  append_posed_solids(*target.model, X_FL, known, &placement->robot);
 }
 
 std::string Placer::place(const Measurement& measurement, const SourceTarget& target,
@@ -113,7 +117,10 @@ std::string Placer::place(const Measurement& measurement, const SourceTarget& ta
   FilterPoses last;
   last.X_FL.assign(count, Eigen::Isometry3d::Identity());
   last.known.assign(count, false);
-  for (const ros::Time& instant : instants) pose_robot(target, instant, &last, placement);
+  last.solid.assign(count, 0);
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    pose_robot(target, instants[i], i, &last, placement);
+  }
   return "";
 }
 

@@ -43,9 +43,10 @@ class Placer {
   struct FilterPoses {
     std::vector<Eigen::Isometry3d> X_FL;
     std::vector<bool> known;
+    std::vector<std::size_t> solid;  ///< its number in Placement::robot
   };
-  void pose_robot(const SourceTarget& target, const ros::Time& stamp, FilterPoses* last,
-                  Placement* placement) const;
+  void pose_robot(const SourceTarget& target, const ros::Time& stamp, std::size_t instant,
+                  FilterPoses* last, Placement* placement) const;
 
   const bool self_filter_;
   const double patience_;  ///< [s] a cloud waits this long at most for one link's pose

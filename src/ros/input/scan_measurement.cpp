@@ -28,7 +28,7 @@ class ScanMeasurement : public Measurement {
  public:
   ScanMeasurement(const sensor_msgs::LaserScanConstPtr& message, const LaserScan& scan,
                   double min_range, double max_range)
-      : Measurement(message->header),
+      : Measurement(message->header, message->ranges.size() * sizeof(float)),
         message_(message),
         scan_(scan),
         min_range_(min_range),
@@ -48,10 +48,29 @@ class ScanMeasurement : public Measurement {
     ScanPoints points;
     to_points(scan_, min_range_, max_range_, placement.X_FS.inverse() * placement.X_FS_end,
               &points);
-    ingest->run(points.raw(), placement.X_FS, placement.robot, header().stamp.toSec(), snapshot);
+    ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement), header().stamp.toSec(),
+                snapshot);
   }
 
  private:
+  // The robot's solids, each for the beams that were measured between the instants beside its own:
+  // a beam is compared with two poses of a link, however many there are. A scan of ten seconds
+  // while the robot turns has 400.
+  std::vector<PosedSolid> robot_by_beam(const Placement& placement) const {
+    std::vector<PosedSolid> robot = placement.robot;
+    const std::size_t intervals = instants().size() - 1;
+    if (intervals == 0) return robot;
+    const std::size_t end = scan_.count - 1;
+    const auto beam_at = [&](std::size_t instant) { return end * instant / intervals; };
+    for (std::size_t i = 0; i < robot.size(); ++i) {
+      const auto [first, last] = placement.robot_instants[i];
+      robot[i].first_point = static_cast<std::uint32_t>(first > 0 ? beam_at(first - 1) : 0);
+      robot[i].last_point =
+          static_cast<std::uint32_t>(last < intervals ? beam_at(last + 1) + 1 : end);
+    }
+    return robot;
+  }
+
   sensor_msgs::LaserScanConstPtr message_;
   LaserScan scan_;  ///< views the message
   double min_range_, max_range_;

@@ -31,6 +31,8 @@ struct SourceReport {
   std::uint64_t restarts = 0;      ///< times that the stamps went back and were taken all the same
   std::uint64_t unusable = 0;      ///< dropped: malformed, in the future, or without transform
   std::uint32_t publishers = 0;
+  /// Until the first message: what the master knows of the topic and of others; may be empty.
+  std::string advice;
   double ahead = 0.0;  ///< [s] of the newest message's stamp at its receipt
   /// Newest stamp received, or its receipt where it was ahead of the clock, except for stamps far
   /// in the future; NaN: none.
@@ -39,6 +41,7 @@ struct SourceReport {
   double working = 0.0;
   double last_work = 0.0;  ///< [s] what reading and ingesting the last message took
   std::string problem;     ///< why the last message is not in use (yet); empty when it is
+  std::string doubt;       ///< about messages that are used all the same; empty: none
 
   bool has_snapshot = false;  ///< whether a cloud is in use; the members below describe it
   ros::Time stamp;

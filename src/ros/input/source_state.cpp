@@ -35,21 +35,20 @@ bool SourceState::is_current(const SourceSnapshot* snapshot,
                              const std::shared_ptr<const RobotModel>& model) {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  return snapshot && model && snapshot->model == model &&
+  return snapshot && snapshot->model && model && same_geometry(*snapshot->model, *model) &&
          (snapshot->generation == target_.generation ||
           (snapshot->generation != 0 && is_permanent_));
 }
 
-SourceReport SourceState::report() {
+void SourceState::report(SourceReport* report) {
   const std::lock_guard<std::mutex> lock(mutex_);
   notice_clock_jump();
-  SourceReport report = report_;
+  *report = report_;
   if (work_since_ != kNoWork) {
-    report.working = std::chrono::duration<double>(Clock::now() - work_since_).count();
+    report->working = std::chrono::duration<double>(Clock::now() - work_since_).count();
   }
-  if (!placing_problem_.empty()) report.problem = placing_problem_;
-  if (!file_problem_.empty()) report.problem = file_problem_;
-  return report;
+  if (!placing_problem_.empty()) report->problem = placing_problem_;
+  if (!file_problem_.empty()) report->problem = file_problem_;
 }
 
 void SourceState::set_problem(const std::string& problem, bool dropped) {

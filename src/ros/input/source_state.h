@@ -40,11 +40,12 @@ class SourceState {
                   const RegionOfInterest& region);
   SourceTarget target();
 
-  /// Whether a snapshot was made with `model` since the clock's last jump.
+  /// Whether a snapshot was made with `model`, or one of the same geometry, since the clock's last
+  /// jump.
   bool is_current(const SourceSnapshot* snapshot, const std::shared_ptr<const RobotModel>& model);
 
-  /// Everything but the members about the cloud in use.
-  SourceReport report();
+  /// Everything but the members about the cloud in use; see ObstacleSource::report().
+  void report(SourceReport* report);
   /// Changes the report under the lock.
   template <typename Change>
   void update(const Change& change) {

@@ -11,6 +11,8 @@
 
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/common/exceptions.h"
+#include "ros/common/thread_name.h"
+#include "ros/common/thread_priority.h"
 
 namespace ist {
 namespace {
@@ -34,7 +36,8 @@ std::shared_ptr<const ContactGeometry> no_body(const std::string& note) {
 
 ContactLoader::ContactLoader(const ServerConfig& config, const ModelLoader& loader)
     : config_(config), loader_(loader) {
-  if (config_.contacts_wanted) thread_ = std::thread(&ContactLoader::run, this);
+  if (config_.contacts_wanted != ContactsWanted::kNone)
+    thread_ = std::thread(&ContactLoader::run, this);
 }
 
 ContactLoader::~ContactLoader() {
@@ -53,15 +56,21 @@ void ContactLoader::set(std::shared_ptr<const ContactModel> contacts) {
 }
 
 bool ContactLoader::is_current(const ModelState& state) const {
-  return !stop_signal_.stopped() && loader_.state()->robot == state.robot;
+  if (stop_signal_.stopped()) return false;
+  const auto newest = loader_.state();
+  return newest->robot && same_geometry(*newest->robot, *state.robot);
 }
 
 void ContactLoader::run() {
+  name_thread("ist contact");
+  lower_thread_priority();
   do {
     const std::string fault = exception_of([this] {
-      const auto state = loader_.state();
+      auto state = loader_.state();
+      if (!state->robot) return;
       const auto contacts = this->contacts();
-      if (state->robot && (!contacts || contacts->robot != state->robot)) load(state);
+      if (!contacts || !same_geometry(*contacts->robot, *state->robot)) begin(*state);
+      while (is_current(*state) && add_next(*state)) state = loader_.state();
     });
     // No memory, for example; the next round tries again.
     if (!fault.empty()) {
@@ -70,38 +79,59 @@ void ContactLoader::run() {
   } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
 }
 
-void ContactLoader::load(const std::shared_ptr<const ModelState>& state) {
-  const auto begin = std::chrono::steady_clock::now();
-  const RobotModel& robot = *state->robot;
-  const RobotDescription description = with_objects(*state->description, state->objects);
+/// Begins a model with the bodies that are known from the last one.
+void ContactLoader::begin(const ModelState& state) {
+  const RobotModel& robot = *state.robot;
+  description_ = with_objects(*state.description, state.objects);
+  keys_.assign(robot.links.size(), "");
+  needed_.assign(robot.links.size(), Clock::time_point::max());
   std::map<std::string, std::shared_ptr<const ContactGeometry>> bodies;
-  std::vector<std::string> keys(robot.links.size());
   ContactModel contacts;
-  contacts.robot = state->robot;
+  contacts.robot = state.robot;
   contacts.links.resize(robot.links.size());
-  for (const std::size_t i : state->monitored) {
-    const LinkDescription* link = find_link(description, robot.links[i].name);
+  for (const std::size_t i : state.monitored) {
+    const LinkDescription* link = find_link(description_, robot.links[i].name);
     if (link == nullptr || !robot.links[i].usable()) continue;
-    keys[i] = contact_geometry_key(link->geometry, link->attached, config_.contacts);
-    const auto known = known_.find(keys[i]);
-    if (known != known_.end()) contacts.links[i] = bodies[keys[i]] = known->second;
-  }
-  set(std::make_shared<const ContactModel>(contacts));
-
-  const auto cancelled = [&] { return !is_current(*state); };
-  for (const std::size_t i : state->monitored) {
-    if (keys[i].empty() || contacts.links[i]) continue;
-    std::shared_ptr<const ContactGeometry>& body = bodies[keys[i]];
-    if (!body)
-      body = build(*find_link(description, robot.links[i].name), robot.links[i], cancelled);
-    if (!body || cancelled()) return;
-    contacts.links[i] = body;
-    set(std::make_shared<const ContactModel>(contacts));
+    keys_[i] = contact_geometry_key(link->geometry, link->attached, config_.contacts);
+    const auto known = known_.find(keys_[i]);
+    if (known != known_.end()) contacts.links[i] = bodies[keys_[i]] = known->second;
   }
   known_ = std::move(bodies);
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  ROS_INFO("contact volumes of %zu links ready after %.1f s", state->monitored.size(),
-           took.count());
+  set(std::make_shared<const ContactModel>(std::move(contacts)));
+}
+
+bool ContactLoader::is_needed(const ModelState& state, std::size_t link) {
+  const Clock::time_point now = Clock::now();
+  if (needed_[link] == Clock::time_point::max() &&
+      (config_.contacts_wanted == ContactsWanted::kAll || state.usage->was_near(link))) {
+    needed_[link] = now;
+  }
+  return needed_[link] != Clock::time_point::max() &&
+         (state.robot->links[link].is_final || now - needed_[link] > kMaxWait);
+}
+
+/// Makes the next body that is needed.
+/// @returns false where there is none, or the work was cancelled
+bool ContactLoader::add_next(const ModelState& state) {
+  const auto contacts = this->contacts();
+  const auto next =
+      std::find_if(state.monitored.begin(), state.monitored.end(), [&](std::size_t i) {
+        return !keys_[i].empty() && !contacts->links[i] && is_needed(state, i);
+      });
+  if (next == state.monitored.end()) return false;
+  std::shared_ptr<const ContactGeometry>& body = known_[keys_[*next]];
+  if (!body) {
+    const LinkModel& link = state.robot->links[*next];
+    body = build(*find_link(description_, link.name), link, [&] { return !is_current(state); });
+  }
+  if (!body) {
+    known_.erase(keys_[*next]);
+    return false;
+  }
+  auto more = std::make_shared<ContactModel>(*contacts);
+  more->links[*next] = body;
+  set(std::move(more));
+  return true;
 }
 
 /// @returns null when cancelled

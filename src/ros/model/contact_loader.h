@@ -1,11 +1,14 @@
 #pragma once
 
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "ist_proximity/contact/contact_model.h"
 #include "ros/common/stop_signal.h"
@@ -14,9 +17,15 @@
 
 namespace ist {
 
-/// Makes the contact bodies in a thread of its own, while the node answers already: it packs one
-/// monitored link after the other disjointly, or takes it from the cache. It follows every change
-/// of the robot's model; links that do not change keep their bodies. All members are thread safe.
+/// Makes the contact bodies in a thread of its own, while the node answers already: it packs the
+/// monitored links that need one disjointly, one after the other, or takes them from the cache.
+/// With ~penetration/enabled: auto, those are the links that something has come near. It follows
+/// every change of the robot's model; links that do not change keep their bodies. All members are
+/// thread safe.
+///
+/// A volume is summed over the inner spheres of the packing for distances, too. So it is made when
+/// that packing is final, and the wrench does not jump while it gets finer; but not later than
+/// kMaxWait after it was needed first.
 class ContactLoader {
  public:
   /// @param loader  outlives this
@@ -29,9 +38,16 @@ class ContactLoader {
   /// The bodies made so far; null until a model is ready, and where they are not wanted.
   std::shared_ptr<const ContactModel> contacts() const;
 
+  /// How long a volume waits for the final packing of its link.
+  static constexpr std::chrono::seconds kMaxWait{10};
+
  private:
+  using Clock = std::chrono::steady_clock;
+
+  void begin(const ModelState& state);
+  bool is_needed(const ModelState& state, std::size_t link);
+  bool add_next(const ModelState& state);
   void run();
-  void load(const std::shared_ptr<const ModelState>& state);
   std::shared_ptr<const ContactGeometry> build(const LinkDescription& link, const LinkModel& model,
                                                const std::function<bool()>& cancelled) const;
   void set(std::shared_ptr<const ContactModel> contacts);
@@ -42,9 +58,13 @@ class ContactLoader {
   StopSignal stop_signal_;
   mutable std::mutex mutex_;
   std::shared_ptr<const ContactModel> contacts_;  ///< guarded by mutex_
-  /// The bodies of the last model by key, for the next one; the thread's own.
+  // The thread's own.
+  /// The bodies of this model and the last one by key.
   std::map<std::string, std::shared_ptr<const ContactGeometry>> known_;
-  std::thread thread_;  ///< not running where contact volumes are not wanted
+  RobotDescription description_;           ///< of this model, with attached objects
+  std::vector<std::string> keys_;          ///< by link of the robot; empty: it has no body
+  std::vector<Clock::time_point> needed_;  ///< by link of the robot: since when; max(): not yet
+  std::thread thread_;                     ///< not running where contact volumes are not wanted
 };
 
 }  // namespace ist

@@ -46,6 +46,7 @@ ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
   waiting.problem = waiting_for_description();
   set_state(std::move(waiting));
   thread_ = std::thread(&ModelLoader::run, this);
+  refining_thread_ = std::thread(&ModelLoader::run_refinement, this);
 }
 
 ModelLoader::~ModelLoader() {
@@ -55,6 +56,7 @@ ModelLoader::~ModelLoader() {
   }
   wake_.notify_all();
   thread_.join();
+  refining_thread_.join();
 }
 
 std::shared_ptr<const ModelState> ModelLoader::state() const {
@@ -79,6 +81,8 @@ std::string ModelLoader::reload(bool* found) {
     state->problem = "the robot's model is being loaded again";
     state->fraction = 0.0;
     state->robot = nullptr;
+    state->anytime = nullptr;
+    state->repulsion = nullptr;
     state->monitored.clear();
     state_ = std::move(state);
     reload_ = true;
@@ -197,6 +201,8 @@ void ModelLoader::finish(const RobotDescription& description, ModelState* state)
     state->monitored.push_back(i);
     state->links.push_back(name);
   }
+  state->usage = std::make_shared<LinkUsage>(state->robot->links.size());
+  state->repulsion = nullptr;
   state->phase = ModelState::Phase::kReady;
   state->problem = state->links.empty() ? "no link of the robot '" + description.name +
                                               "' has geometry: nothing can be measured"
@@ -234,7 +240,8 @@ void ModelLoader::load(const std::string& urdf) {
                    return show_reading(link, mesh);
                  }));
   warn_of_visual_fallback(*state.description);
-  const RobotDescription description = carry_over_objects(&state);
+  const auto carrying = std::make_shared<const RobotDescription>(carry_over_objects(&state));
+  const RobotDescription& description = *carrying;
 
   state.phase = ModelState::Phase::kPacking;
   state.problem = "packing of the robot '" + description.name + "' begins";
@@ -251,12 +258,14 @@ void ModelLoader::load(const std::string& urdf) {
   set_state(state);
 
   const auto begin = std::chrono::steady_clock::now();
-  if (!build(description, &state)) return;  // cancelled
+  if (!build(carrying, &state)) return;  // cancelled
   finish(description, &state);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  ROS_INFO("model of '%s' ready after %.1f s: %zu links monitored, %zu packed",
-           description.name.c_str(), took.count(), state.monitored.size(),
-           state.robot->links.size());
+  const auto coarse = std::count_if(state.robot->links.begin(), state.robot->links.end(),
+                                    [](const LinkModel& link) { return !link.is_final; });
+  ROS_INFO("model of '%s' ready after %.2f s: %s; %zu packed coarsely so far",
+           description.name.c_str(), took.count(), link_counts(state).c_str(),
+           static_cast<std::size_t>(coarse));
   set_state(std::move(state));
 }
 
@@ -270,9 +279,10 @@ bool ModelLoader::show_reading(const std::string& link, const std::string& mesh)
   return !cancelled();
 }
 
-/// Packs the links, or takes them from the cache, and reports the progress.
+/// Packs the links coarsely, or takes them from the cache, and reports the progress.
 /// @returns false when cancelled
-bool ModelLoader::build(const RobotDescription& description, ModelState* state) {
+bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& description,
+                        ModelState* state) {
   ProgressReport report;
   std::mutex report_mutex;  // several threads pack
   RobotModelCallbacks callbacks;
@@ -291,9 +301,10 @@ bool ModelLoader::build(const RobotDescription& description, ModelState* state) 
     state->problem = sentence;
     set_state(*state);
   };
-  state->robot =
-      build_robot_model(description, model_config(description, state->objects), callbacks);
+  state->anytime = AnytimeModel::build(description, model_config(*description, state->objects),
+                                       AnytimeModel::Stage::kFirst, callbacks);
   report.finish();
+  if (state->anytime) state->robot = state->anytime->robot();
   return state->robot != nullptr;
 }
 

@@ -5,10 +5,10 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <cstddef>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,8 +21,10 @@
 namespace ist {
 
 /// Makes the robot's model in a thread of its own: it waits for robot_description on the parameter
-/// server, reads the URDF, and packs its links or takes them from the cache. After a text that is
-/// no URDF it reads again as soon as the parameter changes. All members are thread safe.
+/// server, reads the URDF, and packs its links coarsely or takes them from the cache. After a text
+/// that is no URDF it reads again as soon as the parameter changes. Another thread, of the lowest
+/// priority, packs more finely the links that are near something or costly, for as long as that
+/// pays. All members are thread safe.
 class ModelLoader {
  public:
   /// @param nh  namespace in which, and above which, `config.robot_description` is searched
@@ -40,11 +42,6 @@ class ModelLoader {
   /// @returns a sentence about what happens now
   std::string reload(bool* found);
 
-  /// Attached objects, at most: each is packed, and measured by every query.
-  static constexpr std::size_t kMaxObjects = 100;
-  /// How long attaching an object may take, reading and packing it included.
-  static constexpr std::chrono::seconds kMaxAttachTime{30};
-
   /// Makes the object to attach. True of the request ends its work.
   /// @throws ModelError, Cancelled
   using ObjectReader = std::function<AttachedObject(const CancelRequest&)>;
@@ -52,7 +49,8 @@ class ModelLoader {
   /// Makes an object a part of its link, or removes it again. The old model stays in use until the
   /// new one replaces it, which happens before the function returns. Attached objects survive
   /// reload() as long as their link does. attach() is cancelled by detach() of the same name, by
-  /// reload(), by end_changes() and after kMaxAttachTime.
+  /// reload(), by end_changes() and after ~attach/max_time. detach() works at any time: a model
+  /// that is being loaded is loaded again without the object.
   /// @returns empty on success, else the reason; then nothing has changed
   std::string attach(const std::string& name, const ObjectReader& read);
   std::string detach(const std::string& name);
@@ -67,8 +65,11 @@ class ModelLoader {
   std::string waiting_for_description() const;
   bool fetch_urdf(std::string* urdf, std::string* problem) const;
   void load(const std::string& urdf);
-  bool build(const RobotDescription& description, ModelState* state);
+  bool build(const std::shared_ptr<const RobotDescription>& description, ModelState* state);
   std::string attach_read(const std::string& name, const ObjectReader& read);
+  std::string detach_from(const std::shared_ptr<const ModelState>& state, const std::string& name);
+  std::optional<std::string> detach_while_loading(const std::string& name);
+  void begin_deadline();
   std::string change_objects(const std::shared_ptr<const ModelState>& state,
                              std::vector<AttachedObject> objects, const std::string& link);
   void begin_change(const std::string& name);
@@ -81,6 +82,11 @@ class ModelLoader {
   RobotDescription carry_over_objects(ModelState* state);
   void set_state(ModelState state);
   void wait();
+  void run_refinement();
+  bool refine_once();
+  std::optional<std::size_t> link_to_refine(const ModelState& state);
+  void take_packings(const ModelState& base, const AnytimeModel::Ptr& refined,
+                     const std::vector<std::string>& warnings);
   bool cancelled() const { return stop_ || reload_; }
 
   const ServerConfig config_;
@@ -97,7 +103,13 @@ class ModelLoader {
   std::atomic<bool> change_revoked_{false};  ///< the same object was detached meanwhile
   std::atomic<bool> changes_ended_{false};
   std::chrono::steady_clock::time_point change_deadline_;  ///< guarded by change_mutex_
-  std::thread thread_;
+
+  // Used by the refining thread alone.
+  std::vector<LinkUsage::Need> needs_;  ///< by link, lately
+  std::shared_ptr<LinkUsage> needs_of_;
+  std::vector<std::shared_ptr<const ModelState>> retired_;
+
+  std::thread thread_, refining_thread_;
 };
 
 }  // namespace ist

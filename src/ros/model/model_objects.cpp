@@ -15,6 +15,20 @@ std::string not_ready(const ModelState& state) {
   return "the robot's model is not ready yet: " + state.problem;
 }
 
+std::vector<AttachedObject>::iterator find_object(const std::string& name,
+                                                  std::vector<AttachedObject>* objects) {
+  return std::find_if(objects->begin(), objects->end(),
+                      [&](const AttachedObject& object) { return object.name == name; });
+}
+
+std::string not_attached(const std::string& name, const std::vector<AttachedObject>& objects) {
+  std::vector<std::string> names;
+  names.reserve(objects.size());
+  for (const AttachedObject& object : objects) names.push_back(object.name);
+  return "no object '" + printable(name) + "' is attached; there is " +
+         (names.empty() ? "none at all" : join(names, ", "));
+}
+
 }  // namespace
 
 void ModelLoader::end_changes() { changes_ended_ = true; }
@@ -28,8 +42,8 @@ std::string ModelLoader::why_cancelled() const {
   if (stop_ || changes_ended_) return "the node is shutting down";
   if (change_revoked_) return "the object was detached while it was being attached";
   if (reload_) return "the robot's model has been loaded again meanwhile; try again";
-  return "it takes longer than " + std::to_string(kMaxAttachTime.count()) +
-         " s; use a simpler mesh, a primitive shape, or raise ~packing/max_error";
+  return format_text("it takes longer than %g s (~attach/max_time)", config_.attach.max_time) +
+         "; use a simpler mesh, a primitive shape, or raise ~packing/max_error";
 }
 
 /// Makes `name` the object at work, or none where it is empty.
@@ -39,10 +53,16 @@ void ModelLoader::begin_change(const std::string& name) {
   change_revoked_ = false;
 }
 
+void ModelLoader::begin_deadline() {
+  const std::chrono::duration<double> allowed(config_.attach.max_time);
+  change_deadline_ = std::chrono::steady_clock::now() +
+                     std::chrono::duration_cast<std::chrono::steady_clock::duration>(allowed);
+}
+
 std::string ModelLoader::attach(const std::string& name, const ObjectReader& read) {
   const std::lock_guard<std::mutex> lock(change_mutex_);
   begin_change(name);
-  change_deadline_ = std::chrono::steady_clock::now() + kMaxAttachTime;
+  begin_deadline();
   std::string problem;
   try {
     problem = attach_read(name, read);
@@ -58,8 +78,10 @@ std::string ModelLoader::attach(const std::string& name, const ObjectReader& rea
 std::string ModelLoader::attach_read(const std::string& name, const ObjectReader& read) {
   const auto state = this->state();
   if (!state->robot) return not_ready(*state);
-  if (state->objects.size() >= kMaxObjects) {
-    return std::to_string(kMaxObjects) + " objects are attached, which is the limit; detach some";
+  const auto limit = static_cast<std::size_t>(config_.attach.max_objects);
+  if (state->objects.size() >= limit) {
+    return std::to_string(limit) +
+           " objects are attached, which is the limit (~attach/max_objects); detach some";
   }
   for (const AttachedObject& other : state->objects) {
     if (other.name != name) continue;
@@ -82,22 +104,39 @@ std::string ModelLoader::detach(const std::string& name) {
   }
   const std::lock_guard<std::mutex> lock(change_mutex_);
   begin_change("");
-  change_deadline_ = std::chrono::steady_clock::now() + kMaxAttachTime;
-  const auto state = this->state();
-  if (!state->robot) return not_ready(*state);
-  std::vector<AttachedObject> objects = state->objects;
-  const auto found = std::find_if(objects.begin(), objects.end(),
-                                  [&](const AttachedObject& other) { return other.name == name; });
-  if (found == objects.end()) {
-    std::vector<std::string> names;
-    names.reserve(objects.size());
-    for (const AttachedObject& other : objects) names.push_back(other.name);
-    return "no object '" + printable(name) + "' is attached; there is " +
-           (names.empty() ? "none at all" : join(names, ", "));
+  begin_deadline();
+  for (;;) {
+    const auto state = this->state();
+    if (state->robot) return detach_from(state, name);
+    const std::optional<std::string> done = detach_while_loading(name);
+    if (done) return *done;
   }
+}
+
+std::string ModelLoader::detach_from(const std::shared_ptr<const ModelState>& state,
+                                     const std::string& name) {
+  std::vector<AttachedObject> objects = state->objects;
+  const auto found = find_object(name, &objects);
+  if (found == objects.end()) return not_attached(name, objects);
   const std::string link = found->link;
   objects.erase(found);
   return change_objects(state, std::move(objects), link);
+}
+
+/// Removes an object while no model is in use. One that is being loaded may have it already, so
+/// loading begins again; links that are packed by then are in the cache.
+/// @returns empty: the model is ready meanwhile, and nothing has changed. Else what detach() does
+std::optional<std::string> ModelLoader::detach_while_loading(const std::string& name) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (state_->robot) return std::nullopt;
+    const auto found = find_object(name, &objects_);
+    if (found == objects_.end()) return not_attached(name, objects_);
+    objects_.erase(found);
+    reload_ = true;
+  }
+  wake_.notify_all();
+  return "";
 }
 
 std::string ModelLoader::change_objects(const std::shared_ptr<const ModelState>& state,
@@ -109,10 +148,12 @@ std::string ModelLoader::change_objects(const std::shared_ptr<const ModelState>&
   callbacks.cancelled = [this] { return change_cancelled(); };
   callbacks.warning = [&](const std::string& warning) { ROS_WARN_STREAM(warning); };
   try {
-    const RobotDescription description = with_objects(*state->description, next.objects);
-    next.robot = rebuild_link(*state->robot, description, link,
-                              model_config(description, next.objects), callbacks);
-    if (next.robot) finish(description, &next);
+    const auto description =
+        std::make_shared<const RobotDescription>(with_objects(*state->description, next.objects));
+    next.anytime = state->anytime->with_link(description, link,
+                                             model_config(*description, next.objects), callbacks);
+    next.robot = next.anytime ? next.anytime->robot() : nullptr;
+    if (next.robot) finish(*description, &next);
   } catch (const ModelError& error) {
     return error.what();
   }

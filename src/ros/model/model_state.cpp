@@ -6,6 +6,11 @@
 
 namespace ist {
 
+bool is_refinement(const ModelState& before, const ModelState& after) {
+  return before.phase == ModelState::Phase::kReady && after.phase == ModelState::Phase::kReady &&
+         before.robot && after.robot && same_geometry(*before.robot, *after.robot);
+}
+
 std::string no_kinematics(const ModelState& model) {
   return "link poses cannot be computed from the URDF: " + model.kinematics_problem;
 }
@@ -39,6 +44,23 @@ std::vector<std::string> monitored_links(const RobotDescription& description,
   for (const std::string& name : description.link_order) choose(name);
   for (const std::string& name : wanted) choose(name);  // not in the URDF
   return names;
+}
+
+std::string link_counts(const ModelState& state) {
+  std::size_t monitored = 0, packed = 0;
+  for (const LinkModel& link : state.robot->links) packed += link.usable() ? 1 : 0;
+  for (const std::size_t i : state.monitored) {
+    monitored += state.robot->links[i].usable() ? 1 : 0;
+  }
+  const std::size_t broken = state.monitored.size() - monitored;
+  std::string text = std::to_string(monitored) + " links monitored";
+  if (broken > 0) {
+    text += ", " + std::to_string(broken) + " UNKNOWN (its geometry cannot be used: see above)";
+  }
+  if (packed > monitored) {
+    text += ", " + std::to_string(packed - monitored) + " more packed for the self-filter";
+  }
+  return text;
 }
 
 }  // namespace ist

@@ -5,9 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "internal/robot/anytime_model.h"
+#include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ros/model/link_usage.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
@@ -30,6 +33,12 @@ struct ModelState {
   /// Known when ready. It holds every link with geometry, because the self-filter needs them all,
   /// not only the monitored ones.
   std::shared_ptr<const RobotModel> robot;
+  /// Known when ready: where `robot` comes from, and what finer packings are made of.
+  AnytimeModel::Ptr anytime;
+  /// Of `robot`; null: the cycle makes its own. Finer packings bring it along.
+  std::shared_ptr<const Repulsion> repulsion;
+  /// Known when ready; states of the same geometry share it.
+  std::shared_ptr<LinkUsage> usage;
   std::vector<std::size_t> monitored;  ///< known when ready: indices into robot->links
   std::shared_ptr<const Kinematics>
       kinematics;                  ///< known from kPacking on; null where it is faulty
@@ -37,6 +46,9 @@ struct ModelState {
   std::shared_ptr<const RobotDescription> description;  ///< the parsed URDF; known from kPacking on
   std::vector<AttachedObject> objects;                  ///< known when ready: parts of `robot`
 };
+
+/// Whether the second state is ready and differs from the first one in its packings alone.
+bool is_refinement(const ModelState& before, const ModelState& after);
 
 /// The sentence about a URDF whose kinematics is faulty.
 std::string no_kinematics(const ModelState& model);
@@ -54,5 +66,9 @@ std::vector<bool> wanted_links(const ModelState& model);
 /// @param wanted  empty: every link with geometry. Names that the URDF lacks go to the end
 std::vector<std::string> monitored_links(const RobotDescription& description,
                                          const std::vector<std::string>& wanted);
+
+/// Counts the links of a model that is ready: those that are answered, those whose geometry cannot
+/// be read, and those that only the self-filter needs.
+std::string link_counts(const ModelState& state);
 
 }  // namespace ist

@@ -1,12 +1,16 @@
 #include "ros/output/markers.h"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
+#include "ros/output/label_layout.h"
+#include "ros/output/nearest_summary.h"
+#include "ros/output/nearness_color.h"
 
 namespace ist {
 namespace {
@@ -18,27 +22,19 @@ using LinkMessage = ist_proximity::LinkProximity;
 constexpr double kLineWidth = 0.005;        // [m]
 constexpr double kPointSize = 0.015;        // [m]
 constexpr double kTextHeight = 0.03;        // [m]
+constexpr double kRow = 1.3 * kTextHeight;  // [m] from a label to the next
+constexpr double kLabelled = 0.3;           // [m] farther links have no label
+constexpr double kLabelMoves = 3.0 * kRow;  // [m] that a label may be away from its line
+constexpr double kNumberHeight = 0.09;      // [m]
+constexpr double kNumberFollows = 0.05;     // share of its way that the number moves at a time
+constexpr double kNumberJumps = 2.0;        // [m] farther ways it takes at once
 constexpr double kArrowPerRepulsion = 0.3;  // [m] for a repulsion of length 1
-
-std_msgs::ColorRGBA color(double r, double g, double b, double a) {
-  std_msgs::ColorRGBA result;
-  result.r = static_cast<float>(r);
-  result.g = static_cast<float>(g);
-  result.b = static_cast<float>(b);
-  result.a = static_cast<float>(a);
-  return result;
-}
-
-std_msgs::ColorRGBA color_of(double distance, double max_distance) {
-  const double far = std::clamp(distance / max_distance, 0.0, 1.0);
-  return color(std::min(1.0, 2.0 * (1.0 - far)), std::min(1.0, 2.0 * far), 0.1, 1.0);
-}
 
 /// Gives neighbours different colours, by the golden ratio on the circle of hues.
 std_msgs::ColorRGBA color_of_link(std::size_t index) {
   const double hue = std::fmod(0.61803398875 * static_cast<double>(index), 1.0) * 2.0 * M_PI;
   const auto channel = [hue](double phase) { return 0.55 + 0.4 * std::cos(hue - phase); };
-  return color(channel(0.0), channel(2.0 * M_PI / 3.0), channel(4.0 * M_PI / 3.0), 0.6);
+  return make_color(channel(0.0), channel(2.0 * M_PI / 3.0), channel(4.0 * M_PI / 3.0), 0.6);
 }
 
 void scale(double x, double y, double z, Marker* marker) {
@@ -63,7 +59,7 @@ Marker ProximityMarkers::marker(const std::string& ns, int id, int type) const {
 
 void ProximityMarkers::draw_link(const LinkMessage& link, int id,
                                  std::vector<Marker>* markers) const {
-  const std_msgs::ColorRGBA shade = color_of(link.distance, max_distance_);
+  const std_msgs::ColorRGBA shade = nearness_color(link.distance, max_distance_);
 
   Marker line = marker("distance", id, Marker::LINE_LIST);
   scale(kLineWidth, 0, 0, &line);
@@ -80,27 +76,84 @@ void ProximityMarkers::draw_link(const LinkMessage& link, int id,
     markers->push_back(point);
   };
   add_point("point_on_link", link.point_on_link, shade);
-  add_point("point_on_obstacle", link.point_on_obstacle, color(0.2, 0.4, 1.0, 1.0));
+  add_point("point_on_obstacle", link.point_on_obstacle, make_color(0.2, 0.4, 1.0, 1.0));
 
   const Eigen::Vector3d repulsion = to_vector(link.repulsion);
   const double length = repulsion.norm() * kArrowPerRepulsion;
   if (length > 1e-3 && std::isfinite(length)) {
     Marker arrow = marker("repulsion", id, Marker::ARROW);
     scale(2 * kLineWidth, 4 * kLineWidth, std::min(0.3 * length, 6 * kLineWidth), &arrow);
-    arrow.color = color(1.0, 0.5, 0.0, 0.9);
+    arrow.color = make_color(0.8, 0.35, 1.0, 0.9);
     geometry_msgs::Point tip = link.point_on_link;
     assign(to_vector(tip) + repulsion * kArrowPerRepulsion, &tip);
     arrow.points = {link.point_on_link, tip};
     markers->push_back(arrow);
   }
+}
 
-  Marker text = marker("text", id, Marker::TEXT_VIEW_FACING);
-  scale(0, 0, kTextHeight, &text);
-  text.color = color(1, 1, 1, 1);
-  assign((to_vector(link.point_on_link) + to_vector(link.point_on_obstacle)) / 2,
-         &text.pose.position);
-  text.text = link.link + format_text(" %.3f m", link.distance);
+void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
+                                   std::vector<Marker>* markers) const {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (links[i].state >= LinkMessage::NEAR && links[i].distance <= kLabelled) order.push_back(i);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return links[a].distance < links[b].distance;
+  });
+  std::vector<Label> labels;
+  for (const std::size_t i : order) {
+    const Eigen::Vector3d middle =
+        (to_vector(links[i].point_on_link) + to_vector(links[i].point_on_obstacle)) / 2;
+    labels.push_back({i, middle});
+  }
+  for (const Label& label : place_labels(labels, kRow, kLabelMoves)) {
+    Marker text = marker("text", static_cast<int>(label.id), Marker::TEXT_VIEW_FACING);
+    scale(0, 0, kTextHeight, &text);
+    text.color = make_color(1, 1, 1, 1);
+    assign(label.position, &text.pose.position);
+    text.text = links[label.id].link + format_text(" %.3f m", links[label.id].distance);
+    markers->push_back(text);
+  }
+}
+
+void ProximityMarkers::draw_nearest(const ist_proximity::ProximityArray& proximity,
+                                    std::vector<Marker>* markers) {
+  const NearestSummary summary = summarize_nearest(proximity, max_distance_);
+  place_number(proximity);
+  Marker text = marker("nearest", 0, Marker::TEXT_VIEW_FACING);
+  scale(0, 0, kNumberHeight, &text);
+  text.color = summary.color;
+  assign(number_position_, &text.pose.position);
+  text.text = summary.text;
   markers->push_back(text);
+  if (summary.link < 0) return;
+
+  const LinkMessage& link = proximity.links[static_cast<std::size_t>(summary.link)];
+  Marker line = marker("nearest", 1, Marker::LINE_LIST);
+  scale(3 * kLineWidth, 0, 0, &line);
+  line.color = summary.color;
+  line.points = {link.point_on_obstacle, link.point_on_link};
+  markers->push_back(line);
+  Marker halo = marker("nearest", 2, Marker::SPHERE);
+  scale(3 * kPointSize, 3 * kPointSize, 3 * kPointSize, &halo);
+  halo.color = summary.color;
+  halo.color.a = 0.5F;
+  halo.pose.position = link.point_on_link;
+  markers->push_back(halo);
+}
+
+/// Moves the number slowly to a place above the links' closest points, so that it can be read while
+/// they jump.
+void ProximityMarkers::place_number(const ist_proximity::ProximityArray& proximity) {
+  Eigen::AlignedBox3d box;
+  for (const LinkMessage& link : proximity.links) {
+    if (link.state >= LinkMessage::NEAR) box.extend(to_vector(link.point_on_link));
+  }
+  if (box.isEmpty()) return;
+  Eigen::Vector3d wanted = box.center();
+  wanted.z() = box.max().z() + 2.0 * kNumberHeight;
+  const bool is_far = !((wanted - number_position_).norm() <= kNumberJumps);
+  number_position_ += (is_far ? 1.0 : kNumberFollows) * (wanted - number_position_);
 }
 
 MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximity) {
@@ -111,6 +164,8 @@ MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximit
       draw_link(proximity.links[i], static_cast<int>(i), &result.markers);
     }
   }
+  draw_labels(proximity.links, &result.markers);
+  draw_nearest(proximity, &result.markers);
 
   std::map<Key, std_msgs::Header> shown;
   for (const Marker& drawn : result.markers) shown[{drawn.ns, drawn.id}] = drawn.header;

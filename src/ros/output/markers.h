@@ -3,6 +3,7 @@
 #include <ist_proximity/ProximityArray.h>
 #include <visualization_msgs/MarkerArray.h>
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <map>
 #include <string>
@@ -14,8 +15,11 @@
 namespace ist {
 
 /// Draws a ProximityArray for rviz, in its own frame. Namespaces: "distance" (line from obstacle to
-/// link, green at ~max_distance to red at touch), "point_on_link", "point_on_obstacle", "repulsion"
-/// (arrow), "text"; the id is the link's place in the array. Not thread safe.
+/// link), "point_on_link", "point_on_obstacle", "repulsion" (violet arrow) and "text" (name and
+/// distance of links within 0.3 m, none over another); the id is the link's place in the array.
+/// "nearest" has the ids 0 (the nearest link's distance as a large number, or why it is not known),
+/// 1 and 2 (its line and its point, highlighted). Colours are those of nearness_color(). Not thread
+/// safe.
 class ProximityMarkers {
  public:
   /// @param max_distance  [m] distance that is drawn green
@@ -33,9 +37,15 @@ class ProximityMarkers {
   visualization_msgs::Marker marker(const std::string& ns, int id, int type) const;
   void draw_link(const ist_proximity::LinkProximity& link, int id,
                  std::vector<visualization_msgs::Marker>* markers) const;
+  void draw_labels(const std::vector<ist_proximity::LinkProximity>& links,
+                   std::vector<visualization_msgs::Marker>* markers) const;
+  void draw_nearest(const ist_proximity::ProximityArray& proximity,
+                    std::vector<visualization_msgs::Marker>* markers);
+  void place_number(const ist_proximity::ProximityArray& proximity);
 
   double max_distance_, lifetime_;
   std_msgs::Header header_;
+  Eigen::Vector3d number_position_{0.0, 0.0, 1.0};  ///< [m] of the large number
   std::map<Key, std_msgs::Header> shown_;
 };
 

@@ -25,6 +25,7 @@ void assign_closing(const ClosingRates& closing, LinkMessage* message) {
   message->closing_speed_robot = closing.robot;
   message->closing_speed_obstacles = closing.obstacles;
   message->time_to_contact = closing.time_to_contact;
+  message->closing_unknown = 0;
   if (std::isnan(closing.robot)) message->closing_unknown |= LinkMessage::ROBOT_UNKNOWN;
   if (std::isnan(closing.obstacles)) message->closing_unknown |= LinkMessage::OBSTACLES_UNKNOWN;
 }
@@ -35,52 +36,65 @@ LinkMessage unknown_link(const std::string& name) {
   return to_message(name, LinkProximity(), RepulsiveWrench::unknown(), Wrench::unknown(), {}, "");
 }
 
+void assign_link(const std::string& name, const LinkProximity& result,
+                 const RepulsiveWrench& repulsion, const Wrench& penetration,
+                 const ClosingRates& closing, const std::string& source, LinkMessage* message) {
+  message->link = name;
+  message->state = static_cast<std::uint8_t>(result.state);
+  message->distance = result.distance;
+  message->lower_bound = result.lower_bound;
+  assign(result.p_FCl, &message->point_on_link);
+  assign(result.p_LCl, &message->point_on_link_local);
+  assign(result.p_FCo, &message->point_on_obstacle);
+  assign(result.direction, &message->direction);
+  assign(repulsion.force, &message->repulsion);
+  assign(repulsion.torque, &message->repulsion_torque);
+  assign_wrench(penetration, &message->penetration);
+  assign_closing(closing, message);
+  if (result.state >= LinkState::kNear) {
+    message->source = source;
+  } else {
+    message->source.clear();
+  }
+}
+
 LinkMessage to_message(const std::string& name, const LinkProximity& result,
                        const RepulsiveWrench& repulsion, const Wrench& penetration,
                        const ClosingRates& closing, const std::string& source) {
   LinkMessage message;
-  message.link = name;
-  message.state = static_cast<std::uint8_t>(result.state);
-  message.distance = result.distance;
-  message.lower_bound = result.lower_bound;
-  assign(result.p_FCl, &message.point_on_link);
-  assign(result.p_LCl, &message.point_on_link_local);
-  assign(result.p_FCo, &message.point_on_obstacle);
-  assign(result.direction, &message.direction);
-  assign(repulsion.force, &message.repulsion);
-  assign(repulsion.torque, &message.repulsion_torque);
-  assign_wrench(penetration, &message.penetration);
-  assign_closing(closing, &message);
-  if (result.state >= LinkState::kNear) message.source = source;
+  assign_link(name, result, repulsion, penetration, closing, source, &message);
   return message;
 }
 
-ist_proximity::SourceStatus to_message(const SourceReport& source, const Status& status,
-                                       const ros::Time& stamp) {
-  ist_proximity::SourceStatus message;
-  message.name = source.name;
-  message.status = status.code;
-  message.age = kNaN;
-  if (!source.has_snapshot) return message;
-  message.stamp = source.stamp;
-  if (!source.is_file) message.age = seconds_between(source.counts_from, stamp);
-  message.points_received = source.counts.received;
-  message.points_used = source.counts.used + source.counts.outside_region;
-  message.points_on_robot = source.counts.on_robot;
-  return message;
+void assign_source(const SourceReport& source, const Status& status, const ros::Time& stamp,
+                   ist_proximity::SourceStatus* message) {
+  const bool has = source.has_snapshot;
+  const IngestCounts counts = has ? source.counts : IngestCounts();
+  message->name = source.name;
+  message->status = status.code;
+  message->stamp = has ? source.stamp : ros::Time();
+  message->age = has && !source.is_file ? seconds_between(source.counts_from, stamp) : kNaN;
+  message->points_received = counts.received;
+  message->points_used = counts.used + counts.outside_region;
+  message->points_on_robot = counts.on_robot;
 }
 
-double min_distance(const ProximityArray& message) {
-  if (message.links.empty() ||
-      (message.status != ProximityArray::OK && message.status != ProximityArray::DEGRADED)) {
-    return kNaN;
-  }
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const LinkMessage& link : message.links) {
+bool lacks_clouds(const ProximityArray& message) {
+  return message.status == ProximityArray::NO_CLOUD ||
+         message.status == ProximityArray::STALE_CLOUD;
+}
+
+double min_distance(const ProximityArray& message, const std::vector<bool>& counts) {
+  if (lacks_clouds(message)) return kNaN;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double smallest = kInfinity;
+  for (std::size_t i = 0; i < message.links.size(); ++i) {
+    const LinkMessage& link = message.links[i];
+    if (counts.size() == message.links.size() && !counts[i]) continue;
     if (link.state == LinkMessage::UNKNOWN) return kNaN;
     smallest = std::min(smallest, link.lower_bound);
   }
-  return smallest;
+  return smallest == kInfinity ? kNaN : smallest;
 }
 
 }  // namespace ist

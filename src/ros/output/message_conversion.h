@@ -6,12 +6,13 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <vector>
 
 #include "ist_proximity/contact/contact_volume.h"
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/input/source_report.h"
-#include "ros/output/closing_speed.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -19,21 +20,29 @@ namespace ist {
 /// Makes the message of an UNKNOWN link: NaN everywhere, lower bound -inf.
 ist_proximity::LinkProximity unknown_link(const std::string& name);
 
-/// Makes the message of a link.
+/// Makes the message of a link; every field of `message` is overwritten, and its memory is kept.
 /// @param result       in the fixed frame
 /// @param penetration  in the fixed frame, about the link's origin
 /// @param source       name of the source of the nearest point; ignored unless NEAR or CONTACT
+void assign_link(const std::string& name, const LinkProximity& result,
+                 const RepulsiveWrench& repulsion, const Wrench& penetration,
+                 const ClosingRates& closing, const std::string& source,
+                 ist_proximity::LinkProximity* message);
 ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
                                         const RepulsiveWrench& repulsion, const Wrench& penetration,
                                         const ClosingRates& closing, const std::string& source);
 
-/// Makes the message of a source.
+/// Makes the message of a source, as assign_link() does.
 /// @param stamp  of the ProximityArray, from which `age` counts
-ist_proximity::SourceStatus to_message(const SourceReport& source, const Status& status,
-                                       const ros::Time& stamp);
+void assign_source(const SourceReport& source, const Status& status, const ros::Time& stamp,
+                   ist_proximity::SourceStatus* message);
 
-/// Gives the smallest lower bound [m]; NaN when a link is UNKNOWN, when there is no link, or when
-/// the status is neither OK nor DEGRADED. All CLEAR gives ~max_distance.
-double min_distance(const ist_proximity::ProximityArray& message);
+/// Whether a message says that a source which is required cannot be used, so that nothing is known.
+bool lacks_clouds(const ist_proximity::ProximityArray& message);
+
+/// Gives the smallest lower bound [m] of the links that count; NaN when one of them is UNKNOWN,
+/// when none counts, or when a required source is missing or stale. All CLEAR gives ~max_distance.
+/// @param counts  by link of the message; another length: every link counts
+double min_distance(const ist_proximity::ProximityArray& message, const std::vector<bool>& counts);
 
 }  // namespace ist

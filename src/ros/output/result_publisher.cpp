@@ -1,11 +1,8 @@
 #include "ros/output/result_publisher.h"
 
-#include <std_msgs/Float64.h>
-
 #include <algorithm>
 
 #include "ros/common/publish.h"
-#include "ros/output/message_conversion.h"
 
 namespace ist {
 namespace {
@@ -15,16 +12,18 @@ constexpr std::chrono::milliseconds kMarkerPeriod(40);  // rviz draws no faster
 }  // namespace
 
 ResultPublisher::ResultPublisher(ros::NodeHandle private_nh, const ServerConfig& config)
-    : marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
+    : summary_(private_nh, config),
+      marker_drawer_(config.query.max_distance, std::max(1.0, 3.0 / config.rate)) {
   proximity_ = private_nh.advertise<ist_proximity::ProximityArray>("proximity", 10);
   joint_repulsion_ = private_nh.advertise<ist_proximity::JointRepulsion>("joint_repulsion", 10);
-  min_distance_ = private_nh.advertise<std_msgs::Float64>("min_distance", 10);
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("markers", 2);
 }
 
 bool ResultPublisher::publish(
     const ist_proximity::ProximityArrayConstPtr& result,
+    const ist_proximity::ProximityArrayConstPtr& self, const SpeedScaleConfig& speed_scale,
     const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion) {
+  summary_.publish(*result, self.get(), speed_scale, ros::Time::now());
   publish_message(proximity_, result);
   if (joint_repulsion_.getNumSubscribers() > 0) {
     ist_proximity::JointRepulsion message;
@@ -34,9 +33,6 @@ bool ResultPublisher::publish(
     fill_joint_repulsion(&message);
     publish_message(joint_repulsion_, message);
   }
-  std_msgs::Float64 smallest;
-  smallest.data = min_distance(*result);
-  publish_message(min_distance_, smallest);
 
   const auto now = std::chrono::steady_clock::now();
   if (markers_.getNumSubscribers() == 0 || now < next_markers_) return false;

@@ -9,25 +9,34 @@
 #include <functional>
 
 #include "ros/output/markers.h"
+#include "ros/output/speed_scale_publisher.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
 
-/// Publishes the results of a cycle: ~proximity, ~joint_repulsion, ~min_distance and ~markers. One
-/// thread.
+/// Publishes the results of a cycle: ~proximity, ~joint_repulsion, ~min_distance, ~speed_scale and
+/// ~markers. One thread.
 class ResultPublisher {
  public:
   ResultPublisher(ros::NodeHandle private_nh, const ServerConfig& config);
 
+  /// What the whole robot's distances come to.
+  SpeedScalePublisher& summary() { return summary_; }
+
+  /// @param self                  the newest ~self_proximity; may be null
+  /// @param speed_scale           its present configuration
   /// @param fill_joint_repulsion  fills the message for the same result; called only while the
   /// topic
   ///                              has subscribers, because Jacobians cost time
   /// @returns whether markers were drawn
   bool publish(const ist_proximity::ProximityArrayConstPtr& result,
+               const ist_proximity::ProximityArrayConstPtr& self,
+               const SpeedScaleConfig& speed_scale,
                const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion);
 
  private:
-  ros::Publisher proximity_, joint_repulsion_, min_distance_, markers_;
+  ros::Publisher proximity_, joint_repulsion_, markers_;
+  SpeedScalePublisher summary_;
   ProximityMarkers marker_drawer_;
   std::chrono::steady_clock::time_point next_markers_;
 };

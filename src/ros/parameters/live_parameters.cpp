@@ -12,6 +12,7 @@
 #include "ros/common/publish.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
+#include "ros/parameters/slider.h"
 
 namespace ist {
 namespace {
@@ -22,11 +23,28 @@ using dynamic_reconfigure::Reconfigure;
 
 constexpr char kOnlyGroup[] = "Default";
 
-/// Gives the part of a tunable's name after "GROUP/"; empty for a tunable of another group.
+constexpr const char* kGroups[] = {"query", "repulsion", "penetration", "speed_scale",
+                                   "speed_scale/separation"};
+
+/// Gives the part of a tunable's name after "GROUP/"; empty for a tunable of another group, and of
+/// one below.
 std::string name_within(const std::string& group, const Tunable& tunable) {
   const std::string prefix = group + "/";
-  return tunable.name.compare(0, prefix.size(), prefix) == 0 ? tunable.name.substr(prefix.size())
-                                                             : std::string();
+  const bool is_below = tunable.name.compare(0, prefix.size(), prefix) == 0 &&
+                        tunable.name.find('/', prefix.size()) == std::string::npos;
+  return is_below ? tunable.name.substr(prefix.size()) : std::string();
+}
+
+/// A tree that holds a value at a path with slashes.
+XmlRpc::XmlRpcValue at_path(const std::string& path, const XmlRpc::XmlRpcValue& value) {
+  XmlRpc::XmlRpcValue tree;
+  const std::size_t slash = path.find('/');
+  if (slash == std::string::npos) {
+    tree[path] = value;
+  } else {
+    tree[path.substr(0, slash)] = at_path(path.substr(slash + 1), value);
+  }
+  return tree;
 }
 
 template <class Parameter, class Value>
@@ -79,10 +97,12 @@ Config values_of(const std::string& group, const std::vector<Tunable>& tunables)
   return config_of(group, tunables, [](const Tunable& tunable) { return tunable.value; });
 }
 
-ConfigDescription describe(const std::string& group, const std::vector<Tunable>& tunables) {
+ConfigDescription describe(const std::string& group, const std::vector<Tunable>& tunables,
+                           double max_distance) {
   ConfigDescription description;
   description.min = config_of(group, tunables, [](const Tunable& t) { return t.range.min; });
-  description.max = config_of(group, tunables, [](const Tunable& t) { return t.range.max; });
+  description.max = config_of(
+      group, tunables, [max_distance](const Tunable& t) { return slider_of(t, max_distance).max; });
   description.dflt = config_of(group, tunables, [](const Tunable& t) { return t.default_value; });
   dynamic_reconfigure::Group only;
   only.name = kOnlyGroup;
@@ -91,15 +111,15 @@ ConfigDescription describe(const std::string& group, const std::vector<Tunable>&
     parameter.name = name_within(group, tunable);
     if (parameter.name.empty()) continue;
     parameter.type = type_name(tunable.kind);
-    parameter.description = "~" + tunable.name;
-    if (*tunable.range.unit) parameter.description += std::string(" [") + tunable.range.unit + "]";
+    parameter.description = slider_of(tunable, max_distance).tooltip;
     only.parameters.push_back(parameter);
   }
   description.groups.push_back(only);
   return description;
 }
 
-constexpr char kKept[] = "the last valid ~query, ~repulsion and ~penetration stay in use: ";
+constexpr char kKept[] =
+    "the last valid ~query, ~repulsion, ~penetration and ~speed_scale stay in use: ";
 constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
 /// Names the first member of a request that is no parameter of the group.
@@ -136,15 +156,20 @@ bool same(const Config& a, const Config& b) {
 }  // namespace
 
 LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config)
-    : private_nh_(private_nh), live_{config.query, config.repulsion, config.penetration, nullptr} {
+    : private_nh_(private_nh),
+      live_{config.query, config.repulsion, config.penetration, config.speed_scale, nullptr} {
   {
     const std::lock_guard<std::mutex> lock(change_mutex_);
     LiveConfig defaults;
     defaults.query.max_distance = config.query.max_distance;
+    defaults.speed_scale = fitted_to(defaults.speed_scale, config.query.max_distance);
+    defaults.speed_scale.links = config.speed_scale.links;
     tunables_ = parse_live(XmlRpc::XmlRpcValue(), defaults).tunables;  // names, ranges, defaults
+    const std::vector<Tunable> in_use = parse_live(XmlRpc::XmlRpcValue(), live_).tunables;
+    for (std::size_t i = 0; i < tunables_.size(); ++i) tunables_[i].value = in_use[i].value;
     configured_.assign(tunables_.size(), false);
     lost_ = configured_;
-    for (const char* name : {"query", "repulsion", "penetration"}) advertise(name);
+    for (const char* name : kGroups) advertise(name);
   }
   read_again();
   thread_ = std::thread(&LiveParameters::run, this);
@@ -166,7 +191,7 @@ void LiveParameters::advertise(const std::string& name) {
   group->name = name;
   ros::NodeHandle nh(private_nh_, name);
   group->descriptions = nh.advertise<ConfigDescription>("parameter_descriptions", 1, true);
-  publish_message(group->descriptions, describe(name, tunables_));
+  publish_message(group->descriptions, describe(name, tunables_, live_.query.max_distance));
   group->updates = nh.advertise<Config>("parameter_updates", 1, true);
   group->service = nh.advertiseService<Reconfigure::Request, Reconfigure::Response>(
       "set_parameters",
@@ -188,6 +213,11 @@ std::string LiveParameters::problem() const {
     return kKept + format_text("the parameter server has not answered for %.0f s", seconds);
   }
   return problem_;
+}
+
+std::string LiveParameters::without_effect() const {
+  const std::lock_guard<std::mutex> lock(live_mutex_);
+  return without_effect_;
 }
 
 void LiveParameters::read_again() {
@@ -217,10 +247,22 @@ bool LiveParameters::read_server() {
     configured_[i] = configured_[i] || reading.found[i];
   }
   take(reading);
+  note_startup_changes(*tree);
   std::vector<std::string> problems = reading.errors;
   if (const std::string lost = lost_names(); !lost.empty()) problems.push_back(lost);
   set_problem(join(problems, "; "));
   return true;
+}
+
+/// Says which parameters were changed without effect. The caller holds change_mutex_.
+void LiveParameters::note_startup_changes(const XmlRpc::XmlRpcValue& tree) {
+  const std::string changes = startup_.changes(tree, tunables_);
+  {
+    const std::lock_guard<std::mutex> lock(live_mutex_);
+    if (changes == without_effect_) return;
+    without_effect_ = changes;
+  }
+  if (!changes.empty()) ROS_WARN_STREAM(changes);
 }
 
 /// Names the parameters that have gone from the server, with the values in use.
@@ -291,9 +333,7 @@ bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
 bool LiveParameters::apply(const std::string& group, const XmlRpc::XmlRpcValue& change) {
   if (!read_server()) return false;
   if (change.valid()) {
-    XmlRpc::XmlRpcValue tree;
-    tree[group] = change;
-    const LiveReading reading = parse_live(tree, get());
+    const LiveReading reading = parse_live(at_path(group, change), get());
     if (!reading.errors.empty()) {
       ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
       publish_updates();

@@ -13,13 +13,15 @@
 
 #include "ros/common/stop_signal.h"
 #include "ros/parameters/parameters.h"
+#include "ros/parameters/startup_parameters.h"
 
 namespace ist {
 
-/// Parameters that may change while the node runs: ~query/*, ~repulsion/* and
-/// ~penetration/stiffness. They change on the parameter server, which is read again once a second
-/// in a thread of its own, or through dynamic_reconfigure, in one group for each of the three names
-/// (rqt_reconfigure; `rosrun dynamic_reconfigure dynparam set ~query ...`).
+/// Parameters that may change while the node runs: ~query/*, ~repulsion/*,
+/// ~penetration/stiffness and ~speed_scale/*. They change on the parameter server, which is read
+/// again once a second in a thread of its own, or through dynamic_reconfigure, in one group for
+/// each of these names and for ~speed_scale/separation (rqt_reconfigure; `rosrun
+/// dynamic_reconfigure dynparam set ~query ...`). Distances of single links have no group.
 ///
 /// Every value stays in use until a valid one replaces it, whatever happens to the parameter
 /// server: no answer, a master that restarts, names that are deleted, values that are wrong.
@@ -44,6 +46,9 @@ class LiveParameters {
   /// Why values stay in use that the parameter server does not hold; empty when there are none.
   std::string problem() const;
 
+  /// Which parameters were changed on the server that are read at the start only; empty: none.
+  std::string without_effect() const;
+
  private:
   using Clock = std::chrono::steady_clock;
   /// The topics and the service of one dynamic_reconfigure server.
@@ -62,6 +67,7 @@ class LiveParameters {
            dynamic_reconfigure::Reconfigure::Response& response);
   bool apply(const std::string& group, const XmlRpc::XmlRpcValue& change);
   void take(const LiveReading& reading);
+  void note_startup_changes(const XmlRpc::XmlRpcValue& tree);
   std::string lost_names() const;
   void set_problem(const std::string& problem);
   void publish_updates();
@@ -72,12 +78,14 @@ class LiveParameters {
   std::vector<Tunable> tunables_;
   std::vector<bool> configured_;  ///< by tunable: it has been on the parameter server
   std::vector<bool> lost_;        ///< by tunable: it was there and is not any more
+  StartupParameters startup_;
   std::string logged_problem_;
   Clock::time_point logged_time_;
 
   mutable std::mutex live_mutex_;  ///< guards the members below
   LiveConfig live_;
   std::string problem_;
+  std::string without_effect_;
   Clock::time_point asked_;  ///< when the server was asked that has not answered yet; else 0
 
   StopSignal stop_signal_;

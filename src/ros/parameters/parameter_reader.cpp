@@ -189,6 +189,16 @@ void ParameterReader::read(const std::string& name,
   *value = std::move(pairs);
 }
 
+void ParameterReader::read_switch(const std::string& name, std::string* value) {
+  const XmlRpcValue* found = find(name);
+  if (found && found->getType() == XmlRpcValue::TypeBoolean) {
+    names_read_.insert(name);
+    *value = static_cast<const bool&>(*found) ? "true" : "false";
+    return;
+  }
+  read_choice(name, {"auto", "true", "false"}, value);
+}
+
 void ParameterReader::read_choice(const std::string& name, const std::vector<std::string>& choices,
                                   std::string* value,
                                   const std::map<std::string, std::string>& hints) {

@@ -45,6 +45,9 @@ class ParameterReader {
   void read_choice(const std::string& name, const std::vector<std::string>& choices,
                    std::string* value, const std::map<std::string, std::string>& hints = {});
 
+  /// Reads "auto", "true" or "false"; true and false may be truth values as well.
+  void read_switch(const std::string& name, std::string* value);
+
   bool has(const std::string& name) const;
   /// Lists the names one level below `name`; adds an error when it is not a dictionary.
   std::vector<std::string> children(const std::string& name);

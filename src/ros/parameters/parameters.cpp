@@ -9,6 +9,7 @@
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_reader.h"
 #include "ros/parameters/source_parameters.h"
+#include "ros/parameters/speed_scale_parameters.h"
 
 namespace ist {
 namespace {
@@ -61,7 +62,8 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
 
 void read_query(ParameterReader* reader, QueryConfig* query) {
   reader->read("query/tolerance", Range::non_negative("m", 1.0), &query->tolerance);
-  reader->read("query/deadline", Range::non_negative("s", 10.0), &query->deadline);
+  // From the whole period to 10 s.
+  reader->read("query/deadline", Range{"s", -1.0, 10.0}, &query->deadline);
   reader->read("query/margin", Range::non_negative("m", 1.0), &query->margin);
 }
 
@@ -71,7 +73,11 @@ void read_penetration(ParameterReader* reader, PenetrationConfig* penetration) {
 }
 
 void read_contacts(ParameterReader* reader, ServerConfig* config) {
-  reader->read("penetration/enabled", &config->contacts_wanted);
+  std::string wanted = "auto";
+  reader->read_switch("penetration/enabled", &wanted);
+  config->contacts_wanted = wanted == "true"    ? ContactsWanted::kAll
+                            : wanted == "false" ? ContactsWanted::kNone
+                                                : ContactsWanted::kAuto;
   reader->read("penetration/max_error", Range::positive("m", 1.0),
                &config->contacts.packing.max_error);
   reader->read("penetration/max_spheres", Range{"", 1.0, 1e5},
@@ -84,6 +90,12 @@ void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
   reader->read("self_collision/ignore", &config->ignore);
   reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
+  reader->read("self_collision/in_minimum", &config->in_minimum);
+}
+
+void read_attach(ParameterReader* reader, AttachConfig* config) {
+  reader->read("attach/max_objects", Range::non_negative("", 1e4), &config->max_objects);
+  reader->read("attach/max_time", Range::positive("s", 3600.0), &config->max_time);
 }
 
 }  // namespace
@@ -99,10 +111,21 @@ std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& priva
   return XmlRpc::XmlRpcValue();
 }
 
+QueryConfig default_query() {
+  QueryConfig query;
+  query.deadline = kDefaultDeadline;
+  return query;
+}
+
+double deadline_of(double parameter, double period) {
+  return parameter < 0.0 ? -parameter * period : parameter;
+}
+
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);
   ServerConfig config;
-  for (const char* group : {"query", "repulsion", "penetration", "packing", "self_collision"}) {
+  for (const char* group : {"query", "repulsion", "penetration", "packing", "self_collision",
+                            "attach", "min_distance", "speed_scale"}) {
     reader.children(group);  // adds an error unless it is a dictionary
   }
   read_poses(&reader, &config);
@@ -118,6 +141,14 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
   read_self_collision(&reader, &config.self_collision);
+  read_attach(&reader, &config.attach);
+  if (config.self_collision.in_minimum && !config.self_collision.enabled) {
+    warnings->push_back("~self_collision/in_minimum has no effect without ~self_collision/enabled");
+  }
+  reader.read("ignore_links", &config.ignore_links);
+  reader.read("min_distance/fixed_links", &config.fixed_links_count);
+  reader.read("speed_scale/enabled", &config.speed_scale_enabled);
+  config.speed_scale = read_speed_scale(&reader, config.query.max_distance);
 
   if (!reader.errors().empty()) throw ParameterError(join(reader.errors(), "\n"));
   const std::vector<std::string> unknown = reader.unknown();
@@ -149,8 +180,9 @@ LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const LiveConfig& last) 
   read_repulsion(&reader, last.query.max_distance, &reading.config.repulsion);
   read_penetration(&reader, &reading.config.penetration);
   reading.tunables = reader.tunables();
-  for (const Tunable& tunable : reading.tunables) reading.found.push_back(reader.has(tunable.name));
   reading.errors = reader.errors();
+  read_live_speed_scale(tree, last.query.max_distance, &reading);
+  for (const Tunable& tunable : reading.tunables) reading.found.push_back(reader.has(tunable.name));
   return reading;
 }
 

@@ -14,6 +14,7 @@
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ist_proximity/robot/robot_model.h"
@@ -32,6 +33,32 @@ struct SelfCollisionConfig {
   std::vector<std::pair<std::string, std::string>>
       ignore;                          ///< pairs of links to leave out, besides adjacent ones
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
+  bool in_minimum = false;             ///< its links count in ~min_distance and ~speed_scale
+};
+
+/// The links whose volumes are packed for `penetration`.
+enum class ContactsWanted {
+  kAuto,  ///< those that something has come within the influence distance of
+  kAll,   ///< all, from the start
+  kNone
+};
+
+/// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
+/// may take half of the time until the next one, so that no scene makes answers late.
+constexpr double kDefaultDeadline = -0.5;
+
+/// How the node's queries answer by default: as the core's, but with a deadline.
+QueryConfig default_query();
+
+/// [s] The deadline of a cycle; 0: none.
+/// @param parameter  ~query/deadline
+/// @param period     [s] from one cycle to the next
+double deadline_of(double parameter, double period);
+
+/// Limits of ~attach_object.
+struct AttachConfig {
+  int max_objects = 100;  ///< attached at a time: each is packed, and measured by every query; >= 0
+  double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
 };
 
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
@@ -46,13 +73,19 @@ struct ServerConfig {
   double rate = 100.0;  ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
-  QueryConfig query;
-  int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
+  QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
+  int max_query_answers = 100000;       ///< states times links of one ~query: 60 MB; > 0
   RepulsionConfig repulsion;
-  bool contacts_wanted = true;  ///< ~penetration/enabled
+  ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
   ContactConfig contacts;
   PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
+  AttachConfig attach;
+  /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.
+  std::vector<std::string> ignore_links;
+  bool fixed_links_count = false;  ///< ~min_distance/fixed_links: links that cannot move count too
+  bool speed_scale_enabled = true;
+  SpeedScaleConfig speed_scale;
   std::vector<SourceConfig> sources;
 };
 
@@ -75,9 +108,11 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 
 /// Parameters that may change while the node runs.
 struct LiveConfig {
-  QueryConfig query;  ///< its max_distance is as it was at the start
+  /// Its max_distance is as it was at the start; its deadline is the parameter, see deadline_of().
+  QueryConfig query = default_query();
   RepulsionConfig repulsion;
   PenetrationConfig penetration;
+  SpeedScaleConfig speed_scale;  ///< its links are those of the start
   /// The contact bodies that are packed so far; may be null. This is no parameter.
   std::shared_ptr<const ContactModel> contacts;
 };
@@ -94,8 +129,8 @@ struct LiveReading {
   std::vector<std::string> errors;  ///< one sentence for each that is wrong
 };
 
-/// Reads ~query/*, ~repulsion/* and ~penetration/stiffness again. What the tree lacks, or has
-/// wrong, keeps its value in `last`.
+/// Reads ~query/*, ~repulsion/*, ~penetration/stiffness and ~speed_scale/* again. What the tree
+/// lacks, or has wrong, keeps its value in `last`.
 /// @param tree  as fetch_parameters() returns it
 /// @param last  the last valid values. Its max_distance limits the influence distance: nothing
 ///              farther away is measured, and the vector could not end in zero

@@ -6,6 +6,8 @@ namespace ist {
 
 const char* message_type(SourceType type) {
   switch (type) {
+    case SourceType::kDepthImage:
+      return "sensor_msgs/Image";
     case SourceType::kScan:
       return "sensor_msgs/LaserScan";
     case SourceType::kMap:
@@ -18,6 +20,8 @@ const char* message_type(SourceType type) {
 
 const char* noun(SourceType type) {
   switch (type) {
+    case SourceType::kDepthImage:
+      return "image";
     case SourceType::kScan:
       return "scan";
     case SourceType::kMap:
@@ -30,14 +34,6 @@ const char* noun(SourceType type) {
 
 bool SourceConfig::is_permanent() const {
   return type == SourceType::kMap && (!file.empty() || std::isinf(timeout));
-}
-
-bool has_noise_filter() {
-#ifdef IST_PROXIMITY_WITH_PCL
-  return true;
-#else
-  return false;
-#endif
 }
 
 }  // namespace ist

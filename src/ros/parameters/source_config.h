@@ -2,40 +2,33 @@
 
 #include <string>
 
+#include "internal/cloud/noise_filter.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/laser_scan.h"
 #include "ist_proximity/cloud/octree.h"
 
 namespace ist {
 
-enum class SourceType { kCloud, kScan, kMap };
+enum class SourceType { kCloud, kDepthImage, kScan, kMap };
 
 /// The ROS message type of a source, as rostopic writes it.
 const char* message_type(SourceType type);
-/// The word for one message of a source: "cloud", "scan" or "map".
+/// The word for one message of a source: "cloud", "image", "scan" or "map".
 const char* noun(SourceType type);
-
-/// Radius outlier removal: points with too few neighbors are taken for noise.
-struct NoiseFilterConfig {
-  double radius = 0.0;  ///< [m] >= 0: neighbors are searched within this distance; 0: no filter
-  int neighbors = 4;    ///< > 0: a point needs this many neighbors
-};
-
-/// Whether this build has the noise filter, which is PCL's.
-bool has_noise_filter();
 
 /// One entry of ~sources.
 struct SourceConfig {
   std::string name = "cloud";
   SourceType type = SourceType::kCloud;
   std::string topic = "cloud";   ///< as configured: relative to the node's namespace, remappable
+  std::string camera_info;       ///< topic, of depth images; empty: camera_info beside `topic`
   std::string file;              ///< absolute path of a map that is read in place of a topic
   std::string frame_id = "map";  ///< frame of the map in `file`
   double timeout = 0.5;          ///< [s] an older message is STALE_CLOUD; > 0, may be inf
   std::string timeout_parameter = "cloud_timeout";
   bool required = true;  ///< false: the absence of this source shows in its own status only
   IngestConfig ingest;
-  NoiseFilterConfig noise;  ///< used for clouds
+  NoiseFilterConfig noise;  ///< used for clouds and depth images
   ScanLimits scan;          ///< used for scans
   OctreeLimits map;         ///< used for maps
 

@@ -28,17 +28,13 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
 void read_noise(ParameterReader* reader, const std::string& prefix, NoiseFilterConfig* noise) {
   reader->read(prefix + "noise_filter/radius", Range::non_negative("m", 1.0), &noise->radius);
   reader->read(prefix + "noise_filter/neighbors", Range{"", 1.0, 1000.0}, &noise->neighbors);
-  if (noise->radius > 0.0 && !has_noise_filter()) {
-    reader->add_error("~" + prefix +
-                      "noise_filter/radius is set, but this build has no noise filter: it was made "
-                      "without PCL (libpcl-dev)");
-  }
 }
 
 // Upper limits of one message. The largest values are what 32 bits, or a machine's memory, hold.
 void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
   switch (source->type) {
     case SourceType::kCloud:
+    case SourceType::kDepthImage:
       return reader->read(prefix + "max_points", Range{"", 1.0, 1e9}, &source->ingest.max_points);
     case SourceType::kScan:
       return reader->read(prefix + "max_beams", Range{"", 1.0, 1e7}, &source->scan.max_beams);
@@ -49,7 +45,8 @@ void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfi
 }
 
 void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
-  const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kScan, SourceType::kMap};
+  const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kDepthImage,
+                                         SourceType::kScan, SourceType::kMap};
   std::vector<std::string> names;
   names.reserve(types.size());
   for (const SourceType one : types) names.emplace_back(message_type(one));
@@ -90,7 +87,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
     read_map(reader, prefix, source);
   } else {
     read_ingest(reader, prefix, &source->ingest);
-    if (source->type == SourceType::kCloud) read_noise(reader, prefix, &source->noise);
+    if (source->type != SourceType::kScan) read_noise(reader, prefix, &source->noise);
   }
   read_limits(reader, prefix, source);
   reader->read(prefix + "topic", &source->topic);
@@ -99,6 +96,9 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   }
   if (source->file.empty()) {
     reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
+  }
+  if (source->type == SourceType::kDepthImage) {
+    reader->read(prefix + "camera_info", &source->camera_info);
   }
   reader->read(prefix + "required", &source->required);
 }

@@ -53,17 +53,19 @@ std::string JointPoseSource::hint() const {
 /// Says why a joint's newest position cannot be used, whatever the other joints' are.
 PoseProblem JointPoseSource::problem_of(std::size_t joint, const ros::Time& now) const {
   const JointPosition& position = positions_[joint];
-  const std::string name = "joint '" + kinematics_->joints()[joint].name + "'";
-  const std::string cause = position.refusal ? ": " + *position.refusal : std::string();
+  const auto name = [&] { return "joint '" + kinematics_->joints()[joint].name + "'"; };
+  const auto cause = [&] { return position.refusal ? ": " + *position.refusal : std::string(); };
   if (position.stamp.isZero()) {
-    if (position.refusal) return {"no position of " + name + " could be used yet" + cause, true};
-    return {name + " has not come in any joint state", false};
+    if (position.refusal) {
+      return {"no position of " + name() + " could be used yet" + cause(), true};
+    }
+    return {name() + " has not come in any joint state", false};
   }
   const double age = seconds_between(position.stamp, now);
   if (age > timeout_) {
-    return {"the newest position of " + name +
+    return {"the newest position of " + name() +
                 format_text(" is %.2f s old, allowed is %.2f s (~pose_timeout)", age, timeout_) +
-                cause,
+                cause(),
             position.refusal != nullptr};
   }
   if (position.dispute &&

@@ -46,7 +46,8 @@ void TfPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
 
   // The instant is never later than now, even if transforms are stamped ahead of the clock.
   ros::Time instant = now;
-  std::vector<ros::Time> stamps(n);
+  std::vector<ros::Time>& stamps = stamps_;
+  stamps.assign(n, ros::Time());
   for (std::size_t i = 0; i < n; ++i) {
     if (!wanted_[i]) continue;
     poses->known[i] = newest(i, now, &stamps[i], &poses->problems[i]);

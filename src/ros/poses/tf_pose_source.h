@@ -41,6 +41,7 @@ class TfPoseSource : public PoseSource {
   std::vector<std::string> frames_;
   std::vector<bool> wanted_;
   double timeout_;
+  std::vector<ros::Time> stamps_;  ///< by link; valid for one look_up()
 };
 
 }  // namespace ist

@@ -54,7 +54,7 @@ std::string TransformBuffer::check(const geometry_msgs::TransformStamped& transf
 }
 
 std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& transform,
-                                    const std::string& fault) {
+                                    const std::string& fault, bool is_static) {
   std::string sentence = title(transform) + fault;
   const std::lock_guard<std::mutex> lock(mutex_);
   last_refusal_ = sentence;
@@ -66,22 +66,36 @@ std::string TransformBuffer::refuse(const geometry_msgs::TransformStamped& trans
   record.parent = without_slash(transform.header.frame_id);
   record.refusal = sentence;
   record.refusal_time = last_refusal_time_;
+  if (is_static && !record.refusal_stays) ++lasting_refusals_;
+  record.refusal_stays = record.refusal_stays || is_static;
   return sentence;
+}
+
+/// Forgets why an earlier transform of a frame was refused, since tf has another now.
+void TransformBuffer::accept(const std::string& child) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (lasting_refusals_ == 0) return;
+  const auto record = records_.find(child);
+  if (record == records_.end() || !record->second.refusal_stays) return;
+  record->second.refusal.clear();
+  record->second.refusal_stays = false;
+  --lasting_refusals_;
 }
 
 std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transform,
                                  const std::string& publisher, bool is_static,
                                  const ros::Time& now) {
   const std::string fault = check(transform, is_static, now);
-  if (!fault.empty()) return refuse(transform, fault);
+  if (!fault.empty()) return refuse(transform, fault, is_static);
+  const std::string child = without_slash(transform.child_frame_id);
   if (!is_static) {
-    const std::string child = without_slash(transform.child_frame_id);
     const ros::Time& stamp = transform.header.stamp;
     std::unique_lock<std::mutex> lock(mutex_);
     const auto found = records_.find(child);
     if (found == records_.end() && records_.size() >= kMaxFrames) {
       lock.unlock();
-      return refuse(transform, format_text("is not used: there are %zu frames", kMaxFrames));
+      return refuse(transform, format_text("is not used: there are %zu frames", kMaxFrames),
+                    is_static);
     }
     Record& record = found == records_.end() ? records_[child] : found->second;
     note_publisher(transform, publisher, &record);
@@ -94,7 +108,8 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
       return refuse(transform,
                     format_text("is not used: its stamp is %.2f s behind that of another "
                                 "one; are there two publishers, with two clocks?",
-                                behind));
+                                behind),
+                    is_static);
     }
     if (stamp > record.newest) {
       record.newest = stamp;
@@ -102,17 +117,20 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
       record.ahead = seconds_between(now, stamp);
       any_ahead_ = any_ahead_ || record.ahead > kClockResolution;
       if (record.ahead >= kToldSkew) record.ahead_time = skew_time_ = Clock::now();
-      record.refusal.clear();
+      if (!record.refusal_stays) record.refusal.clear();
     }
   }
   std::string problem;
   try {
-    if (setTransform(transform, publisher, is_static)) return "";
+    if (setTransform(transform, publisher, is_static)) {
+      accept(child);
+      return "";
+    }
     problem = "is not used: tf refuses it";
   } catch (const std::exception& error) {
     problem = std::string("is not used: ") + error.what();
   }
-  return refuse(transform, problem);
+  return refuse(transform, problem, is_static);
 }
 
 /// The caller holds mutex_.
@@ -131,13 +149,28 @@ void TransformBuffer::note_publisher(const geometry_msgs::TransformStamped& tran
 void TransformBuffer::clear() {
   const std::lock_guard<std::mutex> lock(mutex_);
   tf2::BufferCore::clear();
-  records_.clear();
+  for (auto entry = records_.begin(); entry != records_.end();) {
+    if (!entry->second.refusal_stays) {
+      entry = records_.erase(entry);
+      continue;
+    }
+    Record kept;
+    kept.parent = entry->second.parent;
+    kept.refusal = entry->second.refusal;
+    kept.refusal_stays = true;
+    entry->second = kept;
+    ++entry;
+  }
   any_ahead_ = false;
 }
 
 std::string TransformBuffer::last_refusal() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return Clock::now() - last_refusal_time_ < kMemory ? last_refusal_ : std::string();
+  if (Clock::now() - last_refusal_time_ < kMemory) return last_refusal_;
+  if (lasting_refusals_ == 0) return "";
+  const auto record = std::find_if(records_.begin(), records_.end(),
+                                   [](const auto& entry) { return entry.second.refusal_stays; });
+  return record == records_.end() ? std::string() : record->second.refusal;
 }
 
 std::string TransformBuffer::ahead() const {
@@ -194,11 +227,13 @@ std::vector<std::string> TransformBuffer::between(const std::string& fixed_frame
 std::string TransformBuffer::why_refused(const std::string& fixed, const std::string& frame) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto now = Clock::now();
-  if (now - last_refusal_time_ > kMemory) return "";
+  if (now - last_refusal_time_ > kMemory && lasting_refusals_ == 0) return "";
   for (const std::string& child : between(fixed, frame)) {
     const auto record = records_.find(child);
     if (record == records_.end() || record->second.refusal.empty()) continue;
-    if (now - record->second.refusal_time < kMemory) return record->second.refusal;
+    if (record->second.refusal_stays || now - record->second.refusal_time < kMemory) {
+      return record->second.refusal;
+    }
   }
   return "";
 }

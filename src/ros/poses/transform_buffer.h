@@ -5,6 +5,7 @@
 #include <tf2/buffer_core.h>
 
 #include <chrono>
+#include <cstddef>
 #include <mutex>
 #include <string>
 #include <unordered_map>
@@ -17,7 +18,8 @@ namespace ist {
 /// A tf buffer that checks transforms before tf2 does, and remembers what was wrong with them.
 ///
 /// tf2 logs every transform that it refuses, and nobody can ask it afterwards why a frame has no
-/// fresh pose. Here the reason stays for a second after the last refusal, and goes to the status.
+/// fresh pose. Here the reason stays for a second after the last refusal, and goes to the status. A
+/// static transform is sent once, so the reason of its refusal stays until another takes its place.
 /// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
 /// counts from their receipt, and which frames two publishers state differently. Thread safe.
 class TransformBuffer : public tf2::BufferCore {
@@ -36,14 +38,15 @@ class TransformBuffer : public tf2::BufferCore {
   /// Forgets everything but static transforms.
   void clear();
 
-  /// The last refusal of the last second; empty when there was none.
+  /// The last refusal of the last second, or else of a static transform whose place is still empty;
+  /// empty when there was none.
   std::string last_refusal() const;
   /// A sentence on the transform that is farthest ahead of the clock, where that is 50 ms or more;
   /// empty when there was none in the last second.
   std::string ahead() const;
 
-  /// Why transforms between a frame and another above it have been refused in the last second;
-  /// empty when none was.
+  /// Why transforms between a frame and another above it have been refused in the last second, or
+  /// static ones at any time; empty when none was.
   /// @param fixed  where the way up ends, if it is on the way
   std::string why_refused(const std::string& fixed, const std::string& frame) const;
 
@@ -68,6 +71,7 @@ class TransformBuffer : public tf2::BufferCore {
     Clock::time_point ahead_time;
     std::string refusal;
     Clock::time_point refusal_time;
+    bool refusal_stays = false;  ///< of a static transform, which is not sent again
     PublisherTrack track;
     std::string dispute;
     Clock::time_point dispute_time;
@@ -75,7 +79,9 @@ class TransformBuffer : public tf2::BufferCore {
 
   std::string check(const geometry_msgs::TransformStamped& transform, bool is_static,
                     const ros::Time& now) const;
-  std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& fault);
+  std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& fault,
+                     bool is_static);
+  void accept(const std::string& child);
   void note_publisher(const geometry_msgs::TransformStamped& transform,
                       const std::string& publisher, Record* record);
   bool way_up(const std::string& end, const std::string& frame,
@@ -85,6 +91,7 @@ class TransformBuffer : public tf2::BufferCore {
   mutable std::mutex mutex_;                         // guards the members below
   std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash
   std::string last_refusal_;
+  std::size_t lasting_refusals_ = 0;  ///< records whose refusal stays
   Clock::time_point last_refusal_time_, skew_time_, dispute_time_;
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
 };

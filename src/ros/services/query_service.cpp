@@ -115,7 +115,12 @@ std::string QueryService::take_model() {
   }
   if (!model->kinematics) return no_kinematics(*model);
   if (model == model_) return "";
+  const bool is_refined = cycle_ && model_ && is_refinement(*model_, *model);
   model_ = std::move(model);
+  if (is_refined) {
+    cycle_->refine(model_);
+    return "";
+  }
   auto poses = std::make_unique<StatedPoseSource>(model_->kinematics, buffer_,
                                                   fixed_frame_of(*model_, config_),
                                                   link_names(*model_->robot), config_.pose_timeout);
@@ -152,7 +157,6 @@ std::string QueryService::run(const Service::Request& request, Service::Response
 
   LiveConfig live = live_();
   live.query.deadline = 0.0;
-  CycleReport ignored;
   std::vector<std::vector<double>> positions;
   for (std::size_t i = 0; i < request.states.size(); ++i) {
     problem = poses_->state(request.states[i]);
@@ -161,7 +165,7 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     response->results.emplace_back();
     ProximityArray& result = response->results.back();
     cycle_->forget();  // the configurations are no motion, so there is no speed between them
-    cycle_->run(ros::Time::now(), sources_, live, &result, &ignored);
+    cycle_->run(ros::Time::now(), sources_, live, "", &result);
     assert_invariants(result,
                       {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
     for (std::size_t link = chosen_.size(); link-- > 0;) {

@@ -20,6 +20,7 @@
 namespace ist {
 
 using ist_proximity::ProximityArray;
+using ist_proximity::ProximityArrayConstPtr;
 using Clock = std::chrono::steady_clock;
 
 SelfProximity::SelfProximity(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
@@ -38,6 +39,19 @@ SelfProximity::~SelfProximity() {
 void SelfProximity::set_model(std::shared_ptr<const ModelState> model) {
   const std::lock_guard<std::mutex> lock(mutex_);
   newest_model_ = std::move(model);
+}
+
+ProximityArrayConstPtr SelfProximity::newest() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return newest_;
+}
+
+void SelfProximity::publish(const ProximityArrayConstPtr& message) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    newest_ = message;
+  }
+  publish_message(publisher_, message);
 }
 
 void SelfProximity::run() {
@@ -62,23 +76,30 @@ void SelfProximity::publish_failure(const std::string& fault) {
   ROS_ERROR_STREAM_THROTTLE(
       5.0, "link against link: a cycle failed, and all links are UNKNOWN: " << fault);
   exception_of([&] {  // there may be no memory even for that
-    ProximityArray message;
-    message.header.stamp = ros::Time::now();
-    message.status = ProximityArray::MODEL_ERROR;
-    message.status_text = "the last cycle failed: " + fault;
+    const auto message = boost::make_shared<ProximityArray>();
+    message->header.stamp = ros::Time::now();
+    message->status = ProximityArray::MODEL_ERROR;
+    message->status_text = "the last cycle failed: " + fault;
     if (model_) {
-      message.header.frame_id = fixed_frame_of(*model_, config_);
-      for (const std::string& link : model_->links) message.links.push_back(unknown_link(link));
+      message->header.frame_id = fixed_frame_of(*model_, config_);
+      for (const std::string& link : model_->links) message->links.push_back(unknown_link(link));
     }
-    publisher_.publish(message);
+    publish(message);
   });
 }
 
 void SelfProximity::take_model() {
+  bool is_refined = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (newest_model_ == model_) return;
+    is_refined = query_ && model_ && is_refinement(*model_, *newest_model_);
     model_ = newest_model_;
+  }
+  if (is_refined) {
+    query_ =
+        std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, query_.get());
+    return;
   }
   query_.reset();
   if (!model_->robot || !model_->kinematics) return;
@@ -165,6 +186,7 @@ void SelfProximity::compute_wrenches(const LiveConfig& live) {
   for (std::size_t i = 0; i < results_.size(); ++i) {
     if (results_[i].state != LinkState::kContact) continue;
     const LinkPair& pair = query_->pairs()[i];
+    for (const std::size_t link : {pair.first, pair.second}) model_->usage->note_near(link);
     const ContactGeometry* first = find_contact_geometry(live.contacts.get(), robot, pair.first);
     const ContactGeometry* second = find_contact_geometry(live.contacts.get(), robot, pair.second);
     const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
@@ -199,7 +221,8 @@ void SelfProximity::publish_once() {
   }
   last_now_ = now;
   const auto message = boost::make_shared<ProximityArray>();
-  const LiveConfig live = live_();
+  LiveConfig live = live_();
+  live.query.deadline = deadline_of(live.query.deadline, 1.0 / config_.self_collision.rate);
   StatusInput input;
   input.clock_runs = !now.isZero();
   input.model_problem =
@@ -235,7 +258,7 @@ void SelfProximity::publish_once() {
   message->status_text = status.text;
   assert_invariants(*message,
                     {ros::Time::now(), config_.query.max_distance, live.query.margin, false});
-  publish_message(publisher_, message);
+  publish(message);
 }
 
 void SelfProximity::add_link(std::size_t link, ProximityArray* message) {
@@ -243,9 +266,8 @@ void SelfProximity::add_link(std::size_t link, ProximityArray* message) {
   const LinkProximity answer = nearest(link, &other);
   const RobotModel& robot = *model_->robot;
   const std::string& other_name = robot.links[other].name;
-  ClosingRates closing =
-      speeds_[link].update(poses_.stamp, answer, poses_.X_FL[link], {other_name, 0, 0.0});
-  closing.robot = ClosingRates::kNaN;  // both links move, so the speed has no parts
+  // Both links move, so the speed has no parts.
+  const ClosingRates closing = speeds_[link].update_pair(poses_.stamp.toSec(), answer);
   message->links.push_back(to_message(robot.links[link].name, answer, RepulsiveWrench::unknown(),
                                       penetration(link, answer), closing, other_name));
 }

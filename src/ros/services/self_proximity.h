@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
+#include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ros/common/stop_signal.h"
 #include "ros/model/model_state.h"
-#include "ros/output/closing_speed.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/pose_source.h"
@@ -42,10 +42,14 @@ class SelfProximity {
   /// Thread safe.
   void set_model(std::shared_ptr<const ModelState> model);
 
+  /// The message that was published last; null before the first. Thread safe.
+  ist_proximity::ProximityArrayConstPtr newest() const;
+
  private:
   void run();
   void publish_once();
   void publish_failure(const std::string& fault);
+  void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void take_model();
   std::vector<LinkPair> choose_pairs() const;
   NamePairs ignored_pairs() const;
@@ -62,8 +66,9 @@ class SelfProximity {
   ros::Publisher publisher_;
 
   StopSignal stop_signal_;
-  std::mutex mutex_;  // guards the next member
+  mutable std::mutex mutex_;  // guards the next two members
   std::shared_ptr<const ModelState> newest_model_;
+  ist_proximity::ProximityArrayConstPtr newest_;
 
   // Used by the thread alone.
   std::shared_ptr<const ModelState> model_;

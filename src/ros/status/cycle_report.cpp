@@ -22,4 +22,20 @@ double CycleTimes::quantile(double q) const {
   return sorted[std::min(rank, sorted.size() - 1)];
 }
 
+void CycleReport::take(const StatusInput& input, const Status& decided) {
+  status = decided;
+  sources = input.sources;
+  source_statuses = input.source_statuses;
+  pose_problems = input.pose_problems;
+}
+
+void CycleReport::add_times(const ist_proximity::ProximityArray& message) {
+  times.add(message.computation_time);
+  parts[kPartPoses].add(message.poses_time);
+  parts[kPartQuery].add(message.query_time);
+  parts[kPartRepulsion].add(message.repulsion_time);
+  parts[kPartPenetration].add(message.penetration_time);
+  parts[kPartMessage].add(message.message_time);
+}
+
 }  // namespace ist

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <ist_proximity/ProximityArray.h>
+
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -25,6 +28,17 @@ class CycleTimes {
   std::size_t total_ = 0;
 };
 
+/// The parts of a cycle whose times are told.
+enum CyclePart : std::size_t {
+  kPartPoses,
+  kPartQuery,
+  kPartRepulsion,
+  kPartPenetration,
+  kPartMessage,  ///< with the sources and the status
+  kPartPublish,  ///< markers, joint repulsion and roscpp's serialization too
+  kCycleParts
+};
+
 /// Results of the last cycle, for the diagnostics thread.
 struct CycleReport {
   Status status{0, ""};
@@ -32,14 +46,27 @@ struct CycleReport {
   std::vector<Status> source_statuses;  ///< by source
   std::vector<std::string> pose_problems;
   std::string parameter_problem;                 ///< LiveParameters::problem()
+  std::string parameters_without_effect;         ///< LiveParameters::without_effect()
   std::string transform_problem;                 ///< a transform that the tf listener rejected
   std::optional<JointStateReport> joint_states;  ///< null with pose_source tf
   std::size_t links_known = 0, links_monitored = 0;
-  double pose_age = 0.0;             ///< [s] of the poses' common instant, when any link is known
-  std::size_t cycles = 0;            ///< since the start, with or without a model
-  CycleTimes times;                  ///< of cycles with a model
-  std::size_t deadlines_missed = 0;  ///< cycles whose query was cut short, since the start
+  double pose_age = 0.0;   ///< [s] of the poses' common instant, when any link is known
+  std::size_t cycles = 0;  ///< since the start, with or without a model
+  CycleTimes times;        ///< of cycles with a model: computation_time
+  std::array<CycleTimes, kCycleParts> parts;  ///< by CyclePart
+  double deadline = 0.0;                      ///< [s] of the last cycle; 0: none
+  std::size_t deadlines_missed = 0;  ///< cycles that the deadline cut short, since the start
+  DeadlineCost worst_deadline;       ///< since the last diagnostics
+  double min_distance = 0.0;         ///< [m] as on ~min_distance; NaN: not known
+  std::string speed_scale;           ///< the scale, the rule and the link; empty: not enabled
+  std::string counted_links;         ///< which links do not count in both, and why
+  std::string counted_problem;       ///< what is wrong with names of links that are configured
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
+
+  /// Takes the sources, the problems of poses and the status.
+  void take(const StatusInput& input, const Status& decided);
+  /// Adds the times that a message tells.
+  void add_times(const ist_proximity::ProximityArray& message);
 };
 
 }  // namespace ist

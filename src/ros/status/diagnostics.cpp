@@ -1,5 +1,6 @@
 #include "ros/status/diagnostics.h"
 
+#include <array>
 #include <cmath>
 
 #include "ros/common/text.h"
@@ -28,8 +29,9 @@ std::string doubt_of_self_filter(const SourceReport& source) {
            "self_filter_padding";
   }
   // A laser scanner may never see the robot, so this concerns clouds only.
-  if (counts.on_robot == 0 && source.noun == "cloud") {
-    return "no point of the cloud is on the robot: if the sensor sees the robot, its transform or "
+  if (counts.on_robot == 0 && (source.noun == "cloud" || source.noun == "image")) {
+    return "no point of the " + source.noun +
+           " is on the robot: if the sensor sees the robot, its transform or "
            "the URDF is wrong; if it does not, set self_filter: false";
   }
   return "";
@@ -66,6 +68,27 @@ void add_source_counts(const SourceReport& source, double rate, double now,
   }
 }
 
+/// Adds the deadline, and the worst that it has cost since the last diagnostics.
+void add_deadline(const CycleReport& report, DiagnosticStatus* status) {
+  const DeadlineCost& worst = report.worst_deadline;
+  add_value("deadline", report.deadline > 0.0 ? milliseconds(report.deadline) : "none", status);
+  add_value("deadlines missed", report.deadlines_missed, status);
+  add_value("links unfinished, most of a cycle", worst.unfinished, status);
+  add_value("widest bounds of unfinished links", millimetres(worst.widest), status);
+  add_value("links with unblended repulsion, most of a cycle", worst.unblended, status);
+  add_value("links without penetration, most of a cycle", worst.no_penetration, status);
+}
+
+void add_parts(const CycleReport& report, DiagnosticStatus* status) {
+  const std::array<const char*, kCycleParts> names = {"poses",       "query",   "repulsion",
+                                                      "penetration", "message", "publishing"};
+  for (std::size_t i = 0; i < kCycleParts; ++i) {
+    const std::string name = std::string("time of ") + names[i];
+    add_value(name + ", median", milliseconds(report.parts[i].quantile(0.5)), status);
+    add_value(name + ", 99th percentile", milliseconds(report.parts[i].quantile(0.99)), status);
+  }
+}
+
 }  // namespace
 
 DiagnosticStatus input_diagnostics(const std::string& node, const SourceReport& source,
@@ -87,6 +110,7 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceReport& 
               ": its age counts from its receipt; compare the clocks of sensor and node",
           &status);
   }
+  if (!source.doubt.empty()) raise(DiagnosticStatus::WARN, source.doubt, &status);
   const std::string doubt = doubt_of_self_filter(source);
   if (!doubt.empty()) raise(DiagnosticStatus::WARN, doubt, &status);
   add_source_counts(source, rate, now, &status);
@@ -136,16 +160,30 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   if (!report.parameter_problem.empty()) {
     raise(DiagnosticStatus::WARN, report.parameter_problem, &status);
   }
+  if (!report.parameters_without_effect.empty()) {
+    raise(DiagnosticStatus::WARN, report.parameters_without_effect, &status);
+  }
+  if (!report.counted_problem.empty()) {
+    raise(DiagnosticStatus::WARN, report.counted_problem, &status);
+  }
+  add_value("min_distance",
+            std::isnan(report.min_distance) ? "not known" : millimetres(report.min_distance),
+            &status);
+  if (!report.speed_scale.empty()) add_value("speed_scale", report.speed_scale, &status);
+  if (!report.counted_links.empty()) {
+    add_value("links left out", report.counted_links, &status);
+  }
   add_value("live parameters",
             report.parameter_problem.empty() ? "as on the server" : report.parameter_problem,
             &status);
   add_value("rate", format_text("%.1f Hz", rate), &status);
   add_value(wanted, format_text("%.1f Hz", wanted_rate), &status);
-  add_value("deadlines missed", report.deadlines_missed, &status);
+  add_deadline(report, &status);
   add_value("markers drawn", report.markers_drawn, &status);
   add_value("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
   add_value("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)),
             &status);
+  add_parts(report, &status);
   return status;
 }
 

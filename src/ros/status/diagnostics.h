@@ -32,6 +32,6 @@ diagnostic_msgs::DiagnosticStatus query_diagnostics(const std::string& node,
 diagnostic_msgs::DiagnosticStatus model_diagnostics(const std::string& node,
                                                     const ModelState& state,
                                                     const ContactModel* contacts,
-                                                    bool contacts_wanted);
+                                                    ContactsWanted contacts_wanted);
 
 }  // namespace ist

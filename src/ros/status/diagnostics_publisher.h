@@ -34,7 +34,7 @@ class DiagnosticsPublisher {
  private:
   const std::string node_;
   const double rate_;  ///< [Hz] ~rate
-  const bool contacts_wanted_;
+  const ContactsWanted contacts_wanted_;
   ros::Publisher publisher_;
   StatusLog status_log_;
 

@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
 #include "ros/common/text.h"
 #include "ros/status/diagnostic_values.h"
 #include "ros/status/diagnostics.h"
@@ -19,41 +23,50 @@ std::string contact_geometry_text(const ContactGeometry& body) {
 }
 
 /// Adds the contact bodies, and why `penetration` may be NaN in contact.
-void add_contacts(const ModelState& state, const ContactModel* contacts, bool wanted,
+void add_contacts(const ModelState& state, const ContactModel* contacts, ContactsWanted wanted,
                   DiagnosticStatus* status) {
-  if (!wanted) {
+  if (wanted == ContactsWanted::kNone) {
     add_value("contact volumes",
               "off, ~penetration/enabled is false: penetration is NaN in contact", status);
     return;
   }
   if (!state.robot) return;
-  const bool is_current = contacts != nullptr && contacts->robot == state.robot;
-  std::size_t usable = 0, ready = 0;
+  const bool is_current = contacts != nullptr && same_geometry(*contacts->robot, *state.robot);
+  std::size_t usable = 0, needed = 0, ready = 0;
   for (const std::size_t i : state.monitored) {
     if (!state.robot->links[i].usable()) continue;
     ++usable;
-    if (!is_current || !contacts->links[i]) continue;
+    const bool is_ready = is_current && contacts->links[i];
+    if (is_ready || wanted == ContactsWanted::kAll || state.usage->was_near(i)) ++needed;
+    if (!is_ready) continue;
     ++ready;
     add_value("volume of " + state.robot->links[i].name, contact_geometry_text(*contacts->links[i]),
               status);
   }
   add_value("contact volumes",
-            ready == usable ? "ready"
-                            : std::to_string(ready) + " of " + std::to_string(usable) +
+            ready == needed ? "ready"
+                            : std::to_string(ready) + " of " + std::to_string(needed) +
                                   " links; penetration is NaN in contact for those to come",
+            status);
+  add_value("links with a volume",
+            std::to_string(ready) + " of " + std::to_string(usable) +
+                (ready < usable && wanted == ContactsWanted::kAuto
+                     ? "; the others have none until something comes near them"
+                     : ""),
             status);
 }
 
 /// Adds the packing of a link that is usable.
 void add_link(const LinkModel& link, DiagnosticStatus* status) {
   const PackingCertificate& certificate = link.packing.certificate;
-  std::string text = std::to_string(link.packing.spheres.size()) + " spheres, largest gap " +
+  std::string text = std::string(link.is_final ? "final" : "coarse") + ", " +
+                     std::to_string(link.packing.spheres.size()) + " spheres, largest gap " +
                      millimetres(certificate.max_gap) + ", mean " +
                      millimetres(certificate.mean_gap);
   if (certificate.unreachable_area > 0) {
     text += format_text(", %.1f cm2 of sheets", 1e4 * certificate.unreachable_area);
   }
-  if (!certificate.reached) {
+  if (link.is_final && !certificate.reached) {
     text += ", ~packing/max_error not reached";
     raise(DiagnosticStatus::WARN, "link '" + link.name + "': " + text, status);
   }
@@ -62,10 +75,31 @@ void add_link(const LinkModel& link, DiagnosticStatus* status) {
   add_value(link.name, text, status);
 }
 
+/// Adds how far background packing has got.
+void add_packings(const ModelState& state, DiagnosticStatus* status) {
+  if (!state.robot) return;
+  std::size_t usable = 0, final = 0, spheres = 0;
+  double largest_gap = 0.0;
+  for (const std::size_t i : state.monitored) {
+    const LinkModel& link = state.robot->links[i];
+    if (!link.usable()) continue;
+    ++usable;
+    final += link.is_final ? 1 : 0;
+    spheres += link.packing.spheres.size();
+    largest_gap = std::max(largest_gap, link.packing.certificate.max_gap);
+  }
+  add_value("links with their final packing",
+            std::to_string(final) + " of " + std::to_string(usable) +
+                (final < usable ? "; the others get finer spheres when it pays" : ""),
+            status);
+  add_value("spheres", spheres, status);
+  add_value("largest gap", millimetres(largest_gap), status);
+}
+
 }  // namespace
 
 DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
-                                   const ContactModel* contacts, bool contacts_wanted) {
+                                   const ContactModel* contacts, ContactsWanted contacts_wanted) {
   DiagnosticStatus status = make_diagnostic(node, "model");
   const bool ready = state.phase == ModelState::Phase::kReady;
   if (!state.problem.empty()) {
@@ -75,6 +109,7 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   }
   add_value("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction), &status);
   add_value("links monitored", state.links.size(), &status);
+  if (ready) add_value("links", link_counts(state), &status);
   for (const AttachedObject& object : state.objects) {
     add_value("attached object", "'" + object.name + "' on '" + object.link + "'", &status);
   }
@@ -87,6 +122,7 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
     }
     add_link(link, &status);
   }
+  add_packings(state, &status);
   add_contacts(state, contacts, contacts_wanted, &status);
   for (const std::string& warning : state.warnings) {
     raise(DiagnosticStatus::WARN, warning, &status);

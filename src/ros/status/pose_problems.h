@@ -18,9 +18,11 @@ std::vector<std::string> missing_poses(const RobotModel& robot,
                                        const StampedLinkPoses& poses, const PoseSource* source);
 
 /// Names the links with a pose whose own points are still in a cloud, because the self-filter had
-/// no pose for them at the cloud's stamp; empty when there are none.
+/// no pose for them at the cloud's stamp; empty when there are none. Says so where the poses are
+/// older than the cloud.
+/// @param pose_source  of the poses; may be null
 std::string unfiltered_links(const RobotModel& robot, const std::vector<std::size_t>& monitored,
-                             const StampedLinkPoses& poses, const SourceSnapshot& snapshot,
-                             const std::string& source);
+                             const StampedLinkPoses& poses, const PoseSource* pose_source,
+                             const SourceSnapshot& snapshot, const std::string& source);
 
 }  // namespace ist

@@ -44,7 +44,8 @@ Status without_messages(const SourceReport& source) {
                                 ? ", nobody publishes a " + source.type +
                                       " there; start the sensor's driver, or set or remap the topic"
                                 : ", although there is a publisher";
-  return {ProximityArray::NO_CLOUD, title(source) + ": nothing received yet" + cause};
+  const std::string advice = source.advice.empty() ? "" : "; " + source.advice;
+  return {ProximityArray::NO_CLOUD, title(source) + ": nothing received yet" + cause + advice};
 }
 
 /// The share of the timeout from which the time to read and ingest a message is why it is stale.

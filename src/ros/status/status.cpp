@@ -88,7 +88,44 @@ void add_unusable_sources(const StatusInput& input, double now, Sentences* sente
   }
 }
 
+std::string links(std::size_t count) {
+  return std::to_string(count) + (count == 1 ? " link" : " links");
+}
+
+/// Adds what a deadline has cost.
+void add_deadline(const DeadlineCost& cost, Sentences* sentences) {
+  if (!cost.any()) return;
+  const std::string passed = "~query/deadline passed before ";
+  if (cost.unfinished > 0) {
+    const std::string width =
+        cost.widest > 0.0 ? format_text("bounds hold but are up to %.1f mm wide", 1e3 * cost.widest)
+                          : "nothing is known of them";
+    sentences->add(ProximityArray::DEGRADED, passed + links(cost.unfinished) +
+                                                 " met ~query/tolerance: " + width +
+                                                 "; raise either, or ~packing/max_error");
+  }
+  if (cost.unblended > 0) {
+    sentences->add(ProximityArray::DEGRADED, passed + "the repulsion of " + links(cost.unblended) +
+                                                 " was blended: it is that of the nearest point");
+  }
+  if (cost.no_penetration > 0) {
+    sentences->add(
+        ProximityArray::DEGRADED,
+        passed + "the contact volume of " + links(cost.no_penetration) +
+            format_text(" was summed (%.0f %% of the obstacles near): ", 100.0 * cost.least_known) +
+            "its penetration is NaN");
+  }
+}
+
 }  // namespace
+
+void DeadlineCost::add(const DeadlineCost& other) {
+  unfinished = std::max(unfinished, other.unfinished);
+  widest = std::max(widest, other.widest);
+  unblended = std::max(unblended, other.unblended);
+  no_penetration = std::max(no_penetration, other.no_penetration);
+  least_known = std::min(least_known, other.least_known);
+}
 
 bool clouds_usable(const StatusInput& input) {
   bool any = false;
@@ -102,18 +139,22 @@ bool clouds_usable(const StatusInput& input) {
   return any;
 }
 
+bool StatusInput::is_fine() const {
+  return model_problem.empty() && link_errors.empty() && pose_problems.empty() &&
+         pose_doubts.empty() && !deadline.any() && !outside_region &&
+         std::all_of(source_statuses.begin(), source_statuses.end(),
+                     [](const Status& status) { return status.ok(); });
+}
+
 Status overall_status(const StatusInput& input, double now) {
+  if (input.is_fine()) return {ProximityArray::OK, ""};
   Sentences sentences;
   if (!input.model_problem.empty()) sentences.add(ProximityArray::MODEL_ERROR, input.model_problem);
   sentences.add(ProximityArray::MODEL_ERROR, input.link_errors);
   add_silent_sources(input, now, &sentences);
   sentences.add(ProximityArray::NO_POSE, input.pose_problems);
   add_unusable_sources(input, now, &sentences);
-  if (input.deadline_passed) {
-    sentences.add(ProximityArray::DEGRADED,
-                  "~query/deadline passed before every link met ~query/tolerance: bounds hold but "
-                  "are wider; raise either, or ~packing/max_error");
-  }
+  add_deadline(input.deadline, &sentences);
   if (input.outside_region) {
     sentences.add(ProximityArray::DEGRADED,
                   "a link is farther out than the limits of prismatic joints allow and is near "

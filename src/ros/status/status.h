@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -21,6 +22,19 @@ struct Status {
 /// @param now  [s] ROS clock
 Status source_status(const SourceReport& source, double now);
 
+/// What a deadline has cost in one cycle, or in the worst of several.
+struct DeadlineCost {
+  std::size_t unfinished = 0;      ///< links whose bounds are wider than the tolerance, or UNKNOWN
+  double widest = 0.0;             ///< [m] of these bounds, where they are known
+  std::size_t unblended = 0;       ///< links whose repulsion is that of their nearest point alone
+  std::size_t no_penetration = 0;  ///< links whose penetration is NaN
+  double least_known = 1.0;        ///< share of the obstacles near such a link that was summed
+
+  bool any() const { return unfinished + unblended + no_penetration > 0; }
+  /// Keeps the worse of both by each number.
+  void add(const DeadlineCost& other);
+};
+
 /// Everything that decides the status of a ProximityArray.
 struct StatusInput {
   std::string model_problem;             ///< not empty: there is no model (yet)
@@ -29,9 +43,12 @@ struct StatusInput {
   std::vector<Status> source_statuses;     ///< by source
   std::vector<std::string> pose_problems;  ///< one sentence each
   std::vector<std::string> pose_doubts;    ///< poses that are known, and hardly true
-  bool deadline_passed = false;
+  DeadlineCost deadline;
   bool outside_region = false;  ///< a link is farther out than the joint limits allow
   bool clock_runs = true;       ///< false: simulated time, and nothing on /clock yet
+
+  /// Whether nothing is wrong, so that nothing has to be said.
+  bool is_fine() const;
 };
 
 /// Whether queries may use clouds: every required source is usable, and at least one source is. A

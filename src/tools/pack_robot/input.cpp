@@ -60,6 +60,10 @@ Input read_input(const std::string& uri, GeometrySource source) {
       is_uri ? resolve_uri(uri, environment_package_finder()) : fs::absolute(uri).string();
   if (!fs::is_regular_file(path)) throw ModelError("there is no file '" + path + "'");
   const std::string extension = fs::path(path).extension();
+  if (extension == ".xacro") {
+    throw ModelError("'" + path + "' is a xacro file; expand it first: xacro '" + path +
+                     "' > robot.urdf, then pack robot.urdf");
+  }
   if (extension == ".urdf" || extension == ".xml") return read_urdf(path, source);
   Input input;
   LinkDescription link;

@@ -1,0 +1,343 @@
+// The cost of a camera as the node has it: a depth image of 640 x 480 points at 30 Hz, joint states
+// at 1 kHz, and the node's defaults. One image and the 33 cycles until the next one, by part:
+// ingest with self-filter, distances, repulsion, which thins what it looks at, and penetration in
+// contact. Beside it the same images and configurations with other libraries. As Markdown tables.
+//
+// One thread, processor time of that thread, without ROS. The frames of the test data
+// (IST_PROXIMITY_DATA, or ../shared/data), or the synthetic one without them; the robot moves
+// through them. Usage: camera CACHE_FOLDER [--ours | --count WHAT]; scripts/benchmark calls it.
+// --ours: no other libraries. --count: runs "ingest", "list" or "frame" for a profiler, without
+// penetration.
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/contact/contact_model.h"
+#include "ist_proximity/contact/contact_volume.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ist_proximity/robot/link_poses.h"
+#include "peers/method.h"
+#include "peers/scene.h"
+#include "support.h"
+#include "support/data_dir.h"
+#ifdef IST_BENCHMARK_CGAL
+#include "peers/body_filter.h"
+#endif
+
+namespace {
+
+using ist::CloudSnapshot;
+using ist::LinkProximity;
+using ist::LinkState;
+using ist::benchmark::DataSet;
+using ist::benchmark::Frame;
+using ist::benchmark::mean;
+using ist::benchmark::quantile;
+using ist::benchmark::Scene;
+using ist::benchmark::ThreadTimer;
+using Poses = std::vector<Eigen::Isometry3d>;
+
+constexpr std::size_t kCycles = 33;  // at 1 kHz, between two images at 30 Hz
+constexpr int kRepetitions = 30;
+constexpr std::size_t kFewSpheres = 59;  // as many as a common hand-made set for this arm
+
+// The robot as the node has it.
+struct Robot {
+  // @param touches  also packs it for contact volumes
+  Robot(const DataSet& set, const std::string& cache, bool touches)
+      : model(set.robot.pack(ist::PackingConfig().max_error)), known(model->links.size(), true) {
+    for (std::size_t i = 0; touches && i < model->links.size(); ++i) {
+      const ist::LinkGeometry geometry = {
+          {set.robot.meshes[i], Eigen::Isometry3d::Identity(), "link"}};
+      bodies.push_back(ist::build_contact_geometry(geometry, 0, model->links[i], {}, cache));
+    }
+  }
+  std::shared_ptr<const ist::RobotModel> model;
+  std::vector<std::shared_ptr<const ist::ContactGeometry>> bodies;
+  std::vector<bool> known;
+};
+
+// What the node does with images and poses, with its defaults.
+class Node {
+ public:
+  explicit Node(const Robot& robot)
+      : robot_(robot), ingest_({}), query_(robot.model, {}), repulsion_(robot.model) {}
+
+  void ingest(const Frame& frame, const Poses& X_FL) {
+    ist::RawCloud raw = frame.raw();
+    raw.owner = std::shared_ptr<const void>(&frame, [](const void*) {});  // as a message
+    ingest_.run(raw, frame.X_FS, ist::posed_solids(*robot_.model, X_FL, robot_.known), 0.0,
+                &snapshot_);
+  }
+  void query(const Poses& X_FL) { query_.run(X_FL, robot_.known, {&snapshot_}, &results_); }
+  void repel(const Poses& X_FL) {
+    for (std::size_t i = 0; i < results_.size(); ++i) {
+      push_ = repulsion_.wrench(i, X_FL[i], {&snapshot_}, results_[i], {});
+    }
+  }
+  void penetrate(const Poses& X_FL) {
+    for (std::size_t i = 0; i < results_.size(); ++i) {
+      if (results_[i].state != LinkState::kContact) continue;
+      volume_ =
+          ist::contact_volume(robot_.model->links[i], *robot_.bodies[i], X_FL[i], {&snapshot_});
+    }
+  }
+  const CloudSnapshot& snapshot() const { return snapshot_; }
+  std::size_t links_within(double distance) const {
+    return static_cast<std::size_t>(
+        std::count_if(results_.begin(), results_.end(), [distance](const LinkProximity& link) {
+          return link.state >= LinkState::kNear && link.distance < distance;
+        }));
+  }
+
+ private:
+  const Robot& robot_;
+  ist::Ingest ingest_;
+  CloudSnapshot snapshot_;
+  ist::ProximityQuery query_;
+  ist::Repulsion repulsion_;
+  std::vector<LinkProximity> results_;
+  ist::RepulsiveWrench push_;
+  ist::ContactVolume volume_;
+};
+
+// [us] One image and its cycles, by image.
+struct Times {
+  std::vector<double> ingest, query, repulsion, penetration, frame;
+};
+
+Times time_ours(const DataSet& set, const Robot& robot) {
+  Times times;
+  for (const Scene& scene : set.scenes) {
+    Node node(robot);
+    ThreadTimer timer;
+    for (std::size_t begin = 0; begin + kCycles <= set.motion.size(); begin += kCycles) {
+      timer.lap();
+      node.ingest(scene.frame, set.motion[begin]);
+      std::array<double, 4> us = {timer.lap(), 0.0, 0.0, 0.0};
+      for (std::size_t k = begin; k < begin + kCycles; ++k) {
+        const Poses& X_FL = set.motion[k];
+        timer.lap();
+        node.query(X_FL);
+        us[1] += timer.lap();
+        node.repel(X_FL);
+        us[2] += timer.lap();
+        node.penetrate(X_FL);
+        us[3] += timer.lap();
+      }
+      if (begin == 0) continue;  // the first one allocates
+      times.ingest.push_back(us[0]);
+      times.query.push_back(us[1]);
+      times.repulsion.push_back(us[2]);
+      times.penetration.push_back(us[3]);
+      times.frame.push_back(us[0] + us[1] + us[2] + us[3]);
+    }
+  }
+  return times;
+}
+
+void print(const char* name, const Times& times, double ours) {
+  const double frame = quantile(times.frame, 0.5);
+  std::printf("| %s | %.2f ms | %.2f ms", name, 1e-3 * quantile(times.ingest, 0.5),
+              1e-3 * quantile(times.query, 0.5));
+  for (const auto* part : {&times.repulsion, &times.penetration}) {
+    if (part->empty()) {
+      std::printf(" | ");
+    } else {
+      std::printf(" | %.2f ms", 1e-3 * mean(*part));
+    }
+  }
+  std::printf(" | %.2f / %.2f ms | %.1f |\n", 1e-3 * frame, 1e-3 * quantile(times.frame, 0.99),
+              frame / ours);
+}
+
+#ifdef IST_BENCHMARK_CGAL
+// The same images and configurations: the robot's points are dropped point by point.
+Times time_peer(const DataSet& set, const ist::benchmark::BodyFilter& filter,
+                ist::benchmark::Method* method) {
+  constexpr std::size_t kEvery = 6;  // images, for some take long
+  Times times;
+  Frame filtered;
+  std::vector<ist::benchmark::Answer> answers(set.robot.meshes.size());
+  for (const Scene& scene : set.scenes) {
+    ThreadTimer timer;
+    for (std::size_t begin = kCycles; begin + kCycles <= set.motion.size();
+         begin += kEvery * kCycles) {
+      timer.lap();
+      filter.run(scene.frame, set.motion[begin], &filtered);
+      method->ingest(filtered);
+      times.ingest.push_back(timer.lap());
+      for (std::size_t k = begin; k < begin + kCycles; ++k) method->query(set.motion[k], &answers);
+      times.query.push_back(timer.lap());
+      times.frame.push_back(times.ingest.back() + times.query.back());
+    }
+  }
+  return times;
+}
+
+void print_peers(const DataSet& set, double ours) {
+  const ist::benchmark::BodyFilter filter(set.robot, ist::IngestConfig().self_filter_padding);
+  ist::benchmark::Methods methods;
+#ifdef IST_BENCHMARK_EMBREE
+  add_embree(set.robot, &methods);
+#endif
+#ifdef IST_BENCHMARK_NANOFLANN
+  add_nanoflann(few_spheres(set.robot, kFewSpheres), &methods);
+#endif
+  for (const auto& method : methods) {
+    const std::string name = method->name + "; points in inflated hulls dropped";
+    print(name.c_str(), time_peer(set, filter, method.get()), ours);
+  }
+}
+#endif
+
+// The same points in one row, in random order.
+Frame shuffled(const Frame& frame) {
+  std::vector<std::size_t> order(frame.width * frame.height);
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
+  Frame result = frame;
+  result.width = order.size();
+  result.height = 1;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
+  }
+  return result;
+}
+
+double copy_us(const Frame& frame) {
+  std::vector<float> copy(frame.data.size());
+  std::vector<double> us;
+  ThreadTimer timer;
+  for (int i = 0; i < kRepetitions; ++i) {
+    timer.lap();
+    std::memcpy(copy.data(), frame.data.data(), frame.bytes());
+    us.push_back(timer.lap());
+  }
+  return quantile(us, 0.5);
+}
+
+// Where the robot is when nothing is within the influence distance of it.
+Poses far_above(Poses X_FL) {
+  for (Eigen::Isometry3d& X : X_FL) X.pretranslate(Eigen::Vector3d(0.0, 0.0, 3.0));
+  return X_FL;
+}
+
+// The configuration of the motion of which most nearly half the links are within the influence
+// distance; the number of those.
+std::size_t half_near(const DataSet& set, const Scene& scene, const Robot& robot,
+                      std::size_t* links) {
+  std::size_t best = 0, best_off = std::numeric_limits<std::size_t>::max();
+  Node node(robot);
+  for (std::size_t k = 0; k < set.motion.size(); k += kCycles) {
+    node.ingest(scene.frame, set.motion[k]);
+    node.query(set.motion[k]);
+    const std::size_t near = node.links_within(ist::RepulsionConfig().influence_distance);
+    const std::size_t half = (set.robot.meshes.size() + 1) / 2;
+    const std::size_t off = near > half ? near - half : half - near;
+    if (off >= best_off) continue;
+    best = k;
+    best_off = off;
+    *links = near;
+  }
+  return best;
+}
+
+// [us] Ingest, and the time that the first repulsion takes longer than the second one: thinning.
+double ingest_us(const Robot& robot, const Frame& frame, const Poses& X_FL) {
+  Node node(robot);
+  std::vector<double> us;
+  ThreadTimer timer;
+  for (int i = 0; i <= kRepetitions; ++i) {
+    timer.lap();
+    node.ingest(frame, X_FL);
+    const double ingest = timer.lap();
+    node.query(X_FL);
+    timer.lap();
+    node.repel(X_FL);
+    const double first = timer.lap();
+    node.repel(X_FL);
+    const double second = timer.lap();
+    if (i > 0) us.push_back(ingest + std::max(first - second, 0.0));
+  }
+  return quantile(us, 0.5);
+}
+
+void print_ingest(const DataSet& set, const Robot& robot) {
+  std::printf(
+      "\n# node ingest\n| frame | memcpy | image, robot far away | / memcpy | links near | image | "
+      "/ "
+      "memcpy | list, robot far away | / memcpy | list, links near | / memcpy |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (const Scene& scene : set.scenes) {
+    std::size_t links = 0;
+    const Poses& near = set.motion[half_near(set, scene, robot, &links)];
+    const Frame list = shuffled(scene.frame);
+    const double copy = copy_us(scene.frame);
+    std::printf("| %s | %.0f µs", scene.name.c_str(), copy);
+    const auto cell = [copy](double us) { std::printf(" | %.0f µs | %.1f", us, us / copy); };
+    cell(ingest_us(robot, scene.frame, far_above(near)));
+    std::printf(" | %zu of %zu", links, near.size());
+    cell(ingest_us(robot, scene.frame, near));
+    cell(ingest_us(robot, list, far_above(near)));
+    cell(ingest_us(robot, list, near));
+    std::printf(" |\n");
+  }
+}
+
+// Runs under a profiler that counts within the library's functions.
+void count(const DataSet& set, const Robot& robot, const std::string& what) {
+  const Scene& scene = set.scenes[0];
+  std::size_t links = 0;
+  const Poses& near = set.motion[half_near(set, scene, robot, &links)];
+  Node node(robot);
+  if (what == "frame") {
+    for (std::size_t begin = 0; begin + kCycles <= set.motion.size(); begin += 10 * kCycles) {
+      node.ingest(scene.frame, set.motion[begin]);
+      for (std::size_t k = begin; k < begin + kCycles; ++k) {
+        node.query(set.motion[k]);
+        node.repel(set.motion[k]);
+      }
+    }
+    return;
+  }
+  const Frame frame = what == "list" ? shuffled(scene.frame) : scene.frame;
+  for (int i = 0; i < 10; ++i) node.ingest(frame, near);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "Usage: camera CACHE_FOLDER [--ours | --count ingest|list|frame]\n");
+    return 2;
+  }
+  const auto data = ist::test::data_dir();
+  const DataSet set =
+      data ? ist::benchmark::kinect_data(*data, argv[1]) : ist::benchmark::synthetic_data(argv[1]);
+  if (argc > 3) {
+    count(set, Robot(set, argv[1], false), argv[3]);
+    return 0;
+  }
+  const Robot robot(set, argv[1], true);
+  std::printf(
+      "# camera\n| method | image | 33 cycles: distances | repulsion | penetration | one 30 Hz "
+      "frame, median / p99 | / ours |\n|---|---|---|---|---|---|---|\n");
+  const Times ours = time_ours(set, robot);
+  const double frame = quantile(ours.frame, 0.5);
+  print("**ist_proximity**, the node's defaults", ours, frame);
+#ifdef IST_BENCHMARK_CGAL
+  if (argc == 2) print_peers(set, frame);
+#endif
+  print_ingest(set, robot);
+  return 0;
+}

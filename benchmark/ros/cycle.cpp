@@ -1,0 +1,226 @@
+// The cost of a cycle of the node by its parts, in one process and without a ROS master: the link
+// poses are given, the clouds are ingested as the node does it, and everything is on that is on by
+// default. Printed as a Markdown table; run it on an idle machine.
+//
+// Needs the test data for the Panda: IST_PROXIMITY_DATA, or ../shared/data.
+// Usage: cycle CACHE_FOLDER [--quick] [DOCUMENT]
+
+#include <ist_proximity/ProximityArray.h>
+#include <ros/serialization.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "document.h"
+#include "ist_proximity/contact/contact_model.h"
+#include "ist_proximity/robot/link_poses.h"
+#include "peers/scene.h"
+#include "ros/common/stopwatch.h"
+#include "ros/cycle/proximity_cycle.h"
+#include "ros/output/message_pool.h"
+#include "support.h"
+#include "support/cycle_parts.h"
+#include "support/data_dir.h"
+#include "support/demo_arm.h"
+
+namespace ist::benchmark {
+namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;
+
+constexpr std::size_t kCyclesPerCloud = 33;
+constexpr double kMaxError = 0.005;  // [m] the node's default
+
+// A robot, its motion and what it sees.
+struct Trial {
+  std::string name;
+  std::shared_ptr<const RobotModel> robot;
+  std::vector<LinkGeometry> geometry;  // by link
+  std::vector<Frame> frames;
+  std::vector<Poses> motion;  // 1 ms apart
+};
+
+enum Part { kQuery, kRepulsion, kPenetration, kMessage, kReport, kSerialize, kCycle, kParts };
+constexpr std::array<const char*, kParts> kNames = {
+    "distances", "repulsion", "contact volumes", "message", "report", "serialization", "cycle"};
+
+std::vector<Trial> trials(const std::string& cache, bool quick) {
+  std::vector<Trial> all;
+  const RobotDescription demo = test::demo_robot();
+  const Kinematics kinematics(demo);
+  Trial arm{"demo arm", test::demo_model(), {}, {synthetic_frame(640, 480)}, {}};
+  for (const LinkDescription& link : demo.links) arm.geometry.push_back(link.geometry);
+  std::vector<double> q(kinematics.joints().size(), 0.0);
+  const std::size_t steps = quick ? 200 : 2000;
+  for (std::size_t k = 0; k < steps; ++k) {
+    const double t = 1e-3 * static_cast<double>(k);
+    for (std::size_t j = 0; j < q.size(); ++j) q[j] = 0.4 * std::sin(t + static_cast<double>(j));
+    arm.motion.push_back(link_poses(*arm.robot, kinematics, q).X_FL);
+  }
+  all.push_back(std::move(arm));
+  const auto data = test::data_dir();
+  if (!data) return all;
+  const DataSet panda = kinect_data(*data, cache);
+  for (const Scene& scene : panda.scenes) {
+    Trial trial{"Panda, " + scene.name, panda.robot.pack(kMaxError), {}, {scene.frame}, {}};
+    for (const TriangleMesh& mesh : panda.robot.meshes) {
+      trial.geometry.push_back({{mesh, Eigen::Isometry3d::Identity(), "mesh"}});
+    }
+    trial.motion = panda.motion;
+    all.push_back(std::move(trial));
+  }
+  return all;
+}
+
+std::shared_ptr<const ContactModel> contacts_of(const Trial& trial, const std::string& cache) {
+  auto contacts = std::make_shared<ContactModel>();
+  contacts->robot = trial.robot;
+  for (std::size_t i = 0; i < trial.robot->links.size(); ++i) {
+    contacts->links.push_back(build_contact_geometry(trial.geometry[i], 0, trial.robot->links[i],
+                                                     ContactConfig(), cache));
+  }
+  return contacts;
+}
+
+// [us] By part: the times of all cycles.
+using Times = std::array<std::vector<double>, kParts>;
+
+class CycleBenchmark {
+ public:
+  CycleBenchmark(const Trial& trial, const std::string& cache) : trial_(trial) {
+    auto poses = std::make_unique<test::StatedPoses>();
+    poses_ = poses.get();
+    poses_->set(trial.motion.front());
+    cycle_ = std::make_unique<ProximityCycle>(test::ready_model(trial.robot), ServerConfig(),
+                                              std::move(poses), CloudSelection::Reader::kOnly);
+    auto source = std::make_unique<test::StatedSource>("camera");
+    source_ = source.get();
+    sources_.push_back(std::move(source));
+    live_.query.deadline = 0.0;
+    live_.contacts = contacts_of(trial, cache);
+  }
+
+  void run() {
+    Ingest ingest{IngestConfig()};
+    const std::vector<bool> known(trial_.robot->links.size(), true);
+    std::vector<PosedSolid> solids;
+    for (std::size_t k = 0; k < trial_.motion.size(); ++k) {
+      const Poses& X_FL = trial_.motion[k];
+      if (k % kCyclesPerCloud == 0) {
+        const Frame& frame = trial_.frames[k / kCyclesPerCloud % trial_.frames.size()];
+        solids = posed_solids(*trial_.robot, X_FL, known);
+        ingest.run(frame.raw(), frame.X_FS, solids, now_.toSec(), source_->cloud(now_));
+      }
+      now_ += ros::Duration(0.001);
+      poses_->set(X_FL);
+      step();
+    }
+  }
+
+  const Times& times() const { return times_; }
+  std::size_t near() const { return near_; }
+
+ private:
+  void step() {
+    const auto message = messages_.take();
+    Stopwatch watch;
+    cycle_->run(now_, sources_, live_, "", message.get());
+    const double cycle_us = 1e6 * watch.lap();
+    cycle_->report(*message, &report_);
+    const double report_us = 1e6 * watch.lap();
+    const ros::SerializedMessage bytes = ros::serialization::serializeMessage(*message);
+    const double serialize_us = 1e6 * watch.lap();
+    const std::array<double, kParts> parts = {1e6 * message->query_time,
+                                              1e6 * message->repulsion_time,
+                                              1e6 * message->penetration_time,
+                                              1e6 * message->message_time,
+                                              report_us,
+                                              serialize_us,
+                                              cycle_us + report_us + serialize_us};
+    for (std::size_t i = 0; i < kParts; ++i) times_[i].push_back(parts[i]);
+    for (const auto& link : message->links) {
+      near_ += link.distance < live_.repulsion.influence_distance ? 1 : 0;
+    }
+  }
+
+  const Trial& trial_;
+  test::StatedPoses* poses_ = nullptr;
+  test::StatedSource* source_ = nullptr;
+  CloudSources sources_;
+  std::unique_ptr<ProximityCycle> cycle_;
+  LiveConfig live_;
+  MessagePool<ist_proximity::ProximityArray> messages_;
+  CycleReport report_;
+  ros::Time now_{100.0};
+  Times times_;
+  std::size_t near_ = 0;  // links within the influence distance, over all cycles
+};
+
+std::string text(double us) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, us < 100.0 ? "%.1f µs" : "%.0f µs", us);
+  return buffer;
+}
+
+std::string row(const Trial& trial, const CycleBenchmark& done) {
+  const Times& times = done.times();
+  const auto cycles = static_cast<double>(times[kCycle].size());
+  std::string line = "| " + trial.name;
+  char near[32];
+  std::snprintf(near, sizeof near, " | %.1f of %zu", static_cast<double>(done.near()) / cycles,
+                trial.robot->links.size());
+  line += near;
+  for (std::size_t i = 0; i < kParts; ++i) {
+    line += " | " + text(quantile(times[i], 0.5)) + " / " + text(quantile(times[i], 0.99));
+  }
+  char ratio[64];
+  std::snprintf(ratio, sizeof ratio, " | %.2f / %.2f |\n",
+                quantile(times[kCycle], 0.5) / quantile(times[kQuery], 0.5),
+                quantile(times[kCycle], 0.99) / quantile(times[kQuery], 0.99));
+  return line + ratio;
+}
+
+int run(const std::string& cache, bool quick, const std::string& document) {
+  ros::Time::init();
+  std::string table = "| scene | links within the influence distance";
+  std::string line = "|---|---";
+  for (const char* name : kNames) {
+    table += std::string(" | ") + name;
+    line += "|---";
+  }
+  table += " | cycle / distances |\n" + line + "|---|\n";
+  std::printf("%s", table.c_str());
+  for (const Trial& trial : trials(cache, quick)) {
+    CycleBenchmark benchmark(trial, cache);
+    benchmark.run();
+    const std::string one = row(trial, benchmark);
+    std::printf("%s", one.c_str());
+    std::fflush(stdout);
+    table += one;
+  }
+  return document.empty() || write_table(document, "benchmark cycle", table) ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace ist::benchmark
+
+int main(int argc, char** argv) {
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  bool quick = false;
+  for (auto it = arguments.begin(); it != arguments.end(); ++it) {
+    if (*it != "--quick") continue;
+    quick = true;
+    arguments.erase(it);
+    break;
+  }
+  if (arguments.empty() || arguments.size() > 2) {
+    std::fprintf(stderr, "Usage: cycle CACHE_FOLDER [--quick] [DOCUMENT]\n");
+    return 2;
+  }
+  return ist::benchmark::run(arguments[0], quick, arguments.size() > 1 ? arguments[1] : "");
+}

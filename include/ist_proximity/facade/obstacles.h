@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/geometry/span.h"
+
+namespace ist {
+
+class Robot;
+
+/// The choice of the points that become obstacles.
+struct ObstaclesConfig {
+  /// Frame S of the points -> fixed frame; rigid.
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  double min_range = 0.0;  ///< [m] >= 0: points nearer to the origin of S are dropped
+  /// [m] > min_range: points farther from the origin of S are dropped
+  double max_range = std::numeric_limits<double>::infinity();
+  /// Self-filter: points on this robot at configuration `q` are dropped. Null: none.
+  const Robot* robot = nullptr;
+  std::vector<double> q;              ///< [rad, m] in the order of Robot::joints()
+  double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
+};
+
+/// Obstacle points, indexed for queries. Points that are not finite are dropped.
+/// Immutable, cheap to copy (copies share the index), thread safe.
+class Obstacles {
+ public:
+  /// A list of points [m] in frame S.
+  /// @throws std::invalid_argument when a setting is out of its range, or there are more than
+  ///         five million points
+  explicit Obstacles(Span<const Eigen::Vector3f> points, const ObstaclesConfig& config = {});
+  /// The same in double.
+  explicit Obstacles(Span<const Eigen::Vector3d> points, const ObstaclesConfig& config = {});
+
+  /// An image of points, NaN where nothing was measured: indexed several times faster than a list.
+  /// @param xyz     [m] in S, row by row: height * width * 3 numbers
+  /// @param width   points in a row
+  /// @param height  rows
+  static Obstacles from_image(const float* xyz, std::size_t width, std::size_t height,
+                              const ObstaclesConfig& config = {});
+  /// The same in double.
+  static Obstacles from_image(const double* xyz, std::size_t width, std::size_t height,
+                              const ObstaclesConfig& config = {});
+
+  /// The points of a PCD or PLY file, by its extension (read_points).
+  /// @throws ModelError when the file cannot be read
+  static Obstacles from_file(const std::string& path, const ObstaclesConfig& config = {});
+
+  std::size_t size() const { return snapshot_->counts.used; }  ///< points used
+  /// Numbers of points by what was done with them.
+  const IngestCounts& counts() const { return snapshot_->counts; }
+  const CloudSnapshot& snapshot() const { return *snapshot_; }  ///< what queries take
+
+ private:
+  explicit Obstacles(std::shared_ptr<const CloudSnapshot> snapshot);
+
+  std::shared_ptr<const CloudSnapshot> snapshot_;  // not null
+};
+
+/// Points of a file.
+struct PointFile {
+  std::vector<Eigen::Vector3d> points;  ///< [m] in the file's frame, NaN where nothing was measured
+  std::size_t width = 0;                ///< points in a row
+  std::size_t height = 0;               ///< rows; 1: a list
+};
+
+/// Reads the points of a PCD file (ascii, binary, binary_compressed) or of a PLY file's element
+/// "vertex" (ascii, binary of either byte order); other fields are ignored. Thread safe.
+/// @throws ModelError naming the file, the place and what is wrong: not a regular file, over 1 GB,
+///         cut off, no x, y and z, more than five million points
+PointFile read_points(const std::string& path);
+
+}  // namespace ist

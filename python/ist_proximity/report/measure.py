@@ -1,0 +1,175 @@
+"""What a report measures, with a robot and a scene on this machine."""
+
+import dataclasses
+import os
+
+import numpy as np
+
+import ist_proximity as ist
+
+PIECES = 8  # pieces of motion
+STEPS = 330  # steps of a piece; at 1 kHz ten images of a camera
+SPEED = 1.0  # [rad/s, m/s] of the fastest joint
+PER_CLOUD = 33  # cycles for each image
+DEADLINES = (0.1, 0.25, 0.5, 1.0, 2.0)  # as shares of the median query
+
+
+@dataclasses.dataclass
+class Cost:
+    """Times [s] of cycles along the motion, with one setting."""
+
+    max_error: float  # [m]
+    tolerance: float  # [m]
+    query: np.ndarray
+    repulsion: np.ndarray
+    width: np.ndarray  # [m]
+    unknown: np.ndarray
+
+    @property
+    def cycle(self):
+        return self.query + self.repulsion
+
+
+@dataclasses.dataclass
+class Report:
+    """Everything that the page shows."""
+
+    robot: object
+    scene: object
+    obstacles: object
+    warnings: list
+    packing: list  # one dictionary for each link
+    packing_time: float  # [s]
+    costs: list  # of Cost, by packing and tolerance
+    deadlines: list  # (share, deadline [s], mean width [m], share of steps with all links known)
+    ingest: np.ndarray  # [s]
+    memory: dict  # [bytes] by what
+    answer: object  # Distances at the scene's configuration
+    q: np.ndarray
+
+
+def resident_memory():
+    """[bytes] of this process."""
+    with open('/proc/self/statm', encoding='ascii') as file:
+        return int(file.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+
+
+def configuration(robot, positions):
+    """(joints,) of the positions that are known; 0, or the nearest limit, for the others."""
+    q = np.array([positions.get(name, 0.0) for name in robot.joints], float)
+    return np.clip(q, robot.lower_limits, robot.upper_limits)
+
+
+def motion(robot, q, seed=0):
+    """(n, joints): pieces of motion at 1 kHz within the joints' limits; the first begins at q."""
+    rng = np.random.default_rng(seed)
+    low = np.maximum(robot.lower_limits, -np.pi)
+    high = np.minimum(robot.upper_limits, np.pi)
+    pieces = []
+    for piece in range(PIECES):
+        begin = q if piece == 0 else rng.uniform(low, high)
+        way = rng.uniform(low, high) - begin
+        way *= SPEED / max(np.abs(way).max(initial=0.0), 1e-9)
+        steps = begin + np.arange(STEPS)[:, None] * 1e-3 * way
+        pieces.append(np.clip(steps, robot.lower_limits, robot.upper_limits))
+    return np.vstack(pieces)
+
+
+def warn_about(robot, packing, counts):
+    """Sentences about links and points that a user should look at."""
+    warnings = []
+    for link, more in zip(robot.packing, packing):
+        name = link['link']
+        if link['error']:
+            warnings.append(f'{name} cannot be used and is UNKNOWN: {link["error"]}')
+            continue
+        share = more['filled_volume'] / max(more['solid_volume'], 1e-12)
+        box = np.ptp(link['centers'], axis=0) if len(link['centers']) else np.zeros(3)
+        if more['solid_volume'] < 0.02 * box.prod():
+            warnings.append(f'{name} looks like a hollow shell: its mesh has only '
+                            f'{1e6 * more["solid_volume"]:.1f} cm³ of volume. Distances are right, '
+                            'but points inside the housing count as outside, and contact volumes '
+                            'mean little. Use a closed collision mesh.')
+        elif share < 0.5:
+            warnings.append(f'{name} is filled to {share:.0%} only; contact volumes are coarse.')
+        if more['open_edges'] > 0:
+            warnings.append(f'{name} has {more["open_edges"]} open edges: inside is where the '
+                            'winding number exceeds 0.5, and queries in contact take longer.')
+    if robot.links_without_geometry:
+        warnings.append('Links without geometry are not monitored: ' +
+                        ', '.join(robot.links_without_geometry) + '.')
+    received = max(counts['received'], 1)
+    if counts['on_robot'] > 0.3 * received:
+        warnings.append(f'{counts["on_robot"] / received:.0%} of the points are on the robot; if '
+                        'that is more than the camera sees of it, its pose or the joints are wrong.')
+    if counts['used'] == 0:
+        warnings.append('No point is left as an obstacle: '
+                        + ', '.join(f'{count} {name}' for name, count in counts.items()) + '.')
+    return warnings
+
+
+def measure_deadlines(robot, steps, scenes, tolerance, median):
+    """Widths of the bounds for deadlines of several shares of the median query."""
+    rows = []
+    for share in DEADLINES:
+        deadline = max(share * median, 1e-6)
+        cost = robot.cycle_cost(steps, scenes, tolerance=tolerance, deadline=deadline,
+                                per_cloud=PER_CLOUD)
+        rows.append((share, deadline, cost['width'].mean(), (cost['unknown'] == 0).mean()))
+    return rows
+
+
+def run(make_robot, scene, max_errors, tolerances, padding, tell):
+    """Measures everything.
+
+    make_robot(max_error, progress, warning): a Robot. max_errors, tolerances: [m], the first of
+    each is the one that is used. tell(text, share): shows progress.
+    """
+    warnings, before = [], resident_memory()
+    robots = {}
+    for number, max_error in enumerate(max_errors):
+        text = f'packing to {1e3 * max_error:g} mm'
+        robots[max_error] = make_robot(
+            max_error, lambda share, text=text, number=number: tell(
+                text, 0.5 * (number + share) / len(max_errors)),
+            warnings.append if number == 0 else None)
+    robot = robots[max_errors[0]]
+    model_bytes = resident_memory() - before
+    q = configuration(robot, scene.positions)
+    keywords = {'sensor_pose': scene.sensor_pose, 'max_range': 3.0}
+    if scene.positions:
+        keywords.update(robot=robot, q=q, self_filter_padding=padding)
+
+    tell('reading the scene', 0.52)
+    before = resident_memory()
+    scenes = [ist.Obstacles(scene.points, **keywords) for _ in range(2)]
+    cloud_bytes = (resident_memory() - before) // 2
+    ingest = np.array([ist.Obstacles(scene.points, **keywords).ingest_time for _ in range(10)])
+
+    steps = motion(robot, q)
+    costs = []
+    for max_error in max_errors:
+        for tolerance in tolerances:
+            share = 0.55 + 0.3 * len(costs) / (len(max_errors) * len(tolerances))
+            tell(f'measuring {1e3 * max_error:g} mm, tolerance {1e3 * tolerance:g} mm', share)
+            result = robots[max_error].cycle_cost(steps, scenes, tolerance=tolerance,
+                                                  per_cloud=PER_CLOUD)
+            costs.append(Cost(max_error, tolerance, result['query'], result['repulsion'],
+                              result['width'], result['unknown']))
+    tell('measuring deadlines', 0.88)
+    median = float(np.median(costs[0].query))
+    deadlines = measure_deadlines(robot, steps, scenes, tolerances[0], median)
+    tell('measuring the packing', 0.95)
+    packing = robot.measure_packing()
+    warnings += warn_about(robot, packing, scenes[0].counts)
+    memory = {'robots of this report (all packings)': model_bytes, 'one indexed cloud': cloud_bytes}
+    packing_time = sum(link['packing_time'] for link in robot.packing)
+    return Report(robot, scene, scenes[0], warnings, packing, packing_time, costs, deadlines, ingest,
+                  memory, robot.distances(q, scenes[0]), q)
+
+
+def recommend(costs, rate, error):
+    """The setting with the least 99th percentile among those whose bounds are as wide as wanted."""
+    fitting = [cost for cost in costs if cost.tolerance <= error] or costs
+    best = min(fitting, key=lambda cost: np.percentile(cost.cycle, 99))
+    return best, 0.5 / rate

@@ -1,0 +1,196 @@
+// The PLY format: http://paulbourke.net/dataformats/ply/
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "internal/geometry/limits.h"
+#include "ist_proximity/cloud/ingest.h"
+#include "number_format.h"
+#include "point_file.h"
+#include "text_scanner.h"
+
+namespace ist {
+namespace {
+
+struct Property {
+  std::string name;
+  bool is_list = false;
+  NumberFormat length;  // of a list
+  NumberFormat value;
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct Header {
+  std::string encoding;
+  std::vector<Element> elements;
+};
+
+bool parse_format(const std::string& name, NumberFormat* format) {
+  using Kind = NumberFormat::Kind;
+  static const std::map<std::string, NumberFormat> kFormats = {
+      {"char", {Kind::kSigned, 1, false}},     {"int8", {Kind::kSigned, 1, false}},
+      {"uchar", {Kind::kUnsigned, 1, false}},  {"uint8", {Kind::kUnsigned, 1, false}},
+      {"short", {Kind::kSigned, 2, false}},    {"int16", {Kind::kSigned, 2, false}},
+      {"ushort", {Kind::kUnsigned, 2, false}}, {"uint16", {Kind::kUnsigned, 2, false}},
+      {"int", {Kind::kSigned, 4, false}},      {"int32", {Kind::kSigned, 4, false}},
+      {"uint", {Kind::kUnsigned, 4, false}},   {"uint32", {Kind::kUnsigned, 4, false}},
+      {"float", {Kind::kFloat, 4, false}},     {"float32", {Kind::kFloat, 4, false}},
+      {"double", {Kind::kFloat, 8, false}},    {"float64", {Kind::kFloat, 8, false}}};
+  const auto found = kFormats.find(name);
+  if (found == kFormats.end()) return false;
+  *format = found->second;
+  return true;
+}
+
+std::string read_property(const std::vector<std::string>& words, Header* header) {
+  Property property;
+  property.is_list = words.size() == 5 && words[1] == "list";
+  const std::size_t last = words.size() - 1;
+  bool is_known = !header->elements.empty() && (property.is_list || words.size() == 3);
+  if (property.is_list) is_known = is_known && parse_format(words[2], &property.length);
+  is_known = is_known && parse_format(words[last - 1], &property.value);
+  if (!is_known) return "has a line 'property' that is not understood";
+  property.name = words[last];
+  header->elements.back().properties.push_back(property);
+  return "";
+}
+
+std::string read_header(TextScanner* in, Header* header) {
+  const std::vector<std::string> magic = in->at_end() ? std::vector<std::string>() : in->words();
+  if (magic.size() != 1 || magic[0] != "ply") return "is no PLY file: its first line is not 'ply'";
+  while (!in->at_end()) {
+    const std::vector<std::string> words = in->words();
+    if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
+    if (words[0] == "end_header") return "";
+    std::string problem;
+    if (words[0] == "format" && words.size() == 3) {
+      header->encoding = words[1];
+    } else if (words[0] == "element" && words.size() == 3) {
+      Element element{words[1], 0, {}};
+      if (!parse_count(words[2], 1000000000, &element.count)) problem = "has a wrong 'element'";
+      header->elements.push_back(element);
+    } else if (words[0] == "property") {
+      problem = read_property(words, header);
+    } else {
+      problem = "has a line '" + printable(words[0]) + "' that is not understood";
+    }
+    if (!problem.empty()) return problem;
+  }
+  return "ends before its line 'end_header'";
+}
+
+/// Reads the numbers of a file one after the other.
+class NumberReader {
+ public:
+  NumberReader(const std::string& bytes, TextScanner in, const std::string& encoding)
+      : bytes_(bytes),
+        in_(in),
+        at_(in.at()),
+        is_ascii_(encoding == "ascii"),
+        is_big_endian_(encoding == "binary_big_endian") {}
+
+  bool read(NumberFormat format, double* value) {
+    if (is_ascii_) return in_.number(value);
+    if (bytes_.size() - at_ < format.size) return false;
+    format.is_big_endian = is_big_endian_;
+    *value = format.read(bytes_.data() + at_);
+    at_ += format.size;
+    return true;
+  }
+
+ private:
+  const std::string& bytes_;
+  TextScanner in_;
+  std::size_t at_;
+  bool is_ascii_, is_big_endian_;
+};
+
+/// The properties x, y and z of an element; -1 where it has none.
+std::array<int, 3> coordinates(const Element& element) {
+  std::array<int, 3> xyz = {-1, -1, -1};
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const Property& property = element.properties[i];
+    if (property.is_list || property.name.size() != 1) continue;
+    const int k = property.name[0] - 'x';
+    if (k >= 0 && k < 3) xyz[static_cast<std::size_t>(k)] = static_cast<int>(i);
+  }
+  return xyz;
+}
+
+/// Reads one instance of an element.
+/// @param values  one for each property; a list leaves 0
+bool read_instance(const Element& element, NumberReader* in, std::vector<double>* values) {
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const Property& property = element.properties[i];
+    double value = 0.0;
+    if (!property.is_list) {
+      if (!in->read(property.value, &value)) return false;
+      (*values)[i] = value;
+      continue;
+    }
+    double length = 0.0;
+    if (!in->read(property.length, &length)) return false;
+    for (double k = 0.0; k < length; ++k) {
+      if (!in->read(property.value, &value)) return false;
+    }
+  }
+  return true;
+}
+
+std::string read_vertices(const Element& element, NumberReader* in, PointFile* file) {
+  const std::array<int, 3> xyz = coordinates(element);
+  if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0) return "has vertices without x, y and z";
+  const std::size_t most = IngestConfig().max_points;
+  if (element.count > most) {
+    return "has " + std::to_string(element.count) + " vertices; at most " + std::to_string(most) +
+           " are read";
+  }
+  std::vector<double> values(element.properties.size());
+  for (std::size_t i = 0; i < element.count; ++i) {
+    if (!read_instance(element, in, &values)) {
+      return "is cut off or damaged in vertex " + std::to_string(i) + " of " +
+             std::to_string(element.count);
+    }
+    file->points.emplace_back(values[static_cast<std::size_t>(xyz[0])],
+                              values[static_cast<std::size_t>(xyz[1])],
+                              values[static_cast<std::size_t>(xyz[2])]);
+  }
+  file->width = element.count;
+  file->height = 1;
+  return "";
+}
+
+}  // namespace
+
+std::string parse_ply(const std::string& bytes, PointFile* file) {
+  TextScanner in(bytes);
+  Header header;
+  const std::string problem = read_header(&in, &header);
+  if (!problem.empty()) return problem;
+  if (header.encoding != "ascii" && header.encoding != "binary_little_endian" &&
+      header.encoding != "binary_big_endian") {
+    return "has the format '" + printable(header.encoding) + "', which is not read";
+  }
+  NumberReader numbers(bytes, in, header.encoding);
+  for (const Element& element : header.elements) {
+    if (element.name == "vertex") return read_vertices(element, &numbers, file);
+    if (element.properties.empty()) continue;
+    std::vector<double> values(element.properties.size());
+    for (std::size_t i = 0; i < element.count; ++i) {
+      if (!read_instance(element, &numbers, &values)) {
+        return "is cut off or damaged in its element '" + printable(element.name) + "'";
+      }
+    }
+  }
+  return "has no element 'vertex'";
+}
+
+}  // namespace ist

@@ -1,0 +1,36 @@
+#include "point_file.h"
+
+#include <cctype>
+
+#include "internal/geometry/limits.h"
+#include "internal/geometry/regular_file.h"
+#include "ist_proximity/geometry/error.h"
+
+namespace ist {
+namespace {
+
+bool ends_in(const std::string& path, const std::string& extension) {
+  if (path.size() < extension.size()) return false;
+  std::string end = path.substr(path.size() - extension.size());
+  for (char& c : end) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return end == extension;
+}
+
+}  // namespace
+
+PointFile read_points(const std::string& path) {
+  const bool is_pcd = ends_in(path, ".pcd");
+  std::string problem;
+  PointFile file;
+  if (!is_pcd && !ends_in(path, ".ply")) {
+    problem = "has an extension that is not read; .pcd and .ply are";
+  } else {
+    std::string bytes;
+    problem = read_regular_file(path, kMaxPointFileSize, &bytes);
+    if (problem.empty()) problem = is_pcd ? parse_pcd(bytes, &file) : parse_ply(bytes, &file);
+  }
+  if (!problem.empty()) throw ModelError("point file '" + printable(path) + "' " + problem);
+  return file;
+}
+
+}  // namespace ist

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "ist_proximity/facade/obstacles.h"
+
+namespace ist {
+
+/// The largest file of points that is read [bytes].
+constexpr std::size_t kMaxPointFileSize = std::size_t{1} << 30U;
+
+/// Parses the bytes of a PCD file (version 0.5 to 0.7).
+/// @returns an empty string, or what is wrong: a part of a sentence that begins with the file
+std::string parse_pcd(const std::string& bytes, PointFile* file);
+
+/// Parses the bytes of a PLY file (version 1.0).
+/// @returns as parse_pcd()
+std::string parse_ply(const std::string& bytes, PointFile* file);
+
+}  // namespace ist

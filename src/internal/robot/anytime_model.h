@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/packing/packing.h"
+#include "ist_proximity/robot/robot_description.h"
+#include "ist_proximity/robot/robot_model.h"
+
+namespace ist {
+
+/// A robot model on its way from coarse packings to fine ones, by an anytime algorithm (Dean and
+/// Boddy 1988): it can be used after every step. The certificate of a packing holds at every stage,
+/// so answers are right from the first stage on; queries of coarse packings measure more points
+/// exactly and cost more.
+///
+/// Immutable. Each step gives a new model, which shares what has not changed: links keep their
+/// place and their exact geometry, and all but the packed link keep their packing_id. Thread safe.
+class AnytimeModel {
+ public:
+  using Ptr = std::shared_ptr<const AnytimeModel>;
+
+  AnytimeModel();  ///< empty; build() makes one to use
+  AnytimeModel(const AnytimeModel& other);
+  AnytimeModel& operator=(const AnytimeModel&) = delete;
+  ~AnytimeModel();
+
+  /// The stage that shapes are packed to.
+  enum class Stage {
+    kFirst,  ///< a few dozen spheres a shape, unless its final packing is in the cache
+    kFinal,  ///< config.packing
+  };
+
+  /// Packs every monitored link to a stage, equal shapes once, on config.threads threads.
+  /// @param description  not null
+  /// @returns null when cancelled
+  /// @throws ModelError when the packing configuration is out of range
+  static Ptr build(std::shared_ptr<const RobotDescription> description,
+                   const RobotModelConfig& config, Stage stage,
+                   const RobotModelCallbacks& callbacks = {});
+
+  /// Packs the shapes of one link to their next stage, in the calling thread. Other links of the
+  /// same shapes get the packing too. A shape that cannot be packed more finely, for want of memory
+  /// for example, keeps its packing for good, with a warning.
+  /// @param link  index in robot(), not final
+  /// @returns null when cancelled
+  Ptr refined(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
+
+  /// The same model with the packings of another one where those are finer.
+  Ptr with_packings_of(const AnytimeModel& other) const;
+
+  /// The model of a description that differs in one link. Shapes that are not known yet are packed
+  /// to the final stage, the others stay as they are.
+  /// @param link    without geometry it is left out, unless `config.links` names it
+  /// @param config  differs in `links` only
+  /// @returns null when cancelled
+  Ptr with_link(std::shared_ptr<const RobotDescription> description, const std::string& link,
+                const RobotModelConfig& config, const RobotModelCallbacks& callbacks = {}) const;
+
+  const std::shared_ptr<const RobotModel>& robot() const { return robot_; }
+  const RobotDescription& description() const { return *description_; }
+
+ private:
+  /// The packing of a shape, as fine as it has got.
+  struct ShapePacking {
+    Packing packing;
+    bool is_final = true, from_cache = false;
+    bool fell_short = false;  ///< see PackingJob
+    double time = 0.0;        ///< [s] of all stages
+    std::string error;        ///< why there is no packing
+  };
+  struct Link;
+  class Step;
+
+  std::shared_ptr<const RobotDescription> description_;
+  RobotModelConfig config_;
+  std::vector<Link> links_;
+  std::map<std::string, std::shared_ptr<const ShapePacking>> shapes_;  ///< by key
+  std::shared_ptr<const RobotModel> robot_;
+};
+
+}  // namespace ist

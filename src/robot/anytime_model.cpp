@@ -1,0 +1,369 @@
+#include "internal/robot/anytime_model.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <mutex>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "internal/bvh/build_id.h"
+#include "internal/geometry/cancelled.h"
+#include "internal/geometry/solid_queries.h"
+#include "internal/packing/packing_cache.h"
+#include "internal/robot/link_packing.h"
+#include "ist_proximity/geometry/error.h"
+#include "monitored_links.h"
+#include "packing_jobs.h"
+#include "packing_stages.h"
+
+namespace ist {
+namespace {
+
+void check_config(const PackingConfig& config) {
+  std::ostringstream text;
+  if (!std::isfinite(config.max_error) || config.max_error <= 0.0) {
+    text << "packing/max_error is " << config.max_error << " m; it must be > 0";
+  } else if (config.max_spheres < 1) {
+    text << "packing/max_spheres is " << config.max_spheres << "; it must be at least 1";
+  }
+  if (!text.str().empty()) throw ModelError(text.str());
+}
+
+std::string millimetres(double metres) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.2f mm", 1e3 * metres);
+  return text;
+}
+
+// Calls function(i) for i < count on several threads. The first exception comes out.
+template <typename Function>
+void for_each_in_parallel(std::size_t count, int threads, const Function& function) {
+  std::atomic<std::size_t> next{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::size_t i; (i = next++) < count;) {
+      try {
+        function(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (!failure) failure = std::current_exception();
+        next = count;
+      }
+    }
+  };
+  std::vector<std::thread> others;
+  try {
+    while (others.size() + 1 < std::min(count, thread_count(threads))) others.emplace_back(work);
+  } catch (const std::system_error&) {
+    // The system has no more threads; fewer do the same.
+  }
+  work();
+  for (std::thread& thread : others) thread.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace
+
+/// A monitored link, its place in the model being its index.
+struct AnytimeModel::Link : MonitoredLink {
+  std::vector<std::string> keys;       ///< of the shapes, by element
+  std::vector<PackingConfig> configs;  ///< of their final stage, by element
+};
+
+AnytimeModel::AnytimeModel() = default;
+AnytimeModel::AnytimeModel(const AnytimeModel& other) = default;
+AnytimeModel::~AnytimeModel() = default;
+
+/// One step from a model to the next.
+class AnytimeModel::Step {
+ public:
+  Step(std::shared_ptr<AnytimeModel> model, RobotModelCallbacks callbacks)
+      : model_(std::move(model)), callbacks_(std::move(callbacks)) {}
+
+  // Callbacks are called one at a time.
+  bool is_cancelled() const {
+    const std::lock_guard<std::mutex> lock(cancel_mutex_);
+    return callbacks_.cancelled && callbacks_.cancelled();
+  }
+
+  void choose_links();
+  void forget_unused_shapes();
+  void add_unknown_shapes(Stage stage);
+  void add_shapes_to_refine(std::size_t link);
+  bool pack(int threads);
+  /// @param before   supplies the links that are the same; may be null
+  /// @param changed  the link whose geometry may differ from `before`
+  /// @returns null when cancelled
+  Ptr finish(const RobotModel* before, const std::string* changed);
+
+  void touch(const std::string& key) { touched_.insert(key); }
+
+ private:
+  void add_job(const Link& link, std::size_t element, const PackingConfig& stage);
+  void take(PackingJob* job);
+  LinkModel assemble(const Link& link, const LinkModel* before, bool same_geometry) const;
+  bool is_touched(const Link& link) const;
+  void warn(const RobotModel& robot) const;
+
+  const std::shared_ptr<AnytimeModel> model_;
+  const RobotModelCallbacks callbacks_;
+  mutable std::mutex cancel_mutex_;
+  std::vector<PackingJob> jobs_;
+  std::set<std::string> touched_;  ///< keys of shapes that have another packing than before
+};
+
+void AnytimeModel::Step::choose_links() {
+  model_->links_.clear();
+  for (MonitoredLink& chosen : select_links(*model_->description_, model_->config_.links)) {
+    Link link;
+    static_cast<MonitoredLink&>(link) = std::move(chosen);
+    if (link.error.empty()) {
+      const LinkGeometry& geometry = link.description->geometry;
+      link.configs = link_configs(geometry, link.description->attached, model_->config_.packing);
+      for (std::size_t e = 0; e < geometry.size(); ++e) {
+        link.keys.push_back(packing_key(geometry[e].shape, link.configs[e]));
+      }
+    }
+    model_->links_.push_back(std::move(link));
+  }
+}
+
+// Packings of objects that are detached again are not kept.
+void AnytimeModel::Step::forget_unused_shapes() {
+  std::set<std::string> used;
+  for (const Link& link : model_->links_) used.insert(link.keys.begin(), link.keys.end());
+  for (auto shape = model_->shapes_.begin(); shape != model_->shapes_.end();) {
+    shape = used.count(shape->first) > 0 ? std::next(shape) : model_->shapes_.erase(shape);
+  }
+}
+
+void AnytimeModel::Step::add_job(const Link& link, std::size_t element,
+                                 const PackingConfig& stage) {
+  PackingJob job;
+  job.key = link.keys[element];
+  if (!touched_.insert(job.key).second) return;
+  job.shape = &link.description->geometry[element].shape;
+  job.config = link.configs[element];
+  job.stage = stage;
+  job.link = static_cast<std::size_t>(&link - model_->links_.data());
+  job.work = packing_work(*job.shape);
+  jobs_.push_back(std::move(job));
+}
+
+// One job for each distinct shape and configuration: two equal fingers are packed once.
+void AnytimeModel::Step::add_unknown_shapes(Stage stage) {
+  for (const Link& link : model_->links_) {
+    for (std::size_t e = 0; e < link.keys.size(); ++e) {
+      if (model_->shapes_.count(link.keys[e]) > 0) continue;
+      const Shape& shape = link.description->geometry[e].shape;
+      add_job(link, e,
+              stage == Stage::kFirst ? first_stage(shape, link.configs[e]) : link.configs[e]);
+    }
+  }
+}
+
+void AnytimeModel::Step::add_shapes_to_refine(std::size_t index) {
+  const Link& link = model_->links_[index];
+  for (std::size_t e = 0; e < link.keys.size(); ++e) {
+    const ShapePacking& known = *model_->shapes_.at(link.keys[e]);
+    if (known.is_final) continue;
+    add_job(link, e,
+            known.fell_short ? link.configs[e] : next_stage(known.packing, link.configs[e]));
+  }
+  for (PackingJob& job : jobs_) job.look_in_cache = false;  // the first stage has looked
+}
+
+// False when cancelled.
+bool AnytimeModel::Step::pack(int threads) {
+  const PackingCache cache(model_->config_.cache_directory);
+  const auto report = [&](const PackingJob& job, double fraction) {
+    if (is_cancelled()) return false;
+    if (callbacks_.progress) {
+      callbacks_.progress(
+          {model_->links_[job.link].name, job.link, model_->links_.size(), fraction});
+    }
+    return true;
+  };
+  if (is_cancelled() || !PackingJobs(&jobs_, cache, report).run(threads)) return false;
+  for (PackingJob& job : jobs_) take(&job);
+  return true;
+}
+
+void AnytimeModel::Step::take(PackingJob* job) {
+  auto shape = std::make_shared<ShapePacking>();
+  std::shared_ptr<const ShapePacking>& known = model_->shapes_[job->key];
+  if (known && !job->error.empty()) {
+    *shape = *known;
+    shape->is_final = true;
+    if (callbacks_.warning) {
+      callbacks_.warning("link '" + model_->links_[job->link].name +
+                         "' cannot be packed more finely: " + job->error);
+    }
+  } else {
+    shape->packing = std::move(job->packing);
+    shape->is_final = job->is_final || !job->error.empty();
+    shape->fell_short = job->fell_short;
+    shape->from_cache = job->from_cache;
+    shape->time = job->time + (known ? known->time : 0.0);
+    shape->error = job->error;
+  }
+  known = std::move(shape);
+}
+
+bool AnytimeModel::Step::is_touched(const Link& link) const {
+  return std::any_of(link.keys.begin(), link.keys.end(),
+                     [&](const std::string& key) { return touched_.count(key) > 0; });
+}
+
+LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before,
+                                       bool same_geometry) const {
+  LinkModel model;
+  model.name = link.name;
+  model.error = link.error;
+  if (!model.error.empty()) return model;
+  const LinkGeometry& geometry = link.description->geometry;
+  std::vector<const Packing*> packings;
+  model.from_cache = true;
+  for (std::size_t e = 0; e < geometry.size(); ++e) {
+    const ShapePacking& shape = *model_->shapes_.at(link.keys[e]);
+    if (!shape.error.empty()) {
+      model.error = "link '" + link.name + "', element " + std::to_string(e + 1) + " (" +
+                    geometry[e].source + ") cannot be packed: " + shape.error;
+      model.from_cache = false;
+      return model;
+    }
+    packings.push_back(&shape.packing);
+    model.from_cache = model.from_cache && shape.from_cache;
+    model.is_final = model.is_final && shape.is_final;
+    model.packing_time += shape.time;
+  }
+  const auto cancelled = [this] { return is_cancelled(); };
+  model.packing = combine(geometry, packings);
+  model.tree = InnerSphereTree(model.packing, model_->config_.tree);
+  model.packing_id = next_build_id();
+  throw_if(cancelled);
+  model.solid =
+      before != nullptr && same_geometry ? before->solid : make_solid(geometry, cancelled);
+  return model;
+}
+
+AnytimeModel::Ptr AnytimeModel::Step::finish(const RobotModel* before, const std::string* changed) {
+  const auto robot = std::make_shared<RobotModel>();
+  robot->name = model_->description_->name;
+  robot->root_link = model_->description_->root_link;
+  robot->geometry_id =
+      before != nullptr && changed == nullptr ? before->geometry_id : next_build_id();
+  robot->links.resize(model_->links_.size());
+  const auto one = [&](std::size_t i) {
+    const Link& link = model_->links_[i];
+    const LinkModel* same = nullptr;
+    if (before != nullptr) {
+      const auto found =
+          std::find_if(before->links.begin(), before->links.end(),
+                       [&](const LinkModel& other) { return other.name == link.name; });
+      if (found != before->links.end()) same = &*found;
+    }
+    const bool same_geometry = changed == nullptr || link.name != *changed;
+    robot->links[i] = same != nullptr && same_geometry && !is_touched(link)
+                          ? *same
+                          : assemble(link, same, same_geometry);
+  };
+  try {
+    for_each_in_parallel(robot->links.size(), before != nullptr ? 1 : model_->config_.threads, one);
+  } catch (const Cancelled&) {
+    return nullptr;
+  }
+  warn(*robot);
+  model_->robot_ = robot;
+  return model_;
+}
+
+void AnytimeModel::Step::warn(const RobotModel& robot) const {
+  if (!callbacks_.warning) return;
+  for (const PackingJob& job : jobs_) {
+    if (!job.load_warning.empty()) {
+      callbacks_.warning(job.load_warning + "; the link is packed again");
+    }
+  }
+  // A full or read-only disk says the same for every shape.
+  const auto refused = std::find_if(
+      jobs_.begin(), jobs_.end(), [](const PackingJob& job) { return !job.store_warning.empty(); });
+  if (refused != jobs_.end()) callbacks_.warning(refused->store_warning);
+  for (std::size_t l = 0; l < model_->links_.size(); ++l) {
+    const LinkModel& link = robot.links[l];
+    if (!link.usable() || !is_touched(model_->links_[l])) continue;
+    const bool is_new = model_->robot_ == nullptr;
+    if (is_new && model_->links_[l].description->used_visual_fallback) {
+      callbacks_.warning("link '" + link.name +
+                         "' has no collision geometry in the URDF; its visual geometry is used "
+                         "instead");
+    }
+    if (link.is_final && !link.packing.certificate.reached) {
+      const PackingConfig& wanted = model_->config_.packing;
+      callbacks_.warning(
+          "link '" + link.name + "' is packed with " + std::to_string(link.packing.spheres.size()) +
+          " spheres to an error of " + millimetres(link.packing.certificate.max_gap) +
+          " instead of " + millimetres(wanted.max_error) + ": packing/max_spheres (" +
+          std::to_string(wanted.max_spheres) + ") was reached first; raise it, or max_error");
+    }
+  }
+}
+
+AnytimeModel::Ptr AnytimeModel::build(std::shared_ptr<const RobotDescription> description,
+                                      const RobotModelConfig& config, Stage stage,
+                                      const RobotModelCallbacks& callbacks) {
+  check_config(config.packing);
+  const auto model = std::make_shared<AnytimeModel>();
+  model->description_ = std::move(description);
+  model->config_ = config;
+  Step step(model, callbacks);
+  step.choose_links();
+  step.add_unknown_shapes(stage);
+  return step.pack(config.threads) ? step.finish(nullptr, nullptr) : nullptr;
+}
+
+AnytimeModel::Ptr AnytimeModel::refined(std::size_t link,
+                                        const RobotModelCallbacks& callbacks) const {
+  Step step(std::make_shared<AnytimeModel>(*this), callbacks);
+  step.add_shapes_to_refine(link);
+  return step.pack(1) ? step.finish(robot_.get(), nullptr) : nullptr;
+}
+
+AnytimeModel::Ptr AnytimeModel::with_packings_of(const AnytimeModel& other) const {
+  const auto model = std::make_shared<AnytimeModel>(*this);
+  Step step(model, {});
+  for (auto& [key, known] : model->shapes_) {
+    const auto found = other.shapes_.find(key);
+    if (found == other.shapes_.end() || known->is_final || !found->second->error.empty()) continue;
+    const ShapePacking& theirs = *found->second;
+    if (!theirs.is_final &&
+        theirs.packing.certificate.max_gap >= known->packing.certificate.max_gap) {
+      continue;
+    }
+    known = found->second;
+    step.touch(key);
+  }
+  return step.finish(robot_.get(), nullptr);
+}
+
+AnytimeModel::Ptr AnytimeModel::with_link(std::shared_ptr<const RobotDescription> description,
+                                          const std::string& link, const RobotModelConfig& config,
+                                          const RobotModelCallbacks& callbacks) const {
+  const auto model = std::make_shared<AnytimeModel>(*this);
+  model->description_ = std::move(description);
+  model->config_ = config;
+  Step step(model, callbacks);
+  step.choose_links();
+  step.forget_unused_shapes();
+  step.add_unknown_shapes(Stage::kFinal);
+  return step.pack(config.threads) ? step.finish(robot_.get(), &link) : nullptr;
+}
+
+}  // namespace ist

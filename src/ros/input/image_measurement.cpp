@@ -1,0 +1,102 @@
+#include "ros/input/image_measurement.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "ros/common/frame_name.h"
+#include "ros/input/cloud_measurement.h"
+
+namespace ist {
+namespace {
+
+CameraModel camera_model(const sensor_msgs::CameraInfo& message) {
+  CameraModel camera;
+  camera.width = message.width;
+  camera.height = message.height;
+  std::copy(message.K.begin(), message.K.end(), camera.K.begin());
+  std::copy(message.P.begin(), message.P.end(), camera.P.begin());
+  camera.D = message.D;
+  camera.binning_x = message.binning_x;
+  camera.binning_y = message.binning_y;
+  camera.roi_x_offset = message.roi.x_offset;
+  camera.roi_y_offset = message.roi.y_offset;
+  camera.roi_width = message.roi.width;
+  camera.roi_height = message.roi.height;
+  return camera;
+}
+
+// Numbers that are NaN count as different, and are checked again with each message.
+bool is_same_camera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
+  return a.header.frame_id == b.header.frame_id && a.width == b.width && a.height == b.height &&
+         a.K == b.K && a.P == b.P && a.D == b.D && a.binning_x == b.binning_x &&
+         a.binning_y == b.binning_y && a.roi.x_offset == b.roi.x_offset &&
+         a.roi.y_offset == b.roi.y_offset && a.roi.width == b.roi.width &&
+         a.roi.height == b.roi.height;
+}
+
+}  // namespace
+
+std::string sibling_camera_info(const std::string& image_topic) {
+  return image_topic.substr(0, image_topic.rfind('/') + 1) + "camera_info";
+}
+
+DepthCamera::DepthCamera(std::string source, std::string topic)
+    : source_(std::move(source)), topic_(std::move(topic)) {}
+
+void DepthCamera::take(const sensor_msgs::CameraInfo& message) {
+  if (has_come_ && is_same_camera(message, newest_)) return;
+  newest_ = message;
+  has_come_ = true;
+  const CameraModel camera = camera_model(message);
+  rays_.reset();
+  fault_ = check_camera(camera, &rays_);
+  const std::string doubt =
+      is_distorted(camera)
+          ? "the camera_info on " + topic_ +
+                " has distortion coefficients (D): depth images are taken for rectified, so that "
+                "points are off where they are not; use a rectified topic (image_rect)"
+          : "";
+  if (!doubt.empty() && doubt_.empty()) {
+    ROS_WARN_STREAM("source '" << source_ << "': " << doubt);
+  }
+  doubt_ = doubt;
+}
+
+std::string DepthCamera::fault(const std::string& frame_id) const {
+  if (!has_come_) {
+    return "no sensor_msgs/CameraInfo has come on " + topic_ + "; set ~sources/" + source_ +
+           "/camera_info to its topic";
+  }
+  if (!fault_.empty()) return "malformed camera_info on " + topic_ + ": " + fault_;
+  const std::string frame = without_slash(newest_.header.frame_id);
+  if (!frame.empty() && frame != without_slash(frame_id)) {
+    return "its images are in the frame '" + frame_id + "', the camera_info on " + topic_ +
+           " is of '" + newest_.header.frame_id.substr(0, 256) + "': is it another camera's?";
+  }
+  return "";
+}
+
+Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera& camera,
+                    std::size_t max_points, const std::shared_ptr<NoiseFilter>& noise) {
+  const std_msgs::Header& header = message->header;
+  std::string fault = camera.fault(header.frame_id);
+  if (!fault.empty()) return {header, fault, nullptr};
+  DepthImage image;
+  image.encoding = message->encoding;
+  image.width = message->width;
+  image.height = message->height;
+  image.step = message->step;
+  image.is_bigendian = message->is_bigendian != 0;
+  image.data = message->data.data();
+  image.data_size = message->data.size();
+  RawCloud raw;
+  fault = check_depth_image(image, camera.rays(), &raw, max_points);
+  if (!fault.empty()) return {header, "malformed image: " + fault, nullptr};
+  raw.owner = std::shared_ptr<const void>(message.get(), [message](const void*) {});
+  return {header, "", make_cloud_measurement(header, raw, message->data.size(), noise),
+          camera.doubt()};
+}
+
+}  // namespace ist

@@ -1,0 +1,66 @@
+#include "ros/output/nearest_summary.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "ros/common/text.h"
+#include "ros/output/nearness_color.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+using Link = ist_proximity::LinkProximity;
+
+const char* name_of(std::uint8_t status) {
+  switch (status) {
+    case ProximityArray::NO_CLOUD:
+      return "NO_CLOUD";
+    case ProximityArray::STALE_CLOUD:
+      return "STALE_CLOUD";
+    case ProximityArray::NO_POSE:
+      return "NO_POSE";
+    case ProximityArray::DEGRADED:
+      return "DEGRADED";
+    case ProximityArray::MODEL_ERROR:
+      return "MODEL_ERROR";
+    default:
+      return "OK";
+  }
+}
+
+}  // namespace
+
+NearestSummary summarize_nearest(const ProximityArray& proximity, double max_distance) {
+  NearestSummary summary;
+  const std::vector<Link>& links = proximity.links;
+  std::size_t unknown = 0;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (links[i].state == Link::UNKNOWN) ++unknown;
+    if (links[i].state < Link::NEAR) continue;
+    const bool is_nearer =
+        summary.link < 0 ||
+        links[i].distance < links[static_cast<std::size_t>(summary.link)].distance;
+    if (is_nearer) summary.link = static_cast<int>(i);
+  }
+  if (links.empty() || unknown == links.size()) {
+    summary.text = std::string("NOT KNOWN\n") + name_of(proximity.status);
+    summary.color = make_color(1.0, 0.45, 0.1, 1.0);
+    return summary;
+  }
+  if (summary.link >= 0) {
+    const Link& nearest = links[static_cast<std::size_t>(summary.link)];
+    summary.text = format_text("%.3f m\n", nearest.distance) + nearest.link;
+    summary.color = nearness_color(nearest.distance, max_distance);
+  } else {
+    summary.text = format_text("> %.2f m", max_distance);
+    summary.color = nearness_color(max_distance, max_distance);
+  }
+  if (unknown > 0) summary.text += "\n" + std::to_string(unknown) + " links NOT KNOWN";
+  if (proximity.status != ProximityArray::OK) {
+    summary.text += std::string("\n") + name_of(proximity.status);
+  }
+  return summary;
+}
+
+}  // namespace ist

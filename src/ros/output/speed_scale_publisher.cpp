@@ -1,0 +1,187 @@
+#include "ros/output/speed_scale_publisher.h"
+
+#include <std_msgs/Float64.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ros/common/publish.h"
+#include "ros/common/ros_time.h"
+#include "ros/common/text.h"
+#include "ros/output/message_conversion.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+using ist_proximity::SpeedScaleState;
+
+std::string metres(double value) { return format_text("%.3f m", value); }
+
+void publish_number(double value, const ros::Publisher& publisher) {
+  std_msgs::Float64 message;
+  message.data = value;
+  publish_message(publisher, message);
+}
+
+/// Whether the links of a message are those that were announced.
+bool are_links_of(const ProximityArray& result, const CountedLinks& links) {
+  return result.links.size() == links.links.size() &&
+         std::equal(result.links.begin(), result.links.end(), links.links.begin(),
+                    [](const auto& link, const std::string& name) { return link.link == name; });
+}
+
+std::vector<SpeedScaleInput> inputs_of(const ProximityArray& result) {
+  std::vector<SpeedScaleInput> inputs;
+  for (const auto& link : result.links) {
+    inputs.push_back(
+        {static_cast<LinkState>(link.state), link.lower_bound, link.closing_speed_obstacles});
+  }
+  return inputs;
+}
+
+std::string unknown_text(const SpeedScaleAnswer& answer, const CountedLinks& links,
+                         const ProximityArray& result) {
+  std::string what = "nothing is known of the robot's links";
+  if (answer.link >= 0) {
+    what = "'" + links.links[static_cast<std::size_t>(answer.link)] + "' is UNKNOWN";
+  }
+  return "stop: " + what + (result.status_text.empty() ? "" : ": " + result.status_text);
+}
+
+}  // namespace
+
+std::string speed_scale_text(const SpeedScaleAnswer& answer, const CountedLinks& links,
+                             const ProximityArray& result) {
+  if (answer.rule == SpeedRule::kUnknown) return unknown_text(answer, links, result);
+  const auto& link = result.links[static_cast<std::size_t>(answer.link)];
+  const std::string near = "'" + link.link + "' is " + metres(link.lower_bound) + " or more from " +
+                           (link.source.empty() ? "obstacles" : "'" + link.source + "'");
+  const std::string held =
+      answer.bound < link.lower_bound ? " (hysteresis holds " + metres(answer.bound) + ")" : "";
+  switch (answer.rule) {
+    case SpeedRule::kStop:
+      return "stop: " + near + held + ", it stops at " + metres(answer.stop_distance);
+    case SpeedRule::kSlow:
+      return "slow: " + near + held + ", it is free at " + metres(answer.free_distance);
+    case SpeedRule::kSeparation:
+      return "separation: " + near + held + ", and obstacles may be there before it stands";
+    default:
+      return "free: " + near;
+  }
+}
+
+SpeedScalePublisher::SpeedScalePublisher(ros::NodeHandle private_nh, const ServerConfig& config)
+    : is_enabled_(config.speed_scale_enabled),
+      self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
+      pose_timeout_(config.pose_timeout),
+      scale_({}),
+      min_distance_(std::numeric_limits<double>::quiet_NaN()) {
+  for (const SourceConfig& source : config.sources) {
+    if (!source.file.empty() || std::isinf(source.timeout)) never_stale_.insert(source.name);
+  }
+  min_publisher_ = private_nh.advertise<std_msgs::Float64>("min_distance", 10);
+  if (!is_enabled_) return;
+  scale_publisher_ = private_nh.advertise<std_msgs::Float64>("speed_scale", 10);
+  state_publisher_ = private_nh.advertise<SpeedScaleState>("speed_scale_state", 10);
+}
+
+void SpeedScalePublisher::set_links(const CountedLinks& links) {
+  if (links.links != links_.links) scale_ = SpeedScale(links.links);
+  links_ = links;
+}
+
+bool SpeedScalePublisher::is_usable(const ProximityArray& result) const {
+  return are_links_of(result, links_) && !lacks_clouds(result);
+}
+
+bool SpeedScalePublisher::is_fresh(const ProximityArray* self, const ros::Time& now) const {
+  return self && are_links_of(*self, links_) &&
+         seconds_between(self->header.stamp, now) <= pose_timeout_;
+}
+
+void SpeedScalePublisher::publish(const ProximityArray& result, const ProximityArray* self,
+                                  const SpeedScaleConfig& config, const ros::Time& now) {
+  self_problem_.clear();
+  if (self_counts_ && !is_fresh(self, now)) {
+    self_problem_ = self ? "the newest ~self_proximity is too old, or of another model"
+                         : "no ~self_proximity has come yet";
+  }
+  const bool is_known = is_usable(result) && self_problem_.empty();
+  min_distance_ = std::numeric_limits<double>::quiet_NaN();
+  if (is_known) min_distance_ = ist::min_distance(result, links_.counts);
+  if (is_known && self_counts_) {
+    const double own = ist::min_distance(*self, links_.counts);
+    min_distance_ = std::isnan(own) ? own : std::min(min_distance_, own);  // keeps NaN
+  }
+  if (is_enabled_) {
+    find_scale(result, is_known && self_counts_ ? self : nullptr, config, now);
+    publish_number(answer_.scale, scale_publisher_);
+    if (state_publisher_.getNumSubscribers() > 0) {
+      SpeedScaleState state;
+      fill_state(result, config, &state);
+      publish_message(state_publisher_, state);
+    }
+  }
+  publish_number(min_distance_, min_publisher_);
+  decisive_ = nullptr;
+}
+
+/// @param self  null: it does not count
+void SpeedScalePublisher::find_scale(const ProximityArray& result, const ProximityArray* self,
+                                     const SpeedScaleConfig& config, const ros::Time& now) {
+  answer_ = SpeedScaleAnswer();
+  decisive_ = &result;
+  if (!is_usable(result) || !self_problem_.empty()) return;
+  answer_ = scale_.update(config, inputs_of(result), links_.counts, oldest_age(result, now));
+  if (!self || answer_.rule == SpeedRule::kUnknown) return;
+  SpeedScale own_scale(links_.links);  // without hysteresis it remembers nothing
+  const SpeedScaleAnswer own =
+      own_scale.update(between_links(config), inputs_of(*self), links_.counts, 0.0);
+  if (own.rule != SpeedRule::kUnknown && own.scale >= answer_.scale) return;
+  answer_ = own;
+  decisive_ = self;
+}
+
+/// [s] The age of the oldest measurement in use; maps that never go stale stand still.
+double SpeedScalePublisher::oldest_age(const ProximityArray& result, const ros::Time& now) const {
+  double oldest = 0.0;
+  for (const auto& source : result.sources) {
+    const bool is_in_use = source.status == ProximityArray::OK && !std::isnan(source.age);
+    if (is_in_use && never_stale_.count(source.name) == 0) oldest = std::max(oldest, source.age);
+  }
+  return oldest + std::max(seconds_between(result.header.stamp, now), 0.0);
+}
+
+void SpeedScalePublisher::fill_state(const ProximityArray& result, const SpeedScaleConfig& config,
+                                     SpeedScaleState* state) const {
+  state->header = result.header;
+  state->scale = answer_.scale;
+  state->bound = answer_.bound;
+  state->rule = static_cast<std::uint8_t>(answer_.rule);
+  state->stop_distance = answer_.stop_distance;
+  state->free_distance = answer_.free_distance;
+  state->text = speed_scale_text(answer_, links_, *decisive_);
+  if (!self_problem_.empty()) state->text = "stop: " + self_problem_;
+  const std::vector<std::string> unknown = scale_.unknown_links(config);
+  if (!unknown.empty() && !links_.links.empty()) {
+    state->text =
+        "stop: ~speed_scale/links names " + join(unknown, ", ") + ", which is no monitored link";
+  }
+  if (answer_.link < 0) return;
+  const auto& link = decisive_->links[static_cast<std::size_t>(answer_.link)];
+  state->link = link.link;
+  state->source = link.source;
+}
+
+std::string SpeedScalePublisher::summary() const {
+  if (!is_enabled_) return "";
+  constexpr const char* kRules[] = {"not known", "stop", "slow", "free", "separation"};
+  std::string text = format_text("%.2f, ", answer_.scale);
+  text += kRules[static_cast<std::size_t>(answer_.rule)];
+  if (answer_.link >= 0) text += ", " + links_.links[static_cast<std::size_t>(answer_.link)];
+  return text;
+}
+
+}  // namespace ist

@@ -1,0 +1,475 @@
+// Anytime models: what holds at every stage of their growth, and queries that take a finer model
+// while they are at work.
+
+#include "internal/robot/anytime_model.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/error.h"
+#include "support/data_dir.h"
+#include "support/demo_arm.h"
+#include "support/long_chain.h"
+#include "support/random_links.h"
+#include "support/temp_dir.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+using Stage = AnytimeModel::Stage;
+constexpr double kMaxError = 0.004;  // [m]
+constexpr std::size_t kFewDozen = 48;
+constexpr int kGrowthPoints = 10;
+
+RobotModelConfig config_to(double max_error) {
+  RobotModelConfig config;
+  config.packing.max_error = test::packed_to(max_error);
+  return config;
+}
+
+std::shared_ptr<const RobotDescription> robot_of(const std::vector<LinkGeometry>& links) {
+  auto robot = std::make_shared<RobotDescription>();
+  robot->name = "test";
+  for (const LinkGeometry& geometry : links) {
+    LinkDescription link;
+    link.name = "link" + std::to_string(robot->links.size());
+    link.geometry = geometry;
+    robot->links.push_back(std::move(link));
+  }
+  return robot;
+}
+
+std::shared_ptr<const RobotDescription> demo() {
+  return std::make_shared<const RobotDescription>(test::demo_robot());
+}
+
+// The next link that is not final after `link`, in turn; -1: all are final.
+std::ptrdiff_t next_link(const RobotModel& robot, std::ptrdiff_t link) {
+  const auto count = static_cast<std::ptrdiff_t>(robot.links.size());
+  for (std::ptrdiff_t k = 1; k <= count; ++k) {
+    const std::ptrdiff_t next = (link + k) % count;
+    if (!robot.links[static_cast<std::size_t>(next)].is_final) return next;
+  }
+  return -1;
+}
+
+// All models from the first stage to the last, one link refined at a time.
+std::vector<AnytimeModel::Ptr> growth(AnytimeModel::Ptr model) {
+  std::vector<AnytimeModel::Ptr> stages = {std::move(model)};
+  for (std::ptrdiff_t link = -1; (link = next_link(*stages.back()->robot(), link)) >= 0;) {
+    stages.push_back(stages.back()->refined(static_cast<std::size_t>(link)));
+  }
+  return stages;
+}
+
+// Ten of them, the first and the last among them.
+std::vector<AnytimeModel::Ptr> growth_points(const std::vector<AnytimeModel::Ptr>& stages) {
+  std::vector<AnytimeModel::Ptr> points;
+  for (std::size_t k = 0; k < kGrowthPoints; ++k) {
+    points.push_back(stages[k * (stages.size() - 1) / (kGrowthPoints - 1)]);
+  }
+  return points;
+}
+
+double cover_distance(const Packing& packing, const Eigen::Vector3d& p) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const InnerSphere& sphere : packing.spheres) {
+    nearest = std::min(nearest, (p - sphere.center).norm() - sphere.cover_radius);
+  }
+  return nearest;
+}
+
+double inner_distance(const Packing& packing, const Eigen::Vector3d& p) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const InnerSphere& sphere : packing.spheres) {
+    nearest = std::min(nearest, (p - sphere.center).norm() - sphere.radius);
+  }
+  return nearest;
+}
+
+// The certificate, against the exact geometry at points about the link.
+void expect_certificate(const LinkModel& link, test::Rng* rng) {
+  const PackingCertificate& certificate = link.packing.certificate;
+  const double size = link.tree.center().norm() + link.tree.radius();
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d p = test::random_vector(rng, size);
+    const double exact = link.solid.signed_distance(p).distance;
+    const double cover = cover_distance(link.packing, p);
+    if (exact > 0.0) {
+      ASSERT_LE(cover, exact + 1e-9) << link.name;
+      ASSERT_LE(inner_distance(link.packing, p), exact + certificate.max_gap + 1e-9) << link.name;
+    } else {
+      ASSERT_LE(cover, certificate.interior_gap + 1e-9) << link.name;
+    }
+  }
+}
+
+TEST(AnytimeModel, beginsWithAFewDozenSpheresAShape) {
+  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
+  ASSERT_NE(first, nullptr);
+  test::Rng rng(71);
+  std::size_t coarse = 0;
+  for (std::size_t i = 0; i < first->robot()->links.size(); ++i) {
+    const LinkModel& link = first->robot()->links[i];
+    ASSERT_TRUE(link.usable()) << link.error;
+    EXPECT_LE(link.packing.spheres.size(),
+              kFewDozen * first->description().links[i].geometry.size());
+    EXPECT_GT(link.packing_id, 0U);
+    EXPECT_EQ(link.is_final, link.packing.certificate.reached);
+    coarse += link.is_final ? 0 : 1;
+    expect_certificate(link, &rng);
+  }
+  if (!test::kSanitized) EXPECT_GE(coarse, 6U);
+}
+
+TEST(AnytimeModel, growsLinkByLinkToTheFinalPacking) {
+  const RobotModelConfig config = config_to(kMaxError);
+  const auto stages = growth(AnytimeModel::build(demo(), config, Stage::kFirst));
+  for (std::size_t k = 1; k < stages.size(); ++k) {
+    const RobotModel &before = *stages[k - 1]->robot(), &after = *stages[k]->robot();
+    EXPECT_TRUE(same_geometry(before, after));
+    std::size_t changed = 0;
+    for (std::size_t i = 0; i < after.links.size(); ++i) {
+      const LinkModel &old = before.links[i], &now = after.links[i];
+      EXPECT_LE(now.packing.certificate.max_gap, old.packing.certificate.max_gap) << now.name;
+      if (now.packing_id == old.packing_id) {
+        EXPECT_EQ(now.packing.spheres.size(), old.packing.spheres.size());
+        continue;
+      }
+      ++changed;
+      EXPECT_GT(now.packing.spheres.size(), old.packing.spheres.size()) << now.name;
+    }
+    EXPECT_EQ(changed, 1U);
+  }
+  const auto whole = build_robot_model(test::demo_robot(), config);
+  for (std::size_t i = 0; i < whole->links.size(); ++i) {
+    const LinkModel &grown = stages.back()->robot()->links[i], &packed = whole->links[i];
+    EXPECT_TRUE(grown.is_final && packed.is_final);
+    ASSERT_EQ(grown.packing.spheres.size(), packed.packing.spheres.size()) << packed.name;
+    for (std::size_t s = 0; s < packed.packing.spheres.size(); ++s) {
+      ASSERT_EQ(grown.packing.spheres[s].center, packed.packing.spheres[s].center);
+      ASSERT_EQ(grown.packing.spheres[s].cover_radius, packed.packing.spheres[s].cover_radius);
+    }
+  }
+}
+
+TEST(AnytimeModel, equalShapesGrowTogether) {
+  const std::vector<LinkGeometry> links(2, test::one(test::torus(0.1, 0.03, 24, 12)));
+  const auto first = AnytimeModel::build(robot_of(links), config_to(kMaxError), Stage::kFirst);
+  ASSERT_FALSE(first->robot()->links[0].is_final);
+  const auto next = first->refined(0);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_NE(next->robot()->links[i].packing_id, first->robot()->links[i].packing_id);
+    EXPECT_EQ(next->robot()->links[i].packing.spheres.size(),
+              next->robot()->links[0].packing.spheres.size());
+  }
+}
+
+// Only final packings are kept, and a start with a full cache has them at once.
+TEST(AnytimeModel, keepsFinalPackingsInTheCache) {
+  const test::TempDir dir;
+  RobotModelConfig config = config_to(kMaxError);
+  config.cache_directory = dir.file("cache");
+  const auto first = AnytimeModel::build(demo(), config, Stage::kFirst);
+  const auto again = AnytimeModel::build(demo(), config, Stage::kFirst);
+  for (std::size_t i = 0; i < first->robot()->links.size(); ++i) {
+    const LinkModel &one = first->robot()->links[i], &two = again->robot()->links[i];
+    EXPECT_FALSE(one.from_cache);
+    EXPECT_EQ(two.from_cache, one.is_final) << one.name;
+  }
+  const auto grown = growth(first).back();
+  const auto cached = AnytimeModel::build(demo(), config, Stage::kFirst);
+  for (std::size_t i = 0; i < cached->robot()->links.size(); ++i) {
+    const LinkModel& link = cached->robot()->links[i];
+    EXPECT_TRUE(link.from_cache && link.is_final) << link.name;
+    EXPECT_EQ(link.packing.spheres.size(), grown->robot()->links[i].packing.spheres.size());
+  }
+}
+
+TEST(AnytimeModel, tellsALimitThatWasReachedAtTheEndOnly) {
+  RobotModelConfig config = config_to(0.0005);
+  config.packing.max_spheres = 60;
+  std::vector<std::string> warnings;
+  RobotModelCallbacks callbacks;
+  callbacks.warning = [&](const std::string& text) { warnings.push_back(text); };
+  const std::vector<LinkGeometry> links = {test::one(test::torus(0.1, 0.03, 24, 12))};
+  auto model = AnytimeModel::build(robot_of(links), config, Stage::kFirst, callbacks);
+  EXPECT_TRUE(warnings.empty());
+  while (!model->robot()->links[0].is_final) model = model->refined(0, callbacks);
+  EXPECT_LE(model->robot()->links[0].packing.spheres.size(), 60U);
+  EXPECT_FALSE(model->robot()->links[0].packing.certificate.reached);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("max_spheres (60)"), std::string::npos) << warnings[0];
+}
+
+double processor_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// From the text of the URDF to a model that answers: half a second on two cores. Processor time is
+// measured, which other load on the machine hardly changes.
+void expect_ready_soon(const std::string& urdf, GeometrySource source, const std::string& folder) {
+  if (test::kSanitized) GTEST_SKIP() << "sanitizers are slow";
+  constexpr double kSeconds = 0.5, kCores = 2.0;
+  const double begin = processor_seconds();
+  const auto robot = std::make_shared<const RobotDescription>(
+      parse_urdf(urdf, source, [&](const std::string& /*package*/) { return folder; }));
+  RobotModelConfig config = config_to(kMaxError);
+  config.threads = static_cast<int>(kCores);
+  const auto first = AnytimeModel::build(robot, config, Stage::kFirst);
+  const double took = processor_seconds() - begin;
+  for (const LinkModel& link : first->robot()->links) EXPECT_TRUE(link.usable()) << link.error;
+  RecordProperty("processor_time_ms", static_cast<int>(1e3 * took));
+  EXPECT_LE(took, kSeconds * kCores);
+}
+
+TEST(AnytimeModel, isReadyInHalfASecondOnTwoCores) {
+  const std::string folder = IST_PROXIMITY_SOURCE_DIR;
+  std::stringstream text;
+  text << std::ifstream(folder + "/demo/demo_arm.urdf").rdbuf();
+  expect_ready_soon(text.str(), GeometrySource::kCollision, folder);
+}
+
+TEST(AnytimeModel, aRobotOfFortyLinksIsReadyInHalfASecond) {
+  expect_ready_soon(test::long_chain_urdf(40), GeometrySource::kCollision,
+                    IST_PROXIMITY_SOURCE_DIR);
+}
+
+TEST(AnytimeModel, thePandaIsReadyInHalfASecond) {
+  const auto data = test::data_dir();
+  if (!data) GTEST_SKIP() << test::kNoData;
+  const std::string package = test::franka_package(*data);
+  std::stringstream text;
+  text << std::ifstream(package + "/robots/panda.urdf").rdbuf();
+  expect_ready_soon(text.str(), GeometrySource::kVisual, package);
+}
+
+TEST(AnytimeModel, canBeCancelledAtEveryStep) {
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = [] { return true; };
+  EXPECT_EQ(AnytimeModel::build(demo(), {}, Stage::kFirst, callbacks), nullptr);
+  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
+  const std::ptrdiff_t link = next_link(*first->robot(), -1);
+  if (link < 0) GTEST_SKIP() << "packed coarsely";
+  EXPECT_EQ(first->refined(static_cast<std::size_t>(link), callbacks), nullptr);
+  EXPECT_EQ(first->with_link(demo(), first->robot()->links[0].name, {}, callbacks), nullptr);
+}
+
+TEST(AnytimeModel, refusesAnInvalidPackingConfiguration) {
+  RobotModelConfig config;
+  config.packing.max_error = 0.0;
+  EXPECT_THROW(AnytimeModel::build(demo(), config, Stage::kFirst), ModelError);
+}
+
+// An object that is attached while packing goes on: links keep the packings that they have, those
+// that come in from a step begun before are taken over, and detaching restores the model.
+TEST(AnytimeModel, linksWithObjectsKeepTheirPackings) {
+  const RobotModelConfig config = config_to(kMaxError);
+  const auto first = AnytimeModel::build(demo(), config, Stage::kFirst);
+  const std::ptrdiff_t link = next_link(*first->robot(), -1);
+  if (link < 0) GTEST_SKIP() << "packed coarsely";
+  const LinkModel& bare = first->robot()->links[static_cast<std::size_t>(link)];
+  AttachedObject ball;
+  ball.name = "ball";
+  ball.link = bare.name;
+  ball.element.shape = Sphere{0.05};
+  const auto with_ball =
+      std::make_shared<const RobotDescription>(with_objects(first->description(), {ball}));
+  const auto carrying = first->with_link(with_ball, bare.name, config);
+  EXPECT_FALSE(same_geometry(*first->robot(), *carrying->robot()));
+  const auto at = static_cast<std::size_t>(link);
+  EXPECT_EQ(carrying->robot()->links[at].packing.spheres.size(), bare.packing.spheres.size() + 1);
+  EXPECT_FALSE(carrying->robot()->links[at].is_final);
+  for (std::size_t i = 0; i < carrying->robot()->links.size(); ++i) {
+    if (i == at) continue;
+    EXPECT_EQ(carrying->robot()->links[i].packing_id, first->robot()->links[i].packing_id);
+  }
+  const auto merged = carrying->with_packings_of(*first->refined(at));
+  EXPECT_TRUE(same_geometry(*merged->robot(), *carrying->robot()));
+  EXPECT_GT(merged->robot()->links[at].packing.spheres.size(),
+            carrying->robot()->links[at].packing.spheres.size());
+  EXPECT_EQ(merged->with_packings_of(*first)->robot()->links[at].packing.spheres.size(),
+            merged->robot()->links[at].packing.spheres.size())
+      << "coarser packings are not taken";
+  const auto detached = merged->with_link(demo(), bare.name, config);
+  EXPECT_EQ(detached->robot()->links[at].packing.spheres.size() + 1,
+            merged->robot()->links[at].packing.spheres.size());
+}
+
+// Links of every kind, and ten points of their growth. Made once.
+struct Grown {
+  Grown() {
+    test::Rng rng(72);
+    links = test::random_links(&rng);
+    links.resize(links.size() - 3);  // three soups: slow, and much like each other
+    stages = growth(AnytimeModel::build(robot_of(links), config_to(kMaxError), Stage::kFirst));
+  }
+  std::vector<LinkGeometry> links;
+  std::vector<AnytimeModel::Ptr> stages;
+};
+const Grown& grown_links() {
+  static const Grown grown;
+  return grown;
+}
+
+TEST(AnytimeModel, certificatesHoldAtEveryStage) {
+  test::Rng rng(72);
+  const auto& stages = grown_links().stages;
+  ASSERT_GE(stages.size(), test::kSanitized ? 1U : kGrowthPoints);
+  for (const AnytimeModel::Ptr& model : growth_points(stages)) {
+    for (const LinkModel& link : model->robot()->links) {
+      ASSERT_NO_FATAL_FAILURE(expect_certificate(link, &rng));
+    }
+  }
+}
+
+// Motions of a query that takes a finer model now and then.
+struct GrowingQuery {
+  explicit GrowingQuery(std::uint64_t seed, double tolerance) : rng(seed) {
+    links = grown_links().links;
+    stages = growth_points(grown_links().stages);
+    config.tolerance = tolerance;
+    config.max_distance = 0.5;
+    X_FL.assign(links.size(), Eigen::Isometry3d::Identity());
+    known.assign(links.size(), true);
+    query = std::make_unique<ProximityQuery>(stages[0]->robot(), config);
+    change_cloud();
+  }
+
+  void change_cloud() {
+    points.clear();
+    const int count = 5 + static_cast<int>(test::uniform(&rng, 0, 40));
+    for (int i = 0; i < count; ++i) points.push_back(test::random_vector(&rng, 0.5));
+    cloud = test::make_snapshot(points, test::random_vector(&rng, 0.1));
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.4);
+  }
+  void move(double size) {
+    for (Eigen::Isometry3d& X : X_FL) {
+      X.translation() += test::random_vector(&rng, size);
+      X.linear() = (Eigen::AngleAxisd(test::uniform(&rng, -size, size),
+                                      test::random_vector(&rng, 1.0).normalized()) *
+                    X.linear());
+      X.linear() = Eigen::Quaterniond(X.linear()).normalized().toRotationMatrix();
+    }
+  }
+  test::Truth truth(std::size_t i) const {
+    return test::truth_of(links[i], X_FL[i], points, cloud);
+  }
+
+  test::Rng rng;
+  std::vector<LinkGeometry> links;
+  std::vector<AnytimeModel::Ptr> stages;
+  QueryConfig config;
+  std::unique_ptr<ProximityQuery> query;
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<bool> known;
+  std::vector<Eigen::Vector3d> points;
+  CloudSnapshot cloud;
+  std::vector<LinkProximity> results;
+};
+
+class AnytimeQuery : public ::testing::TestWithParam<double> {};
+
+TEST_P(AnytimeQuery, answersAreTrueAtTenPointsOfTheGrowth) {
+  GrowingQuery growing(73, GetParam());
+  constexpr int kSteps = 4;  // later ones have bounds to keep
+  const int rounds = test::scaled(3);
+  int contacts = 0;
+  for (int round = 0; round < rounds; ++round) {
+    if (round > 0) {
+      growing.change_cloud();
+      growing.query = std::make_unique<ProximityQuery>(growing.stages[0]->robot(), growing.config);
+    }
+    for (const AnytimeModel::Ptr& stage : growing.stages) {
+      growing.query->set_model(stage->robot());
+      for (int step = 0; step < kSteps; ++step) {
+        ASSERT_TRUE(
+            growing.query->run(growing.X_FL, growing.known, {&growing.cloud}, &growing.results));
+        for (std::size_t i = 0; i < growing.links.size(); ++i) {
+          SCOPED_TRACE("link " + std::to_string(i) + ", step " + std::to_string(step));
+          test::expect_truth(growing.results[i], growing.truth(i), growing.config, growing.X_FL[i]);
+          contacts += growing.results[i].state == LinkState::kContact ? 1 : 0;
+        }
+        if (HasFailure()) return;
+        growing.move(step % 2 == 0 ? 1e-3 : 1e-5);
+      }
+    }
+  }
+  EXPECT_GT(contacts, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, AnytimeQuery, ::testing::Values(0.0, 0.001, 0.02));
+
+// Nothing known is lost in a swap: where there is no time to search, the bound that was proven with
+// the old packing is the answer's, less the displacement.
+TEST(AnytimeQuery, boundsSurviveASwapWithoutASearch) {
+  GrowingQuery growing(74, 0.001);
+  int positive = 0;
+  for (int round = 0; round < 5; ++round) {
+    growing.change_cloud();
+    for (std::size_t s = 0; s + 1 < growing.stages.size(); ++s) {
+      ProximityQuery query(growing.stages[s]->robot(), growing.config);
+      ASSERT_TRUE(query.run(growing.X_FL, growing.known, {&growing.cloud}, &growing.results));
+      const std::vector<LinkProximity> before = growing.results;
+      query.set_model(growing.stages[s + 1]->robot());
+      constexpr double kStep = 1e-5;
+      growing.move(kStep);
+      QueryConfig no_time = growing.config;
+      no_time.deadline = 1e-12;
+      query.set_config(no_time);
+      query.run(growing.X_FL, growing.known, {&growing.cloud}, &growing.results);
+      for (std::size_t i = 0; i < before.size(); ++i) {
+        ASSERT_LE(growing.results[i].lower_bound,
+                  std::max(growing.truth(i).measured, growing.truth(i).stored) + 2e-8);
+        if (!(before[i].state == LinkState::kNear && before[i].lower_bound > 0.02)) continue;
+        // A mesh with holes whose bound is within its interior gap proves nothing of other poses.
+        const LinkModel& link = growing.stages[s]->robot()->links[i];
+        if (!link.solid.is_closed()) continue;
+        ++positive;
+        EXPECT_GE(growing.results[i].lower_bound, before[i].lower_bound - 20.0 * kStep)
+            << link.name << " at stage " << s;
+      }
+    }
+  }
+  EXPECT_GT(positive, 100);
+}
+
+// What has been measured about a link belongs to its geometry: the swap of one link's packing costs
+// the others nothing, and that link no more than its search.
+TEST(AnytimeQuery, aSwapOfOneLinkLeavesTheOthersAlone) {
+  test::Rng rng(75);
+  const std::vector<LinkGeometry> links = {test::one(test::torus(0.1, 0.03, 24, 12)),
+                                           test::one(test::l_shape(0.2, 0.04))};
+  const auto first = AnytimeModel::build(robot_of(links), config_to(kMaxError), Stage::kFirst);
+  if (first->robot()->links[1].is_final) GTEST_SKIP() << "packed coarsely";
+  const auto next = first->refined(1);
+  ProximityQuery query(first->robot(), {});
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 500; ++i) points.push_back(test::random_vector(&rng, 0.5));
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
+  std::vector<LinkProximity> results, again;
+  query.run(X_FL, {true, true}, {&cloud}, &results);
+  query.set_model(next->robot());
+  query.run(X_FL, {true, true}, {&cloud}, &again);
+  EXPECT_EQ(query.link_statistics()[0].node_pairs, 0U) << "the same question has the same answer";
+  EXPECT_EQ(query.link_statistics()[0].exact_evaluations, 0U);
+  EXPECT_EQ(again[0].distance, results[0].distance);
+  const QueryStatistics& all = query.statistics();
+  EXPECT_EQ(all.node_pairs, query.link_statistics()[1].node_pairs);
+}
+
+}  // namespace
+}  // namespace ist

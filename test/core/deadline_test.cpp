@@ -1,0 +1,266 @@
+// What ends when time does: queries, repulsion and contact volumes; what they say is left.
+
+#include <gtest/gtest.h>
+
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/contact/contact_volume.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
+#include "support/contact_oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+using test::ContactLink;
+using test::one;
+using Points = std::vector<Eigen::Vector3d>;
+using Clock = std::chrono::steady_clock;
+
+// [s] A step between two looks at the clock takes less, nine times in ten; instrumented code is
+// slower.
+constexpr double kStep = test::kSanitized ? 5e-3 : 0.1e-3;
+
+TimePoint from_now(double seconds) {
+  return Clock::now() +
+         std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+// [s] Processor time of this thread: other processes do not count.
+double thread_time() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double quantile(std::vector<double> values, double q) {
+  std::sort(values.begin(), values.end());
+  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size()));
+  return values[std::min(rank, values.size() - 1)];
+}
+
+Points shell(std::size_t count, double radius) {
+  test::Rng rng(5);
+  Points points;
+  for (std::size_t i = 0; i < count; ++i) {
+    points.push_back(radius * test::random_vector(&rng, 1.0).normalized());
+  }
+  return points;
+}
+
+// Thinned points all over a cube.
+CloudSnapshot cube(double half, double spacing) {
+  Points points;
+  for (double x = -half; x <= half; x += spacing) {
+    for (double y = -half; y <= half; y += spacing) {
+      for (double z = -half; z <= half; z += spacing) points.emplace_back(x, y, z);
+    }
+  }
+  return test::thinned(points, spacing);
+}
+
+// A map with one leaf.
+CloudSnapshot map_of(const Eigen::AlignedBox3d& leaf) {
+  CloudSnapshot map;
+  auto boxes = std::make_shared<BoxIndex>();
+  boxes->build({leaf});
+  map.boxes = boxes;
+  return map;
+}
+
+// A volume that time ends is a lower bound, says how much it is of, and makes no wrench.
+TEST(Deadline, EndsAContactVolume) {
+  const ContactLink link(one(Box{{0.4, 0.4, 0.4}}));
+  const CloudSnapshot cloud = cube(0.19, 0.01);
+  const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  const ContactVolume whole = contact_volume(link.link(), *link.body, X_FL, {&cloud});
+  ASSERT_EQ(whole.known, 1.0);
+  ASSERT_GT(whole.spheres, 10000U);
+
+  const ContactVolume none = contact_volume(link.link(), *link.body, X_FL, {&cloud}, Clock::now());
+  EXPECT_EQ(none.known, 0.0);
+  EXPECT_EQ(none.volume, 0.0);
+
+  std::vector<double> overruns;
+  int partly = 0;
+  for (int i = 0; i < test::scaled(200); ++i) {
+    const double limit = 1e-5 * (1 + i % 100);
+    const double begin = thread_time();
+    const ContactVolume part =
+        contact_volume(link.link(), *link.body, X_FL, {&cloud}, from_now(limit));
+    overruns.push_back(thread_time() - begin - limit);
+    ASSERT_LT(part.known, 1.0) << "a volume of 10,000 points takes more than a millisecond";
+    ASSERT_LE(part.volume, whole.volume);
+    partly += part.known > 0.0 && part.volume > 0.0 ? 1 : 0;
+    LinkProximity contact;
+    contact.state = LinkState::kContact;
+    contact.lower_bound = contact.distance = -0.1;
+    ASSERT_TRUE(std::isnan(penetration_wrench(contact, {}, &part, X_FL, {}).force.x()));
+  }
+  EXPECT_GT(partly, 0);
+  EXPECT_LT(quantile(overruns, 0.9), kStep);
+}
+
+// One leaf of a map may be divided into thousands of cells; the clock is asked meanwhile.
+TEST(Deadline, EndsTheDivisionOfALeaf) {
+  const ContactLink link(one(Box{{0.4, 0.4, 0.4}}));
+  const CloudSnapshot map = map_of({Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 1)});
+  std::vector<double> overruns;
+  for (int i = 0; i < test::scaled(100); ++i) {
+    const double limit = 2e-5 * (1 + i % 10);
+    const double begin = thread_time();
+    const ContactVolume part = contact_volume(
+        link.link(), *link.body, Eigen::Isometry3d::Identity(), {&map}, from_now(limit));
+    overruns.push_back(thread_time() - begin - limit);
+    ASSERT_EQ(part.known, 0.0);
+  }
+  EXPECT_LT(quantile(overruns, 0.9), kStep);
+}
+
+// Repulsion that is not there in time is NaN, never that of some of the points.
+TEST(Deadline, EndsRepulsion) {
+  const auto model = test::make_model({Box{{0.4, 0.4, 0.4}}}, 0.01);
+  const Repulsion repulsion(model);
+  RepulsionConfig config;
+  config.smoothing = 1.0;  // every pair counts
+  const CloudSnapshot cloud = cube(0.6, 0.03);
+  LinkProximity near;
+  near.state = LinkState::kNear;
+  near.distance = near.lower_bound = 0.05;
+  near.direction = Eigen::Vector3d::UnitX();
+  const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  const RepulsiveWrench whole = repulsion.wrench(0, X_FL, {&cloud}, near, config);
+  ASSERT_TRUE(whole.force.allFinite());
+  std::vector<double> overruns;
+  int known = 0, unknown = 0;
+  for (int i = 0; i < test::scaled(400); ++i) {
+    const double limit = i % 2 == 0 ? 1e-5 * (1 + i % 40) : 10.0;
+    const double begin = thread_time();
+    const RepulsiveWrench found =
+        repulsion.wrench(0, X_FL, {&cloud}, near, config, from_now(limit));
+    overruns.push_back(thread_time() - begin - limit);
+    if (std::isnan(found.force.x())) {
+      ++unknown;
+      EXPECT_TRUE(found.force.array().isNaN().all() && found.torque.array().isNaN().all());
+    } else {
+      ++known;
+      EXPECT_EQ(found.force, whole.force);
+      EXPECT_EQ(found.torque, whole.torque);
+    }
+  }
+  EXPECT_GT(known, 0);
+  EXPECT_GT(unknown, 0);
+  EXPECT_LT(quantile(overruns, 0.9), kStep);
+  // A link that is not repelled needs no time.
+  near.distance = 10.0;
+  EXPECT_TRUE(repulsion.wrench(0, X_FL, {&cloud}, near, config, Clock::now()).force.isZero(0.0));
+}
+
+// A link counts as unfinished where its bounds are wider than was asked for, and nowhere else.
+TEST(Deadline, SaysHowManyLinksItLeft) {
+  const auto model = test::make_model({Sphere{0.1}, Sphere{0.1}, Sphere{0.1}}, 0.005);
+  std::vector<Eigen::Isometry3d> X_FL(3, Eigen::Isometry3d::Identity());
+  X_FL[1].translation().x() = 2.0;
+  X_FL[2].translation().x() = 50.0;  // CLEAR
+  const CloudSnapshot cloud = test::make_snapshot(shell(50000, 0.4));
+  QueryConfig config;
+  config.tolerance = 0.0;
+  std::vector<LinkProximity> results;
+  std::size_t some = 0;
+  for (int i = 0; i < test::scaled(200); ++i) {
+    config.deadline = 1e-6 * std::pow(10.0, 0.02 * (i % 150));
+    ProximityQuery query(model, config);
+    const bool complete = query.run(X_FL, {true, true, true}, {&cloud}, &results);
+    std::size_t wide = 0;
+    double widest = 0.0;
+    for (const LinkProximity& one : results) {
+      if (one.state == LinkState::kClear) continue;
+      const double width = one.distance - one.lower_bound;
+      if (width <= 2e-6) continue;
+      ++wide;
+      if (!std::isnan(width)) widest = std::max(widest, width);
+    }
+    ASSERT_EQ(query.statistics().unfinished, wide);
+    ASSERT_EQ(query.statistics().widest, widest);
+    if (complete) ASSERT_EQ(wide, 0U);
+    some += wide;
+  }
+  EXPECT_GT(some, 0U);
+  config.deadline = 0.0;
+  ProximityQuery query(model, config);
+  query.run(X_FL, {true, true, true}, {&cloud}, &results);
+  EXPECT_EQ(query.statistics().unfinished, 0U);
+}
+
+// A query that has a deadline asks coarsely first. Where the deadline passes then, the coarse
+// answer is kept, and the same pose asked again must not take it for the whole one: it said to be
+// complete with bounds half as wide as the distance.
+TEST(Deadline, DoesNotMakeACoarseAnswerAWholeOne) {
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  const CloudSnapshot cloud = test::make_snapshot(shell(20000, 0.4));
+  QueryConfig config;
+  config.tolerance = 0.0;
+  std::vector<LinkProximity> results;
+  int late = 0;
+  for (int i = 0; i < test::scaled(300); ++i) {
+    ProximityQuery query(model, config);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    X_FL.translation().x() = 1e-4 * i;
+    for (const double deadline : {1e-6 * std::pow(10.0, 0.01 * i), 100.0}) {
+      config.deadline = deadline;
+      query.set_config(config);
+      const bool complete = query.run({X_FL}, {true}, {&cloud}, &results);
+      late += complete ? 0 : 1;
+      if (!complete) continue;
+      ASSERT_EQ(results[0].state, LinkState::kNear);
+      ASSERT_LT(results[0].distance - results[0].lower_bound, 2e-6) << i << ", " << deadline;
+    }
+    // The whole answer serves both questions: asked once more, it costs nothing.
+    ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+    EXPECT_EQ(query.statistics().node_pairs, 0U);
+    EXPECT_EQ(query.statistics().exact_evaluations, 0U);
+  }
+  EXPECT_GT(late, 0);
+}
+
+// Five million points, all at one place or all equally near: answered in time, with bounds that
+// hold, from the first query on.
+TEST(Deadline, HoldsForFiveMillionPointsThatAreEquallyNear) {
+  const std::size_t count = test::kSanitized ? 100000 : 5000000;
+  const auto model = test::make_model({Sphere{0.1}, Box{{0.1, 0.2, 0.3}}}, 0.005);
+  const Points same(count, Eigen::Vector3d(0.4, 0.0, 0.0));
+  for (const bool at_one_place : {true, false}) {
+    const CloudSnapshot cloud = test::make_snapshot(at_one_place ? same : shell(count, 0.4));
+    for (const double deadline : {1e-3, 5e-3}) {
+      QueryConfig config;
+      config.deadline = deadline;
+      ProximityQuery query(model, config);
+      std::vector<LinkProximity> results;
+      std::vector<double> overruns;
+      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      for (int step = 0; step < 100; ++step) {
+        X_FL.translation().z() = 1e-4 * step;
+        const double begin = thread_time();
+        query.run({X_FL, X_FL}, {true, true}, {&cloud}, &results);
+        overruns.push_back(thread_time() - begin - deadline);
+        const double from_center = at_one_place ? std::hypot(0.4, 1e-4 * step) : 0.4 - 1e-4 * step;
+        ASSERT_EQ(results[0].state, LinkState::kNear);
+        ASSERT_LE(results[0].lower_bound, from_center - 0.1 + 1e-6);
+        ASSERT_GE(results[0].distance, from_center - 0.1 - 1e-6);
+        ASSERT_GT(results[0].lower_bound, 0.0);
+        ASSERT_GT(results[1].lower_bound, 0.0);
+      }
+      EXPECT_LT(quantile(overruns, 0.9), kStep) << at_one_place << ", " << deadline << " s";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,263 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ist_proximity/facade/obstacles.h"
+#include "ist_proximity/facade/robot.h"
+#include "support/demo_arm.h"
+#include "support/errors.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+RobotConfig demo_config() {
+  RobotConfig config;
+  config.packing.max_error = test::packed_to(config.packing.max_error);
+  config.find_package = [](const std::string&) { return std::string(IST_PROXIMITY_SOURCE_DIR); };
+  return config;
+}
+
+const Robot& demo() {
+  static const Robot robot(std::string(IST_PROXIMITY_SOURCE_DIR) + "/demo/demo_arm.urdf",
+                           demo_config());
+  return robot;
+}
+
+std::vector<Eigen::Vector3f> random_points(test::Rng* rng, std::size_t count) {
+  std::vector<Eigen::Vector3f> points;
+  for (std::size_t i = 0; i < count; ++i) {
+    points.emplace_back((test::random_vector(rng, 0.9) + Eigen::Vector3d(0, 0, 0.5)).cast<float>());
+  }
+  return points;
+}
+
+std::vector<double> random_configurations(test::Rng* rng, std::size_t count) {
+  std::vector<double> q;
+  for (std::size_t i = 0; i < count * demo().joints().size(); ++i) {
+    q.push_back(test::uniform(rng, -1.5, 1.5));
+  }
+  return q;
+}
+
+void expect_same(const LinkProximity& a, const LinkProximity& b) {
+  EXPECT_EQ(a.state, b.state);
+  if (a.state == LinkState::kUnknown || b.state == LinkState::kUnknown) return;
+  // Another history may end the search elsewhere within the tolerance.
+  EXPECT_LE(a.lower_bound, b.distance);
+  EXPECT_LE(b.lower_bound, a.distance);
+}
+
+// Answers of the facade hold against brute force over the exact geometry of every link.
+TEST(Facade, DistancesAreThoseOfBruteForce) {
+  test::Rng rng(1);
+  const std::vector<Eigen::Vector3f> points = random_points(&rng, 300);
+  const Obstacles obstacles(points);
+  ASSERT_EQ(obstacles.size(), points.size());
+  const std::vector<double> q = random_configurations(&rng, 20);
+  const std::size_t joints = demo().joints().size(), links = demo().links().size();
+  QueryConfig exact;
+  exact.tolerance = 0.0;
+  for (std::size_t k = 0; k < 20; ++k) {
+    const Span<const double> one(q.data() + k * joints, joints);
+    const std::vector<LinkProximity> answers = demo().distances(one, obstacles, exact);
+    const LinkPoses poses = demo().link_poses(one);
+    ASSERT_EQ(answers.size(), links);
+    double smallest = exact.max_distance;
+    for (std::size_t i = 0; i < links; ++i) {
+      double truth = exact.max_distance;
+      for (const Eigen::Vector3f& p : points) {
+        const Eigen::Vector3d p_L = poses.X_FL[i].inverse() * p.cast<double>();
+        truth = std::min(truth, demo().model()->links[i].solid.signed_distance(p_L).distance);
+      }
+      smallest = std::min(smallest, truth);
+      if (answers[i].state == LinkState::kClear) {
+        EXPECT_EQ(truth, exact.max_distance);
+      } else {
+        EXPECT_NEAR(answers[i].distance, truth, 1e-6) << demo().links()[i];
+      }
+    }
+    EXPECT_NEAR(demo().nearest(one, obstacles, exact).nearest.distance, smallest, 1e-6);
+  }
+}
+
+TEST(Facade, BatchesAnswerAsSingleCallsDo) {
+  test::Rng rng(2);
+  const Obstacles obstacles(random_points(&rng, 500));
+  const std::size_t n = 50, joints = demo().joints().size(), links = demo().links().size();
+  const std::vector<double> q = random_configurations(&rng, n);
+  for (const int threads : {1, 3}) {
+    BatchConfig config;
+    config.threads = threads;
+    const std::vector<LinkProximity> all = demo().distances_batch(q, obstacles, config);
+    const std::vector<RobotProximity> nearest = demo().nearest_batch(q, obstacles, config);
+    ASSERT_EQ(all.size(), n * links);
+    ASSERT_EQ(nearest.size(), n);
+    std::vector<Eigen::Isometry3d> X_FL;
+    for (std::size_t k = 0; k < n; ++k) {
+      const Span<const double> one(q.data() + k * joints, joints);
+      const std::vector<LinkProximity> answers = demo().distances(one, obstacles);
+      for (std::size_t i = 0; i < links; ++i) expect_same(all[k * links + i], answers[i]);
+      const RobotProximity single = demo().nearest(one, obstacles);
+      expect_same(nearest[k].nearest, single.nearest);
+      for (const Eigen::Isometry3d& X : demo().link_poses(one).X_FL) X_FL.push_back(X);
+    }
+    const std::vector<LinkProximity> at = demo().distances_at(X_FL, obstacles, config);
+    ASSERT_EQ(at.size(), all.size());
+    for (std::size_t i = 0; i < at.size(); ++i) expect_same(at[i], all[i]);
+  }
+}
+
+TEST(Facade, OneRobotServesSeveralThreads) {
+  test::Rng rng(3);
+  const Obstacles obstacles(random_points(&rng, 200));
+  const std::vector<double> q = random_configurations(&rng, 16);
+  const std::vector<LinkProximity> expected = demo().distances_batch(q, obstacles);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&] {
+      const std::vector<LinkProximity> answers = demo().distances_batch(q, obstacles);
+      for (std::size_t i = 0; i < answers.size(); ++i) expect_same(answers[i], expected[i]);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(Facade, AnUnknownPositionLeavesLinksUnknown) {
+  const Obstacles obstacles(std::vector<Eigen::Vector3f>{{0.5F, 0.0F, 0.5F}});
+  std::vector<double> q(demo().joints().size(), 0.0);
+  q.back() = kNaN;
+  const std::vector<LinkProximity> answers = demo().distances(q, obstacles);
+  EXPECT_NE(answers.front().state, LinkState::kUnknown);
+  EXPECT_EQ(answers.back().state, LinkState::kUnknown);
+  const std::vector<LinkProximity> known =
+      demo().distances(demo().configuration({{demo().joints().front(), 0.3}}), obstacles);
+  EXPECT_NE(known.back().state, LinkState::kUnknown);
+}
+
+// Pixels without a measurement are NaN; an image has the answers of the list of its points.
+TEST(Facade, ImagesAnswerAsLists) {
+  constexpr std::size_t kWidth = 64, kHeight = 48;
+  std::vector<float> image;
+  std::vector<Eigen::Vector3f> list;
+  for (std::size_t v = 0; v < kHeight; ++v) {
+    for (std::size_t u = 0; u < kWidth; ++u) {
+      const bool is_hole = (u + 3 * v) % 11 == 0;
+      const float x = 0.02F * static_cast<float>(u) - 0.6F, z = 0.02F * static_cast<float>(v);
+      const Eigen::Vector3f p(is_hole ? std::nanf("") : x, 0.45F, z);
+      image.insert(image.end(), {p.x(), p.y(), p.z()});
+      if (!is_hole) list.push_back(p);
+    }
+  }
+  const Obstacles from_image = Obstacles::from_image(image.data(), kWidth, kHeight);
+  image.assign(image.size(), 0.0F);  // the obstacles do not need it any more
+  const Obstacles from_list(list);
+  EXPECT_EQ(from_image.size(), list.size());
+  const std::vector<double> q(demo().joints().size(), 0.2);
+  const auto a = demo().distances(q, from_image), b = demo().distances(q, from_list);
+  for (std::size_t i = 0; i < a.size(); ++i) expect_same(a[i], b[i]);
+}
+
+// The self-filter drops points on the robot, and no others.
+TEST(Facade, SelfFilterDropsPointsOnTheRobot) {
+  const std::vector<double> q(demo().joints().size(), 0.0);
+  const LinkPoses poses = demo().link_poses(q);
+  std::vector<Eigen::Vector3f> points;
+  for (std::size_t i = 0; i < poses.X_FL.size(); ++i) {
+    const Eigen::Vector3d inside = demo().model()->links[i].packing.spheres.front().center;
+    points.push_back((poses.X_FL[i] * inside).cast<float>());
+  }
+  const std::size_t on_robot = points.size();
+  points.emplace_back(0.9F, 0.9F, 0.9F);
+  ObstaclesConfig config;
+  config.robot = &demo();
+  config.q = q;
+  const Obstacles obstacles(points, config);
+  EXPECT_EQ(obstacles.size(), 1U);
+  EXPECT_EQ(obstacles.counts().on_robot, on_robot);
+}
+
+TEST(Facade, BytesHoldTheWholeRobot) {
+  const std::string bytes = demo().to_bytes();
+  const Robot copy = Robot::from_bytes(bytes);
+  EXPECT_EQ(copy.to_bytes(), bytes);
+  EXPECT_EQ(copy.links(), demo().links());
+  EXPECT_EQ(copy.joints(), demo().joints());
+  EXPECT_EQ(copy.upper_limits(), demo().upper_limits());
+  test::Rng rng(4);
+  const Obstacles obstacles(random_points(&rng, 400));
+  const std::vector<double> q = random_configurations(&rng, 10);
+  BatchConfig config;
+  config.threads = 1;
+  const auto a = Robot(demo()).distances_batch(q, obstacles, config);
+  const auto b = copy.distances_batch(q, obstacles, config);
+  for (std::size_t i = 0; i < a.size(); ++i) expect_same(a[i], b[i]);
+}
+
+TEST(Facade, DamagedBytesAreRefused) {
+  const std::string bytes = demo().to_bytes();
+  test::Rng rng(5);
+  test::expect_says(test::error_of([&] { Robot::from_bytes(""); }), "they are too few");
+  for (int i = 0; i < 30; ++i) {
+    std::string damaged = bytes;
+    const auto at = std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(rng);
+    if (i % 2 == 0) {
+      damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    } else {
+      damaged.resize(at);
+    }
+    test::expect_says(test::error_of([&] { Robot::from_bytes(damaged); }), "cannot be read");
+  }
+}
+
+template <class Call>
+std::string argument_error(const Call& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+TEST(Facade, WrongArgumentsAreNamed) {
+  const Obstacles obstacles(std::vector<Eigen::Vector3f>{{0.5F, 0.0F, 0.5F}});
+  const std::vector<double> q(demo().joints().size(), 0.0), short_q(2, 0.0);
+  using test::expect_says;
+  expect_says(argument_error([&] { demo().distances(short_q, obstacles); }),
+              "2 positions were given");
+  expect_says(argument_error([&] { demo().distances_batch(short_q, obstacles); }),
+              "2 numbers were given");
+  expect_says(argument_error([&] {
+                demo().configuration({{"no_joint", 0.0}});
+              }),
+              "no joint 'no_joint'");
+  QueryConfig config;
+  config.tolerance = -1.0;
+  expect_says(argument_error([&] { demo().distances(q, obstacles, config); }), "tolerance");
+  config = QueryConfig();
+  config.max_distance = kNaN;
+  expect_says(argument_error([&] { demo().distances(q, obstacles, config); }), "max_distance");
+  Eigen::Isometry3d sheared = Eigen::Isometry3d::Identity();
+  sheared(0, 1) = 0.1;
+  const std::vector<Eigen::Isometry3d> X_FL(demo().links().size(), sheared);
+  expect_says(argument_error([&] { demo().distances_at(X_FL, obstacles); }), "not rigid");
+  ObstaclesConfig far;
+  far.min_range = 2.0;
+  far.max_range = 1.0;
+  EXPECT_NE(argument_error([&] { Obstacles(std::vector<Eigen::Vector3f>(1), far); }), "(no error)");
+  expect_says(test::error_of([] { Robot("/no/such/robot.urdf"); }), "/no/such/robot.urdf");
+  expect_says(test::error_of([] { Robot("<robot name='r'><link name='l'/></robot>"); }),
+              "no usable link");
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,144 @@
+#include "ist_proximity/repulsion/kept_repulsion.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/contact_oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+// Points about a link, at random.
+CloudSnapshot surroundings(std::uint64_t seed) {
+  test::Rng rng(seed);
+  std::vector<Eigen::Vector3d> points;
+  while (points.size() < 3000) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 0.5);
+    if (p.norm() > 0.22) points.push_back(p);
+  }
+  return test::thinned(points, 0.01);
+}
+
+class KeptRepulsionTest : public ::testing::Test {
+ protected:
+  KeptRepulsionTest()
+      : model_(test::make_model({Box{{0.1, 0.2, 0.3}}}, 0.01)),
+        cloud_(surroundings(3)),
+        repulsion_(model_),
+        kept_(*model_, 0) {}
+
+  LinkProximity answer(const Eigen::Isometry3d& X_FL) {
+    ProximityQuery query(model_, QueryConfig());
+    std::vector<LinkProximity> results;
+    query.run({X_FL}, {true}, {&cloud_}, &results);
+    return results[0];
+  }
+  RepulsiveWrench exact(const Eigen::Isometry3d& X_FL) {
+    return repulsion_.wrench(0, X_FL, {&cloud_}, answer(X_FL), config_);
+  }
+  RepulsiveWrench kept(const Eigen::Isometry3d& X_FL, TimePoint end = TimePoint::max()) {
+    return kept_.update(repulsion_, X_FL, {&cloud_}, answer(X_FL), config_, end);
+  }
+
+  static Eigen::Isometry3d at(double x) {
+    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+    X.translation().x() = x;
+    X.rotate(Eigen::AngleAxisd(2.0 * x, Eigen::Vector3d::UnitZ()));
+    return X;
+  }
+
+  std::shared_ptr<RobotModel> model_;
+  CloudSnapshot cloud_;
+  Repulsion repulsion_;
+  KeptRepulsion kept_;
+  RepulsionConfig config_;
+};
+
+// A link moves by 6 cm in steps of 0.1 mm: most blends are kept, and none is far from the exact
+// one.
+TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendOfThePose) {
+  double largest = 0.0, largest_step = 0.0;
+  int kept_blends = 0;
+  RepulsiveWrench last;
+  for (int i = 0; i < 600; ++i) {
+    const Eigen::Isometry3d X_FL = at(1e-4 * i);
+    const RepulsiveWrench found = kept(X_FL), truth = exact(X_FL);
+    const double length = config_.gain * repulsion_strength(answer(X_FL), config_);
+    ASSERT_GT(length, 0.0);
+    largest = std::max(largest, (found.force - truth.force).norm() / length);
+    kept_blends += found.force != truth.force ? 1 : 0;
+    if (i > 0) largest_step = std::max(largest_step, (found.force - last.force).norm());
+    last = found;
+  }
+  EXPECT_GT(kept_blends, 400) << "blends have to be kept for this test to show anything";
+  EXPECT_LT(largest, 0.03);
+  EXPECT_LT(largest_step, 0.03);
+}
+
+TEST_F(KeptRepulsionTest, LengthFollowsTheDistanceAtOnce) {
+  const LinkProximity here = answer(at(0.0));
+  kept(at(0.0));
+  LinkProximity nearer = here;
+  nearer.distance = 0.5 * here.distance;
+  const RepulsiveWrench found =
+      kept_.update(repulsion_, at(0.0), {&cloud_}, nearer, config_, TimePoint());
+  const RepulsiveWrench truth = repulsion_.wrench(0, at(0.0), {&cloud_}, nearer, config_);
+  EXPECT_LT((found.force - truth.force).norm(), 1e-9);
+  EXPECT_LT((found.torque - truth.torque).norm(), 1e-9);
+  nearer.distance = config_.influence_distance;
+  EXPECT_TRUE(
+      kept_.update(repulsion_, at(0.0), {&cloud_}, nearer, config_, TimePoint()).force.isZero());
+}
+
+// Other obstacles, another smoothing and a motion of more than 1 mm are blended anew, to the bit.
+TEST_F(KeptRepulsionTest, IsBlendedAnewWhereItMatters) {
+  kept(at(0.0));
+  EXPECT_EQ(kept(at(1e-4)).force, kept(at(1e-4)).force);
+  EXPECT_NE(kept(at(1e-4)).force, exact(at(1e-4)).force) << "kept";
+  cloud_ = surroundings(4);
+  EXPECT_EQ(kept(at(1e-4)).force, exact(at(1e-4)).force) << "another cloud";
+  config_.smoothing = 0.05;
+  EXPECT_EQ(kept(at(2e-4)).force, exact(at(2e-4)).force) << "another smoothing";
+  EXPECT_EQ(kept(at(0.01)).force, exact(at(0.01)).force) << "moved";
+}
+
+// A map of a robot that drives stays the same map, at another place.
+TEST_F(KeptRepulsionTest, IsBlendedAnewWhereAMapMoves) {
+  cloud_ = CloudSnapshot();
+  auto boxes = std::make_shared<BoxIndex>();
+  boxes->build({{Eigen::Vector3d(0.1, 0.1, -0.1), Eigen::Vector3d(0.2, 0.3, 0.1)},
+                {Eigen::Vector3d(-0.1, -0.3, 0.0), Eigen::Vector3d(0.0, -0.2, 0.2)}});
+  cloud_.boxes = boxes;
+  kept(at(0.0));
+  cloud_.X_FM.translation().x() += 1e-4;
+  EXPECT_EQ(kept(at(0.0)).force, exact(at(0.0)).force);
+}
+
+// A turn about the link's middle moves its ends.
+TEST_F(KeptRepulsionTest, TurnsCountAsMotion) {
+  kept(Eigen::Isometry3d::Identity());
+  Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  X_FL.rotate(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitX()));
+  EXPECT_EQ(kept(X_FL).force, exact(X_FL).force);
+}
+
+// What is not known is not kept, and what is kept needs no time.
+TEST_F(KeptRepulsionTest, KeepsNothingThatIsNotKnown) {
+  const TimePoint passed = std::chrono::steady_clock::now();
+  EXPECT_TRUE(std::isnan(kept(at(0.0), passed).force.x()));
+  EXPECT_EQ(kept(at(0.0)).force, exact(at(0.0)).force);
+  EXPECT_EQ(kept(at(0.0), passed).force, exact(at(0.0)).force);
+  const LinkProximity unknown;
+  EXPECT_TRUE(std::isnan(kept_.update(repulsion_, at(0.0), {&cloud_}, unknown, config_).force.x()));
+  EXPECT_TRUE(std::isnan(kept(at(0.0), passed).force.x())) << "forgotten";
+}
+
+}  // namespace
+}  // namespace ist

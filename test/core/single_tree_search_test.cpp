@@ -1,0 +1,186 @@
+// The single-tree traversal near the link and among ties, and the bounds that it keeps.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "proximity/coherence/node_bounds.h"
+#include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+using Point = Eigen::Vector3d;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+const std::vector<Shape>& shapes() {
+  static const std::vector<Shape> kShapes = {
+      Box{{0.2, 0.1, 0.3}},          Cylinder{0.05, 0.25},    test::l_shape(0.2, 0.05),
+      test::torus(0.1, 0.03, 12, 6), test::icosphere(0.1, 2), test::open_box({0.15, 0.1, 0.2})};
+  return kShapes;
+}
+
+// Points whose signed distance to the link at rest is from `lowest` to `highest` [m].
+std::vector<Point> points_about(const LinkModel& link, double lowest, double highest, int count,
+                                test::Rng* rng) {
+  std::vector<Point> points;
+  for (int i = 0; i < count; ++i) {
+    const Point p = link.tree.center() + test::random_vector(rng, 1.2 * link.tree.radius());
+    const SignedDistance from = link.solid.signed_distance(p);
+    points.push_back(from.witness + test::uniform(rng, lowest, highest) * from.normal);
+  }
+  return points;
+}
+
+Eigen::Isometry3d small_motion(double step, test::Rng* rng) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = test::random_vector(rng, step);
+  X.rotate(Eigen::AngleAxisd(test::uniform(rng, 0, 5.0 * step),
+                             test::random_vector(rng, 1.0).normalized()));
+  return X;
+}
+
+// The answers on motions that touch, leave and enter, with clouds that come and go: bounds that are
+// kept too long, or for another cloud, would be above the truth.
+TEST(SingleTreeSearch, HoldsOnMotionsNearTheSurface) {
+  const test::Trial trial(shapes(), 0.005);
+  test::Rng rng(171);
+  int contacts = 0, near = 0;
+  for (int run = 0; run < test::scaled(60); ++run) {
+    const auto l = static_cast<std::size_t>(run) % trial.model().links.size();
+    SCOPED_TRACE(trial.model().links[l].name + ", run " + std::to_string(run));
+    const double height = run % 3 == 0 ? 0.002 : 0.02;
+    const double lowest = run % 2 == 0 ? -height : 0.3 * height;
+    std::vector<std::vector<Point>> points;
+    std::vector<CloudSnapshot> clouds(2);
+    for (CloudSnapshot& cloud : clouds) {
+      points.push_back(points_about(trial.model().links[l], lowest, height, 300, &rng));
+      cloud = test::make_snapshot(points.back());
+    }
+    QueryConfig config;
+    config.tolerance = run % 4 == 0 ? 0.0 : std::pow(10.0, test::uniform(&rng, -4, -2));
+    ProximityQuery query(trial.shared_model(), config);
+    LinkProximity result;
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    X_FL.translation() = test::random_vector(&rng, 0.2 * height);
+    const double step = std::pow(10.0, test::uniform(&rng, -5, -2));
+    std::size_t c = 0;
+    for (int i = 0; i < 40; ++i) {
+      X_FL = small_motion(i % 13 == 12 ? 20.0 * step : step, &rng) * X_FL;
+      if (i % 10 == 9) c = 1 - c;
+      ASSERT_TRUE(query.run_link(l, X_FL, {&clouds[c]}, &result));
+      const test::Truth truth = test::truth_of(trial.link(l), X_FL, points[c], clouds[c]);
+      test::expect_truth(result, truth, config, X_FL);
+      ASSERT_FALSE(testing::Test::HasFailure()) << "step " << i;
+      contacts += truth.stored < 0.0 ? 1 : 0;
+      near += truth.stored > 0.0 && truth.stored < 0.01 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(contacts, test::scaled(500));
+  EXPECT_GT(near, test::scaled(200));
+}
+
+// Points about equally near on all sides, at a distance from the link: after the first query few of
+// them are measured again, though every one of them is within twice the tolerance.
+TEST(SingleTreeSearch, KeepsTheBoundsOfTies) {
+  const std::vector<Shape> bodies = {Cylinder{0.05, 0.3}, Box{{0.2, 0.16, 0.1}}};
+  const test::Trial trial(bodies, 0.005);
+  test::Rng rng(172);
+  for (std::size_t l = 0; l < bodies.size(); ++l) {
+    SCOPED_TRACE(trial.model().links[l].name);
+    const Solid& solid = trial.model().links[l].solid;
+    for (const double gap : {0.002, 0.02, 0.05}) {
+      SCOPED_TRACE("gap " + std::to_string(gap));
+      std::vector<Point> points;
+      while (points.size() < 20000) {
+        const Point p = test::random_vector(&rng, 0.4);
+        const SignedDistance from = solid.signed_distance(p);
+        if (!(from.distance > gap)) continue;
+        points.push_back(from.witness + (gap + test::uniform(&rng, 0, 5e-4)) * from.normal);
+      }
+      const CloudSnapshot cloud = test::make_snapshot(points);
+      const std::vector<Point> stored = test::stored_points(cloud.index);
+      ProximityQuery query(trial.shared_model(), QueryConfig());
+      LinkProximity result;
+      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      std::uint64_t measured = 0;
+      constexpr int kSteps = 40;
+      for (int i = 0; i < kSteps; ++i) {
+        X_FL = small_motion(2e-5, &rng) * X_FL;
+        ASSERT_TRUE(query.run_link(l, X_FL, {&cloud}, &result));
+        if (i > 0) measured += query.statistics().exact_evaluations;
+        double truth = kInfinity;
+        for (const Point& p : stored) {
+          truth = std::min(truth, solid.signed_distance(X_FL.inverse() * p).distance);
+        }
+        ASSERT_LE(result.lower_bound, truth) << "step " << i;
+        ASSERT_LE(result.distance, truth + 0.001 + 1e-9) << "step " << i;
+      }
+      EXPECT_LT(measured / kSteps, 500U);
+    }
+  }
+}
+
+TEST(NodeBounds, LowersWhatIsKeptByTheDisplacement) {
+  const test::Trial trial({Shape(Box{{0.2, 0.1, 0.3}}), Shape(test::open_box({0.1, 0.1, 0.1}))});
+  test::Rng rng(173);
+  for (const LinkModel& link : trial.model().links) {
+    const DisplacementBound displacement(link);
+    NodeBounds kept(link);
+    Eigen::Isometry3d X = test::random_pose(&rng, 1.0);
+    kept.begin(7, X, displacement);
+    ChildBounds bounds, loaded;
+    EXPECT_FALSE(kept.load(3, &loaded));
+    bounds.set_all(0.02, 0.03);
+    bounds.floor[5] = -kInfinity;
+    bounds.outside[6] = kInfinity;
+    kept.store(3, bounds);
+    kept.store(~3, bounds);
+    double moved = 0.0;
+    while (moved < 0.09) {
+      const Eigen::Isometry3d next = small_motion(1e-3, &rng) * X;
+      moved += displacement.between(X, next);
+      X = next;
+      kept.begin(7, X, displacement);
+    }
+    for (const std::int32_t child : {3, ~3}) {
+      ASSERT_TRUE(kept.load(child, &loaded));
+      EXPECT_LE(loaded.floor[0], 0.02 - moved);
+      EXPECT_GT(loaded.floor[0], 0.02 - moved - 1e-7);
+      EXPECT_EQ(loaded.floor[5], -kInfinity);
+      EXPECT_EQ(loaded.outside[6], kInfinity);
+      if (link.solid.is_closed()) continue;  // which needs one of the two only
+      EXPECT_LE(loaded.outside[0], 0.03 - moved);
+      EXPECT_GT(loaded.outside[0], 0.03 - moved - 1e-7);
+    }
+    EXPECT_FALSE(kept.load(4, &loaded));
+    // Another index has bounds of its own, and neither forgets the other's.
+    kept.begin(8, X, displacement);
+    EXPECT_FALSE(kept.load(3, &loaded));
+    kept.begin(7, X, displacement);
+    EXPECT_TRUE(kept.load(3, &loaded));
+    // What has moved too far, or by an unknown displacement, is discarded.
+    Eigen::Isometry3d far = X;
+    far.translation().x() += 0.05;
+    kept.begin(7, far, displacement);
+    EXPECT_FALSE(kept.load(3, &loaded));
+    kept.store(3, bounds);
+    far.translation().x() = std::numeric_limits<double>::quiet_NaN();
+    kept.begin(7, far, displacement);
+    EXPECT_FALSE(kept.load(3, &loaded));
+    kept.begin(7, X, displacement);
+    kept.store(3, bounds);
+    kept.forget();
+    kept.begin(7, X, displacement);
+    EXPECT_FALSE(kept.load(3, &loaded));
+  }
+}
+
+}  // namespace
+}  // namespace ist

@@ -1,0 +1,94 @@
+"""The report: what it says of the demo's arm, and its messages for input that is wrong."""
+
+import html.parser
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+URDF = ROOT / 'demo' / 'demo_arm.urdf'
+ENVIRONMENT = {**os.environ, 'ROS_PACKAGE_PATH': str(ROOT)}
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, ROOT / 'scripts' / 'proximity_report', *map(str, arguments)],
+                          check=False, capture_output=True, text=True, timeout=200, env=ENVIRONMENT)
+
+
+class Page(html.parser.HTMLParser):
+    """The text of a page by its headings, and every address it refers to."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.sections, self.addresses, self.open, self.heading = {}, [], [], ''
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.addresses += [value for name, value in attrs if name in ('src', 'href')]
+        if tag != 'meta':  # which has no end
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] == 'h2':
+            self.heading = data
+        self.sections[self.heading] = self.sections.get(self.heading, '') + data + ' '
+
+
+@pytest.fixture(scope='module', name='wall')
+def fixture_wall(tmp_path_factory):
+    """A wall of points in front of the arm, as ascii PLY."""
+    y, z = np.meshgrid(np.linspace(-0.5, 0.5, 40), np.linspace(0.0, 1.0, 40))
+    lines = [f'0.6 {a:.4f} {b:.4f}' for a, b in zip(y.ravel(), z.ravel())]
+    path = tmp_path_factory.mktemp('scene') / 'wall.ply'
+    path.write_text('ply\nformat ascii 1.0\n' + f'element vertex {len(lines)}\n'
+                    'property float x\nproperty float y\nproperty float z\nend_header\n'
+                    + '\n'.join(lines) + '\n')
+    return path
+
+
+def test_page(wall, tmp_path):
+    output = tmp_path / 'report.html'
+    result = run('--urdf', URDF, '--cloud', wall, '--output', output, '--max-error', 0.01, 0.02,
+                 '--tolerance', 0.001, 0, '--joints', 'shoulder_pitch=0.4')
+    assert result.returncode == 0, result.stderr
+    page = Page(output.read_text(encoding='utf-8'))
+    assert page.open == [] and page.addresses == []  # whole, and complete without anything else
+    assert 'max_error: 0.0' in page.sections['Recommended parameters']
+    assert 'tool0' in page.sections['Warnings']  # a link without geometry
+    assert '1600' in page.sections['Scene'] and 'shoulder_pitch 0.400' in page.sections['Scene']
+    for link in ('base_link', 'gripper_link'):
+        assert link in page.sections['Packing']
+    assert '10' in page.sections['Speed against error'] and '20' in page.sections['Speed against error']
+
+
+@pytest.mark.parametrize('change, message', [
+    ({'--cloud': 'cut.ply'}, 'is cut off'),
+    ({'--cloud': 'none.pcd'}, 'none.pcd'),
+    ({'--urdf': 'empty.urdf'}, 'no usable link'),
+    ({'--urdf': 'robot.urdf.xacro'}, 'xacro'),
+    ({'--joints': 'knee=1'}, 'no joint knee'),
+    ({'--joints': 'knee'}, 'NAME=POSITION'),
+    ({'--rate': '0'}, '--rate'),
+    ({'--max-error': '-1'}, 'max_error'),
+    ({'--cloud': 'damaged.bag'}, 'bag'),
+])
+def test_wrong_input(change, message, wall, tmp_path):
+    (tmp_path / 'cut.ply').write_text(wall.read_text()[:300])
+    (tmp_path / 'empty.urdf').write_text('<robot name="r"><link name="l"/></robot>')
+    (tmp_path / 'robot.urdf.xacro').write_text(
+        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:no_such_macro/></robot>')
+    (tmp_path / 'damaged.bag').write_text('#ROSBAG V2.0\nnothing')
+    arguments = {'--urdf': URDF, '--cloud': wall, '--max-error': '0.02', '--tolerance': '0.001'}
+    for name, value in change.items():
+        arguments[name] = tmp_path / value if '.' in value else value
+    result = run('--output', tmp_path / 'report.html',
+                 *(word for pair in arguments.items() for word in pair))
+    assert result.returncode != 0 and message in result.stderr, result.stderr
+    assert 'Traceback' not in result.stderr

@@ -1,0 +1,244 @@
+// A cycle without a ROS master: what it costs, and what its parts are.
+
+#include <gtest/gtest.h>
+#include <ist_proximity/ProximityArray.h>
+#include <ros/time.h>
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/contact/contact_model.h"
+#include "ist_proximity/robot/link_poses.h"
+#include "ros/cycle/proximity_cycle.h"
+#include "ros/output/message_pool.h"
+#include "support/allocations.h"
+#include "support/cycle_parts.h"
+#include "support/demo_arm.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+
+constexpr std::size_t kWidth = 64, kHeight = 48;
+// Longer than what a string holds without an allocation.
+constexpr char kSource[] = "the_camera_at_the_end_of_the_bench";
+
+// A wall that the camera looks at, `depth` [m] away.
+RawCloud wall(float depth, std::shared_ptr<std::vector<float>>* xyz) {
+  *xyz = std::make_shared<std::vector<float>>();
+  for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
+    (*xyz)->push_back(depth);
+    (*xyz)->push_back(0.02F * static_cast<float>(i % kWidth) - 0.64F);
+    (*xyz)->push_back(0.02F * static_cast<float>(i / kWidth));
+  }
+  RawCloud cloud;
+  cloud.data = reinterpret_cast<const std::uint8_t*>((*xyz)->data());
+  cloud.width = kWidth;
+  cloud.height = kHeight;
+  cloud.point_step = 3 * sizeof(float);
+  cloud.row_step = cloud.width * cloud.point_step;
+  cloud.y = sizeof(float);
+  cloud.z = 2 * sizeof(float);
+  cloud.owner = *xyz;
+  return cloud;
+}
+
+// The demo arm's volumes, packed coarsely.
+std::shared_ptr<const ContactModel> contacts_of(const std::shared_ptr<const RobotModel>& robot,
+                                                const RobotDescription& description) {
+  auto contacts = std::make_shared<ContactModel>();
+  contacts->robot = robot;
+  ContactConfig config;
+  config.packing.max_spheres = 30;
+  for (std::size_t i = 0; i < robot->links.size(); ++i) {
+    contacts->links.push_back(
+        build_contact_geometry(description.links[i].geometry, 0, robot->links[i], config, ""));
+  }
+  return contacts;
+}
+
+class Cycle : public ::testing::Test {
+ protected:
+  Cycle()
+      : description_(test::demo_robot()),
+        robot_(test::demo_model()),
+        kinematics_(description_),
+        q_(kinematics_.joints().size(), 0.0),
+        ingest_(IngestConfig()) {
+    ros::Time::init();
+    auto poses = std::make_unique<test::StatedPoses>();
+    poses_ = poses.get();
+    poses_->set(link_poses(*robot_, kinematics_, q_).X_FL);
+    cycle_ = std::make_unique<ProximityCycle>(test::ready_model(robot_), ServerConfig(),
+                                              std::move(poses), CloudSelection::Reader::kOnly);
+    auto source = std::make_unique<test::StatedSource>(kSource);
+    source_ = source.get();
+    sources_.push_back(std::move(source));
+    live_.contacts = contacts_of(robot_, description_);
+    live_.query.deadline = 0.0;
+    // As in a URDF, the model's links and the description's are in the same order.
+    for (std::size_t i = 0; i < robot_->links.size(); ++i) {
+      EXPECT_EQ(robot_->links[i].name, description_.links[i].name);
+    }
+  }
+
+  void see_wall(float depth) {
+    ingest_.run(wall(depth, &xyz_), Eigen::Isometry3d::Identity(), {}, now_.toSec(),
+                source_->cloud(now_));
+  }
+
+  // Moves the arm, runs a cycle and reports it. Returns the allocations of cycle and report.
+  long step(boost::shared_ptr<ProximityArray>* message) {
+    now_ += ros::Duration(0.001);
+    for (double& position : q_) position += 1e-4;
+    poses_->set(link_poses(*robot_, kinematics_, q_).X_FL);
+    if (is_fresh_) source_->cloud(now_);
+    const long before = test::allocations;
+    *message = messages_.take();
+    cycle_->run(now_, sources_, live_, transform_problem_, message->get());
+    cycle_->report(**message, &report_);
+    return test::allocations - before;
+  }
+
+  RobotDescription description_;
+  std::shared_ptr<const RobotModel> robot_;
+  Kinematics kinematics_;
+  std::vector<double> q_;
+  Ingest ingest_;
+  std::shared_ptr<std::vector<float>> xyz_;
+  test::StatedPoses* poses_ = nullptr;
+  test::StatedSource* source_ = nullptr;
+  CloudSources sources_;
+  std::unique_ptr<ProximityCycle> cycle_;
+  LiveConfig live_;
+  MessagePool<ProximityArray> messages_;
+  CycleReport report_;
+  const std::string transform_problem_;
+  ros::Time now_{100.0};
+  bool is_fresh_ = true;  // the cloud in use has the newest stamp
+};
+
+// Messages, strings and lists are used again.
+TEST_F(Cycle, AllocatesNothingOnceItIsSteady) {
+  // The last wall passes through the arm.
+  int contacts = 0;
+  for (const float depth : {0.8F, 0.5F, 0.1F}) {
+    see_wall(depth);
+    q_.assign(q_.size(), 0.0);
+    boost::shared_ptr<ProximityArray> message;
+    for (int i = 0; i < 10; ++i) step(&message);  // the pool's messages get their memory
+    for (int i = 0; i < 2000; ++i) {              // more than the report keeps the times of
+      const long count = step(&message);
+      if (i < 1000) continue;
+      ASSERT_EQ(count, 0) << "wall at " << depth << ", cycle " << i;
+      for (const auto& link : message->links) {
+        if (link.state != link.CONTACT) continue;
+        ++contacts;
+        EXPECT_TRUE(std::isfinite(link.penetration.force.x)) << link.link;
+      }
+    }
+    ASSERT_EQ(message->status, ProximityArray::OK) << message->status_text;
+    ASSERT_EQ(message->links.size(), robot_->links.size());
+    EXPECT_EQ(message->sources.at(0).name, kSource);
+    see_wall(depth + 0.05F);
+    EXPECT_EQ(step(&message), 0) << "the first cycle with a new cloud";
+  }
+  EXPECT_GT(contacts, 0);
+}
+
+// A message that a subscriber holds is not written to; what it no longer holds is used again.
+TEST_F(Cycle, LeavesMessagesAloneThatOthersHold) {
+  see_wall(0.5F);
+  std::vector<boost::shared_ptr<ProximityArray>> held(40);
+  std::vector<ros::Time> stamps;
+  for (auto& message : held) {
+    step(&message);
+    stamps.push_back(message->header.stamp);
+  }
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    EXPECT_EQ(held[i]->header.stamp, stamps[i]);
+    for (std::size_t k = 0; k < i; ++k) ASSERT_NE(held[i], held[k]);
+  }
+}
+
+// A field that one cycle has set must not stay in the message of another one.
+TEST_F(Cycle, MessagesThatAreUsedAgainHoldTheirOwnCycleOnly) {
+  boost::shared_ptr<ProximityArray> message;
+  see_wall(0.1F);
+  for (int i = 0; i < 20; ++i) step(&message);
+  source_->cloud(now_ - ros::Duration(90.0));  // stale
+  is_fresh_ = false;
+  for (int i = 0; i < 20; ++i) {
+    step(&message);
+    EXPECT_EQ(message->status, ProximityArray::STALE_CLOUD);
+    EXPECT_NE(message->status_text, "");
+    for (const auto& link : message->links) {
+      EXPECT_EQ(link.state, link.UNKNOWN);
+      EXPECT_EQ(link.source, "");
+      EXPECT_TRUE(std::isnan(link.distance) && std::isnan(link.penetration.force.x));
+      EXPECT_EQ(link.closing_unknown, link.ROBOT_UNKNOWN | link.OBSTACLES_UNKNOWN);
+    }
+  }
+  is_fresh_ = true;
+  see_wall(3.0F);  // CLEAR: out of range
+  for (int i = 0; i < 20; ++i) {
+    step(&message);
+    EXPECT_EQ(message->status, ProximityArray::OK);
+    EXPECT_EQ(message->status_text, "");
+    for (const auto& link : message->links) EXPECT_EQ(link.source, "");
+  }
+}
+
+// The parts add up, and the report keeps them.
+TEST_F(Cycle, SaysWhereItsTimeGoes) {
+  see_wall(0.1F);
+  boost::shared_ptr<ProximityArray> message;
+  for (int i = 0; i < 10; ++i) step(&message);
+  EXPECT_GT(message->query_time, 0.0);
+  EXPECT_GT(message->repulsion_time, 0.0);
+  EXPECT_GT(message->penetration_time, 0.0);
+  EXPECT_DOUBLE_EQ(message->query_time + message->repulsion_time + message->penetration_time +
+                       message->message_time,
+                   message->computation_time);
+  EXPECT_GT(report_.parts[kPartQuery].quantile(0.5), 0.0);
+}
+
+// Whatever time is left, every link has an answer, repulsion is finite and the status says what was
+// left.
+TEST_F(Cycle, EndsAtItsDeadline) {
+  see_wall(0.1F);
+  boost::shared_ptr<ProximityArray> message;
+  for (const double deadline : {1e-9, 1e-5, 1e-4, 10.0}) {
+    live_.query.deadline = deadline;
+    for (int i = 0; i < 50; ++i) {
+      step(&message);
+      std::size_t wide = 0;
+      for (const auto& link : message->links) {
+        if (link.state == link.UNKNOWN) {
+          ++wide;
+          continue;
+        }
+        EXPECT_TRUE(std::isfinite(link.repulsion.x)) << link.link;
+        if (link.state != link.CLEAR && link.distance - link.lower_bound > 0.001 + 2e-6) ++wide;
+      }
+      EXPECT_EQ(message->unfinished, wide);
+      if (message->status != ProximityArray::OK) {
+        EXPECT_EQ(message->status, ProximityArray::DEGRADED);
+        EXPECT_NE(message->status_text.find("~query/deadline"), std::string::npos);
+      } else {
+        EXPECT_EQ(wide, 0U);
+      }
+    }
+  }
+  EXPECT_EQ(message->status, ProximityArray::OK);
+  EXPECT_GT(report_.worst_deadline.unblended, 0U);
+  EXPECT_GT(report_.deadlines_missed, 50U);
+}
+
+}  // namespace
+}  // namespace ist

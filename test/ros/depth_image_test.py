@@ -1,0 +1,239 @@
+#!/usr/bin/env python3
+"""Depth images as a source: the distances of their points, what is malformed, and silence."""
+
+import contextlib
+import re
+import sys
+import unittest
+
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+
+FAR_BOX = pt.transform((0, 0.8, 0))
+X_BASE_CAMERA = pt.transform((0.0, 0.0, -0.9), axis=(0, 0, 1), angle=0.2)
+WIDTH, HEIGHT = 64, 48
+FOCAL_LENGTH, CX, CY = 60.0, 31.0, 24.5
+NUMPY = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+
+
+def depths():
+    """A tilted wall, 0.6 m in front of the camera, with pixels that saw nothing [m]."""
+    image = 0.6 + 0.002 * np.arange(WIDTH)[None, :] + 0.001 * np.arange(HEIGHT)[:, None]
+    image[::7, ::5] = 0.0
+    return np.round(image, 3)
+
+
+def points(image):
+    """The cloud that is made of the image, in the camera's frame."""
+    v, u = np.mgrid[0 : image.shape[0], 0 : image.shape[1]]
+    cloud = np.stack([(u - CX) * image, (v - CY) * image, FOCAL_LENGTH * image], axis=-1)
+    return (cloud / FOCAL_LENGTH)[image > 0.0]
+
+
+def camera_info(frame="camera", **members):
+    f = FOCAL_LENGTH
+    info = CameraInfo(width=WIDTH, height=HEIGHT, distortion_model="plumb_bob", D=[0.0] * 5)
+    info.P = [f, 0, CX, 0, 0, f, CY, 0, 0, 0, 1, 0]
+    info.header.frame_id = frame
+    for name, value in members.items():
+        setattr(info, name, value)
+    return info
+
+
+def image(values, encoding="16UC1", big=False, padding=0, frame="camera", **members):
+    kind = np.dtype((">" if big else "<") + NUMPY[encoding])
+    scaled = values if encoding == "32FC1" else np.round(1000.0 * values)
+    rows = [row.tobytes() + b"\xab" * padding for row in scaled.astype(kind)]
+    message = Image(width=values.shape[1], height=values.shape[0], encoding=encoding)
+    message.header.frame_id, message.header.stamp = frame, rospy.Time.now()
+    message.is_bigendian, message.step, message.data = big, len(rows[0]), b"".join(rows)
+    for name, value in members.items():
+        setattr(message, name, value)
+    return message
+
+
+MALFORMED = [
+    ({"encoding": "rgb8"}, "encoding is 'rgb8'"),
+    ({"step": 127}, "step is 127"),
+    ({"data": b"1234"}, "data holds 4 bytes"),
+    ({"width": 0}, "width 0"),
+    ({"width": 63}, "has 63 x 48 pixels, its camera"),
+    ({"height": 4000000000}, "data holds 6144 bytes"),
+]
+P = camera_info().P
+BAD_CAMERAS = [
+    ({"P": [0.0] * 12}, "not calibrated"),
+    ({"P": [0.0] + P[1:]}, "P[0] is 0"),
+    ({"P": [float("nan")] + P[1:]}, "P[0] is nan"),
+    ({"P": P[:3] + [-9.0] + P[4:]}, "P[3] is -9"),
+    ({"width": 0}, "width is 0"),
+    ({"width": 640}, "its camera (width and height"),
+]
+
+
+class DepthImageTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace, X_BASE_CAMERA).stand(box=FAR_BOX)
+        self.images = rospy.Publisher(self.namespace + "/depth/image", Image, queue_size=10)
+        self.infos = {}
+        self.info = camera_info()
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        for publisher in [self.images, *self.infos.values()]:
+            publisher.unregister()
+        for message in self.node.messages:
+            pt.check_invariants(self, message)
+        self.assertEqual(self.node.stop(), 0)
+
+    def start(self, topic="depth/camera_info", **source):
+        source = {"topic": "depth/image", "type": "sensor_msgs/Image", **source}
+        self.infos[topic] = rospy.Publisher(self.namespace + "/" + topic, CameraInfo, queue_size=10)
+        self.node = pt.ProximityNode(
+            self.namespace, {"sources": {"depth": source}, "query/tolerance": 0.0}, pt.urdf()
+        )
+        self.world.start_tf()
+        if self.info is not None:
+            self.world.repeat(10, lambda: self.infos[topic].publish(self.info))
+
+    @contextlib.contextmanager
+    def stream(self, make, rate=20):
+        repeater = self.world.repeat(rate, lambda: self.images.publish(make()))
+        try:
+            yield repeater
+        finally:
+            repeater.stop()
+
+    def check_wall(self, **format):
+        seen = pt.apply(X_BASE_CAMERA, points(depths()))
+        with self.stream(lambda: image(depths(), **format)):
+            begin = rospy.Time.now()
+            answer = self.node.wait_for(
+                lambda m: m.status == 0 and m.cloud_stamp > begin, "the wall"
+            )
+        for name, link_pose in (("ball_link", pt.transform()), ("box_link", FAR_BOX)):
+            truth = pt.DISTANCE[name](pt.apply(pt.inverse(link_pose), seen)).min()
+            self.assertAlmostEqual(pt.link(answer, name).distance, truth, 5)
+            self.assertEqual(pt.link(answer, name).source, "depth")
+        self.assertEqual(answer.sources[0].points_received, WIDTH * HEIGHT)
+        self.assertEqual(answer.sources[0].points_used, len(seen))
+
+    def test_distances_and_silence(self):
+        self.start()
+        for format in (
+            {},
+            {"encoding": "mono16", "big": True, "padding": 3},
+            {"encoding": "32FC1"},
+            {"encoding": "32FC1", "big": True, "padding": 5},
+        ):
+            with self.subTest(format):
+                self.check_wall(**format)
+        message = self.node.wait_for_status(ProximityArray.STALE_CLOUD, "the newest image is")
+        self.assertTrue(pt.all_unknown(message))
+        # A blind camera knows nothing; one that measured that nothing is in range does.
+        for blind, format in ((0.0, {}), (np.nan, {"encoding": "32FC1"})):
+            with self.stream(lambda b=blind, f=format: image(np.full((HEIGHT, WIDTH), b), **f)):
+                message = self.node.wait_for_status(
+                    ProximityArray.NO_CLOUD, "every point of the newest image is NaN"
+                )
+                self.assertTrue(pt.all_unknown(message))
+            self.check_wall()
+        far = np.full((HEIGHT, WIDTH), np.inf)
+        with self.stream(lambda: image(far, encoding="32FC1")):
+            message = self.node.wait_for(
+                lambda m: m.status == 0 and m.sources[0].points_used == 0, "nothing in range"
+            )
+        self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+
+    def test_malformed(self):
+        self.start()
+        self.check_wall()
+        for members, words in MALFORMED:
+            with self.subTest(words), self.stream(lambda m=members: image(depths(), **m)):
+                message = self.node.wait_for(
+                    lambda m: m.status != 0 and words in m.status_text, words
+                )
+                self.assertIn("malformed image", message.status_text)
+                self.assertTrue(pt.all_unknown(message))
+        self.check_wall()
+        for members, words in BAD_CAMERAS:
+            self.info = camera_info(**members)
+            with self.subTest(words), self.stream(lambda: image(depths())):
+                message = self.node.wait_for(
+                    lambda m: m.status != 0 and words in m.status_text, words
+                )
+                self.assertTrue(pt.all_unknown(message))
+        self.info = camera_info(frame="another")
+        with self.stream(lambda: image(depths())):
+            self.node.wait_for_status(ProximityArray.STALE_CLOUD, "is of 'another'")
+        self.info = camera_info(frame="")
+        self.check_wall()
+
+    def test_camera_info(self):
+        """Without a CameraInfo nothing is known, and the text says where one is expected."""
+        self.info = None
+        self.start("elsewhere/info", camera_info="elsewhere/info")
+        with self.stream(lambda: image(depths())):
+            message = self.node.wait_for_status(
+                ProximityArray.NO_CLOUD, self.namespace + "/elsewhere/info; set ~sources/depth/"
+            )
+        self.assertTrue(pt.all_unknown(message))
+        self.info = camera_info(D=[0.1, 0.0, 0.0, 0.0, 0.0])
+        self.world.repeat(10, lambda: self.infos["elsewhere/info"].publish(self.info))
+        self.check_wall()
+        # Lens distortion: the image must be rectified. It is used, and said once.
+        self.node.wait_until(
+            lambda: self.node.log().count("has distortion coefficients") == 1, "the warning"
+        )
+
+    def test_noise_filter(self):
+        """A lone pixel, 0.2 m in front of the wall, is dropped."""
+        values = depths()
+        values[20:23, 30:33] = 0.0
+        values[21, 31] = 0.4
+        seen = pt.apply(X_BASE_CAMERA, points(np.where(values == 0.4, 0.0, values)))
+        self.start(noise_filter={"radius": 0.05})
+        with self.stream(lambda: image(values)):
+            answer = self.node.wait_for_status(ProximityArray.OK)
+        truth = pt.DISTANCE["ball_link"](seen).min()
+        self.assertAlmostEqual(pt.link(answer, "ball_link").distance, truth, 5)
+
+    def test_wrong_topic(self):
+        """A topic of another type is named; else the topics that a source could have."""
+        other = rospy.Publisher(self.namespace + "/points", PointCloud2, queue_size=1)
+        self.start(topic="depth/camera_info")
+        self.node.stop()
+        name = self.namespace + "/depth/image"
+        cases = (
+            ({"c": {"topic": "depth/image"}}, name + r" is a sensor_msgs/Image: give the source"),
+            ({"c": {"topic": "nothing"}}, r"published are .*" + self.namespace + r"/points \("),
+            ({"c": {"topic": "depth/camera_info"}}, "CameraInfo, which no source reads"),
+        )
+        for sources, words in cases:
+            with self.subTest(words):
+                rospy.delete_param(self.node.name)
+                self.node = pt.ProximityNode(self.namespace, {"sources": sources}, pt.urdf())
+                expected = re.compile(words)
+                message = self.node.wait_for(
+                    lambda m: expected.search(m.status_text), words  # noqa: B023
+                )
+                self.assertEqual(message.status, ProximityArray.NO_CLOUD)
+                self.assertNotIn("filtered_cloud", message.status_text)
+                self.node.wait_until(
+                    lambda: expected.search(self.node.log()), "the log"  # noqa: B023
+                )
+                if sources is not cases[-1][0]:
+                    self.node.stop()
+        other.unregister()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("depth_image_test")
+    rostest.rosrun("ist_proximity", "depth_image_test", DepthImageTest, sys.argv)

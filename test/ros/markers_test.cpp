@@ -1,0 +1,139 @@
+#include "ros/output/markers.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ros/output/label_layout.h"
+#include "ros/output/nearest_summary.h"
+#include "ros/output/nearness_color.h"
+
+namespace ist {
+namespace {
+
+using ist_proximity::ProximityArray;
+using Link = ist_proximity::LinkProximity;
+using visualization_msgs::Marker;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+Link link(const std::string& name, double distance, double x = 0.0) {
+  Link one;
+  one.link = name;
+  one.distance = distance;
+  one.state = std::isnan(distance) ? Link::UNKNOWN
+              : distance == kInf   ? Link::CLEAR
+              : distance < 0.0     ? Link::CONTACT
+                                   : Link::NEAR;
+  one.point_on_link.x = one.point_on_obstacle.x = x;
+  one.point_on_obstacle.z = -distance;
+  one.repulsion.z = 0.5;
+  return one;
+}
+
+ProximityArray array(const std::vector<Link>& links, std::uint8_t status = ProximityArray::OK) {
+  ProximityArray message;
+  message.header.frame_id = "base";
+  message.status = status;
+  message.links = links;
+  return message;
+}
+
+std::map<std::pair<std::string, int>, Marker> by_key(const visualization_msgs::MarkerArray& all) {
+  std::map<std::pair<std::string, int>, Marker> markers;
+  for (const Marker& one : all.markers) markers[{one.ns, one.id}] = one;
+  return markers;
+}
+
+TEST(NearestSummary, SaysWhatIsNearestAndWhatIsNotKnown) {
+  NearestSummary all =
+      summarize_nearest(array({link("a", 0.4), link("b", 0.2), link("c", kInf)}), 1.0);
+  EXPECT_EQ(all.link, 1);
+  EXPECT_EQ(all.text, "0.200 m\nb");
+  EXPECT_EQ(summarize_nearest(array({link("a", 0.4), link("b", -0.02)}), 1.0).text, "-0.020 m\nb");
+  EXPECT_EQ(summarize_nearest(array({link("a", kInf)}), 0.5).text, "> 0.50 m");
+  all = summarize_nearest(array({link("a", kNaN), link("b", kNaN)}, ProximityArray::STALE_CLOUD),
+                          1.0);
+  EXPECT_EQ(all.link, -1);
+  EXPECT_EQ(all.text, "NOT KNOWN\nSTALE_CLOUD");
+  EXPECT_EQ(summarize_nearest(array({}, ProximityArray::MODEL_ERROR), 1.0).text,
+            "NOT KNOWN\nMODEL_ERROR");
+  // One unknown link must not vanish behind a clear one.
+  all = summarize_nearest(array({link("a", kNaN), link("b", kInf)}, ProximityArray::NO_POSE), 1.0);
+  EXPECT_EQ(all.text, "> 1.00 m\n1 links NOT KNOWN\nNO_POSE");
+}
+
+TEST(NearnessColor, OneScale) {
+  const auto is = [](double distance, float r, float g) {
+    const std_msgs::ColorRGBA color = nearness_color(distance, 1.0);
+    EXPECT_FLOAT_EQ(color.r, r) << distance;
+    EXPECT_FLOAT_EQ(color.g, g) << distance;
+  };
+  is(-0.1, 1.0F, 0.0F);
+  is(0.0, 1.0F, 0.0F);
+  is(0.5, 1.0F, 1.0F);
+  is(1.0, 0.0F, 1.0F);
+  is(kInf, 0.0F, 1.0F);
+  is(kNaN, 0.6F, 0.6F);
+}
+
+TEST(LabelLayout, NoRowCrossesAnother) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> height(0.0, 0.3);
+  for (int round = 0; round < 200; ++round) {
+    std::vector<Label> labels(12);
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      labels[i] = {i, Eigen::Vector3d(height(random), height(random), height(random))};
+    }
+    const std::vector<Label> placed = place_labels(labels, 0.04, 0.12);
+    ASSERT_FALSE(placed.empty());
+    EXPECT_EQ(placed[0].id, 0U);
+    EXPECT_EQ(placed[0].position, labels[0].position) << "the first one stays in its place";
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      EXPECT_LE((placed[i].position - labels[placed[i].id].position).norm(), 0.12 + 1e-12);
+      for (std::size_t k = 0; k < i; ++k) {
+        EXPECT_GE(std::abs(placed[i].position.z() - placed[k].position.z()), 0.04 - 1e-6);
+      }
+    }
+  }
+}
+
+TEST(ProximityMarkers, NamespacesAndIds) {
+  ProximityMarkers drawer(1.0, 1.0);
+  auto drawn = by_key(drawer.draw(
+      array({link("far", 0.5), link("near", 0.2, 0.1), link("unknown", kNaN), link("c", kInf)})));
+  for (const char* ns : {"distance", "point_on_link", "point_on_obstacle", "repulsion"}) {
+    EXPECT_EQ(drawn.count({ns, 0}), 1U) << ns;
+    EXPECT_EQ(drawn.count({ns, 1}), 1U) << ns;
+    EXPECT_EQ(drawn.count({ns, 2}), 0U) << ns;
+    EXPECT_EQ(drawn.count({ns, 3}), 0U) << ns;
+  }
+  // Labels of near links only, and the nearest link highlighted.
+  EXPECT_EQ(drawn.count({"text", 0}), 0U);
+  EXPECT_EQ((drawn[{"text", 1}].text), "near 0.200 m");
+  EXPECT_EQ((drawn[{"nearest", 0}].text), "0.200 m\nnear\n1 links NOT KNOWN");
+  EXPECT_EQ((drawn[{"nearest", 1}].points[1].x), 0.1);
+  EXPECT_EQ((drawn[{"nearest", 2}].pose.position.x), 0.1);
+  EXPECT_GT((drawn[{"nearest", 0}].scale.z), 2.0 * (drawn[{"text", 1}].scale.z));
+  EXPECT_EQ(drawn.size(), 4U * 2U + 1U + 3U);
+  // Arrows of repulsion are of no colour of the scale: those have little blue.
+  EXPECT_GT((drawn[{"repulsion", 0}].color.b), 0.5F);
+
+  drawn = by_key(drawer.draw(array({link("far", kInf), link("near", kInf)})));
+  for (const auto& [key, one] : drawn) {
+    const bool stays = key == std::pair<std::string, int>("nearest", 0);
+    EXPECT_EQ(one.action, stays ? Marker::ADD : Marker::DELETE) << key.first << key.second;
+  }
+  EXPECT_EQ((drawn[{"nearest", 0}].text), "> 1.00 m");
+  EXPECT_EQ(drawn.size(), 12U);
+}
+
+}  // namespace
+}  // namespace ist
