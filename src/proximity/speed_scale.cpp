@@ -98,6 +98,27 @@ double separation_scale(const SeparationConfig& config, double bound, double obs
   return std::min(rest / std::max(time * config.robot_speed, 1e-9), 1.0);
 }
 
+// What one link allows.
+// @param held  [m] the bound that hysteresis gives
+SpeedScaleAnswer scale_of_link(const SpeedScaleConfig& config, double stop, double free,
+                               double held, const SpeedScaleInput& input, double age) {
+  SpeedScaleAnswer answer;
+  answer.bound = std::min(held, input.lower_bound);
+  answer.stop_distance = stop;
+  answer.free_distance = free;
+  answer.scale = ramp(config, stop, free, held);
+  answer.rule = answer.scale <= 0.0 ? SpeedRule::kStop : SpeedRule::kSlow;
+  if (answer.scale >= 1.0) answer.rule = SpeedRule::kFree;
+  if (!config.separation.enabled) return answer;
+  const double allowed =
+      separation_scale(config.separation, answer.bound, input.obstacle_speed, age);
+  if (allowed < answer.scale) {
+    answer.scale = allowed;
+    answer.rule = SpeedRule::kSeparation;
+  }
+  return answer;
+}
+
 }  // namespace
 
 std::vector<std::string> config_errors(const SpeedScaleConfig& config, const std::string& prefix,
@@ -220,22 +241,11 @@ SpeedScaleAnswer SpeedScale::update(const SpeedScaleConfig& config,
     }
     hold_bound(i, input, config.hysteresis);
     const auto [stop, free] = distances(config, i);
-    double scale = ramp(config, stop, free, held_[i]);
-    SpeedRule rule = scale <= 0.0 ? SpeedRule::kStop : SpeedRule::kSlow;
-    if (scale >= 1.0) rule = SpeedRule::kFree;
-    if (config.separation.enabled) {
-      // A link that is CLEAR is known to be as far away as its bound says, and no farther.
-      const double bound = std::min(held_[i], input.lower_bound);
-      const double allowed =
-          separation_scale(config.separation, bound, input.obstacle_speed, std::max(age, 0.0));
-      if (allowed < scale) {
-        scale = allowed;
-        rule = SpeedRule::kSeparation;
-      }
-    }
-    const double bound = std::min(held_[i], input.lower_bound);
-    if (scale > least.scale || (scale == least.scale && bound >= least.bound)) continue;
-    least = {scale, rule, static_cast<std::int32_t>(i), bound, stop, free};
+    // A link that is CLEAR is held at +inf, and known to be as far away as its bound says.
+    SpeedScaleAnswer one = scale_of_link(config, stop, free, held_[i], input, std::max(age, 0.0));
+    if (one.scale > least.scale || (one.scale == least.scale && one.bound >= least.bound)) continue;
+    one.link = static_cast<std::int32_t>(i);
+    least = one;
   }
   return least.link < 0 ? answer : least;
 }

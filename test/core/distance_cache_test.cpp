@@ -37,6 +37,19 @@ TEST(DistanceCache, FindsTheSamePointOfTheSameIndex) {
   EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, p)));
 }
 
+// Points share the entries of the cache; none is given what another has stored.
+TEST(DistanceCache, TellsPointsOfOneEntryApart) {
+  DistanceCache cache;
+  const Eigen::Vector3d p(0.1, 0.2, 0.3);
+  cache.store(1, Quantity::kSigned, 7, p, 0.5);
+  for (std::uint32_t key = 0; key < 100000; ++key) {
+    for (const Quantity quantity : {Quantity::kUnsigned, Quantity::kSigned, Quantity::kOutside}) {
+      const bool is_it = key == 7 && quantity == Quantity::kSigned;
+      ASSERT_EQ(std::isfinite(cache.find(1, quantity, key, p)), is_it) << key;
+    }
+  }
+}
+
 // More points than the cache has entries move in and out of a link.
 TEST(DistanceCache, BoundsAreNeverAboveTheTruth) {
   test::Rng rng(91);

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
+#include "internal/proximity/deadline.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -311,6 +313,60 @@ TEST(ProximityQuery, BoundsHoldWheneverTheDeadlinePasses) {
     }
   }
   EXPECT_GT(unfinished, test::scaled(20));
+}
+
+// The same at every single step, in place of where the clock happens to stop a query: two clouds,
+// and points inside. Where the answer has a point, its distance is that point's, with its side.
+TEST(ProximityQuery, BoundsHoldWhereverAQueryStops) {
+  test::Rng rng(143);
+  std::vector<TriangleMesh> meshes = link_meshes();
+  meshes.push_back(test::open_box({0.1, 0.1, 0.15}));
+  const auto model = test::make_model(shapes_of(meshes), 0.005);
+  std::vector<Solid> solids;
+  for (const LinkModel& link : model->links) solids.push_back(link.solid);
+  const std::vector<bool> known(meshes.size(), true);
+  int stopped = 0, answered = 0, contacts = 0;
+  for (int scene = 0; scene < test::scaled(60); ++scene) {
+    std::vector<Eigen::Isometry3d> X_FL(meshes.size());
+    for (Eigen::Isometry3d& X : X_FL) X = test::random_pose(&rng, 0.3);
+    std::vector<Eigen::Vector3d> points_F = random_cloud(&rng, scene, 400);
+    const Eigen::Vector3d inside = X_FL[static_cast<std::size_t>(scene) % 6].translation();
+    for (int i = 0; i < 100; ++i) points_F.push_back(inside + test::random_vector(&rng, 0.05));
+    const CloudSnapshot first = test::make_snapshot(random_cloud(&rng, scene + 1, 400)),
+                        second = test::make_snapshot(points_F);
+    std::vector<double> truth;
+    for (std::size_t k = 0; k < meshes.size(); ++k) {
+      const Eigen::Isometry3d X_LF = X_FL[k].inverse();
+      truth.push_back(std::min(test::oracle_minimum(meshes[k], stored_points(first, X_LF)),
+                               test::oracle_minimum(meshes[k], stored_points(second, X_LF))));
+    }
+    QueryConfig config;
+    config.max_distance = 2.0;
+    config.deadline = 1e3;
+    bool complete = false;
+    for (double step = 0.0; !complete; step = std::ceil(1.2 * step + 0.5)) {
+      ProximityQuery query(model, config);
+      std::vector<LinkProximity> results;
+      Deadline::asks_left_for_test = static_cast<std::int64_t>(step);
+      complete = query.run(X_FL, known, {&first, &second}, &results);
+      Deadline::asks_left_for_test = -1;
+      stopped += complete ? 0 : 1;
+      for (std::size_t k = 0; k < meshes.size(); ++k) {
+        const LinkProximity& result = results[k];
+        ASSERT_LE(result.lower_bound, truth[k] + 1e-9) << "step " << step << ", link " << k;
+        if (result.state < LinkState::kNear) continue;
+        expect_consistent(result, X_FL[k]);
+        ASSERT_GE(result.distance, truth[k] - 1e-7) << "step " << step << ", link " << k;
+        const double exact = solids[k].signed_distance(X_FL[k].inverse() * result.p_FCo).distance;
+        ASSERT_NEAR(result.distance, exact, 1e-7) << "step " << step << ", link " << k;
+        ++answered;
+        contacts += result.state == LinkState::kContact ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(stopped, test::scaled(600));
+  EXPECT_GT(answered, stopped);
+  EXPECT_GT(contacts, test::scaled(60));
 }
 
 // The deadline passes in a cloud that is far and slow to search, since all of its points are

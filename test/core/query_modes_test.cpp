@@ -51,6 +51,31 @@ double truth_of(const TriangleMesh& mesh, const Eigen::Isometry3d& X_FL,
   return test::oracle_minimum(mesh, points_L);
 }
 
+// The margin is taken off the bound of every link, that of the nearest and of those that a
+// tolerance leaves unsearched because they can hardly be nearer.
+TEST(RobotMinimum, KeepsTheMargin) {
+  test::Rng rng(37);
+  const std::vector<TriangleMesh> meshes = link_meshes();
+  const auto model = model_of(meshes);
+  const std::vector<bool> known(meshes.size(), true);
+  QueryConfig config;
+  config.tolerance = 0.1;
+  config.margin = 0.12;
+  for (int scene = 0; scene < test::scaled(200); ++scene) {
+    const std::vector<Eigen::Vector3d> points = random_points(&rng, 20);
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    const std::vector<Eigen::Isometry3d> X_FL = random_poses(&rng, meshes.size());
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+      least = std::min(least, truth_of(meshes[i], X_FL[i], points));
+    }
+    ProximityQuery query(model, config);
+    RobotProximity robot;
+    ASSERT_TRUE(query.run_minimum(X_FL, known, {&cloud}, &robot));
+    ASSERT_LE(robot.nearest.lower_bound, least - config.margin) << scene;
+  }
+}
+
 class QueryModes : public ::testing::TestWithParam<double> {};
 
 TEST_P(QueryModes, AgainstBruteForce) {

@@ -347,6 +347,39 @@ TEST(CoherentQueries, BoundsHoldWhenAMapMoves) {
   }
 }
 
+// Many points are nearly as near as the answer, so that a large tolerance prunes most of them by
+// the distances kept from earlier poses: what was pruned counts in the bound.
+TEST(CoherentQueries, BoundsHoldAmongManyPointsOfNearlyTheSameDistance) {
+  test::Rng rng(66);
+  const std::size_t count = shapes().size();
+  QueryConfig config;
+  for (const double tolerance : {0.005, 0.02}) {
+    config.tolerance = tolerance;
+    for (int scene = 0; scene < test::scaled(20); ++scene) {
+      Points points;
+      for (int i = 0; i < 300; ++i) {
+        points.push_back(test::uniform(&rng, 0.45, 0.47) *
+                         test::random_vector(&rng, 1.0).normalized());
+      }
+      const CloudSnapshot cloud = test::make_snapshot(points);
+      ProximityQuery query(links().shared_model(), config);
+      Poses X_FL(count);
+      std::vector<LinkProximity> results;
+      for (int step = 0; step < 20; ++step) {
+        for (Eigen::Isometry3d& X : X_FL) {
+          X = displaced(Eigen::Isometry3d::Identity(), Eigen::Vector3d::Zero(), 0.02 * step,
+                        Eigen::Vector3d::UnitZ(), test::random_vector(&rng, 0.003));
+        }
+        query.run(X_FL, std::vector<bool>(count, true), {&cloud}, &results);
+        for (std::size_t i = 0; i < count; ++i) {
+          const test::Truth truth = test::truth_of(links().link(i), X_FL[i], points, cloud);
+          test::expect_truth(results[i], truth, config, X_FL[i]);
+        }
+      }
+    }
+  }
+}
+
 // A bound kept from another pose may say that nothing is deeper than the tolerance. Where the last
 // obstacle touches the link at exactly 0, that does not settle the query: another one may be
 // inside. All numbers are multiples of 2^-12 m, so that touch is exact.

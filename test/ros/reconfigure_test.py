@@ -143,8 +143,9 @@ class ReconfigureTest(unittest.TestCase):
             lambda: "must be less than ~speed_scale/free_distance, 0.18 m" in self.node.log(), "why"
         )
         self.assertGreater(scales[-1], 0.98)
-        rospy.set_param(name + "/stop_distance", 0.17)
-        self.node.wait_until(lambda: scales[-1] < 0.99, "the new distance")
+        rospy.set_param(name + "/free_distance", 0.26)
+        rospy.set_param(name + "/stop_distance", 0.1)
+        self.node.wait_until(lambda: abs(scales[-1] - 0.5) < 0.01, "the new distances")
         separation = self.client("speed_scale/separation")
         separation.update_configuration({"enabled": True, "stopping_time": 0.1})
         self.node.wait_until(lambda: scales[-1] == 0.0, "a walking person 0.18 m away")

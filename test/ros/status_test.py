@@ -193,12 +193,9 @@ class StatusTest(unittest.TestCase):
                 self.assertEqual(frames, {"ball_link", "box/link"})
                 self.finish(self.nodes.pop())
 
-    def test_late_tf(self):
-        """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""
-        node = self.start()
-
+    def start_late_tf(self, late):
         def send_late_tf():
-            stamp = rospy.Time.now() - rospy.Duration(0.15)
+            stamp = rospy.Time.now() - rospy.Duration(late)
             self.world.publish_transforms(
                 [
                     pt.transform_message(parent, child, X, stamp)
@@ -207,12 +204,21 @@ class StatusTest(unittest.TestCase):
             )
 
         self.world.repeat(50, send_late_tf)
-        self.world.start_clouds()
+
+    def expect_ok(self, node):
+        """150 messages, of which hardly any is not OK."""
         node.wait_for_status(ProximityArray.OK)
         begin = len(node.messages)
         node.wait_for(lambda m: len(node.messages) > begin + 150, "150 messages")
         late = [m for m in node.messages[begin:] if m.status != ProximityArray.OK]
         self.assertLess(len(late), 15, late[-1].status_text if late else "")
+
+    def test_late_tf(self):
+        """Clouds that are 0.15 s ahead of tf are used as soon as tf has caught up."""
+        node = self.start()
+        self.start_late_tf(0.15)
+        self.world.start_clouds()
+        self.expect_ok(node)
         # The wait is no reason for a warning.
         node.diagnostics.pop("input cloud", None)
         node.wait_until(
@@ -220,6 +226,13 @@ class StatusTest(unittest.TestCase):
             and "not in use" not in node.diagnostics["input cloud"].message,
             "diagnostics without a word on the wait",
         )
+
+    def test_tf_is_later_than_ten_clouds(self):
+        """Only ten clouds waited: at 30 Hz none was ever used whose transforms came 0.45 s later."""
+        node = self.start(cloud_timeout=1.0, pose_timeout=1.0)
+        self.start_late_tf(0.45)
+        self.world.start_clouds(30)
+        self.expect_ok(node)
 
     def test_rate(self):
         """Every cycle is published, whatever is missing."""
