@@ -112,4 +112,8 @@ bool is_one_mesh(const Solid& solid) {
   return elements.size() == 1 && elements[0].is_mesh();
 }
 
+bool is_same_solid(const Solid& one, const Solid& other) {
+  return !one.empty() && &elements_of(one) == &elements_of(other);
+}
+
 }  // namespace ist

@@ -17,12 +17,16 @@ constexpr double kFarEnough = 0.02;
 constexpr int kMaxTests = 2000, kMaxSteps = 50000;
 // [m] Parts of a surface are divided no farther.
 constexpr double kSmallest = 1e-6;
+// [m] Where surfaces are near openings, they are tested with this much slack, so that the answer
+// holds for a while.
+constexpr double kSlack = 2e-3;
 
 // Decides for the part of a surface that is in a cell whether it is inside.
 class CellVisitor : public SurfacePairSearch::Visitor {
  public:
-  CellVisitor(const Openings& openings, const Eigen::Isometry3d& X_AB)
-      : openings_(openings), X_AB_(X_AB) {}
+  /// @param slack  [m] no point may be inside, wherever it is moved by that much
+  CellVisitor(const Openings& openings, const Eigen::Isometry3d& X_AB, double slack)
+      : openings_(openings), X_AB_(X_AB), slack_(slack) {}
 
   bool visit(const ConvexPart& cell_B, const ConvexPart& part_B) override {
     if (part_B.kind != ConvexPart::Kind::kTriangle) {
@@ -39,7 +43,7 @@ class CellVisitor : public SurfacePairSearch::Visitor {
 
   Openings::Side test(const ConvexPart& cell_B, const Eigen::Vector3d& center_B, double radius) {
     ++tests_;
-    const Openings::Side side = openings_.side(cell_B.number, X_AB_ * center_B, radius);
+    const Openings::Side side = openings_.side(cell_B.number, X_AB_ * center_B, radius + slack_);
     found_inside_ = found_inside_ || side == Openings::Side::kInside;
     return side;
   }
@@ -52,7 +56,7 @@ class CellVisitor : public SurfacePairSearch::Visitor {
     while (size > 0) {
       const Triangle t = stack[--size];
       const Eigen::Vector3d nearest = closest_point_on_triangle(cell_B.a, t[0], t[1], t[2]);
-      if ((nearest - cell_B.a).norm() > cell_B.radius * (1.0 + 1e-9) + 1e-12) continue;
+      if ((nearest - cell_B.a).norm() > (cell_B.radius + slack_) * (1.0 + 1e-9) + 1e-12) continue;
       const Eigen::Vector3d center = (t[0] + t[1] + t[2]) / 3.0;
       double radius = 0.0, longest = -1.0;
       std::size_t first = 0;
@@ -67,7 +71,7 @@ class CellVisitor : public SurfacePairSearch::Visitor {
       const Openings::Side side = test(cell_B, center, radius * (1.0 + 1e-9));
       if (side == Openings::Side::kOutside) continue;
       const bool is_over = side == Openings::Side::kInside || tests_ >= kMaxTests ||
-                           radius < kSmallest || size + 2 > stack.size();
+                           radius < kSmallest + 0.1 * slack_ || size + 2 > stack.size();
       if (is_over) return false;
       const std::size_t second = (first + 1) % 3, apex = (first + 2) % 3;
       const Eigen::Vector3d middle = 0.5 * (t[first] + t[second]);
@@ -79,6 +83,7 @@ class CellVisitor : public SurfacePairSearch::Visitor {
 
   const Openings& openings_;
   const Eigen::Isometry3d& X_AB_;
+  const double slack_;
   int tests_ = 0;
   bool found_inside_ = false;
 };
@@ -115,10 +120,15 @@ OpeningSearch::Answer OpeningSearch::decide(const Eigen::Isometry3d& X_BA, int* 
     answer = Answer::kApart;
   } else {
     const Eigen::Isometry3d X_AB = X_BA.inverse();
-    CellVisitor visitor(a_.openings, X_AB);
-    const bool all_outside = search_.visit_intersections(&visitor, &left);
-    if (all_outside) answer = Answer::kApart;
-    if (visitor.found_inside()) answer = Answer::kInside;
+    for (const double slack : {kSlack, 0.0}) {
+      CellVisitor visitor(a_.openings, X_AB, slack);
+      const bool all_outside = search_.visit_near(slack, &visitor, &left);
+      if (visitor.found_inside()) answer = Answer::kInside;
+      if (!all_outside && !visitor.found_inside()) continue;
+      if (all_outside) answer = Answer::kApart;
+      clearance_ = all_outside ? slack : 0.0;
+      break;
+    }
   }
   *steps -= kMaxSteps - left;
   return answer;

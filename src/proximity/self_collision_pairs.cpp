@@ -3,7 +3,9 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <random>
 
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/link_poses.h"
@@ -36,6 +38,38 @@ bool names(const NamePairs& pairs, const std::string& a, const std::string& b) {
   return std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
     return (pair.first == a && pair.second == b) || (pair.first == b && pair.second == a);
   });
+}
+
+// A planar or floating joint has no rest position, so the bodies below it are a group of their own.
+// Places such joints anywhere. @returns by body: its group
+std::vector<std::size_t> rest_unstated_joints(const Kinematics& kinematics, JointPoses* poses) {
+  const auto& joints = kinematics.joints();
+  std::vector<std::size_t> group_of_body = {0};
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const bool starts_group = joints[j].has_unstated_pose();
+    group_of_body.push_back(starts_group ? j + 1 : group_of_body[joints[j].parent]);
+    if (!starts_group) continue;
+    poses->X_PC[j] = joints[j].X_PJ;
+    poses->known[j] = true;
+  }
+  return group_of_body;
+}
+
+// An XML attribute's value.
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '&') {
+      result += "&amp;";
+    } else if (c == '<') {
+      result += "&lt;";
+    } else if (c == '"') {
+      result += "&quot;";
+    } else {
+      result += c;
+    }
+  }
+  return result;
 }
 
 }  // namespace
@@ -75,16 +109,7 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   for (const auto& joint : joints) q.push_back(std::clamp(0.0, joint.lower, joint.upper));
   JointPoses poses;
   kinematics.place_joints(q, &poses);
-  // A planar or floating joint has no rest position, so the bodies below it are a group of their
-  // own.
-  std::vector<std::size_t> group_of_body = {0};
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const bool starts_group = joints[j].has_unstated_pose();
-    group_of_body.push_back(starts_group ? j + 1 : group_of_body[joints[j].parent]);
-    if (!starts_group) continue;
-    poses.X_PC[j] = joints[j].X_PJ;
-    poses.known[j] = true;
-  }
+  const std::vector<std::size_t> group_of_body = rest_unstated_joints(kinematics, &poses);
   // The kinematics outlives this call, so the pointer does not own it.
   ForwardKinematics forward(*model, {std::shared_ptr<const Kinematics>(), &kinematics});
   const LinkPoses& links = forward.run(poses);
@@ -102,6 +127,73 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
     if (have_rest && results[i].state == LinkState::kContact) found.push_back(pairs[i]);
   }
   return found;
+}
+
+std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& model,
+                                      const Kinematics& kinematics,
+                                      const std::vector<LinkPair>& pairs,
+                                      const PairSampling& sampling,
+                                      const std::function<bool()>& cancelled) {
+  constexpr double kTurn = 3.14159265358979323846, kSlide = 0.5;  // [rad, m] without limits
+  const auto& joints = kinematics.joints();
+  std::vector<SampledPair> sampled;
+  for (const LinkPair& pair : pairs) sampled.push_back({pair, 0, 0});
+  ForwardKinematics forward(*model, {std::shared_ptr<const Kinematics>(), &kinematics});
+  QueryConfig config;
+  config.max_distance = 0.001;  // [m] nothing but contact matters
+  SelfQuery query(model, pairs, config);
+  std::vector<PairProximity> results;
+  std::mt19937_64 random(sampling.seed);
+  std::vector<double> q(joints.size(), 0.0);
+  JointPoses poses;
+  for (std::size_t i = 0; i < sampling.configurations && !(cancelled && cancelled()); ++i) {
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      const double free_range = joints[j].type == JointType::kPrismatic ? kSlide : kTurn;
+      const double low = std::isfinite(joints[j].lower) ? joints[j].lower : -free_range;
+      const double high = std::isfinite(joints[j].upper) ? joints[j].upper : free_range;
+      // Not std::uniform_real_distribution, which differs between libraries.
+      q[j] = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    }
+    kinematics.place_joints(q, &poses);
+    const std::vector<std::size_t> group_of_body = rest_unstated_joints(kinematics, &poses);
+    const LinkPoses& links = forward.run(poses);
+    query.run(links.X_FL, links.known, &results);
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const auto first = forward.body(pairs[k].first), second = forward.body(pairs[k].second);
+      const bool have_pose = first && second && group_of_body[*first] == group_of_body[*second];
+      if (!have_pose || results[k].state == LinkState::kUnknown) continue;
+      ++sampled[k].measured;
+      sampled[k].contacts += results[k].lower_bound <= 0.0 ? 1 : 0;
+    }
+  }
+  return sampled;
+}
+
+std::string to_srdf(const RobotModel& model, const Kinematics& kinematics,
+                    const std::vector<SampledPair>& sampled, bool never) {
+  std::string srdf = "<?xml version=\"1.0\"?>\n<robot name=\"" + escaped(model.name) + "\">\n";
+  const auto add = [&](const LinkPair& pair, const char* reason) {
+    srdf += "  <disable_collisions link1=\"" + escaped(model.links[pair.first].name) +
+            "\" link2=\"" + escaped(model.links[pair.second].name) + "\" reason=\"" + reason +
+            "\"/>\n";
+  };
+  const std::vector<bool> all(model.links.size(), true);
+  const std::vector<LinkPair> watched = self_collision_pairs(model, kinematics, all, {});
+  for (std::size_t i = 0; i < model.links.size(); ++i) {
+    for (std::size_t k = i + 1; k < model.links.size(); ++k) {
+      const bool is_watched =
+          std::any_of(watched.begin(), watched.end(),
+                      [&](const LinkPair& pair) { return pair.first == i && pair.second == k; });
+      if (!is_watched && model.links[i].usable() && model.links[k].usable()) {
+        add({i, k}, "Adjacent");
+      }
+    }
+  }
+  for (const SampledPair& pair : sampled) {
+    if (pair.always()) add(pair.pair, "Always");
+    if (pair.never() && never) add(pair.pair, "Never");
+  }
+  return srdf + "</robot>\n";
 }
 
 NamePairs disabled_collisions(const std::string& srdf_xml) {

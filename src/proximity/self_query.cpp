@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "internal/geometry/relative_pose.h"
+#include "internal/geometry/solid_queries.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/link_pair_query.h"
 #include "proximity/link_surface.h"
@@ -35,7 +36,8 @@ struct SelfQuery::Impl {
     bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
   };
 
-  void prepare();
+  void prepare(const Impl* previous);
+  std::shared_ptr<const LinkSurface> surface_of(std::size_t link, const Impl* previous) const;
   bool finish(std::size_t pair, int steps);
   bool finish_by(Deadline* deadline);
 
@@ -43,14 +45,25 @@ struct SelfQuery::Impl {
   std::vector<LinkPair> pairs;
   QueryConfig config;
   SelfQueryStatistics statistics;
-  std::vector<std::unique_ptr<LinkSurface>> surfaces;   // by link; null where no pair needs it
+  // By link; null where no pair needs it.
+  std::vector<std::shared_ptr<const LinkSurface>> surfaces;
   std::vector<std::unique_ptr<LinkPairQuery>> queries;  // by pair; null where a link is unusable
   std::vector<RigidPose> X_FL;                          // by link
   std::vector<Waiting> queue;                           // a heap
   std::vector<LinkPairSearch::Entry> depth_queue;       // scratch
 };
 
-void SelfQuery::Impl::prepare() {
+std::shared_ptr<const LinkSurface> SelfQuery::Impl::surface_of(std::size_t link,
+                                                               const Impl* previous) const {
+  const LinkModel& wanted = model->links[link];
+  if (previous != nullptr && link < previous->surfaces.size() && previous->surfaces[link] &&
+      is_same_solid(previous->model->links[link].solid, wanted.solid)) {
+    return previous->surfaces[link];
+  }
+  return std::make_shared<const LinkSurface>(wanted);
+}
+
+void SelfQuery::Impl::prepare(const Impl* previous) {
   const auto& links = model->links;
   surfaces.resize(links.size());
   X_FL.resize(links.size());
@@ -60,7 +73,7 @@ void SelfQuery::Impl::prepare() {
     if (std::max(pair.first, pair.second) >= links.size()) continue;
     if (!can_query(links[pair.first]) || !can_query(links[pair.second])) continue;
     for (const std::size_t i : {pair.first, pair.second}) {
-      if (!surfaces[i]) surfaces[i] = std::make_unique<LinkSurface>(links[i]);
+      if (!surfaces[i]) surfaces[i] = surface_of(i, previous);
       entries = std::max(entries, (links[i].tree.nodes().size() + 1) * kSphereWidth);
     }
     queries.back() = std::make_unique<LinkPairQuery>(links[pair.first], links[pair.second],
@@ -71,12 +84,12 @@ void SelfQuery::Impl::prepare() {
 }
 
 SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-                     const QueryConfig& config)
+                     const QueryConfig& config, const SelfQuery* previous)
     : impl_(std::make_unique<Impl>()) {
   impl_->model = std::move(model);
   impl_->pairs = std::move(pairs);
   impl_->config = config;
-  impl_->prepare();
+  impl_->prepare(previous != nullptr ? previous->impl_.get() : nullptr);
 }
 SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;

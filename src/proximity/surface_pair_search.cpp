@@ -286,7 +286,7 @@ void SurfacePairSearch::visit(const Entry& entry, int* steps) {
   }
 }
 
-bool SurfacePairSearch::visit_intersections(Visitor* visitor, int* steps) {
+bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) {
   TraversalStack<Pair, kStackCapacity> stack;
   if (!a_.empty() && !b_.empty()) stack.push({-1e30, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
   while (!stack.empty()) {
@@ -296,14 +296,14 @@ bool SurfacePairSearch::visit_intersections(Visitor* visitor, int* steps) {
       Pair children[SurfaceBvh::kWidth];
       const int count = expand(pair, children);
       for (int k = 0; k < count; ++k) {
-        if (children[k].bound <= 0.0) stack.push(children[k]);
+        if (children[k].bound <= margin) stack.push(children[k]);
       }
       continue;
     }
     const ConvexPart part_a = posed(part_of(a_, pair.a), X_BA_);
     const ConvexPart& part_b = part_of(b_, pair.b);
     const ConvexDistance found = convex_distance(part_a, part_b);
-    if (found.lower_bound > exact_rounding_) continue;
+    if (found.lower_bound > margin + exact_rounding_) continue;
     if (!visitor->visit(part_a, part_b)) return false;
   }
   return true;

@@ -48,7 +48,7 @@ class SurfacePairSearch {
   /// @returns false when the steps were used up first; the next call continues
   bool run(const Goal& goal, int* steps);
 
-  /// Visits parts that intersect.
+  /// Visits parts that are near one another.
   class Visitor {
    public:
     virtual ~Visitor() = default;
@@ -56,10 +56,10 @@ class SurfacePairSearch {
     /// @returns false to end the search
     virtual bool visit(const ConvexPart& part_a, const ConvexPart& part_b) = 0;
   };
-  /// Visits all pairs of parts that intersect at this pose.
+  /// Visits all pairs of parts that intersect at this pose, or are no farther than `margin` [m].
   /// @param steps  as for run()
   /// @returns false when the visitor or the steps ended the search
-  bool visit_intersections(Visitor* visitor, int* steps);
+  bool visit_near(double margin, Visitor* visitor, int* steps);
 
   /// [m] An upper bound at this pose, of two real points; inf: no parts have been measured; 0 or
   /// less: the surfaces intersect.

@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <random>
 #include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "support/allocations.h"
 #include "support/demo_arm.h"
@@ -105,6 +107,35 @@ TEST_P(AllocationsOfQueries, AreNoneWhenTheNumberOfCloudsChanges) {
   query.run_minimum(poses.X_FL, poses.known, {&near}, &nearest);
   query.run(poses.X_FL, poses.known, {}, &results);
   EXPECT_EQ(test::allocations - before, 0);
+}
+
+// Link against link: near, far and in contact, after jumps and along motions.
+TEST(AllocationsOfSelfQueries, AreNone) {
+  const std::shared_ptr<const RobotModel> robot = test::demo_model();
+  const Kinematics kinematics(test::demo_robot());
+  const std::vector<bool> all(robot->links.size(), true);
+  const std::vector<LinkPair> pairs = self_collision_pairs(*robot, kinematics, all, {});
+  std::vector<PairProximity> results(pairs.size());
+  QueryConfig config;
+  for (const double tolerance : {0.001, 0.0}) {
+    config.tolerance = tolerance;
+    SelfQuery query(robot, pairs, config);
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> angle(-3.0, 3.0);
+    std::vector<double> q(kinematics.joints().size(), 0.0);
+    int contacts = 0;
+    for (int i = 0; i < 200; ++i) {
+      for (double& position : q) position = i % 10 == 0 ? angle(random) : position + 1e-3;
+      const LinkPoses poses = link_poses(*robot, kinematics, q);
+      const long before = test::allocations;
+      query.run(poses.X_FL, poses.known, &results);
+      ASSERT_EQ(test::allocations - before, 0) << i;
+      for (const PairProximity& result : results) {
+        contacts += result.state == LinkState::kContact ? 1 : 0;
+      }
+    }
+    EXPECT_GT(contacts, 20);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Clouds, AllocationsOfQueries,

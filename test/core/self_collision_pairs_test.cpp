@@ -113,6 +113,65 @@ TEST(SelfCollisionPairs, floatingBodiesHaveNoRest) {
   EXPECT_EQ(model->links[found[1].first].name + model->links[found[1].second].name, "bb1");
 }
 
+// c slides from 0.85 to 1.6 m, past a at 1 m: it touches a below 1.2 m. With a radius of 0.6 m
+// it always does.
+TEST(SelfCollisionPairs, SamplingFindsWhatNeverAndAlwaysTouches) {
+  const Robot robot;
+  const std::vector<LinkPair> pairs = robot.pairs();
+  const auto sampled = sample_pairs(robot.model, robot.kinematics, pairs, {500, 7});
+  ASSERT_EQ(sampled.size(), pairs.size());
+  for (const SampledPair& found : sampled) {
+    EXPECT_EQ(found.measured, 500U);
+    if (robot.names({found.pair}) != Names{"a-c"}) continue;
+    EXPECT_FALSE(found.always() || found.never());
+    EXPECT_NEAR(static_cast<double>(found.contacts), 500 * 0.35 / 0.75, 40.0);
+  }
+  const auto with_radius = [](const std::string& radius) {
+    std::string urdf = kRobot;
+    const std::string old = "<link name=\"c\"><collision><geometry><sphere radius=\"0.1\"/>";
+    urdf.replace(urdf.find(old), old.size(),
+                 "<link name=\"c\"><collision><geometry><sphere radius=\"" + radius + "\"/>");
+    const RobotDescription description = parse_urdf(urdf, GeometrySource::kCollision, {});
+    const auto model = build_robot_model(description, {});
+    const Kinematics kinematics(description);
+    const std::vector<bool> all(model->links.size(), true);
+    std::vector<LinkPair> a_c;
+    for (const LinkPair& pair : self_collision_pairs(*model, kinematics, all, {})) {
+      if (model->links[pair.first].name == "a" && model->links[pair.second].name == "c") {
+        a_c.push_back(pair);
+      }
+    }
+    return sample_pairs(model, kinematics, a_c, {100, 7}).at(0);
+  };
+  EXPECT_TRUE(with_radius("0.6").always());
+  EXPECT_FALSE(with_radius("0.6").never());
+  const auto again = sample_pairs(robot.model, robot.kinematics, pairs, {500, 7});
+  for (std::size_t i = 0; i < again.size(); ++i) EXPECT_EQ(again[i].contacts, sampled[i].contacts);
+}
+
+TEST(SelfCollisionPairs, SamplingEndsWhenItIsCancelled) {
+  const Robot robot;
+  int asked = 0;
+  const auto sampled = sample_pairs(robot.model, robot.kinematics, robot.pairs(), {500, 1},
+                                    [&] { return ++asked > 10; });
+  EXPECT_EQ(sampled[0].measured, 10U);
+}
+
+TEST(SelfCollisionPairs, WritesAnSrdfThatIsReadAgain) {
+  const Robot robot;
+  std::vector<SampledPair> sampled;
+  for (const LinkPair& pair : robot.pairs()) sampled.push_back({pair, 5, 5});
+  sampled[0].contacts = 0;  // base-b
+  sampled[1].contacts = 3;  // base-tip
+  const auto left = [&](bool never) {
+    return robot.names(
+        robot.pairs(disabled_collisions(to_srdf(*robot.model, robot.kinematics, sampled, never))));
+  };
+  const Names without_always = {"base-b", "base-tip"};
+  EXPECT_EQ(left(false), without_always);
+  EXPECT_EQ(left(true), Names{"base-tip"});
+}
+
 TEST(SelfCollisionPairs, srdf) {
   const NamePairs expected = {{"a", "b"}, {"c", "a"}};
   EXPECT_EQ(disabled_collisions("<robot name='r'><group name='g'/>"

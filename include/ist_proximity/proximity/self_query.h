@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -72,8 +73,10 @@ struct SelfQueryStatistics {
 class SelfQuery {
  public:
   /// Builds a hierarchy for each link: up to a second for a million triangles.
+  /// @param previous  null, or a query whose hierarchies are shared for links of the same `solid`:
+  ///                  for a model that differs in its packings alone
   SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-            const QueryConfig& config);
+            const QueryConfig& config, const SelfQuery* previous = nullptr);
   ~SelfQuery();
   SelfQuery(SelfQuery&&) noexcept;
   SelfQuery& operator=(SelfQuery&&) noexcept;
@@ -119,5 +122,38 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
 /// Reads the `<disable_collisions>` elements of an SRDF.
 /// @throws ModelError when the text is no SRDF
 NamePairs disabled_collisions(const std::string& srdf_xml);
+
+/// How pairs of links behave over random configurations.
+struct PairSampling {
+  std::size_t configurations = 2000;  ///< drawn evenly between the joints' limits
+  std::uint64_t seed = 1;             ///< the same seed gives the same configurations
+};
+
+/// What sampling found about a pair. It is evidence, not proof: a pair that was never in contact
+/// may be, in a configuration that was not drawn.
+struct SampledPair {
+  LinkPair pair;
+  std::size_t contacts = 0;  ///< configurations in which the links are in contact
+  std::size_t measured = 0;  ///< configurations in which that is known
+  bool always() const { return measured > 0 && contacts == measured; }  ///< always in contact
+  bool never() const { return measured > 0 && contacts == 0; }          ///< never in contact
+};
+
+/// Measures pairs at random configurations. Joints without limits turn once about their axis, or
+/// slide by a metre; planar and floating joints rest, and pairs with such a joint between them are
+/// not measured. Deterministic.
+/// @param cancelled  asked between configurations; true ends the sampling. May be empty
+/// @returns one per pair
+std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& model,
+                                      const Kinematics& kinematics,
+                                      const std::vector<LinkPair>& pairs,
+                                      const PairSampling& sampling,
+                                      const std::function<bool()>& cancelled = {});
+
+/// An SRDF with a `<disable_collisions>` for each pair: by what the links are to each other
+/// (reason="Adjacent"), and by what was sampled (reason="Always", "Never").
+/// @param never  whether to disable pairs that were never in contact: convenient, and no proof
+std::string to_srdf(const RobotModel& model, const Kinematics& kinematics,
+                    const std::vector<SampledPair>& sampled, bool never);
 
 }  // namespace ist

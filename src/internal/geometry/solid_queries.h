@@ -93,4 +93,7 @@ bool is_one_mesh(const Solid& solid);
 /// [bytes] of the elements, which copies of the solid share.
 std::size_t memory_of(const Solid& solid);
 
+/// Whether one is a copy of the other.
+bool is_same_solid(const Solid& one, const Solid& other);
+
 }  // namespace ist

@@ -97,7 +97,8 @@ void SelfProximity::take_model() {
     model_ = newest_model_;
   }
   if (is_refined) {
-    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query);
+    query_ =
+        std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, query_.get());
     return;
   }
   query_.reset();
@@ -233,7 +234,7 @@ void SelfProximity::publish_once() {
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
     query_->set_config(live.query);
-    query_->run(poses_.X_FL, poses_.known, &results_);
+    input.deadline_passed = !query_->run(poses_.X_FL, poses_.known, &results_);
     compute_wrenches(live);
     message->header.stamp = poses_.stamp;
     for (const std::size_t i : model_->monitored) {
