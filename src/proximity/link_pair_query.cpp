@@ -218,7 +218,11 @@ void LinkPairQuery::report(PairProximity* result) const {
     return;
   }
   const ConvexDistance& closest = surfaces_.closest();
-  if (!(closest.distance > 0.0 && closest.distance < kInf)) return result->reset();
+  if (!(closest.distance > 0.0 && closest.distance < kInf)) {
+    result->reset();
+    result->finished = stage_ == Stage::kDone;
+    return;
+  }
   result->state = LinkState::kNear;
   result->distance = closest.distance;
   result->p_FCa = X_FB_ * closest.on_p;

@@ -180,6 +180,15 @@ LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const
   return answer;
 }
 
+/// Whether no deadline passed before the pairs of a link met the tolerance.
+bool SelfProximity::is_finished(std::size_t link) const {
+  for (std::size_t i = 0; i < results_.size(); ++i) {
+    const LinkPair& pair = query_->pairs()[i];
+    if ((pair.first == link || pair.second == link) && !results_[i].finished) return false;
+  }
+  return true;
+}
+
 void SelfProximity::compute_wrenches(const LiveConfig& live) {
   const RobotModel& robot = *model_->robot;
   wrenches_.assign(results_.size(), Wrench::zero());
@@ -234,7 +243,10 @@ void SelfProximity::publish_once() {
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
     query_->set_config(live.query);
-    input.deadline_passed = !query_->run(poses_.X_FL, poses_.known, &results_);
+    query_->run(poses_.X_FL, poses_.known, &results_);
+    for (const std::size_t i : model_->monitored)
+      input.deadline.unfinished += is_finished(i) ? 0 : 1;
+    message->unfinished = static_cast<std::uint32_t>(input.deadline.unfinished);
     compute_wrenches(live);
     message->header.stamp = poses_.stamp;
     for (const std::size_t i : model_->monitored) {

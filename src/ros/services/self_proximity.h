@@ -55,6 +55,7 @@ class SelfProximity {
   NamePairs ignored_pairs() const;
   LinkProximity nearest(std::size_t link, std::size_t* other) const;
   void add_link(std::size_t link, ist_proximity::ProximityArray* message);
+  bool is_finished(std::size_t link) const;
   void compute_wrenches(const LiveConfig& live);
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
