@@ -129,7 +129,7 @@ void check_query(const ist::QueryConfig& query) {
              query.max_distance);
   FUZZ_CHECK(query.tolerance >= 0.0 && query.tolerance <= 1.0, "tolerance %g", query.tolerance);
   FUZZ_CHECK(query.margin >= 0.0 && query.margin <= 1.0, "margin %g", query.margin);
-  FUZZ_CHECK(query.deadline >= 0.0 && query.deadline <= 10.0, "deadline %g", query.deadline);
+  FUZZ_CHECK(query.deadline >= -1.0 && query.deadline <= 10.0, "deadline %g", query.deadline);
 }
 
 void check_repulsion(const ist::RepulsionConfig& repulsion, double max_distance) {

@@ -304,7 +304,7 @@ void ProximityServer::Impl::take_model() {
 void ProximityServer::Impl::choose_counted_links() {
   const CountedLinks before = std::move(counted_);
   counted_ = counted_links(*model_, config_, root_stands_still_);
-  results_.summary().set_links(counted_);
+  results_.set_links(counted_);
   std::string problem = counted_.problem;
   if (model_->robot) {
     const std::vector<std::string> missing =

@@ -14,6 +14,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "support/contact_oracle.h"
+#include "support/meshes.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -161,6 +162,32 @@ TEST(Deadline, EndsRepulsion) {
   // A link that is not repelled needs no time.
   near.distance = 10.0;
   EXPECT_TRUE(repulsion.wrench(0, X_FL, {&cloud}, near, config, Clock::now()).force.isZero(0.0));
+}
+
+// The first upper bounds of many links count as well: each is an exact distance.
+TEST(Deadline, HoldsForManyLinksAndANewCloud) {
+  const std::vector<Shape> shapes(test::scaled(40), Shape(test::torus(0.1, 0.03, 48, 24)));
+  const auto model = test::make_model(shapes, 0.01);
+  test::Rng rng(9);
+  std::vector<Eigen::Isometry3d> X_FL;
+  for (std::size_t i = 0; i < shapes.size(); ++i) X_FL.push_back(test::random_pose(&rng, 0.3));
+  const std::vector<bool> known(shapes.size(), true);
+  QueryConfig config;
+  config.deadline = 5e-5;
+  std::vector<LinkProximity> results;
+  std::vector<double> overruns;
+  ProximityQuery query(model, config);
+  for (int i = 0; i < test::scaled(100); ++i) {
+    const CloudSnapshot cloud = test::make_snapshot(shell(5000, 0.8));
+    const double begin = thread_time();
+    query.run(X_FL, known, {&cloud}, &results);
+    overruns.push_back(thread_time() - begin - config.deadline);
+    for (std::size_t k = 0; k < results.size(); ++k) {
+      if (results[k].state == LinkState::kUnknown) continue;
+      ASSERT_LE(results[k].lower_bound, results[k].distance);
+    }
+  }
+  EXPECT_LT(quantile(overruns, 0.9), kStep);
 }
 
 // A link counts as unfinished where its bounds are wider than was asked for, and nowhere else.

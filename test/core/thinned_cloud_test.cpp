@@ -95,7 +95,7 @@ Thinned found(const PointIndex& index) {
 
 // All points at once, one entry for each voxel.
 Thinned expected(const CloudSnapshot& snapshot) {
-  const VoxelGrid grid(snapshot.index.X_FO(), snapshot.index.bounds(), snapshot.thinning);
+  const VoxelGrid grid(snapshot.index.X_FO(), snapshot.thinning);
   using Voxel = std::array<float, 3>;
   using Best = std::tuple<float, float, float, float, std::uint32_t>;
   std::map<Voxel, Best> voxels;

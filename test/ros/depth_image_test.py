@@ -43,13 +43,18 @@ def camera_info(frame="camera", **members):
     return info
 
 
-def image(values, encoding="16UC1", big=False, padding=0, frame="camera", **members):
+def image(values, encoding="16UC1", big=False, padding=0, frame="camera"):
     kind = np.dtype((">" if big else "<") + NUMPY[encoding])
     scaled = values if encoding == "32FC1" else np.round(1000.0 * values)
     rows = [row.tobytes() + b"\xab" * padding for row in scaled.astype(kind)]
     message = Image(width=values.shape[1], height=values.shape[0], encoding=encoding)
     message.header.frame_id, message.header.stamp = frame, rospy.Time.now()
     message.is_bigendian, message.step, message.data = big, len(rows[0]), b"".join(rows)
+    return message
+
+
+def malformed(members):
+    message = image(depths())
     for name, value in members.items():
         setattr(message, name, value)
     return message
@@ -154,7 +159,7 @@ class DepthImageTest(unittest.TestCase):
         self.start()
         self.check_wall()
         for members, words in MALFORMED:
-            with self.subTest(words), self.stream(lambda m=members: image(depths(), **m)):
+            with self.subTest(words), self.stream(lambda m=members: malformed(m)):
                 message = self.node.wait_for(
                     lambda m: m.status != 0 and words in m.status_text, words
                 )

@@ -54,19 +54,24 @@ std::map<std::pair<std::string, int>, Marker> by_key(const visualization_msgs::M
 
 TEST(NearestSummary, SaysWhatIsNearestAndWhatIsNotKnown) {
   NearestSummary all =
-      summarize_nearest(array({link("a", 0.4), link("b", 0.2), link("c", kInf)}), 1.0);
+      summarize_nearest(array({link("a", 0.4), link("b", 0.2), link("c", kInf)}), 1.0, {});
   EXPECT_EQ(all.link, 1);
   EXPECT_EQ(all.text, "0.200 m\nb");
-  EXPECT_EQ(summarize_nearest(array({link("a", 0.4), link("b", -0.02)}), 1.0).text, "-0.020 m\nb");
-  EXPECT_EQ(summarize_nearest(array({link("a", kInf)}), 0.5).text, "> 0.50 m");
+  EXPECT_EQ(summarize_nearest(array({link("a", 0.4), link("b", -0.02)}), 1.0, {}).text,
+            "-0.020 m\nb");
+  EXPECT_EQ(summarize_nearest(array({link("a", kInf)}), 0.5, {}).text, "> 0.50 m");
   all = summarize_nearest(array({link("a", kNaN), link("b", kNaN)}, ProximityArray::STALE_CLOUD),
-                          1.0);
+                          1.0, {});
   EXPECT_EQ(all.link, -1);
   EXPECT_EQ(all.text, "NOT KNOWN\nSTALE_CLOUD");
-  EXPECT_EQ(summarize_nearest(array({}, ProximityArray::MODEL_ERROR), 1.0).text,
+  EXPECT_EQ(summarize_nearest(array({}, ProximityArray::MODEL_ERROR), 1.0, {}).text,
             "NOT KNOWN\nMODEL_ERROR");
+  // A base that is bolted to its table is not the news.
+  all = summarize_nearest(array({link("base", 0.02), link("b", 0.2)}), 1.0, {false, true});
+  EXPECT_EQ(all.text, "0.200 m\nb");
   // One unknown link must not vanish behind a clear one.
-  all = summarize_nearest(array({link("a", kNaN), link("b", kInf)}, ProximityArray::NO_POSE), 1.0);
+  all = summarize_nearest(array({link("a", kNaN), link("b", kInf)}, ProximityArray::NO_POSE), 1.0,
+                          {});
   EXPECT_EQ(all.text, "> 1.00 m\n1 links NOT KNOWN\nNO_POSE");
 }
 

@@ -86,7 +86,7 @@ class ReconfigureTest(unittest.TestCase):
 
     def test_read_at_the_start_only(self):
         """A change that has no effect is named, with the value in use, once in the log."""
-        words = "~max_distance is 2.0, in use is 0.6"
+        words = "~max_distance is 2, in use is 0.6"
         rospy.set_param(self.node.name + "/max_distance", 2.0)
         self.node.wait_until(lambda: words in self.node.log(), words)
         self.node.wait_until(

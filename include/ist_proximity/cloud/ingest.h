@@ -58,7 +58,7 @@ struct RawCloud {
   DepthType depth = DepthType::kNone;     ///< of a depth image, which has no x, y and z
   std::shared_ptr<const DepthRays> rays;  ///< of a depth image's pixels
   /// `data` stays unchanged as long as this lives, so that points may be read later, when a query
-  /// needs them (where no thinned cloud is made). Null: `data` is valid during the call only.
+  /// needs them. Null: `data` is valid during the call only, and all points are read then.
   std::shared_ptr<const void> owner;
 
   /// Points in the cloud, those that are not finite included.

@@ -22,9 +22,9 @@ using LinkMessage = ist_proximity::LinkProximity;
 constexpr double kLineWidth = 0.005;        // [m]
 constexpr double kPointSize = 0.015;        // [m]
 constexpr double kTextHeight = 0.03;        // [m]
-constexpr double kRow = 1.3 * kTextHeight;  // [m] from a label to the next
+constexpr double kRow = 2.0 * kTextHeight;  // [m] from a label to the next
 constexpr double kLabelled = 0.3;           // [m] farther links have no label
-constexpr double kLabelMoves = 3.0 * kRow;  // [m] that a label may be away from its line
+constexpr double kLabelMoves = 2.0 * kRow;  // [m] that a label may be away from its line
 constexpr double kNumberHeight = 0.09;      // [m]
 constexpr double kNumberFollows = 0.05;     // share of its way that the number moves at a time
 constexpr double kNumberJumps = 2.0;        // [m] farther ways it takes at once
@@ -118,7 +118,7 @@ void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
 
 void ProximityMarkers::draw_nearest(const ist_proximity::ProximityArray& proximity,
                                     std::vector<Marker>* markers) {
-  const NearestSummary summary = summarize_nearest(proximity, max_distance_);
+  const NearestSummary summary = summarize_nearest(proximity, max_distance_, counts_);
   place_number(proximity);
   Marker text = marker("nearest", 0, Marker::TEXT_VIEW_FACING);
   scale(0, 0, kNumberHeight, &text);
@@ -151,7 +151,7 @@ void ProximityMarkers::place_number(const ist_proximity::ProximityArray& proximi
   }
   if (box.isEmpty()) return;
   Eigen::Vector3d wanted = box.center();
-  wanted.z() = box.max().z() + 2.0 * kNumberHeight;
+  wanted.z() = box.max().z() + 4.0 * kNumberHeight;
   const bool is_far = !((wanted - number_position_).norm() <= kNumberJumps);
   number_position_ += (is_far ? 1.0 : kNumberFollows) * (wanted - number_position_);
 }

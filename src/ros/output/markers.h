@@ -28,6 +28,9 @@ class ProximityMarkers {
   ProximityMarkers(double max_distance, double lifetime)
       : max_distance_(max_distance), lifetime_(lifetime) {}
 
+  /// Says which links may be the nearest: those that count in ~min_distance. At first all do.
+  void set_counts(const std::vector<bool>& counts) { counts_ = counts; }
+
   /// Draws every link that is NEAR or CONTACT, and deletes the other markers of the last call.
   visualization_msgs::MarkerArray draw(const ist_proximity::ProximityArray& proximity);
 
@@ -44,6 +47,7 @@ class ProximityMarkers {
   void place_number(const ist_proximity::ProximityArray& proximity);
 
   double max_distance_, lifetime_;
+  std::vector<bool> counts_;  ///< by link; where its size is not the message's, all count
   std_msgs::Header header_;
   Eigen::Vector3d number_position_{0.0, 0.0, 1.0};  ///< [m] of the large number
   std::map<Key, std_msgs::Header> shown_;

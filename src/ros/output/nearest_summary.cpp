@@ -31,13 +31,15 @@ const char* name_of(std::uint8_t status) {
 
 }  // namespace
 
-NearestSummary summarize_nearest(const ProximityArray& proximity, double max_distance) {
+NearestSummary summarize_nearest(const ProximityArray& proximity, double max_distance,
+                                 const std::vector<bool>& counts) {
   NearestSummary summary;
   const std::vector<Link>& links = proximity.links;
   std::size_t unknown = 0;
   for (std::size_t i = 0; i < links.size(); ++i) {
     if (links[i].state == Link::UNKNOWN) ++unknown;
-    if (links[i].state < Link::NEAR) continue;
+    const bool does_count = counts.size() != links.size() || counts[i];
+    if (links[i].state < Link::NEAR || !does_count) continue;
     const bool is_nearer =
         summary.link < 0 ||
         links[i].distance < links[static_cast<std::size_t>(summary.link)].distance;

@@ -4,6 +4,7 @@
 #include <std_msgs/ColorRGBA.h>
 
 #include <string>
+#include <vector>
 
 namespace ist {
 
@@ -15,7 +16,9 @@ struct NearestSummary {
 };
 
 /// @param max_distance  [m]
+/// @param counts  by link of the message: whether it counts, as in ~min_distance; where it has
+///                another size, all do
 NearestSummary summarize_nearest(const ist_proximity::ProximityArray& proximity,
-                                 double max_distance);
+                                 double max_distance, const std::vector<bool>& counts);
 
 }  // namespace ist

@@ -22,6 +22,11 @@ class ResultPublisher {
 
   /// What the whole robot's distances come to.
   SpeedScalePublisher& summary() { return summary_; }
+  /// Sets which links count, in the summary and as the nearest one of the markers.
+  void set_links(const CountedLinks& links) {
+    summary_.set_links(links);
+    marker_drawer_.set_counts(links.counts);
+  }
 
   /// @param self                  the newest ~self_proximity; may be null
   /// @param speed_scale           its present configuration

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ros/common/text.h"
+#include "ros/parameters/range.h"
 
 namespace ist {
 namespace {
@@ -14,6 +15,9 @@ using Values = std::map<std::string, std::string>;
 
 // Values of one parameter are compared and shown as text.
 std::string text_of(const XmlRpcValue& value) {
+  if (value.getType() == XmlRpcValue::TypeDouble) {
+    return number_text(static_cast<const double&>(value));
+  }
   std::ostringstream text;
   text << value;
   return text.str();
