@@ -341,7 +341,7 @@ TEST(ProximityQuery, BoundsHoldWhereverAQueryStops) {
                                test::oracle_minimum(meshes[k], stored_points(second, X_LF))));
     }
     QueryConfig config;
-    config.max_distance = 2.0;
+    config.max_distance = scene % 2 == 0 ? 2.0 : 0.1;  // or most is out of range
     config.deadline = 1e3;
     bool complete = false;
     for (double step = 0.0; !complete; step = std::ceil(1.2 * step + 0.5)) {
