@@ -28,7 +28,7 @@ constexpr double kCloudPeriod = 1.0 / 30.0;  // [s]
 
 // An answer with the obstacle at a distance along x.
 // Numbers of sources.
-constexpr int kFront = 0, kBack = 1, kLaser = 2;
+constexpr int kFront = 0, kBack = 1, kLaser = 2, kMap = 3;
 
 LinkProximity answer_at(double distance) {
   LinkProximity result;
@@ -141,12 +141,12 @@ TEST(ClosingSpeed, TheRobotsPartIsThatOfThePoses) {
   for (int i = 0; i < 1000; ++i) {  // at rest, at 1 kHz
     const double time = 1e-3 * i;
     const double x = noise(rng);
-    rates = speed.update(time, answer_at(0.5 - x), pose(x), {"map", 1, 0.0, true});
+    rates = speed.update(time, answer_at(0.5 - x), pose(x), {kMap, 1, 0.0, true});
     if (i > 0) EXPECT_EQ(rates.time_to_contact, std::numeric_limits<double>::infinity());
   }
   for (int i = 0; i < 1000; ++i) {
     const double x = 2e-4 * i;
-    rates = speed.update(1.0 + 1e-3 * i, answer_at(0.5 - x), pose(x), {"map", 1, 0.0, true});
+    rates = speed.update(1.0 + 1e-3 * i, answer_at(0.5 - x), pose(x), {kMap, 1, 0.0, true});
   }
   EXPECT_NEAR(rates.robot, 0.2, 1e-6);
   EXPECT_EQ(rates.obstacles, 0.0);  // a map file stands still
@@ -328,9 +328,8 @@ TEST(ClosingSpeedInScenes, StaticLinksBesideAKinect) {
     for (int m = 0; m < 2; ++m) {
       query.run(X_FL, known, {&snapshot}, &answers);
       for (std::size_t i = 0; i < answers.size(); ++i) {
-        const ClosingRates rates =
-            speeds[i].update(stamp + 0.01 + 0.01 * m, answers[i], X_FL[i],
-                             {"kinect", static_cast<std::uint64_t>(k), stamp});
+        const ClosingRates rates = speeds[i].update(stamp + 0.01 + 0.01 * m, answers[i], X_FL[i],
+                                                    {kFront, static_cast<std::uint64_t>(k), stamp});
         if (answers[i].state != LinkState::kNear || k < 8) continue;
         ++messages;
         finite += std::isfinite(rates.time_to_contact) ? 1 : 0;
