@@ -219,7 +219,7 @@ void LinkQuery::search_inside(const BoxObstacles& obstacles) { search_depth(obst
 
 // Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
 // point of the link to the last answer's obstacle is still a point of the link.
-void LinkQuery::warm_start(SnapshotSpan clouds) {
+void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
   if (link_.search.is_answered) return;
   const auto& last = link_.kept.last;
   const auto measure_last = [&](const auto& obstacles) {
@@ -230,7 +230,7 @@ void LinkQuery::warm_start(SnapshotSpan clouds) {
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_last);
   }
-  if (distance() < kInfinity) return;
+  if (distance() < kInfinity || !has_time) return;
   // A new cloud has about the same obstacle about the same place.
   const Eigen::Vector3d p_FQ =
       last.has_place ? last.p_FCo : link_.search.X_FL * link_.context.tree().center();

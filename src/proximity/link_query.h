@@ -29,7 +29,8 @@ class LinkQuery {
 
   /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a
   /// point that is near to where it was.
-  void warm_start(SnapshotSpan clouds);
+  /// @param has_time  false: only the last answer's obstacle, which is one exact distance
+  void warm_start(SnapshotSpan clouds, bool has_time = true);
 
   /// Asks again for what begin() has asked, with other tolerances; what run() has found since is
   /// the upper bound.

@@ -118,7 +118,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
     impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity,
                           &impl_->link_statistics[i]);
     // Many links and a new cloud may take all of a short deadline here.
-    if (!deadline.passed()) impl_->links[i].warm_start(clouds);
+    impl_->links[i].warm_start(clouds, !deadline.passed());
   }
   if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
   const bool is_stopped = deadline.has_passed();
