@@ -29,11 +29,13 @@ foreach(module IN LISTS python_modules)
 endforeach()
 
 file(GLOB python_sources CONFIGURE_DEPENDS src/python/*.cpp)
-pybind11_add_module(ist_proximity_python MODULE NO_EXTRAS ${python_sources})
+add_library(ist_proximity_python MODULE ${python_sources})
+pybind11_extension(ist_proximity_python)
 target_include_directories(ist_proximity_python PRIVATE src)
-target_link_libraries(ist_proximity_python PRIVATE ist_proximity_core)
+target_link_libraries(ist_proximity_python PRIVATE ist_proximity_core pybind11::module)
 set_target_properties(ist_proximity_python PROPERTIES
   OUTPUT_NAME _core
+  CXX_VISIBILITY_PRESET hidden
   LIBRARY_OUTPUT_DIRECTORY ${python_output}
   INSTALL_RPATH "$ORIGIN/../../..;$ORIGIN/../../../${CMAKE_LIBRARY_ARCHITECTURE}")
 install(TARGETS ist_proximity_python LIBRARY DESTINATION ${python_destination})
