@@ -176,7 +176,9 @@ class Sensor:
 
     def pause(self, node):
         """Returns the time of the last input, which the node uses and which is answered."""
-        return settle(node, self.repeater, self.sent, lambda message: message.cloud_stamp)
+        # Clouds with a stamp ahead of the clock wait until transforms have come that far.
+        wait = 0.25 + max(self.offset, 0.0)
+        return settle(node, self.repeater, self.sent, lambda message: message.cloud_stamp, wait)
 
     def resume(self):
         self.repeater.paused = False
