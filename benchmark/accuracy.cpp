@@ -1,7 +1,7 @@
 // Errors of published distances against the exact truth, as a Markdown table.
 //
 // Needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
-// Usage: accuracy [--update-doc README.md] [max_error_mm ...]
+// Usage: accuracy [--update-doc doc/accuracy.md] [max_error_mm ...]
 
 #include <algorithm>
 #include <array>
