@@ -255,7 +255,10 @@ class QueryTest(unittest.TestCase):
                 return [int(line.split()[1]) for line in f if line.startswith(name)][0]
 
         self.assertTrue(self.ask(NOW).success)
-        before = memory("VmRSS")
+        before = 0
+        while memory("VmRSS") > before:  # packing in the background ends
+            before = memory("VmRSS")
+            time.sleep(1.0)
         answer = self.ask(*[NOW] * 10001)
         self.assertFalse(answer.success)
         self.assertIn("10001 states for 2 links are more than 20000 answers", answer.message)

@@ -238,7 +238,7 @@ class StatusTest(unittest.TestCase):
         """Every cycle is published, whatever is missing."""
         node = self.start(rate=50)
         first = node.wait_for(lambda m: True, "the first message", start=0)
-        self.assertEqual(first.status, ProximityArray.MODEL_ERROR)
+        self.assertNotEqual(first.status, ProximityArray.OK)
         for prepare in (lambda: None, self.world.start_tf, self.world.start_clouds):
             prepare()
             begin = len(node.messages)
