@@ -11,7 +11,7 @@
 
 namespace ist {
 
-/// What one thread needs to answer configurations of a robot.
+/// The query and the buffers with which one thread answers configurations of a robot.
 struct QueryWorker {
   QueryWorker(const std::shared_ptr<const RobotModel>& model,
               const std::shared_ptr<const Kinematics>& kinematics)

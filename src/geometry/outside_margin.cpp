@@ -16,7 +16,7 @@ constexpr double kFourPi = 12.566370614359172;
 constexpr double kLargestMargin = 0.01;
 // A block is opened where its edges may be nearer than so many of its radii.
 constexpr double kFarBlock = 2.0;
-// Below this winding number a place is outside in spite of the errors of winding numbers, which are
+// A place below this winding number is outside in spite of the errors of winding numbers, which are
 // 0.01, and 0.06 for the quick one.
 constexpr double kSurelyOutside = 0.47;
 

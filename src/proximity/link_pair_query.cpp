@@ -48,7 +48,8 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
       has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInf;
   openings_a_.note_motion(moved);
   openings_b_.note_motion(moved);
-  // What is apart stays apart while no point moves as far as the other surface, or an opening.
+  // Surfaces that are apart stay apart while no point moves as far as the other surface, or an
+  // opening.
   are_apart_ = are_apart_ && moved < surfaces_.lower_bound() && openings_a_.stays_apart() &&
                openings_b_.stays_apart();
   X_BA_ = X_BA;
@@ -90,7 +91,7 @@ void LinkPairQuery::decide_contact(int* steps) {
   are_apart_ = into_a == Answer::kApart && into_b == Answer::kApart;
 }
 
-// Where the surfaces are apart: whether a component of one is inside the other.
+// Tells whether a component of one is inside the other, where the surfaces are apart.
 bool LinkPairQuery::is_inside_other() const {
   const Eigen::Isometry3d X_AB = X_BA_.inverse();
   const auto holds = [](const LinkModel& link, const SurfaceBvh& surface,
@@ -139,8 +140,8 @@ void LinkPairQuery::measure_depth(std::vector<LinkPairSearch::Entry>* queue) {
   depth_bound_ = std::min(depth_bound_, depth_distance_);
 }
 
-// From a point where the surfaces meet, alternately into the one and the other: solids that merely
-// graze one another have so little in common that their spheres do not show it.
+// Steps from a point where the surfaces meet, alternately into the one and the other: solids that
+// merely graze one another have so little in common that their spheres do not show it.
 void LinkPairQuery::search_from_touch() {
   constexpr double kFirst = 1e-3, kLast = 1e-9;  // [m]
   constexpr int kProjections = 8;
@@ -169,7 +170,7 @@ void LinkPairQuery::search_from_touch() {
   }
 }
 
-// Where a triangle passes through the other link, some of its corners lead inward from there.
+// Some corners of a triangle that passes through the other link lead inward.
 void LinkPairQuery::search_along_parts() {
   constexpr double kLast = 1e-7;  // share of the way to a corner
   const Eigen::Vector3d touch_B = surfaces_.closest().on_q;

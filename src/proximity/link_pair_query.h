@@ -32,7 +32,7 @@ class LinkPairQuery {
 
   /// [m] Proven at this pose, whatever has been done so far; the margin is not taken off.
   double lower_bound() const;
-  /// What is known, at any time.
+  /// The bounds that are known, at any time.
   void report(PairProximity* result) const;
 
  private:

@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// What the distances of a link to other links need, in its frame L. Immutable.
+/// The surface of a link for its distances to other links, in its frame L. Immutable.
 struct LinkSurface {
   explicit LinkSurface(const LinkModel& link);
 

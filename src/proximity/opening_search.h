@@ -16,7 +16,7 @@ class OpeningSearch {
   /// Both outlive this.
   OpeningSearch(const LinkSurface& a, const LinkSurface& b);
 
-  /// What is known at a pose.
+  /// Knowledge at a pose.
   enum class Answer {
     kApart,   ///< no opening of A meets the surface of B
     kInside,  ///< a point of B's surface is inside A

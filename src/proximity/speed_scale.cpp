@@ -98,7 +98,7 @@ double separation_scale(const SeparationConfig& config, double bound, double obs
   return std::min(rest / std::max(time * config.robot_speed, 1e-9), 1.0);
 }
 
-// What one link allows.
+// The scale that one link allows.
 // @param held  [m] the bound that hysteresis gives
 SpeedScaleAnswer scale_of_link(const SpeedScaleConfig& config, double stop, double free,
                                double held, const SpeedScaleInput& input, double age) {

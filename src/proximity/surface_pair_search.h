@@ -29,7 +29,7 @@ class SurfacePairSearch {
   /// @param capacity  pairs that the front may hold, at least 16
   SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity);
 
-  /// What is wanted: bounds that differ by `tolerance` at most where the surfaces are nearer than
+  /// The question: bounds that differ by `tolerance` at most where the surfaces are nearer than
   /// `range`; whether they intersect is always decided.
   struct Goal {
     double range = std::numeric_limits<double>::infinity();  ///< [m] > 0

@@ -65,7 +65,7 @@ struct SelfQueryStatistics {
 /// leaves (temporal coherence): a pair, and within it two boxes, are looked at again when the slack
 /// of their bound is used up. Poses may jump.
 ///
-/// With a deadline, each pair first gets what is known from the last run; then the pair with the
+/// Each pair with a deadline first gets what is known from the last run; then the pair with the
 /// least bound goes on, a little at a time, until all are finished or the time is over. Every bound
 /// holds at any time.
 ///
@@ -129,8 +129,8 @@ struct PairSampling {
   std::uint64_t seed = 1;             ///< the same seed gives the same configurations
 };
 
-/// What sampling found about a pair. It is evidence, not proof: a pair that was never in contact
-/// may be, in a configuration that was not drawn.
+/// The finding of sampling about a pair. It is evidence, not proof: a pair that was never in
+/// contact may be, in a configuration that was not drawn.
 struct SampledPair {
   LinkPair pair;
   std::size_t contacts = 0;  ///< configurations in which the links are in contact

@@ -65,7 +65,7 @@ std::vector<std::string> config_errors(const SpeedScaleConfig& config, const std
 /// Makes stop_distance and free_distance fit a smaller range of the queries, in proportion.
 SpeedScaleConfig fitted_to(SpeedScaleConfig config, double max_distance);
 
-/// What decides a speed scale.
+/// The rules that decide a speed scale.
 enum class SpeedRule : std::uint8_t {
   kUnknown = 0,     ///< 0: something required is not known
   kStop = 1,        ///< 0: a link is within its stop distance
@@ -102,7 +102,7 @@ struct SpeedScaleAnswer {
 /// `hysteresis`, so the bound used is never above the link's own. Noise that is smaller than the
 /// hysteresis changes nothing. Time does not matter.
 ///
-/// With SeparationConfig::enabled, the scale is also limited to what ISO/TS 15066 allows. With
+/// The scale, with SeparationConfig::enabled, is also limited to what ISO/TS 15066 allows. With
 /// T_r = reaction_time + age and T_s = stopping_time, the separation distance is
 ///   S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z,
 /// where v_h is obstacle_speed, or the obstacles' measured speed where that is larger, and the

@@ -35,7 +35,7 @@ struct Axis {
   std::uint32_t extent() const { return (length > 0 ? length : size) / binned(); }
 };
 
-// Which matrix is used, and the places of its numbers.
+// The matrix that is used, and the places of its numbers.
 struct Projection {
   const char* name;
   const double* numbers;

@@ -11,14 +11,14 @@
 
 namespace ist {
 
-/// Where the inside of a link's meshes with holes ends without a surface. A mesh's winding number
-/// changes by an integer at its surface, and elsewhere smoothly. The gradient is that of the
-/// triangles (caps) that would close its holes: no more than 2 A / (4 pi d^3) for caps of area A at
-/// a distance d; and it is the Biot-Savart field of the open edges: no more than l / (4 pi d^2) for
-/// edges of length l, with a derivative of no more than 2 l / (4 pi d^3). That bounds, from the
-/// winding number of one point, those of all points about it; so most places are known not to hold
-/// a point where the winding number is 0.5. The cells of an octree that are left hold all openings.
-/// Immutable; const members are thread safe and allocate nothing.
+/// The places where the inside of a link's meshes with holes ends without a surface. A mesh's
+/// winding number changes by an integer at its surface, and elsewhere smoothly. The gradient is
+/// that of the triangles (caps) that would close its holes: no more than 2 A / (4 pi d^3) for caps
+/// of area A at a distance d; and it is the Biot-Savart field of the open edges: no more than l /
+/// (4 pi d^2) for edges of length l, with a derivative of no more than 2 l / (4 pi d^3). That
+/// bounds, from the winding number of one point, those of all points about it; so most places are
+/// known not to hold a point where the winding number is 0.5. The cells of an octree that are left
+/// hold all openings. Immutable; const members are thread safe and allocate nothing.
 class Openings {
  public:
   Openings() = default;
@@ -29,7 +29,7 @@ class Openings {
   /// entry. Empty for closed links.
   const std::vector<ConvexPart>& cells() const { return cells_; }
 
-  /// What is known about the points of a sphere.
+  /// Knowledge about the points of a sphere.
   enum class Side {
     kOutside,    ///< its centre is outside, and no opening of the element is in the sphere
     kInside,     ///< its centre is inside the element

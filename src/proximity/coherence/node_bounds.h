@@ -16,7 +16,7 @@ namespace ist {
 /// link. Every such point has one of two properties:
 ///  - its signed distance is at least `floor`, in the sense of PointDepth::floor;
 ///  - it is outside the link, and so is every place that is nearer to it than `outside` > 0.
-/// Where no point has the one or the other property, its bound is inf. Closed links need the first
+/// The bound is inf where no point has the one or the other property. Closed links need the first
 /// only. -inf: nothing is known.
 struct ChildBounds {
   std::array<double, kBoxWidth> floor, outside;  ///< [m]

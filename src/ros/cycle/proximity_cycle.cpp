@@ -120,7 +120,7 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   status_input_.deadline.widest = statistics.widest;
 }
 
-/// Where time ends, the links that matter most have been served.
+/// The links that matter most are served first, as time may end.
 void ProximityCycle::find_urgent_links() {
   urgent_.assign(model_->monitored.begin(), model_->monitored.end());
   std::sort(urgent_.begin(), urgent_.end(), [this](std::size_t a, std::size_t b) {

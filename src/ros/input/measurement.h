@@ -46,7 +46,7 @@ class Measurement {
   /// The instant from which its age counts: its stamp, or its receipt where the stamp was ahead of
   /// the clock.
   ros::Time counts_from() const { return std::min(header_.stamp, received_); }
-  /// What it keeps in memory, about.
+  /// The memory that it keeps, about [bytes].
   std::size_t bytes() const { return bytes_; }
 
   /// The instants, in order, at which the poses of sensor and robot must be known, the stamp first:

@@ -31,7 +31,8 @@ struct SourceReport {
   std::uint64_t restarts = 0;      ///< times that the stamps went back and were taken all the same
   std::uint64_t unusable = 0;      ///< dropped: malformed, in the future, or without transform
   std::uint32_t publishers = 0;
-  /// Until the first message: what the master knows of the topic and of others; may be empty.
+  /// The advice until the first message: what the master knows of the topic and of others; may be
+  /// empty.
   std::string advice;
   double ahead = 0.0;  ///< [s] of the newest message's stamp at its receipt
   /// Newest stamp received, or its receipt where it was ahead of the clock, except for stamps far

@@ -21,7 +21,7 @@ std::string advice_on_topic(const std::string& topic, const std::string& type,
 /// should be held around ask(). Not thread safe.
 class TopicAdvice {
  public:
-  /// As for advice_on_topic().
+  /// The same as for advice_on_topic().
   TopicAdvice(std::string topic, std::string type, std::string own);
 
   /// Returns the sentence when it is due and the master answers, else nothing.

@@ -19,7 +19,7 @@ namespace ist {
 
 /// Makes the contact bodies in a thread of its own, while the node answers already: it packs the
 /// monitored links that need one disjointly, one after the other, or takes them from the cache.
-/// With ~penetration/enabled: auto, those are the links that something has come near. It follows
+/// Those are, with ~penetration/enabled: auto, the links that something has come near. It follows
 /// every change of the robot's model; links that do not change keep their bodies. All members are
 /// thread safe.
 ///

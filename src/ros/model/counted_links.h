@@ -8,7 +8,8 @@
 
 namespace ist {
 
-/// Which monitored links count in ~min_distance, ~speed_scale and the summary of the diagnostics.
+/// The monitored links that count in ~min_distance, ~speed_scale and the summary of the
+/// diagnostics.
 struct CountedLinks {
   std::vector<std::string> links;  ///< names of the monitored links, as in every message
   std::vector<bool> counts;        ///< by monitored link
@@ -18,7 +19,7 @@ struct CountedLinks {
 
 /// Decides which links count: not those in ~ignore_links, and not those that cannot move in the
 /// fixed frame, unless ~min_distance/fixed_links says so. A link of which that is not known counts.
-/// Where no link can move, and none is left, the fixed ones count.
+/// The fixed links count where no link can move, and none is left.
 /// @param root_stands_still  whether tf states that the root link never moves in a fixed frame that
 ///                           the URDF lacks
 CountedLinks counted_links(const ModelState& model, const ServerConfig& config,

@@ -35,7 +35,7 @@ struct ModelState {
   std::shared_ptr<const RobotModel> robot;
   /// Known when ready: where `robot` comes from, and what finer packings are made of.
   AnytimeModel::Ptr anytime;
-  /// Of `robot`; null: the cycle makes its own. Finer packings bring it along.
+  /// Repulsion of `robot`; null: the cycle makes its own. Finer packings bring it along.
   std::shared_ptr<const Repulsion> repulsion;
   /// Known when ready; states of the same geometry share it.
   std::shared_ptr<LinkUsage> usage;

@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// What the contract of a ProximityArray depends on.
+/// The facts that the contract of a ProximityArray depends on.
 struct InvariantInput {
   ros::Time now;              ///< the ROS clock's time after the poses were read
   double max_distance = 1.0;  ///< [m] ~max_distance

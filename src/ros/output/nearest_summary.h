@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What a viewer reads in one glance.
+/// The text that a viewer reads in one glance.
 struct NearestSummary {
   int link = -1;     ///< the nearest link's place in the array; -1: no link is near
   std::string text;  ///< its distance and name, "clear", or that something is not known

@@ -20,7 +20,7 @@ class ResultPublisher {
  public:
   ResultPublisher(ros::NodeHandle private_nh, const ServerConfig& config);
 
-  /// What the whole robot's distances come to.
+  /// The summary of the whole robot's distances.
   SpeedScalePublisher& summary() { return summary_; }
   /// Sets which links count, in the summary and as the nearest one of the markers.
   void set_links(const CountedLinks& links) {

@@ -35,7 +35,7 @@ class SpeedScalePublisher {
                const ist_proximity::ProximityArray* self, const SpeedScaleConfig& config,
                const ros::Time& now);
 
-  // Of the last publish(), for the diagnostics.
+  // The result of the last publish(), for the diagnostics.
   double min_distance() const { return min_distance_; }  ///< [m] NaN: not known
   /// The scale, and the link and the rule that decide, as a sentence. Empty: not enabled.
   std::string summary() const;

@@ -46,7 +46,7 @@ class LiveParameters {
   /// Why values stay in use that the parameter server does not hold; empty when there are none.
   std::string problem() const;
 
-  /// Which parameters were changed on the server that are read at the start only; empty: none.
+  /// The parameters that were changed on the server and are read at the start only; empty: none.
   std::string without_effect() const;
 
  private:

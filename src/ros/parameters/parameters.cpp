@@ -62,7 +62,7 @@ void read_model(ParameterReader* reader, ServerConfig* config) {
 
 void read_query(ParameterReader* reader, QueryConfig* query) {
   reader->read("query/tolerance", Range::non_negative("m", 1.0), &query->tolerance);
-  // From the whole period to 10 s.
+  // The range is from the whole period to 10 s.
   reader->read("query/deadline", Range{"s", -1.0, 10.0}, &query->deadline);
   reader->read("query/margin", Range::non_negative("m", 1.0), &query->margin);
 }

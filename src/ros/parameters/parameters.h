@@ -108,7 +108,8 @@ ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 
 /// Parameters that may change while the node runs.
 struct LiveConfig {
-  /// Its max_distance is as it was at the start; its deadline is the parameter, see deadline_of().
+  /// The query's max_distance is as it was at the start; its deadline is the parameter, see
+  /// deadline_of().
   QueryConfig query = default_query();
   RepulsionConfig repulsion;
   PenetrationConfig penetration;

@@ -57,7 +57,7 @@ Slider slider_of(const Tunable& tunable, double max_distance) {
     slider.max = std::min(tunable.range.max, entry.max > 0.0 ? entry.max : max_distance);
     slider.tooltip += std::string(": ") + entry.meaning;
   }
-  // What is set must not be cut off by a slider.
+  // A value that is set must not be cut off by a slider.
   slider.max = std::max({slider.max, tunable.value, tunable.default_value});
   return slider;
 }

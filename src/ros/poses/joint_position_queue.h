@@ -16,7 +16,7 @@ namespace ist {
 struct JointPosition {
   /// [rad, m]; NaN and stamp 0 until a message states it.
   double q = std::numeric_limits<double>::quiet_NaN();
-  /// As the message states it; the receipt where that is ahead of the clock. Never goes back.
+  /// The stamp of the message; the receipt where that is ahead of the clock. Never goes back.
   ros::Time stamp;
   ros::Time sent;        ///< the message's stamp
   double spacing = 0.0;  ///< [s] usual time between two stamps; 0: not known yet

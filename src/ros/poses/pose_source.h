@@ -22,8 +22,8 @@ struct PoseProblem {
 
 /// The poses of the links at one common instant.
 struct StampedLinkPoses : LinkPoses {
-  /// That instant; when no link is known, now or the stamp before. It never goes back, unless the
-  /// owner sets it to 0: look_up() reads the stamp of the last poses here.
+  /// The instant of the poses; when no link is known, now or the stamp before. It never goes back,
+  /// unless the owner sets it to 0: look_up() reads the stamp of the last poses here.
   ros::Time stamp;
   std::vector<PoseProblem> problems;  ///< by link: why it is not known; else empty
   std::vector<std::string> doubts;    ///< sentences on poses that are known, and hardly true

@@ -62,7 +62,7 @@ class TransformBuffer : public tf2::BufferCore {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// What is known of the transforms of one child frame.
+  /// Knowledge of the transforms of one child frame.
   struct Record {
     std::string parent;  ///< of the last transform, used or refused
     ros::Time newest;    ///< stamp of the newest transform

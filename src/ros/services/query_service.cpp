@@ -187,7 +187,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   std::vector<bool> wanted = cycle_->measurable();
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
     const std::size_t link = model_->monitored[i];
-    // Without the root link's pose, nothing is known of the motion.
+    // Nothing is known of the motion while the root link has no pose.
     wanted[link] = wanted[link] && chosen_[i] && poses_->is_root_known();
   }
   std::vector<double> first;

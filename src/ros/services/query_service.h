@@ -66,7 +66,7 @@ class QueryService {
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
   std::vector<bool> chosen_;  ///< by monitored link
-  /// Until then, memory of a large answer is returned to the system: roscpp frees it after
+  /// Memory of a large answer is until then returned to the system: roscpp frees it after
   /// answer().
   std::chrono::steady_clock::time_point return_memory_until_, next_return_;
 };

@@ -22,7 +22,7 @@ struct Status {
 /// @param now  [s] ROS clock
 Status source_status(const SourceReport& source, double now);
 
-/// What a deadline has cost in one cycle, or in the worst of several.
+/// The cost of a deadline in one cycle, or in the worst of several.
 struct DeadlineCost {
   std::size_t unfinished = 0;      ///< links whose bounds are wider than the tolerance, or UNKNOWN
   double widest = 0.0;             ///< [m] of these bounds, where they are known
