@@ -44,7 +44,7 @@ struct ClosestObstacle {
   bool is_box = false;
 };
 
-/// What a query has found.
+/// The result of a query.
 struct SearchResult {
   ClosestObstacle closest;
   double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured

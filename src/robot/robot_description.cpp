@@ -181,7 +181,7 @@ urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot)
   throw ModelError("robot description is no valid URDF: " + reasons);
 }
 
-// What reading a mesh needs besides its element.
+// Needs of reading a mesh besides its element.
 struct MeshReader {
   const PackageFinder& find_package;
   const ReadingProgress& progress;
