@@ -143,9 +143,10 @@ if(rostest_FOUND)
     add_rostest(${file} DEPENDENCIES
       proximity_node ist_proximity_nodelet simulator_node dodge_node)
     string(REPLACE "/" "_" test ${file})
-    # One at a time: they measure rates and ages. Tests of faults know how late the machine is.
+    # Tests that measure rates and ages run one at a time. The others wait for what the node says, or
+    # know how late the machine is (faults).
     set(serial ON)
-    if(test MATCHES "faults_")
+    if(test MATCHES "faults_|bad_input|laser_scan|octomap|parameters|pose_faults|query|self_filter")
       set(serial OFF)
     endif()
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES
