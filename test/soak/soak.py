@@ -7,8 +7,8 @@ and soak.svg. The exit code is 0 only if every promise held; the last line says 
 
 import argparse
 import collections
-import math
 import csv
+import math
 import os
 import signal
 import subprocess
