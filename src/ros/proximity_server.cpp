@@ -36,6 +36,7 @@
 #include "ros/poses/transform_listener.h"
 #include "ros/poses/transforms.h"
 #include "ros/poses/usual_period.h"
+#include "ros/services/link_pair_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
@@ -121,6 +122,7 @@ class ProximityServer::Impl {
 
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
+  std::unique_ptr<LinkPairService> link_pairs_;    ///< the same
   std::thread cycle_thread_, diagnostics_thread_;
 };
 
@@ -150,10 +152,12 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     });
   }
   const auto live = [this] { return live_config(); };
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live);
+  query_service_ =
+      std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_, live);
   if (config_.self_collision.enabled) {
     self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
                                                       joint_states_.get(), live);
+    link_pairs_ = std::make_unique<LinkPairService>(nh_, private_nh_, config_);
   }
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
   diagnostics_thread_ = std::thread(&Impl::run_diagnostics, this);
@@ -166,6 +170,7 @@ ProximityServer::Impl::~Impl() {
   diagnostics_thread_.join();
   query_service_.reset();
   self_proximity_.reset();
+  link_pairs_.reset();
   cycle_.reset();
   joint_states_.reset();  // the listener's thread uses members that are destroyed before it
 }
@@ -242,13 +247,14 @@ void ProximityServer::Impl::run_cycle() {
   }
   last_stamp_ = message->header.stamp;
   assert_invariants(*message,
-                    {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
-  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
-    if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
-  };
+                    {ros::Time::now(), config_.query.max_distance, live.query.margin});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
+  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
+    if (!cycle_) return;
+    cycle_->fill_joint_repulsion(*message, results_.summary().self_problem(), self.get(), efforts);
+  };
   const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
@@ -293,6 +299,7 @@ void ProximityServer::Impl::take_model() {
   }
   query_service_->set_model(model_);
   if (self_proximity_) self_proximity_->set_model(model_);
+  if (link_pairs_) link_pairs_->set_model(model_);
   spheres_.show(*model_);
   set_source_targets(live_.get().query);
   root_stands_still_ = false;

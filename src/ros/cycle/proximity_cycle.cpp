@@ -36,6 +36,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
       pose_timeout_(config.pose_timeout),
+      self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
       selection_(reader),
       query_(model_->robot, config.query),
       repulsion_(model_->robot),
@@ -241,8 +242,32 @@ void ProximityCycle::forget() {
 }
 
 void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
+                                          const std::string& self_problem,
+                                          const ProximityArray* self,
                                           ist_proximity::JointRepulsion* message) {
-  joint_repulsion_.fill(pose_source_.get(), pushes_, proximity, message);
+  all_pushes_ = pushes_;
+  if (self_counts_) add_self_repulsion(self_problem.empty() ? self : nullptr);
+  joint_repulsion_.fill(pose_source_.get(), all_pushes_, proximity, message);
+  if (!self_counts_ || message->status != ProximityArray::OK) return;
+  const bool is_known = self_problem.empty() && self != nullptr;
+  if (is_known && self->status == ProximityArray::OK) return;
+  message->status = is_known ? self->status : static_cast<std::uint8_t>(ProximityArray::NO_POSE);
+  message->status_text = "link against link: " + (is_known ? self->status_text : self_problem);
+}
+
+/// @param self  of the monitored links, or null: not known
+void ProximityCycle::add_self_repulsion(const ProximityArray* self) {
+  for (std::size_t i = 0; i < model_->monitored.size(); ++i) {
+    RepulsiveWrench& push = all_pushes_[model_->monitored[i]];
+    if (self == nullptr || i >= self->links.size()) {
+      push = RepulsiveWrench::unknown();
+      continue;
+    }
+    const auto& own = self->links[i];
+    push.force += Eigen::Vector3d(own.repulsion.x, own.repulsion.y, own.repulsion.z);
+    push.torque +=
+        Eigen::Vector3d(own.repulsion_torque.x, own.repulsion_torque.y, own.repulsion_torque.z);
+  }
 }
 
 }  // namespace ist

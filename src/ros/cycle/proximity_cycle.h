@@ -69,8 +69,13 @@ class ProximityCycle {
   const std::vector<bool>& measurable() const { return measurable_; }
 
   /// Gives the repulsion of the last run() as joint efforts.
-  /// @param proximity  the message of that run()
+  /// @param proximity     the message of that run()
+  /// @param self_problem  with ~self_collision/in_minimum: why `self` cannot be used; else empty
+  /// @param self          the newest ~self_proximity, whose repulsion is added with
+  ///                      ~self_collision/in_minimum; may be null
   void fill_joint_repulsion(const ist_proximity::ProximityArray& proximity,
+                            const std::string& self_problem,
+                            const ist_proximity::ProximityArray* self,
                             ist_proximity::JointRepulsion* message);
 
  private:
@@ -82,6 +87,7 @@ class ProximityCycle {
   void compute_pushes(const LiveConfig& config, TimePoint end);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
+  void add_self_repulsion(const ist_proximity::ProximityArray* self);
   void fill_links(ist_proximity::ProximityArray* message);
 
   const std::shared_ptr<const ModelState> model_;
@@ -90,6 +96,7 @@ class ProximityCycle {
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;
   const double pose_timeout_;  ///< [s]
+  const bool self_counts_;     ///< ~self_collision/in_minimum
   CloudSelection selection_;
   ProximityQuery query_;
   Repulsion repulsion_;
@@ -107,10 +114,11 @@ class ProximityCycle {
   std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
   StatusInput status_input_;
-  std::vector<LinkProximity> results_;   ///< by link of the robot
-  std::vector<RepulsiveWrench> pushes_;  ///< by link of the robot, filtered
-  std::vector<Wrench> wrenches_;         ///< by link of the robot
-  std::vector<std::size_t> urgent_;      ///< monitored links, the least lower bound first
+  std::vector<LinkProximity> results_;       ///< by link of the robot
+  std::vector<RepulsiveWrench> pushes_;      ///< by link of the robot, filtered
+  std::vector<RepulsiveWrench> all_pushes_;  ///< the same, with those of link against link
+  std::vector<Wrench> wrenches_;             ///< by link of the robot
+  std::vector<std::size_t> urgent_;          ///< monitored links, the least lower bound first
 };
 
 }  // namespace ist
