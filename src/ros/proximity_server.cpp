@@ -213,8 +213,9 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
-  results_.publish(message, nullptr, live_.get().speed_scale,
-                   [](ist_proximity::JointRepulsion*) {});
+  results_.publish(
+      message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
+      [] { return Eigen::AlignedBox3d(); });
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -249,7 +250,9 @@ void ProximityServer::Impl::run_cycle() {
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
-  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
+  const auto robot_box = [&] { return cycle_ ? cycle_->robot_box() : Eigen::AlignedBox3d(); };
+  const bool drawn =
+      results_.publish(message, self, live.speed_scale, fill_joint_repulsion, robot_box);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
   if (cycle_) report_.parts[kPartPublish].add(watch.lap());
