@@ -6,6 +6,9 @@ if(NOT IST_PROXIMITY_CLI11_INCLUDE_DIR)
   message(STATUS "ist_proximity: no benchmark/hard_cases and near_touch, CLI11 is missing "
     "(apt install libcli11-dev)")
 endif()
+if(NOT octomap_FOUND)
+  list(FILTER benchmark_sources EXCLUDE REGEX "/map_reading\\.cpp$")
+endif()
 add_custom_target(benchmarks)
 foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
@@ -23,6 +26,11 @@ endforeach()
 foreach(name closed_loop self_view)
   target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
 endforeach()
+
+if(TARGET benchmark_map_reading)
+  target_include_directories(benchmark_map_reading SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
+  target_link_libraries(benchmark_map_reading PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+endif()
 
 # What the maps are measured beside, where it is installed.
 find_path(FCL_INCLUDE_DIR fcl/fcl.h)

@@ -218,8 +218,9 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
-  results_.publish(message, nullptr, live_.get().speed_scale,
-                   [](ist_proximity::JointRepulsion*) {});
+  results_.publish(
+      message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
+      [] { return Eigen::AlignedBox3d(); });
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -255,7 +256,9 @@ void ProximityServer::Impl::run_cycle() {
     if (!cycle_) return;
     cycle_->fill_joint_repulsion(*message, results_.summary().self_problem(), self.get(), efforts);
   };
-  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
+  const auto robot_box = [&] { return cycle_ ? cycle_->robot_box() : Eigen::AlignedBox3d(); };
+  const bool drawn =
+      results_.publish(message, self, live.speed_scale, fill_joint_repulsion, robot_box);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
   if (cycle_) report_.parts[kPartPublish].add(watch.lap());

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
@@ -64,6 +65,27 @@ struct RawCloud {
   /// Points in the cloud, those that are not finite included.
   std::size_t size() const { return width * height; }
 };
+
+/// Views points that lie one after the other in memory, such as an array (height, width, 3).
+/// @param data     x of the first point; its y and z follow. Not owned: see RawCloud::owner
+/// @param width    points in a row
+/// @param height   rows; 1 for a list
+/// @param numbers  from a point to the next, at least 3; those after z are not read
+template <class Scalar>
+RawCloud packed_cloud(const Scalar* data, std::size_t width, std::size_t height,
+                      std::size_t numbers = 3) {
+  static_assert(std::is_same_v<Scalar, float> || std::is_same_v<Scalar, double>);
+  RawCloud cloud;
+  cloud.data = reinterpret_cast<const std::uint8_t*>(data);
+  cloud.width = width;
+  cloud.height = height;
+  cloud.point_step = numbers * sizeof(Scalar);
+  cloud.row_step = width * cloud.point_step;
+  cloud.y = sizeof(Scalar);
+  cloud.z = 2 * sizeof(Scalar);
+  cloud.is_double = std::is_same_v<Scalar, double>;
+  return cloud;
+}
 
 /// The choice of the points of a cloud that are kept.
 struct IngestConfig {

@@ -68,19 +68,7 @@ std::string check_scan(const LaserScan& scan, const ScanLimits& limits) {
   return {};
 }
 
-RawCloud ScanPoints::raw() const {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  cloud.width = xyz.size() / 3;
-  cloud.height = 1;
-  cloud.point_step = 3 * sizeof(double);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.x = 0;
-  cloud.y = sizeof(double);
-  cloud.z = 2 * sizeof(double);
-  cloud.is_double = true;
-  return cloud;
-}
+RawCloud ScanPoints::raw() const { return packed_cloud(xyz.data(), xyz.size() / 3, 1); }
 
 void to_points(const LaserScan& scan, double min_range, double max_range,
                const Eigen::Isometry3d& X_SE, ScanPoints* points) {

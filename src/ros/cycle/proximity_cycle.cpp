@@ -241,6 +241,19 @@ void ProximityCycle::forget() {
   poses_.stamp = ros::Time();
 }
 
+Eigen::AlignedBox3d ProximityCycle::robot_box() const {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < packed_->links.size(); ++i) {
+    if (i >= poses_.known.size() || !poses_.known[i]) continue;
+    for (const InnerSphere& sphere : packed_->links[i].packing.spheres) {
+      const Eigen::Vector3d p_FS = poses_.X_FL[i] * sphere.center;
+      box.extend(p_FS - Eigen::Vector3d::Constant(sphere.radius));
+      box.extend(p_FS + Eigen::Vector3d::Constant(sphere.radius));
+    }
+  }
+  return box;
+}
+
 void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
                                           const std::string& self_problem,
                                           const ProximityArray* self,

@@ -4,6 +4,7 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ros/time.h>
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <vector>
@@ -67,6 +68,10 @@ class ProximityCycle {
   SnapshotSpan clouds() const { return selection_.clouds(); }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
+
+  /// Encloses the inner spheres of all links whose pose the last run() knew, in the fixed frame.
+  /// Looks at each sphere: for pictures, not for every cycle.
+  Eigen::AlignedBox3d robot_box() const;
 
   /// Gives the repulsion of the last run() as joint efforts.
   /// @param proximity     the message of that run()
