@@ -41,8 +41,8 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
                            const CloudSources& sources, const TransformBuffer& buffer,
-                           std::function<LiveConfig()> live)
-    : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
+                           std::function<LiveConfig()> live, UnknownSpaceWatch* watch)
+    : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)), watch_(watch) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_.start("ist query", [this] { return_memory(); });
@@ -126,7 +126,7 @@ std::string QueryService::take_model() {
                                                   link_names(*model_->robot), config_.pose_timeout);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            CloudSelection::Reader::kOther);
+                                            CloudSelection::Reader::kOther, watch_);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }
