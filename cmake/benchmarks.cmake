@@ -23,13 +23,18 @@ foreach(source IN LISTS benchmark_sources)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
 
-foreach(name closed_loop self_view)
+foreach(name closed_loop memory self_view)
   target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
 endforeach()
 
 if(TARGET benchmark_map_reading)
   target_include_directories(benchmark_map_reading SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
   target_link_libraries(benchmark_map_reading PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+endif()
+if(octomap_FOUND)
+  target_compile_definitions(benchmark_memory PRIVATE IST_PROXIMITY_HAS_OCTOMAP)
+  target_include_directories(benchmark_memory SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
+  target_link_libraries(benchmark_memory PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
 endif()
 
 # What the maps are measured beside, where it is installed.

@@ -8,6 +8,7 @@
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 #include <thread>
 
@@ -21,6 +22,9 @@
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
+#include "ros/input/map_message.h"
+#include "ros/input/memory_source.h"
+#include "ros/input/unknown_space.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
@@ -37,6 +41,7 @@
 #include "ros/poses/transforms.h"
 #include "ros/poses/usual_period.h"
 #include "ros/services/link_pair_service.h"
+#include "ros/services/memory_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
@@ -70,6 +75,7 @@ class ProximityServer::Impl {
   ~Impl();
 
  private:
+  void add_source(const SourceConfig& config, const ros::Publisher& filtered);
   void run_cycles();
   bool wait_for_joint_states();
   void run_cycle();
@@ -93,7 +99,10 @@ class ProximityServer::Impl {
   DiagnosticsPublisher diagnostics_;
   TransformBuffer buffer_;
   TransformListener listener_;
+  SourceMemories memories_;
   CloudSources sources_;
+  std::unique_ptr<MemoryService> memory_service_;
+  std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
   ModelLoader loader_;
   ModelServices model_services_;
   LiveParameters live_;
@@ -142,8 +151,9 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       contact_loader_(config, loader_) {
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
-    sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud));
+    add_source(source, filtered_cloud);
   }
+  memory_service_ = std::make_unique<MemoryService>(private_nh_, memories_);
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
       ++joint_states_received_;
@@ -152,8 +162,12 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     });
   }
   const auto live = [this] { return live_config(); };
-  query_service_ =
-      std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_, live);
+  if (config_.unknown_space != UnknownSpace::kFree) {
+    unknown_space_ =
+        std::make_unique<UnknownSpaceWatch>(memories_, buffer_, config_.query.max_distance);
+  }
+  query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_, live,
+                                                  unknown_space_.get());
   if (config_.self_collision.enabled) {
     self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
                                                       joint_states_.get(), live);
@@ -173,6 +187,22 @@ ProximityServer::Impl::~Impl() {
   link_pairs_.reset();
   cycle_.reset();
   joint_states_.reset();  // the listener's thread uses members that are destroyed before it
+}
+
+/// Adds a source, and what it remembers.
+void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Publisher& filtered) {
+  std::shared_ptr<SourceMemory> memory;
+  ros::Publisher map;
+  if (config.memory.enabled) {
+    map = advertise_map(&private_nh_, "memory/" + config.name);
+    memory = std::make_shared<SourceMemory>(config, buffer_,
+                                            config_.unknown_space != UnknownSpace::kFree, map);
+    memories_.push_back(memory);
+  }
+  sources_.push_back(std::make_unique<CloudSource>(config, nh_, buffer_, filtered, memory));
+  if (!memory) return;
+  const ObstacleSource& parent = *sources_.back();
+  sources_.push_back(std::make_unique<MemorySource>(parent, memory, map.getTopic()));
 }
 
 /// Waits until a joint state comes, but not for ever. Joint states that came during the last cycle
@@ -247,8 +277,10 @@ void ProximityServer::Impl::run_cycle() {
     ++report_.cycles;
   }
   last_stamp_ = message->header.stamp;
-  assert_invariants(*message,
-                    {ros::Time::now(), config_.query.max_distance, live.query.margin});
+  const double least_when_clear = config_.unknown_space == UnknownSpace::kObstacle
+                                      ? -std::numeric_limits<double>::infinity()
+                                      : config_.query.max_distance;
+  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin, true});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
@@ -290,7 +322,7 @@ void ProximityServer::Impl::take_model() {
         model_, config_,
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),
                          JointPoseSource::Which::kTaken),
-        CloudSelection::Reader::kOnly);
+        CloudSelection::Reader::kOnly, unknown_space_.get());
     cycle_->continue_from(last_stamp_);
   } else {
     cycle_.reset();

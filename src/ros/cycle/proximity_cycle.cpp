@@ -17,6 +17,8 @@ using ist_proximity::ProximityArray;
 
 namespace {
 
+// Of a cycle's deadline: unknown space needs coarse bounds only.
+constexpr double kUnknownShare = 0.2;
 constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
 
 /// When a share of a deadline [s] has passed.
@@ -29,7 +31,8 @@ TimePoint end_of(double deadline, double share, TimePoint begin) {
 }  // namespace
 
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                               std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader)
+                               std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
+                               UnknownSpaceWatch* watch)
     : model_(std::move(model)),
       packed_(model_->robot),
       robot_(*model_->robot),
@@ -39,6 +42,11 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
       selection_(reader),
       query_(model_->robot, config.query),
+      unknown_space_(watch == nullptr
+                         ? nullptr
+                         : std::make_unique<UnknownSpaceQuery>(
+                               model_->robot, watch, reader == CloudSelection::Reader::kOnly)),
+      unknown_is_obstacle_(config.unknown_space == UnknownSpace::kObstacle),
       repulsion_(model_->robot),
       filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
@@ -71,6 +79,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   const double preparation = watch.lap();
 
   run_query(config, begin);
+  ask_unknown_space(config);
   message->query_time = watch.lap();
   find_urgent_links();
   compute_pushes(config, end_of(deadline_, kRepulsionShare, begin));
@@ -119,6 +128,14 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   status_input_.outside_region = statistics.outside_region > 0;
   status_input_.deadline.unfinished = statistics.unfinished;
   status_input_.deadline.widest = statistics.widest;
+}
+
+void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
+  if (!unknown_space_) return;
+  QueryConfig query = config.query;
+  query.deadline *= kUnknownShare;
+  unknown_space_->run(poses_.X_FL, known_, poses_.stamp.toSec(), query,
+                      config.repulsion.influence_distance);
 }
 
 /// The links that matter most are served first, as time may end.
@@ -191,6 +208,11 @@ void ProximityCycle::fill_links(ProximityArray* message) {
                                   selection_.nearest(result)),
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
+    if (unknown_space_ && result.state != LinkState::kUnknown) {
+      assign_unknown_space(unknown_space_->answer(i).seen, unknown_space_->answer(i).lower_bound,
+                           unknown_space_->answer(i).direction, unknown_is_obstacle_,
+                           &message->links[k]);
+    }
   }
 }
 
@@ -231,6 +253,7 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
   }
   packed_ = model->robot;
   query_.set_model(packed_);
+  if (unknown_space_) unknown_space_->set_model(packed_);
   repulsion_ = model->repulsion ? *model->repulsion : Repulsion(packed_);
 }
 

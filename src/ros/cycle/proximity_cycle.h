@@ -14,6 +14,7 @@
 #include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
+#include "ros/cycle/unknown_space_query.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
 #include "ros/output/joint_repulsion.h"
@@ -33,8 +34,10 @@ class ProximityCycle {
  public:
   /// @param model  ready
   /// @param poses  of model->robot->links; null where the kinematics that it needs is faulty
+  /// @param watch  outlives this; null with ~unknown_space free
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                 std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader);
+                 std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
+                 UnknownSpaceWatch* watch = nullptr);
 
   /// @param now      the ROS clock's time
   /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
@@ -88,6 +91,7 @@ class ProximityCycle {
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
   void run_query(const LiveConfig& config, TimePoint begin);
+  void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
@@ -104,6 +108,8 @@ class ProximityCycle {
   const bool self_counts_;     ///< ~self_collision/in_minimum
   CloudSelection selection_;
   ProximityQuery query_;
+  std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
+  const bool unknown_is_obstacle_;
   Repulsion repulsion_;
   std::vector<KeptRepulsion> blends_;     ///< by link of the robot
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot

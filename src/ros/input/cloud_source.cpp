@@ -38,11 +38,13 @@ std::string clock_difference(const Measurement& measurement) {
 }  // namespace
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
-                         const TransformBuffer& buffer, const ros::Publisher& filtered)
+                         const TransformBuffer& buffer, const ros::Publisher& filtered,
+                         std::shared_ptr<SourceMemory> memory)
     : config_(config),
       is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
       filtered_(filtered),
+      memory_(std::move(memory)),
       state_(config, config.file.empty() ? nh.resolveName(config.topic) : config.file),
       placer_(config, buffer),
       ingest_(ingest_config(config)),
@@ -326,6 +328,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     return problem;
   }
   complete(measurement, placement, &snapshot);
+  snapshot.memory = memory_ ? memory_->take(measurement, placement, target_, snapshot) : nullptr;
   in_use_ = snapshot.stamp;
   if (show) {
     publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));

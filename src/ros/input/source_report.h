@@ -18,6 +18,7 @@ struct SourceReport {
   std::string type = "sensor_msgs/PointCloud2";
   std::string noun = "cloud";                       ///< the word for one message
   bool is_file = false;                             ///< a map file: read once and never stale
+  bool is_memory = false;                           ///< what another source remembers: never stale
   double timeout = 0.5;                             ///< [s]
   std::string timeout_parameter = "cloud_timeout";  ///< its name
   bool required = true;
@@ -49,6 +50,7 @@ struct SourceReport {
   ros::Time counts_from;     ///< the age counts from then
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
+  std::size_t memory_voxels = 0, memory_occupied = 0;  ///< of a memory
 };
 
 }  // namespace ist

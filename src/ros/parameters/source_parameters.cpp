@@ -1,6 +1,7 @@
 #include "ros/parameters/source_parameters.h"
 
 #include <limits>
+#include <map>
 #include <sstream>
 #include <string>
 
@@ -44,6 +45,36 @@ void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfi
   }
 }
 
+// The limits are those of MemoryConfig; 10^9 voxels take 8.6 GB.
+void read_memory(ParameterReader* reader, const std::string& prefix, SourceMemoryConfig* memory) {
+  reader->children(prefix + "memory");  // adds an error unless it is a dictionary
+  reader->read(prefix + "memory/enabled", &memory->enabled);
+  reader->read(prefix + "memory/decay", Range::positive("s", kInf, true), &memory->map.decay);
+  reader->read(prefix + "memory/resolution", Range{"m", 0.001, 1.0}, &memory->map.resolution);
+  reader->read(prefix + "memory/max_nodes", Range{"", 4096.0, 1e9}, &memory->map.max_nodes);
+  reader->read(prefix + "memory/max_range", Range::positive("m", 100.0), &memory->map.max_range);
+  reader->read(prefix + "memory/frame_id", &memory->frame_id);
+  reader->read(prefix + "memory/file", &memory->file);
+  if (!memory->file.empty() && memory->file[0] != '/') {
+    reader->add_error("~" + prefix + "memory/file is \"" + memory->file +
+                      "\": an absolute path is needed, for example /home/robot/memory.bt");
+  }
+}
+
+// Each memory has a file of its own.
+void check_memories(ParameterReader* reader, const std::vector<SourceConfig>& sources) {
+  std::map<std::string, std::string> writers;
+  for (const SourceConfig& source : sources) {
+    const std::string& file = source.memory.file;
+    if (!source.memory.enabled || file.empty()) continue;
+    const auto [other, is_new] = writers.emplace(file, source.name);
+    if (is_new) continue;
+    reader->add_error("~sources/" + source.name + "/memory/file is \"" + file +
+                      "\", and so is that of '" + other->second +
+                      "': each memory needs a file of its own");
+  }
+}
+
 void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
   const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kDepthImage,
                                          SourceType::kScan, SourceType::kMap};
@@ -83,6 +114,16 @@ void read_map(ParameterReader* reader, const std::string& prefix, SourceConfig* 
 
 void read_source(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
   read_type(reader, prefix, &source->type);
+  if (source->type == SourceType::kCloud || source->type == SourceType::kDepthImage) {
+    read_memory(reader, prefix, &source->memory);
+  } else {
+    source->memory.enabled = false;
+    if (reader->has(prefix + "memory")) {
+      reader->add_error("~" + prefix +
+                        "memory is set: it is for clouds and depth images, not for a " +
+                        message_type(source->type));
+    }
+  }
   if (source->type == SourceType::kMap) {
     read_map(reader, prefix, source);
   } else {
@@ -112,6 +153,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   read_ingest(reader, "", &single.ingest);
   read_noise(reader, "", &single.noise);
   read_limits(reader, "", &single);
+  read_memory(reader, "", &single.memory);
   if (!reader->has("sources")) return {single};
 
   std::vector<SourceConfig> sources;
@@ -124,6 +166,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
     read_source(reader, prefix + "/", &source);
     sources.push_back(source);
   }
+  check_memories(reader, sources);
   if (sources.empty() && reader->errors().empty()) {
     reader->add_error("~sources is empty: at least one source is needed, or no ~sources at all");
   }

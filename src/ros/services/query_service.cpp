@@ -41,11 +41,13 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 QueryService::QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
                            const ServerConfig& config, const CloudSources& sources,
-                           const TransformBuffer& buffer, std::function<LiveConfig()> live)
+                           const TransformBuffer& buffer, std::function<LiveConfig()> live,
+                           UnknownSpaceWatch* watch)
     : config_(config),
       sources_(sources),
       buffer_(buffer),
       live_(std::move(live)),
+      watch_(watch),
       self_(nh, config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
@@ -135,7 +137,7 @@ std::string QueryService::take_model() {
                                                   link_names(*model_->robot), config_.pose_timeout);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            CloudSelection::Reader::kOther);
+                                            CloudSelection::Reader::kOther, watch_);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }

@@ -41,6 +41,16 @@ void add_source_counts(const SourceReport& source, double rate, double now,
                        DiagnosticStatus* status) {
   add_value("topic", source.topic, status);
   add_value("required", source.required ? "true" : "false", status);
+  if (source.is_memory) {
+    if (source.has_snapshot) {
+      add_value("age", format_text("%.3f s", now - source.counts_from.toSec()), status);
+      add_value("boxes in use", source.counts.used, status);
+      add_value("time to remember", milliseconds(source.ingest_time), status);
+    }
+    add_value("voxels occupied", source.memory_occupied, status);
+    add_value("voxels in memory", source.memory_voxels, status);
+    return;
+  }
   add_value("publishers", source.publishers, status);
   add_value("messages received", source.messages, status);
   if (!source.is_file) add_value("rate", format_text("%.1f Hz", rate), status);
