@@ -54,12 +54,14 @@ int main(int argc, char** argv) {
   ist::IngestConfig filter;
   touch.filters = {filter};
   filter.self_filter_mode = ist::SelfFilterMode::kView;
+  filter.view.noise = {touch.noise, 0.0};
   touch.filters.push_back(filter);
   const std::vector<ist::sim::TouchResult> touches = ist::sim::run_touch(robot, model, touch);
 
   view.position_error = touch.position_error;
   view.angle_error = touch.angle_error;
   view.resolution = touch.resolution;
+  view.view = filter.view;
   view.paddings = {filter.self_filter_padding};
   std::string table =
       "| mode | told while it touches | places | mean distance told | told at 5 cm and more | "

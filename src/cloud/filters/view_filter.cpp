@@ -8,6 +8,7 @@
 #include "cloud/filters/crop.h"
 #include "cloud/format/point_reader.h"
 #include "internal/geometry/ray_cast.h"
+#include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -209,20 +210,23 @@ bool ViewFilter::add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const Sel
   return true;
 }
 
-// Whether a ray that misses the links passes them farther away than their edges may be off; a point
-// in front of the place where it is nearest is an obstacle too.
-bool ViewFilter::is_beside(const Eigen::Vector3d& p_S, const Sight& sight,
-                           const SelfFilter& filter) const {
+// Whether a point is nowhere near a surface that the ray meets or passes, within what noise, the
+// sensor's pose and blurred edges leave open. Behind the surface's nearest point it is a mixed
+// pixel or a shadow.
+bool ViewFilter::is_obstacle(const Eigen::Vector3d& p_S, const Sight& sight,
+                             const SelfFilter& filter) const {
   const double range = p_S.norm();
+  const double last = range + kCertain * config_.noise.sigma(range);
   for (const SelfFilter::Link* link : filter.group()) {
     const LinkState& state = links_[link->number];
     const double tolerance = state.tolerance + config_.mixed_pixels * pixel_ * range;
-    const RayApproach near =
-        nearest_approach(*link->solid, state.X_LS.translation(),
-                         state.X_LS.linear() * sight.direction, range, padding_ + kFlat);
-    if (near.distance > tolerance) continue;
-    const double noise = config_.noise.sigma(range);
-    if (range > near.t - kCertain * noise - tolerance) return false;
+    const Eigen::Vector3d o_L = state.X_LS.translation(),
+                          d_L = state.X_LS.linear() * sight.direction;
+    if (distance_outside(*link->solid, o_L + last * d_L, tolerance).distance <= tolerance) {
+      return false;
+    }
+    const RayApproach near = nearest_approach(*link->solid, o_L, d_L, range, padding_ + kFlat);
+    if (near.distance <= tolerance && near.t <= last) return false;
   }
   return true;
 }
@@ -249,11 +253,19 @@ void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uin
     if (sight.link == nullptr) {
       tile->skin |= bit;
       tile->robot |= bit;
-      if (is_beside(p_S[k], sight, filter)) tile->obstacle |= bit;
+      if (is_obstacle(p_S[k], sight, filter)) tile->obstacle |= bit;
       continue;
     }
     const double cosine = -sight.normal.dot(sight.direction);
-    add_gap(k, (sight.t - range) * cosine, config_.noise.sigma(range) * cosine, tile);
+    const double gap = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
+    const bool is_far = gap > kCertain * noise + static_cast<double>(tile->tolerance);
+    if (is_far && !is_obstacle(p_S[k], sight, filter)) {
+      // At an edge the ray may meet what is behind it: nothing is known of the gap.
+      tile->skin |= bit;
+      tile->robot |= bit;
+      continue;
+    }
+    add_gap(k, gap, noise, tile);
   }
 }
 

@@ -96,7 +96,7 @@ class ViewFilter {
   void add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uint32_t kept,
                   const SelfFilter& filter, const Eigen::Isometry3d& X_OS, Tile* tile) const;
   void add_gap(std::size_t k, double gap, double noise, Tile* tile) const;
-  bool is_beside(const Eigen::Vector3d& p_S, const Sight& sight, const SelfFilter& filter) const;
+  bool is_obstacle(const Eigen::Vector3d& p_S, const Sight& sight, const SelfFilter& filter) const;
 
   Tile* tile_at(std::int64_t row, std::int64_t column);
   bool is_in_front(double sum, double variance, int count, double tolerance, double sigmas) const;
