@@ -269,8 +269,9 @@ std::vector<TouchResult> run_touch(const RobotDescription& robot,
     if (step % 20 != 0 || !has_cloud || at >= places.size()) continue;
     const double since = t - places[at].begin - coming();
     const bool touches = since >= config.latency + camera.period && since <= hold;
-    const bool is_away = !(bar_distance(places[at], hold, t - 0.2) < kAway) &&
-                         !(bar_distance(places[at], hold, t) < kAway);
+    const double then = t - config.latency - camera.period;
+    const bool is_away = !(world.nearest_then(kAway, then).distance < kAway) &&
+                         !(world.nearest(kAway).distance < kAway);
     if (!touches && !is_away) continue;
     const std::vector<Eigen::Isometry3d> X_FL = world.link_poses();
     for (Trial& trial : trials) {

@@ -24,6 +24,20 @@ void require(bool valid, const char* member, double value, const char* range) {
                               std::to_string(value) + ", it must be " + range + ".");
 }
 
+void check(const ViewFilterConfig& view) {
+  const auto is_positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  const auto is_not_negative = [](double value) { return value >= 0.0 && std::isfinite(value); };
+  const RangeNoise& noise = view.noise;
+  require(is_not_negative(noise.constant), "view.noise.constant", noise.constant, "0 or more");
+  require(is_not_negative(noise.quadratic), "view.noise.quadratic", noise.quadratic, "0 or more");
+  require(is_positive(view.position_error), "view.position_error", view.position_error,
+          "more than 0");
+  require(is_positive(view.angle_error), "view.angle_error", view.angle_error, "more than 0");
+  require(is_not_negative(view.model_error), "view.model_error", view.model_error, "0 or more");
+  require(is_not_negative(view.time_error), "view.time_error", view.time_error, "0 or more");
+  require(is_not_negative(view.mixed_pixels), "view.mixed_pixels", view.mixed_pixels, "0 or more");
+}
+
 void check(const IngestConfig& config) {
   require(config.min_range >= 0.0 && std::isfinite(config.min_range), "min_range", config.min_range,
           "0 or more");
@@ -33,6 +47,7 @@ void check(const IngestConfig& config) {
           "self_filter_padding", config.self_filter_padding, "0 or more");
   require(config.thinning >= kSmallestVoxel && std::isfinite(config.thinning), "thinning",
           config.thinning, "1e-9 or more");
+  if (config.self_filter_mode == SelfFilterMode::kView) check(config.view);
   require(config.max_points > 0, "max_points", 0.0, "1 or more");
 }
 
@@ -115,7 +130,8 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   bool organized = is_organized(cloud, crop);
   SelfFilter* on_robot = nullptr;
   ViewFilter* view = nullptr;
-  snapshot->view = ViewReport();
+  snapshot->view.is_used = false;
+  snapshot->view.links.clear();
   if (config.self_filter && !robot.empty()) {
     on_robot = &impl_->self_filter;
     if (impl_->view != nullptr && is_view(cloud)) view = impl_->view.get();

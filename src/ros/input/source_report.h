@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
 
@@ -24,6 +25,8 @@ struct SourceReport {
   /// [m] Points this near to a link are taken for the robot, so obstacles in this skin are not
   /// seen. NaN without self-filter.
   double blind_skin = std::numeric_limits<double>::quiet_NaN();
+  /// Whether the self-filter is to decide by view; `blind_skin` is the padding then.
+  bool by_view = false;
   std::uint64_t messages = 0;      ///< received
   std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use
   std::uint64_t overtaken = 0;     ///< dropped: a newer one was ready first
@@ -49,6 +52,8 @@ struct SourceReport {
   ros::Time counts_from;     ///< the age counts from then
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
+  ViewReport view;                      ///< of a self-filter by view
+  std::vector<std::string> view_links;  ///< names of view.links
 };
 
 }  // namespace ist
