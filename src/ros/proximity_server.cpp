@@ -280,7 +280,7 @@ void ProximityServer::Impl::run_cycle() {
   const double least_when_clear = config_.unknown_space == UnknownSpace::kObstacle
                                       ? -std::numeric_limits<double>::infinity()
                                       : config_.query.max_distance;
-  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin, true});
+  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/region_of_interest.h"
 #include "ist_proximity/geometry/span.h"
 
@@ -101,6 +102,7 @@ struct CloudSnapshot {
   std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
   IngestCounts counts;       ///< what was done with the points of the message
+  ViewReport view;           ///< of a self-filter by view
   double stamp = 0.0;        ///< [s] time of acquisition
   double ingest_time = 0.0;  ///< [s] duration of Ingest::run()
 };

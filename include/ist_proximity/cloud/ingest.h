@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 
@@ -93,6 +94,8 @@ struct IngestConfig {
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
+  SelfFilterMode self_filter_mode = SelfFilterMode::kPadding;  ///< how the robot is recognised
+  ViewFilterConfig view;  ///< used where self_filter_mode is kView
   /// Give the cloud a thinned one; without it repulsion and contact volumes see no points. It costs
   /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
@@ -140,7 +143,9 @@ class Ingest {
   /// from its sensor's frame (map coordinates); it is subtracted before double becomes float.
   ///
   /// A point is the robot's when its exact distance to one of the solids is at most the padding, or
-  /// when it is inside one.
+  /// when it is inside one. With SelfFilterMode::kView, those of them that the sensor cannot see
+  /// where the robot is are kept, and X_FS is corrected by what the points on the robot say of it
+  /// (CloudSnapshot::view).
   /// @param cloud  checked by check_layout; points in the sensor frame S
   /// @param X_FS   sensor frame -> fixed frame, rigid
   /// @param robot  the robot's links at the cloud's stamp, see posed_solids(); for a measurement

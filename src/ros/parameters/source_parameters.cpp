@@ -10,6 +10,23 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
+void read_view(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
+  const bool is_view = ingest->self_filter_mode == SelfFilterMode::kView;
+  std::string mode = is_view ? "view" : "padding";
+  reader->read_choice(prefix + "self_filter_mode", {"padding", "view"}, &mode);
+  ingest->self_filter_mode = mode == "view" ? SelfFilterMode::kView : SelfFilterMode::kPadding;
+  ViewFilterConfig& view = ingest->view;
+  const std::string of = prefix + "self_filter_view/";
+  constexpr double kSmallest = 1e-6;  // errors of a sensor's pose are never less
+  reader->read(of + "noise_constant", Range::non_negative("m", 1.0), &view.noise.constant);
+  reader->read(of + "noise_quadratic", Range::non_negative("1/m", 1.0), &view.noise.quadratic);
+  reader->read(of + "position_error", Range{"m", kSmallest, 1.0}, &view.position_error);
+  reader->read(of + "angle_error", Range{"rad", kSmallest, 1.0}, &view.angle_error);
+  reader->read(of + "model_error", Range::non_negative("m", 1.0), &view.model_error);
+  reader->read(of + "time_error", Range::non_negative("s", 1.0), &view.time_error);
+  reader->read(of + "mixed_pixels", Range::non_negative("pixels", 10.0), &view.mixed_pixels);
+}
+
 void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
   const double default_max_range = ingest->max_range;
   reader->read(prefix + "min_range", Range::non_negative("m", 1e4), &ingest->min_range);
@@ -17,6 +34,7 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
   reader->read(prefix + "self_filter", &ingest->self_filter);
   reader->read(prefix + "self_filter_padding", Range::non_negative("m", 1.0),
                &ingest->self_filter_padding);
+  read_view(reader, prefix, ingest);
   if (!(ingest->max_range > ingest->min_range)) {
     std::ostringstream text;
     text << "~" << prefix << "max_range is " << ingest->max_range
