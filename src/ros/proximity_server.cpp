@@ -21,6 +21,7 @@
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
+#include "ros/input/world_source.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
@@ -140,6 +141,10 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       contact_loader_(config, loader_) {
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
+    if (source.type == SourceType::kWorld) {
+      sources_.push_back(std::make_unique<WorldSource>(source, nh_, buffer_));
+      continue;
+    }
     sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud));
   }
   if (config_.pose_source == PoseSourceKind::kJointStates) {

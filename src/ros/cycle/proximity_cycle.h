@@ -13,6 +13,7 @@
 #include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
+#include "ros/cycle/world_answers.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
 #include "ros/output/joint_repulsion.h"
@@ -65,6 +66,8 @@ class ProximityCycle {
 
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }
+  /// Whether known worlds were among the obstacles of the last run().
+  bool has_worlds() const { return worlds_.any(); }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 
@@ -80,6 +83,8 @@ class ProximityCycle {
   void run_query(const LiveConfig& config, TimePoint begin);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
+  RepulsiveWrench push_of_clouds(std::size_t link, const LinkProximity& result,
+                                 const LiveConfig& config, TimePoint end, std::uint64_t* key);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
   void fill_links(ist_proximity::ProximityArray* message);
@@ -91,6 +96,7 @@ class ProximityCycle {
   std::unique_ptr<PoseSource> pose_source_;
   const double pose_timeout_;  ///< [s]
   CloudSelection selection_;
+  WorldAnswers worlds_;
   ProximityQuery query_;
   Repulsion repulsion_;
   std::vector<KeptRepulsion> blends_;     ///< by link of the robot
@@ -107,10 +113,11 @@ class ProximityCycle {
   std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
   StatusInput status_input_;
-  std::vector<LinkProximity> results_;   ///< by link of the robot
-  std::vector<RepulsiveWrench> pushes_;  ///< by link of the robot, filtered
-  std::vector<Wrench> wrenches_;         ///< by link of the robot
-  std::vector<std::size_t> urgent_;      ///< monitored links, the least lower bound first
+  std::vector<LinkProximity> results_;        ///< by link of the robot: clouds and worlds
+  std::vector<LinkProximity> cloud_results_;  ///< the same of clouds alone
+  std::vector<RepulsiveWrench> pushes_;       ///< by link of the robot, filtered
+  std::vector<Wrench> wrenches_;              ///< by link of the robot
+  std::vector<std::size_t> urgent_;           ///< monitored links, the least lower bound first
 };
 
 }  // namespace ist

@@ -98,6 +98,9 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   if (bad != response.results.end()) {
     response.message =
         "results[" + std::to_string(bad - response.results.begin()) + "]: " + bad->status_text;
+  } else if (!response.impact_times.empty() && cycle_->has_worlds()) {
+    response.message =
+        "impact_times are NaN: they are found against clouds alone, and there are known worlds";
   }
   return true;
 }
@@ -193,6 +196,11 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   std::vector<double> first;
   first.reserve(wanted.size());
   for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
+  // Times are found against clouds alone: beside a known world, "never" would not be known.
+  if (cycle_->has_worlds()) {
+    std::fill(first.begin(), first.end(), std::nan(""));
+    std::fill(wanted.begin(), wanted.end(), false);
+  }
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
     const JointMotion motion{positions[k], positions[k + 1],
