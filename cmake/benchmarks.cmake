@@ -53,8 +53,13 @@ if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
     ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
   target_link_libraries(benchmark_link_pairs PRIVATE
     ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+  target_compile_definitions(benchmark_world PRIVATE IST_PROXIMITY_HAS_FCL)
+  target_include_directories(benchmark_world SYSTEM PRIVATE
+    ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
+  target_link_libraries(benchmark_world PRIVATE
+    ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
 else()
-  message(STATUS "ist_proximity: benchmark/octomap and link_pairs without FCL (apt install libfcl-dev)")
+  message(STATUS "ist_proximity: benchmark/octomap, link_pairs and world without FCL (apt install libfcl-dev)")
 endif()
 
 target_sources(benchmark_repulsion PRIVATE

@@ -25,6 +25,7 @@
 #include "ros/input/map_message.h"
 #include "ros/input/memory_source.h"
 #include "ros/input/unknown_space.h"
+#include "ros/input/world_source.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
@@ -151,6 +152,10 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       contact_loader_(config, loader_) {
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
+    if (source.type == SourceType::kWorld) {
+      sources_.push_back(std::make_unique<WorldSource>(source, nh_, buffer_));
+      continue;
+    }
     add_source(source, filtered_cloud);
   }
   memory_service_ = std::make_unique<MemoryService>(private_nh_, memories_);

@@ -47,6 +47,8 @@ struct SourceReport {
   double last_work = 0.0;  ///< [s] what reading and ingesting the last message took
   std::string problem;     ///< why the last message is not in use (yet); empty when it is
   std::string doubt;       ///< about messages that are used all the same; empty: none
+  /// Objects of a known world that cannot be used, though others can; empty: none.
+  std::string incomplete;
 
   bool has_snapshot = false;  ///< whether a cloud is in use; the members below describe it
   ros::Time stamp;

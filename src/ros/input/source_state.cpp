@@ -7,7 +7,8 @@ namespace ist {
 SourceState::SourceState(const SourceConfig& config, const std::string& topic)
     : is_permanent_(config.is_permanent()) {
   report_.name = config.name;
-  report_.is_file = !config.file.empty();
+  report_.is_file =
+      config.type == SourceType::kWorld ? !config.world.has_topic : !config.file.empty();
   report_.topic = topic;
   report_.type = message_type(config.type);
   report_.noun = noun(config.type);

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <string>
 
+#include "ros/parameters/world_parameters.h"
+
 namespace ist {
 namespace {
 
@@ -59,7 +61,9 @@ void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfi
       return reader->read(prefix + "max_beams", Range{"", 1.0, 1e7}, &source->scan.max_beams);
     case SourceType::kMap:
       reader->read(prefix + "max_leaves", Range{"", 1.0, 5e7}, &source->map.max_leaves);
-      reader->read(prefix + "max_bytes", Range{"", 1.0, 2e9}, &source->map.max_bytes);
+      return reader->read(prefix + "max_bytes", Range{"", 1.0, 2e9}, &source->map.max_bytes);
+    case SourceType::kWorld:
+      break;  // see read_world()
   }
 }
 
@@ -95,14 +99,17 @@ void check_memories(ParameterReader* reader, const std::vector<SourceConfig>& so
 
 void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
   const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kDepthImage,
-                                         SourceType::kScan, SourceType::kMap};
+                                         SourceType::kScan, SourceType::kMap, SourceType::kWorld};
+  const auto name_of = [](SourceType one) {
+    return one == SourceType::kWorld ? kWorldType : message_type(one);
+  };
   std::vector<std::string> names;
   names.reserve(types.size());
-  for (const SourceType one : types) names.emplace_back(message_type(one));
-  std::string name = message_type(*type);
+  for (const SourceType one : types) names.emplace_back(name_of(one));
+  std::string name = name_of(*type);
   reader->read_choice(prefix + "type", names, &name);
   for (const SourceType one : types) {
-    if (name == message_type(one)) *type = one;
+    if (name == name_of(one)) *type = one;
   }
 }
 
@@ -144,6 +151,8 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   }
   if (source->type == SourceType::kMap) {
     read_map(reader, prefix, source);
+  } else if (source->type == SourceType::kWorld) {
+    read_world(reader, prefix, source);
   } else {
     read_ingest(reader, prefix, &source->ingest);
     if (source->type != SourceType::kScan) read_noise(reader, prefix, &source->noise);
@@ -153,7 +162,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   if (source->topic.empty()) {
     reader->add_error("~" + prefix + "topic is empty: the name of a topic is needed");
   }
-  if (source->file.empty()) {
+  if (source->file.empty() && source->type != SourceType::kWorld) {
     reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
   }
   if (source->type == SourceType::kDepthImage) {

@@ -109,6 +109,9 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   if (bad != response.results.end()) {
     response.message =
         "results[" + std::to_string(bad - response.results.begin()) + "]: " + bad->status_text;
+  } else if (!response.impact_times.empty() && cycle_->has_worlds()) {
+    response.message =
+        "impact_times are NaN: they are found against clouds alone, and there are known worlds";
   }
   return true;
 }
@@ -212,6 +215,11 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   if (request.self_proximity != 0) self_.begin_motion();
   JointPoses still;  // nothing is known of the motion while the root link has no pose
   if (poses_->is_root_known()) still = poses_->joints();
+  // Times are found against clouds alone: beside a known world, "never" would not be known.
+  if (cycle_->has_worlds()) {
+    std::fill(first.begin(), first.end(), std::nan(""));
+    std::fill(wanted.begin(), wanted.end(), false);
+  }
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
     const JointMotion motion{positions[k], positions[k + 1],
