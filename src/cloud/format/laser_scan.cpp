@@ -79,11 +79,13 @@ RawCloud ScanPoints::raw() const {
   cloud.y = sizeof(double);
   cloud.z = 2 * sizeof(double);
   cloud.is_double = true;
+  cloud.pixel_angle = beam_angle;
   return cloud;
 }
 
 void to_points(const LaserScan& scan, double min_range, double max_range,
                const Eigen::Isometry3d& X_SE, ScanPoints* points) {
+  points->beam_angle = std::abs(scan.angle_increment);
   const bool moves = scan.count > 1 && scan.time_increment != 0.0;
   const Eigen::Quaterniond q_SE(X_SE.linear());
   points->xyz.resize(3 * scan.count);
