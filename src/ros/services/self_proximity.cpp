@@ -97,8 +97,7 @@ void SelfProximity::take_model() {
     model_ = newest_model_;
   }
   if (is_refined) {
-    query_ =
-        std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, query_.get());
+    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query);
     return;
   }
   query_.reset();
