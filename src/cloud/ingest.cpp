@@ -1,5 +1,6 @@
 #include "ist_proximity/cloud/ingest.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <sstream>
@@ -38,6 +39,10 @@ void check(const ViewFilterConfig& view) {
   require(is_not_negative(view.mixed_pixels), "view.mixed_pixels", view.mixed_pixels, "0 or more");
 }
 
+double farthest_point(const IngestConfig& config) {
+  return std::min(config.max_range, config.extent.max_range);
+}
+
 void check(const IngestConfig& config) {
   require(config.min_range >= 0.0 && std::isfinite(config.min_range), "min_range", config.min_range,
           "0 or more");
@@ -49,6 +54,9 @@ void check(const IngestConfig& config) {
           config.thinning, "1e-9 or more");
   if (config.self_filter_mode == SelfFilterMode::kView) check(config.view);
   require(config.max_points > 0, "max_points", 0.0, "1 or more");
+  if (config.extent.is_zero()) return;
+  const std::string fault = check_extent(config.extent, farthest_point(config));
+  if (!fault.empty()) throw std::invalid_argument("IngestConfig::extent: " + fault + ".");
 }
 
 void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestConfig& config) {
@@ -67,6 +75,34 @@ void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestCon
                                 " points, allowed are at most " +
                                 std::to_string(config.max_points) + " (max_points).");
   }
+}
+
+// The extent of a cloud's points.
+// @throws std::invalid_argument where it follows from a camera, and the cloud is no camera's
+PointExtent extent_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
+                      const IngestConfig& config) {
+  PointExtent extent;
+  if (config.extent.is_zero()) return extent;
+  double angle = 0.0;
+  if (config.extent.footprint == ExtentConfig::Footprint::kCamera) {
+    angle = pixel_angle(cloud, config.extent.field_of_view);
+    if (!(angle > 0.0) && cloud.size() > 0) {
+      throw std::invalid_argument(
+          "the footprint of a point is asked for, but its angle is not known: the cloud has " +
+          std::to_string(cloud.width) + " x " + std::to_string(cloud.height) +
+          " points and no camera_info. Give the footprint as an angle or a radius, or for an "
+          "organized cloud the field of view.");
+    }
+  }
+  extent = point_extent(config.extent, angle > 0.0 ? angle : 0.0, farthest_point(config));
+  if (!(extent.radius(std::min(extent.max_range, kLargestRange)) <= kMaxExtent)) {
+    std::ostringstream text;
+    text << "the footprint of a pixel makes points at max_range, " << extent.max_range
+         << " m, larger than " << kMaxExtent << " m. Lower max_range.";
+    throw std::invalid_argument(text.str());
+  }
+  extent.p_FS = X_FS.translation();
+  return extent;
 }
 
 }  // namespace
@@ -126,6 +162,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   const auto start = std::chrono::steady_clock::now();
   const IngestConfig& config = impl_->config;
   check(cloud, X_FS, config);
+  const PointExtent extent = extent_of(cloud, X_FS, config);
   CropParameters crop = impl_->crop_of(cloud, X_FS);
   bool organized = is_organized(cloud, crop);
   SelfFilter* on_robot = nullptr;
@@ -160,6 +197,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
                         counts.outside_region - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
+  snapshot->extent = extent;
   snapshot->thinning = config.thinning;
   snapshot->region = impl_->region;
   if (config.thin) snapshot->index.bvh().set_thinning(config.thinning);

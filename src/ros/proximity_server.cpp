@@ -171,8 +171,8 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     unknown_space_ =
         std::make_unique<UnknownSpaceWatch>(memories_, buffer_, config_.query.max_distance);
   }
-  query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_, live,
-                                                  unknown_space_.get());
+  query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
+                                                  live, unknown_space_.get());
   if (config_.self_collision.enabled) {
     self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
                                                       joint_states_.get(), live);

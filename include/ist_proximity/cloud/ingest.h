@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/point_extent.h"
 #include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
@@ -59,6 +60,7 @@ struct RawCloud {
   bool swap_bytes = false;                ///< the data's byte order is not the machine's
   DepthType depth = DepthType::kNone;     ///< of a depth image, which has no x, y and z
   std::shared_ptr<const DepthRays> rays;  ///< of a depth image's pixels
+  double pixel_angle = 0.0;  ///< [rad] largest angle between two neighbours; 0: not known
   /// `data` stays unchanged as long as this lives, so that points may be read later, when a query
   /// needs them. Null: `data` is valid during the call only, and all points are read then.
   std::shared_ptr<const void> owner;
@@ -100,6 +102,8 @@ struct IngestConfig {
   /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
   double thinning = 0.01;  ///< [m] at least 1e-9: edge of a voxel of the thinned cloud
+  /// Radius of a point, for lower bounds that hold for the surface in place of its samples.
+  ExtentConfig extent;
   /// >= 1: a cloud of more points is refused. This bounds time and memory of one cloud: five
   /// million points take about 3 s and 700 MB where neighbours in the message lie anywhere in
   /// space.

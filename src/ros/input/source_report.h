@@ -56,8 +56,8 @@ struct SourceReport {
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
   std::size_t memory_voxels = 0, memory_occupied = 0;  ///< of a memory
-  ViewReport view;                      ///< of a self-filter by view
-  std::vector<std::string> view_links;  ///< names of view.links
+  ViewReport view;                                     ///< of a self-filter by view
+  std::vector<std::string> view_links;                 ///< names of view.links
 };
 
 }  // namespace ist
