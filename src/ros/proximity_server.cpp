@@ -246,8 +246,7 @@ void ProximityServer::Impl::run_cycle() {
     ++report_.cycles;
   }
   last_stamp_ = message->header.stamp;
-  assert_invariants(*message,
-                    {ros::Time::now(), config_.query.max_distance, live.query.margin});
+  assert_invariants(*message, {ros::Time::now(), config_.query.max_distance, live.query.margin});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;

@@ -231,8 +231,7 @@ void SelfProximity::publish_once() {
   const Status status = overall_status(input, now.toSec());
   message->status = status.code;
   message->status_text = status.text;
-  assert_invariants(*message,
-                    {ros::Time::now(), config_.query.max_distance, live.query.margin});
+  assert_invariants(*message, {ros::Time::now(), config_.query.max_distance, live.query.margin});
   publish(message);
 }
 
