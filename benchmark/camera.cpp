@@ -23,6 +23,7 @@
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "peers/method.h"
@@ -70,7 +71,9 @@ struct Robot {
 class Node {
  public:
   explicit Node(const Robot& robot)
-      : robot_(robot), ingest_({}), query_(robot.model, {}), repulsion_(robot.model) {}
+      : robot_(robot), ingest_({}), query_(robot.model, {}), repulsion_(robot.model) {
+    for (std::size_t i = 0; i < robot.model->links.size(); ++i) kept_.emplace_back(*robot.model, i);
+  }
 
   void ingest(const Frame& frame, const Poses& X_FL) {
     ist::RawCloud raw = frame.raw();
@@ -81,8 +84,13 @@ class Node {
   void query(const Poses& X_FL) { query_.run(X_FL, robot_.known, {&snapshot_}, &results_); }
   void repel(const Poses& X_FL) {
     for (std::size_t i = 0; i < results_.size(); ++i) {
-      push_ = repulsion_.wrench(i, X_FL[i], {&snapshot_}, results_[i], {});
+      push_ = kept_[i].update(repulsion_, X_FL[i], {&snapshot_}, results_[i], {});
     }
+  }
+  // As repel() where nothing is kept.
+  void blend(const Poses& X_FL) {
+    for (ist::KeptRepulsion& kept : kept_) kept.forget();
+    repel(X_FL);
   }
   void penetrate(const Poses& X_FL) {
     for (std::size_t i = 0; i < results_.size(); ++i) {
@@ -105,6 +113,7 @@ class Node {
   CloudSnapshot snapshot_;
   ist::ProximityQuery query_;
   ist::Repulsion repulsion_;
+  std::vector<ist::KeptRepulsion> kept_;
   std::vector<LinkProximity> results_;
   ist::RepulsiveWrench push_;
   ist::ContactVolume volume_;
@@ -263,9 +272,9 @@ double ingest_us(const Robot& robot, const Frame& frame, const Poses& X_FL) {
     const double ingest = timer.lap();
     node.query(X_FL);
     timer.lap();
-    node.repel(X_FL);
+    node.blend(X_FL);
     const double first = timer.lap();
-    node.repel(X_FL);
+    node.blend(X_FL);
     const double second = timer.lap();
     if (i > 0) us.push_back(ingest + std::max(first - second, 0.0));
   }

@@ -176,8 +176,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale,
   if (mesh.triangles.empty()) {
     fail(path, "holds no triangle; export the surface as triangles or polygons");
   }
-  throw_if(cancelled);
-  orient_outward(&mesh);  // some exporters write meshes inside out
+  orient_outward(&mesh, cancelled);  // some exporters write meshes inside out
   return mesh;
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "internal/geometry/cancelled.h"
 #include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
@@ -14,7 +15,8 @@ namespace ist {
 class OpenEdgeBlocks {
  public:
   OpenEdgeBlocks() = default;
-  explicit OpenEdgeBlocks(const TriangleMesh& mesh);
+  /// @throws Cancelled
+  explicit OpenEdgeBlocks(const TriangleMesh& mesh, const CancelRequest& cancelled = {});
 
   /// [1/m] An upper bound of the gradient of the winding number within a ball that the surface does
   /// not enter; inf where an open edge may.

@@ -73,11 +73,16 @@ std::vector<Triangles> find_shells(const TriangleMesh& mesh) {
   return shells;
 }
 
+// Pairs of shells that are tested before the caller is asked whether to go on: some milliseconds at
+// most.
+constexpr std::size_t kAskEvery = 4096;
+
 // Decides which shells lie within which others.
 class Nesting {
  public:
-  Nesting(const TriangleMesh& mesh, const std::vector<Triangles>& shells)
-      : mesh_(mesh), shells_(shells) {
+  Nesting(const TriangleMesh& mesh, const std::vector<Triangles>& shells,
+          const CancelRequest& cancelled)
+      : mesh_(mesh), shells_(shells), cancelled_(cancelled) {
     for (const Triangles& shell : shells) {
       Eigen::AlignedBox3d box;
       for (const std::size_t t : shell) {
@@ -88,6 +93,7 @@ class Nesting {
   }
 
   bool is_within(std::size_t inner, std::size_t outer) {
+    if (++asked_ % kAskEvery == 0) throw_if(cancelled_);
     if (inner == outer || !boxes_[outer].contains(boxes_[inner])) return false;
     const Eigen::Vector3d& p = mesh_.corner(shells_[inner].front(), 0);
     return std::abs(surface(outer).winding_number(p)) > 0.5;
@@ -103,29 +109,34 @@ class Nesting {
       for (int k = 0; k < 3; ++k) part.vertices.push_back(mesh_.corner(t, k));
       part.triangles.push_back({first, first + 1, first + 2});
     }
-    return surfaces_.emplace(shell, TriangleBvh(part)).first->second;
+    return surfaces_.emplace(shell, TriangleBvh(part, cancelled_)).first->second;
   }
 
   const TriangleMesh& mesh_;
   const std::vector<Triangles>& shells_;
+  const CancelRequest& cancelled_;
   std::vector<Eigen::AlignedBox3d> boxes_;
   std::map<std::size_t, TriangleBvh> surfaces_;
+  std::size_t asked_ = 0;
 };
 
 }  // namespace
 
-void orient_outward(TriangleMesh* mesh) {
+void orient_outward(TriangleMesh* mesh, const CancelRequest& cancelled) {
+  throw_if(cancelled);
   Triangles all(mesh->triangles.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   if (is_inside_out(*mesh, all)) flip(mesh, all);
+  throw_if(cancelled);
   const std::vector<Triangles> shells = find_shells(*mesh);
+  throw_if(cancelled);
   if (shells.size() < 2) return;
   std::vector<std::size_t> inside_out;
   for (std::size_t s = 0; s < shells.size(); ++s) {
     if (is_inside_out(*mesh, shells[s])) inside_out.push_back(s);
   }
   if (inside_out.empty() || inside_out.size() > kMaxPairs / shells.size()) return;
-  Nesting nesting(*mesh, shells);
+  Nesting nesting(*mesh, shells, cancelled);
   std::vector<bool> flips(shells.size(), false);
   for (const std::size_t s : inside_out) {
     bool is_outermost = true;

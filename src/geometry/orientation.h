@@ -1,5 +1,6 @@
 #pragma once
 
+#include "internal/geometry/cancelled.h"
 #include "ist_proximity/geometry/shapes.h"
 
 namespace ist {
@@ -12,6 +13,7 @@ namespace ist {
 /// cavities. Open meshes and shells, whose volume has no certain sign, stay as they are, and so do
 /// shells with inconsistent orientation and meshes of many thousand shells.
 /// @param mesh  vertices at the same place are one vertex, as load_mesh makes them
-void orient_outward(TriangleMesh* mesh);
+/// @throws Cancelled; the mesh is as it was then, or every triangle is flipped
+void orient_outward(TriangleMesh* mesh, const CancelRequest& cancelled = {});
 
 }  // namespace ist

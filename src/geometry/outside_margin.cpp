@@ -29,11 +29,12 @@ double distance_to_edge(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
 
 }  // namespace
 
-OpenEdgeBlocks::OpenEdgeBlocks(const TriangleMesh& mesh) {
-  for (const OpenEdge& edge : open_edges(mesh)) {
+OpenEdgeBlocks::OpenEdgeBlocks(const TriangleMesh& mesh, const CancelRequest& cancelled) {
+  for (const OpenEdge& edge : open_edges(mesh, cancelled)) {
     const Eigen::Vector3d &from = mesh.vertices[edge.from], &to = mesh.vertices[edge.to];
     edges_.push_back({from, to, edge.count * (to - from).norm()});
   }
+  throw_if(cancelled);
   for (std::size_t first = 0; first < edges_.size(); first += kEdges) {
     Block block{Eigen::Vector3d::Zero(), 0.0, 0.0, first, std::min(first + kEdges, edges_.size())};
     Eigen::AlignedBox3d box;

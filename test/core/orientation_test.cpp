@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -72,6 +73,37 @@ TEST(OrientOutward, KeepsMeshesWithoutACertainOutside) {
       {"some faces flipped", test::partly_flipped(sphere, 7)}};
   for (const auto& [name, mesh] : meshes) {
     EXPECT_EQ(oriented(mesh).triangles, mesh.triangles) << name;
+  }
+}
+
+// Shutdown while a mesh of many shells was oriented waited for it: up to a second of pairs that
+// nothing could end.
+TEST(OrientOutward, CanBeCancelled) {
+  TriangleMesh mesh;  // a row of tetrahedra, every other one inside out
+  const TriangleMesh outward{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                             {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+  constexpr int kShells = 2000;
+  for (int i = 0; i < kShells; ++i) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    const TriangleMesh shell = shifted(i % 2 == 0 ? outward : inside_out(outward), {3.0 * i, 0, 0});
+    mesh.vertices.insert(mesh.vertices.end(), shell.vertices.begin(), shell.vertices.end());
+    for (TriangleMesh::Triangle t : shell.triangles) {
+      for (std::uint32_t& v : t) v += first;
+      mesh.triangles.push_back(t);
+    }
+  }
+  int calls = 0;
+  TriangleMesh whole = mesh;
+  orient_outward(&whole, [&] { return ++calls < 0; });
+  EXPECT_NEAR(volume(whole), kShells / 6.0, 1e-6);
+  // Two million pairs and more; some thousands of them lie between two calls.
+  EXPECT_GT(calls, 400);
+  for (const int last : {1, 2, 3, 10, calls}) {
+    int asked = 0;
+    TriangleMesh part = mesh;
+    EXPECT_THROW(orient_outward(&part, [&] { return ++asked >= last; }), Cancelled);
+    EXPECT_EQ(asked, last);
+    EXPECT_EQ(part.triangles, mesh.triangles) << "what is cancelled changes nothing";
   }
 }
 

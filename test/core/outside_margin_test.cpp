@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "geometry/open_edge_blocks.h"
 #include "internal/geometry/solid_queries.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
@@ -53,6 +54,21 @@ TEST(OutsideMargin, HoldsNoPlaceInside) {
   }
   EXPECT_GT(positive, test::scaled(2000));
   EXPECT_GT(large, test::scaled(1000));
+}
+
+// The edges of a large mesh take a second to collect, which nothing could end.
+TEST(OutsideMargin, EdgesCanBeCancelled) {
+  const TriangleMesh mesh = perforated(3);
+  int calls = 0;
+  const OpenEdgeBlocks whole(mesh, [&] { return ++calls < 0; });
+  ASSERT_GT(calls, 1);
+  for (const int last : {1, calls}) {
+    int asked = 0;
+    EXPECT_THROW(OpenEdgeBlocks(mesh, [&] { return ++asked >= last; }), Cancelled);
+    EXPECT_EQ(asked, last);
+  }
+  const double far = whole.gradient_bound({1.0, 0.0, 0.0}, 0.0);
+  EXPECT_EQ(far, OpenEdgeBlocks(mesh).gradient_bound({1.0, 0.0, 0.0}, 0.0));
 }
 
 }  // namespace

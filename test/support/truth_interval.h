@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ist_proximity/geometry/shapes.h"
+#include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/shape_oracle.h"
 
@@ -33,7 +34,9 @@ inline TruthInterval truth_interval(const LinkGeometry& link, const Eigen::Vecto
   for (const GeometryElement& element : link) {
     const Eigen::Vector3d p = element.X_LE.inverse() * p_L;
     if (const auto* mesh = std::get_if<TriangleMesh>(&element.shape)) {
-      const double distance = oracle_distance(*mesh, p), winding = oracle_winding(*mesh, p);
+      const double distance = oracle_distance(*mesh, p);
+      // Outside the mesh's bounding box is outside (Solid).
+      const double winding = bounds(*mesh).contains(p) ? oracle_winding(*mesh, p) : 0.0;
       truth.add({winding > 0.5 - kWindingError ? -distance : distance,
                  winding > 0.5 + kWindingError ? -distance : distance});
     } else {

@@ -27,7 +27,9 @@ struct SolidElement;
 ///
 /// A point outside has the distance to the nearest element. A point inside has minus its depth in
 /// the element that holds it deepest; each element's depth is measured to its own surface. The
-/// inside of a mesh is where its generalized winding number exceeds 0.5 (Jacobson et al. 2013).
+/// inside of a mesh is where its generalized winding number exceeds 0.5 (Jacobson et al. 2013),
+/// within the mesh's axis-aligned bounding box: next to surfaces that lie double, the number alone
+/// may exceed 0.5 outside of it.
 /// Immutable, cheap to copy (copies share the elements); const members are thread safe and allocate
 /// nothing.
 class Solid {

@@ -78,14 +78,35 @@ std::string cause_of_staleness(const SourceReport& source) {
   return is_working || source.problem.empty() ? slow : because(source.problem);
 }
 
+/// The likely causes where no newer message has come.
+std::string question(const SourceReport& source) {
+  return source.noun == "map"
+             ? "; is it latched, and sent once? Then its timeout should be .inf"
+             : "; has its driver stopped, or do the clocks of sensor and node differ?";
+}
+
 Status stale(const SourceReport& source, double age) {
-  std::string cause = cause_of_staleness(source);
-  if (cause.empty() && source.noun == "map") {
-    cause = "; is it latched, and sent once? Then its timeout should be .inf";
-  } else if (cause.empty()) {
-    cause = "; has its driver stopped, or do the clocks of sensor and node differ?";
-  }
+  const std::string cause = cause_of_staleness(source);
   return {ProximityArray::STALE_CLOUD, title(source) + ": the newest " + source.noun + " is " +
+                                           seconds(age) + " old, allowed is " + allowed(source) +
+                                           (cause.empty() ? question(source) : cause)};
+}
+
+/// [s] Two instants of one message, its receipt and the beginning of its work, differ by less.
+constexpr double kSameMessage = 0.01;
+
+/// The snapshot in use is stale, though the newest message is not. A cloud that has just begun to
+/// be read is the reason before it has taken long.
+Status stale_snapshot(const SourceReport& source, double age) {
+  std::string cause = cause_of_staleness(source);
+  if (cause.empty() && source.working > 0.0) {
+    cause = ": a newer one has been read and indexed for " + seconds(source.working) + " so far";
+  } else if (cause.empty() && source.newest - source.counts_from.toSec() > kSameMessage) {
+    cause = ": a newer one waits to be read";
+  } else if (cause.empty()) {
+    cause = question(source);
+  }
+  return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun + " is " +
                                            seconds(age) + " old, allowed is " + allowed(source) +
                                            cause};
 }
@@ -105,11 +126,7 @@ Status source_status(const SourceReport& source, double now) {
                                           cause_of_staleness(source)};
   }
   const double age = now - source.counts_from.toSec();
-  if (age > source.timeout) {
-    return {ProximityArray::STALE_CLOUD, title(source) + ": the last usable " + source.noun +
-                                             " is " + seconds(age) + " old, allowed is " +
-                                             allowed(source) + cause_of_staleness(source)};
-  }
+  if (age > source.timeout) return stale_snapshot(source, age);
   if (source.counts.saw_nothing()) {
     return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
                                           " is NaN, the sensor sees nothing at all"};
