@@ -304,7 +304,6 @@ ist::TriangleMesh divided(const ist::TriangleMesh& mesh) {
 
 // Where thousands of triangles are equally near, to 1 mm. The first link moves to and fro by 20 um.
 std::string measure_ties() {
-  using ist::test::Rng;
   const auto plate = [](int cells, double z) {  // a square of 0.2 m and 20 mm thickness
     ist::TriangleMesh mesh = ist::test::box({0.2, 0.2, 0.02});
     for (int i = 0; i < cells; ++i) mesh = divided(mesh);
@@ -325,9 +324,8 @@ std::string measure_ties() {
     const auto model = ist::test::make_model({c.a, c.b}, 0.01);
     ist::SelfQuery query(model, {{0, 1}}, {});
     std::vector<PairProximity> results;
-    std::vector<double> us;
-    double cold = 0.0;
-    Rng rng(9);
+    std::vector<double> us, steps;
+    double cold = 0.0, cold_steps = 0.0;
     ist::benchmark::ThreadTimer timer;
     for (int i = 0; i < 500; ++i) {
       std::vector<Eigen::Isometry3d> X_FL(2, Eigen::Isometry3d::Identity());
@@ -336,11 +334,15 @@ std::string measure_ties() {
       timer.lap();
       query.run(X_FL, {true, true}, &results);
       (i == 0 ? cold : us.emplace_back()) = timer.lap();
+      (i == 0 ? cold_steps : steps.emplace_back()) = static_cast<double>(query.statistics().steps);
     }
     char row[256];
-    std::snprintf(row, sizeof row, "| %s, %zu and %zu triangles | %.2f | %.3f | %.3f | %.2f |\n",
-                  c.name.c_str(), c.a.triangles.size(), c.b.triangles.size(), 1e-3 * cold,
-                  1e-3 * quantile(us, 0.5), 1e-3 * quantile(us, 0.99), 1e3 * results[0].distance);
+    std::snprintf(
+        row, sizeof row,
+        "| %s, %zu and %zu triangles | %.2f | %.3f | %.3f | %.0f | %.0f | %.0f | %.2f |\n",
+        c.name.c_str(), c.a.triangles.size(), c.b.triangles.size(), 1e-3 * cold,
+        1e-3 * quantile(us, 0.5), 1e-3 * quantile(us, 0.99), cold_steps, quantile(steps, 0.5),
+        quantile(steps, 0.99), 1e3 * results[0].distance);
     rows += row;
     std::printf("%s", row);
     std::fflush(stdout);
@@ -373,8 +375,9 @@ int main(int argc, char** argv) {
   bool written = true;
   if (part == "all" || part == "time") {
     std::string ties =
-        "| case | first query [ms] | warm, median [ms] | warm, p99 [ms] | distance [mm] |\n"
-        "|---|---|---|---|---|\n";
+        "| case | first query [ms] | warm, median [ms] | warm, p99 [ms] | steps, first | median | "
+        "p99 "
+        "| distance [mm] |\n|---|---|---|---|---|---|---|---|\n";
     ties += measure_ties();
     std::string time =
         "| robot | poses | ours to 1 mm [us] | ours exact [us] | FCL [us] | FCL / ours | FCL / "

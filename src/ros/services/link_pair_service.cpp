@@ -7,6 +7,7 @@
 
 #include "internal/proximity/pair_samples_cache.h"
 #include "ros/common/exceptions.h"
+#include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/common/thread_priority.h"
 
@@ -132,6 +133,33 @@ void LinkPairService::sample(Findings* findings) {
   }
   if (!warning.empty()) ROS_WARN_STREAM(warning);
   ROS_INFO_STREAM(text_of(findings->sampled, sampling.configurations));
+  const std::string apart = left_out_though_apart(*findings);
+  if (apart.empty()) return;
+  ROS_WARN_STREAM(
+      "self-collision: in contact with all joints at zero, and therefore not watched, "
+      "but apart in other configurations: "
+      << apart
+      << "; set ~self_collision/ignore_contact_at_rest to false, and name the pairs "
+         "that really are to be left out in ~self_collision/ignore or an SRDF");
+}
+
+/// Names the pairs that are left out as in contact at rest, though they are often apart.
+std::string LinkPairService::left_out_though_apart(const Findings& findings) {
+  const RobotModel& robot = *findings.model->robot;
+  std::vector<std::string> names;
+  for (const ChosenPair& chosen : findings.chosen) {
+    if (chosen.reason != PairReason::kAtRest) continue;
+    for (const SampledPair& sampled : findings.sampled) {
+      const bool is_same =
+          sampled.pair.first == chosen.pair.first && sampled.pair.second == chosen.pair.second;
+      if (!is_same || sampled.contacts == sampled.measured) continue;
+      names.push_back(robot.links[chosen.pair.first].name + " and " +
+                      robot.links[chosen.pair.second].name + " (apart in " +
+                      std::to_string(sampled.measured - sampled.contacts) + " of " +
+                      std::to_string(sampled.measured) + ")");
+    }
+  }
+  return join(names, ", ");
 }
 
 bool LinkPairService::answer(Service::Request& request, Service::Response& response) {

@@ -46,6 +46,7 @@ class LinkPairService {
   void run();
   void sample_newest();
   void sample(Findings* findings);
+  static std::string left_out_though_apart(const Findings& findings);
   bool is_outdated(const ModelState& model) const;
   bool answer(Service::Request& request, Service::Response& response);
 

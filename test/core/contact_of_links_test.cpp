@@ -1,0 +1,109 @@
+// The volume that two links share, and its wrench, beside bodies with closed forms and beside dense
+// sampling of the links' exact geometry.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "ist_proximity/contact/contact_volume.h"
+#include "support/contact_oracle.h"
+#include "support/meshes.h"
+#include "support/shape_oracle.h"
+
+namespace ist {
+namespace {
+
+using test::ContactLink;
+using test::one;
+
+constexpr double kPi = 3.14159265358979323846;
+
+Eigen::Isometry3d at(const Eigen::Vector3d& p) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = p;
+  return X;
+}
+
+// Two balls: the lens of the balls themselves, and a force along the line of the centres, without a
+// moment about it.
+TEST(ContactOfLinks, BallsShareTheirLens) {
+  const double R = 0.1, r = 0.06;
+  const ContactLink a(one(Sphere{R})), b(one(Sphere{r}));
+  for (const double depth : {0.005, 0.01, 0.02, 0.04, 0.08}) {
+    const double d = R + r - depth;
+    const double lens =
+        kPi * depth * depth * (d * d + 2 * d * (R + r) - 3 * (R - r) * (R - r)) / (12.0 * d);
+    const Eigen::Vector3d along = Eigen::Vector3d(1, 2, 2) / 3.0;
+    const ContactVolume found = contact_volume(*a.body, *b.body, at(d * along));
+    EXPECT_NEAR(found.volume / lens, 1.0, 0.02) << depth;
+    EXPECT_GT(-found.weighted_normal.dot(along), 0.9 * found.volume) << depth;
+    EXPECT_LT(found.weighted_normal.cross(along).norm(), 0.02 * found.volume) << depth;
+    EXPECT_LT(found.weighted_moment.norm(), 0.02 * R * found.volume) << depth;
+  }
+}
+
+// A box that stands in another one: area times depth, a force along the face's normal that acts in
+// the middle of the shared part; and the other box gets the opposite wrench.
+TEST(ContactOfLinks, BoxesShareAreaTimesDepth) {
+  const ContactLink plate(one(Box{{0.3, 0.3, 0.1}}), 1000), post(one(Box{{0.1, 0.1, 0.3}}), 1000);
+  for (const double depth : {0.02, 0.03, 0.04}) {
+    const Eigen::Isometry3d X = at({0.05, -0.03, 0.05 + 0.15 - depth});
+    const ContactVolume found = contact_volume(*plate.body, *post.body, X);
+    EXPECT_NEAR(found.volume / (0.1 * 0.1 * depth), 1.0, 0.1) << depth;
+    const Eigen::Vector3d n = found.weighted_normal / found.volume;
+    EXPECT_LT(n.z(), -0.6) << depth;
+    EXPECT_LT(n.head<2>().norm(), 0.05) << depth;
+    // p x F with F along -z.
+    const Eigen::Vector3d arm = found.weighted_moment / -found.weighted_normal.z();
+    EXPECT_NEAR(arm.x(), 0.03, 0.005) << depth;
+    EXPECT_NEAR(arm.y(), 0.05, 0.005) << depth;
+
+    PenetrationConfig stiffness;
+    const Wrench on_plate = contact_wrench(found, Eigen::Isometry3d::Identity(), stiffness);
+    const Wrench on_post = reaction(on_plate, -X.translation());
+    const ContactVolume back = contact_volume(*post.body, *plate.body, X.inverse());
+    const Wrench same = contact_wrench(back, X, stiffness);
+    EXPECT_NEAR(back.volume, found.volume, 1e-4 * found.volume);
+    EXPECT_LT((same.force - on_post.force).norm(), 1e-3 * on_post.force.norm());
+    EXPECT_LT((same.torque - on_post.torque).norm(), 1e-3 * on_post.force.norm() * 0.2);
+  }
+}
+
+// Random pairs of links with a few hundred spheres each, beside 216,000 points of a cube about the
+// first link.
+TEST(ContactOfLinks, VolumeIsThatOfDenseSampling) {
+  constexpr int kAlong = 60;
+  constexpr double kSide = 0.24;
+  test::Rng rng(31);
+  const std::vector<LinkGeometry> shapes = {one(Box{{0.2, 0.1, 0.08}}), one(Cylinder{0.05, 0.2}),
+                                            one(Sphere{0.1}), one(Box{{0.15, 0.15, 0.15}})};
+  const std::vector<double> volumes = {0.0016, kPi * 0.0005, 4.0 / 3.0 * kPi * 0.001, 0.003375};
+  std::vector<ContactLink> links;
+  for (const auto& shape : shapes) links.emplace_back(shape);
+  std::vector<double> errors;  // of the smaller body's volume
+  for (int trial = 0; trial < test::scaled(40); ++trial) {
+    const auto a = static_cast<std::size_t>(test::uniform(&rng, 0, 3.999));
+    const auto b = static_cast<std::size_t>(test::uniform(&rng, 0, 3.999));
+    const Eigen::Isometry3d X_AB = test::random_pose(&rng, 0.1), X_BA = X_AB.inverse();
+    int both = 0;
+    for (int i = 0; i < kAlong * kAlong * kAlong; ++i) {
+      const Eigen::Vector3d cell(i % kAlong, i / kAlong % kAlong, i / kAlong / kAlong);
+      const Eigen::Vector3d p = ((cell.array() + 0.5) / kAlong - 0.5) * kSide;
+      both += test::oracle_signed_distance(shapes[a], p) < 0.0 &&
+                      test::oracle_signed_distance(shapes[b], X_BA * p) < 0.0
+                  ? 1
+                  : 0;
+    }
+    const double truth = both * std::pow(kSide / kAlong, 3);
+    const ContactVolume found = contact_volume(*links[a].body, *links[b].body, X_AB);
+    errors.push_back(std::abs(found.volume - truth) / std::min(volumes[a], volumes[b]));
+    EXPECT_LT(errors.back(), 0.05) << "trial " << trial << ": " << found.volume << " " << truth;
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.01);
+}
+
+}  // namespace
+}  // namespace ist
