@@ -22,15 +22,17 @@ from private_master import ROOT, PrivateMaster, rewrite
 BATCHES = (1, 100, 10000)
 
 
-def us_each(ask, count, seconds):
-    """Median time of a call, for each of its `count` configurations [us]."""
-    ask()
-    times, end = [], time.monotonic() + seconds
-    while len(times) < 3 or time.monotonic() < end:
+def us_each(ask, batches, seconds):
+    """Mean time of a configuration [us]; each batch is asked once, until `seconds` have passed."""
+    spent, count = 0.0, 0
+    for batch, size in batches:
         begin = time.perf_counter()
-        ask()
-        times.append(time.perf_counter() - begin)
-    return 1e6 * np.median(times) / count
+        ask(batch)
+        spent += time.perf_counter() - begin
+        count += size
+        if spent > seconds:
+            break
+    return 1e6 * spent / count
 
 
 class QueryService:
@@ -56,22 +58,25 @@ class QueryService:
         self.service.wait_for_service(30)
         self.joints = robot.joints
 
-    def prepare(self, q):
-        """A call for these configurations, which checks that they were answered."""
+    def states(self, q):
+        """The configurations as a request holds them."""
         from sensor_msgs.msg import JointState
-        states = [JointState(name=self.joints, position=row) for row in q]
+        return [JointState(name=self.joints, position=row) for row in q]
 
-        def ask():
-            answer = self.service(states=states)
-            if not answer.success or answer.results[0].status != 0:
-                raise RuntimeError(answer.message)
-        for attempt in range(100):  # until the cloud has come
+    def ask(self, states):
+        answer = self.service(states=states)
+        if not answer.success or answer.results[0].status != 0:
+            raise RuntimeError(answer.message)
+
+    def wait(self, q):
+        """Until the cloud has come."""
+        for _ in range(150):
             try:
-                ask()
-                return ask
-            except RuntimeError:
+                return self.ask(self.states(q))
+            except RuntimeError as error:
+                problem = error
                 time.sleep(0.2)
-        raise RuntimeError('~query does not answer')
+        raise problem
 
     def stop(self):
         self.world.stop()
@@ -104,13 +109,17 @@ def main():
              '|---:|---:|---:|---:|---:|---:|---:|' + ('---:|' if service else '')]
     try:
         for count in BATCHES:
-            q, cells = samples[:count], [f'{count:,}']
+            cells = [f'{count:,}']
+            rows = [samples[k:k + count] for k in range(0, len(samples), count)]
+            batches = [(q, count) for q in rows]
             for call in (robot.distances, robot.nearest):
-                one, every = (us_each(lambda: call(q, obstacles, threads=n), count, options.seconds)
+                one, every = (us_each(lambda q: call(q, obstacles, threads=n), batches, options.seconds)
                               for n in (1, 0))
                 cells += [f'{one:.1f} µs', f'{every:.1f} µs', f'{one / every:.1f}']
             if service:
-                cells.append(f'{us_each(service.prepare(q), count, options.seconds):.1f} µs')
+                service.wait(rows[0][:1])
+                requests = [(service.states(q), count) for q in rows]
+                cells.append(f'{us_each(service.ask, requests, options.seconds):.1f} µs')
             lines.append('| ' + ' | '.join(cells) + ' |')
             print(lines[-1], file=sys.stderr)
     finally:

@@ -23,6 +23,7 @@ using visualization_msgs::Marker;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kLabelHeight = 0.04;  // [m]
 
 Link link(const std::string& name, double distance, double x = 0.0) {
   Link one;
@@ -108,6 +109,7 @@ TEST(ProximityMarkers, LabelsAreAListAboveTheRobot) {
     for (const auto& [key, one] : drawn) {
       if (key.first != "text" || one.action != Marker::ADD) continue;
       EXPECT_LE(links[static_cast<std::size_t>(key.second)].distance, 0.3);
+      EXPECT_EQ(one.scale.z, kLabelHeight);
       EXPECT_EQ(one.pose.position.x, number.pose.position.x);
       EXPECT_EQ(one.pose.position.y, number.pose.position.y);
       EXPECT_GT(one.pose.position.z - one.scale.z / 2, robot.max().z());
@@ -121,7 +123,7 @@ TEST(ProximityMarkers, LabelsAreAListAboveTheRobot) {
     double free = number.pose.position.z - number.scale.z;
     for (const auto& [distance, top] : rows) {
       EXPECT_LT(top, free);
-      free = top - 0.03;
+      free = top - kLabelHeight;
     }
   }
 }

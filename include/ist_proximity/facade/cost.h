@@ -7,8 +7,8 @@
 
 namespace ist {
 
-/// The time that each configuration of a motion takes on this machine [s], by configuration. One
-/// thread answers one after the other, as a control loop does.
+/// The processor time that each configuration of a motion takes on this machine [s], by
+/// configuration. One thread answers one after the other, as a control loop does.
 struct CycleCost {
   std::vector<double> query;      ///< ProximityQuery::run for all links
   std::vector<double> repulsion;  ///< Repulsion for all links

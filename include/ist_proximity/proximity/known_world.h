@@ -47,7 +47,7 @@ class KnownWorld {
     std::uint64_t id = 0;  ///< another one for each shape; the same when the object is moved
   };
 
-  /// The objects, in the order in which they were added.
+  /// All objects of the world.
   const std::vector<Object>& objects() const { return objects_; }
   /// Names of the frames that objects stand in, each once.
   const std::vector<std::string>& frames() const { return frames_; }

@@ -20,8 +20,8 @@ using LinkMessage = ist_proximity::LinkProximity;
 
 constexpr double kLineWidth = 0.005;        // [m]
 constexpr double kPointSize = 0.015;        // [m]
-constexpr double kTextHeight = 0.03;        // [m]
-constexpr double kRow = 1.5 * kTextHeight;  // [m] from a label to the next
+constexpr double kTextHeight = 0.04;        // [m]
+constexpr double kRow = 1.3 * kTextHeight;  // [m] from a label to the next
 constexpr double kLabelled = 0.3;           // [m] farther links have no label
 constexpr std::size_t kLabels = 4;          // the nearest ones
 constexpr double kNumberHeight = 0.09;      // [m]
