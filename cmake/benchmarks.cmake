@@ -20,7 +20,7 @@ foreach(source IN LISTS benchmark_sources)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
 
-foreach(name closed_loop memory self_view)
+foreach(name closed_loop hidden memory self_view)
   target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
 endforeach()
 
