@@ -3,14 +3,17 @@
 // for each point), the query with and without what is remembered, and memory over time. The
 // simulated arm moves among obstacles in front of a depth camera.
 //
-// Usage: memory [seconds of simulation] [minutes of clouds for memory over time]
+// Usage: memory [seconds of simulation] [minutes of clouds for memory over time] [document]
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "document.h"
 #include "internal/cloud/memory_scan.h"
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/proximity/proximity_query.h"
@@ -77,30 +80,52 @@ std::size_t resident_bytes() {
   return 4096 * pages;
 }
 
-void print_row(const char* name, const std::vector<double>& us) {
-  std::printf("| %s | %.2f ms | %.2f ms |\n", name, 1e-3 * quantile(us, 0.5),
-              1e-3 * quantile(us, 0.99));
+std::string line(const char* format, double a, double b) {
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(), format, a, b);
+  return text.data();
 }
 
-void print(const Times& t) {
-  std::printf("| a cloud of 640 x 480 points | median | 99th percentile |\n|---|---|---|\n");
-  print_row("ingest, without memory", t.ingest);
-  print_row("points by obstacle and robot", t.scan);
-  print_row("insertion", t.insert);
-  print_row("insertion, a ray for each point", t.insert_each);
-  print_row("boxes of what is hidden, and their index", t.boxes);
-  print_row("liboctomap, as octomap_server", t.octomap);
-  print_row("liboctomap, discretized", t.octomap_discrete);
-  print_row("query of all links", t.query);
-  print_row("query of all links, with memory", t.query_with);
+std::string row(const char* name, const std::vector<double>& us) {
+  return std::string("| ") + name +
+         line(" | %.2f ms | %.2f ms |\n", 1e-3 * quantile(us, 0.5), 1e-3 * quantile(us, 0.99));
+}
+
+std::string table(const Times& t) {
+  std::string text = "| a cloud of 640 x 480 points | median | 99th percentile |\n|---|---|---|\n";
+  text += row("ingest, without memory", t.ingest);
+  text += row("memory: points by obstacle and robot", t.scan);
+  text += row("memory: insertion", t.insert);
+  text += row("memory: boxes of what is hidden, and their index", t.boxes);
+  text += row("liboctomap, as octomap_server", t.octomap);
+  text += row("liboctomap, discretized", t.octomap_discrete);
+  text += row("memory: insertion with a ray for each point", t.insert_each);
+  text += row("query of all links, without memory", t.query);
+  text += row("query of all links, with memory", t.query_with);
   const double ours = quantile(t.scan, 0.5) + quantile(t.insert, 0.5) + quantile(t.boxes, 0.5);
-  std::printf("\n%.0f clouds a second on one core; liboctomap takes %.1f times as long\n",
-              1e6 / ours, quantile(t.octomap, 0.5) / ours);
-  std::printf("ray for ray: discretized %.1f times, each point %.1f times as long as ours\n",
-              quantile(t.octomap_discrete, 0.5) / quantile(t.insert, 0.5),
-              quantile(t.octomap, 0.5) / quantile(t.insert_each, 0.5));
-  std::printf("query with memory, 99th percentile: %.2f times that of without\n",
-              quantile(t.query_with, 0.99) / quantile(t.query, 0.99));
+  text += line(
+      "\n%.0f clouds a second on one core. liboctomap takes %.1f times as long as octomap_server ",
+      1e6 / ours, quantile(t.octomap, 0.5) / ours);
+  text += line(
+      "inserts,\nand %.1f times as long discretized. With memory the query's 99th percentile is "
+      "%.2f times that without.\n",
+      quantile(t.octomap_discrete, 0.5) / ours,
+      quantile(t.query_with, 0.99) / quantile(t.query, 0.99));
+  return text;
+}
+
+// A room about the demonstration, so that every pixel has a depth.
+std::vector<ist::sim::Obstacle> walls() {
+  std::vector<ist::sim::Obstacle> all;
+  for (const Eigen::Vector3d& middle : {Eigen::Vector3d(2.5, 0, 0), Eigen::Vector3d(-2.5, 0, 0),
+                                        Eigen::Vector3d(0, 2.5, 0), Eigen::Vector3d(0, -2.5, 0)}) {
+    ist::sim::Obstacle wall;
+    wall.name = "wall";
+    wall.shape = ist::Box{{middle.x() != 0 ? 0.1 : 5.0, middle.y() != 0 ? 0.1 : 5.0, 5.0}};
+    wall.from = middle;
+    all.push_back(wall);
+  }
+  return all;
 }
 
 // Sends the same clouds again and again, 30 a second of their stamps.
@@ -135,7 +160,10 @@ int main(int argc, char** argv) {
   cameras[0].width = 640;
   cameras[0].height = 480;
   cameras[0].focal_length *= 4.0;
-  ist::sim::Simulation world(robot, ist::sim::demo_arm(), ist::sim::demo_obstacles(), cameras, 1);
+  cameras[0].max_depth = 4.5;
+  std::vector<ist::sim::Obstacle> obstacles = walls();
+  for (const ist::sim::Obstacle& one : ist::sim::demo_obstacles()) obstacles.push_back(one);
+  ist::sim::Simulation world(robot, ist::sim::demo_arm(), obstacles, cameras, 1);
   Eigen::VectorXd q =
       Eigen::VectorXd::Zero(static_cast<Eigen::Index>(world.arm().config().joints.size()));
   world.arm().reset(q);
@@ -200,12 +228,14 @@ int main(int argc, char** argv) {
     }
     world.step(command);
   }
-  print(times);
+  const std::string text = table(times);
+  std::printf("%s", text.c_str());
   const ist::MemoryCounts counts = map.counts();
   std::printf("last cloud: %zu obstacle points, %zu other rays; ", scan.hits.size(),
               scan.free_ends.size());
   std::printf("%zu voxels known, %zu occupied, %zu in memory, %zu boxes hidden\n", counts.known,
               counts.occupied, counts.nodes, boxes.size());
   if (minutes > 0.0) watch_memory(std::move(kept), minutes);
-  return 0;
+  if (argc <= 3) return 0;
+  return ist::benchmark::write_table(argv[3], "memory cost", text) ? 0 : 1;
 }

@@ -23,7 +23,7 @@ foreach(source IN LISTS benchmark_sources)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
 
-foreach(name closed_loop memory self_view self_contact)
+foreach(name closed_loop hidden memory self_view self_contact)
   target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
 endforeach()
 

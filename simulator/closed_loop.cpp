@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "internal/cloud/memory_scan.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/robot/link_poses.h"
 
@@ -80,12 +81,14 @@ Perception::Perception(std::shared_ptr<const RobotModel> model, const ClosedLoop
                        std::size_t cameras)
     : model_(std::move(model)),
       config_(config),
-      snapshots_(cameras),
+      snapshots_(config.remember ? 2 * cameras : cameras),
       seen_(cameras, false),
       query_(model_, config.query),
       repulsion_(model_),
       speed_scale_(link_names(*model_)) {
   for (std::size_t i = 0; i < cameras; ++i) ingest_.emplace_back(config.ingest);
+  for (std::size_t i = 0; config.remember && i < cameras; ++i)
+    memories_.emplace_back(config.memory);
 }
 
 bool Perception::has_seen() const {
@@ -101,7 +104,22 @@ void Perception::look(Simulation* world) {
     ingest_[c].run(picture.raw(), world->cameras()[c].config().X_FC, robot, picture.stamp,
                    &snapshots_[c]);
     seen_[c] = true;
+    if (config_.remember) remember(picture, world->cameras()[c].config().X_FC);
   }
+}
+
+void Perception::remember(const Picture& picture, const Eigen::Isometry3d& X_FC) {
+  MemoryMap& memory = memories_[picture.camera];
+  const RawCloud raw = picture.raw();
+  const double range = std::min(config_.ingest.max_range, memory.config().max_range);
+  read_memory_scan(raw, snapshots_[picture.camera], X_FC, config_.ingest.min_range, range, &scan_);
+  memory.insert(scan_);
+  memory.hidden_boxes(&boxes_);
+  auto index = std::make_shared<BoxIndex>();
+  index->build(boxes_);
+  CloudSnapshot& hidden = snapshots_[memories_.size() + picture.camera];
+  hidden.boxes = index;
+  hidden.stamp = picture.stamp;
 }
 
 const std::vector<LinkProximity>& Perception::answer(const Simulation& world) {

@@ -9,6 +9,7 @@
 
 #include "dodge_controller.h"
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
@@ -36,6 +37,8 @@ struct ClosedLoopConfig {
   QueryConfig query;
   RepulsionConfig repulsion;
   SpeedScaleConfig speed_scale;
+  bool remember = false;  ///< what a camera no longer sees stays, as the node's ~memory
+  MemoryConfig memory;
   ClosedLoopConfig() {
     speed_scale.free_distance = 0.25;    // as in config/dodge.yaml
     ingest.self_filter_padding = 0.03;   // six times the cameras' noise
@@ -56,14 +59,20 @@ class Perception {
   /// The last answers as the controller reads them.
   example::Reading reading(const Simulation& world, const example::ControlledArm& arm);
 
-  const std::vector<CloudSnapshot>& snapshots() const { return snapshots_; }  ///< by camera
+  /// By camera; with `remember`, what is hidden from each of them follows.
+  const std::vector<CloudSnapshot>& snapshots() const { return snapshots_; }
   bool has_seen() const;  ///< every camera has delivered an image
 
  private:
   std::shared_ptr<const RobotModel> model_;
   ClosedLoopConfig config_;
   std::vector<Ingest> ingest_;
+  void remember(const Picture& picture, const Eigen::Isometry3d& X_FC);
+
   std::vector<CloudSnapshot> snapshots_;
+  std::vector<MemoryMap> memories_;  ///< by camera
+  MemoryScan scan_;
+  VoxelBoxes boxes_;
   std::vector<bool> seen_;
   ProximityQuery query_;
   Repulsion repulsion_;

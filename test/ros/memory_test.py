@@ -179,7 +179,9 @@ class MemoryTest(unittest.TestCase):
         memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
         self.start(memory=memory, unknown_space=unknown_space, max_distance=2.0)
         is_in_middle = lambda m: (  # noqa: E731
-            self.is_from("cloud")(m) and self.ball(m).unseen_distance > 0.17
+            self.is_from("cloud")(m)
+            and self.ball(m).unseen_distance > 0.17
+            and self.ball(m).seen_share > 0.75
         )
         before = self.ball(self.node.wait_for(is_in_middle, "the ball in seen space"))
         self.world.stand(pt.transform(side), pt.transform((0, 0, 5)))

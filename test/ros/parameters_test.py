@@ -171,7 +171,7 @@ WRONG = [
             "each memory needs a file of its own",
             "need the same resolution and frame_id",
             "'two' has self_filter: false",
-            "~sources/flat/memory is True: a dictionary is needed",
+            "~sources/flat/memory is true: a dictionary is needed",
         ],
     ),
     ({"unknown_space": "obstacle"}, ["~unknown_space is obstacle", "set ~memory/enabled"]),

@@ -52,9 +52,12 @@ void UnknownSpaceQuery::run(const std::vector<Eigen::Isometry3d>& X_FL,
     surroundings_.assign(surroundings_.size(), std::nullopt);
     surroundings_distance_ = influence_distance;
   }
-  if (answers_.empty()) return;
-  next_ = (next_ + 1) % answers_.size();
-  if (known[next_]) look_about(next_, X_FL[next_], now, influence_distance, *unknown);
+  for (std::size_t i = 1; i <= answers_.size(); ++i) {
+    const std::size_t link = (next_ + i) % answers_.size();
+    if (!known[link]) continue;
+    next_ = link;
+    return look_about(link, X_FL[link], now, influence_distance, *unknown);
+  }
 }
 
 /// [m] A lower bound of any signed distance: nothing is deeper inside anything than a link is
