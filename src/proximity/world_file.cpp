@@ -127,6 +127,7 @@ TriangleMesh read_mesh(Scanner* in, std::size_t allowed) {
   // A vertex that no triangle names costs memory as well.
   const std::size_t vertices = in->count("the number of vertices", 3 * allowed);
   const std::size_t triangles = in->count("the number of triangles", allowed);
+  if (vertices == 0 || triangles == 0) in->fail("a mesh needs vertices and triangles");
   for (std::size_t i = 0; i < vertices; ++i) mesh.vertices.push_back(in->vector("a vertex"));
   for (std::size_t i = 0; i < triangles; ++i) {
     TriangleMesh::Triangle triangle{};
