@@ -121,8 +121,8 @@ TEST(WorldFile, NamesTheLineAndTheValue) {
   EXPECT_PRED2(has, parse_scene("", "world").fault, "it is empty");
   EXPECT_PRED2(has, parse_scene("\n\n", "world").fault, "it is empty");
   WorldLimits limits;
-  limits.max_objects = 1;
-  EXPECT_PRED2(has, fault_of(kNew, "a table", "table", limits), "more than 1 objects");
+  limits.max_objects = 2;
+  EXPECT_PRED2(has, fault_of(kNew, "* ball", "* ball", limits), "the number of shapes is 1.0");
   limits.max_triangles = 3;
   EXPECT_PRED2(has, fault_of(kOld, "pyramid", "p", limits), "the number of triangles");
 }

@@ -428,6 +428,11 @@ TEST(KnownWorld, KeepsToItsLimits) {
   EXPECT_NE(too_many[0].text.find("100002 objects; allowed are 3"), std::string::npos)
       << too_many[0].text;
   EXPECT_EQ(builder.size(), 2U);
+  LinkGeometry compound;
+  for (int i = 0; i < 2; ++i) compound.push_back(test::one(Sphere{0.1})[0]);
+  const auto too_complex = builder.add({object_of("compound", compound)});
+  ASSERT_EQ(too_complex.size(), 1U);
+  EXPECT_NE(too_complex[0].text.find("4 shapes; allowed are 3"), std::string::npos);
   EXPECT_TRUE(builder.add({object_of("a", test::one(Sphere{0.1}))}).empty()) << "replaced";
   EXPECT_EQ(builder.size(), 2U);
   EXPECT_EQ(builder.world()->triangles(), 12U);
