@@ -74,26 +74,28 @@ Eigen::AlignedBox3d whole_box(const LinkModel& link, const LinkSurface& surface)
 }
 
 std::string WorldBuilder::exceeded_limit(const std::vector<WorldObject>& objects) const {
-  std::size_t triangles = triangles_;
+  std::size_t triangles = triangles_, shapes = shapes_;
   std::set<std::string> names;
-  std::size_t added = 0;
+  std::size_t count = entries_.size();
   for (const WorldObject& object : objects) {
     triangles += triangles_of(object.geometry);
+    shapes += object.geometry.size();
     if (!names.insert(object.name).second) continue;
     const auto known = entries_.find(object.name);
     if (known == entries_.end()) {
-      ++added;
+      ++count;
     } else {
       triangles -= known->second.triangles;
+      shapes -= known->second.object.geometry->size();
     }
   }
-  const std::size_t count = entries_.size() + added;
   const auto text = [](std::size_t is, const char* what, std::size_t allowed, const char* limit) {
     return "the world would hold " + std::to_string(is) + " " + what + "; allowed are " +
            std::to_string(allowed) + " (" + limit + "): nothing of it is taken";
   };
-  if (count > limits_.max_objects)
-    return text(count, "objects", limits_.max_objects, "max_objects");
+  const std::size_t most = limits_.max_objects;
+  if (count > most) return text(count, "objects", most, "max_objects");
+  if (shapes > most) return text(shapes, "shapes", most, "max_objects");
   if (triangles > limits_.max_triangles) {
     return text(triangles, "triangles", limits_.max_triangles, "max_triangles");
   }
@@ -151,6 +153,7 @@ std::vector<WorldFault> WorldBuilder::add(const std::vector<WorldObject>& object
     entry.triangles = triangles_of(object.geometry);
     remove(object.name);
     triangles_ += entry.triangles;
+    shapes_ += object.geometry.size();
     entries_[object.name] = std::move(entry);
   }
   return faults;
@@ -173,13 +176,14 @@ bool WorldBuilder::remove(const std::string& name) {
   const auto found = entries_.find(name);
   if (found == entries_.end()) return false;
   triangles_ -= found->second.triangles;
+  shapes_ -= found->second.object.geometry->size();
   entries_.erase(found);
   return true;
 }
 
 void WorldBuilder::clear() {
   entries_.clear();
-  triangles_ = 0;
+  triangles_ = shapes_ = 0;
 }
 
 std::shared_ptr<const KnownWorld> WorldBuilder::world() const {

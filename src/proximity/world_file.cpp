@@ -127,6 +127,7 @@ TriangleMesh read_mesh(Scanner* in, std::size_t allowed) {
   // A vertex that no triangle names costs memory as well.
   const std::size_t vertices = in->count("the number of vertices", 3 * allowed);
   const std::size_t triangles = in->count("the number of triangles", allowed);
+  if (vertices == 0 || triangles == 0) in->fail("a mesh needs vertices and triangles");
   for (std::size_t i = 0; i < vertices; ++i) mesh.vertices.push_back(in->vector("a vertex"));
   for (std::size_t i = 0; i < triangles; ++i) {
     TriangleMesh::Triangle triangle{};
@@ -179,7 +180,7 @@ std::size_t triangles_of(const GeometryElement& element) {
 void read_objects(Scanner* in, const std::string& frame, const WorldLimits& limits,
                   std::vector<WorldObject>* objects) {
   in->line();  // the scene's name
-  std::size_t triangles = 0;
+  std::size_t triangles = 0, shapes_read = 0;
   bool is_first = true, has_poses = false;
   while (true) {
     const std::string marker = in->word("'*' or '.'");
@@ -191,7 +192,8 @@ void read_objects(Scanner* in, const std::string& frame, const WorldLimits& limi
     if (is_first) has_poses = in->next_line_has_words();
     is_first = false;
     if (has_poses) object.X_BO = in->pose("the object's pose");
-    const std::size_t shapes = in->count("the number of shapes", kMaxElements);
+    const std::size_t shapes = in->count("the number of shapes", limits.max_objects - shapes_read);
+    shapes_read += shapes;
     for (std::size_t i = 0; i < shapes; ++i) {
       object.geometry.push_back(read_element(in, limits.max_triangles - triangles));
       triangles += triangles_of(object.geometry.back());

@@ -153,7 +153,7 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
     if (source.type == SourceType::kWorld) {
-      sources_.push_back(std::make_unique<WorldSource>(source, nh_, buffer_));
+      sources_.push_back(std::make_unique<WorldSource>(source, nh_, private_nh_, buffer_));
       continue;
     }
     add_source(source, filtered_cloud);

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/world_query.h"
+#include "ist_proximity/repulsion/object_repulsion.h"
 #include "support/allocations.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
@@ -88,10 +90,15 @@ struct Scene {
   double truth(std::size_t link, bool* all_closed) const {
     double best = kInf;
     *all_closed = link_is_closed[link];
+    std::vector<std::pair<double, std::size_t>> order;  // the nearest origin first
     for (std::size_t i = 0; i < object_oracles.size(); ++i) {
-      const Eigen::Isometry3d X = X_FL[link].inverse() * world.X_FB[i];
-      best = std::min(best, link_oracles[link].distance(object_oracles[i], X, best));
+      order.emplace_back((X_FL[link].translation() - world.X_FB[i].translation()).norm(), i);
       *all_closed = *all_closed && object_is_closed[i];
+    }
+    std::sort(order.begin(), order.end());
+    for (const auto& one : order) {
+      const Eigen::Isometry3d X = X_FL[link].inverse() * world.X_FB[one.second];
+      best = std::min(best, link_oracles[link].distance(object_oracles[one.second], X, best));
     }
     return best;
   }
@@ -356,6 +363,40 @@ TEST(WorldQuery, ManyNearObjects) {
   }
 }
 
+// Between two walls the pushes cancel, and no step is larger than the motion allows.
+TEST(WorldQuery, RepulsionOfObjectsIsContinuous) {
+  const PosedWorld world = posed({object_of("left", cube(1.0), at(-0.8, 0.0, 0.0)),
+                                  object_of("right", cube(1.0), at(0.8, 0.0, 0.0))});
+  WorldQuery query(ball(), {});
+  RepulsionConfig config;
+  query.set_influence_distance(config.influence_distance);
+  LinkProximity no_cloud;
+  no_cloud.state = LinkState::kClear;
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for (int i = -200; i <= 200; ++i) {
+    const Eigen::Isometry3d X_FL = at(5e-4 * i, 0.0, 0.0);
+    const LinkProximity r = answer_at(&query, world, X_FL);
+    const Eigen::Vector3d push =
+        with_objects(X_FL, {}, no_cloud, query.near_objects(0), r, config).force;
+    EXPECT_LE(push.norm(), config.gain);
+    if (i == 0) EXPECT_LT(push.norm(), 0.02);
+    if (i == 200) EXPECT_NEAR(push.x(), -config.gain * (1.0 - 0.1 / 0.3), 0.02);
+    if (i > -200) EXPECT_LT((push - last).norm(), 0.02) << i;
+    last = push;
+  }
+  // A cloud that is nearer decides.
+  LinkProximity cloud;
+  cloud.state = LinkState::kNear;
+  cloud.distance = 0.01;
+  RepulsiveWrench of_cloud;
+  of_cloud.force = Eigen::Vector3d(0.0, config.gain * (1.0 - 0.01 / 0.3), 0.0);
+  const LinkProximity r = answer_at(&query, world);
+  ASSERT_GT(r.distance, 0.01 + config.smoothing);
+  const Eigen::Vector3d push =
+      with_objects(at(0.0, 0.0, 0.0), of_cloud, cloud, query.near_objects(0), cloud, config).force;
+  EXPECT_NEAR((push - of_cloud.force).norm(), 0.0, 1e-12);
+}
+
 TEST(WorldQuery, AllocatesNothingWhileTheWorldIsTheSame) {
   Scene scene(45);
   WorldQuery query(make_robot_surfaces(scene.model));
@@ -387,6 +428,11 @@ TEST(KnownWorld, KeepsToItsLimits) {
   EXPECT_NE(too_many[0].text.find("100002 objects; allowed are 3"), std::string::npos)
       << too_many[0].text;
   EXPECT_EQ(builder.size(), 2U);
+  LinkGeometry compound;
+  for (int i = 0; i < 2; ++i) compound.push_back(test::one(Sphere{0.1})[0]);
+  const auto too_complex = builder.add({object_of("compound", compound)});
+  ASSERT_EQ(too_complex.size(), 1U);
+  EXPECT_NE(too_complex[0].text.find("4 shapes; allowed are 3"), std::string::npos);
   EXPECT_TRUE(builder.add({object_of("a", test::one(Sphere{0.1}))}).empty()) << "replaced";
   EXPECT_EQ(builder.size(), 2U);
   EXPECT_EQ(builder.world()->triangles(), 12U);

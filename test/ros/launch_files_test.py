@@ -14,7 +14,7 @@ import roslaunch.xmlloader
 import rospy
 import yaml
 from joint_states_test import ARM, JointStatesTest, arm_poses, joint_state
-from proximity_testing import ProximityArray
+from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import PointCloud2
 
 LAUNCH = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..", "launch")
@@ -124,6 +124,13 @@ class LaunchFilesTest(unittest.TestCase):
         q = {"turn": 0.5, "slide": 0.2}
         robot = Robot("/managed", q, {"camera/points": beside_the_ball(q, 0.1)})
         self.check(robot, 0.1, "cloud")
+        robot.stop()
+
+    def test_cell(self):
+        """The ball is above the table of config/cell.yaml, the box in its back wall; no camera."""
+        robot = Robot("/in_cell", {"turn": 0.0, "slide": 0.2}, {})
+        self.check(robot, 0.5 + 0.005 - pt.BALL_RADIUS, "cell")
+        self.assertEqual(pt.link(robot.answer, "box_link").state, LinkProximity.CONTACT)
         robot.stop()
 
     def test_common_arguments(self):

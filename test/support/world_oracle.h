@@ -16,13 +16,13 @@
 /// triangle against every triangle. It shares no code with the library.
 namespace ist::test {
 
-/// The least value of a convex function on [0, 1], to 1e-12 of the interval.
+/// The least value of a convex function on [0, 1], to 1e-9 of the interval.
 template <typename Function>
 double least_value(const Function& f) {
   const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
   double a = 0.0, b = 1.0, x = b - ratio * (b - a), y = a + ratio * (b - a), fx = f(x), fy = f(y);
   double least = std::min({f(a), f(b), fx, fy});
-  while (b - a > 1e-12) {
+  while (b - a > 1e-9) {
     if (fx < fy) {
       b = y;
       y = x;

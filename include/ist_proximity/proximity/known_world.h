@@ -25,7 +25,7 @@ struct WorldObject {
 
 /// Limits of a known world. A box takes about 15 kB, a mesh about 500 bytes for each triangle.
 struct WorldLimits {
-  std::size_t max_objects = 10000;      ///< in one world
+  std::size_t max_objects = 10000;      ///< and shapes of all objects together
   std::size_t max_triangles = 2000000;  ///< of all objects; a box has 12
 };
 
@@ -109,7 +109,7 @@ class WorldBuilder {
 
   const WorldLimits limits_;
   std::map<std::string, Entry> entries_;  ///< by name
-  std::size_t triangles_ = 0;
+  std::size_t triangles_ = 0, shapes_ = 0;
 };
 
 }  // namespace ist

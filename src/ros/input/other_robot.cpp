@@ -63,11 +63,14 @@ std::string OtherRobot::read(std::vector<WorldObject>* links, std::vector<WorldF
   return "";
 }
 
+bool OtherRobot::owns(const std::string& frame) const {
+  return own_buffer_ && frame.compare(0, std::char_traits<char>::length(kOwnFrame), kOwnFrame) == 0;
+}
+
 std::string OtherRobot::look_up_frame(const TransformBuffer& buffer, const std::string& fixed_frame,
                                       const std::string& frame, const ros::Time& time,
                                       double max_age, Eigen::Isometry3d* X_FB, bool* is_own) const {
-  *is_own =
-      own_buffer_ && frame.compare(0, std::char_traits<char>::length(kOwnFrame), kOwnFrame) == 0;
+  *is_own = owns(frame);
   if (!*is_own) return "";
   const std::string link = frame.substr(std::char_traits<char>::length(kOwnFrame));
   std::string root;

@@ -27,6 +27,9 @@ class OtherRobot {
   /// @returns empty, or why it cannot be read yet
   std::string read(std::vector<WorldObject>* links, std::vector<WorldFault>* faults);
 
+  /// Whether a frame is known from its joint states alone, and so has no name in tf.
+  bool owns(const std::string& frame) const;
+
   /// Looks up where a frame of its links is.
   /// @param buffer  with the poses of frames other than its own
   /// @param is_own  whether the frame is one of its own: else nothing is done

@@ -12,8 +12,10 @@
 #include "ist_proximity/proximity/world_file.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
+#include "ros/common/publish.h"
 #include "ros/common/thread_name.h"
 #include "ros/input/world_conversion.h"
+#include "ros/input/world_markers.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
@@ -23,9 +25,13 @@ const ros::WallDuration kPoll(0.02);
 // Messages change the world, so none may be lost.
 constexpr std::uint32_t kQueueSize = 1000;
 constexpr std::chrono::milliseconds kRobotPeriod(500);
-// The fault of what is no object.
-constexpr const char* kWhole = "";
+// Keys of faults that are not one object's. That of the last message lasts until the next one;
+// those of the configured objects and of the other robot stay, because what is missing is never
+// sent again.
+constexpr const char* kConfigured = "(configured)";
+constexpr const char* kMessage = "(message)";
 constexpr const char* kRobot = "(other robot)";
+constexpr const char* kWork = "(work)";  // of the thread, until it succeeds
 
 std::string frame_or_fixed(const std::string& frame) {
   const std::string name = without_slash(frame);
@@ -39,7 +45,7 @@ std::string place_of(const SourceConfig& config, const ros::NodeHandle& nh) {
 
 }  // namespace
 
-WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh,
+WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
                          const TransformBuffer& buffer)
     : config_(config),
       buffer_(buffer),
@@ -52,6 +58,7 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh,
     state_.update(
         [&](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
   }
+  markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
   nh.setCallbackQueue(&queue_);
   if (config.world.has_topic) {
     subscriber_ = nh.subscribe(config.topic, kQueueSize, &WorldSource::receive, this,
@@ -118,23 +125,24 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
 
 void WorldSource::run() {
   name_thread("ist " + config_.name);
-  guard([this] { read_configured(); });
+  guard(kConfigured, [this] { read_configured(); });
   is_changed_ = true;
   while (running_) {
-    guard([this] { queue_.callAvailable(kPoll); });
-    guard([this] {
+    guard(kMessage, [this] { queue_.callAvailable(kPoll); });
+    guard(kWork, [this] {
       if (!is_robot_read_) read_robot();
       count_publishers();
       take_target();
       if (is_changed_ && target_.model) publish();
+      if (faults_.erase(kWork) > 0) show_faults();
     });
   }
 }
 
-void WorldSource::guard(const std::function<void()>& function) {
+void WorldSource::guard(const char* what, const std::function<void()>& function) {
   const std::string fault = exception_of(function);
   if (fault.empty()) return;
-  note_fault(kWhole, "its objects could not be used: " + fault);
+  if (faults_.count(what) == 0) note_fault(what, "its objects could not be used: " + fault);
   show_faults();
 }
 
@@ -167,12 +175,12 @@ void WorldSource::read_robot() {
     if (faults_[kRobot] != problem) note_fault(kRobot, problem);
     return show_faults();
   }
-  is_robot_read_ = true;
   faults_.erase(kRobot);
   for (WorldObject& link : links) link.margin = config_.world.margin;
-  add(links);
+  add(kRobot, links);
   for (const WorldFault& fault : faults) note_fault(fault.object, fault.text);
   show_faults();
+  is_robot_read_ = true;
   ROS_INFO_STREAM("source '" << config_.name << "': another robot of " << links.size()
                              << " links with geometry");
 }
@@ -192,7 +200,7 @@ void WorldSource::count_publishers() {
 void WorldSource::receive(const ist_proximity::WorldObjects& message) {
   has_received_ = true;
   state_.begin_work();
-  guard([&] { apply(message); });
+  guard(kMessage, [&] { apply(message); });
   state_.end_work();
   const ros::Time now = ros::Time::now();
   stamp_ = message.header.stamp.isZero() ? now : std::min(message.header.stamp, now);
@@ -205,12 +213,12 @@ void WorldSource::receive(const ist_proximity::WorldObjects& message) {
 void WorldSource::apply(const ist_proximity::WorldObjects& message) {
   const std::size_t limit = config_.world.limits.max_objects;
   if (message.objects.size() > limit) {
-    note_fault(kWhole, "a message holds " + std::to_string(message.objects.size()) +
-                           " objects; allowed are " + std::to_string(limit) + " (~sources/" +
-                           config_.name + "/max_objects): it is not used");
+    note_fault(kMessage, "a message holds " + std::to_string(message.objects.size()) +
+                             " objects; allowed are " + std::to_string(limit) + " (~sources/" +
+                             config_.name + "/max_objects): it is not used");
     return show_faults();
   }
-  faults_.erase(kWhole);
+  faults_.erase(kMessage);
   if (message.replace_all) {
     for (const std::string& name : from_topic_) {
       builder_.remove(name);
@@ -227,7 +235,7 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
       note_fault(object.id, "object '" + name + "': " + error.what());
     }
   }
-  add(added);
+  add(kMessage, added);
 }
 
 /// Applies what a message says of one object; objects to add are collected, because many are built
@@ -241,7 +249,7 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
     return;
   }
   if (!added->empty()) {  // in the order of the message
-    add(*added);
+    add(kMessage, *added);
     added->clear();
   }
   is_changed_ = true;
@@ -269,7 +277,8 @@ void WorldSource::allow_contacts(WorldObject* object) const {
   }
 }
 
-void WorldSource::add(const std::vector<WorldObject>& objects) {
+/// @param what  the key of a fault of all of them
+void WorldSource::add(const char* what, const std::vector<WorldObject>& objects) {
   std::vector<WorldObject> complete = objects;
   for (WorldObject& object : complete) {
     object.frame = frame_or_fixed(object.frame);
@@ -278,7 +287,9 @@ void WorldSource::add(const std::vector<WorldObject>& objects) {
   }
   const std::vector<WorldFault> faults =
       builder_.add(complete, [this] { return !running_.load(); });
-  for (const WorldFault& fault : faults) note_fault(fault.object, fault.text);
+  for (const WorldFault& fault : faults) {
+    note_fault(fault.object.empty() ? what : fault.object, fault.text);
+  }
   is_changed_ = true;
   show_faults();
 }
@@ -304,7 +315,7 @@ void WorldSource::read_configured() {
   }
   if (!config_.file.empty()) {
     SceneFile scene = read_scene_file(config_.file, frame_or_fixed(world.frame_id), world.limits);
-    if (!scene.fault.empty()) note_fault(kWhole, scene.fault);
+    if (!scene.fault.empty()) note_fault(kConfigured, scene.fault);
     for (WorldObject& object : scene.objects) {
       object.margin = world.margin;
       objects.push_back(std::move(object));
@@ -319,7 +330,7 @@ void WorldSource::read_configured() {
     }
   }
   stamp_ = ros::Time::now();
-  add(objects);
+  add(kConfigured, objects);
   ROS_INFO_STREAM("source '" << config_.name << "': a known world of " << builder_.size()
                              << " objects");
 }
@@ -353,6 +364,15 @@ void WorldSource::publish() {
   snapshot.cloud.counts.received = snapshot.cloud.counts.used =
       static_cast<std::uint32_t>(builder_.size());
   exchange_.publish();
+  publish_markers();
+}
+
+void WorldSource::publish_markers() {
+  const auto frame_of = [this](const std::string& frame) {
+    if (frame == kFixedFrame) return target_.fixed_frame;
+    return robot_ && robot_->owns(frame) ? std::string() : frame;
+  };
+  publish_message(markers_, world_markers(*builder_.world(), frame_of));
 }
 
 }  // namespace ist

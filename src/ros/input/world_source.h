@@ -3,6 +3,7 @@
 #include <ist_proximity/WorldObjects.h>
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
+#include <ros/publisher.h>
 #include <ros/subscriber.h>
 
 #include <atomic>
@@ -40,7 +41,9 @@ class WorldSource : public ObstacleSource {
  public:
   /// @param nh      in the namespace that the topic is relative to
   /// @param buffer  outlives this
-  WorldSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer);
+  /// @param private_nh  of ~world/NAME, the markers
+  WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
+              const TransformBuffer& buffer);
   ~WorldSource() override;
   WorldSource(const WorldSource&) = delete;
   WorldSource& operator=(const WorldSource&) = delete;
@@ -55,24 +58,26 @@ class WorldSource : public ObstacleSource {
 
  private:
   void run();
-  void guard(const std::function<void()>& function);
+  void guard(const char* what, const std::function<void()>& function);
   void read_configured();
   void read_robot();
   void receive(const ist_proximity::WorldObjects& message);
   void apply(const ist_proximity::WorldObjects& message);
   void change(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
   void count_publishers();
-  void add(const std::vector<WorldObject>& objects);
+  void add(const char* what, const std::vector<WorldObject>& objects);
   void note_fault(const std::string& object, const std::string& fault);
   void show_faults();
   void allow_contacts(WorldObject* object) const;
   void take_target();
   void publish();
+  void publish_markers();
   std::string place(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
 
   const SourceConfig config_;
   const TransformBuffer& buffer_;
   ros::CallbackQueue queue_;
+  ros::Publisher markers_;
   ros::Subscriber subscriber_;         ///< unless there is no topic
   std::unique_ptr<OtherRobot> robot_;  ///< null: none
   SnapshotExchange exchange_;

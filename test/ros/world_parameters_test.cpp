@@ -1,0 +1,131 @@
+// The parameters of a source of type world: what is read, and how mistakes are named.
+
+#include <gtest/gtest.h>
+#include <xmlrpcpp/XmlRpc.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "ros/parameters/parameters.h"
+
+namespace ist {
+namespace {
+
+using XmlRpc::XmlRpcValue;
+
+XmlRpcValue list(const std::vector<double>& numbers) {
+  XmlRpcValue value;
+  value.setSize(static_cast<int>(numbers.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i) value[static_cast<int>(i)] = numbers[i];
+  return value;
+}
+
+// A table, a mesh, and another robot.
+XmlRpcValue good() {
+  XmlRpcValue tree;
+  XmlRpcValue& cell = tree["sources"]["cell"];
+  cell["type"] = "world";
+  cell["frame_id"] = "hall";
+  cell["margin"] = 0.01;
+  cell["link_margins"]["wrist"] = 0.02;
+  XmlRpcValue& table = cell["objects"]["table"];
+  table["shape"] = "box";
+  table["size"] = list({1.0, 2.0, 0.1});
+  table["position"] = list({0.0, 0.0, -0.05});
+  table["rpy"] = list({0.0, 0.0, 1.5707963267948966});
+  XmlRpcValue& wall = cell["objects"]["wall"];
+  wall["shape"] = "mesh";
+  wall["mesh"] = "package://cell/wall.stl";
+  wall["frame_id"] = "map";
+  wall["margin"] = 0.5;
+  cell["robot"]["description"] = "/other/robot_description";
+  return tree;
+}
+
+TEST(WorldParameters, AreRead) {
+  std::vector<std::string> warnings;
+  const ServerConfig config = parse_parameters(good(), &warnings);
+  EXPECT_TRUE(warnings.empty()) << warnings.front();
+  ASSERT_EQ(config.sources.size(), 1U);
+  const SourceConfig& source = config.sources[0];
+  EXPECT_EQ(source.type, SourceType::kWorld);
+  EXPECT_TRUE(std::isinf(source.timeout));
+  EXPECT_TRUE(source.is_permanent());
+  EXPECT_FALSE(source.world.has_topic);
+  EXPECT_EQ(source.world.link_margins.at("wrist"), 0.02);
+  EXPECT_EQ(source.world.robot.description, "/other/robot_description");
+  ASSERT_EQ(source.world.objects.size(), 2U);
+  const WorldObject& table = source.world.objects[0].object;
+  EXPECT_EQ(table.name, "table");
+  EXPECT_EQ(table.frame, "hall");
+  EXPECT_EQ(table.margin, 0.01);
+  EXPECT_EQ(std::get<Box>(table.geometry[0].shape).size, Eigen::Vector3d(1.0, 2.0, 0.1));
+  EXPECT_NEAR(table.X_BO.linear()(1, 0), 1.0, 1e-12);
+  const WorldObjectConfig& wall = source.world.objects[1];
+  EXPECT_EQ(wall.mesh, "package://cell/wall.stl");
+  EXPECT_TRUE(wall.object.geometry.empty());
+  EXPECT_EQ(wall.object.frame, "map");
+  EXPECT_EQ(wall.object.margin, 0.5);
+}
+
+std::string error_of(const std::function<void(XmlRpcValue*)>& change) {
+  XmlRpcValue tree = good();
+  change(&tree["sources"]["cell"]);
+  std::vector<std::string> warnings;
+  try {
+    parse_parameters(tree, &warnings);
+  } catch (const ParameterError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(WorldParameters, MistakesAreNamed) {
+  const auto has = [](const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+  };
+  const std::string table = "~sources/cell/objects/table/";
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["table"]["shape"] = "cube"; }),
+               table + "shape is \"cube\"");
+  EXPECT_PRED2(has, error_of([](auto* cell) {
+                 (*cell)["objects"]["table"]["size"] = list({1.0, 0.0, 1.0});
+               }),
+               table + "size is 0");
+  EXPECT_PRED2(has, error_of([](auto* cell) {
+                 (*cell)["objects"]["table"]["size"] = list({1.0, 1.0});
+               }),
+               table + "size is a list of 2");
+  EXPECT_PRED2(has, error_of([](auto* cell) {
+                 (*cell)["objects"]["table"]["size"] = list({1.0, std::nan(""), 1.0});
+               }),
+               table + "size is");
+  EXPECT_PRED2(has, error_of([](auto* cell) {
+                 (*cell)["objects"]["table"]["orientation"] = list({0.0, 0.0, 0.0, 1.0});
+               }),
+               "are both set");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["table"]["shape"] = "sphere"; }),
+               table + "radius is not set");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["wall"]["mesh"] = ""; }),
+               "wall/mesh is not set");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["wall"]["margin"] = -1.0; }),
+               "wall/margin is -1 m");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["objects"]["odd"] = 3; }),
+               "~sources/cell/objects/odd is 3: a dictionary is needed");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["max_objects"] = 0; }), "max_objects");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["max_objects"] = 1; }),
+               "~sources/cell/objects holds 2 objects: allowed are 1");
+  EXPECT_PRED2(has, error_of([](auto* cell) { (*cell)["file"] = "cell.scene"; }),
+               "an absolute path is needed");
+  EXPECT_PRED2(has, error_of([](auto* cell) {
+                 XmlRpcValue empty;
+                 empty["type"] = "world";
+                 *cell = empty;
+               }),
+               "at least one of objects, file, topic or robot is needed");
+}
+
+}  // namespace
+}  // namespace ist
