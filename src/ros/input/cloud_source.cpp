@@ -325,6 +325,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     ROS_ERROR_STREAM_THROTTLE(5.0, "source '" << config_.name << "': " << problem);
     return problem;
   }
+  if (is_map_) snapshot.cloud.box_extent = map_extent(config_);
   complete(measurement, placement, &snapshot);
   in_use_ = snapshot.stamp;
   if (show) {
