@@ -23,6 +23,7 @@
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
 #include "ros/input/map_message.h"
+#include "ros/input/measurement.h"
 #include "ros/input/memory_source.h"
 #include "ros/input/unknown_space.h"
 #include "ros/input/world_source.h"
@@ -88,6 +89,7 @@ class ProximityServer::Impl {
   void notice_standing_root();
   void refine_model(std::shared_ptr<const ModelState> model);
   void set_source_targets(const QueryConfig& query);
+  double largest_extent() const;
   void run_diagnostics();
   void publish_diagnostics();
   LiveConfig live_config() const;
@@ -396,6 +398,15 @@ void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model
   set_source_targets(live_.get().query);
 }
 
+/// [m] No obstacle of any source has a larger extent.
+double ProximityServer::Impl::largest_extent() const {
+  double largest = 0.0;
+  for (const SourceConfig& source : config_.sources) {
+    largest = std::max(largest, ist::largest_extent(source));
+  }
+  return largest;
+}
+
 /// Tells the sources the model, the fixed frame and the region of interest.
 void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   const std::string fixed_frame = fixed_frame_of(*model_, config_);
@@ -405,7 +416,7 @@ void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
   const bool computes_poses = config_.pose_source == PoseSourceKind::kJointStates;
   if (computes_poses && model_->robot && model_->kinematics) {
     region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
-                                query.max_distance + query.margin);
+                                query.max_distance + query.margin + largest_extent());
     // Clouds that were cropped before serve finer packings, too.
     region_radius_ = region.radius = std::max(region.radius, region_radius_);
   }

@@ -24,7 +24,8 @@ FIELDS = {
         geometry_msgs/Point point_on_link; geometry_msgs/Point point_on_link_local;
         geometry_msgs/Point point_on_obstacle; geometry_msgs/Vector3 direction;
         geometry_msgs/Vector3 repulsion; geometry_msgs/Wrench penetration; float64 closing_speed;
-        string source""",
+        string source; float64 interval_model; float64 interval_tolerance;
+        float64 interval_sensor""",
     ProximityArray: """std_msgs/Header header; uint8 status; string status_text; time cloud_stamp;
         ist_proximity/SourceStatus[] sources; float64 computation_time;
         ist_proximity/LinkProximity[] links""",

@@ -196,6 +196,47 @@ class DepthImageTest(unittest.TestCase):
             lambda: self.node.log().count("has distortion coefficients") == 1, "the warning"
         )
 
+    def radius(self, seen, k, a, b, calibration, moved):
+        """Of each point, from its range: what the parameters of test_extent state."""
+        ranges = np.linalg.norm(seen - X_BASE_CAMERA[:3, 3], axis=1)
+        pixel = np.sqrt(0.5) / np.cos(1.0472) / FOCAL_LENGTH
+        return k * (a + b * ranges**2) + calibration + pixel * ranges + moved
+
+    def test_extent(self):
+        """Noise, footprint and latency: the bound is that of a sphere about each point."""
+        self.start(
+            noise={"a": 0.001, "b": 0.004, "k": 2, "calibration": 0.003},
+            footprint="camera",
+            latency={"time": 0.02, "speed": 0.5},
+        )
+        self.check_wall()  # the distance stays that of the nearest point
+        seen = pt.apply(X_BASE_CAMERA, points(depths()))
+        radius = self.radius(seen, 2, 0.001, 0.004, 0.003, 0.01)
+        self.assertGreater(radius.min(), 0.02)
+        with self.stream(lambda: image(depths())):
+            answer = self.node.wait_for_status(ProximityArray.OK)
+        for name, link_pose in (("ball_link", pt.transform()), ("box_link", FAR_BOX)):
+            one = pt.link(answer, name)
+            distances = pt.DISTANCE[name](pt.apply(pt.inverse(link_pose), seen))
+            truth = (distances - radius).min()
+            self.assertLessEqual(one.lower_bound, truth + 1e-6)
+            self.assertGreaterEqual(one.lower_bound, truth - 1e-4)
+            self.assertAlmostEqual(one.interval_sensor, distances.min() - truth, 3)
+            self.assertEqual(one.interval_model, 0.0)
+
+    def test_footprint_of_no_camera(self):
+        """A cloud that is no image has no angle between pixels: it is not used, and why is said."""
+        clouds = rospy.Publisher(self.namespace + "/points", PointCloud2, queue_size=1)
+        source = {"topic": "points", "footprint": "camera", "noise": "kinect_v1"}
+        self.node = pt.ProximityNode(self.namespace, {"sources": {"c": source}}, pt.urdf())
+        self.world.start_tf()
+        self.world.repeat(20, lambda: clouds.publish(pt.cloud(points(depths()))))
+        message = self.node.wait_for(
+            lambda m: "the footprint of a point is asked for" in m.status_text, "the reason"
+        )
+        self.assertTrue(pt.all_unknown(message))
+        clouds.unregister()
+
     def test_noise_filter(self):
         """A lone pixel, 0.2 m in front of the wall, is dropped."""
         values = depths()

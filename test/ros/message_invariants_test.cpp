@@ -26,7 +26,9 @@ LinkProximity measured(double distance) {
   LinkProximity result;
   result.state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result.distance = distance;
-  result.lower_bound = distance - 0.021;
+  result.lower_bound = distance - 0.026;
+  result.margin = 0.02;
+  result.sensor_width = 0.005;
   result.p_FCo = Eigen::Vector3d(1.0, 2.0, 3.0);
   result.direction = Eigen::Vector3d::UnitZ();
   result.p_FCl = result.p_FCo + distance * result.direction;
@@ -76,6 +78,12 @@ TEST(MessageInvariants, findEachBreach) {
       {"'near' in state 2: distance", link(kNear, [](Link* l) { l->distance = kNaN; })},
       {"sign", link(kNear, [](Link* l) { l->distance = -0.3; })},
       {"sign", link(kContact, [](Link* l) { l->distance = 0.1; })},
+      {"have to be NaN",
+       link(kClear,
+            [](Link* l) { l->interval_model = l->interval_sensor = l->interval_tolerance = 0.0; })},
+      {"add up", link(kNear, [](Link* l) { l->interval_sensor = 0.006; })},
+      {"must not be negative", link(kNear, [](Link* l) { l->interval_tolerance = -0.001; })},
+      {"must not be negative", link(kContact, [](Link* l) { l->interval_model = kNaN; })},
       {"margin", link(kNear, [](Link* l) { l->lower_bound = 0.29; })},
       {"margin", link(kContact, [](Link* l) { l->lower_bound = kNaN; })},
       {"finite", link(kNear, [](Link* l) { l->point_on_link_local.x = kNaN; })},

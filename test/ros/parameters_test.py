@@ -97,6 +97,38 @@ WRONG = [
         ],
     ),
     ({"sources": [1, 2]}, ["~sources"]),
+    (  # the extent of points
+        {
+            "noise": {"a": -0.001, "b": float("nan"), "k": 1e9, "calibration": "some"},
+            "footprint": -0.1,
+            "latency": {"time": -1, "speed": float("inf")},
+            "sources": {
+                "unknown": {"noise": "kinect_v9"},
+                "list": {"noise": ["a"], "footprint": "pixel", "latency": "late"},
+                "far": {"noise": {"b": 0.01, "k": 3}, "max_range": float("inf")},
+                "large": {"noise": {"a": 0.5, "k": 3}},
+                "both": {"footprint": {"radius": 0.01, "angle": 0.002}},
+                "map": {"type": "octomap_msgs/Octomap", "noise": "kinect_v1"},
+            },
+        },
+        [
+            "~noise/a is -0.001 m: allowed is from 0 to 1 m",
+            "~noise/b is nan 1/m",
+            "~noise/k is 1e+09: allowed is from 0 to 10",
+            '~noise/calibration is "some"',
+            "~footprint is -0.1 rad",
+            "~latency/time is -1 s",
+            "~latency/speed is inf m/s",
+            '~sources/unknown/noise is "kinect_v9": allowed is none, kinect_v1, realsense_d435',
+            "~sources/list/noise",
+            '~sources/list/footprint is "pixel": allowed is none, camera',
+            '~sources/list/latency is "late"',
+            "~sources/far/noise, footprint and latency: the radius of a point at max_range, inf m",
+            "~sources/large/noise, footprint and latency: the points' radius is 1.5 m",
+            "~sources/both/footprint/radius and ~sources/both/footprint/angle are both set",
+            "~sources/map/noise and footprint grow with the range",
+        ],
+    ),
     (
         {
             "ignore_links": "base",

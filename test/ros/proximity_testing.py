@@ -406,6 +406,12 @@ def check_invariants(test, message, max_distance=1.0):
         if np.isfinite(rates[:2]).all():
             test.assertAlmostEqual(one.closing_speed, sum(rates[:2]), 9)
         test.assertFalse(one.time_to_contact < 0)
+        parts = [one.interval_model, one.interval_tolerance, one.interval_sensor]
+        if one.state in (LinkProximity.NEAR, LinkProximity.CONTACT):
+            test.assertGreaterEqual(min(parts), 0.0)
+            test.assertAlmostEqual(sum(parts), one.distance - one.lower_bound, 6)
+        else:
+            test.assertTrue(np.isnan(parts).all())
         if one.state == LinkProximity.UNKNOWN:
             test.assertTrue(np.isnan(one.distance))
             test.assertEqual(one.lower_bound, -np.inf)
@@ -431,7 +437,7 @@ def check_invariants(test, message, max_distance=1.0):
             if one.state == LinkProximity.NEAR:
                 test.assertGreaterEqual(one.distance, 0.0)
                 # The wrench is unknown where the query left open whether they overlap.
-                left_open = one.lower_bound < 0 and np.isnan(wrench).all()
+                left_open = one.lower_bound + one.interval_sensor < 0 and np.isnan(wrench).all()
                 test.assertTrue(left_open or not wrench.any())
             else:  # all or nothing is known
                 test.assertIn(np.isfinite(wrench).sum(), (0, 6))

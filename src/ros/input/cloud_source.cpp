@@ -328,6 +328,7 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     ROS_ERROR_STREAM_THROTTLE(5.0, "source '" << config_.name << "': " << problem);
     return problem;
   }
+  if (is_map_) snapshot.cloud.box_extent = map_extent(config_);
   complete(measurement, placement, &snapshot);
   snapshot.memory = memory_ ? memory_->take(measurement, placement, target_, snapshot) : nullptr;
   note_view(placement, snapshot.cloud.view);

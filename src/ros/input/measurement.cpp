@@ -20,6 +20,10 @@ constexpr std::uint32_t kQueueSize = 2;
 // within kMaxPosition of the fixed frame's origin along each axis, so that no link is so far. [m]
 constexpr double kFarthestPoint = 4.0 * kMaxPosition;
 
+// [rad] A camera has at least 160 pixels across 90 degrees. With fewer, its clouds may be cropped a
+// little nearer than max_distance, and links out there say so.
+constexpr double kLargestPixelAngle = 0.0125;
+
 template <typename Message, typename Read>
 ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
                              const ReadingBegins& begin, const Receiver& receive,
@@ -35,10 +39,23 @@ ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
 
 }  // namespace
 
+double map_extent(const SourceConfig& config) {
+  return point_extent(config.ingest.extent, 0.0, 0.0).constant;
+}
+
+double largest_extent(const SourceConfig& config) {
+  if (config.ingest.extent.is_zero()) return 0.0;
+  if (config.type == SourceType::kMap) return map_extent(config);
+  const double max_range = std::min(config.ingest.max_range, kFarthestPoint);
+  const PointExtent extent = point_extent(config.ingest.extent, kLargestPixelAngle, max_range);
+  return std::min(extent.radius(max_range), kMaxExtent);
+}
+
 IngestConfig ingest_config(const SourceConfig& config) {
   IngestConfig ingest = config.ingest;
   ingest.max_range = std::min(ingest.max_range, kFarthestPoint);
   if (config.type == SourceType::kScan) {  // read_scan() applies the limits to each beam
+    ingest.extent.max_range = ingest.max_range;
     ingest.min_range = 0.0;
     ingest.max_range = std::numeric_limits<double>::infinity();
     ingest.max_points = config.scan.max_beams;

@@ -81,6 +81,12 @@ using Receiver = std::function<void(const Received&)>;
 /// Called before a message is read, which takes long for a large map.
 using ReadingBegins = std::function<void()>;
 
+/// [m] The extent of a map's boxes.
+double map_extent(const SourceConfig& config);
+
+/// [m] No obstacle of the source has a larger extent.
+double largest_extent(const SourceConfig& config);
+
 /// The configuration of a source's Ingest. The range limits of scans apply to beams instead.
 IngestConfig ingest_config(const SourceConfig& config);
 

@@ -50,6 +50,8 @@ class ScanMeasurement : public Measurement {
               &points);
     ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement), header().stamp.toSec(),
                 snapshot);
+    const Eigen::Vector3d moved = placement.X_FS_end.translation() - placement.X_FS.translation();
+    if (!snapshot->extent.is_zero()) snapshot->extent.allow_for(moved.norm());
   }
 
  private:

@@ -30,6 +30,17 @@ void assign_closing(const ClosingRates& closing, LinkMessage* message) {
   if (std::isnan(closing.obstacles)) message->closing_unknown |= LinkMessage::OBSTACLES_UNKNOWN;
 }
 
+// The parts of distance - lower_bound.
+void assign_interval(const LinkProximity& result, LinkMessage* message) {
+  const bool has = result.state >= LinkState::kNear;
+  message->interval_model = has ? result.margin : kNaN;
+  message->interval_sensor = has ? result.sensor_width : kNaN;
+  message->interval_tolerance =
+      has ? std::max(result.distance - result.lower_bound - result.margin - result.sensor_width,
+                     0.0)
+          : kNaN;
+}
+
 }  // namespace
 
 LinkMessage unknown_link(const std::string& name) {
@@ -43,6 +54,7 @@ void assign_link(const std::string& name, const LinkProximity& result,
   message->state = static_cast<std::uint8_t>(result.state);
   message->distance = result.distance;
   message->lower_bound = result.lower_bound;
+  assign_interval(result, message);
   assign(result.p_FCl, &message->point_on_link);
   assign(result.p_LCl, &message->point_on_link_local);
   assign(result.p_FCo, &message->point_on_obstacle);

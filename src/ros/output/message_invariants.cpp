@@ -1,6 +1,7 @@
 #include "ros/output/message_invariants.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -67,6 +68,21 @@ void check_nothing_near(const LinkMessage& link, const Vectors& v, Check* check)
   check->that(std::isnan(link.closing_speed), "closing_speed has to be NaN", link.closing_speed);
 }
 
+// The parts of distance - lower_bound.
+void check_interval(const LinkMessage& link, Check* check) {
+  const double sum = link.interval_model + link.interval_tolerance + link.interval_sensor;
+  if (link.state < LinkMessage::NEAR) {
+    check->that(std::isnan(sum), "the parts of the interval have to be NaN", sum);
+    return;
+  }
+  const double least =
+      std::min({link.interval_model, link.interval_tolerance, link.interval_sensor});
+  check->that(least >= 0.0, "the parts of the interval must not be negative", least);
+  const double width = link.distance - link.lower_bound;
+  check->that(std::abs(sum - width) <= kRounding * (1.0 + std::abs(width)),
+              "the parts of the interval have to add up to it", sum);
+}
+
 void check_measured(const LinkMessage& link, const Vectors& v, const InvariantInput& input,
                     Check* check) {
   const bool in_contact = link.state == LinkMessage::CONTACT;
@@ -108,6 +124,7 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
   Check check("link '" + link.link + "' in state " + std::to_string(link.state) + ": ");
   const Vectors v(link);
   check_closing(link, &check);
+  check_interval(link, &check);
   switch (link.state) {
     case LinkMessage::UNKNOWN:
       check.that(std::isnan(link.distance), "distance has to be NaN", link.distance);

@@ -70,6 +70,16 @@ const XmlRpcValue* ParameterReader::find_and_note(const std::string& name) {
 
 bool ParameterReader::has(const std::string& name) const { return find(name) != nullptr; }
 
+bool ParameterReader::is_dictionary(const std::string& name) const {
+  const XmlRpcValue* value = find(name);
+  return value != nullptr && value->getType() == XmlRpcValue::TypeStruct;
+}
+
+bool ParameterReader::is_text(const std::string& name) const {
+  const XmlRpcValue* value = find(name);
+  return value != nullptr && value->getType() == XmlRpcValue::TypeString;
+}
+
 void ParameterReader::reject(const std::string& name, const XmlRpcValue& value,
                              const std::string& expected) {
   errors_.push_back("~" + name + " is " + value_text(value) + ": " + expected);

@@ -52,6 +52,8 @@ class ParameterReader {
   void read_switch(const std::string& name, std::string* value);
 
   bool has(const std::string& name) const;
+  bool is_dictionary(const std::string& name) const;
+  bool is_text(const std::string& name) const;
   /// Lists the names one level below `name`; adds an error when it is not a dictionary.
   std::vector<std::string> children(const std::string& name);
 

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "ros/parameters/extent_parameters.h"
 #include "ros/parameters/world_parameters.h"
 
 namespace ist {
@@ -151,10 +152,15 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   }
   if (source->type == SourceType::kMap) {
     read_map(reader, prefix, source);
+    source->ingest.extent = ExtentConfig();  // defaults for all sources are those of sensors
+    read_extent(reader, prefix, &source->ingest.extent);
+    require_map_extent(reader, prefix, &source->ingest.extent);
   } else if (source->type == SourceType::kWorld) {
     read_world(reader, prefix, source);
   } else {
     read_ingest(reader, prefix, &source->ingest);
+    read_extent(reader, prefix, &source->ingest.extent);
+    require_extent(reader, prefix, source->ingest.max_range, &source->ingest.extent);
     if (source->type != SourceType::kScan) read_noise(reader, prefix, &source->noise);
   }
   read_limits(reader, prefix, source);
@@ -178,6 +184,10 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   SourceConfig single;
   reader->read("cloud_timeout", Range::positive("s", kInf, true), &single.timeout);
   read_ingest(reader, "", &single.ingest);
+  read_extent(reader, "", &single.ingest.extent);
+  if (!reader->has("sources")) {
+    require_extent(reader, "", single.ingest.max_range, &single.ingest.extent);
+  }
   read_noise(reader, "", &single.noise);
   read_limits(reader, "", &single);
   read_memory(reader, "", &single.memory);

@@ -122,6 +122,7 @@ LinkProximity SelfProximity::nearest(std::size_t link, std::size_t* other) const
   answer.state = LinkState::kClear;
   answer.distance = std::numeric_limits<double>::infinity();
   answer.lower_bound = config_.query.max_distance;
+  answer.margin = margin_;
   for (std::size_t i = 0; i < results_.size(); ++i) {
     const LinkPair& pair = query_->pairs()[i];
     if (pair.first != link && pair.second != link) continue;
@@ -206,6 +207,7 @@ void SelfProximity::publish_once() {
     pose_source_->look_up(now, &poses_);
     const auto begin = Clock::now();
     query_->set_config(live.query);
+    margin_ = live.query.margin;
     query_->run(poses_.X_FL, poses_.known, &results_);
     for (const std::size_t i : model_->monitored)
       input.deadline.unfinished += is_finished(i) ? 0 : 1;

@@ -79,6 +79,7 @@ class SelfProximity {
   ros::Time last_now_, last_stamp_;
   StampedLinkPoses poses_;
   std::vector<PairProximity> results_;
+  double margin_ = 0.0;           ///< [m] in their lower bounds
   std::vector<Wrench> wrenches_;  ///< by pair: the wrench on its first link
   std::thread thread_;
 };
