@@ -15,7 +15,6 @@
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -23,6 +22,7 @@
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "peers/method.h"
@@ -70,7 +70,9 @@ struct Robot {
 class Node {
  public:
   explicit Node(const Robot& robot)
-      : robot_(robot), ingest_({}), query_(robot.model, {}), repulsion_(robot.model) {}
+      : robot_(robot), ingest_({}), query_(robot.model, {}), repulsion_(robot.model) {
+    for (std::size_t i = 0; i < robot.model->links.size(); ++i) kept_.emplace_back(*robot.model, i);
+  }
 
   void ingest(const Frame& frame, const Poses& X_FL) {
     ist::RawCloud raw = frame.raw();
@@ -81,8 +83,13 @@ class Node {
   void query(const Poses& X_FL) { query_.run(X_FL, robot_.known, {&snapshot_}, &results_); }
   void repel(const Poses& X_FL) {
     for (std::size_t i = 0; i < results_.size(); ++i) {
-      push_ = repulsion_.wrench(i, X_FL[i], {&snapshot_}, results_[i], {});
+      push_ = kept_[i].update(repulsion_, X_FL[i], {&snapshot_}, results_[i], {});
     }
+  }
+  // As repel() where nothing is kept.
+  void blend(const Poses& X_FL) {
+    for (ist::KeptRepulsion& kept : kept_) kept.forget();
+    repel(X_FL);
   }
   void penetrate(const Poses& X_FL) {
     for (std::size_t i = 0; i < results_.size(); ++i) {
@@ -105,6 +112,7 @@ class Node {
   CloudSnapshot snapshot_;
   ist::ProximityQuery query_;
   ist::Repulsion repulsion_;
+  std::vector<ist::KeptRepulsion> kept_;
   std::vector<LinkProximity> results_;
   ist::RepulsiveWrench push_;
   ist::ContactVolume volume_;
@@ -200,32 +208,6 @@ void print_peers(const DataSet& set, double ours) {
 }
 #endif
 
-// The same points in one row, in random order.
-Frame shuffled(const Frame& frame) {
-  std::vector<std::size_t> order(frame.width * frame.height);
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
-  Frame result = frame;
-  result.width = order.size();
-  result.height = 1;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
-  }
-  return result;
-}
-
-double copy_us(const Frame& frame) {
-  std::vector<float> copy(frame.data.size());
-  std::vector<double> us;
-  ThreadTimer timer;
-  for (int i = 0; i < kRepetitions; ++i) {
-    timer.lap();
-    std::memcpy(copy.data(), frame.data.data(), frame.bytes());
-    us.push_back(timer.lap());
-  }
-  return quantile(us, 0.5);
-}
-
 // Where the robot is when nothing is within the influence distance of it.
 Poses far_above(Poses X_FL) {
   for (Eigen::Isometry3d& X : X_FL) X.pretranslate(Eigen::Vector3d(0.0, 0.0, 3.0));
@@ -263,9 +245,9 @@ double ingest_us(const Robot& robot, const Frame& frame, const Poses& X_FL) {
     const double ingest = timer.lap();
     node.query(X_FL);
     timer.lap();
-    node.repel(X_FL);
+    node.blend(X_FL);
     const double first = timer.lap();
-    node.repel(X_FL);
+    node.blend(X_FL);
     const double second = timer.lap();
     if (i > 0) us.push_back(ingest + std::max(first - second, 0.0));
   }
@@ -282,7 +264,8 @@ void print_ingest(const DataSet& set, const Robot& robot) {
     std::size_t links = 0;
     const Poses& near = set.motion[half_near(set, scene, robot, &links)];
     const Frame list = shuffled(scene.frame);
-    const double copy = copy_us(scene.frame);
+    const double copy =
+        ist::benchmark::copy_us(scene.frame.data.data(), scene.frame.bytes(), kRepetitions);
     std::printf("| %s | %.0f µs", scene.name.c_str(), copy);
     const auto cell = [copy](double us) { std::printf(" | %.0f µs | %.1f", us, us / copy); };
     cell(ingest_us(robot, scene.frame, far_above(near)));

@@ -50,7 +50,7 @@ set(octomap_FOUND OFF)
 if(OCTOMAP_INCLUDE_DIR AND OCTOMAP_LIBRARY AND OCTOMATH_LIBRARY)
   set(octomap_FOUND ON)
 else()
-  message(STATUS "ist_proximity: no octree_test, OctoMap is missing (apt install liboctomap-dev)")
+  message(STATUS "ist_proximity: no octree_test and memory_octomap_test, OctoMap is missing (apt install liboctomap-dev)")
 endif()
 
 # ist_proximity_gtest(TARGET [ARGUMENT...]): makes a GoogleTest program a core test.
@@ -82,7 +82,7 @@ foreach(source IN LISTS core_test_sources)
     endif()
   endif()
   get_filename_component(test ${source} NAME_WE)
-  if((test STREQUAL "octree_test" AND NOT octomap_FOUND) OR
+  if((test MATCHES "^(octree|memory_octomap)_test$" AND NOT octomap_FOUND) OR
      (test STREQUAL "pack_robot_test" AND NOT TARGET pack_robot))
     continue()
   endif()
@@ -100,7 +100,7 @@ foreach(source IN LISTS core_test_sources)
   if(test MATCHES "^(closed_loop|closing_speed|dodge_controller|simulator)_test$")
     target_link_libraries(${test} PRIVATE ist_proximity_simulator)
   endif()
-  if(test STREQUAL "octree_test")
+  if(test MATCHES "^(octree|memory_octomap)_test$")
     target_include_directories(${test} SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
     target_link_libraries(${test} PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
   endif()
@@ -146,7 +146,7 @@ if(rostest_FOUND)
     # Tests that measure rates and ages run one at a time. The others wait for what the node says, or
     # know how late the machine is (faults).
     set(serial ON)
-    if(test MATCHES "faults_|bad_input|laser_scan|octomap|parameters|pose_faults|query|self_filter")
+    if(test MATCHES "faults_|bad_input|laser_scan|octomap|parameters|pose_faults|query|self_filter|world")
       set(serial OFF)
     endif()
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES

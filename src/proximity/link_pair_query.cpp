@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "internal/geometry/solid_queries.h"
 
@@ -35,6 +36,16 @@ LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkS
       surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity),
       openings_a_(surface_a, surface_b),
       openings_b_(surface_b, surface_a) {}
+
+LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
+                             const LinkSurface& surface_b, LinkPairQuery&& memory)
+    : a_(a),
+      b_(b),
+      surface_a_(surface_a),
+      surface_b_(surface_b),
+      surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity, std::move(memory.surfaces_)),
+      openings_a_(surface_a, surface_b, std::move(memory.openings_a_)),
+      openings_b_(surface_b, surface_a, std::move(memory.openings_b_)) {}
 
 // [m] The error of a distance by poses that are not quite rigid.
 double LinkPairQuery::pose_uncertainty(double distance) const {

@@ -20,6 +20,10 @@ class LinkPairQuery {
   /// All arguments outlive this.
   LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
                 const LinkSurface& surface_b);
+  /// The same in the memory of another query, which is void then: nothing is allocated where the
+  /// other one's links had holes too, or these have none.
+  LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
+                const LinkSurface& surface_b, LinkPairQuery&& memory);
 
   /// The poses of the next steps. Bounds hold for them from here on.
   void move_to(const RigidPose& X_FA, const RigidPose& X_FB, const QueryConfig& config);

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <numeric>
 #include <tuple>
+
+#include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -78,11 +81,28 @@ Eigen::AlignedBox3d box_of(const LinkModel& link, const SurfaceBvh& surface,
 }  // namespace
 
 LinkSurface::LinkSurface(const LinkModel& link)
-    : surface(link.solid),
+    : solid(link.solid),
+      surface(link.solid),
       openings(link.solid),
       opening_cells(openings.cells()),
       component_points(points_of_components(surface)),
       displacement(box_of(link, surface, opening_cells)),
       depth_limit(depth_limit_of(link, surface)) {}
+
+std::shared_ptr<const LinkSurface> LinkSurface::of(const LinkModel& link) {
+  static std::mutex mutex;
+  static std::vector<std::weak_ptr<const LinkSurface>> in_use;
+  const std::lock_guard<std::mutex> lock(mutex);  // two threads would make the same one
+  in_use.erase(std::remove_if(in_use.begin(), in_use.end(),
+                              [](const auto& surface) { return surface.expired(); }),
+               in_use.end());
+  for (const auto& kept : in_use) {
+    auto surface = kept.lock();
+    if (surface && is_same_solid(surface->solid, link.solid)) return surface;
+  }
+  auto made = std::make_shared<const LinkSurface>(link);
+  in_use.push_back(made);
+  return made;
+}
 
 }  // namespace ist

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "internal/geometry/openings.h"
@@ -14,6 +15,11 @@ namespace ist {
 struct LinkSurface {
   explicit LinkSurface(const LinkModel& link);
 
+  /// The surface of a link; all that ask for one of the same solid share it while it is in use.
+  /// The first one takes up to some tenths of a second. Thread safe.
+  static std::shared_ptr<const LinkSurface> of(const LinkModel& link);
+
+  Solid solid;
   SurfaceBvh surface;
   Openings openings;         ///< none for closed links
   SurfaceBvh opening_cells;  ///< over the cells of `openings`

@@ -29,12 +29,12 @@ double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion) {
 
 MotionBound::MotionBound(const Kinematics& kinematics, const JointMotion& motion,
                          const JointPoses& still, std::size_t body, const Eigen::Vector3d& center,
-                         double radius)
+                         double radius, std::size_t ancestor)
     : body_(body), center_(center), radius_(radius) {
   const auto& joints = kinematics.joints();
   double lever = center.norm();  // [m] from the origin of the joint's child body to the centre
   double center_speed = 0.0;     // [m/s] by the joints nearer to the body
-  for (std::size_t at = body; at > 0; at = joints[at - 1].parent) {
+  for (std::size_t at = body; at != ancestor; at = joints[at - 1].parent) {
     const Kinematics::Joint& joint = joints[at - 1];
     const double speed = joint_speed(joint, motion);
     const bool turns = joint.type != JointType::kPrismatic;
@@ -51,7 +51,7 @@ MotionBound::MotionBound(const Kinematics& kinematics, const JointMotion& motion
   }
 }
 
-double MotionBound::time_for(double distance, Span<const Eigen::Isometry3d> X_FB) const {
+double MotionBound::speed(Span<const Eigen::Isometry3d> X_FB) const {
   const Eigen::Vector3d center_F = X_FB[body_] * center_;
   double speed = sliding_speed_;
   for (const Mover& mover : movers_) {
@@ -60,10 +60,18 @@ double MotionBound::time_for(double distance, Span<const Eigen::Isometry3d> X_FB
     const Eigen::Vector3d axis_F = X_FB[mover.child].linear() * mover.axis;
     speed += mover.speed * (axis_F.cross(to_center).norm() + radius_);
   }
+  return speed;
+}
+
+double MotionBound::time_for(double distance, Span<const Eigen::Isometry3d> X_FB) const {
+  return time_within(distance, speed(X_FB), growth_);
+}
+
+double time_within(double distance, double speed, double growth) {
   if (!(speed > 0.0)) return std::numeric_limits<double>::infinity();
-  // The root of a h + b h^2 / 2 = distance, a little less to allow for rounding.
+  // The root of a h + b h^2 / 2 = distance.
   return (1.0 - 1e-9) * 2.0 * distance /
-         (speed + std::sqrt(speed * speed + 2.0 * growth_ * distance));
+         (speed + std::sqrt(speed * speed + 2.0 * growth * distance));
 }
 
 }  // namespace ist

@@ -21,13 +21,19 @@ namespace ist {
 class MotionBound {
  public:
   /// @param center, radius  [m] the body's bounding sphere, in the body's frame
+  /// @param ancestor  a body that this one hangs on: the motion is that in its frame
   MotionBound(const Kinematics& kinematics, const JointMotion& motion, const JointPoses& still,
-              std::size_t body, const Eigen::Vector3d& center, double radius);
+              std::size_t body, const Eigen::Vector3d& center, double radius,
+              std::size_t ancestor = 0);
 
   /// The time [s] during which no point of the body moves farther than `distance` [m]; +inf when
   /// the body stands still.
   /// @param X_FB  by body, now
   double time_for(double distance, Span<const Eigen::Isometry3d> X_FB) const;
+
+  /// [m/s] a: no point of the body is faster now. @param X_FB  by body, now
+  double speed(Span<const Eigen::Isometry3d> X_FB) const;
+  double growth() const { return growth_; }  ///< [m/s^2] b
 
  private:
   struct Mover {
@@ -44,6 +50,10 @@ class MotionBound {
   double sliding_speed_ = 0.0;  ///< [m/s] sum over the prismatic joints
   double growth_ = 0.0;         ///< [m/s^2] b
 };
+
+/// The time [s] until speed h + growth h^2 / 2 is `distance` [m], a little less to allow for
+/// rounding; +inf for a speed of 0.
+double time_within(double distance, double speed, double growth);
 
 /// How fast [rad/s, m/s] the motion moves a joint, mimic joints included; 0: not at all.
 double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion);

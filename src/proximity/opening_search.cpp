@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "internal/geometry/closest_point_on_triangle.h"
 
@@ -94,6 +95,15 @@ OpeningSearch::OpeningSearch(const LinkSurface& a, const LinkSurface& b)
     : a_(a),
       is_closed_(a.opening_cells.empty()),
       search_(a.opening_cells, b.surface, is_closed_ ? 2 * SurfaceBvh::kWidth : kFrontCapacity),
+      moved_(kInf) {
+  if (is_closed_) clearance_ = kInf;
+}
+
+OpeningSearch::OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch&& memory)
+    : a_(a),
+      is_closed_(a.opening_cells.empty()),
+      search_(a.opening_cells, b.surface, is_closed_ ? 2 * SurfaceBvh::kWidth : kFrontCapacity,
+              std::move(memory.search_)),
       moved_(kInf) {
   if (is_closed_) clearance_ = kInf;
 }

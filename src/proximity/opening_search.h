@@ -15,6 +15,8 @@ class OpeningSearch {
  public:
   /// Both outlive this.
   OpeningSearch(const LinkSurface& a, const LinkSurface& b);
+  /// The same in the memory of another search, as for SurfacePairSearch.
+  OpeningSearch(const LinkSurface& a, const LinkSurface& b, OpeningSearch&& memory);
 
   /// Knowledge at a pose.
   enum class Answer {

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "internal/geometry/relative_pose.h"
-#include "internal/geometry/solid_queries.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/link_pair_query.h"
 #include "proximity/link_surface.h"
@@ -36,8 +35,7 @@ struct SelfQuery::Impl {
     bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
   };
 
-  void prepare(const Impl* previous);
-  std::shared_ptr<const LinkSurface> surface_of(std::size_t link, const Impl* previous) const;
+  void prepare();
   bool finish(std::size_t pair, int steps);
   bool finish_by(Deadline* deadline);
 
@@ -53,17 +51,7 @@ struct SelfQuery::Impl {
   std::vector<LinkPairSearch::Entry> depth_queue;       // scratch
 };
 
-std::shared_ptr<const LinkSurface> SelfQuery::Impl::surface_of(std::size_t link,
-                                                               const Impl* previous) const {
-  const LinkModel& wanted = model->links[link];
-  if (previous != nullptr && link < previous->surfaces.size() && previous->surfaces[link] &&
-      is_same_solid(previous->model->links[link].solid, wanted.solid)) {
-    return previous->surfaces[link];
-  }
-  return std::make_shared<const LinkSurface>(wanted);
-}
-
-void SelfQuery::Impl::prepare(const Impl* previous) {
+void SelfQuery::Impl::prepare() {
   const auto& links = model->links;
   surfaces.resize(links.size());
   X_FL.resize(links.size());
@@ -73,7 +61,7 @@ void SelfQuery::Impl::prepare(const Impl* previous) {
     if (std::max(pair.first, pair.second) >= links.size()) continue;
     if (!can_query(links[pair.first]) || !can_query(links[pair.second])) continue;
     for (const std::size_t i : {pair.first, pair.second}) {
-      if (!surfaces[i]) surfaces[i] = surface_of(i, previous);
+      if (!surfaces[i]) surfaces[i] = LinkSurface::of(links[i]);
       entries = std::max(entries, (links[i].tree.nodes().size() + 1) * kSphereWidth);
     }
     queries.back() = std::make_unique<LinkPairQuery>(links[pair.first], links[pair.second],
@@ -84,12 +72,12 @@ void SelfQuery::Impl::prepare(const Impl* previous) {
 }
 
 SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-                     const QueryConfig& config, const SelfQuery* previous)
+                     const QueryConfig& config)
     : impl_(std::make_unique<Impl>()) {
   impl_->model = std::move(model);
   impl_->pairs = std::move(pairs);
   impl_->config = config;
-  impl_->prepare(previous != nullptr ? previous->impl_.get() : nullptr);
+  impl_->prepare();
 }
 SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;

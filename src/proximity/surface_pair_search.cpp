@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/float_rounding.h"
@@ -56,6 +57,19 @@ OrientedBox posed_box(const SurfaceBvh& bvh, SurfaceBvh::Slot slot, const Eigen:
 
 SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity)
     : a_(a), b_(b), capacity_(capacity) {
+  assert(capacity >= 2 * SurfaceBvh::kWidth);
+  front_.reserve(capacity);
+  measured_.reserve(capacity);
+  start_anew();
+}
+
+SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
+                                     SurfacePairSearch&& memory)
+    : a_(a),
+      b_(b),
+      capacity_(capacity),
+      front_(std::move(memory.front_)),
+      measured_(std::move(memory.measured_)) {
   assert(capacity >= 2 * SurfaceBvh::kWidth);
   front_.reserve(capacity);
   measured_.reserve(capacity);

@@ -28,6 +28,10 @@ class SurfacePairSearch {
   /// @param a, b      outlive this
   /// @param capacity  pairs that the front may hold, at least 16
   SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity);
+  /// The same, in the memory of another search, which is void then: nothing is allocated where that
+  /// is large enough.
+  SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
+                    SurfacePairSearch&& memory);
 
   /// The question: bounds that differ by `tolerance` at most where the surfaces are nearer than
   /// `range`; whether they intersect is always decided.

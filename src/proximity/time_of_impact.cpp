@@ -5,6 +5,7 @@
 
 #include "ist_proximity/robot/link_poses.h"
 #include "proximity/motion_bound.h"
+#include "proximity/moved_joints.h"
 
 namespace ist {
 namespace {
@@ -30,17 +31,7 @@ struct TimeOfImpact::Impl {
   // Poses of all links after `time` [s].
   void place(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
              double time) {
-    const Kinematics& kinematics = forward.kinematics();
-    const auto& joints = kinematics.joints();
-    const double s = std::min(time / motion.duration, 1.0);
-    moved = still;
-    for (std::size_t j = 0; j < joints.size(); ++j) {
-      if (!(joint_speed(joints[j], motion) > 0.0)) continue;
-      const std::size_t source = joints[j].source;
-      const double q = (1.0 - s) * motion.from[source] + s * motion.to[source];
-      moved.X_PC[j] = kinematics.joint_pose(j, joints[j].multiplier * q + joints[j].offset);
-      moved.known[j] = true;
-    }
+    place_moved_joints(forward.kinematics(), motion, still, time, &moved);
     forward.run(moved, X_FR);
   }
 

@@ -89,6 +89,9 @@ class TriangleGroups {
   explicit TriangleGroups(std::vector<Corners3<double>> triangles)
       : triangles_(std::move(triangles)) {
     divide(0, triangles_.size());
+    for (const auto& t : triangles_) {
+      for (const auto& p : t.p) box_.extend(p);
+    }
     for (const auto& t : triangles_) spheres_.push_back(sphere_of(&t, &t + 1));
   }
 
@@ -96,49 +99,75 @@ class TriangleGroups {
 
   /// [m] The distance of the surfaces; the other one is posed.
   double distance(const TriangleGroups& other, const Eigen::Isometry3d& X) const {
-    std::vector<std::pair<double, std::pair<std::size_t, std::size_t>>> order;
-    for (std::size_t i = 0; i < groups_.size(); ++i) {
-      for (std::size_t k = 0; k < other.groups_.size(); ++k) {
-        const double bound = gap(groups_[i].sphere, posed(other.groups_[k].sphere, X));
-        order.push_back({bound, {i, k}});
-      }
-    }
-    std::sort(order.begin(), order.end());
-    std::vector<Corners3<double>> posed_triangles;
-    std::vector<Ball> posed_balls;
-    for (std::size_t i = 0; i < other.size(); ++i) {
-      posed_triangles.push_back(other.triangles_[i]);
-      for (auto& p : posed_triangles.back().p) p = X * p;
-      posed_balls.push_back(posed(other.spheres_[i], X));
-    }
     double best = std::numeric_limits<double>::infinity();
-    for (const auto& [bound, pair] : order) {
-      if (bound >= best) break;
-      const Group &a = groups_[pair.first], &b = other.groups_[pair.second];
-      for (std::size_t i = a.first; i < a.last; ++i) {
-        for (std::size_t k = b.first; k < b.last; ++k) {
-          if (gap(spheres_[i], posed_balls[k]) >= best) continue;
-          best = std::min(best, oracle_triangles(triangles_[i], posed_triangles[k]));
-        }
-      }
-      if (best == 0.0) break;
-    }
+    descend(0, other, 0, X, &best);
     return best;
+  }
+
+  /// Whether a part of the other link is inside this one, by the winding number of one corner of
+  /// each of its groups; for closed links whose surfaces are apart. A component of the surface that
+  /// shares every group with others may be missed.
+  bool holds_part_of(const TriangleGroups& other, const Eigen::Isometry3d& X) const {
+    for (const Group& group : other.groups_) {
+      if (group.right != 0) continue;
+      if (contains(X * other.triangles_[group.first].p[0])) return true;
+    }
+    return false;
+  }
+
+  /// Whether the winding number of the surface about the point is more than a half.
+  bool contains(const Eigen::Vector3d& p) const {
+    if (!box_.contains(p)) return false;
+    double angle = 0.0;  // the sum of solid angles (van Oosterom and Strackee 1983)
+    for (const auto& t : triangles_) {
+      const Eigen::Vector3d a = t.p[0] - p, b = t.p[1] - p, c = t.p[2] - p;
+      const double la = a.norm(), lb = b.norm(), lc = c.norm();
+      angle += 2.0 * std::atan2(a.dot(b.cross(c)),
+                                la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+    }
+    return angle > 0.5 * 4.0 * 3.14159265358979323846;
   }
 
  private:
   struct Ball {
     Eigen::Vector3d center;
     double radius;
+    Eigen::Vector3d half = Eigen::Vector3d::Zero();  // of the box with this centre, unposed
   };
+  // A sphere about some triangles, in two halves or, with `right` 0, a few.
   struct Group {
     std::size_t first, last;
     Ball sphere;
+    std::size_t right = 0;  // the left half follows its parent
   };
-  static constexpr std::size_t kGroup = 48;
+  static constexpr std::size_t kGroup = 6;
 
   static Ball posed(const Ball& ball, const Eigen::Isometry3d& X) {
     return {X * ball.center, ball.radius};
+  }
+  // The width of the slab between two triangles that is perpendicular to n.
+  static double slab(const Eigen::Vector3d& n, const Corners3<double>& a,
+                     const Corners3<double>& b) {
+    const double norm = n.norm();
+    if (!(norm > 0.0)) return 0.0;
+    const auto along = [&](const Corners3<double>& t) {
+      const double x = n.dot(t.p[0]), y = n.dot(t.p[1]), z = n.dot(t.p[2]);
+      return std::pair<double, double>{std::min({x, y, z}), std::max({x, y, z})};
+    };
+    const auto of_a = along(a), of_b = along(b);
+    return std::max(of_b.first - of_a.second, of_a.first - of_b.second) / norm - 1e-12;
+  }
+  // The same between the boxes about two groups, along the line of their centres.
+  static double slab(const Ball& a, const Ball& b, const Eigen::Isometry3d& X) {
+    const Eigen::Vector3d between = X * b.center - a.center;
+    const double norm = between.norm();
+    if (!(norm > 0.0)) return 0.0;
+    const Eigen::Vector3d n = between / norm;
+    return norm - n.cwiseAbs().dot(a.half) - (X.linear().transpose() * n).cwiseAbs().dot(b.half) -
+           1e-12;
+  }
+  static double bound(const Group& a, const Group& b, const Eigen::Isometry3d& X) {
+    return std::max(gap(a.sphere, posed(b.sphere, X)), slab(a.sphere, b.sphere, X));
   }
   static double gap(const Ball& a, const Ball& b) {
     return (a.center - b.center).norm() - a.radius - b.radius - 1e-12;
@@ -148,18 +177,62 @@ class TriangleGroups {
     for (auto* t = begin; t != end; ++t) {
       for (const auto& p : t->p) box.extend(p);
     }
-    Ball ball{box.center(), 0.0};
+    Ball ball{box.center(), 0.0, 0.5 * box.sizes()};
     for (auto* t = begin; t != end; ++t) {
       for (const auto& p : t->p) ball.radius = std::max(ball.radius, (p - ball.center).norm());
     }
     return ball;
   }
-  void divide(std::size_t first, std::size_t last) {
-    if (last - first <= kGroup) {
-      groups_.push_back(
-          {first, last, sphere_of(&triangles_[first], &triangles_[first] + (last - first))});
-      return;
+
+  static Eigen::Vector3d normal(const Corners3<double>& t) {
+    return (t.p[1] - t.p[0]).cross(t.p[2] - t.p[0]);
+  }
+
+  void compare(const Group& a, const TriangleGroups& other, const Group& b,
+               const Eigen::Isometry3d& X, double* best) const {
+    for (std::size_t k = b.first; k < b.last; ++k) {
+      const Ball ball = posed(other.spheres_[k], X);
+      if (gap(a.sphere, ball) >= *best) continue;
+      Corners3<double> t = other.triangles_[k];
+      for (auto& p : t.p) p = X * p;
+      for (std::size_t i = a.first; i < a.last; ++i) {
+        if (gap(spheres_[i], ball) >= *best) continue;
+        const Corners3<double>& own = triangles_[i];
+        if (slab(ball.center - spheres_[i].center, own, t) >= *best ||
+            slab(normal(own), own, t) >= *best || slab(normal(t), own, t) >= *best) {
+          continue;
+        }
+        *best = std::min(*best, oracle_triangles(own, t));
+      }
     }
+  }
+
+  // The larger group is halved, and the nearer half comes first.
+  void descend(std::size_t a, const TriangleGroups& other, std::size_t b,
+               const Eigen::Isometry3d& X, double* best) const {
+    const Group &of_a = groups_[a], &of_b = other.groups_[b];
+    if (bound(of_a, of_b, X) >= *best) return;
+    if (of_a.right == 0 && of_b.right == 0) return compare(of_a, other, of_b, X, best);
+    const bool halves_a =
+        of_b.right == 0 || (of_a.right != 0 && of_a.sphere.radius >= of_b.sphere.radius);
+    std::pair<std::size_t, std::size_t> halves[2];
+    double gaps[2];
+    for (int i = 0; i < 2; ++i) {
+      halves[i] = {halves_a ? (i == 0 ? a + 1 : of_a.right) : a,
+                   halves_a ? b : (i == 0 ? b + 1 : of_b.right)};
+      gaps[i] = bound(groups_[halves[i].first], other.groups_[halves[i].second], X);
+    }
+    const int nearer = gaps[1] < gaps[0] ? 1 : 0;
+    for (const int i : {nearer, 1 - nearer}) {
+      descend(halves[i].first, other, halves[i].second, X, best);
+    }
+  }
+
+  void divide(std::size_t first, std::size_t last) {
+    const std::size_t group = groups_.size();
+    groups_.push_back(
+        {first, last, sphere_of(&triangles_[first], &triangles_[first] + (last - first))});
+    if (last - first <= kGroup) return;
     Eigen::AlignedBox3d box;
     for (std::size_t i = first; i < last; ++i) box.extend(triangles_[i].p[0]);
     Eigen::Index axis;
@@ -170,12 +243,14 @@ class TriangleGroups {
                      triangles_.begin() + static_cast<std::ptrdiff_t>(last),
                      [axis](const auto& a, const auto& b) { return a.p[0][axis] < b.p[0][axis]; });
     divide(first, middle);
+    groups_[group].right = groups_.size();
     divide(middle, last);
   }
 
   std::vector<Corners3<double>> triangles_;
   std::vector<Ball> spheres_;
   std::vector<Group> groups_;
+  Eigen::AlignedBox3d box_;
 };
 
 /// All triangles of the meshes and boxes of a link, in its frame. Other shapes are left out.
@@ -205,6 +280,59 @@ inline std::vector<Corners3<double>> triangles_of(const LinkGeometry& link) {
     }
   }
   return triangles;
+}
+
+/// Appends inscribed triangles of the cylinders and spheres of a link.
+/// @returns [m] no point of those is farther from the triangles
+inline double append_round_shapes(const LinkGeometry& link,
+                                  std::vector<Corners3<double>>* triangles) {
+  constexpr int kAround = 160;
+  constexpr double kPi = 3.14159265358979323846;
+  double inexactness = 0.0;
+  // Profiles (radius, z) that turn about z, from below to above.
+  const auto turn = [&](const std::vector<Eigen::Vector2d>& profile, const Eigen::Isometry3d& X) {
+    const auto point = [&](const Eigen::Vector2d& p, int k) {
+      const double angle = 2.0 * kPi * (k % kAround) / kAround;
+      return Eigen::Vector3d(
+          X * Eigen::Vector3d(p.x() * std::cos(angle), p.x() * std::sin(angle), p.y()));
+    };
+    for (std::size_t i = 0; i + 1 < profile.size(); ++i) {
+      for (int k = 0; k < kAround; ++k) {
+        const auto a = point(profile[i], k), b = point(profile[i], k + 1);
+        const auto c = point(profile[i + 1], k), d = point(profile[i + 1], k + 1);
+        if (profile[i].x() > 0.0) triangles->push_back({{a, b, d}});
+        if (profile[i + 1].x() > 0.0) triangles->push_back({{a, d, c}});
+      }
+    }
+  };
+  for (const GeometryElement& element : link) {
+    if (const auto* cylinder = std::get_if<Cylinder>(&element.shape)) {
+      const double r = cylinder->radius, h = 0.5 * cylinder->length;
+      std::vector<Eigen::Vector2d> profile;  // in pieces, because spheres about slivers are large
+      const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+        const int pieces = static_cast<int>(std::ceil((to - from).norm() / (0.2 * r)));
+        for (int i = 0; i < pieces; ++i) profile.push_back(from + i * (to - from) / pieces);
+      };
+      add({0.0, -h}, {r, -h});
+      add({r, -h}, {r, h});
+      add({r, h}, {0.0, h});
+      profile.emplace_back(0.0, h);
+      turn(profile, element.X_LE);
+      inexactness = std::max(inexactness, r * (1.0 - std::cos(kPi / kAround)));
+    } else if (const auto* sphere = std::get_if<Sphere>(&element.shape)) {
+      std::vector<Eigen::Vector2d> profile;
+      for (int i = 0; i <= kAround / 2; ++i) {
+        const double angle = kPi * i / (kAround / 2);
+        const bool is_pole = i == 0 || i == kAround / 2;
+        profile.emplace_back(is_pole ? 0.0 : sphere->radius * std::sin(angle),
+                             -sphere->radius * std::cos(angle));
+      }
+      turn(profile, element.X_LE);
+      // A quadrangle spans an angle of 2 pi / kAround both along and across.
+      inexactness = std::max(inexactness, sphere->radius * 2.0 * (1.0 - std::cos(kPi / kAround)));
+    }
+  }
+  return inexactness;
 }
 
 }  // namespace ist::test

@@ -22,7 +22,9 @@ struct OctreeData {
 struct Octree {
   std::vector<Eigen::AlignedBox3d> occupied;  ///< [m] leaves of all sizes, in the map's frame
   std::size_t free = 0;                       ///< number of leaves known to be free
-  std::size_t nodes = 0;                      ///< number of nodes, inner ones too
+  std::vector<Eigen::AlignedBox3d>
+      free_leaves;        ///< these, with OctreeLimits::keep_free; else empty
+  std::size_t nodes = 0;  ///< number of nodes, inner ones too
 };
 
 /// The largest tree that is read; a larger one is refused. They bound time and memory of one map.
@@ -34,6 +36,8 @@ struct OctreeLimits {
   std::size_t max_bytes = std::size_t{256} << 20U;
   /// [m] Coordinates of occupied leaves in the map's frame. Float resolves 1 mm there.
   double max_position = 1e4;
+  /// Whether free leaves are kept, too; max_leaves and max_position apply to both together then.
+  bool keep_free = false;
 };
 
 /// Reads the occupied leaves. In a binary tree each leaf says whether it is occupied; in a full
@@ -51,8 +55,9 @@ std::string read_octree(const OctreeData& data, Octree* octree, const OctreeLimi
 
 /// Reads a map file, `.bt` (binary) or `.ot` (full); its header says which. Only regular files are
 /// read.
+/// @param resolution  if not null, receives the edge of the smallest leaf [m]
 /// @returns an empty string, or one sentence that names the fault
 std::string read_octree_file(const std::string& path, Octree* octree,
-                             const OctreeLimits& limits = {});
+                             const OctreeLimits& limits = {}, double* resolution = nullptr);
 
 }  // namespace ist

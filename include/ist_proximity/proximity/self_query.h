@@ -72,11 +72,10 @@ struct SelfQueryStatistics {
 /// run() never throws, locks nothing and allocates nothing. One object per thread.
 class SelfQuery {
  public:
-  /// Builds a hierarchy for each link: up to a second for a million triangles.
-  /// @param previous  null, or a query whose hierarchies are shared for links of the same `solid`:
-  ///                  for a model that differs in its packings alone
+  /// Builds a hierarchy for each link: up to a second for a million triangles. Queries share the
+  /// hierarchies of links of the same `solid`, also between models that differ in their packings.
   SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-            const QueryConfig& config, const SelfQuery* previous = nullptr);
+            const QueryConfig& config);
   ~SelfQuery();
   SelfQuery(SelfQuery&&) noexcept;
   SelfQuery& operator=(SelfQuery&&) noexcept;
@@ -132,7 +131,7 @@ struct PairSampling {
 /// The finding of sampling about a pair. It is evidence, not proof: a pair that was never in
 /// contact may be, in a configuration that was not drawn.
 struct SampledPair {
-  LinkPair pair;
+  LinkPair pair;             ///< the links
   std::size_t contacts = 0;  ///< configurations in which the links are in contact
   std::size_t measured = 0;  ///< configurations in which that is known
   bool always() const { return measured > 0 && contacts == measured; }  ///< always in contact

@@ -35,7 +35,7 @@ class Reader {
       const std::uint32_t code = codes >> (2 * child) & 3U;
       if (code == kFree) {
         ++out_.nodes;
-        ++out_.free;
+        if (!add_free(corner(low, depth + 1, child), depth + 1)) return false;
       } else if (code == kOccupied) {
         ++out_.nodes;
         if (!add(corner(low, depth + 1, child), depth + 1)) return false;
@@ -57,9 +57,7 @@ class Reader {
     next_ += sizeof log_odds + 1;
     if (!std::isfinite(log_odds)) return fail("holds a log-odds value that is not finite");
     if (children == 0) {
-      if (log_odds >= 0.0F) return add(low, depth);
-      ++out_.free;
-      return true;
+      return log_odds >= 0.0F ? add(low, depth) : add_free(low, depth);
     }
     if (depth == kDepth) return fail("is deeper than 16 levels");
     for (int child = 0; child < 8; ++child) {
@@ -87,26 +85,34 @@ class Reader {
 
   // Adds an occupied leaf. Its corners are whole numbers times the resolution, so that neighbours
   // meet exactly.
-  bool add(const Eigen::Vector3i& low, int depth) {
-    if (out_.occupied.size() >= limits_.max_leaves) {
-      return fail("has more occupied leaves than allowed, which are " +
-                  std::to_string(limits_.max_leaves) + " (max_leaves)");
+  bool add(const Eigen::Vector3i& low, int depth) { return keep(low, depth, &out_.occupied); }
+
+  bool add_free(const Eigen::Vector3i& low, int depth) {
+    ++out_.free;
+    return !limits_.keep_free || keep(low, depth, &out_.free_leaves);
+  }
+
+  bool keep(const Eigen::Vector3i& low, int depth, std::vector<Eigen::AlignedBox3d>* leaves) {
+    if (out_.occupied.size() + out_.free_leaves.size() >= limits_.max_leaves) {
+      return fail(std::string("has more ") + (limits_.keep_free ? "" : "occupied ") +
+                  "leaves than allowed, which are " + std::to_string(limits_.max_leaves) +
+                  " (max_leaves)");
     }
     const Eigen::Vector3i high = low.array() + (1 << (kDepth - depth));
     const Eigen::AlignedBox3d box(resolution_ * low.cast<double>(),
                                   resolution_ * high.cast<double>());
     const Eigen::Vector3d farthest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs());
     if (!(farthest.maxCoeff() <= limits_.max_position)) return fail(too_far(box));
-    out_.occupied.push_back(box);
+    leaves->push_back(box);
     return true;
   }
 
   std::string too_far(const Eigen::AlignedBox3d& box) const {
     const Eigen::Vector3d &low = box.min(), &high = box.max();
     std::ostringstream text;
-    text << "has an occupied leaf from (" << low.x() << ", " << low.y() << ", " << low.z()
-         << ") to (" << high.x() << ", " << high.y() << ", " << high.z() << ") m, farther out than "
-         << limits_.max_position << " m (max_position)";
+    text << (limits_.keep_free ? "has a leaf from (" : "has an occupied leaf from (") << low.x()
+         << ", " << low.y() << ", " << low.z() << ") to (" << high.x() << ", " << high.y() << ", "
+         << high.z() << ") m, farther out than " << limits_.max_position << " m (max_position)";
     return text.str();
   }
 
@@ -194,7 +200,8 @@ std::string read_octree(const OctreeData& data, Octree* octree, const OctreeLimi
          std::to_string(data.size) + " bytes does.";
 }
 
-std::string read_octree_file(const std::string& path, Octree* octree, const OctreeLimits& limits) {
+std::string read_octree_file(const std::string& path, Octree* octree, const OctreeLimits& limits,
+                             double* resolution) {
   const std::string name = "map file '" + path + "' ";
   std::string bytes;
   std::string fault = read_map_bytes(path, limits.max_bytes, &bytes);
@@ -208,6 +215,7 @@ std::string read_octree_file(const std::string& path, Octree* octree, const Octr
   data.id = header.id;
   data.is_binary = header.is_binary;
   data.resolution = header.resolution;
+  if (resolution != nullptr) *resolution = header.resolution;
   data.data = reinterpret_cast<const std::uint8_t*>(bytes.data()) + data_begin;
   data.size = header.nodes > 0 ? data_size : 0;
   if (header.nodes > 0 && data_size == 0) return name + "is cut off: it holds no data.";

@@ -87,6 +87,16 @@ class TriangleBvh {
   /// winding_number(p_M) > 0.5. The quick winding number decides where its error allows it.
   bool is_inside(const Eigen::Vector3d& p_M) const;
 
+  /// A crossing of a ray with the surface.
+  struct RayCrossing {
+    double t = std::numeric_limits<double>::infinity();  ///< parameter of the ray; inf: none
+    std::uint32_t slot = 0;                              ///< for triangle(), valid when t is finite
+  };
+  /// The crossing with the smallest t in [0, max_t] of the ray origin + t direction, from either
+  /// side of the surface. A ray along the plane of a triangle does not cross it.
+  RayCrossing first_crossing(const Eigen::Vector3d& origin_M, const Eigen::Vector3d& direction_M,
+                             double max_t = std::numeric_limits<double>::infinity()) const;
+
   std::size_t size() const { return triangles_.size(); }
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }
 

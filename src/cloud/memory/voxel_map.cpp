@@ -1,0 +1,327 @@
+#include "cloud/memory/voxel_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "cloud/memory/block_bits.h"
+
+namespace ist {
+namespace {
+
+constexpr double kTick = 0.01;  // [s] of VoxelBlock's times: 32 bits last for 490 days
+constexpr double kMaxTicks = 4e9;
+// One in so many blocks is forgotten when memory is short, at least.
+constexpr std::size_t kForgottenShare = 8;
+// [voxels] from the end of a ray on: what lies behind a point is answered by that point.
+constexpr double kShade[] = {0.5, 1.0};
+
+float log_odds_of(double probability) {
+  return static_cast<float>(std::log(probability / (1.0 - probability)));
+}
+
+void require(bool valid, const char* member, double value, const char* range) {
+  if (valid) return;
+  std::ostringstream text;
+  text << "MemoryConfig::" << member << " is " << value << ", it must be " << range << ".";
+  throw std::invalid_argument(text.str());
+}
+
+const MemoryConfig& checked(const MemoryConfig& config) {
+  require(config.decay > 0.0, "decay", config.decay, "more than 0 s");
+  require(config.resolution >= 0.001 && config.resolution <= 1.0, "resolution", config.resolution,
+          "from 0.001 to 1 m");
+  require(config.max_nodes >= 4096, "max_nodes", static_cast<double>(config.max_nodes),
+          "4096 or more");
+  require(config.max_range > 0.0 && std::isfinite(config.max_range), "max_range", config.max_range,
+          "more than 0 m, and finite");
+  require(config.hit >= 0.5 && config.hit < 1.0, "hit", config.hit, "from 0.5 to 1");
+  require(config.miss > 0.0 && config.miss <= 0.5, "miss", config.miss, "from 0 to 0.5");
+  require(config.clamp_min > 0.0 && config.clamp_min <= 0.5, "clamp_min", config.clamp_min,
+          "from 0 to 0.5");
+  require(config.clamp_max >= 0.5 && config.clamp_max < 1.0, "clamp_max", config.clamp_max,
+          "from 0.5 to 1");
+  return config;
+}
+
+/// Forgets the voxels of a block that were measured before `limit`.
+/// @returns whether none is left
+bool forget_before(std::uint32_t limit, VoxelBlock* block) {
+  if (block->oldest < limit) {
+    std::uint32_t oldest = std::numeric_limits<std::uint32_t>::max();
+    for_each_bit(BlockBits(block->known), [&](unsigned place) {
+      if (block->time[place] >= limit) {
+        oldest = std::min(oldest, block->time[place]);
+        return;
+      }
+      block->log_odds[place] = std::numeric_limits<float>::quiet_NaN();
+      clear_bit(place, &block->known);
+      clear_bit(place, &block->occupied);
+    });
+    block->oldest = oldest;
+  }
+  return block->known == BlockBits{};
+}
+
+}  // namespace
+
+VoxelMap::VoxelMap(const MemoryConfig& config)
+    : config_(checked(config)),
+      scale_(config.resolution),
+      blocks_(config.max_nodes / kBlockVoxels),
+      hit_(log_odds_of(config.hit)),
+      miss_(log_odds_of(config.miss)),
+      least_(log_odds_of(config.clamp_min)),
+      most_(log_odds_of(config.clamp_max)) {}
+
+void VoxelMap::set_region(const RegionOfInterest& region_M) {
+  const auto limit = [&](double coordinate, std::int32_t outside) {
+    std::int32_t key = outside;
+    scale_.key(coordinate, &key);
+    return key;
+  };
+  const Eigen::Vector3d& c = region_M.center_F;
+  const double r = region_M.radius;
+  low_ = {limit(c.x() - r, 0), limit(c.y() - r, 0), limit(c.z() - r, 0)};
+  high_ = {limit(c.x() + r, kKeyEnd - 1), limit(c.y() + r, kKeyEnd - 1),
+           limit(c.z() + r, kKeyEnd - 1)};
+}
+
+void VoxelMap::insert(const MemoryScan& scan) {
+  if (!scan.origin.allFinite()) {
+    throw std::invalid_argument("the sensor's position in the memory's frame is not finite.");
+  }
+  set_now(scan.stamp);
+  forget_old();
+  make_place();
+  ++frame_;
+  skipped_ = 0;
+  touched_.clear();
+  reset_cursor();
+  add_rays(scan.origin, scan.hits, true);
+  add_rays(scan.origin, scan.free_ends, false);
+  apply();
+}
+
+void VoxelMap::clear() {
+  blocks_.clear();
+  reset_cursor();
+  now_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+std::uint32_t VoxelMap::tick(double time) const {
+  return static_cast<std::uint32_t>(std::clamp((time - epoch_) / kTick, 0.0, kMaxTicks));
+}
+
+double VoxelMap::time(std::uint32_t tick) const { return epoch_ + kTick * tick; }
+
+void VoxelMap::set_now(double time) {
+  if (!std::isfinite(time)) return;
+  if (std::isnan(now_) || (time - epoch_) / kTick >= kMaxTicks) {
+    blocks_.clear();
+    reset_cursor();
+    now_ = epoch_ = time;
+  }
+  now_ = std::max(now_, time);
+}
+
+bool VoxelMap::is_inside(const VoxelKey& key) const {
+  return key.x >= low_.x && key.y >= low_.y && key.z >= low_.z && key.x <= high_.x &&
+         key.y <= high_.y && key.z <= high_.z;
+}
+
+/// The block of a voxel, with its bits emptied for this cloud; null: there is no memory for it.
+VoxelBlock* VoxelMap::block_for(const VoxelKey& key) {
+  const std::uint64_t id = block_id(key);
+  if (id == last_id_) return last_block_;
+  VoxelBlock* block = blocks_.find_or_add(id);
+  if (block != nullptr && block->frame != frame_) {
+    block->frame = frame_;
+    block->hit = block->free = block->shaded = BlockBits{};
+    touched_.push_back(block);
+  }
+  last_id_ = id;
+  last_block_ = block;
+  return block;
+}
+
+void VoxelMap::mark(const VoxelKey& key, BlockBits VoxelBlock::*bits) {
+  VoxelBlock* block = block_for(key);
+  if (block == nullptr) {
+    ++skipped_;
+    return;
+  }
+  set_bit(place_in_block(key), &(block->*bits));
+}
+
+/// Marks what a ray passes, within the region. A ray that has come into it ends where it leaves it.
+void VoxelMap::mark_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& end) {
+  VoxelKey first, last;
+  if (!scale_.key(origin, &first) || !scale_.key(end, &last)) return;
+  // The cursor is here and not a member, so that the compiler keeps it in registers.
+  std::uint64_t id = kNoBlock;
+  VoxelBlock* block = nullptr;
+  std::size_t skipped = 0;
+  const auto mark_free = [&](const VoxelKey& key) {
+    const std::uint64_t here = block_id(key);
+    if (here != id) {
+      id = here;
+      block = block_for(key);
+    }
+    if (block != nullptr) {
+      set_bit(place_in_block(key), &block->free);
+    } else {
+      ++skipped;
+    }
+  };
+  if (is_inside(first) && is_inside(last)) {  // and so is all in between
+    walk_ray(scale_, origin, end, first, last, [&](const VoxelKey& key) {
+      mark_free(key);
+      return true;
+    });
+  } else {
+    bool was_inside = false;
+    walk_ray(scale_, origin, end, first, last, [&](const VoxelKey& key) {
+      if (!is_inside(key)) return !was_inside;
+      was_inside = true;
+      mark_free(key);
+      return true;
+    });
+  }
+  skipped_ += skipped;
+}
+
+/// Marks what lies just behind the end of a ray, in blocks that are there.
+void VoxelMap::mark_shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& end) {
+  const Eigen::Vector3d p = end.cast<double>();
+  const Eigen::Vector3d direction = (end - origin).cast<double>().normalized();
+  for (const double behind : kShade) {
+    VoxelKey key;
+    if (!scale_.key(Eigen::Vector3d(p + behind * config_.resolution * direction), &key)) continue;
+    if (blocks_.find(block_id(key)) == nullptr) continue;
+    set_bit(place_in_block(key), &block_for(key)->shaded);
+  }
+}
+
+/// Takes one ray.
+/// @param is_hit  whether space is occupied at its end
+void VoxelMap::add_ray(const Eigen::Vector3f& origin, Eigen::Vector3f end, bool is_hit) {
+  const Eigen::Vector3f ray = end - origin;
+  const double length = octomap_norm(ray);
+  if (length > config_.max_range) {
+    const Eigen::Vector3f direction = ray / static_cast<float>(length);
+    end = origin + direction * static_cast<float>(config_.max_range);
+    is_hit = false;
+  }
+  mark_ray(origin, end);
+  VoxelKey key;
+  if (!is_hit || !scale_.key(end, &key) || !is_inside(key)) return;
+  mark(key, &VoxelBlock::hit);
+  mark_shade(origin, end);
+}
+
+void VoxelMap::add_rays(const Eigen::Vector3f& origin, const std::vector<Eigen::Vector3f>& ends,
+                        bool is_hit) {
+  ray_ends_.clear();
+  for (const Eigen::Vector3f& end : ends) {
+    VoxelKey key;
+    if (!scale_.key(end, &key)) continue;
+    if (!config_.discretize) {
+      add_ray(origin, end, is_hit);
+    } else if (ray_ends_.insert(key)) {
+      add_ray(origin, scale_.middle(key).cast<float>(), is_hit);
+    }
+  }
+}
+
+void VoxelMap::update(VoxelBlock* block, unsigned place, float change, std::uint32_t time) {
+  float& value = block->log_odds[place];
+  value = std::clamp((std::isnan(value) ? 0.0F : value) + change, least_, most_);
+  note(block, place, time, change > 0.0F);
+}
+
+/// Notes what a voxel's log-odds are now. A voxel that stays occupied keeps the time of its last
+/// hit.
+void VoxelMap::note(VoxelBlock* block, unsigned place, std::uint32_t time, bool is_hit) {
+  set_bit(place, &block->known);
+  if (block->log_odds[place] >= 0.0F) {
+    set_bit(place, &block->occupied);
+    if (!is_hit) return;
+  } else {
+    clear_bit(place, &block->occupied);
+  }
+  block->time[place] = time;
+  block->oldest = std::min(block->oldest, time);
+  block->newest = std::max(block->newest, time);
+}
+
+void VoxelMap::apply() {
+  const std::uint32_t time = tick(now_);
+  for (VoxelBlock* block : touched_) {
+    for_each_bit(without(block->free, block->hit),
+                 [&](unsigned place) { update(block, place, miss_, time); });
+    for_each_bit(block->hit, [&](unsigned place) { update(block, place, hit_, time); });
+  }
+}
+
+void VoxelMap::assign(const VoxelKey& key, float log_odds) {
+  VoxelBlock* block = blocks_.find_or_add(block_id(key));
+  if (block == nullptr) return;
+  block->log_odds[place_in_block(key)] = log_odds;
+  note(block, place_in_block(key), tick(now_), true);
+}
+
+void VoxelMap::forget_old() {
+  if (std::isnan(now_) || !(now_ - config_.decay > epoch_)) return;
+  const std::uint32_t limit = tick(now_ - config_.decay);
+  bool any_empty = false;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    any_empty = forget_before(limit, &blocks_[i]) || any_empty;
+  }
+  if (!any_empty) return;
+  blocks_.remove_if([](const VoxelBlock& block) { return block.known == BlockBits{}; });
+  reset_cursor();
+}
+
+/// Forgets blocks where the last cloud lacked memory, or the next one would if it needs as much
+/// more as the last one: those that were measured longest ago, those without anything occupied
+/// first.
+void VoxelMap::make_place() {
+  const std::size_t used_before = std::exchange(blocks_before_, blocks_.size());
+  const std::size_t added = blocks_.size() - std::min(used_before, blocks_.size());
+  const bool is_short = skipped_ > 0 || blocks_.size() + added > blocks_.max_size();
+  if (!is_short || blocks_.size() == 0) return;
+  using Age = std::pair<bool, std::uint32_t>;
+  const auto age = [](const VoxelBlock& block) {
+    return Age(block.occupied != BlockBits{}, block.newest);
+  };
+  std::vector<Age> ages;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) ages.push_back(age(blocks_[i]));
+  const std::size_t share = ages.size() / kForgottenShare;
+  std::size_t allowed = std::min(ages.size() / 2, std::max(share, added)) + 1;
+  const auto last = ages.begin() + static_cast<std::ptrdiff_t>(allowed - 1);
+  std::nth_element(ages.begin(), last, ages.end());
+  const Age limit = *last;
+  blocks_.remove_if([&](const VoxelBlock& block) {
+    if (allowed == 0 || age(block) > limit) return false;
+    --allowed;
+    forgotten_ += count_bits(block.known);
+    return true;
+  });
+  blocks_before_ = blocks_.size();
+  reset_cursor();
+}
+
+void VoxelMap::reset_cursor() {
+  last_id_ = kNoBlock;
+  last_block_ = nullptr;
+}
+
+BlockBits VoxelMap::hidden(const VoxelBlock& block) const {
+  if (block.frame != frame_) return block.occupied;
+  return without(without(without(block.occupied, block.hit), block.free), block.shaded);
+}
+
+}  // namespace ist

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/cloud/memory_map.h"
+
+namespace ist {
+
+/// What a cloud says of space. Points that are in the snapshot are obstacles. Rays are free up to
+/// the other points in range, which are on the robot or outside the region of interest, and up to
+/// `max_range` where a point is farther or, in a depth image, nothing is in range. A pixel or point
+/// of which nothing is known (NaN), or nearer than `min_range`, says nothing.
+/// @param cloud      that the snapshot was made of
+/// @param X_MS       sensor frame -> memory's frame
+/// @param min_range  [m] of the snapshot's Ingest
+/// @param max_range  [m] finite
+/// @param scan       overwritten, its memory used again
+void read_memory_scan(const RawCloud& cloud, const CloudSnapshot& snapshot,
+                      const Eigen::Isometry3d& X_MS, double min_range, double max_range,
+                      MemoryScan* scan);
+
+}  // namespace ist

@@ -1,0 +1,199 @@
+#include "ist_proximity/proximity/known_world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+#include <utility>
+#include <variant>
+
+#include "internal/bvh/build_id.h"
+#include "internal/geometry/limits.h"
+#include "internal/robot/anytime_model.h"
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "proximity/coherence/displacement.h"
+#include "proximity/world_shape.h"
+
+namespace ist {
+namespace {
+
+// Spheres of an object's packing. It serves the bounds of depths alone; distances come from the
+// exact geometry.
+constexpr int kMaxSpheres = 32;
+constexpr double kPackingError = 0.01;  // [m]
+
+std::size_t triangles_of(const LinkGeometry& geometry) {
+  std::size_t count = 0;
+  for (const GeometryElement& element : geometry) {
+    if (std::holds_alternative<Box>(element.shape)) count += 12;
+    if (const auto* mesh = std::get_if<TriangleMesh>(&element.shape)) {
+      count += mesh->triangles.size();
+    }
+  }
+  return count;
+}
+
+std::string pose_fault(const Eigen::Isometry3d& X_BO) {
+  if (!is_rigid(X_BO)) return "its pose is no rotation and translation of finite numbers";
+  return position_fault("its position", X_BO.translation());
+}
+
+std::string object_fault(const WorldObject& object) {
+  const std::string unnamed = name_fault(object.name);
+  if (!unnamed.empty()) return "its name " + unnamed;
+  const std::string unplaced = name_fault(object.frame);
+  if (!unplaced.empty()) return "its frame " + unplaced;
+  const std::string misplaced = pose_fault(object.X_BO);
+  if (!misplaced.empty()) return misplaced;
+  if (!(object.margin >= 0.0 && object.margin <= kMaxLength)) {
+    std::ostringstream text;
+    text << "its margin is " << object.margin << " m; allowed is 0 to " << kMaxLength << " m";
+    return text.str();
+  }
+  if (object.geometry.empty()) return "it has no shape";
+  for (const GeometryElement& element : object.geometry) {
+    const std::string fault = element_fault(element);
+    if (!fault.empty()) return fault;
+  }
+  return "";
+}
+
+std::string sentence(const std::string& name, const std::string& fault) {
+  return "object '" + printable(name) + "': " + fault;
+}
+
+}  // namespace
+
+Eigen::AlignedBox3d whole_box(const LinkModel& link, const LinkSurface& surface) {
+  Eigen::AlignedBox3d box = bounding_box(link);
+  for (const SurfaceBvh* bvh : {&surface.surface, &surface.opening_cells}) {
+    if (!bvh->empty()) box.extend(bvh->bounds());
+  }
+  return box;
+}
+
+std::string WorldBuilder::exceeded_limit(const std::vector<WorldObject>& objects) const {
+  std::size_t triangles = triangles_;
+  std::set<std::string> names;
+  std::size_t added = 0;
+  for (const WorldObject& object : objects) {
+    triangles += triangles_of(object.geometry);
+    if (!names.insert(object.name).second) continue;
+    const auto known = entries_.find(object.name);
+    if (known == entries_.end()) {
+      ++added;
+    } else {
+      triangles -= known->second.triangles;
+    }
+  }
+  const std::size_t count = entries_.size() + added;
+  const auto text = [](std::size_t is, const char* what, std::size_t allowed, const char* limit) {
+    return "the world would hold " + std::to_string(is) + " " + what + "; allowed are " +
+           std::to_string(allowed) + " (" + limit + "): nothing of it is taken";
+  };
+  if (count > limits_.max_objects)
+    return text(count, "objects", limits_.max_objects, "max_objects");
+  if (triangles > limits_.max_triangles) {
+    return text(triangles, "triangles", limits_.max_triangles, "max_triangles");
+  }
+  return "";
+}
+
+std::vector<WorldFault> WorldBuilder::add(const std::vector<WorldObject>& objects,
+                                          const std::function<bool()>& cancelled) {
+  const std::string limit = exceeded_limit(objects);
+  if (!limit.empty()) return {{"", limit}};
+  std::vector<WorldFault> faults;
+  auto description = std::make_shared<RobotDescription>();
+  std::vector<const WorldObject*> taken;
+  for (const WorldObject& object : objects) {
+    const std::string fault = object_fault(object);
+    if (!fault.empty()) {
+      faults.push_back({object.name, sentence(object.name, fault)});
+      continue;
+    }
+    LinkDescription link;
+    link.name = "object " + std::to_string(taken.size());  // names may be repeated
+    link.geometry = object.geometry;
+    description->links.push_back(std::move(link));
+    taken.push_back(&object);
+  }
+  if (taken.empty()) return faults;
+  RobotModelConfig config;
+  config.packing.max_error = kPackingError;
+  config.packing.max_spheres = kMaxSpheres;
+  config.threads = 1;
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = cancelled;
+  const auto built =
+      AnytimeModel::build(description, config, AnytimeModel::Stage::kFirst, callbacks);
+  if (!built) return faults;
+  for (std::size_t i = 0; i < taken.size(); ++i) {
+    const WorldObject& object = *taken[i];
+    LinkModel link = built->robot()->links[i];
+    if (!link.usable() || link.tree.empty()) {
+      faults.push_back(
+          {object.name, sentence(object.name, link.usable() ? "it has neither surface nor volume"
+                                                            : link.error)});
+      continue;
+    }
+    link.name = object.name;
+    Entry entry;
+    entry.object.name = object.name;
+    entry.object.X_BO = object.X_BO;
+    entry.object.margin = object.margin;
+    entry.object.allowed_links = object.allowed_links;
+    entry.object.geometry = std::make_shared<const LinkGeometry>(object.geometry);
+    entry.object.shape = std::make_shared<const WorldShape>(std::move(link));
+    entry.object.id = next_build_id();
+    entry.frame = object.frame;
+    entry.triangles = triangles_of(object.geometry);
+    remove(object.name);
+    triangles_ += entry.triangles;
+    entries_[object.name] = std::move(entry);
+  }
+  return faults;
+}
+
+std::string WorldBuilder::move(const std::string& name, const std::string& frame,
+                               const Eigen::Isometry3d& X_BO) {
+  const auto found = entries_.find(name);
+  if (found == entries_.end()) return sentence(name, "it is to be moved, and was never added");
+  std::string fault = name_fault(frame);
+  if (!fault.empty()) return sentence(name, "its frame " + fault);
+  fault = pose_fault(X_BO);
+  if (!fault.empty()) return sentence(name, fault);
+  found->second.frame = frame;
+  found->second.object.X_BO = X_BO;
+  return "";
+}
+
+bool WorldBuilder::remove(const std::string& name) {
+  const auto found = entries_.find(name);
+  if (found == entries_.end()) return false;
+  triangles_ -= found->second.triangles;
+  entries_.erase(found);
+  return true;
+}
+
+void WorldBuilder::clear() {
+  entries_.clear();
+  triangles_ = 0;
+}
+
+std::shared_ptr<const KnownWorld> WorldBuilder::world() const {
+  auto world = std::make_shared<KnownWorld>();
+  world->triangles_ = triangles_;
+  world->objects_.reserve(entries_.size());
+  std::map<std::string, std::size_t> frames;
+  for (const auto& [name, entry] : entries_) {
+    const auto [frame, is_new] = frames.try_emplace(entry.frame, frames.size());
+    if (is_new) world->frames_.push_back(entry.frame);
+    world->objects_.push_back(entry.object);
+    world->objects_.back().frame = frame->second;
+  }
+  return world;
+}
+
+}  // namespace ist

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/robot/robot_model.h"
+#include "proximity/link_surface.h"
+
+namespace ist {
+
+struct RobotSurfaces {
+  std::shared_ptr<const RobotModel> model;
+  std::vector<std::unique_ptr<const LinkSurface>> surfaces;  ///< by link; null: not usable
+  std::vector<Eigen::AlignedBox3d> boxes;                    ///< by link: see whole_box()
+};
+
+}  // namespace ist

@@ -1,0 +1,240 @@
+#include "ist_proximity/proximity/world_query.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "internal/proximity/deadline.h"
+#include "proximity/object_search.h"
+
+namespace ist {
+namespace {
+
+// Pairs of boxes that a link looks at before the clock is read: some tens of microseconds.
+constexpr int kSlice = 256;
+// [m] The path is counted anew after this length, so that it keeps its digits.
+constexpr double kLongestPath = 1e4;
+
+bool is_placed(const PosedWorld& posed) {
+  if (!posed.world) return true;
+  return posed.X_FB.size() == posed.world->frames().size() &&
+         std::all_of(posed.X_FB.begin(), posed.X_FB.end(),
+                     [](const Eigen::Isometry3d& X) { return X.matrix().allFinite(); });
+}
+
+}  // namespace
+
+std::shared_ptr<const RobotSurfaces> make_robot_surfaces(std::shared_ptr<const RobotModel> model) {
+  auto robot = std::make_shared<RobotSurfaces>();
+  for (const LinkModel& link : model->links) {
+    robot->surfaces.emplace_back();
+    robot->boxes.emplace_back();
+    if (!link.usable() || link.tree.empty()) continue;
+    robot->surfaces.back() = std::make_unique<const LinkSurface>(link);
+    robot->boxes.back() = whole_box(link, *robot->surfaces.back());
+  }
+  robot->model = std::move(model);
+  return robot;
+}
+
+struct WorldQuery::Impl {
+  // A link that is not finished.
+  struct Waiting {
+    double bound;
+    std::size_t link;
+    bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
+  };
+
+  bool take_worlds(Span<const PosedWorld* const> worlds);
+  void list_objects(Span<const PosedWorld* const> worlds);
+  void prepare_searches();
+  void note_allowed(const std::vector<std::string>& names, std::uint64_t* bits) const;
+  void move_objects(Span<const PosedWorld* const> worlds);
+  void finish_by(Deadline* deadline);
+  void count_unfinished(const LinkProximity& result);
+
+  std::shared_ptr<const RobotSurfaces> robot;
+  QueryConfig config;
+  std::vector<double> link_margins;
+  double influence_distance = 0.0;
+  WorldQueryStatistics statistics;
+  std::vector<PosedWorld> worlds;  // of the last run
+  PosedObjects objects;
+  std::vector<ObjectSearch> searches;  // by link
+  std::vector<Waiting> queue;          // a heap
+  std::vector<LinkPairSearch::Entry> depth_queue;
+};
+
+WorldQuery::WorldQuery(std::shared_ptr<const RobotSurfaces> robot, const QueryConfig& config)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->robot = std::move(robot);
+  impl_->config = config;
+  const std::size_t links = impl_->robot->model->links.size();
+  impl_->searches.reserve(links);
+  for (std::size_t i = 0; i < links; ++i) impl_->searches.emplace_back(*impl_->robot, i);
+  impl_->queue.reserve(links);
+  impl_->objects.words = (links + 63) / 64;
+}
+WorldQuery::~WorldQuery() = default;
+WorldQuery::WorldQuery(WorldQuery&&) noexcept = default;
+WorldQuery& WorldQuery::operator=(WorldQuery&&) noexcept = default;
+
+void WorldQuery::set_config(const QueryConfig& config) { impl_->config = config; }
+void WorldQuery::set_link_margins(std::vector<double> margins) {
+  impl_->link_margins = std::move(margins);
+}
+void WorldQuery::set_influence_distance(double distance) { impl_->influence_distance = distance; }
+const std::shared_ptr<const RobotSurfaces>& WorldQuery::robot() const { return impl_->robot; }
+const WorldQueryStatistics& WorldQuery::statistics() const { return impl_->statistics; }
+
+Span<const NearObject> WorldQuery::near_objects(std::size_t link) const {
+  if (link >= impl_->searches.size()) return {};
+  const std::vector<NearObject>& near = impl_->searches[link].near();
+  return {near.data(), near.size()};
+}
+
+void WorldQuery::Impl::note_allowed(const std::vector<std::string>& names,
+                                    std::uint64_t* bits) const {
+  const auto& links = robot->model->links;
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (std::find(names.begin(), names.end(), links[i].name) == names.end()) continue;
+    bits[i / 64] |= std::uint64_t{1} << (i % 64);
+  }
+}
+
+void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
+  objects.objects.clear();
+  ++objects.generation;
+  objects.path = 0.0;
+  worlds.resize(given.size());
+  for (std::size_t w = 0; w < given.size(); ++w) {
+    worlds[w] = *given[w];
+    if (!worlds[w].world) continue;
+    const auto& described = worlds[w].world->objects();
+    for (std::size_t i = 0; i < described.size(); ++i) {
+      PosedObject object;
+      object.object = &described[i];
+      object.world = static_cast<std::uint32_t>(w);
+      object.index = static_cast<std::uint32_t>(i);
+      object.place(worlds[w].X_FB[described[i].frame] * described[i].X_BO);
+      objects.objects.push_back(object);
+    }
+  }
+  objects.allowed.assign(objects.words * objects.objects.size(), 0);
+  for (std::size_t i = 0; i < objects.objects.size(); ++i) {
+    note_allowed(objects.objects[i].object->allowed_links, &objects.allowed[i * objects.words]);
+  }
+}
+
+// Memory for the searches of all links.
+void WorldQuery::Impl::prepare_searches() {
+  const WorldShape* open = nullptr;
+  std::size_t nodes = 0;
+  for (const LinkModel& link : robot->model->links) {
+    nodes = std::max(nodes, link.tree.nodes().size());
+  }
+  for (const PosedObject& object : objects.objects) {
+    const WorldShape& shape = *object.object->shape;
+    nodes = std::max(nodes, shape.link.tree.nodes().size());
+    if (!shape.surface.opening_cells.empty()) open = &shape;
+  }
+  depth_queue.reserve((nodes + 1) * kSphereWidth);
+  for (ObjectSearch& search : searches) search.prepare(objects.objects.size(), open);
+}
+
+// Places the objects of frames that have moved.
+void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
+  double farthest = 0.0;
+  for (PosedObject& object : objects.objects) {
+    const std::size_t frame = object.object->frame;
+    const Eigen::Isometry3d& X_FB = given[object.world]->X_FB[frame];
+    if (X_FB.matrix() == worlds[object.world].X_FB[frame].matrix()) continue;
+    const Eigen::Isometry3d before = object.X_FO.X;
+    object.place(X_FB * object.object->X_BO);
+    farthest = std::max(farthest,
+                        object.object->shape->surface.displacement.between(before, object.X_FO.X));
+  }
+  for (std::size_t w = 0; w < given.size(); ++w) {
+    std::copy(given[w]->X_FB.begin(), given[w]->X_FB.end(), worlds[w].X_FB.begin());
+  }
+  objects.path += farthest;
+  if (!(objects.path < kLongestPath)) {  // the lists are made anew
+    objects.path = 0.0;
+    ++objects.generation;
+  }
+}
+
+// @returns false where a world is not placed
+bool WorldQuery::Impl::take_worlds(Span<const PosedWorld* const> given) {
+  if (!std::all_of(given.begin(), given.end(),
+                   [](const PosedWorld* world) { return is_placed(*world); })) {
+    return false;
+  }
+  const bool are_same = std::equal(
+      given.begin(), given.end(), worlds.begin(), worlds.end(),
+      [](const PosedWorld* one, const PosedWorld& other) { return one->world == other.world; });
+  if (are_same) {
+    move_objects(given);
+  } else {
+    list_objects(given);
+    prepare_searches();
+  }
+  return true;
+}
+
+// The link with the least bound goes on, until all are finished or the time is over.
+void WorldQuery::Impl::finish_by(Deadline* deadline) {
+  std::make_heap(queue.begin(), queue.end());
+  while (!queue.empty() && !deadline->passed()) {
+    std::pop_heap(queue.begin(), queue.end());
+    const std::size_t link = queue.back().link;
+    queue.pop_back();
+    if (searches[link].advance(kSlice, &depth_queue)) continue;
+    queue.push_back({searches[link].lower_bound(), link});
+    std::push_heap(queue.begin(), queue.end());
+  }
+}
+
+void WorldQuery::Impl::count_unfinished(const LinkProximity& result) {
+  ++statistics.unfinished;
+  if (result.state == LinkState::kUnknown) return;
+  statistics.widest =
+      std::max(statistics.widest, result.distance - result.lower_bound - config.margin);
+}
+
+bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
+                     Span<const PosedWorld* const> worlds, TimePoint end,
+                     std::vector<LinkProximity>* results) {
+  Impl& impl = *impl_;
+  const std::size_t count = impl.searches.size();
+  impl.statistics = {};
+  results->resize(count);
+  for (LinkProximity& result : *results) result.reset();
+  for (ObjectSearch& search : impl.searches) search.begin_unknown();
+  if (X_FL.size() != count || known.size() != count || !impl.take_worlds(worlds)) return true;
+  const bool is_limited = end != TimePoint::max();
+  Deadline deadline(end);
+  impl.queue.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!known[i]) continue;
+    const ObjectQuestion question{impl.config,
+                                  i < impl.link_margins.size() ? impl.link_margins[i] : 0.0,
+                                  impl.influence_distance};
+    ObjectSearch& search = impl.searches[i];
+    search.begin(X_FL[i], impl.objects, question, &impl.statistics);
+    if (search.is_finished()) continue;
+    if (is_limited) {
+      impl.queue.push_back({search.lower_bound(), i});
+    } else {
+      search.advance(std::numeric_limits<int>::max(), &impl.depth_queue);
+    }
+  }
+  if (is_limited) impl.finish_by(&deadline);
+  for (std::size_t i = 0; i < count; ++i) {
+    impl.searches[i].report(&(*results)[i]);
+    if (!impl.searches[i].is_finished()) impl.count_unfinished((*results)[i]);
+  }
+  return impl.statistics.unfinished == 0;
+}
+
+}  // namespace ist

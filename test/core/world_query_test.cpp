@@ -1,0 +1,441 @@
+// Links against the objects of a known world, beside brute force.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "internal/proximity/deadline.h"
+#include "ist_proximity/proximity/world_query.h"
+#include "support/allocations.h"
+#include "support/random_links.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
+#include "support/world_oracle.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+WorldObject object_of(const std::string& name, const LinkGeometry& geometry,
+                      const Eigen::Isometry3d& X_BO = Eigen::Isometry3d::Identity()) {
+  WorldObject object;
+  object.name = name;
+  object.frame = "world";
+  object.geometry = geometry;
+  object.X_BO = X_BO;
+  return object;
+}
+
+Eigen::Isometry3d at(double x, double y, double z) {
+  return Eigen::Isometry3d(Eigen::Translation3d(x, y, z));
+}
+
+PosedWorld posed(const std::vector<WorldObject>& objects) {
+  WorldBuilder builder;
+  for (const WorldFault& fault : builder.add(objects)) ADD_FAILURE() << fault.text;
+  PosedWorld world;
+  world.world = builder.world();
+  world.X_FB.assign(world.world->frames().size(), Eigen::Isometry3d::Identity());
+  return world;
+}
+
+/// Random links and random objects, with their oracles.
+struct Scene {
+  test::Rng rng;
+  std::vector<LinkGeometry> links, shapes;
+  std::shared_ptr<const RobotModel> model;
+  std::vector<test::OracleSolid> link_oracles, object_oracles;
+  std::vector<bool> link_is_closed, object_is_closed;
+  PosedWorld world;
+  std::vector<std::size_t> object_shape;  // by object of the world
+  std::vector<Eigen::Isometry3d> X_FL;
+  std::vector<bool> known;
+
+  explicit Scene(std::uint64_t seed) : rng(seed) {
+    links = test::random_links(&rng);
+    shapes = test::random_links(&rng);
+    model = test::model_of(links, 0.02);
+    std::vector<WorldObject> objects;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      objects.push_back(object_of("object" + std::to_string(100 + i), shapes[i]));
+      objects.back().frame = "frame" + std::to_string(100 + i);
+    }
+    world = posed(objects);
+    for (const LinkGeometry& link : links) {
+      link_oracles.emplace_back(link);
+      link_is_closed.push_back(Solid(link).is_closed());
+    }
+    for (const LinkGeometry& shape : shapes) {
+      object_oracles.emplace_back(shape);
+      object_is_closed.push_back(Solid(shape).is_closed());
+    }
+    X_FL.resize(links.size());
+    known.assign(links.size(), true);
+  }
+
+  void place(double size) {
+    for (auto& X : X_FL) X = test::random_pose(&rng, size);
+    for (auto& X : world.X_FB) X = test::random_pose(&rng, size);
+  }
+
+  /// [m] To the nearest object; 0 or less in contact.
+  double truth(std::size_t link, bool* all_closed) const {
+    double best = kInf;
+    *all_closed = link_is_closed[link];
+    for (std::size_t i = 0; i < object_oracles.size(); ++i) {
+      const Eigen::Isometry3d X = X_FL[link].inverse() * world.X_FB[i];
+      best = std::min(best, link_oracles[link].distance(object_oracles[i], X, best));
+      *all_closed = *all_closed && object_is_closed[i];
+    }
+    return best;
+  }
+};
+
+TEST(WorldQuery, RandomLinksAndObjectsAgainstBruteForce) {
+  Scene scene(41);
+  const auto robot = make_robot_surfaces(scene.model);
+  int near = 0, contacts = 0, clear = 0, cases = 0;
+  std::vector<LinkProximity> results;
+  for (const double tolerance : {0.0, 0.001, 0.005}) {
+    QueryConfig config;
+    config.max_distance = 0.4;
+    config.tolerance = tolerance;
+    WorldQuery query(robot, config);
+    for (int trial = 0; trial < test::scaled(140); ++trial) {
+      scene.place(trial % 4 == 0 ? 0.5 : 1.2);
+      ASSERT_TRUE(query.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &results));
+      for (std::size_t i = 0; i < scene.links.size(); ++i) {
+        bool all_closed = true;
+        const double truth = scene.truth(i, &all_closed);
+        const LinkProximity& r = results[i];
+        const std::string what = "link " + std::to_string(i) + " trial " + std::to_string(trial) +
+                                 " truth " + std::to_string(truth);
+        ++cases;
+        if (truth <= 0.0) {
+          EXPECT_LE(r.lower_bound, 0.0) << what;
+          contacts += r.state == LinkState::kContact ? 1 : 0;
+          continue;
+        }
+        if (r.distance <= 0.0) {  // a face inside, through a hole
+          EXPECT_FALSE(all_closed) << what;
+          continue;
+        }
+        EXPECT_LE(r.lower_bound, truth + 1e-9) << what;
+        if (r.state == LinkState::kClear) {
+          ++clear;
+          EXPECT_GE(truth, config.max_distance - 1e-9) << what;
+          continue;
+        }
+        ++near;
+        ASSERT_EQ(r.state, LinkState::kNear) << what;
+        EXPECT_GE(r.distance, truth - 1e-9) << what;
+        EXPECT_LE(r.distance, truth + tolerance + 1e-9) << what;
+        if (r.lower_bound > 0.0) EXPECT_LE(r.distance - r.lower_bound, tolerance + 1e-9) << what;
+        EXPECT_NEAR((r.p_FCl - r.p_FCo - r.distance * r.direction).norm(), 0.0, 1e-9) << what;
+        EXPECT_NEAR(r.direction.norm(), 1.0, 1e-9) << what;
+        EXPECT_NEAR((scene.X_FL[i] * r.p_LCl - r.p_FCl).norm(), 0.0, 1e-9) << what;
+        EXPECT_EQ(r.source, 0) << what;
+      }
+      if (HasFailure()) return;
+    }
+  }
+  if (test::kSanitized) return;
+  EXPECT_GE(cases, 10000);
+  EXPECT_GT(near, 4000);
+  EXPECT_GT(contacts, 200);
+  EXPECT_GT(clear, 200);
+}
+
+// The answers along a motion are those of a fresh query at each step: objects move, links move.
+TEST(WorldQuery, AMotionGivesTheAnswersOfFreshQueries) {
+  Scene scene(42);
+  const auto robot = make_robot_surfaces(scene.model);
+  QueryConfig config;
+  config.max_distance = 0.6;
+  for (const double tolerance : {0.0, 0.001}) {
+    config.tolerance = tolerance;
+    WorldQuery kept(robot, config);
+    std::vector<LinkProximity> from_kept, anew;
+    scene.place(1.0);
+    std::uint64_t steps = 0, fresh_steps = 0, scans = 0;
+    const int count = test::scaled(150);
+    for (int step = 0; step < count; ++step) {
+      for (std::size_t i = 0; i < scene.X_FL.size(); ++i) {
+        const double sign = i % 2 == 0 ? 1.0 : -1.0;
+        scene.X_FL[i].translation() += sign * Eigen::Vector3d(4e-4, -2e-4, 3e-4);
+        scene.X_FL[i].linear() *= Eigen::AngleAxisd(1e-3, Eigen::Vector3d::UnitX()).matrix();
+      }
+      for (std::size_t i = 0; i < scene.world.X_FB.size(); i += 2) {
+        scene.world.X_FB[i].translation() += Eigen::Vector3d(-3e-4, 5e-4, 1e-4);
+      }
+      kept.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &from_kept);
+      WorldQuery fresh(robot, config);
+      fresh.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &anew);
+      steps += kept.statistics().steps;
+      scans += kept.statistics().scans;
+      fresh_steps += fresh.statistics().steps;
+      for (std::size_t i = 0; i < anew.size(); ++i) {
+        if (from_kept[i].distance <= 0.0 && anew[i].distance <= 0.0) continue;
+        ASSERT_EQ(from_kept[i].state, anew[i].state) << i << " step " << step;
+        if (anew[i].state != LinkState::kNear) continue;
+        ASSERT_NEAR(from_kept[i].distance, anew[i].distance, tolerance + 1e-11) << i;
+        ASSERT_LE(from_kept[i].lower_bound, anew[i].distance + 1e-12) << i << " step " << step;
+        ASSERT_LE(anew[i].lower_bound, from_kept[i].distance + 1e-12) << i << " step " << step;
+      }
+    }
+    if (test::kSanitized) continue;
+    EXPECT_LT(2 * steps, fresh_steps) << "the fronts are of use";
+    EXPECT_LT(scans, scene.X_FL.size() * static_cast<std::uint64_t>(count) / 10);
+  }
+}
+
+// A ball of 0.1 m at the origin, as the only link.
+std::shared_ptr<const RobotSurfaces> ball() {
+  return make_robot_surfaces(test::make_model({Sphere{0.1}}, 0.01));
+}
+
+LinkProximity answer_at(WorldQuery* query, const PosedWorld& world,
+                        const Eigen::Isometry3d& X_FL = Eigen::Isometry3d::Identity()) {
+  std::vector<LinkProximity> results;
+  query->run({X_FL}, {true}, {&world}, TimePoint::max(), &results);
+  return results[0];
+}
+
+LinkGeometry cube(double size) { return test::one(Box{{size, size, size}}); }
+
+TEST(WorldQuery, NothingIsThere) {
+  WorldQuery query(ball());
+  const LinkProximity r = answer_at(&query, PosedWorld());
+  EXPECT_EQ(r.state, LinkState::kClear);
+  EXPECT_EQ(r.lower_bound, 1.0);
+}
+
+// The nearest object is named, though another one has the least bound by its margin.
+TEST(WorldQuery, MarginsReduceTheLowerBoundAlone) {
+  std::vector<WorldObject> objects = {object_of("near", cube(0.2), at(0.5, 0.0, 0.0)),
+                                      object_of("wide", cube(0.2), at(-0.6, 0.0, 0.0))};
+  objects[1].margin = 0.2;
+  QueryConfig config;
+  config.margin = 0.01;
+  WorldQuery query(ball(), config);
+  const PosedWorld world = posed(objects);
+  LinkProximity r = answer_at(&query, world);
+  EXPECT_NEAR(r.distance, 0.3, 1e-9);
+  EXPECT_EQ(r.point, 0U);
+  EXPECT_LE(r.lower_bound, 0.4 - 0.2 - 0.01 + 1e-9);
+  EXPECT_GE(r.lower_bound, 0.3 - 0.2 - 0.01 - config.tolerance - 1e-9);
+  query.set_link_margins({0.05});
+  r = answer_at(&query, world);
+  EXPECT_LE(r.lower_bound, 0.4 - 0.2 - 0.05 - 0.01 + 1e-9);
+  EXPECT_NEAR(r.distance, 0.3, 1e-9);
+}
+
+// An object outside of the range whose margin reaches into it takes CLEAR away.
+TEST(WorldQuery, AMarginReachesIntoTheRange) {
+  std::vector<WorldObject> objects = {object_of("far", cube(0.2), at(1.3, 0.0, 0.0))};
+  WorldQuery query(ball());
+  EXPECT_EQ(answer_at(&query, posed(objects)).state, LinkState::kClear);
+  objects[0].margin = 0.4;
+  const LinkProximity r = answer_at(&query, posed(objects));
+  EXPECT_EQ(r.state, LinkState::kNear);
+  EXPECT_NEAR(r.distance, 1.1, 1e-9);
+  EXPECT_NEAR(r.lower_bound, 0.7, 0.0011);
+  // The list of objects in range was made without the link's margin.
+  WorldQuery other(ball());
+  objects[0].margin = 0.0;
+  const PosedWorld world = posed(objects);
+  EXPECT_EQ(answer_at(&other, world).state, LinkState::kClear);
+  other.set_link_margins({0.4});
+  EXPECT_NEAR(answer_at(&other, world).lower_bound, 0.7, 0.0011);
+}
+
+TEST(WorldQuery, AnAllowedContactIsNotMeasured) {
+  std::vector<WorldObject> objects = {object_of("bench", cube(0.2)),
+                                      object_of("wall", cube(0.2), at(0.0, 0.6, 0.0))};
+  WorldQuery query(ball());
+  EXPECT_EQ(answer_at(&query, posed(objects)).state, LinkState::kContact);
+  objects[0].allowed_links = {"no such link", "link0"};
+  const LinkProximity r = answer_at(&query, posed(objects));
+  EXPECT_EQ(r.state, LinkState::kNear);
+  EXPECT_NEAR(r.distance, 0.4, 1e-9);
+  EXPECT_EQ(r.point, 1U);
+}
+
+TEST(WorldQuery, AWorldWithoutPosesIsNotKnown) {
+  PosedWorld world = posed({object_of("wall", cube(0.2), at(5.0, 0.0, 0.0))});
+  WorldQuery query(ball());
+  EXPECT_EQ(answer_at(&query, world).state, LinkState::kClear);
+  world.X_FB[0].translation().x() = std::nan("");
+  EXPECT_EQ(answer_at(&query, world).state, LinkState::kUnknown);
+  world.X_FB.clear();
+  EXPECT_EQ(answer_at(&query, world).state, LinkState::kUnknown);
+}
+
+// Every time at which a deadline may come leaves a bound that holds.
+TEST(WorldQuery, EveryLinkHasABoundWhenTheTimeIsOver) {
+  Scene scene(43);
+  const auto robot = make_robot_surfaces(scene.model);
+  QueryConfig config;
+  config.max_distance = 0.6;
+  config.tolerance = 0.0;
+  WorldQuery exact(robot, config), hurried(robot, config);
+  std::vector<LinkProximity> truth, answer;
+  int unfinished = 0;
+  for (int trial = 0; trial < test::scaled(100); ++trial) {
+    if (trial % 5 == 0) scene.place(1.0);
+    for (auto& X : scene.X_FL) X.translation() += test::random_vector(&scene.rng, 1e-3);
+    exact.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &truth);
+    Deadline::asks_left_for_test = trial % 7;
+    const TimePoint end = std::chrono::steady_clock::now() + std::chrono::hours(1);
+    const bool all = hurried.run(scene.X_FL, scene.known, {&scene.world}, end, &answer);
+    Deadline::asks_left_for_test = -1;
+    EXPECT_EQ(all, hurried.statistics().unfinished == 0);
+    unfinished += static_cast<int>(hurried.statistics().unfinished);
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      if (truth[i].distance <= 0.0) {
+        EXPECT_LE(answer[i].lower_bound, 0.0) << i << " trial " << trial;
+        continue;
+      }
+      EXPECT_LE(answer[i].lower_bound, truth[i].distance + 1e-12) << i << " trial " << trial;
+      if (truth[i].state == LinkState::kNear && answer[i].state == LinkState::kNear)
+        EXPECT_GE(answer[i].distance, truth[i].distance - 1e-12);
+    }
+  }
+  if (!test::kSanitized) EXPECT_GT(unfinished, 100);
+}
+
+// A thousand objects that are far cost no more than one comparison of boxes now and then.
+TEST(WorldQuery, FarObjectsCostLittle) {
+  std::vector<WorldObject> objects = {object_of("table", cube(0.2), at(0.5, 0.0, 0.0))};
+  for (int i = 0; i < 1000; ++i) {
+    objects.push_back(object_of("far" + std::to_string(i), cube(0.2), at(3.0 + 0.1 * i, 1.0, 0.0)));
+  }
+  const PosedWorld world = posed(objects);
+  WorldQuery query(ball());
+  std::uint64_t bounded = 0, searched = 0;
+  std::vector<LinkProximity> results;
+  for (int step = 0; step < 200; ++step) {  // 1 mm at each step
+    query.run({at(0.0, 0.0, 1e-3 * step)}, {true}, {&world}, TimePoint::max(), &results);
+    EXPECT_EQ(results[0].state, LinkState::kNear);
+    bounded += query.statistics().objects_bounded;
+    searched += query.statistics().pairs_searched;
+  }
+  EXPECT_LE(bounded, 4 * 1001U + 200U);
+  EXPECT_EQ(searched, 200U);
+}
+
+// More objects are near than searches are kept.
+TEST(WorldQuery, ManyNearObjects) {
+  std::vector<WorldObject> objects;
+  test::Rng rng(44);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d n = test::random_vector(&rng, 1.0).normalized();
+    objects.push_back(object_of("object" + std::to_string(100 + i), cube(0.02),
+                                at(0.4 * n.x(), 0.4 * n.y(), 0.4 * n.z())));
+  }
+  const PosedWorld world = posed(objects);
+  WorldQuery query(ball());
+  query.set_influence_distance(0.5);
+  for (int step = 0; step < 20; ++step) {
+    const Eigen::Vector3d center = test::random_vector(&rng, 0.1);
+    double truth = kInf;
+    for (const auto& object : world.world->objects()) {
+      const Eigen::Vector3d p = (center - object.X_BO.translation()).cwiseAbs();
+      truth = std::min(truth, (p.array() - 0.01).max(0.0).matrix().norm() - 0.1);
+    }
+    const LinkProximity r = answer_at(&query, world, at(center.x(), center.y(), center.z()));
+    EXPECT_NEAR(r.distance, truth, 0.0011) << step;
+    EXPECT_LE(r.lower_bound, truth + 1e-12) << step;
+    EXPECT_EQ(query.near_objects(0).size(), 24U);
+  }
+}
+
+TEST(WorldQuery, AllocatesNothingWhileTheWorldIsTheSame) {
+  Scene scene(45);
+  WorldQuery query(make_robot_surfaces(scene.model));
+  std::vector<LinkProximity> results;
+  scene.place(0.6);
+  query.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &results);
+  for (int trial = 0; trial < 20; ++trial) {
+    scene.place(0.6);
+    const long before = test::allocations;
+    query.run(scene.X_FL, scene.known, {&scene.world}, TimePoint::max(), &results);
+    EXPECT_EQ(test::allocations, before);
+  }
+}
+
+TEST(KnownWorld, KeepsToItsLimits) {
+  WorldLimits limits;
+  limits.max_objects = 3;
+  limits.max_triangles = 30;
+  WorldBuilder builder(limits);
+  EXPECT_TRUE(builder.add({object_of("a", cube(0.1)), object_of("b", cube(0.1))}).empty());
+  const auto too_large = builder.add({object_of("c", cube(0.1))});
+  ASSERT_EQ(too_large.size(), 1U);
+  EXPECT_NE(too_large[0].text.find("36 triangles; allowed are 30"), std::string::npos)
+      << too_large[0].text;
+  std::vector<WorldObject> many(100000, object_of("many", test::one(Sphere{0.1})));
+  for (std::size_t i = 0; i < many.size(); ++i) many[i].name += std::to_string(i);
+  const auto too_many = builder.add(many);
+  ASSERT_EQ(too_many.size(), 1U);
+  EXPECT_NE(too_many[0].text.find("100002 objects; allowed are 3"), std::string::npos)
+      << too_many[0].text;
+  EXPECT_EQ(builder.size(), 2U);
+  EXPECT_TRUE(builder.add({object_of("a", test::one(Sphere{0.1}))}).empty()) << "replaced";
+  EXPECT_EQ(builder.size(), 2U);
+  EXPECT_EQ(builder.world()->triangles(), 12U);
+}
+
+TEST(KnownWorld, NamesWhatCannotBeUsed) {
+  const auto fault = [](const WorldObject& object) {
+    WorldBuilder builder;
+    const auto faults = builder.add({object_of("good", cube(0.1)), object});
+    EXPECT_EQ(builder.size(), 1U) << "the others go on";
+    if (faults.size() != 1) return std::string("no fault");
+    EXPECT_EQ(faults[0].object, object.name);
+    return faults[0].text;
+  };
+  const auto has = [](const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+  };
+  EXPECT_PRED2(has, fault(object_of("huge", cube(2e4))), "'huge'");
+  EXPECT_PRED2(has, fault(object_of("flat", test::one(Box{{1.0, 0.0, 1.0}}))), "'flat'");
+  EXPECT_PRED2(has, fault(object_of("empty", {})), "it has no shape");
+  EXPECT_PRED2(has, fault(object_of("", cube(0.1))), "name");
+  EXPECT_PRED2(has, fault(object_of("away", cube(0.1), at(2e4, 0.0, 0.0))), "its position");
+  EXPECT_PRED2(has, fault(object_of("nan", cube(0.1), at(std::nan(""), 0.0, 0.0))), "its pose");
+  WorldObject object = object_of("margin", cube(0.1));
+  object.margin = -1.0;
+  EXPECT_PRED2(has, fault(object), "its margin is -1 m");
+  object = object_of("frame", cube(0.1));
+  object.frame = "";
+  EXPECT_PRED2(has, fault(object), "frame");
+  EXPECT_PRED2(has, fault(object_of("mesh", test::one(TriangleMesh()))), "'mesh'");
+}
+
+TEST(KnownWorld, MovesAndRemoves) {
+  WorldBuilder builder;
+  EXPECT_TRUE(builder.add({object_of("a", cube(0.2), at(0.5, 0.0, 0.0))}).empty());
+  const auto first = builder.world();
+  EXPECT_EQ(builder.move("a", "other", at(0.7, 0.0, 0.0)), "");
+  EXPECT_NE(builder.move("b", "other", at(0.7, 0.0, 0.0)), "");
+  EXPECT_NE(builder.move("a", "other", at(kInf, 0.0, 0.0)), "");
+  const auto second = builder.world();
+  EXPECT_EQ(first->objects()[0].id, second->objects()[0].id) << "its search is kept";
+  EXPECT_EQ(second->frames()[0], "other");
+  WorldQuery query(ball());
+  EXPECT_NEAR(answer_at(&query, {first, {at(0.0, 0.0, 0.0)}}).distance, 0.3, 1e-9);
+  EXPECT_NEAR(answer_at(&query, {second, {at(0.1, 0.0, 0.0)}}).distance, 0.6, 1e-9);
+  EXPECT_TRUE(builder.remove("a"));
+  EXPECT_FALSE(builder.remove("a"));
+  EXPECT_EQ(answer_at(&query, {builder.world(), {}}).state, LinkState::kClear);
+}
+
+}  // namespace
+}  // namespace ist
