@@ -241,7 +241,7 @@ std::int32_t SurfaceBvh::add_node(const Range& range) {
 }
 
 void SurfaceBvh::set_box(const Range& range, Node* node, int slot) const {
-  const auto [first, last] = range;
+  const std::uint32_t first = range.first, last = range.second;  // a lambda captures no binding
   Fit best;
   const auto attempt = [&](const Eigen::Matrix3d& axes) {
     const Fit candidate = fit(parts_, first, last, axes);

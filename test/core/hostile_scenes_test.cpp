@@ -138,6 +138,27 @@ QueryConfig random_config(test::Rng* rng) {
   return config;
 }
 
+/// All settings change, or one of them.
+QueryConfig changed(test::Rng* rng, QueryConfig config) {
+  const QueryConfig other = random_config(rng);
+  switch (below(rng, 6)) {
+    case 0:
+      config.tolerance = other.tolerance;
+      return config;
+    case 1:
+      config.margin = other.margin;
+      return config;
+    case 2:
+      config.relative_tolerance = other.relative_tolerance;
+      return config;
+    case 3:
+      config.max_distance = other.max_distance;
+      return config;
+    default:
+      return other;
+  }
+}
+
 Eigen::Isometry3d small_motion(test::Rng* rng) {
   const double size = power_of_ten(rng, -8.0, -1.5);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
@@ -158,7 +179,7 @@ class HostileScenes : public testing::Test {
     }
     ProximityQuery query(robot.packings[0], random_config(&rng_));
     for (int step = 0; step < 15 && !HasFailure(); ++step) {
-      if (chance(&rng_, 0.3)) query.set_config(random_config(&rng_));
+      if (chance(&rng_, 0.4)) query.set_config(changed(&rng_, query.config()));
       if (chance(&rng_, 0.2)) query.set_model(robot.packings[below(&rng_, 2)]);
       if (chance(&rng_, 0.1)) {
         clouds[below(&rng_, clouds.size())] = random_cloud(&rng_, robot.geometry, X_FL);

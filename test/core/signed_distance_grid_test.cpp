@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "support/hostile_meshes.h"
 #include "support/meshes.h"
 #include "support/trial.h"
 
@@ -143,6 +144,51 @@ TEST(SignedDistanceGrid, BoundsPartsOfSpace) {
     }
   }
   EXPECT_GT(outside, 2000);
+}
+
+// A cell's plane holds within its radius: a part that is longer may meet a wall that the cell does
+// not know. Above the plane may be the inside: where a slot is narrow, that of its other side.
+TEST(SignedDistanceGrid, BoundsLongPartsInCornersAndSlots) {
+  TriangleMesh slot = test::shifted(test::box({0.2, 0.2, 0.1}), {0, 0, 0.051});
+  slot = test::joined(slot, test::shifted(test::box({0.2, 0.2, 0.03}), {0, 0, -0.016}));
+  TriangleMesh comb = test::box({0.3, 0.1, 0.02});  // fins of 5 mm, 35 mm apart
+  for (int i = -3; i <= 3; ++i) {
+    comb = test::joined(comb, test::shifted(test::box({0.005, 0.1, 0.06}), {0.04 * i, 0, 0.041}));
+  }
+  const test::Trial trial({test::l_shape(0.2, 0.05), slot, comb}, 0.005);
+  test::Rng rng(96);
+  for (const LinkModel& link : trial.model().links) {
+    SCOPED_TRACE(link.name);
+    SignedDistanceGrid grid(link);
+    const Eigen::Matrix3d R_LO = Eigen::Matrix3d::Identity();
+    int outside = 0, at_walls = 0;
+    for (int i = 0; i < test::scaled(20000); ++i) {
+      const Eigen::Vector3d p = link.tree.center() + test::random_vector(&rng, link.tree.radius());
+      const SignedDistance from = link.solid.signed_distance(p);
+      SignedDistanceGrid::Part part;
+      const double height = test::uniform(&rng, -0.5, 1.0) * grid.plane_radius();
+      part.center_L = part.center_O = from.witness + height * from.normal;
+      for (int axis = 0; axis < 3; ++axis) {
+        part.half[axis] = grid.plane_radius() * std::pow(10.0, test::uniform(&rng, -3.0, 0.4));
+      }
+      part.radius = part.half.norm();
+      part.R_LO = &R_LO;
+      SignedDistanceGrid::Cell* cell = grid.measure(part.center_L);
+      const SignedDistanceGrid::Bound bound = grid.bound(cell, part, kInfinity);
+      outside += bound.is_outside ? 1 : 0;
+      for (int k = 0; k < 27; ++k) {
+        const Eigen::Vector3d corner(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+        const double truth =
+            link.solid.signed_distance(part.center_L + part.half.cwiseProduct(corner)).distance;
+        ASSERT_LE(bound.signed_distance, truth) << "part " << i;
+        ASSERT_LE(bound.surface_distance, std::abs(truth)) << "part " << i;
+        if (bound.is_outside) ASSERT_GE(truth, 0.0) << "part " << i;
+        at_walls += std::abs(truth) < 1e-3 ? 1 : 0;
+      }
+    }
+    EXPECT_GT(outside, test::scaled(100));
+    EXPECT_GT(at_walls, test::scaled(1000));
+  }
 }
 
 // A bound is the same before and after its cell is measured. A place that is not finite, or very

@@ -90,8 +90,7 @@ double displacement(const test::Arm& arm, const test::ArmMotion& motion, std::si
   return largest;
 }
 
-// During the time that the motion bound allows, no point moves farther than the distance. A folded
-// arm unfolds: the lever of its first joint grows from nothing while the others turn.
+// During the time that the motion bound allows, no point moves farther than the distance.
 TEST(MotionBound, noPointMovesFarther) {
   test::Rng rng(68);
   double closest = 0.0;  // share of the distance that was used

@@ -51,7 +51,7 @@ inline std::string broken_promise(const LinkProximity& answer, const SceneTruth&
   }
   if (!(answer.lower_bound <= answer.distance)) return values("bound above distance");
   if (answer.state == LinkState::kClear) {
-    return truth.measured.high > config.max_distance - 1e-6 * truth.scale
+    return truth.measured.high > config.max_distance + config.margin - 1e-6 * truth.scale
                ? std::string()
                : values("clear, and there is something");
   }
