@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/point_extent.h"
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/region_of_interest.h"
 #include "ist_proximity/geometry/span.h"
 
@@ -104,6 +105,7 @@ struct CloudSnapshot {
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
   double box_extent = 0.0;   ///< [m] 0 to kMaxExtent: each box is larger by this on all sides
   IngestCounts counts;       ///< what was done with the points of the message
+  ViewReport view;           ///< of a self-filter by view
   double stamp = 0.0;        ///< [s] time of acquisition
   double ingest_time = 0.0;  ///< [s] duration of Ingest::run()
 };

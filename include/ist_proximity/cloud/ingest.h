@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/cloud/point_extent.h"
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 
@@ -67,12 +69,35 @@ struct RawCloud {
   std::size_t size() const { return width * height; }
 };
 
+/// Views points that lie one after the other in memory, such as an array (height, width, 3).
+/// @param data     x of the first point; its y and z follow. Not owned: see RawCloud::owner
+/// @param width    points in a row
+/// @param height   rows; 1 for a list
+/// @param numbers  from a point to the next, at least 3; those after z are not read
+template <class Scalar>
+RawCloud packed_cloud(const Scalar* data, std::size_t width, std::size_t height,
+                      std::size_t numbers = 3) {
+  static_assert(std::is_same_v<Scalar, float> || std::is_same_v<Scalar, double>);
+  RawCloud cloud;
+  cloud.data = reinterpret_cast<const std::uint8_t*>(data);
+  cloud.width = width;
+  cloud.height = height;
+  cloud.point_step = numbers * sizeof(Scalar);
+  cloud.row_step = width * cloud.point_step;
+  cloud.y = sizeof(Scalar);
+  cloud.z = 2 * sizeof(Scalar);
+  cloud.is_double = std::is_same_v<Scalar, double>;
+  return cloud;
+}
+
 /// The choice of the points of a cloud that are kept.
 struct IngestConfig {
   double min_range = 0.05;            ///< [m] from the sensor; >= 0
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
+  SelfFilterMode self_filter_mode = SelfFilterMode::kPadding;  ///< how the robot is recognised
+  ViewFilterConfig view;  ///< used where self_filter_mode is kView
   /// Give the cloud a thinned one; without it repulsion and contact volumes see no points. It costs
   /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
@@ -122,7 +147,9 @@ class Ingest {
   /// from its sensor's frame (map coordinates); it is subtracted before double becomes float.
   ///
   /// A point is the robot's when its exact distance to one of the solids is at most the padding, or
-  /// when it is inside one.
+  /// when it is inside one. With SelfFilterMode::kView, those of them that the sensor cannot see
+  /// where the robot is are kept, and X_FS is corrected by what the points on the robot say of it
+  /// (CloudSnapshot::view).
   /// @param cloud  checked by check_layout; points in the sensor frame S
   /// @param X_FS   sensor frame -> fixed frame, rigid
   /// @param robot  the robot's links at the cloud's stamp, see posed_solids(); for a measurement

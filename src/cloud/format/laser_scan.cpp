@@ -69,16 +69,7 @@ std::string check_scan(const LaserScan& scan, const ScanLimits& limits) {
 }
 
 RawCloud ScanPoints::raw() const {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  cloud.width = xyz.size() / 3;
-  cloud.height = 1;
-  cloud.point_step = 3 * sizeof(double);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.x = 0;
-  cloud.y = sizeof(double);
-  cloud.z = 2 * sizeof(double);
-  cloud.is_double = true;
+  RawCloud cloud = packed_cloud(xyz.data(), xyz.size() / 3, 1);
   cloud.pixel_angle = beam_angle;
   return cloud;
 }

@@ -79,7 +79,7 @@ void check_interval(const LinkMessage& link, Check* check) {
       std::min({link.interval_model, link.interval_tolerance, link.interval_sensor});
   check->that(least >= 0.0, "the parts of the interval must not be negative", least);
   const double width = link.distance - link.lower_bound;
-  check->that(std::abs(sum - width) <= kRounding * (1.0 + std::abs(width)),
+  check->that(sum == width || std::abs(sum - width) <= kRounding * (1.0 + std::abs(width)),
               "the parts of the interval have to add up to it", sum);
 }
 
@@ -150,8 +150,7 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
       check.that(false, "the state has to be one of the constants", int{link.state});
   }
   if (link.state != LinkMessage::UNKNOWN) {
-    check.that(input.has_repulsion ? v.repulsion.allFinite() : all_nan(v.repulsion),
-               "repulsion has to be finite where it is computed", v.repulsion.transpose());
+    check.that(v.repulsion.allFinite(), "repulsion has to be finite", v.repulsion.transpose());
   }
   return check.broken();
 }
