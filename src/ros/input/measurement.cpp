@@ -44,7 +44,7 @@ double map_extent(const SourceConfig& config) {
 }
 
 double largest_extent(const SourceConfig& config) {
-  if (config.ingest.extent.is_zero()) return 0.0;
+  if (config.ingest.extent.is_zero() || config.type == SourceType::kWorld) return 0.0;
   if (config.type == SourceType::kMap) return map_extent(config);
   const double max_range = std::min(config.ingest.max_range, kFarthestPoint);
   const PointExtent extent = point_extent(config.ingest.extent, kLargestPixelAngle, max_range);

@@ -79,7 +79,10 @@ void assign_unknown_space(const SeenShare& seen, double lower_bound,
   message->seen_age = seen.age;
   message->unseen_distance = lower_bound;
   assign(direction, &message->unseen_direction);
-  if (is_obstacle) message->lower_bound = std::min(message->lower_bound, lower_bound);
+  if (!is_obstacle || !(lower_bound < message->lower_bound)) return;
+  // What no sensor has seen is a part of the sensors' share; NaN stays NaN.
+  message->interval_sensor += message->lower_bound - lower_bound;
+  message->lower_bound = lower_bound;
 }
 
 LinkMessage to_message(const std::string& name, const LinkProximity& result,

@@ -79,7 +79,7 @@ void check_interval(const LinkMessage& link, Check* check) {
       std::min({link.interval_model, link.interval_tolerance, link.interval_sensor});
   check->that(least >= 0.0, "the parts of the interval must not be negative", least);
   const double width = link.distance - link.lower_bound;
-  check->that(std::abs(sum - width) <= kRounding * (1.0 + std::abs(width)),
+  check->that(sum == width || std::abs(sum - width) <= kRounding * (1.0 + std::abs(width)),
               "the parts of the interval have to add up to it", sum);
 }
 
