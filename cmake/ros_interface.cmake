@@ -26,7 +26,9 @@ add_message_files(DIRECTORY msg FILES
   LinkProximity.msg
   ProximityArray.msg
   SourceStatus.msg
-  SpeedScaleState.msg)
+  SpeedScaleState.msg
+  WorldObject.msg
+  WorldObjects.msg)
 add_service_files(DIRECTORY srv FILES
   AttachObject.srv
   DetachObject.srv

@@ -47,6 +47,10 @@ enum class ContactsWanted {
   kNone
 };
 
+/// What is done about space that no memory knows: nothing; it counts in `lower_bound`; it is
+/// described for each link.
+enum class UnknownSpace { kFree, kObstacle, kReport };
+
 /// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
 /// may take half of the time until the next one, so that no scene makes answers late.
 constexpr double kDefaultDeadline = -0.5;
@@ -91,6 +95,7 @@ struct ServerConfig {
   bool speed_scale_enabled = true;
   SpeedScaleConfig speed_scale;
   std::vector<SourceConfig> sources;
+  UnknownSpace unknown_space = UnknownSpace::kFree;  ///< others need a memory
 };
 
 /// Parameters of the wrong type or out of range. The message has one line for each, with its name,

@@ -41,11 +41,13 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 QueryService::QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
                            const ServerConfig& config, const CloudSources& sources,
-                           const TransformBuffer& buffer, std::function<LiveConfig()> live)
+                           const TransformBuffer& buffer, std::function<LiveConfig()> live,
+                           UnknownSpaceWatch* watch)
     : config_(config),
       sources_(sources),
       buffer_(buffer),
       live_(std::move(live)),
+      watch_(watch),
       self_(nh, config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
@@ -107,6 +109,9 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   if (bad != response.results.end()) {
     response.message =
         "results[" + std::to_string(bad - response.results.begin()) + "]: " + bad->status_text;
+  } else if (!response.impact_times.empty() && cycle_->has_worlds()) {
+    response.message =
+        "impact_times are NaN: they are found against clouds alone, and there are known worlds";
   }
   return true;
 }
@@ -135,7 +140,7 @@ std::string QueryService::take_model() {
                                                   link_names(*model_->robot), config_.pose_timeout);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            CloudSelection::Reader::kOther);
+                                            CloudSelection::Reader::kOther, watch_);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }
@@ -209,6 +214,11 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   if (request.self_proximity != 0) self_.begin_motion();
   JointPoses still;  // nothing is known of the motion while the root link has no pose
   if (poses_->is_root_known()) still = poses_->joints();
+  // Times are found against clouds alone: beside a known world, "never" would not be known.
+  if (cycle_->has_worlds()) {
+    std::fill(first.begin(), first.end(), std::nan(""));
+    std::fill(wanted.begin(), wanted.end(), false);
+  }
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
     const JointMotion motion{positions[k], positions[k + 1],

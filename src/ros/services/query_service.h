@@ -15,6 +15,7 @@
 #include "ros/common/callback_thread.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
+#include "ros/input/unknown_space.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/stated_pose_source.h"
@@ -28,11 +29,12 @@ namespace ist {
 class QueryService {
  public:
   /// @param sources, buffer  outlive this
+  /// @param watch            outlives this; null with ~unknown_space free
   /// @param live             gives the present configuration; called from the service's thread
   /// @param nh               namespace in which, and above which, an SRDF is searched
   QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
                const CloudSources& sources, const TransformBuffer& buffer,
-               std::function<LiveConfig()> live);
+               std::function<LiveConfig()> live, UnknownSpaceWatch* watch = nullptr);
   ~QueryService();
   QueryService(const QueryService&) = delete;
   QueryService& operator=(const QueryService&) = delete;
@@ -57,6 +59,7 @@ class QueryService {
   const CloudSources& sources_;
   const TransformBuffer& buffer_;
   const std::function<LiveConfig()> live_;
+  UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
   CallbackThread thread_;
   ros::ServiceServer service_;
 
