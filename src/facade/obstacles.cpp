@@ -14,6 +14,7 @@ std::shared_ptr<const CloudSnapshot> index(const RawCloud& cloud, const Obstacle
   ingest_config.max_range = config.max_range;
   ingest_config.self_filter = config.robot != nullptr;
   ingest_config.self_filter_padding = config.self_filter_padding;
+  ingest_config.extent = config.extent;
   Ingest ingest(ingest_config);
   LinkPoses poses;
   std::vector<PosedSolid> robot;

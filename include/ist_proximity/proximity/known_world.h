@@ -66,6 +66,12 @@ struct PosedWorld {
   std::vector<Eigen::Isometry3d> X_FB;      ///< by frame of the world: B -> fixed frame, rigid
 };
 
+/// Why an object cannot be used.
+struct WorldFault {
+  std::string object;  ///< its name; empty: all that were to be added
+  std::string text;    ///< a sentence that names it
+};
+
 /// Makes known worlds, object by object. Objects that do not change are shared by all worlds that
 /// are made. One thread.
 class WorldBuilder {
@@ -76,10 +82,10 @@ class WorldBuilder {
   /// Adds objects; one takes the place of another of the same name. It builds their hierarchies and
   /// packs them coarsely: milliseconds for primitives, up to a second for 10^5 triangles.
   /// @param cancelled  asked now and then; true ends the work, and nothing is added. May be empty
-  /// @returns one sentence for each object that cannot be used; an older one of that name stays.
-  ///          Where a limit is exceeded, the only sentence says so and nothing is added
-  std::vector<std::string> add(const std::vector<WorldObject>& objects,
-                               const std::function<bool()>& cancelled = {});
+  /// @returns one fault for each object that cannot be used; an older one of that name stays. Where
+  ///          a limit is exceeded, the only fault says so and nothing is added
+  std::vector<WorldFault> add(const std::vector<WorldObject>& objects,
+                              const std::function<bool()>& cancelled = {});
 
   /// Moves an object, which keeps its shape.
   /// @returns empty, or why it is not moved

@@ -68,10 +68,15 @@ std::string check_scan(const LaserScan& scan, const ScanLimits& limits) {
   return {};
 }
 
-RawCloud ScanPoints::raw() const { return packed_cloud(xyz.data(), xyz.size() / 3, 1); }
+RawCloud ScanPoints::raw() const {
+  RawCloud cloud = packed_cloud(xyz.data(), xyz.size() / 3, 1);
+  cloud.pixel_angle = beam_angle;
+  return cloud;
+}
 
 void to_points(const LaserScan& scan, double min_range, double max_range,
                const Eigen::Isometry3d& X_SE, ScanPoints* points) {
+  points->beam_angle = std::abs(scan.angle_increment);
   const bool moves = scan.count > 1 && scan.time_increment != 0.0;
   const Eigen::Quaterniond q_SE(X_SE.linear());
   points->xyz.resize(3 * scan.count);
