@@ -101,7 +101,9 @@ TEST(ProximityMarkers, LabelsAreAListAboveTheRobot) {
     const Eigen::Vector3d corner(uniform(random), uniform(random), uniform(random));
     const Eigen::AlignedBox3d robot(corner, corner + Eigen::Vector3d(0.4, 0.4, 1.0));
     auto drawn = by_key(drawer.draw(array(links), robot));
-    if (round == 0) EXPECT_GT((drawn[{"nearest", 0}].pose.position.z), robot.max().z());
+    if (round == 0) {
+      EXPECT_GT((drawn[{"nearest", 0}].pose.position.z), robot.max().z());
+    }
     for (int i = 0; i < 200; ++i) drawn = by_key(drawer.draw(array(links), robot));  // it follows
 
     const Marker& number = drawn[{"nearest", 0}];

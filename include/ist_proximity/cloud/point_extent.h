@@ -54,9 +54,9 @@ struct ExtentConfig {
     kAngle,   ///< by the angle between two pixels
     kCamera   ///< by the angle that follows from the message, see pixel_angle()
   };
-  Footprint footprint = Footprint::kNone;
-  double footprint_radius = 0.0;  ///< [m] >= 0
-  double footprint_angle = 0.0;   ///< [rad] >= 0: between two pixels
+  Footprint footprint = Footprint::kNone;  ///< how wide a point is
+  double footprint_radius = 0.0;           ///< [m] >= 0
+  double footprint_angle = 0.0;            ///< [rad] >= 0: between two pixels
   /// [rad] the sensor's field of view along a row, for kCamera where no CameraInfo is; 0: unknown
   double field_of_view = 0.0;
   /// [rad] The surface is inclined by no more than this against the plane across the ray; below
@@ -91,7 +91,7 @@ double pixel_angle(const RawCloud& cloud, double field_of_view);
 
 /// A depth camera or scanner whose noise has been published.
 struct SensorModel {
-  const char* name;
+  const char* name;          ///< as the configuration names it
   double noise_constant;     ///< [m] see ExtentConfig
   double noise_quadratic;    ///< [1/m]
   double calibration;        ///< [m]

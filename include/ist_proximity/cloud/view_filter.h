@@ -22,6 +22,7 @@ struct RangeNoise {
   double constant = 0.003;   ///< [m] >= 0
   double quadratic = 0.002;  ///< [1/m] >= 0
 
+  /// [m] Standard deviation at a range [m].
   double sigma(double range) const { return constant + quadratic * range * range; }
 };
 

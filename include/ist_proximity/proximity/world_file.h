@@ -24,8 +24,8 @@ GeometryElement half_space(const Eigen::Vector3d& n, double offset);
 
 /// The objects of a scene.
 struct SceneFile {
-  std::vector<WorldObject> objects;
-  std::string fault;  ///< why the text cannot be used; empty: it can
+  std::vector<WorldObject> objects;  ///< in the order of the file
+  std::string fault;                 ///< why the text cannot be used; empty: it can
 };
 
 /// Reads the text of a MoveIt scene (`.scene`), as rviz exports it: with the poses of objects or,
