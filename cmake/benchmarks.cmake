@@ -6,6 +6,9 @@ if(NOT IST_PROXIMITY_CLI11_INCLUDE_DIR)
   message(STATUS "ist_proximity: no benchmark/hard_cases and near_touch, CLI11 is missing "
     "(apt install libcli11-dev)")
 endif()
+if(NOT octomap_FOUND)
+  list(FILTER benchmark_sources EXCLUDE REGEX "/map_reading\\.cpp$")
+endif()
 add_custom_target(benchmarks)
 foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
@@ -20,10 +23,14 @@ foreach(source IN LISTS benchmark_sources)
   add_dependencies(benchmarks benchmark_${name})
 endforeach()
 
-foreach(name closed_loop hidden memory self_view)
+foreach(name closed_loop hidden memory self_view self_contact)
   target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
 endforeach()
 
+if(TARGET benchmark_map_reading)
+  target_include_directories(benchmark_map_reading SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
+  target_link_libraries(benchmark_map_reading PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+endif()
 if(octomap_FOUND)
   target_compile_definitions(benchmark_memory PRIVATE IST_PROXIMITY_HAS_OCTOMAP)
   target_include_directories(benchmark_memory SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
@@ -46,8 +53,13 @@ if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
     ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
   target_link_libraries(benchmark_link_pairs PRIVATE
     ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
+  target_compile_definitions(benchmark_world PRIVATE IST_PROXIMITY_HAS_FCL)
+  target_include_directories(benchmark_world SYSTEM PRIVATE
+    ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
+  target_link_libraries(benchmark_world PRIVATE
+    ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
 else()
-  message(STATUS "ist_proximity: benchmark/octomap and link_pairs without FCL (apt install libfcl-dev)")
+  message(STATUS "ist_proximity: benchmark/octomap, link_pairs and world without FCL (apt install libfcl-dev)")
 endif()
 
 target_sources(benchmark_repulsion PRIVATE

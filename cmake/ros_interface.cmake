@@ -21,13 +21,18 @@ find_package(catkin REQUIRED COMPONENTS
 
 add_message_files(DIRECTORY msg FILES
   JointRepulsion.msg
+  LinkPair.msg
+  LinkPairProximity.msg
   LinkProximity.msg
   ProximityArray.msg
   SourceStatus.msg
-  SpeedScaleState.msg)
+  SpeedScaleState.msg
+  WorldObject.msg
+  WorldObjects.msg)
 add_service_files(DIRECTORY srv FILES
   AttachObject.srv
   DetachObject.srv
+  ListLinkPairs.srv
   QueryProximity.srv)
 generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
 

@@ -100,17 +100,17 @@ std::string WorldBuilder::exceeded_limit(const std::vector<WorldObject>& objects
   return "";
 }
 
-std::vector<std::string> WorldBuilder::add(const std::vector<WorldObject>& objects,
-                                           const std::function<bool()>& cancelled) {
+std::vector<WorldFault> WorldBuilder::add(const std::vector<WorldObject>& objects,
+                                          const std::function<bool()>& cancelled) {
   const std::string limit = exceeded_limit(objects);
-  if (!limit.empty()) return {limit};
-  std::vector<std::string> faults;
+  if (!limit.empty()) return {{"", limit}};
+  std::vector<WorldFault> faults;
   auto description = std::make_shared<RobotDescription>();
   std::vector<const WorldObject*> taken;
   for (const WorldObject& object : objects) {
     const std::string fault = object_fault(object);
     if (!fault.empty()) {
-      faults.push_back(sentence(object.name, fault));
+      faults.push_back({object.name, sentence(object.name, fault)});
       continue;
     }
     LinkDescription link;
@@ -134,7 +134,8 @@ std::vector<std::string> WorldBuilder::add(const std::vector<WorldObject>& objec
     LinkModel link = built->robot()->links[i];
     if (!link.usable() || link.tree.empty()) {
       faults.push_back(
-          sentence(object.name, link.usable() ? "it has neither surface nor volume" : link.error));
+          {object.name, sentence(object.name, link.usable() ? "it has neither surface nor volume"
+                                                            : link.error)});
       continue;
     }
     link.name = object.name;

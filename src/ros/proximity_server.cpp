@@ -25,6 +25,7 @@
 #include "ros/input/map_message.h"
 #include "ros/input/memory_source.h"
 #include "ros/input/unknown_space.h"
+#include "ros/input/world_source.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
 #include "ros/model/model_loader.h"
@@ -40,6 +41,7 @@
 #include "ros/poses/transform_listener.h"
 #include "ros/poses/transforms.h"
 #include "ros/poses/usual_period.h"
+#include "ros/services/link_pair_service.h"
 #include "ros/services/memory_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
@@ -130,6 +132,7 @@ class ProximityServer::Impl {
 
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
+  std::unique_ptr<LinkPairService> link_pairs_;    ///< the same
   std::thread cycle_thread_, diagnostics_thread_;
 };
 
@@ -149,6 +152,10 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       contact_loader_(config, loader_) {
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
+    if (source.type == SourceType::kWorld) {
+      sources_.push_back(std::make_unique<WorldSource>(source, nh_, buffer_));
+      continue;
+    }
     add_source(source, filtered_cloud);
   }
   memory_service_ = std::make_unique<MemoryService>(private_nh_, memories_);
@@ -164,11 +171,12 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     unknown_space_ =
         std::make_unique<UnknownSpaceWatch>(memories_, buffer_, config_.query.max_distance);
   }
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live,
-                                                  unknown_space_.get());
+  query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
+                                                  live, unknown_space_.get());
   if (config_.self_collision.enabled) {
     self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
                                                       joint_states_.get(), live);
+    link_pairs_ = std::make_unique<LinkPairService>(nh_, private_nh_, config_);
   }
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
   diagnostics_thread_ = std::thread(&Impl::run_diagnostics, this);
@@ -181,6 +189,7 @@ ProximityServer::Impl::~Impl() {
   diagnostics_thread_.join();
   query_service_.reset();
   self_proximity_.reset();
+  link_pairs_.reset();
   cycle_.reset();
   joint_states_.reset();  // the listener's thread uses members that are destroyed before it
 }
@@ -244,8 +253,9 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
-  results_.publish(message, nullptr, live_.get().speed_scale,
-                   [](ist_proximity::JointRepulsion*) {});
+  results_.publish(
+      message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
+      [] { return Eigen::AlignedBox3d(); });
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -275,14 +285,17 @@ void ProximityServer::Impl::run_cycle() {
   const double least_when_clear = config_.unknown_space == UnknownSpace::kObstacle
                                       ? -std::numeric_limits<double>::infinity()
                                       : config_.query.max_distance;
-  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin, true});
-  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
-    if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
-  };
+  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
-  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
+  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
+    if (!cycle_) return;
+    cycle_->fill_joint_repulsion(*message, results_.summary().self_problem(), self.get(), efforts);
+  };
+  const auto robot_box = [&] { return cycle_ ? cycle_->robot_box() : Eigen::AlignedBox3d(); };
+  const bool drawn =
+      results_.publish(message, self, live.speed_scale, fill_joint_repulsion, robot_box);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
   if (cycle_) report_.parts[kPartPublish].add(watch.lap());
@@ -326,6 +339,7 @@ void ProximityServer::Impl::take_model() {
   }
   query_service_->set_model(model_);
   if (self_proximity_) self_proximity_->set_model(model_);
+  if (link_pairs_) link_pairs_->set_model(model_);
   spheres_.show(*model_);
   set_source_targets(live_.get().query);
   root_stands_still_ = false;

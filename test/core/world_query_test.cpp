@@ -38,8 +38,7 @@ Eigen::Isometry3d at(double x, double y, double z) {
 
 PosedWorld posed(const std::vector<WorldObject>& objects) {
   WorldBuilder builder;
-  const std::vector<std::string> faults = builder.add(objects);
-  for (const std::string& fault : faults) ADD_FAILURE() << fault;
+  for (const WorldFault& fault : builder.add(objects)) ADD_FAILURE() << fault.text;
   PosedWorld world;
   world.world = builder.world();
   world.X_FB.assign(world.world->frames().size(), Eigen::Isometry3d::Identity());
@@ -379,12 +378,14 @@ TEST(KnownWorld, KeepsToItsLimits) {
   EXPECT_TRUE(builder.add({object_of("a", cube(0.1)), object_of("b", cube(0.1))}).empty());
   const auto too_large = builder.add({object_of("c", cube(0.1))});
   ASSERT_EQ(too_large.size(), 1U);
-  EXPECT_NE(too_large[0].find("36 triangles; allowed are 30"), std::string::npos) << too_large[0];
+  EXPECT_NE(too_large[0].text.find("36 triangles; allowed are 30"), std::string::npos)
+      << too_large[0].text;
   std::vector<WorldObject> many(100000, object_of("many", test::one(Sphere{0.1})));
   for (std::size_t i = 0; i < many.size(); ++i) many[i].name += std::to_string(i);
   const auto too_many = builder.add(many);
   ASSERT_EQ(too_many.size(), 1U);
-  EXPECT_NE(too_many[0].find("100002 objects; allowed are 3"), std::string::npos) << too_many[0];
+  EXPECT_NE(too_many[0].text.find("100002 objects; allowed are 3"), std::string::npos)
+      << too_many[0].text;
   EXPECT_EQ(builder.size(), 2U);
   EXPECT_TRUE(builder.add({object_of("a", test::one(Sphere{0.1}))}).empty()) << "replaced";
   EXPECT_EQ(builder.size(), 2U);
@@ -396,7 +397,9 @@ TEST(KnownWorld, NamesWhatCannotBeUsed) {
     WorldBuilder builder;
     const auto faults = builder.add({object_of("good", cube(0.1)), object});
     EXPECT_EQ(builder.size(), 1U) << "the others go on";
-    return faults.size() == 1 ? faults[0] : "no fault";
+    if (faults.size() != 1) return std::string("no fault");
+    EXPECT_EQ(faults[0].object, object.name);
+    return faults[0].text;
   };
   const auto has = [](const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;

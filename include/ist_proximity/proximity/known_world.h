@@ -15,7 +15,7 @@ namespace ist {
 
 /// An object of a known world as it is described: a wall, a table, a link of another robot.
 struct WorldObject {
-  std::string name;
+  std::string name;       ///< not empty; another object of the same name is replaced
   std::string frame;      ///< name of the frame B that it stands still in
   LinkGeometry geometry;  ///< its elements, in the object's frame O; the solid is their union
   Eigen::Isometry3d X_BO = Eigen::Isometry3d::Identity();  ///< object frame O -> B, rigid
@@ -25,7 +25,7 @@ struct WorldObject {
 
 /// Limits of a known world. A box takes about 15 kB, a mesh about 500 bytes for each triangle.
 struct WorldLimits {
-  std::size_t max_objects = 10000;
+  std::size_t max_objects = 10000;      ///< in one world
   std::size_t max_triangles = 2000000;  ///< of all objects; a box has 12
 };
 
@@ -43,10 +43,11 @@ class KnownWorld {
     double margin = 0.0;                                     ///< [m]
     std::vector<std::string> allowed_links;                  ///< links that may touch it
     std::shared_ptr<const LinkGeometry> geometry;            ///< in O
-    std::shared_ptr<const WorldShape> shape;
+    std::shared_ptr<const WorldShape> shape;                 ///< what queries need, in O
     std::uint64_t id = 0;  ///< another one for each shape; the same when the object is moved
   };
 
+  /// The objects, in the order in which they were added.
   const std::vector<Object>& objects() const { return objects_; }
   /// Names of the frames that objects stand in, each once.
   const std::vector<std::string>& frames() const { return frames_; }
@@ -65,19 +66,26 @@ struct PosedWorld {
   std::vector<Eigen::Isometry3d> X_FB;      ///< by frame of the world: B -> fixed frame, rigid
 };
 
+/// Why an object cannot be used.
+struct WorldFault {
+  std::string object;  ///< its name; empty: all that were to be added
+  std::string text;    ///< a sentence that names it
+};
+
 /// Makes known worlds, object by object. Objects that do not change are shared by all worlds that
 /// are made. One thread.
 class WorldBuilder {
  public:
+  /// @param limits  of the worlds that it makes
   explicit WorldBuilder(const WorldLimits& limits = {}) : limits_(limits) {}
 
   /// Adds objects; one takes the place of another of the same name. It builds their hierarchies and
   /// packs them coarsely: milliseconds for primitives, up to a second for 10^5 triangles.
   /// @param cancelled  asked now and then; true ends the work, and nothing is added. May be empty
-  /// @returns one sentence for each object that cannot be used; an older one of that name stays.
-  ///          Where a limit is exceeded, the only sentence says so and nothing is added
-  std::vector<std::string> add(const std::vector<WorldObject>& objects,
-                               const std::function<bool()>& cancelled = {});
+  /// @returns one fault for each object that cannot be used; an older one of that name stays. Where
+  ///          a limit is exceeded, the only fault says so and nothing is added
+  std::vector<WorldFault> add(const std::vector<WorldObject>& objects,
+                              const std::function<bool()>& cancelled = {});
 
   /// Moves an object, which keeps its shape.
   /// @returns empty, or why it is not moved

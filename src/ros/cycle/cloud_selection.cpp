@@ -36,11 +36,22 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
   clouds_.clear();
   cloud_sources_.clear();
   cloud_stands_still_.clear();
+  worlds_.clear();
+  world_sources_.clear();
+  surfaces_.reset();
   oldest_stamp_ = ros::Time();
   const bool usable = clouds_usable(*status);
   for (std::size_t i = 0; i < selected_.size(); ++i) {
-    if (!usable || !status->source_statuses[i].ok()) selected_[i] = nullptr;
+    // The rest of an incomplete world counts, where it is not required.
+    const bool is_incomplete = !status->sources[i].incomplete.empty();
+    if (!usable || !(status->source_statuses[i].ok() || is_incomplete)) selected_[i] = nullptr;
     if (!selected_[i]) continue;
+    if (selected_[i]->surfaces) {
+      worlds_.push_back(&selected_[i]->world);
+      world_sources_.push_back(static_cast<int>(i));
+      surfaces_ = selected_[i]->surfaces;
+      continue;
+    }
     clouds_.push_back(&selected_[i]->cloud);
     cloud_sources_.push_back(static_cast<int>(i));
     const SourceReport& report = status->sources[i];

@@ -36,6 +36,12 @@ class CloudSelection {
 
   /// The clouds that queries may use; empty while a required source is not usable.
   SnapshotSpan clouds() const { return clouds_; }
+  /// The known worlds that queries may use, at their poses; as clouds().
+  Span<const PosedWorld* const> worlds() const { return worlds_; }
+  /// The surfaces of the robot's links; null where there is no world.
+  const std::shared_ptr<const RobotSurfaces>& surfaces() const { return surfaces_; }
+  /// By world: the number of its source.
+  const std::vector<int>& world_sources() const { return world_sources_; }
   /// By source: its snapshot where that is selected, else null.
   const std::vector<const SourceSnapshot*>& selected() const { return selected_; }
   /// The stamp of the oldest selected cloud, map files aside; zero when there is none.
@@ -60,6 +66,9 @@ class CloudSelection {
   std::vector<const CloudSnapshot*> clouds_;
   std::vector<int> cloud_sources_;        ///< by cloud: the number of its source
   std::vector<bool> cloud_stands_still_;  ///< by cloud: its source never goes stale
+  std::vector<const PosedWorld*> worlds_;
+  std::vector<int> world_sources_;  ///< by world: the number of its source
+  std::shared_ptr<const RobotSurfaces> surfaces_;
   ros::Time oldest_stamp_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "ist_proximity/repulsion/object_repulsion.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/stopwatch.h"
 #include "ros/cycle/cycle_message.h"
@@ -39,7 +40,9 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
       pose_timeout_(config.pose_timeout),
+      self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
       selection_(reader),
+      worlds_(config),
       query_(model_->robot, config.query),
       unknown_space_(watch == nullptr
                          ? nullptr
@@ -111,22 +114,28 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
 
 void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   QueryConfig query = config.query;
+  measurable_ = wanted_;
+  selection_.exclude_unfiltered(&measurable_);
+  known_ = measurable_;
+  for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
+  // The world is known exactly and costs little: it may take half of the time.
+  worlds_.set_influence_distance(config.repulsion.influence_distance);
+  worlds_.run(robot_, poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
+              end_of(query.deadline, 0.5 * kQueryShare, begin), &status_input_.deadline);
   if (query.deadline > 0.0) {
     const std::chrono::duration<double> left =
         end_of(query.deadline, kQueryShare, begin) - Stopwatch::Clock::now();
     query.deadline = std::max(left.count(), kLeastDeadline);
   }
   query_.set_config(query);
-  measurable_ = wanted_;
-  selection_.exclude_unfiltered(&measurable_);
-  known_ = measurable_;
-  for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
   query_.run(poses_.X_FL, known_, selection_.clouds(), &results_);
-  note_usage(config);
   const QueryStatistics& statistics = query_.statistics();
   status_input_.outside_region = statistics.outside_region > 0;
-  status_input_.deadline.unfinished = statistics.unfinished;
-  status_input_.deadline.widest = statistics.widest;
+  status_input_.deadline.unfinished += statistics.unfinished;
+  status_input_.deadline.widest = std::max(status_input_.deadline.widest, statistics.widest);
+  cloud_results_ = results_;
+  worlds_.combine(selection_.clouds(), &results_);
+  note_usage(config);
 }
 
 void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
@@ -146,21 +155,39 @@ void ProximityCycle::find_urgent_links() {
 }
 
 void ProximityCycle::compute_pushes(const LiveConfig& config, TimePoint end) {
-  const SnapshotSpan clouds = selection_.clouds();
-  const std::uint64_t obstacles = obstacles_key(clouds);
+  const std::uint64_t obstacles = obstacles_key(selection_.clouds()) ^ worlds_.key();
   for (const std::size_t i : urgent_) {
-    const LinkProximity& result = results_[i];
-    const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
-    RepulsiveWrench raw =
-        blends_[i].update(repulsion_, X_FL, clouds, result, config.repulsion, end);
     std::uint64_t key = obstacles;
-    if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
-      raw = nearest_repulsion(X_FL, result, config.repulsion);
-      key = ~obstacles;  // the filter spreads the change as if the obstacles were others
-      ++status_input_.deadline.unblended;
+    RepulsiveWrench raw;
+    if (!worlds_.any()) {
+      raw = push_of_clouds(i, results_[i], config, end, &key);
+    } else {
+      LinkProximity clouds;
+      clouds.state = LinkState::kClear;
+      if (!selection_.clouds().empty()) {
+        clouds = cloud_results_[i];
+        raw = push_of_clouds(i, clouds, config, end, &key);
+      }
+      raw = with_objects(poses_.X_FL[i], raw, clouds, worlds_.near_objects(i), results_[i],
+                         config.repulsion);
     }
-    pushes_[i] = filters_[i].update(poses_.stamp.toSec(), key, raw, result, config.repulsion);
+    pushes_[i] = filters_[i].update(poses_.stamp.toSec(), key, raw, results_[i], config.repulsion);
   }
+}
+
+/// @param key  of the obstacles; changed where the blend is late
+RepulsiveWrench ProximityCycle::push_of_clouds(std::size_t link, const LinkProximity& result,
+                                               const LiveConfig& config, TimePoint end,
+                                               std::uint64_t* key) {
+  const Eigen::Isometry3d& X_FL = poses_.X_FL[link];
+  RepulsiveWrench raw =
+      blends_[link].update(repulsion_, X_FL, selection_.clouds(), result, config.repulsion, end);
+  if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
+    raw = nearest_repulsion(X_FL, result, config.repulsion);
+    *key = ~*key;  // the filter spreads the change as if the obstacles were others
+    ++status_input_.deadline.unblended;
+  }
+  return raw;
 }
 
 void ProximityCycle::compute_wrenches(const LiveConfig& config, TimePoint end) {
@@ -201,10 +228,11 @@ void ProximityCycle::fill_links(ProximityArray* message) {
   for (std::size_t k = 0; k < message->links.size(); ++k) {
     const std::size_t i = model_->monitored[k];
     const LinkProximity& result = results_[i];
-    const int source = selection_.source_of(result);
+    const bool is_world = worlds_.any() && worlds_.is_nearest(i);
+    const int source = is_world ? worlds_.source_of(result) : selection_.source_of(result);
     assign_link(robot_.links[i].name, result, pushes_[i], wrenches_[i],
                 speeds_[i].update(message->header.stamp.toSec(), result, poses_.X_FL[i],
-                                  selection_.nearest(result)),
+                                  is_world ? worlds_.nearest(result) : selection_.nearest(result)),
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
     if (unknown_space_ && result.state != LinkState::kUnknown) {
@@ -219,6 +247,8 @@ void ProximityCycle::fill_links(ProximityArray* message) {
 /// passes before all of the volume is summed.
 Wrench ProximityCycle::penetration(std::size_t link, const LiveConfig& config, TimePoint end) {
   const LinkProximity& result = results_[link];
+  // The volume that a link shares with an object is not computed.
+  if (worlds_.is_in_contact(link)) return Wrench::unknown();
   const ContactGeometry* body = find_contact_geometry(config.contacts.get(), robot_, link);
   ContactVolume volume;
   const bool is_known = result.state == LinkState::kContact && body != nullptr;
@@ -263,9 +293,46 @@ void ProximityCycle::forget() {
   poses_.stamp = ros::Time();
 }
 
+Eigen::AlignedBox3d ProximityCycle::robot_box() const {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < packed_->links.size(); ++i) {
+    if (i >= poses_.known.size() || !poses_.known[i]) continue;
+    for (const InnerSphere& sphere : packed_->links[i].packing.spheres) {
+      const Eigen::Vector3d p_FS = poses_.X_FL[i] * sphere.center;
+      box.extend(p_FS - Eigen::Vector3d::Constant(sphere.radius));
+      box.extend(p_FS + Eigen::Vector3d::Constant(sphere.radius));
+    }
+  }
+  return box;
+}
+
 void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
+                                          const std::string& self_problem,
+                                          const ProximityArray* self,
                                           ist_proximity::JointRepulsion* message) {
-  joint_repulsion_.fill(pose_source_.get(), pushes_, proximity, message);
+  all_pushes_ = pushes_;
+  if (self_counts_) add_self_repulsion(self_problem.empty() ? self : nullptr);
+  joint_repulsion_.fill(pose_source_.get(), all_pushes_, proximity, message);
+  if (!self_counts_ || message->status != ProximityArray::OK) return;
+  const bool is_known = self_problem.empty() && self != nullptr;
+  if (is_known && self->status == ProximityArray::OK) return;
+  message->status = is_known ? self->status : static_cast<std::uint8_t>(ProximityArray::NO_POSE);
+  message->status_text = "link against link: " + (is_known ? self->status_text : self_problem);
+}
+
+/// @param self  of the monitored links, or null: not known
+void ProximityCycle::add_self_repulsion(const ProximityArray* self) {
+  for (std::size_t i = 0; i < model_->monitored.size(); ++i) {
+    RepulsiveWrench& push = all_pushes_[model_->monitored[i]];
+    if (self == nullptr || i >= self->links.size()) {
+      push = RepulsiveWrench::unknown();
+      continue;
+    }
+    const auto& own = self->links[i];
+    push.force += Eigen::Vector3d(own.repulsion.x, own.repulsion.y, own.repulsion.z);
+    push.torque +=
+        Eigen::Vector3d(own.repulsion_torque.x, own.repulsion_torque.y, own.repulsion_torque.z);
+  }
 }
 
 }  // namespace ist

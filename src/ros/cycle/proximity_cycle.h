@@ -4,6 +4,7 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ros/time.h>
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
 #include "ros/cycle/unknown_space_query.h"
+#include "ros/cycle/world_answers.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
 #include "ros/output/joint_repulsion.h"
@@ -68,12 +70,23 @@ class ProximityCycle {
 
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }
+  /// Whether known worlds were among the obstacles of the last run().
+  bool has_worlds() const { return worlds_.any(); }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 
+  /// Encloses the inner spheres of all links whose pose the last run() knew, in the fixed frame.
+  /// Looks at each sphere: for pictures, not for every cycle.
+  Eigen::AlignedBox3d robot_box() const;
+
   /// Gives the repulsion of the last run() as joint efforts.
-  /// @param proximity  the message of that run()
+  /// @param proximity     the message of that run()
+  /// @param self_problem  with ~self_collision/in_minimum: why `self` cannot be used; else empty
+  /// @param self          the newest ~self_proximity, whose repulsion is added with
+  ///                      ~self_collision/in_minimum; may be null
   void fill_joint_repulsion(const ist_proximity::ProximityArray& proximity,
+                            const std::string& self_problem,
+                            const ist_proximity::ProximityArray* self,
                             ist_proximity::JointRepulsion* message);
 
  private:
@@ -84,8 +97,11 @@ class ProximityCycle {
   void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
+  RepulsiveWrench push_of_clouds(std::size_t link, const LinkProximity& result,
+                                 const LiveConfig& config, TimePoint end, std::uint64_t* key);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
+  void add_self_repulsion(const ist_proximity::ProximityArray* self);
   void fill_links(ist_proximity::ProximityArray* message);
 
   const std::shared_ptr<const ModelState> model_;
@@ -94,7 +110,9 @@ class ProximityCycle {
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;
   const double pose_timeout_;  ///< [s]
+  const bool self_counts_;     ///< ~self_collision/in_minimum
   CloudSelection selection_;
+  WorldAnswers worlds_;
   ProximityQuery query_;
   std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
   const bool unknown_is_obstacle_;
@@ -113,10 +131,12 @@ class ProximityCycle {
   std::vector<bool> measurable_, known_;  ///< by link of the robot
   StampedLinkPoses poses_;
   StatusInput status_input_;
-  std::vector<LinkProximity> results_;   ///< by link of the robot
-  std::vector<RepulsiveWrench> pushes_;  ///< by link of the robot, filtered
-  std::vector<Wrench> wrenches_;         ///< by link of the robot
-  std::vector<std::size_t> urgent_;      ///< monitored links, the least lower bound first
+  std::vector<LinkProximity> results_;        ///< by link of the robot: clouds and worlds
+  std::vector<LinkProximity> cloud_results_;  ///< the same of clouds alone
+  std::vector<RepulsiveWrench> pushes_;       ///< by link of the robot, filtered
+  std::vector<RepulsiveWrench> all_pushes_;   ///< the same, with those of link against link
+  std::vector<Wrench> wrenches_;              ///< by link of the robot
+  std::vector<std::size_t> urgent_;           ///< monitored links, the least lower bound first
 };
 
 }  // namespace ist

@@ -81,6 +81,7 @@ class CloudSource : public ObstacleSource {
   std::string ingest(const Measurement& measurement);
   void complete(const Measurement& measurement, const Placement& placement,
                 SourceSnapshot* snapshot) const;
+  void note_view(const Placement& placement, const ViewReport& view);
   void count_publishers();
 
   const SourceConfig config_;

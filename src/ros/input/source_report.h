@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
 
@@ -25,6 +26,8 @@ struct SourceReport {
   /// [m] Points this near to a link are taken for the robot, so obstacles in this skin are not
   /// seen. NaN without self-filter.
   double blind_skin = std::numeric_limits<double>::quiet_NaN();
+  /// Whether the self-filter is to decide by view; `blind_skin` is the padding then.
+  bool by_view = false;
   std::uint64_t messages = 0;      ///< received
   std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use
   std::uint64_t overtaken = 0;     ///< dropped: a newer one was ready first
@@ -44,6 +47,8 @@ struct SourceReport {
   double last_work = 0.0;  ///< [s] what reading and ingesting the last message took
   std::string problem;     ///< why the last message is not in use (yet); empty when it is
   std::string doubt;       ///< about messages that are used all the same; empty: none
+  /// Objects of a known world that cannot be used, though others can; empty: none.
+  std::string incomplete;
 
   bool has_snapshot = false;  ///< whether a cloud is in use; the members below describe it
   ros::Time stamp;
@@ -51,6 +56,8 @@ struct SourceReport {
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
   std::size_t memory_voxels = 0, memory_occupied = 0;  ///< of a memory
+  ViewReport view;                                     ///< of a self-filter by view
+  std::vector<std::string> view_links;                 ///< names of view.links
 };
 
 }  // namespace ist

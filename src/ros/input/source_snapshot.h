@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
@@ -25,6 +26,9 @@ struct SourceSnapshot {
   std::string fixed_frame, map_frame;  ///< the frames between which a map is placed
   /// What the source remembers and the cloud does not show; null: nothing.
   std::shared_ptr<const SourceSnapshot> memory;
+  /// A known world in place of the cloud, and the surfaces of the model's links; null: a cloud.
+  PosedWorld world;
+  std::shared_ptr<const RobotSurfaces> surfaces;
 };
 
 }  // namespace ist

@@ -7,7 +7,8 @@ namespace ist {
 SourceState::SourceState(const SourceConfig& config, const std::string& topic)
     : is_permanent_(config.is_permanent()) {
   report_.name = config.name;
-  report_.is_file = !config.file.empty();
+  report_.is_file =
+      config.type == SourceType::kWorld ? !config.world.has_topic : !config.file.empty();
   report_.topic = topic;
   report_.type = message_type(config.type);
   report_.noun = noun(config.type);
@@ -15,6 +16,8 @@ SourceState::SourceState(const SourceConfig& config, const std::string& topic)
   report_.timeout_parameter = config.timeout_parameter;
   report_.required = config.required;
   if (config.ingest.self_filter) report_.blind_skin = config.ingest.self_filter_padding;
+  report_.by_view =
+      config.ingest.self_filter && config.ingest.self_filter_mode == SelfFilterMode::kView;
 }
 
 void SourceState::set_target(std::shared_ptr<const RobotModel> model,

@@ -170,6 +170,28 @@ void ParameterReader::read(const std::string& name, std::vector<std::string>* va
   *value = std::move(strings);
 }
 
+void ParameterReader::read(const std::string& name, const Range& range, std::size_t count,
+                           std::vector<double>* value) {
+  const XmlRpcValue* found = find_and_note(name);
+  if (!found) return;
+  const std::string needed =
+      "a list of " + std::to_string(count) + " numbers is needed, each " + range.text();
+  if (found->getType() != XmlRpcValue::TypeArray ||
+      static_cast<std::size_t>(found->size()) != count) {
+    return reject(name, *found, needed);
+  }
+  std::vector<double> numbers;
+  for (int i = 0; i < found->size(); ++i) {
+    const XmlRpcValue& element = (*found)[i];
+    double number = std::nan("");
+    if (element.getType() == XmlRpcValue::TypeInt) number = static_cast<const int&>(element);
+    if (element.getType() == XmlRpcValue::TypeDouble) number = static_cast<const double&>(element);
+    if (!range.contains(number)) return reject(name, element, needed);
+    numbers.push_back(number);
+  }
+  *value = std::move(numbers);
+}
+
 void ParameterReader::read(const std::string& name,
                            std::vector<std::pair<std::string, std::string>>* value) {
   const XmlRpcValue* found = find_and_note(name);

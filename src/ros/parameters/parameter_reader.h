@@ -40,6 +40,9 @@ class ParameterReader {
   void read(const std::string& name, bool* value);
   void read(const std::string& name, std::string* value);
   void read(const std::string& name, std::vector<std::string>* value);
+  /// Reads a list of `count` numbers.
+  void read(const std::string& name, const Range& range, std::size_t count,
+            std::vector<double>* value);
   void read(const std::string& name, std::vector<std::pair<std::string, std::string>>* value);
   /// Reads one of `choices`. The hint for the value found, if there is one, follows the error.
   void read_choice(const std::string& name, const std::vector<std::string>& choices,

@@ -91,6 +91,7 @@ void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/ignore", &config->ignore);
   reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
   reader->read("self_collision/in_minimum", &config->in_minimum);
+  reader->read("self_collision/samples", Range::non_negative("", 1e6), &config->samples);
 }
 
 void read_attach(ParameterReader* reader, AttachConfig* config) {

@@ -14,6 +14,7 @@
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"
@@ -33,7 +34,10 @@ struct SelfCollisionConfig {
   std::vector<std::pair<std::string, std::string>>
       ignore;                          ///< pairs of links to leave out, besides adjacent ones
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
-  bool in_minimum = false;             ///< its links count in ~min_distance and ~speed_scale
+  /// Its links count in ~min_distance, ~speed_scale and ~joint_repulsion.
+  bool in_minimum = false;
+  /// Random configurations in which ~link_pairs counts contacts; 0: none.
+  int samples = static_cast<int>(PairSampling().configurations);
 };
 
 /// The links whose volumes are packed for `penetration`.

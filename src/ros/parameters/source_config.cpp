@@ -12,6 +12,8 @@ const char* message_type(SourceType type) {
       return "sensor_msgs/LaserScan";
     case SourceType::kMap:
       return "octomap_msgs/Octomap";
+    case SourceType::kWorld:
+      return "ist_proximity/WorldObjects";
     case SourceType::kCloud:
       break;
   }
@@ -26,6 +28,8 @@ const char* noun(SourceType type) {
       return "scan";
     case SourceType::kMap:
       return "map";
+    case SourceType::kWorld:
+      return "world";
     case SourceType::kCloud:
       break;
   }
@@ -33,7 +37,8 @@ const char* noun(SourceType type) {
 }
 
 bool SourceConfig::is_permanent() const {
-  return type == SourceType::kMap && (!file.empty() || std::isinf(timeout));
+  const bool stays = type == SourceType::kMap || type == SourceType::kWorld;
+  return stays && (!file.empty() || std::isinf(timeout));
 }
 
 }  // namespace ist

@@ -7,14 +7,16 @@
 #include "ist_proximity/cloud/laser_scan.h"
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/octree.h"
+#include "ros/parameters/world_config.h"
 
 namespace ist {
 
-enum class SourceType { kCloud, kDepthImage, kScan, kMap };
+enum class SourceType { kCloud, kDepthImage, kScan, kMap, kWorld };
 
-/// The ROS message type of a source, as rostopic writes it.
+/// The ROS message type of a source, as rostopic writes it; of a known world its type in ~sources
+/// is kWorldType.
 const char* message_type(SourceType type);
-/// The word for one message of a source: "cloud", "image", "scan" or "map".
+/// The word for one message of a source: "cloud", "image", "scan", "map" or "world".
 const char* noun(SourceType type);
 
 /// What a source remembers (~memory, ~sources/NAME/memory).
@@ -41,9 +43,10 @@ struct SourceConfig {
   ScanLimits scan;            ///< used for scans
   OctreeLimits map;           ///< used for maps
   SourceMemoryConfig memory;  ///< used for clouds and depth images
+  WorldConfig world;          ///< used for known worlds
 
-  /// Whether a message stays valid for ever and survives jumps of the clock: a map from a file, or
-  /// a map with an infinite timeout.
+  /// Whether a message stays valid for ever and survives jumps of the clock: a map from a file, a
+  /// map with an infinite timeout, and the same of a known world.
   bool is_permanent() const;
 };
 

@@ -5,10 +5,29 @@
 #include <sstream>
 #include <string>
 
+#include "ros/parameters/world_parameters.h"
+
 namespace ist {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
+
+void read_view(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
+  const bool is_view = ingest->self_filter_mode == SelfFilterMode::kView;
+  std::string mode = is_view ? "view" : "padding";
+  reader->read_choice(prefix + "self_filter_mode", {"padding", "view"}, &mode);
+  ingest->self_filter_mode = mode == "view" ? SelfFilterMode::kView : SelfFilterMode::kPadding;
+  ViewFilterConfig& view = ingest->view;
+  const std::string of = prefix + "self_filter_view/";
+  constexpr double kSmallest = 1e-6;  // errors of a sensor's pose are never less
+  reader->read(of + "noise_constant", Range::non_negative("m", 1.0), &view.noise.constant);
+  reader->read(of + "noise_quadratic", Range::non_negative("1/m", 1.0), &view.noise.quadratic);
+  reader->read(of + "position_error", Range{"m", kSmallest, 1.0}, &view.position_error);
+  reader->read(of + "angle_error", Range{"rad", kSmallest, 1.0}, &view.angle_error);
+  reader->read(of + "model_error", Range::non_negative("m", 1.0), &view.model_error);
+  reader->read(of + "time_error", Range::non_negative("s", 1.0), &view.time_error);
+  reader->read(of + "mixed_pixels", Range::non_negative("pixels", 10.0), &view.mixed_pixels);
+}
 
 void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
   const double default_max_range = ingest->max_range;
@@ -17,6 +36,7 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
   reader->read(prefix + "self_filter", &ingest->self_filter);
   reader->read(prefix + "self_filter_padding", Range::non_negative("m", 1.0),
                &ingest->self_filter_padding);
+  read_view(reader, prefix, ingest);
   if (!(ingest->max_range > ingest->min_range)) {
     std::ostringstream text;
     text << "~" << prefix << "max_range is " << ingest->max_range
@@ -41,7 +61,9 @@ void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfi
       return reader->read(prefix + "max_beams", Range{"", 1.0, 1e7}, &source->scan.max_beams);
     case SourceType::kMap:
       reader->read(prefix + "max_leaves", Range{"", 1.0, 5e7}, &source->map.max_leaves);
-      reader->read(prefix + "max_bytes", Range{"", 1.0, 2e9}, &source->map.max_bytes);
+      return reader->read(prefix + "max_bytes", Range{"", 1.0, 2e9}, &source->map.max_bytes);
+    case SourceType::kWorld:
+      break;  // see read_world()
   }
 }
 
@@ -77,14 +99,17 @@ void check_memories(ParameterReader* reader, const std::vector<SourceConfig>& so
 
 void read_type(ParameterReader* reader, const std::string& prefix, SourceType* type) {
   const std::vector<SourceType> types = {SourceType::kCloud, SourceType::kDepthImage,
-                                         SourceType::kScan, SourceType::kMap};
+                                         SourceType::kScan, SourceType::kMap, SourceType::kWorld};
+  const auto name_of = [](SourceType one) {
+    return one == SourceType::kWorld ? kWorldType : message_type(one);
+  };
   std::vector<std::string> names;
   names.reserve(types.size());
-  for (const SourceType one : types) names.emplace_back(message_type(one));
-  std::string name = message_type(*type);
+  for (const SourceType one : types) names.emplace_back(name_of(one));
+  std::string name = name_of(*type);
   reader->read_choice(prefix + "type", names, &name);
   for (const SourceType one : types) {
-    if (name == message_type(one)) *type = one;
+    if (name == name_of(one)) *type = one;
   }
 }
 
@@ -126,6 +151,8 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   }
   if (source->type == SourceType::kMap) {
     read_map(reader, prefix, source);
+  } else if (source->type == SourceType::kWorld) {
+    read_world(reader, prefix, source);
   } else {
     read_ingest(reader, prefix, &source->ingest);
     if (source->type != SourceType::kScan) read_noise(reader, prefix, &source->noise);
@@ -135,7 +162,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   if (source->topic.empty()) {
     reader->add_error("~" + prefix + "topic is empty: the name of a topic is needed");
   }
-  if (source->file.empty()) {
+  if (source->file.empty() && source->type != SourceType::kWorld) {
     reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
   }
   if (source->type == SourceType::kDepthImage) {

@@ -121,6 +121,10 @@ Status stale_snapshot(const SourceReport& source, double age) {
 }  // namespace
 
 Status source_status(const SourceReport& source, double now) {
+  // What is missing must not read as free.
+  if (!source.incomplete.empty()) {
+    return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + source.incomplete};
+  }
   if (source.is_file) return file_status(source);
   if (source.is_memory) return memory_status(source);
   if (source.messages == 0) return without_messages(source);

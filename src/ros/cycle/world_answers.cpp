@@ -1,0 +1,107 @@
+#include "ros/cycle/world_answers.h"
+
+#include <algorithm>
+
+namespace ist {
+namespace {
+
+// [s] Frames that have not moved for so long stand still.
+constexpr double kStandsStill = 1.0;
+
+bool is_near(const LinkProximity& answer) {
+  return answer.state == LinkState::kNear || answer.state == LinkState::kContact;
+}
+
+}  // namespace
+
+WorldAnswers::WorldAnswers(const ServerConfig& config) : config_(config) {}
+
+/// The largest margin of all sources counts.
+void WorldAnswers::set_margins(const RobotModel& model) {
+  std::vector<double> margins(model.links.size(), 0.0);
+  for (const SourceConfig& source : config_.sources) {
+    for (std::size_t i = 0; i < margins.size(); ++i) {
+      const auto found = source.world.link_margins.find(model.links[i].name);
+      if (found != source.world.link_margins.end()) {
+        margins[i] = std::max(margins[i], found->second);
+      }
+    }
+  }
+  query_->set_link_margins(std::move(margins));
+}
+
+void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
+  const Span<const PosedWorld* const> worlds = selection.worlds();
+  sources_.assign(selection.world_sources().begin(), selection.world_sources().end());
+  motions_.resize(worlds.size());
+  for (std::size_t w = 0; w < worlds.size(); ++w) {
+    Motion& motion = motions_[w];
+    const PosedWorld& world = *worlds[w];
+    const auto is_same = [](const Eigen::Isometry3d& one, const Eigen::Isometry3d& other) {
+      return one.matrix() == other.matrix();
+    };
+    if (motion.world == world.world && std::equal(motion.X_FB.begin(), motion.X_FB.end(),
+                                                  world.X_FB.begin(), world.X_FB.end(), is_same)) {
+      continue;
+    }
+    // The first world is no motion.
+    motion.moved = motion.world ? time : motion.moved;
+    ++motion.key;
+    if (motion.world != world.world) ++key_;
+    motion.world = world.world;
+    motion.X_FB = world.X_FB;
+  }
+}
+
+void WorldAnswers::run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
+                       const std::vector<bool>& known, const CloudSelection& selection,
+                       const QueryConfig& query, double time, TimePoint end, DeadlineCost* cost) {
+  is_nearest_.assign(X_FL.size(), false);
+  any_ = !selection.worlds().empty();
+  time_ = time;
+  if (!any_) return;
+  if (!query_ || query_->robot() != selection.surfaces()) {
+    query_ = std::make_unique<WorldQuery>(selection.surfaces(), query);
+    set_margins(robot);
+  }
+  note_motion(selection, time);
+  query_->set_config(query);
+  query_->set_influence_distance(influence_distance_);
+  query_->run(X_FL, known, selection.worlds(), end, &answers_);
+  cost->unfinished += query_->statistics().unfinished;
+  cost->widest = std::max(cost->widest, query_->statistics().widest);
+}
+
+void WorldAnswers::combine(SnapshotSpan clouds, std::vector<LinkProximity>* results) {
+  if (!any_ || answers_.size() != results->size()) return;
+  for (std::size_t i = 0; i < results->size(); ++i) {
+    LinkProximity& cloud = (*results)[i];
+    const LinkProximity& world = answers_[i];
+    if (clouds.empty() || world.state == LinkState::kUnknown) {
+      cloud = world;
+      is_nearest_[i] = is_near(world);
+      continue;
+    }
+    if (cloud.state == LinkState::kUnknown) continue;
+    const double lower_bound = std::min(cloud.lower_bound, world.lower_bound);
+    if (is_near(world) && world.distance < cloud.distance) {
+      cloud = world;
+      is_nearest_[i] = true;
+    }
+    cloud.lower_bound = lower_bound;
+  }
+}
+
+int WorldAnswers::source_of(const LinkProximity& answer) const {
+  const auto world = static_cast<std::size_t>(answer.source);
+  return answer.source < 0 || world >= sources_.size() ? -1 : sources_[world];
+}
+
+ClosingSpeed::Nearest WorldAnswers::nearest(const LinkProximity& answer) const {
+  const int source = source_of(answer);
+  if (source < 0) return {};
+  const Motion& motion = motions_[static_cast<std::size_t>(answer.source)];
+  return {source, motion.key, time_, time_ - motion.moved > kStandsStill};
+}
+
+}  // namespace ist

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "ist_proximity/proximity/closing_speed.h"
+#include "ist_proximity/proximity/world_query.h"
+#include "ros/cycle/cloud_selection.h"
+#include "ros/parameters/parameters.h"
+#include "ros/status/status.h"
+
+namespace ist {
+
+/// The distances of one cycle to the known worlds, beside those to clouds. One thread.
+class WorldAnswers {
+ public:
+  explicit WorldAnswers(const ServerConfig& config);
+
+  /// Measures the links against the worlds of a selection.
+  /// @param time  [s] of the poses
+  /// @param cost  links that `end` left unfinished are added
+  void run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
+           const std::vector<bool>& known, const CloudSelection& selection,
+           const QueryConfig& query, double time, TimePoint end, DeadlineCost* cost);
+
+  /// Takes the nearer of cloud and world for each link; the lower bound is that of both. A link
+  /// that is UNKNOWN to either is UNKNOWN.
+  /// @param clouds   the selected clouds; where there are none, the worlds alone decide
+  /// @param results  by link: the answers of the clouds, overwritten
+  void combine(SnapshotSpan clouds, std::vector<LinkProximity>* results);
+
+  /// Whether the nearest point of a link is an object's.
+  bool is_nearest(std::size_t link) const { return is_nearest_[link]; }
+  /// Whether there is a world.
+  bool any() const { return any_; }
+  bool is_in_contact(std::size_t link) const {
+    return any_ && answers_[link].state == LinkState::kContact;
+  }
+  /// See WorldQuery::near_objects().
+  Span<const NearObject> near_objects(std::size_t link) const {
+    return any_ ? query_->near_objects(link) : Span<const NearObject>();
+  }
+  void set_influence_distance(double distance) { influence_distance_ = distance; }
+  /// Another one whenever the objects are others, but not when they move with their frames; 0
+  /// without a world.
+  std::uint64_t key() const { return any_ ? key_ : 0; }
+  /// For a link whose nearest point is an object's: the number of its source, and its motion.
+  int source_of(const LinkProximity& answer) const;
+  ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
+
+ private:
+  /// The motion of a world's frames.
+  struct Motion {
+    std::uint64_t key = 0;  ///< another one at each cycle in which frames have moved
+    double moved = -1e300;  ///< [s] when they did last
+    std::shared_ptr<const KnownWorld> world;
+    std::vector<Eigen::Isometry3d> X_FB;
+  };
+  void note_motion(const CloudSelection& selection, double time);
+  void set_margins(const RobotModel& model);
+
+  const ServerConfig config_;
+  std::unique_ptr<WorldQuery> query_;  ///< null before the first world
+  std::vector<LinkProximity> answers_;
+  std::vector<bool> is_nearest_;
+  std::vector<int> sources_;         ///< by world
+  std::vector<Motion> motions_;      ///< by world
+  double time_ = 0.0;                ///< [s] of the last run()
+  double influence_distance_ = 0.0;  ///< [m]
+  std::uint64_t key_ = 0;
+  bool any_ = false;
+};
+
+}  // namespace ist

@@ -1,0 +1,95 @@
+#include "ros/input/other_robot.h"
+
+#include <utility>
+
+#include "ist_proximity/geometry/error.h"
+#include "ros/common/frame_name.h"
+#include "ros/poses/transforms.h"
+
+namespace ist {
+namespace {
+
+/// Frames that are known from the other robot's joint states alone.
+constexpr const char* kOwnFrame = "(other robot) ";
+
+/// Looks up a pose at an instant, or else the newest one.
+std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
+                         const std::string& frame, const ros::Time& time, double max_age,
+                         Eigen::Isometry3d* X) {
+  std::string ignored;
+  if (is_known(buffer, fixed, frame, time, &ignored)) return look_up(buffer, fixed, frame, time, X);
+  return look_up_newest(buffer, fixed, frame, time, max_age, X);
+}
+
+}  // namespace
+
+OtherRobot::OtherRobot(const OtherRobotConfig& config, const std::string& base_frame,
+                       ros::NodeHandle nh)
+    : config_(config), base_frame_(without_slash(base_frame)), nh_(std::move(nh)) {
+  if (config.joint_states.empty()) return;
+  own_buffer_ = std::make_shared<TransformBuffer>(ros::Duration(10.0));
+  const ros::NodeHandle remapped(
+      nh_, "", {{nh_.resolveName("joint_states", false), nh_.resolveName(config.joint_states)}});
+  joint_states_ = std::make_unique<JointStateListener>(own_buffer_.get(), remapped, [] {});
+}
+
+std::string OtherRobot::read(std::vector<WorldObject>* links, std::vector<WorldFault>* faults) {
+  std::string key, urdf;
+  if (!nh_.searchParam(config_.description, key) || !nh_.getParam(key, urdf)) {
+    return "waiting for the parameter '" + config_.description + "' with the other robot's URDF";
+  }
+  std::shared_ptr<const Kinematics> kinematics;
+  RobotDescription description;
+  try {
+    description = parse_urdf(urdf, GeometrySource::kCollision, environment_package_finder());
+    kinematics = std::make_shared<const Kinematics>(description);
+  } catch (const ModelError& error) {
+    return "the other robot's URDF in '" + key + "' cannot be used: " + error.what();
+  }
+  for (LinkDescription& link : description.links) {
+    WorldObject object;
+    object.name = config_.tf_prefix + link.name;
+    object.frame = own_buffer_ ? kOwnFrame + link.name : config_.tf_prefix + link.name;
+    object.geometry = std::move(link.geometry);
+    if (link.error.empty()) {
+      links->push_back(std::move(object));
+    } else {
+      faults->push_back({object.name, "the other robot's " + link.error});
+    }
+  }
+  if (joint_states_) joint_states_->set_kinematics(kinematics);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  root_link_ = description.root_link;
+  return "";
+}
+
+std::string OtherRobot::look_up_frame(const TransformBuffer& buffer, const std::string& fixed_frame,
+                                      const std::string& frame, const ros::Time& time,
+                                      double max_age, Eigen::Isometry3d* X_FB, bool* is_own) const {
+  *is_own =
+      own_buffer_ && frame.compare(0, std::char_traits<char>::length(kOwnFrame), kOwnFrame) == 0;
+  if (!*is_own) return "";
+  const std::string link = frame.substr(std::char_traits<char>::length(kOwnFrame));
+  std::string root;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    root = root_link_;
+  }
+  const std::string base = base_frame_.empty() ? config_.tf_prefix + root : base_frame_;
+  Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity(), X_RB = Eigen::Isometry3d::Identity();
+  std::string problem;
+  if (base != fixed_frame) {
+    problem = look_up_near(buffer, fixed_frame, base, time, max_age, &X_FR);
+  }
+  if (problem.empty() && link != root) {
+    problem = look_up_near(*own_buffer_, root, link, time, max_age, &X_RB);
+    if (!problem.empty()) {
+      problem =
+          "the other robot's joint states (" + config_.joint_states + ") give no pose: " + problem;
+    }
+  }
+  if (problem.empty()) *X_FB = X_FR * X_RB;
+  return problem;
+}
+
+}  // namespace ist

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <geometry_msgs/Pose.h>
+#include <ist_proximity/WorldObject.h>
+
+#include <Eigen/Geometry>
+#include <string>
+
+#include "internal/geometry/cancelled.h"
+#include "ist_proximity/proximity/known_world.h"
+#include "ros/parameters/world_config.h"
+
+namespace ist {
+
+/// Converts a message of ADD, reading the mesh file that it may name.
+/// @param config  its frame_id and margin are those of objects that state none
+/// @throws ModelError, Cancelled
+WorldObject to_world_object(const ist_proximity::WorldObject& message, const WorldConfig& config,
+                            const CancelRequest& cancelled);
+
+/// Converts a pose.
+/// @throws ModelError
+Eigen::Isometry3d to_object_pose(const geometry_msgs::Pose& pose);
+
+}  // namespace ist

@@ -1,0 +1,358 @@
+#include "ros/input/world_source.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "internal/geometry/limits.h"
+#include "internal/geometry/mesh_io.h"
+#include "internal/robot/package_resolver.h"
+#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/proximity/world_file.h"
+#include "ros/common/exceptions.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/thread_name.h"
+#include "ros/input/world_conversion.h"
+#include "ros/poses/transforms.h"
+
+namespace ist {
+namespace {
+
+const ros::WallDuration kPoll(0.02);
+// Messages change the world, so none may be lost.
+constexpr std::uint32_t kQueueSize = 1000;
+constexpr std::chrono::milliseconds kRobotPeriod(500);
+// The fault of what is no object.
+constexpr const char* kWhole = "";
+constexpr const char* kRobot = "(other robot)";
+
+std::string frame_or_fixed(const std::string& frame) {
+  const std::string name = without_slash(frame);
+  return name.empty() ? kFixedFrame : name;
+}
+
+std::string place_of(const SourceConfig& config, const ros::NodeHandle& nh) {
+  if (config.world.has_topic) return nh.resolveName(config.topic);
+  return config.file.empty() ? "~sources/" + config.name : config.file;
+}
+
+}  // namespace
+
+WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh,
+                         const TransformBuffer& buffer)
+    : config_(config),
+      buffer_(buffer),
+      state_(config, place_of(config, nh)),
+      builder_(config.world.limits),
+      topic_advice_(nh.resolveName(config.topic), message_type(config.type), "") {
+  if (!config.world.robot.description.empty()) {
+    robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
+    is_robot_read_ = false;
+    state_.update(
+        [&](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
+  }
+  nh.setCallbackQueue(&queue_);
+  if (config.world.has_topic) {
+    subscriber_ = nh.subscribe(config.topic, kQueueSize, &WorldSource::receive, this,
+                               ros::TransportHints().tcpNoDelay());
+  }
+  thread_ = std::thread(&WorldSource::run, this);
+}
+
+WorldSource::~WorldSource() {
+  running_ = false;
+  thread_.join();
+  subscriber_.shutdown();
+}
+
+void WorldSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
+                            const RegionOfInterest& region) {
+  state_.set_target(std::move(model), fixed_frame, region);
+}
+
+const SourceSnapshot* WorldSource::newest(const std::shared_ptr<const RobotModel>& model,
+                                          const ros::Time& time, double max_age) {
+  const std::shared_ptr<SourceSnapshot>& snapshot = exchange_.newest();
+  if (!state_.is_current(snapshot.get(), model)) return nullptr;
+  if (original_ != snapshot) {
+    original_ = snapshot;
+    placed_ = *snapshot;
+  }
+  const std::string problem = place(time, max_age, &placed_);
+  state_.set_placing_problem(problem);
+  return problem.empty() ? &placed_ : nullptr;
+}
+
+std::shared_ptr<const SourceSnapshot> WorldSource::share(
+    const std::shared_ptr<const RobotModel>& model, const ros::Time& time, double max_age) {
+  const std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
+  if (!state_.is_current(snapshot.get(), model)) return nullptr;
+  const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
+  return place(time, max_age, placed.get()).empty() ? placed : nullptr;
+}
+
+/// Looks up where the objects' frames are at an instant, or else at the newest one that tf knows.
+std::string WorldSource::place(const ros::Time& time, double max_age,
+                               SourceSnapshot* snapshot) const {
+  const std::vector<std::string>& frames = snapshot->world.world->frames();
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Eigen::Isometry3d& X_FB = snapshot->world.X_FB[i];
+    if (frames[i] == kFixedFrame) continue;  // it is the identity for good
+    bool is_own = false;
+    const std::string unplaced =
+        robot_ ? robot_->look_up_frame(buffer_, snapshot->fixed_frame, frames[i], time, max_age,
+                                       &X_FB, &is_own)
+               : "";
+    if (!unplaced.empty()) return unplaced;
+    if (is_own) continue;
+    std::string ignored;
+    const std::string problem =
+        is_known(buffer_, snapshot->fixed_frame, frames[i], time, &ignored)
+            ? look_up(buffer_, snapshot->fixed_frame, frames[i], time, &X_FB)
+            : look_up_newest(buffer_, snapshot->fixed_frame, frames[i], time, max_age, &X_FB);
+    if (!problem.empty()) return problem;
+  }
+  return "";
+}
+
+void WorldSource::run() {
+  name_thread("ist " + config_.name);
+  guard([this] { read_configured(); });
+  is_changed_ = true;
+  while (running_) {
+    guard([this] { queue_.callAvailable(kPoll); });
+    guard([this] {
+      if (!is_robot_read_) read_robot();
+      count_publishers();
+      take_target();
+      if (is_changed_ && target_.model) publish();
+    });
+  }
+}
+
+void WorldSource::guard(const std::function<void()>& function) {
+  const std::string fault = exception_of(function);
+  if (fault.empty()) return;
+  note_fault(kWhole, "its objects could not be used: " + fault);
+  show_faults();
+}
+
+void WorldSource::note_fault(const std::string& object, const std::string& fault) {
+  ROS_ERROR_STREAM("source '" << config_.name << "': " << fault);
+  faults_[object] = fault;
+}
+
+/// The source is not OK while an object is missing.
+void WorldSource::show_faults() {
+  std::string text;
+  if (!faults_.empty()) {
+    text = faults_.begin()->second;
+    if (faults_.size() > 1) {
+      text += "; and " + std::to_string(faults_.size() - 1) + " more objects cannot be used";
+    }
+  }
+  state_.update([&](SourceReport* report) { report->incomplete = text; });
+}
+
+/// Reads the other robot's description as soon as it is there.
+void WorldSource::read_robot() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_reading_) return;
+  next_reading_ = now + kRobotPeriod;
+  std::vector<WorldObject> links;
+  std::vector<WorldFault> faults;
+  const std::string problem = robot_->read(&links, &faults);
+  if (!problem.empty()) {
+    if (faults_[kRobot] != problem) note_fault(kRobot, problem);
+    return show_faults();
+  }
+  is_robot_read_ = true;
+  faults_.erase(kRobot);
+  for (WorldObject& link : links) link.margin = config_.world.margin;
+  add(links);
+  for (const WorldFault& fault : faults) note_fault(fault.object, fault.text);
+  show_faults();
+  ROS_INFO_STREAM("source '" << config_.name << "': another robot of " << links.size()
+                             << " links with geometry");
+}
+
+void WorldSource::count_publishers() {
+  if (!config_.world.has_topic) return;
+  const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
+  if (!publishers) return;
+  std::optional<std::string> advice;
+  if (!has_received_) advice = topic_advice_.ask();
+  state_.update([&](SourceReport* report) {
+    report->publishers = *publishers;
+    if (advice) report->advice = *advice;
+  });
+}
+
+void WorldSource::receive(const ist_proximity::WorldObjects& message) {
+  has_received_ = true;
+  state_.begin_work();
+  guard([&] { apply(message); });
+  state_.end_work();
+  const ros::Time now = ros::Time::now();
+  stamp_ = message.header.stamp.isZero() ? now : std::min(message.header.stamp, now);
+  state_.update([&](SourceReport* report) {
+    ++report->messages;
+    report->newest = stamp_.toSec();
+  });
+}
+
+void WorldSource::apply(const ist_proximity::WorldObjects& message) {
+  const std::size_t limit = config_.world.limits.max_objects;
+  if (message.objects.size() > limit) {
+    note_fault(kWhole, "a message holds " + std::to_string(message.objects.size()) +
+                           " objects; allowed are " + std::to_string(limit) + " (~sources/" +
+                           config_.name + "/max_objects): it is not used");
+    return show_faults();
+  }
+  faults_.erase(kWhole);
+  if (message.replace_all) {
+    for (const std::string& name : from_topic_) {
+      builder_.remove(name);
+      faults_.erase(name);
+    }
+    from_topic_.clear();
+  }
+  std::vector<WorldObject> added;
+  for (const ist_proximity::WorldObject& object : message.objects) {
+    const std::string name = printable(object.id);
+    try {
+      change(object, &added);
+    } catch (const ModelError& error) {
+      note_fault(object.id, "object '" + name + "': " + error.what());
+    }
+  }
+  add(added);
+}
+
+/// Applies what a message says of one object; objects to add are collected, because many are built
+/// faster together.
+void WorldSource::change(const ist_proximity::WorldObject& message,
+                         std::vector<WorldObject>* added) {
+  using Message = ist_proximity::WorldObject;
+  if (message.operation == Message::ADD) {
+    from_topic_.insert(message.id);
+    added->push_back(to_world_object(message, config_.world, [this] { return !running_.load(); }));
+    return;
+  }
+  if (!added->empty()) {  // in the order of the message
+    add(*added);
+    added->clear();
+  }
+  is_changed_ = true;
+  if (message.operation == Message::REMOVE) {
+    builder_.remove(message.id);
+    from_topic_.erase(message.id);
+    faults_.erase(message.id);
+  } else if (message.operation == Message::MOVE) {
+    const std::string& frame =
+        message.header.frame_id.empty() ? config_.world.frame_id : message.header.frame_id;
+    const std::string fault =
+        builder_.move(message.id, frame_or_fixed(frame), to_object_pose(message.pose));
+    if (!fault.empty()) throw ModelError(fault);
+    faults_.erase(message.id);
+  } else {
+    throw ModelError("operation is " + std::to_string(message.operation) +
+                     "; allowed is 0 (ADD), 1 (REMOVE), 2 (MOVE)");
+  }
+}
+
+/// Adds the links that ~allowed_contacts names.
+void WorldSource::allow_contacts(WorldObject* object) const {
+  for (const auto& [link, name] : config_.world.allowed_contacts) {
+    if (name == object->name) object->allowed_links.push_back(link);
+  }
+}
+
+void WorldSource::add(const std::vector<WorldObject>& objects) {
+  std::vector<WorldObject> complete = objects;
+  for (WorldObject& object : complete) {
+    object.frame = frame_or_fixed(object.frame);
+    faults_.erase(object.name);
+    allow_contacts(&object);
+  }
+  const std::vector<WorldFault> faults =
+      builder_.add(complete, [this] { return !running_.load(); });
+  for (const WorldFault& fault : faults) note_fault(fault.object, fault.text);
+  is_changed_ = true;
+  show_faults();
+}
+
+/// Reads the objects of the parameters and of the file.
+void WorldSource::read_configured() {
+  const WorldConfig& world = config_.world;
+  std::vector<WorldObject> objects;
+  for (const WorldObjectConfig& config : world.objects) {
+    WorldObject object = config.object;
+    try {
+      if (!config.mesh.empty()) {
+        GeometryElement element;
+        element.source = config.mesh;
+        element.shape = load_mesh(resolve_uri(config.mesh, environment_package_finder()),
+                                  config.scale, [this] { return !running_.load(); });
+        object.geometry = {std::move(element)};
+      }
+      objects.push_back(std::move(object));
+    } catch (const ModelError& error) {
+      note_fault(object.name, "object '" + object.name + "': " + error.what());
+    }
+  }
+  if (!config_.file.empty()) {
+    SceneFile scene = read_scene_file(config_.file, frame_or_fixed(world.frame_id), world.limits);
+    if (!scene.fault.empty()) note_fault(kWhole, scene.fault);
+    for (WorldObject& object : scene.objects) {
+      object.margin = world.margin;
+      objects.push_back(std::move(object));
+    }
+  }
+  for (const auto& [link, name] : world.allowed_contacts) {
+    const bool is_known = std::any_of(objects.begin(), objects.end(),
+                                      [&](const auto& object) { return object.name == name; });
+    if (!is_known && !world.has_topic) {
+      ROS_WARN_STREAM("source '" << config_.name << "': allowed_contacts names '" << name
+                                 << "', which is no object");
+    }
+  }
+  stamp_ = ros::Time::now();
+  add(objects);
+  ROS_INFO_STREAM("source '" << config_.name << "': a known world of " << builder_.size()
+                             << " objects");
+}
+
+void WorldSource::take_target() {
+  SourceTarget newest = state_.target();
+  const bool is_same_robot =
+      newest.model == target_.model ||
+      (newest.model && target_.model && same_geometry(*newest.model, *target_.model));
+  if (!is_same_robot || newest.fixed_frame != target_.fixed_frame ||
+      newest.generation != target_.generation) {
+    is_changed_ = true;
+  }
+  if (!is_same_robot) {
+    surfaces_ = newest.model ? make_robot_surfaces(newest.model) : nullptr;
+  }
+  target_ = std::move(newest);
+}
+
+void WorldSource::publish() {
+  is_changed_ = false;
+  SourceSnapshot& snapshot = exchange_.writable();
+  snapshot = SourceSnapshot();
+  snapshot.world.world = builder_.world();
+  snapshot.world.X_FB.assign(snapshot.world.world->frames().size(), Eigen::Isometry3d::Identity());
+  snapshot.surfaces = surfaces_;
+  snapshot.model = surfaces_ ? target_.model : nullptr;
+  snapshot.fixed_frame = target_.fixed_frame;
+  snapshot.generation = target_.generation;
+  snapshot.stamp = snapshot.counts_from = stamp_;
+  snapshot.cloud.counts.received = snapshot.cloud.counts.used =
+      static_cast<std::uint32_t>(builder_.size());
+  exchange_.publish();
+}
+
+}  // namespace ist

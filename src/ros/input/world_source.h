@@ -1,0 +1,100 @@
+#pragma once
+
+#include <ist_proximity/WorldObjects.h>
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/subscriber.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ist_proximity/proximity/known_world.h"
+#include "ros/common/publisher_count.h"
+#include "ros/input/obstacle_source.h"
+#include "ros/input/other_robot.h"
+#include "ros/input/snapshot_exchange.h"
+#include "ros/input/source_state.h"
+#include "ros/input/topic_advice.h"
+#include "ros/parameters/source_config.h"
+#include "ros/poses/transform_buffer.h"
+
+namespace ist {
+
+/// The frame of objects that stand still in the fixed frame, whatever that is.
+constexpr const char* kFixedFrame = "(fixed frame)";
+
+/// A known world: objects from parameters, from a MoveIt scene file and from a topic, and the links
+/// of another robot. A thread of its own reads meshes and builds hierarchies, so that no query
+/// waits for them.
+///
+/// Objects are placed when a query asks for them, at the poses of their frames at that time. Where
+/// one of these is not known, or an object cannot be used, the source is not OK and says so.
+class WorldSource : public ObstacleSource {
+ public:
+  /// @param nh      in the namespace that the topic is relative to
+  /// @param buffer  outlives this
+  WorldSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer);
+  ~WorldSource() override;
+  WorldSource(const WorldSource&) = delete;
+  WorldSource& operator=(const WorldSource&) = delete;
+
+  void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
+                 const RegionOfInterest& region) override;
+  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
+                               const ros::Time& time, double max_age) override;
+  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
+                                              const ros::Time& time, double max_age) override;
+  void report(SourceReport* report) override { state_.report(report); }
+
+ private:
+  void run();
+  void guard(const std::function<void()>& function);
+  void read_configured();
+  void read_robot();
+  void receive(const ist_proximity::WorldObjects& message);
+  void apply(const ist_proximity::WorldObjects& message);
+  void change(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
+  void count_publishers();
+  void add(const std::vector<WorldObject>& objects);
+  void note_fault(const std::string& object, const std::string& fault);
+  void show_faults();
+  void allow_contacts(WorldObject* object) const;
+  void take_target();
+  void publish();
+  std::string place(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
+
+  const SourceConfig config_;
+  const TransformBuffer& buffer_;
+  ros::CallbackQueue queue_;
+  ros::Subscriber subscriber_;         ///< unless there is no topic
+  std::unique_ptr<OtherRobot> robot_;  ///< null: none
+  SnapshotExchange exchange_;
+  SourceState state_;
+
+  // Used by the thread that calls newest() alone.
+  std::shared_ptr<const SourceSnapshot> original_;  ///< of placed_
+  SourceSnapshot placed_;
+
+  // Used by the source's thread alone.
+  WorldBuilder builder_;
+  std::map<std::string, std::string> faults_;  ///< by object
+  SourceTarget target_;
+  std::shared_ptr<const RobotSurfaces> surfaces_;  ///< of target_.model
+  bool is_robot_read_ = true, is_changed_ = false, has_received_ = false;
+  std::chrono::steady_clock::time_point next_reading_;  ///< of the other robot's description
+  std::set<std::string> from_topic_;                    ///< names of objects
+  PublisherCount publisher_count_;
+  TopicAdvice topic_advice_;
+  ros::Time stamp_;
+  std::atomic<bool> running_{true};
+  std::thread thread_;
+};
+
+}  // namespace ist

@@ -1,0 +1,257 @@
+#!/usr/bin/env python3
+"""Known worlds as sources: parameters, a MoveIt scene file, a topic, moving frames, another robot."""
+
+import math
+import os
+import sys
+import tempfile
+import unittest
+
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import JointState
+
+from ist_proximity.msg import WorldObject, WorldObjects
+from ist_proximity.srv import QueryProximity
+
+SCENE = """a cell
+* shelf
+-0.6 0 0
+0 0 0 1
+1
+box
+0.2 0.2 0.2
+0 0 0
+0 0 0 1
+0 0 0 0
+0
+.
+"""
+
+OTHER = """<robot name="other">
+  <link name="rail"/>
+  <link name="head"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="slide" type="prismatic"><parent link="rail"/><child link="head"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def box(name, x, y=0.0, z=0.0, edge=0.2, operation=WorldObject.ADD, frame=""):
+    one = WorldObject(id=name, operation=operation, shape=WorldObject.BOX, dimensions=[edge] * 3)
+    one.header.frame_id = frame
+    one.pose.position.x, one.pose.position.y, one.pose.position.z = x, y, z
+    one.pose.orientation.w = 1.0
+    return one
+
+
+class WorldTest(unittest.TestCase):
+    """One node with objects from everywhere; the ball is at the origin, the box link at (0, 0, 2)."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.mkdtemp()
+        path = os.path.join(folder, "cell.scene")
+        with open(path, "w") as file:
+            file.write(SCENE)
+        cls.world = pt.World("/known").stand(box=pt.transform((0, 0, 2)))
+        cls.world.poses["carriage"] = ("base", pt.transform((0, 3, 0)))
+        cls.world.start_tf()
+        cls.topic = rospy.Publisher("/known/parts", WorldObjects, queue_size=10, latch=True)
+        cls.topic.publish(WorldObjects())
+        cls.node = pt.ProximityNode(
+            "/known",
+            {
+                "sources": {
+                    "cell": {
+                        "type": "world",
+                        "file": path,
+                        "objects": {
+                            "table": {"shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.5, 0, 0]},
+                            "bench": {"shape": "cylinder", "radius": 0.3, "length": 4.0},
+                            "slider": {
+                                "shape": "sphere",
+                                "radius": 0.1,
+                                "frame_id": "carriage",
+                            },
+                        },
+                        "allowed_contacts": [["ball_link", "bench"], ["box_link", "bench"]],
+                    },
+                    "parts": {"type": "world", "topic": "parts", "max_objects": 500},
+                },
+                "links": ["ball_link"],
+            },
+            pt.urdf(),
+        )
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.node.stop()
+        cls.world.stop()
+
+    def ball(self, condition, what, status=ProximityArray.OK):
+        return pt.link(
+            self.node.wait_for(
+                lambda m: m.status == status and condition(pt.link(m, "ball_link")), what
+            ),
+            "ball_link",
+        )
+
+    def send(self, *objects, replace_all=False):
+        message = WorldObjects(objects=objects, replace_all=replace_all)
+        message.header.stamp = rospy.Time.now()
+        self.topic.publish(message)
+
+    def is_at_table(self):
+        """Nothing but the table is near."""
+        return self.ball(
+            lambda l: l.state == LinkProximity.NEAR and abs(l.distance - 0.3) < 1e-6, "the table"
+        )
+
+    def test_1_parameters_and_file(self):
+        ball = self.is_at_table()
+        self.assertEqual(ball.source, "cell")
+        self.assertLessEqual(ball.lower_bound, 0.3)
+        self.assertGreaterEqual(ball.lower_bound, 0.3 - 0.0011)
+        self.assertAlmostEqual(ball.direction.x, -1.0, places=6)
+        self.assertAlmostEqual(ball.point_on_obstacle.x, 0.4, places=6)
+        # The shelf of the file is 0.5 - 0.1 away on the other side.
+        self.world.poses["ball_link"] = ("base", pt.transform((-0.2, 0, 0)))
+        near_shelf = self.ball(lambda l: abs(l.distance - 0.2) < 1e-6, "the shelf")
+        self.assertGreater(near_shelf.direction.x, 0.99)
+        self.assertLess(near_shelf.repulsion.y, 1e-6)
+        self.assertGreater(near_shelf.repulsion.x, 0.1)
+        self.world.poses["ball_link"] = ("base", pt.transform((0, 0, 0)))
+        self.is_at_table()
+
+    def test_2_objects_move_with_their_frames(self):
+        for y in (0.5, 0.4, 0.35):
+            self.world.poses["carriage"] = ("base", pt.transform((0, y, 0)))
+            truth = y - 0.2
+            self.ball(lambda l, d=truth: abs(l.distance - min(d, 0.3)) < 1e-6, "the carriage")
+        del self.world.poses["carriage"]
+        lost = self.node.wait_for_status(ProximityArray.NO_CLOUD, "carriage")
+        self.assertEqual(pt.link(lost, "ball_link").state, LinkProximity.UNKNOWN)
+        self.world.poses["carriage"] = ("base", pt.transform((0, 3, 0)))
+        self.is_at_table()
+
+    def test_3_topic(self):
+        self.send(box("part", 0.0, 0.3), box("other", 0.0, 0.0, 0.9))
+        part = self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part")
+        self.assertEqual(part.source, "parts")
+        self.send(box("part", 0.0, 0.35, operation=WorldObject.MOVE))
+        self.ball(lambda l: abs(l.distance - 0.15) < 1e-6, "the part that was moved")
+        self.send(box("part", 0.0, 0.0))
+        contact = self.ball(lambda l: l.state == LinkProximity.CONTACT, "contact")
+        self.assertLess(contact.distance, 0.0)
+        self.assertLessEqual(contact.lower_bound, contact.distance)
+        self.assertTrue(math.isnan(contact.penetration.force.x))
+        self.send(box("part", 0.0, operation=WorldObject.REMOVE))
+        self.is_at_table()
+        self.send(replace_all=True)
+        self.is_at_table()
+
+    def test_4_what_cannot_be_used_is_named(self):
+        broken = box("wall", 1.0)
+        broken.shape, broken.dimensions, broken.mesh = WorldObject.MESH, [], "/no/such/wall.stl"
+        self.send(broken, box("part", 0.0, 0.3))
+        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "wall.stl")
+        self.assertIn("'wall'", told.status_text)
+        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.send(box("wall", 0.0, operation=WorldObject.REMOVE))
+        self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part, without the wall")
+        huge = box("huge", 1.0, edge=2e4)
+        self.send(huge)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "'huge'")
+        nowhere = box("huge", 1.0, frame="no_such_frame")
+        self.send(nowhere)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "no_such_frame")
+        self.send(replace_all=True)
+        self.is_at_table()
+
+    def test_5_too_many_objects(self):
+        self.send(*[box("object %d" % i, 5.0) for i in range(600)])
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "600 objects; allowed are 500")
+        self.send(replace_all=True)
+        self.is_at_table()
+
+    def test_6_query_service(self):
+        self.is_at_table()
+        service = rospy.ServiceProxy("/known/proximity/query", QueryProximity)
+        service.wait_for_service(pt.TIMEOUT)
+        answer = service(states=[JointState(), JointState()], times=[0.0, 1.0])
+        self.assertTrue(answer.success, answer.message)
+        distances = [pt.link(result, "ball_link").distance for result in answer.results]
+        # Links on floating joints are placed by tf, as in the cycles.
+        self.assertTrue(all(abs(d - 0.3) < 1e-6 for d in distances), distances)
+        self.assertTrue(math.isnan(answer.impact_times[0]), "objects count in no time of impact")
+
+
+class OtherRobotTest(unittest.TestCase):
+    """Another robot, by its joint states and by tf."""
+
+    def run_with(self, robot, move, stop):
+        namespace = "/with_%s" % move.__name__
+        world = pt.World(namespace).stand()
+        rospy.set_param(namespace + "/other/robot_description", OTHER)
+        source = {"type": "world", "robot": dict(robot, description="other/robot_description")}
+        world.poses["other/rail"] = ("base", pt.transform((1, 0, 0)))
+        world.start_tf()
+        node = pt.ProximityNode(
+            namespace, {"sources": {"other": source}, "links": ["ball_link"]}, pt.urdf()
+        )
+        try:
+            node.wait_for_status(ProximityArray.NO_CLOUD, "head")
+            mover = world.repeat(50, lambda: move(world, namespace, -0.4))
+            node.wait_for(
+                lambda m: m.status == ProximityArray.OK
+                and abs(pt.link(m, "ball_link").distance - 0.4) < 1e-3
+                and pt.link(m, "ball_link").source == "other",
+                "the other robot's head",
+            )
+            mover.function = lambda: move(world, namespace, -0.6)
+            node.wait_for(
+                lambda m: abs(pt.link(m, "ball_link").distance - 0.2) < 1e-3, "its motion"
+            )
+            mover.paused = True
+            stop(world)
+            old = node.wait_for_status(ProximityArray.NO_CLOUD, "head")
+            self.assertEqual(pt.link(old, "ball_link").state, LinkProximity.UNKNOWN)
+        finally:
+            node.stop()
+            world.stop()
+
+    def test_joint_states(self):
+        publishers = {}
+
+        def by_joint_states(_, namespace, q):
+            if namespace not in publishers:
+                publishers[namespace] = rospy.Publisher(
+                    namespace + "/other/joint_states", JointState, queue_size=10
+                )
+            state = JointState(name=["slide"], position=[q])
+            state.header.stamp = rospy.Time.now()
+            publishers[namespace].publish(state)
+
+        self.run_with(
+            {"joint_states": "other/joint_states", "tf_prefix": "other/"},
+            by_joint_states,
+            lambda world: None,
+        )
+
+    def test_tf(self):
+        def by_tf(world, _, q):
+            world.poses["other/head"] = ("other/rail", pt.transform((q, 0, 0)))
+
+        self.run_with(
+            {"tf_prefix": "other/"}, by_tf, lambda world: world.poses.pop("other/head")
+        )
+
+
+if __name__ == "__main__":
+    import rostest
+
+    kinds = {"objects": WorldTest, "robot": OtherRobotTest}
+    suite = sys.argv[1]
+    rospy.init_node("world_test")
+    rostest.rosrun("ist_proximity", "world_" + suite, kinds[suite], sys.argv)
