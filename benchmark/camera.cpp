@@ -15,7 +15,6 @@
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -209,32 +208,6 @@ void print_peers(const DataSet& set, double ours) {
 }
 #endif
 
-// The same points in one row, in random order.
-Frame shuffled(const Frame& frame) {
-  std::vector<std::size_t> order(frame.width * frame.height);
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
-  Frame result = frame;
-  result.width = order.size();
-  result.height = 1;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
-  }
-  return result;
-}
-
-double copy_us(const Frame& frame) {
-  std::vector<float> copy(frame.data.size());
-  std::vector<double> us;
-  ThreadTimer timer;
-  for (int i = 0; i < kRepetitions; ++i) {
-    timer.lap();
-    std::memcpy(copy.data(), frame.data.data(), frame.bytes());
-    us.push_back(timer.lap());
-  }
-  return quantile(us, 0.5);
-}
-
 // Where the robot is when nothing is within the influence distance of it.
 Poses far_above(Poses X_FL) {
   for (Eigen::Isometry3d& X : X_FL) X.pretranslate(Eigen::Vector3d(0.0, 0.0, 3.0));
@@ -291,7 +264,8 @@ void print_ingest(const DataSet& set, const Robot& robot) {
     std::size_t links = 0;
     const Poses& near = set.motion[half_near(set, scene, robot, &links)];
     const Frame list = shuffled(scene.frame);
-    const double copy = copy_us(scene.frame);
+    const double copy =
+        ist::benchmark::copy_us(scene.frame.data.data(), scene.frame.bytes(), kRepetitions);
     std::printf("| %s | %.0f µs", scene.name.c_str(), copy);
     const auto cell = [copy](double us) { std::printf(" | %.0f µs | %.1f", us, us / copy); };
     cell(ingest_us(robot, scene.frame, far_above(near)));

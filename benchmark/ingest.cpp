@@ -7,8 +7,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <numeric>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -24,32 +22,6 @@ namespace {
 using ist::benchmark::Frame;
 using ist::benchmark::quantile;
 using ist::benchmark::ThreadTimer;
-
-// The same points in one row, in random order.
-Frame shuffled(const Frame& frame) {
-  std::vector<std::size_t> order(frame.width * frame.height);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
-  Frame result = frame;
-  result.width = order.size();
-  result.height = 1;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
-  }
-  return result;
-}
-
-double copy_us(const Frame& frame, int repetitions) {
-  std::vector<float> copy(frame.data.size());
-  std::vector<double> us;
-  ThreadTimer timer;
-  for (int i = 0; i < repetitions; ++i) {
-    timer.lap();
-    std::memcpy(copy.data(), frame.data.data(), frame.bytes());
-    us.push_back(timer.lap());
-  }
-  return quantile(us, 0.5);
-}
 
 // Asks for every point of the thinned cloud.
 void thin_all(const ist::CloudSnapshot& snapshot) {
@@ -77,7 +49,7 @@ double ingest_us(const Frame& frame, bool thin, int repetitions) {
 }
 
 void print(const std::string& name, const Frame& frame, int repetitions) {
-  const double copy = copy_us(frame, repetitions);
+  const double copy = ist::benchmark::copy_us(frame.data.data(), frame.bytes(), repetitions);
   const double image = ingest_us(frame, false, repetitions);
   const double thinned = ingest_us(frame, true, repetitions);
   const double mixed = ingest_us(shuffled(frame), false, repetitions);

@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <limits>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -32,19 +31,6 @@ using ist::benchmark::ThreadTimer;
 
 constexpr double kRadius = 0.02, kRange = 3.0;
 constexpr int kNeighbors = 4;
-
-Frame shuffled(const Frame& frame) {
-  std::vector<std::size_t> order(frame.width * frame.height);
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
-  Frame result = frame;
-  result.width = order.size();
-  result.height = 1;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
-  }
-  return result;
-}
 
 struct Result {
   double us = 0.0;

@@ -21,6 +21,8 @@ find_package(catkin REQUIRED COMPONENTS
 
 add_message_files(DIRECTORY msg FILES
   JointRepulsion.msg
+  LinkPair.msg
+  LinkPairProximity.msg
   LinkProximity.msg
   ProximityArray.msg
   SourceStatus.msg
@@ -30,6 +32,7 @@ add_message_files(DIRECTORY msg FILES
 add_service_files(DIRECTORY srv FILES
   AttachObject.srv
   DetachObject.srv
+  ListLinkPairs.srv
   QueryProximity.srv)
 generate_messages(DEPENDENCIES geometry_msgs sensor_msgs std_msgs)
 

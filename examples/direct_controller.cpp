@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <fstream>
@@ -49,16 +48,7 @@ std::vector<float> sphere_points(const Eigen::Vector3d& center) {
 }
 
 ist::RawCloud as_cloud(const std::vector<float>& xyz) {
-  ist::RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  cloud.width = xyz.size() / 3;
-  cloud.height = 1;
-  cloud.point_step = 3 * sizeof(float);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.x = 0;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
-  return cloud;
+  return ist::packed_cloud(xyz.data(), xyz.size() / 3, 1);
 }
 
 /// The links' volumes, for forces in contact; built once. 100 spheres are quick to pack, and

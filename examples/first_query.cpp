@@ -1,5 +1,4 @@
 // Usage: first_query robot.urdf
-#include <cstdint>
 #include <exception>
 #include <fstream>
 #include <iostream>
@@ -24,11 +23,7 @@ int main(int argc, char** argv) try {
 
   // For each cloud: here a single point, in a sensor frame that is the fixed frame.
   const float xyz[] = {0.5F, 0.0F, 0.5F};  // [m]
-  ist::RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz);
-  cloud.width = cloud.height = 1;
-  cloud.point_step = cloud.row_step = sizeof(xyz);
-  cloud.x = 0, cloud.y = 4, cloud.z = 8;  // offsets within a point [bytes]
+  const ist::RawCloud cloud = ist::packed_cloud(xyz, 1, 1);
   ist::Ingest ingest{ist::IngestConfig()};
   ist::CloudSnapshot snapshot;
   ingest.run(cloud, Eigen::Isometry3d::Identity(),  // points on the robot are dropped

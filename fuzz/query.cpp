@@ -11,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <variant>
 #include <vector>
 
@@ -67,16 +68,9 @@ double extent(const ist::Shape& shape) {
   return ist::fuzz::extent(std::get<ist::TriangleMesh>(shape));
 }
 
-std::shared_ptr<const ist::RobotModel> model_of(const std::vector<ist::LinkGeometry>& links,
-                                                ByteReader* in) {
-  ist::RobotDescription description;
-  for (const ist::LinkGeometry& geometry : links) {
-    ist::LinkDescription link;
-    link.name = "link" + std::to_string(description.links.size());
-    link.geometry = geometry;
-    description.links.push_back(std::move(link));
-  }
-  // Coarse packings: they take most of the time, and bounds must hold for any.
+/// The packing's settings. Coarse packings: they take most of the time, and bounds must hold for
+/// any.
+ist::RobotModelConfig packing_from(const std::vector<ist::LinkGeometry>& links, ByteReader* in) {
   double size = 0.0;
   for (const ist::LinkGeometry& geometry : links) {
     for (const ist::GeometryElement& element : geometry)
@@ -86,7 +80,36 @@ std::shared_ptr<const ist::RobotModel> model_of(const std::vector<ist::LinkGeome
   config.packing.max_error = size * in->between(0.1, 1.0);
   config.packing.max_spheres = 1 + static_cast<int>(in->below(30));
   config.threads = 1;
+  return config;
+}
+
+std::shared_ptr<const ist::RobotModel> build(const std::vector<ist::LinkGeometry>& links,
+                                             const ist::RobotModelConfig& config) {
+  ist::RobotDescription description;
+  for (const ist::LinkGeometry& geometry : links) {
+    ist::LinkDescription link;
+    link.name = "link" + std::to_string(description.links.size());
+    link.geometry = geometry;
+    description.links.push_back(std::move(link));
+  }
   return ist::build_robot_model(description, config);
+}
+
+/// The model of links and a packing, kept from execution to execution: most inputs that libFuzzer
+/// tries differ from others in what comes after the links.
+/// @param key  the bytes that the links were made of
+std::shared_ptr<const ist::RobotModel> model_of(const std::string& key,
+                                                const std::vector<ist::LinkGeometry>& links,
+                                                ByteReader* in) {
+  constexpr std::size_t kKept = 512;
+  static std::unordered_map<std::string, std::shared_ptr<const ist::RobotModel>> kept;
+  const ist::RobotModelConfig config = packing_from(links, in);
+  const std::string whole_key = key + "/" + std::to_string(config.packing.max_error) + "/" +
+                                std::to_string(config.packing.max_spheres);
+  const auto found = kept.find(whole_key);
+  if (found != kept.end()) return found->second;
+  if (kept.size() >= kKept) kept.clear();
+  return kept.emplace(whole_key, build(links, config)).first->second;
 }
 
 using ist::test::truth_interval;
@@ -117,8 +140,9 @@ Points samples_of(const std::vector<Eigen::AlignedBox3d>& boxes) {
 
 struct Scene {
   std::vector<ist::LinkGeometry> links;
-  Points points;   ///< in the fixed frame
-  Points samples;  ///< of the boxes
+  std::string key;  ///< the bytes that the links were made of
+  Points points;    ///< in the fixed frame
+  Points samples;   ///< of the boxes
   ist::CloudSnapshot cloud, map;
   std::vector<const ist::CloudSnapshot*> snapshots;
 };
@@ -219,7 +243,9 @@ ist::QueryConfig config_from(ByteReader* in) {
 
 Scene scene_from(ByteReader* in) {
   Scene scene;
+  const auto* begin = reinterpret_cast<const char*>(in->rest());
   for (std::size_t i = 1 + in->below(2); i > 0; --i) scene.links.push_back(link_from(in));
+  scene.key.assign(begin, reinterpret_cast<const char*>(in->rest()));
   const Eigen::Isometry3d X_FL = in->pose(1.0);
   for (const Eigen::Vector3d& p : points_from(in, scene.links[0])) scene.points.push_back(X_FL * p);
   scene.cloud = ist::test::make_snapshot(scene.points,
@@ -250,7 +276,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (mesh != nullptr && !(ist::fuzz::extent(*mesh) > 1e-5)) return 0;
     }
   }
-  const auto model = model_of(scene.links, &in);
+  const auto model = model_of(scene.key, scene.links, &in);
   ist::ProximityQuery query(model, {});
   const ist::Repulsion repulsion(model);
   std::vector<ist::LinkProximity> answers;

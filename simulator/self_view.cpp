@@ -9,6 +9,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "scene.h"
+#include "touch_view.h"
 
 namespace ist::sim {
 namespace {
@@ -21,15 +22,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 const double kMean[] = {0.0, 0.35, 1.1, 0.0, 0.1, 0.0};
 const double kAmplitude[2][6] = {{0.6, 0.25, 0.3, 0.7, 0.4, 0.9}, {0.2, 0.15, 0.2, 0.3, 0.3, 0.4}};
 const double kRate[2][6] = {{0.83, 0.71, 0.97, 0.61, 1.13, 0.53}, {1.9, 1.7, 1.6, 1.3, 2.1, 1.1}};
-
-Eigen::VectorXd positions(double t) {
-  Eigen::VectorXd q(6);
-  for (int j = 0; j < 6; ++j) {
-    q[j] = kMean[j];
-    for (int k = 0; k < 2; ++k) q[j] += kAmplitude[k][j] * std::sin(kRate[k][j] * t);
-  }
-  return q;
-}
 
 struct Trial {
   Ingest ingest;
@@ -85,7 +77,7 @@ Obstacle ball_at_forearm(const RobotDescription& robot, const Eigen::Vector3d& p
   ball.name = "ball";
   ball.shape = Sphere{kBallRadius};
   ball.path = [arm, forearm, beside, p_FC](double t) -> Eigen::Vector3d {
-    const Eigen::Isometry3d X_FL = arm.link_poses(positions(t))[forearm];
+    const Eigen::Isometry3d X_FL = arm.link_poses(self_view_positions(t))[forearm];
     const Eigen::Vector3d p = X_FL * Eigen::Vector3d(0.0, 0.0, 0.170);
     const Eigen::Vector3d side = X_FL.linear().col(2).cross(p - p_FC).normalized();
     return p + beside * (side.z() < 0.0 ? -side : side);
@@ -95,6 +87,15 @@ Obstacle ball_at_forearm(const RobotDescription& robot, const Eigen::Vector3d& p
 
 }  // namespace
 
+Eigen::VectorXd self_view_positions(double t) {
+  Eigen::VectorXd q(6);
+  for (int j = 0; j < 6; ++j) {
+    q[j] = kMean[j];
+    for (int k = 0; k < 2; ++k) q[j] += kAmplitude[k][j] * std::sin(kRate[k][j] * t);
+  }
+  return q;
+}
+
 std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
                                           const std::shared_ptr<const RobotModel>& model,
                                           const SelfViewConfig& config) {
@@ -103,6 +104,11 @@ std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
   camera.flying_pixels = config.flying_pixels;
   camera.latency = config.latency;
   camera.period = config.camera_period;
+  camera.width *= config.resolution;
+  camera.height *= config.resolution;
+  camera.focal_length *= config.resolution;
+  const Eigen::Isometry3d X_FS =
+      with_error(camera.X_FC, config.position_error, config.angle_error, config.seed);
 
   std::vector<Obstacle> obstacles;
   if (config.ball_distance > 0.0) {
@@ -111,23 +117,26 @@ std::vector<SelfViewResult> run_self_view(const RobotDescription& robot,
   const Obstacle* ball = obstacles.empty() ? nullptr : obstacles.data();
 
   Simulation world(robot, demo_arm(), obstacles, {camera}, config.seed);
-  world.arm().reset(positions(0.0));
+  world.arm().reset(self_view_positions(0.0));
   std::vector<Trial> trials;
   for (const double padding : config.paddings) {
     IngestConfig ingest;
     ingest.self_filter_padding = padding;
+    ingest.self_filter_mode = config.mode;
+    ingest.view = config.view;
     trials.emplace_back(model, ingest);
   }
   const std::vector<bool> known(robot.links.size(), true);
   const auto steps = static_cast<int>(config.duration / Simulation::kStep);
   for (int step = 0; step < steps; ++step) {
     const double t = world.time();
-    world.step((positions(t + Simulation::kStep) - world.arm().positions()) / Simulation::kStep);
+    world.step((self_view_positions(t + Simulation::kStep) - world.arm().positions()) /
+               Simulation::kStep);
     for (const Picture& picture : world.take_pictures()) {
       const std::vector<PosedSolid> posed =
           posed_solids(*model, world.link_poses(picture.stamp), known);
       for (Trial& trial : trials) {
-        trial.ingest.run(picture.raw(), camera.X_FC, posed, picture.stamp, &trial.cloud);
+        trial.ingest.run(picture.raw(), X_FS, posed, picture.stamp, &trial.cloud);
         trial.result.pictures += 1;
         trial.result.on_robot += trial.cloud.counts.on_robot;
         trial.result.phantoms +=

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "simulation.h"
 
@@ -11,6 +12,12 @@ namespace ist::sim {
 
 /// An arm that moves in view of its camera.
 struct SelfViewConfig {
+  /// Of the self-filter, but for the padding.
+  SelfFilterMode mode = SelfFilterMode::kPadding;
+  ViewFilterConfig view;
+  double position_error = 0.0;            ///< [m] of the camera's pose
+  double angle_error = 0.0;               ///< [rad] of the camera's pose
+  int resolution = 1;                     ///< 1: 160 x 120 pixels; 4: 640 x 480
   double duration = 60.0;                 ///< [s]
   double noise = 0.005;                   ///< [m] standard deviation of the depth
   double flying_pixels = 0.0;             ///< see DepthCameraConfig
@@ -37,6 +44,9 @@ struct SelfViewResult {
   int near = 0;
   double largest_excess = -1.0;
 };
+
+/// [rad] The demo arm's positions in this motion.
+Eigen::VectorXd self_view_positions(double t);
 
 /// The demo arm moves without a bench, its joints as fast as 1 rad/s, in view of one camera.
 /// Nothing else is there but the ball, so that every other point found is a false one.

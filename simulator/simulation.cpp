@@ -14,15 +14,8 @@ std::int64_t steps_of(double seconds) { return std::llround(seconds / Simulation
 }  // namespace
 
 RawCloud Picture::raw() const {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(points.data());
-  cloud.width = static_cast<std::size_t>(width);
-  cloud.height = static_cast<std::size_t>(height);
-  cloud.point_step = sizeof(Eigen::Vector3f);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
-  return cloud;
+  return packed_cloud(reinterpret_cast<const float*>(points.data()),
+                      static_cast<std::size_t>(width), static_cast<std::size_t>(height));
 }
 
 Simulation::Simulation(const RobotDescription& robot, const ArmConfig& arm,

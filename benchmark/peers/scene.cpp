@@ -1,25 +1,33 @@
 #include "peers/scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <random>
 
 #include "ist_proximity/geometry/shapes.h"
 
 namespace ist::benchmark {
 
 RawCloud Frame::raw() const {
-  RawCloud cloud;
+  RawCloud cloud = packed_cloud(data.data(), width, height, 4);
   // The frame does not change while its snapshots are queried.
   cloud.owner = std::shared_ptr<const void>(std::shared_ptr<void>(), data.data());
-  cloud.data = reinterpret_cast<const std::uint8_t*>(data.data());
-  cloud.width = width;
-  cloud.height = height;
-  cloud.point_step = 4 * sizeof(float);
-  cloud.row_step = width * cloud.point_step;
-  cloud.x = 0;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
   return cloud;
+}
+
+Frame shuffled(const Frame& frame) {
+  std::vector<std::size_t> order(frame.width * frame.height);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
+  Frame result = frame;
+  result.width = order.size();
+  result.height = 1;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
+  }
+  return result;
 }
 
 void Points::read(const Frame& frame) {

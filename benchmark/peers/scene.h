@@ -26,6 +26,9 @@ struct Frame {
   RawCloud raw() const;
 };
 
+/// The same points in one row, in an order that is random and always the same.
+Frame shuffled(const Frame& frame);
+
 /// The finite points of a frame, in the fixed frame. Most methods start from them.
 struct Points {
   std::vector<float> x, y, z;  ///< [m]

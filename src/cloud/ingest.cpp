@@ -1,5 +1,6 @@
 #include "ist_proximity/cloud/ingest.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <sstream>
@@ -24,6 +25,24 @@ void require(bool valid, const char* member, double value, const char* range) {
                               std::to_string(value) + ", it must be " + range + ".");
 }
 
+void check(const ViewFilterConfig& view) {
+  const auto is_positive = [](double value) { return value > 0.0 && std::isfinite(value); };
+  const auto is_not_negative = [](double value) { return value >= 0.0 && std::isfinite(value); };
+  const RangeNoise& noise = view.noise;
+  require(is_not_negative(noise.constant), "view.noise.constant", noise.constant, "0 or more");
+  require(is_not_negative(noise.quadratic), "view.noise.quadratic", noise.quadratic, "0 or more");
+  require(is_positive(view.position_error), "view.position_error", view.position_error,
+          "more than 0");
+  require(is_positive(view.angle_error), "view.angle_error", view.angle_error, "more than 0");
+  require(is_not_negative(view.model_error), "view.model_error", view.model_error, "0 or more");
+  require(is_not_negative(view.time_error), "view.time_error", view.time_error, "0 or more");
+  require(is_not_negative(view.mixed_pixels), "view.mixed_pixels", view.mixed_pixels, "0 or more");
+}
+
+double farthest_point(const IngestConfig& config) {
+  return std::min(config.max_range, config.extent.max_range);
+}
+
 void check(const IngestConfig& config) {
   require(config.min_range >= 0.0 && std::isfinite(config.min_range), "min_range", config.min_range,
           "0 or more");
@@ -33,7 +52,11 @@ void check(const IngestConfig& config) {
           "self_filter_padding", config.self_filter_padding, "0 or more");
   require(config.thinning >= kSmallestVoxel && std::isfinite(config.thinning), "thinning",
           config.thinning, "1e-9 or more");
+  if (config.self_filter_mode == SelfFilterMode::kView) check(config.view);
   require(config.max_points > 0, "max_points", 0.0, "1 or more");
+  if (config.extent.is_zero()) return;
+  const std::string fault = check_extent(config.extent, farthest_point(config));
+  if (!fault.empty()) throw std::invalid_argument("IngestConfig::extent: " + fault + ".");
 }
 
 void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestConfig& config) {
@@ -54,6 +77,34 @@ void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestCon
   }
 }
 
+// The extent of a cloud's points.
+// @throws std::invalid_argument where it follows from a camera, and the cloud is no camera's
+PointExtent extent_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
+                      const IngestConfig& config) {
+  PointExtent extent;
+  if (config.extent.is_zero()) return extent;
+  double angle = 0.0;
+  if (config.extent.footprint == ExtentConfig::Footprint::kCamera) {
+    angle = pixel_angle(cloud, config.extent.field_of_view);
+    if (!(angle > 0.0) && cloud.size() > 0) {
+      throw std::invalid_argument(
+          "the footprint of a point is asked for, but its angle is not known: the cloud has " +
+          std::to_string(cloud.width) + " x " + std::to_string(cloud.height) +
+          " points and no camera_info. Give the footprint as an angle or a radius, or for an "
+          "organized cloud the field of view.");
+    }
+  }
+  extent = point_extent(config.extent, angle > 0.0 ? angle : 0.0, farthest_point(config));
+  if (!(extent.radius(std::min(extent.max_range, kLargestRange)) <= kMaxExtent)) {
+    std::ostringstream text;
+    text << "the footprint of a pixel makes points at max_range, " << extent.max_range
+         << " m, larger than " << kMaxExtent << " m. Lower max_range.";
+    throw std::invalid_argument(text.str());
+  }
+  extent.p_FS = X_FS.translation();
+  return extent;
+}
+
 }  // namespace
 
 struct Ingest::Impl {
@@ -61,11 +112,36 @@ struct Ingest::Impl {
   RegionOfInterest region;
   PointBvhBuilder builder;
   SelfFilter self_filter;
+  std::unique_ptr<ViewFilter> view;  // null: the self-filter drops all that is within its padding
+
+  CropParameters crop_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS) const {
+    CropParameters crop = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
+    limit_to_region(region, X_FS, &crop);
+    return crop;
+  }
+
+  // Shows a cloud to the view filter, again where that has corrected the sensor's pose by much.
+  // @param organized, crop  as for X_FS; `crop` is corrected
+  void look_at_robot(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
+                     Span<const PosedSolid> robot, double stamp, CropParameters* crop) {
+    view->begin_cloud(robot, stamp);
+    bool again = true;
+    while (again) {
+      const Eigen::Isometry3d X_FC = X_FS * view->X_SC();
+      *crop = crop_of(cloud, X_FC);
+      set_axes(scene_axes(cloud, X_FC.linear(), true), crop);
+      self_filter.set_poses(robot, crop->X_FO, config.self_filter_padding);
+      again = ist::look_at_robot(cloud, *crop, &self_filter, view.get(), &builder);
+    }
+  }
 };
 
 Ingest::Ingest(const IngestConfig& config) : impl_(std::make_unique<Impl>()) {
   check(config);
   impl_->config = config;
+  if (config.self_filter_mode == SelfFilterMode::kView) {
+    impl_->view = std::make_unique<ViewFilter>(config.view, config.self_filter_padding);
+  }
 }
 
 Ingest::~Ingest() = default;
@@ -86,20 +162,32 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   const auto start = std::chrono::steady_clock::now();
   const IngestConfig& config = impl_->config;
   check(cloud, X_FS, config);
-  CropParameters crop = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
-  limit_to_region(impl_->region, X_FS, &crop);
-  const bool organized = is_organized(cloud, crop);
-  set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
-
+  const PointExtent extent = extent_of(cloud, X_FS, config);
+  CropParameters crop = impl_->crop_of(cloud, X_FS);
+  bool organized = is_organized(cloud, crop);
   SelfFilter* on_robot = nullptr;
+  ViewFilter* view = nullptr;
+  snapshot->view.is_used = false;
+  snapshot->view.links.clear();
   if (config.self_filter && !robot.empty()) {
-    impl_->self_filter.set_poses(robot, crop.X_FO, config.self_filter_padding);
     on_robot = &impl_->self_filter;
+    if (impl_->view != nullptr && is_view(cloud)) view = impl_->view.get();
+  }
+  if (view != nullptr) {
+    organized = true;  // its pixels are asked about by their places in the image
+    impl_->look_at_robot(cloud, X_FS, robot, stamp, &crop);
+    view->report(&snapshot->view);
+  } else {
+    set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
+    if (on_robot != nullptr) {
+      on_robot->set_poses(robot, crop.X_FO, config.self_filter_padding);
+    }
   }
   IngestCounts counts;
   std::size_t kept = 0;
   if (organized) {
-    kept = index_organized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept = index_organized(cloud, crop, on_robot, view, &impl_->builder, &snapshot->index.bvh(),
+                           &counts);
   } else {
     kept =
         index_unorganized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
@@ -109,6 +197,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
                         counts.outside_region - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
+  snapshot->extent = extent;
   snapshot->thinning = config.thinning;
   snapshot->region = impl_->region;
   if (config.thin) snapshot->index.bvh().set_thinning(config.thinning);

@@ -10,7 +10,8 @@ constexpr double kRounding = 1e-4;
 
 // Whether a deadline passed before the query knew whether the link is in contact.
 bool is_undecided(const LinkProximity& proximity, const QueryConfig& config) {
-  return proximity.state == LinkState::kNear && proximity.lower_bound + config.margin < -kRounding;
+  const double points_bound = proximity.lower_bound + proximity.sensor_width + config.margin;
+  return proximity.state == LinkState::kNear && points_bound < -kRounding;
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "ist_proximity/repulsion/kept_repulsion.h"
+
 namespace ist {
 namespace {
 
@@ -46,6 +48,8 @@ CycleCost measure_cycles(const Robot& robot, Span<const double> q,
   }
   ProximityQuery query(robot.model(), query_config);
   const Repulsion repulsion(robot.model());
+  std::vector<KeptRepulsion> blends;  // as the node keeps them
+  for (std::size_t i = 0; i < links; ++i) blends.emplace_back(*robot.model(), i);
   std::vector<LinkProximity> answers(links);
   CycleCost cost;
   for (std::size_t k = 0; k * joints < q.size(); ++k) {
@@ -56,7 +60,7 @@ CycleCost measure_cycles(const Robot& robot, Span<const double> q,
     query.run(poses.X_FL, poses.known, {scene}, &answers);
     const Clock::time_point middle = Clock::now();
     for (std::size_t i = 0; i < links; ++i) {
-      repulsion.wrench(i, poses.X_FL[i], {scene}, answers[i], repulsion_config);
+      blends[i].update(repulsion, poses.X_FL[i], {scene}, answers[i], repulsion_config);
     }
     cost.query.push_back(seconds(middle - begin));
     cost.repulsion.push_back(seconds(Clock::now() - middle));

@@ -1,7 +1,5 @@
 #include "ist_proximity/facade/obstacles.h"
 
-#include <cstdint>
-#include <cstring>
 #include <utility>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -10,28 +8,13 @@
 namespace ist {
 namespace {
 
-/// Points that lie one after the other.
-template <class T>
-RawCloud raw_cloud(const T* xyz, std::size_t width, std::size_t height) {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz);
-  cloud.width = width;
-  cloud.height = height;
-  cloud.point_step = 3 * sizeof(T);
-  cloud.row_step = width * cloud.point_step;
-  cloud.x = 0;
-  cloud.y = sizeof(T);
-  cloud.z = 2 * sizeof(T);
-  cloud.is_double = sizeof(T) == sizeof(double);
-  return cloud;
-}
-
 std::shared_ptr<const CloudSnapshot> index(const RawCloud& cloud, const ObstaclesConfig& config) {
   IngestConfig ingest_config;
   ingest_config.min_range = config.min_range;
   ingest_config.max_range = config.max_range;
   ingest_config.self_filter = config.robot != nullptr;
   ingest_config.self_filter_padding = config.self_filter_padding;
+  ingest_config.extent = config.extent;
   Ingest ingest(ingest_config);
   LinkPoses poses;
   std::vector<PosedSolid> robot;
@@ -50,7 +33,7 @@ std::shared_ptr<const CloudSnapshot> index_image(const T* xyz, std::size_t width
                                                  std::size_t height,
                                                  const ObstaclesConfig& config) {
   auto copy = std::make_shared<std::vector<T>>(xyz, xyz + 3 * width * height);
-  RawCloud cloud = raw_cloud(copy->data(), width, height);
+  RawCloud cloud = packed_cloud(copy->data(), width, height);
   cloud.owner = std::move(copy);
   return index(cloud, config);
 }
@@ -61,12 +44,13 @@ Obstacles::Obstacles(std::shared_ptr<const CloudSnapshot> snapshot)
     : snapshot_(std::move(snapshot)) {}
 
 Obstacles::Obstacles(Span<const Eigen::Vector3f> points, const ObstaclesConfig& config)
-    : Obstacles(index(raw_cloud(reinterpret_cast<const float*>(points.data()), points.size(), 1),
+    : Obstacles(index(packed_cloud(reinterpret_cast<const float*>(points.data()), points.size(), 1),
                       config)) {}
 
 Obstacles::Obstacles(Span<const Eigen::Vector3d> points, const ObstaclesConfig& config)
-    : Obstacles(index(raw_cloud(reinterpret_cast<const double*>(points.data()), points.size(), 1),
-                      config)) {}
+    : Obstacles(index(
+          packed_cloud(reinterpret_cast<const double*>(points.data()), points.size(), 1), config)) {
+}
 
 Obstacles Obstacles::from_image(const float* xyz, std::size_t width, std::size_t height,
                                 const ObstaclesConfig& config) {

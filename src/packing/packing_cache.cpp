@@ -55,7 +55,8 @@ std::string temporary_name(const std::string& path) {
 // Whether a file has a name as temporary_name() makes them.
 bool is_temporary(const fs::path& path) {
   return path.extension() == kTemporary &&
-         path.filename().string().find(".istpack.") != std::string::npos;
+         (path.filename().string().find(".istpack.") != std::string::npos ||
+          path.filename().string().find(".istpairs.") != std::string::npos);
 }
 
 // Removes the temporary files that writers which were killed have left in a folder. Others, and
@@ -123,22 +124,29 @@ std::optional<Packing> PackingCache::load(const std::string& key, const Shape& s
   return std::nullopt;
 }
 
+std::string write_cache_file(const std::string& directory, const std::string& file_name,
+                             const std::string& bytes) {
+  const std::string temporary = temporary_name(file_name);
+  std::error_code error;
+  fs::create_directories(directory, error);
+  remove_stale(directory);
+  std::string problem = error ? error.message() : write_synced(temporary, bytes);
+  if (problem.empty()) {
+    fs::rename(temporary, file_name, error);
+    if (!error) return "";
+    problem = error.message();
+  }
+  unlink(temporary.c_str());
+  return problem;
+}
+
 bool PackingCache::store(const std::string& key, const Packing& packing,
                          std::string* warning) const {
   if (directory_.empty()) return true;
   const std::string file_name = path(key);
-  const std::string temporary = temporary_name(file_name);
-  std::error_code error;
-  fs::create_directories(directory_, error);
-  remove_stale(directory_);
-  std::string problem =
-      error ? error.message() : write_synced(temporary, serialize_packing(key, packing));
-  if (problem.empty()) {
-    fs::rename(temporary, file_name, error);
-    if (!error) return true;
-    problem = error.message();
-  }
-  unlink(temporary.c_str());
+  const std::string problem =
+      write_cache_file(directory_, file_name, serialize_packing(key, packing));
+  if (problem.empty()) return true;
   *warning = "packing cache file '" + file_name + "' cannot be written (" + problem +
              "); the packing will be computed again next time";
   return false;

@@ -37,6 +37,7 @@ struct LeafPair {
   std::int32_t leaf_index, tile_index;
   const PosedCenters& centers;
   float plane_offset;  // [m] of the leaf's supporting plane
+  float radius;        // [m] largest of the tile's points; 0 without extents
   const PlaneFrame& planes;
 };
 
@@ -44,7 +45,8 @@ struct LeafPair {
 //   float Limit() const;                      pairs whose bound is not below it are pruned
 //   bool IsSettled() const;                   nothing that is left can matter
 //   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the search ends
-//   float BoundOfBox(const Pair&);            a bound that prunes the pair, or -inf
+//   float BoundOfBox(const Pair&, radius);    a bound that prunes the pair, or -inf
+//   kHasExtent, float LargestRadius(const Pair&)   where obstacles have a radius, see Radius()
 //   float Visit(const LeafPair<Tile>&);       returns the least lower bound of the tile's points
 //   float pruned_bound                        [m] least bound of what it pruned itself
 template <class Visitor, class Bvh>
@@ -80,8 +82,9 @@ class DualTree {
   void Traverse() {
     while (!stack_.empty()) {
       const Pair pair = stack_.pop();
-      if (!(pair.bound < visitor_.Limit())) {
-        PrunePair(pair);
+      const float radius = Radius(pair);
+      if (!(pair.bound < Limit(radius))) {
+        PrunePair(pair, radius);
         continue;
       }
       if (visitor_.IsSettled()) {
@@ -93,27 +96,47 @@ class DualTree {
       }
       if (visitor_.Stops(++node_pairs_, &planes_)) {
         stopped_ = is_cut_short_ = true;
-        Prune(pair.bound);
-        while (!stack_.empty()) Prune(stack_.pop().bound);
+        Prune(Less(pair.bound, radius));
+        while (!stack_.empty()) {
+          const Pair left = stack_.pop();
+          Prune(Less(left.bound, Radius(left)));
+        }
         return;
       }
-      const float bound_of_box = visitor_.BoundOfBox(pair);
+      const float bound_of_box = visitor_.BoundOfBox(pair, radius);
       if (bound_of_box > pair.bound) {
-        Prune(bound_of_box);
-        if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, bound_of_box);
+        const float bound = Less(bound_of_box, radius);
+        Prune(bound);
+        if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, bound);
         continue;
       }
-      Expand(pair);
+      Expand(pair, radius);
     }
   }
 
-  void Expand(const Pair& pair) {
+  // Where obstacles have extents, whatever is pruned or kept in the front is the bound of their
+  // spheres: the bound of a pair less the largest radius in its box. Pairs on the stack carry the
+  // bounds of the obstacles themselves. Without extents, the three do nothing.
+  HWY_INLINE float Radius(const Pair& pair) const {
+    if constexpr (Visitor::kHasExtent) return visitor_.LargestRadius(pair);
+    return 0.0F;
+  }
+  HWY_INLINE float Limit(float radius) const {
+    if constexpr (Visitor::kHasExtent) return visitor_.Limit() + radius;
+    return visitor_.Limit();
+  }
+  HWY_INLINE static float Less(float bound, float radius) {
+    if constexpr (Visitor::kHasExtent) return bound - radius;
+    return bound;
+  }
+
+  void Expand(const Pair& pair, float radius) {
     if (pair.sphere < 0 && pair.box < 0) {
-      VisitLeaves(pair);
+      VisitLeaves(pair, radius);
     } else if (pair.sphere < 0 || (pair.box >= 0 && BoxIsLarger(pair))) {
-      ExpandBox(pair);
+      ExpandBox(pair, radius);
     } else {
-      ExpandSphere(pair);
+      ExpandSphere(pair, radius);
     }
   }
 
@@ -209,9 +232,10 @@ class DualTree {
   void Prune(float bound) { pruned_bound_ = std::min(pruned_bound_, bound); }
 
   // Prunes a pair that was pushed before the limit fell.
-  void PrunePair(const Pair& pair) {
-    Prune(pair.bound);
-    if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, pair.bound);
+  void PrunePair(const Pair& pair, float radius) {
+    const float bound = Less(pair.bound, radius);
+    Prune(bound);
+    if (pair.parent >= 0) front_->prune(pair.parent / kBoxWidth, bound);
   }
 
   // Prunes some children of a pair.
@@ -272,7 +296,7 @@ class DualTree {
     return ChildSupports(slot / kSphereWidth)[slot % kSphereWidth];
   }
 
-  void ExpandSphere(const Pair& pair) {
+  void ExpandSphere(const Pair& pair, float radius) {
     const std::int32_t front_index = EnterFront(pair);
     const std::uint32_t expanded = ExpandedChildren(front_index);
     const SphereNode& node = nodes_[pair.sphere];
@@ -284,8 +308,8 @@ class DualTree {
     PoseCenters(in_, node.x, node.y, node.z, &centers);
     alignas(64) float bound[kSphereWidth];
     const ChildrenBelow children = BoundSphereChildren(
-        pair, node, centers, support, planes_, in_.rounding, visitor_.Limit(), expanded, bound);
-    PruneChildren(front_index, children.pruned_bound);
+        pair, node, centers, support, planes_, in_.rounding, Limit(radius), expanded, bound);
+    PruneChildren(front_index, Less(children.pruned_bound, radius));
     PushChildren(pair, front_index, children.bits, bound, [&](int k, Pair* child) {
       child->sphere_slot = pair.sphere * kSphereWidth + k;
       child->sphere = node.child[k];
@@ -296,19 +320,19 @@ class DualTree {
     });
   }
 
-  void ExpandBox(const Pair& pair) {
+  void ExpandBox(const Pair& pair, float radius) {
     const std::int32_t front_index = EnterFront(pair);
     const std::uint32_t expanded = ExpandedChildren(front_index);
     alignas(64) float bound[kBoxWidth];
     const ChildrenBelow children =
         BoundBoxChildren(pair, box_nodes_[pair.box], SupportOfSlot(pair.sphere_slot), planes_,
-                         in_.rounding, visitor_.Limit(), expanded, bound);
-    PruneChildren(front_index, children.pruned_bound);
+                         in_.rounding, Limit(radius), expanded, bound);
+    PruneChildren(front_index, Less(children.pruned_bound, radius));
     PushChildren(pair, front_index, children.bits, bound,
                  [&](int k, Pair* child) { SetBox(pair.box * kBoxWidth + k, child); });
   }
 
-  HWY_INLINE void VisitLeaves(const Pair& pair) {
+  HWY_INLINE void VisitLeaves(const Pair& pair, float radius) {
     ++leaf_pairs_;
     const std::int32_t front_index = EnterFront(pair);
     const SphereLeaf& leaf = leaves_[~pair.sphere];
@@ -318,8 +342,8 @@ class DualTree {
     const typename Bvh::Tile& tile = in_.bvh->tile(static_cast<std::size_t>(~pair.box), &scratch);
     const float plane_offset = planes_.offset() + SupportOfSlot(pair.sphere_slot);
     const float least = visitor_.Visit(LeafPair<typename Bvh::Tile>{
-        leaf, tile, ~pair.sphere, ~pair.box, centers, plane_offset, planes_});
-    if (front_index >= 0) front_->prune(front_index, least);
+        leaf, tile, ~pair.sphere, ~pair.box, centers, plane_offset, radius, planes_});
+    if (front_index >= 0) front_->prune(front_index, Less(least, radius));
   }
 
   const DualTreeInput<Bvh>& in_;

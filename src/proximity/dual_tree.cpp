@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "proximity/dual_tree-inl.h"
+#include "proximity/extent_refinement.h"
 #include "proximity/refinement.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -41,6 +42,8 @@ HWY_INLINE hn::Vec<BoxTag> LeastDistance(const LeafPair<Tile>& pair, const float
 template <class Policy, class Bvh>
 class RefiningVisitor {
  public:
+  static constexpr bool kHasExtent = Policy::kHasExtent;
+
   RefiningVisitor(const DualTreeInput<Bvh>& input, Policy* policy)
       : in_(input), policy_(*policy), prune_bound_(input.prune_bound) {}
 
@@ -59,17 +62,24 @@ class RefiningVisitor {
   }
 
   // A bound of the pair's box for the whole link, if it makes the pair prunable; else -inf.
-  HWY_INLINE float BoundOfBox(const Pair& pair) {
+  HWY_INLINE float BoundOfBox(const Pair& pair, float radius) {
     if (pair.box_slot < 0) return -std::numeric_limits<float>::infinity();
     const float bound = policy_.bound_box(pair.box_slot, pair.box, pair.min, pair.max);
-    return bound >= prune_bound_ ? bound : -std::numeric_limits<float>::infinity();
+    return bound >= PruneBound(radius) ? bound : -std::numeric_limits<float>::infinity();
+  }
+
+  // [m] No obstacle in a pair's box has a larger radius.
+  HWY_INLINE float LargestRadius(const Pair& pair) const {
+    return policy_.largest_radius(pair.box_slot, pair.min, pair.max);
   }
 
   template <class Tile>
   HWY_INLINE float Visit(const LeafPair<Tile>& pair) {
     const BoxTag d;
     alignas(64) float bound[kBoxWidth];
-    const auto limit = hn::Set(d, Limit());
+    float visit_limit = Limit();
+    if constexpr (kHasExtent) visit_limit += pair.radius;
+    const auto limit = hn::Set(d, visit_limit);
     bool is_near = false;
     for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
       const auto least = LeastDistance(pair, pair.leaf.cover_radius, k);
@@ -83,9 +93,9 @@ class RefiningVisitor {
     }
     const float least_bound = hn::GetLane(hn::MinOfLanes(d, least));
     if (is_near) {
-      RefineTile(pair.tile_index, pair.tile.count, bound);
+      RefineTile(pair.tile_index, pair.tile.count, bound, pair.radius);
     } else {
-      Prune(least_bound);
+      Prune(least_bound, pair.radius);
     }
     return least_bound;
   }
@@ -94,7 +104,14 @@ class RefiningVisitor {
   bool may_be_inside() const { return may_be_inside_; }
 
  private:
-  void Prune(float bound) { pruned_bound_ = std::min(pruned_bound_, bound); }
+  HWY_INLINE float PruneBound(float radius) const {
+    if constexpr (kHasExtent) return prune_bound_ + radius;
+    return prune_bound_;
+  }
+  HWY_INLINE void Prune(float bound, float radius) {
+    if constexpr (kHasExtent) bound -= radius;
+    pruned_bound_ = std::min(pruned_bound_, bound);
+  }
 
   // Raises the bounds to those of the clipped spheres.
   template <class Tile>
@@ -130,27 +147,27 @@ class RefiningVisitor {
   }
 
   // The most promising point first: it may spare the others.
-  void RefineTile(std::int32_t tile, int count, const float* bound) {
+  void RefineTile(std::int32_t tile, int count, const float* bound, float radius) {
     int first = 0;
     for (int k = 1; k < count; ++k) first = bound[k] < bound[first] ? k : first;
-    RefinePoint(tile, first, bound[first]);
+    RefinePoint(tile, first, bound[first], radius);
     for (int k = 0; k < count; ++k) {
-      if (k != first) RefinePoint(tile, k, bound[k]);
+      if (k != first) RefinePoint(tile, k, bound[k], radius);
     }
   }
 
-  HWY_INLINE void RefinePoint(std::int32_t tile, int k, float bound) {
+  HWY_INLINE void RefinePoint(std::int32_t tile, int k, float bound, float radius) {
     const bool is_near = bound <= in_.inside_bound;
     if (is_near && !policy_.is_outside(tile, k)) {
       may_be_inside_ = true;
-    } else if (is_near || bound < prune_bound_) {
+    } else if (is_near || bound < PruneBound(radius)) {
       const float prune_bound = policy_.refine(tile, k, bound);
       if (prune_bound < prune_bound_) {
         prune_bound_ = prune_bound;
         next_planes_ = node_pairs_ + kPairsBeforePlanes;
       }
     } else {
-      Prune(bound);
+      Prune(bound, radius);
     }
   }
 
@@ -165,12 +182,16 @@ class RefiningVisitor {
 // Finds the box that is nearest to the inner spheres.
 class InnerVisitor {
  public:
+  static constexpr bool kHasExtent = false;
+
   explicit InnerVisitor(float prune_bound) : prune_bound_(prune_bound) {}
 
   float Limit() const { return std::min(prune_bound_, nearest_.distance); }
   bool IsSettled() const { return false; }
   bool Stops(std::uint64_t /*node_pairs*/, PlaneFrame* /*planes*/) const { return false; }
-  static float BoundOfBox(const Pair& /*pair*/) { return -std::numeric_limits<float>::infinity(); }
+  static float BoundOfBox(const Pair& /*pair*/, float /*radius*/) {
+    return -std::numeric_limits<float>::infinity();
+  }
 
   template <class Tile>
   HWY_INLINE float Visit(const LeafPair<Tile>& pair) {
@@ -216,6 +237,16 @@ DualTreeResult DualTreeSearchBoxes(const DualTreeInput<BoxBvh>& input, BoxRefine
   return dual_tree::Search(input, policy);
 }
 
+DualTreeResult DualTreeSearchPointExtents(const DualTreeInput<PointBvh>& input,
+                                          PointExtentRefinement* policy) {
+  return dual_tree::Search(input, policy);
+}
+
+DualTreeResult DualTreeSearchBoxExtents(const DualTreeInput<BoxBvh>& input,
+                                        BoxExtentRefinement* policy) {
+  return dual_tree::Search(input, policy);
+}
+
 NearestToInnerSpheres DualTreeNearestToInnerSpheres(const DualTreeInput<BoxBvh>& input) {
   dual_tree::InnerVisitor visitor(input.prune_bound);
   dual_tree::DualTree<dual_tree::InnerVisitor, BoxBvh> traversal(input, &visitor);
@@ -235,6 +266,8 @@ namespace ist {
 
 HWY_EXPORT(DualTreeSearchPoints);
 HWY_EXPORT(DualTreeSearchBoxes);
+HWY_EXPORT(DualTreeSearchPointExtents);
+HWY_EXPORT(DualTreeSearchBoxExtents);
 HWY_EXPORT(DualTreeNearestToInnerSpheres);
 
 DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input, PointRefinement* policy) {
@@ -243,6 +276,15 @@ DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input, PointRefin
 
 DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxRefinement* policy) {
   return HWY_DYNAMIC_DISPATCH(DualTreeSearchBoxes)(input, policy);
+}
+
+DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input,
+                                PointExtentRefinement* policy) {
+  return HWY_DYNAMIC_DISPATCH(DualTreeSearchPointExtents)(input, policy);
+}
+
+DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxExtentRefinement* policy) {
+  return HWY_DYNAMIC_DISPATCH(DualTreeSearchBoxExtents)(input, policy);
 }
 
 NearestToInnerSpheres find_nearest_to_inner_spheres(const DualTreeInput<BoxBvh>& input) {

@@ -13,6 +13,8 @@ namespace ist {
 
 class PointRefinement;
 class BoxRefinement;
+class PointExtentRefinement;
+class BoxExtentRefinement;
 
 /// The input of a dual-tree traversal: a link's Inner Sphere Tree, posed, and the BVH of an index,
 /// in the index's frame O, all in float. Lower bounds of the traversal have an error of `rounding`,
@@ -53,9 +55,19 @@ struct DualTreeResult {
 ///   changed bool deadline_passed();
 ///   bool is_crowded(std::uint64_t node_pairs);  // too many points had to be measured: the
 ///   traversal is stopped
-/// PointRefinement and BoxRefinement are the two there are (refinement.h).
+///   kHasExtent   // whether obstacles are spheres about points, or boxes that are larger on all
+///   sides, for which
+///   float largest_radius(std::int32_t slot, const float* min, const float* max);
+///                  // bounds the radii in a box; `slot` is negative where the box is not known
+/// With extents, the prune bound and DualTreeResult::pruned_bound are those of the spheres, and
+/// what refine() and bound_box() get and return for a single obstacle or box is without a radius.
+/// PointRefinement and BoxRefinement search without extents (refinement.h), PointExtentRefinement
+/// and BoxExtentRefinement with them (extent_refinement.h).
 DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input, PointRefinement* policy);
 DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxRefinement* policy);
+DualTreeResult search_dual_tree(const DualTreeInput<PointBvh>& input,
+                                PointExtentRefinement* policy);
+DualTreeResult search_dual_tree(const DualTreeInput<BoxBvh>& input, BoxExtentRefinement* policy);
 
 /// The box that is nearest to the inner spheres, if nearer than the prune bound.
 struct NearestToInnerSpheres {

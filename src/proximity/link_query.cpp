@@ -53,8 +53,9 @@ int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
 
 }  // namespace
 
-void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryConfig& config,
-                      double other_links, QueryStatistics* statistics) {
+void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneId scene,
+                      const QueryConfig& config, const OtherLinks& other_links,
+                      QueryStatistics* statistics) {
   LinkSearch& search = link_.search;
   const auto& answered = link_.kept.answered;
   const RigidPose rigid = nearest_rigid(X_FL);
@@ -63,7 +64,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.drift = rigid.drift;
   search.scene = scene;
   search.config = config;
-  search.other_links = other_links;
+  search.other_links = other_links.distance;
   search.statistics = statistics;
   search.closest = ClosestObstacle();
   search.refined_bound = kInfinity;
@@ -76,8 +77,9 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryC
   search.is_counted = false;
   search.first_bound = -kInfinity;
   search.is_answered = scene != kUnknownScene && answered.scene == scene &&
-                       other_links == kInfinity && answers(answered.config, config) &&
+                       other_links.distance == kInfinity && answers(answered.config, config) &&
                        answered.X_FL.matrix() == X_FL.matrix();
+  begin_extents(clouds, other_links.extents);
   if (search.is_answered) static_cast<SearchResult&>(search) = answered.result;
 }
 
@@ -87,6 +89,7 @@ void LinkQuery::tighten(const QueryConfig& config) {
   search.is_answered = false;
   search.config = config;
   search.first_bound = search.lower_bound();
+  search.first_extent_bound = search.extents.lower_bound;
   search.refined_bound = kInfinity;
   search.pruned_bound = -link_.context.tree().radius();
   search.is_complete = false;
@@ -98,15 +101,21 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
     count_outside_region();
     return true;
   }
-  if (is_settled(clouds)) {
-    keep_answer();
-    return true;
-  }
+  search.deadline = deadline;
+  const bool has_points = search_points(clouds, deadline);
+  const bool has_extents = bound_extents(clouds, deadline);
+  if (has_points && has_extents) keep_answer();
+  return has_points && has_extents;
+}
+
+// @returns false: the deadline passed before the points were known to the tolerance
+bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
+  LinkSearch& search = link_.search;
+  if (is_settled(clouds)) return true;
   if (deadline->passed()) {
     take_kept_bound();
     return false;
   }
-  search.deadline = deadline;
   const double distance = search.closest.exact.distance;
   link_.context.grid.set_distance(distance < kInfinity ? distance : 0.0);
   search.pruned_bound = search.cover_bound = kInfinity;
@@ -124,7 +133,6 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   search.is_complete = !stopped;
   if (search.is_complete) {
     keep_bound();
-    keep_answer();
   } else {
     take_kept_bound();
   }
@@ -347,12 +355,15 @@ DualTreeInput<Bvh> LinkQuery::dual_tree_input(const PosedIndex<Bvh>& obstacles) 
   input.planes = supporting_planes(obstacles.X_OL, link_);
   return input;
 }
+template DualTreeInput<PointBvh> LinkQuery::dual_tree_input(const PointObstacles& obstacles);
+template DualTreeInput<BoxBvh> LinkQuery::dual_tree_input(const BoxObstacles& obstacles);
 
 // Accounts for the rounding in the frame of an index.
 template <class Obstacles>
 void LinkQuery::enter(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
-  const double range = search.config.max_distance + search.config.margin, extent = this->extent();
+  const double range = search.config.max_distance + search.config.margin + search.extent_range;
+  const double extent = this->extent();
   const double coordinate = obstacles.X_OL.translation().cwiseAbs().maxCoeff() + extent;
   search.max_coordinate = std::max(search.max_coordinate, coordinate);
   const double lever = obstacles.X_OL.translation().norm() + extent + obstacles.drift_lever;
@@ -361,6 +372,8 @@ void LinkQuery::enter(const Obstacles& obstacles) {
       std::max(search.rounding, kFloatError * (coordinate + range) +
                                     pose_error(search.drift, extent, range) + search.index_error);
 }
+template void LinkQuery::enter(const PointObstacles& obstacles);
+template void LinkQuery::enter(const BoxObstacles& obstacles);
 
 double LinkQuery::extent() const {
   const InnerSphereTree& tree = link_.context.tree();
@@ -413,6 +426,7 @@ void LinkQuery::set_link(const LinkModel& link) {
   context.displacement = DisplacementBound(link);
   LinkCoherence& kept = link_.kept;
   kept.bound.set_link(link);
+  kept.extents.set_link(link);
   kept.nodes.forget();
   kept.fronts.forget();
   kept.answered.scene = kUnknownScene;
@@ -437,9 +451,8 @@ double LinkQuery::answer_error(double distance) const {
          pose_error(search.drift, extent(), distance) + search.index_error;
 }
 
-double LinkQuery::proven_bound() const {
+double LinkQuery::proven(double bound) const {
   const LinkSearch& search = link_.search;
-  const double bound = search.lower_bound();
   if (bound == kInfinity) return bound;
   return bound - answer_error(bound) - search.config.margin;
 }
@@ -451,7 +464,7 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   last.build_id = 0;
   const ClosestObstacle& closest = search.closest;
   const double distance = closest.exact.distance;
-  if (distance > search.range()) {
+  if (distance > search.range() || is_clear_of_extents()) {
     // UNKNOWN where nothing was measured and not all is known.
     if (!search.is_complete || !is_inside_regions()) return;
     result->state = LinkState::kClear;
@@ -469,6 +482,14 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   result->distance = distance;
   // Points that could be nearer have coordinates no larger than this one's bound.
   result->lower_bound = search.lower_bound() - answer_error(distance) - search.config.margin;
+  result->margin = search.config.margin;
+  if (search.has_extents) {
+    // Spheres that could be nearer have centres farther than that by their radius.
+    const double points_bound = result->lower_bound;
+    result->lower_bound = points_bound - (search.lower_bound() - search.extent_bound()) -
+                          answer_error(search.extent_range);
+    result->sensor_width = points_bound - result->lower_bound;
+  }
   result->p_LCl = closest.exact.witness;
   result->p_FCl = search.X_FL * closest.exact.witness;
   result->p_FCo = closest.p_FCo;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "proximity/dual_tree.h"
+#include "proximity/extent_refinement.h"
 #include "proximity/link_query_state.h"
 
 namespace ist {
@@ -20,12 +21,16 @@ class LinkQuery {
 
   /// Sets what is asked.
   /// @param X_FL         link frame -> fixed frame, rigid
-  /// @param scene        the identity of the clouds that run() will get
-  /// @param other_links  [m] the upper bound of other links: this link's distance matters only
-  /// where
+  /// @param clouds       the ones that run() will get
+  /// @param scene        their identity
+  /// @param other_links  the upper bounds of other links: this link's distance matters only where
   ///                     it is less; inf: it matters
-  void begin(const Eigen::Isometry3d& X_FL, SceneId scene, const QueryConfig& config,
-             double other_links, QueryStatistics* statistics);
+  struct OtherLinks {
+    double distance = std::numeric_limits<double>::infinity();  ///< [m]
+    double extents = std::numeric_limits<double>::infinity();   ///< [m] of obstacles' spheres
+  };
+  void begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneId scene,
+             const QueryConfig& config, const OtherLinks& other_links, QueryStatistics* statistics);
 
   /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a
   /// point that is near to where it was.
@@ -44,13 +49,24 @@ class LinkQuery {
 
   /// [m] Upper bound of the distance; inf: nothing was found.
   double distance() const { return link_.search.closest.exact.distance; }
-  /// [m] Lower bound of the distance, with every error and the margin taken off; inf where nothing
-  /// is in range.
-  double proven_bound() const;
+  /// [m] Upper bound of the distance to the spheres that obstacles stand for.
+  double extent_distance() const {
+    return link_.search.has_extents ? link_.search.extents.upper : distance();
+  }
+  /// [m] How far apart these bounds of the spheres are.
+  double extent_width() const {
+    const ExtentResult& extents = link_.search.extents;
+    return link_.search.has_extents ? extents.upper - extents.lower_bound : 0.0;
+  }
+  /// [m] Lower bound of the distance to obstacles' spheres, with every error and the margin taken
+  /// off; inf where nothing is in range.
+  double proven_bound() const { return proven(link_.search.extent_bound()); }
+  /// [m] The same for the obstacles without their extents.
+  double proven_points_bound() const { return proven(link_.search.lower_bound()); }
   /// After run(): whether the clouds' regions of interest hold all that this link has to know.
   bool is_inside_regions() const {
-    return link_.search.region_bound >=
-           link_.search.config.max_distance + link_.search.config.margin;
+    return link_.search.region_bound >= link_.search.config.max_distance +
+                                            link_.search.config.margin + link_.search.extent_range;
   }
 
   /// Takes the same link of another model, with the same geometry and perhaps another packing. All
@@ -61,6 +77,8 @@ class LinkQuery {
   void forget() { link_.kept.forget(); }
 
  private:
+  bool search_points(SnapshotSpan clouds, Deadline* deadline);
+  double proven(double bound) const;
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
   void keep_bound();
@@ -93,6 +111,20 @@ class LinkQuery {
   void measure_closest(const Obstacles& obstacles);
   template <class Bvh>
   DualTreeInput<Bvh> dual_tree_input(const PosedIndex<Bvh>& obstacles);
+
+  // The spheres that obstacles stand for; see link_query_extent.cpp.
+  void begin_extents(SnapshotSpan clouds, double other_extents);
+  bool bound_extents(SnapshotSpan clouds, Deadline* deadline);
+  double radius_of_closest(SnapshotSpan clouds) const;
+  bool is_clear_of_extents() const;
+  double contact_bound(SnapshotSpan clouds, double points, double limit);
+  void measure_extent_again(SnapshotSpan clouds, ExtentSearch* spheres);
+  bool search_extents(SnapshotSpan clouds, ExtentSearch* spheres);
+  template <class Obstacles, class ExtentRefinement>
+  bool search_extents(const Obstacles& obstacles, ExtentRefinement* refinement,
+                      ExtentSearch* spheres);
+  template <class Visit>
+  bool for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentSearch* spheres);
 
   LinkQueryState link_;
 };

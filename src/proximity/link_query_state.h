@@ -13,6 +13,7 @@
 #include "proximity/box_bounds.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
+#include "proximity/coherence/extent_bound.h"
 #include "proximity/coherence/link_bound.h"
 #include "proximity/coherence/node_bounds.h"
 #include "proximity/posed_index.h"
@@ -44,9 +45,16 @@ struct ClosestObstacle {
   bool is_box = false;
 };
 
+/// The result for the spheres that obstacles stand for (PointExtent).
+struct ExtentResult {
+  double lower_bound = -std::numeric_limits<double>::infinity();  ///< [m] no sphere is nearer
+  double upper = std::numeric_limits<double>::infinity();         ///< [m] some sphere is that near
+};
+
 /// The result of a query.
 struct SearchResult {
   ClosestObstacle closest;
+  ExtentResult extents;         ///< used where obstacles have extents
   double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured
   double refined_bound = 0.0;   ///< [m] the same of what was measured, to within the tolerance
   double cover_bound = 0.0;     ///< [m] no point is nearer to the clipped cover spheres
@@ -61,9 +69,11 @@ struct SearchResult {
 /// The part that is kept from one query to the next. It speeds queries up and never changes what an
 /// answer promises.
 struct LinkCoherence {
-  explicit LinkCoherence(const LinkModel& link) : bound(link), nodes(link), supports(link.tree) {}
+  explicit LinkCoherence(const LinkModel& link)
+      : bound(link), extents(link), nodes(link), supports(link.tree) {}
 
   LinkBound bound;
+  ExtentBound extents;
   NodeBounds nodes;
   BvttFronts fronts;
   DistanceCache distances;
@@ -75,6 +85,11 @@ struct LinkCoherence {
     bool has_place = false;                           ///< whether p_FCo is that of some answer
     Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
   } last;
+  /// The obstacle whose sphere was found nearest; build_id 0: none was.
+  struct {
+    std::uint64_t build_id = 0;
+    ObstacleId id;
+  } nearest_extent;
   /// [m] The distance at which too many points were about equally near for the dual-tree traversal;
   /// inf: none.
   double crowded_at = std::numeric_limits<double>::infinity();
@@ -90,8 +105,10 @@ struct LinkCoherence {
 
   void forget() {
     last.build_id = 0;
+    nearest_extent.build_id = 0;
     answered.scene = kUnknownScene;
     bound.forget();
+    extents.forget();
     nodes.forget();
     fronts.forget();
   }
@@ -108,13 +125,17 @@ struct LinkSearch : SearchResult {
   Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< the same, a rotation in double
   SceneId scene = kUnknownScene;
   QueryConfig config;
-  double other_links = 0.0;  ///< [m] upper bound of other links, below which this one matters only
+  double other_links = 0.0;   ///< [m] upper bound of other links, below which this one matters only
+  bool has_extents = false;   ///< some obstacle has one
+  double extent_range = 0.0;  ///< [m] largest radius of spheres in range
+  double other_extents = 0.0;  ///< [m] as other_links, of spheres
   Deadline* deadline = nullptr;
   QueryStatistics* statistics = nullptr;
 
-  bool is_answered = false;  ///< the question was the last one
-  bool is_counted = false;   ///< in the statistics, as outside the regions
-  double first_bound = 0.0;  ///< [m] proven before tighten()
+  bool is_answered = false;         ///< the question was the last one
+  bool is_counted = false;          ///< in the statistics, as outside the regions
+  double first_bound = 0.0;         ///< [m] proven before tighten()
+  double first_extent_bound = 0.0;  ///< [m] the same for spheres
   BoxBounds box_bounds;
   VisitedSet visited;          ///< obstacles of the index at work that were refined
   int measured = 0;            ///< points
@@ -123,16 +144,19 @@ struct LinkSearch : SearchResult {
   int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
 
   /// [m] Beyond it nothing matters.
-  double range() const { return config.max_distance + config.margin + rounding; }
+  double range() const { return config.max_distance + config.margin + extent_range + rounding; }
+  /// [m] How far below a distance its lower bound may be.
+  double width(double distance) const {
+    return std::max(config.tolerance, config.relative_tolerance * distance);
+  }
 
   /// [m] A lower bound that is not below this cannot change the answer by more than the tolerance.
   double prune_bound() const {
     const double distance = std::min(closest.exact.distance, other_links);
     if (distance > range()) return range();
-    const double width = std::max(config.tolerance, config.relative_tolerance * distance);
     // Whether any point is inside is always decided, however wide the tolerance. An obstacle that
     // only touches, at distance 0, does not decide it.
-    return distance < 0.0 ? distance - config.tolerance : std::max(distance - width, 0.0);
+    return distance < 0.0 ? distance - config.tolerance : std::max(distance - width(distance), 0.0);
   }
   /// [m] The same for lower bounds in float.
   float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }
@@ -146,6 +170,10 @@ struct LinkSearch : SearchResult {
   /// [m] No obstacle has a smaller signed distance; inf where none is in range.
   double lower_bound() const {
     return std::min({closest.exact.distance, refined_bound, pruned_bound});
+  }
+  /// [m] The same for the spheres that obstacles stand for.
+  double extent_bound() const {
+    return has_extents ? std::min(extents.lower_bound, lower_bound()) : lower_bound();
   }
 
   /// Takes an exact distance as the upper bound, if it is one. Obstacles out of range never are.

@@ -3,16 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <system_error>
-#include <thread>
+
+#include "internal/proximity/chunks.h"
 
 namespace ist {
-namespace {
-
-// Consecutive configurations that a thread takes at a time; all but the first have a warm start.
-constexpr std::size_t kChunk = 8;
-
-}  // namespace
 
 struct ProximityBatch::Impl {
   /// The query of one thread, and its buffers for one configuration.
@@ -26,25 +20,12 @@ struct ProximityBatch::Impl {
   /// @returns whether all calls returned true: no deadline passed
   template <class Answer>
   bool run(std::size_t count, const Answer& answer) {
-    std::atomic<std::size_t> next{0};
     std::atomic<bool> complete{true};
-    const auto work = [&](Worker* worker) {
-      for (std::size_t k; (k = next.fetch_add(kChunk)) < count;) {
-        const std::size_t end = std::min(k + kChunk, count);
-        for (; k < end; ++k) {
-          if (!answer(worker, k)) complete = false;
-        }
-      }
-    };
-    const std::size_t useful = std::min(workers.size(), (count + kChunk - 1) / kChunk);
-    std::vector<std::thread> others;
-    try {
-      while (others.size() + 1 < useful) others.emplace_back(work, &workers[others.size() + 1]);
-    } catch (const std::system_error&) {
-      // The system has no more threads; those that run answer all configurations.
-    }
-    work(&workers[0]);
-    for (std::thread& other : others) other.join();
+    run_in_chunks(count, workers.size(), [&](std::size_t i, Chunks* chunks) {
+      chunks->for_each([&](std::size_t k) {
+        if (!answer(&workers[i], k)) complete = false;
+      });
+    });
     return complete;
   }
 
@@ -67,8 +48,7 @@ ProximityBatch::ProximityBatch(
     const QueryConfig& config, int threads)   // other queries take it
     : impl_(std::make_unique<Impl>()) {
   impl_->links = model->links.size();
-  const std::size_t count = threads > 0 ? static_cast<std::size_t>(threads)
-                                        : std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t count = thread_count(threads);
   for (std::size_t i = 0; i < count; ++i) {
     impl_->workers.push_back({ProximityQuery(model, config),
                               std::vector<Eigen::Isometry3d>(impl_->links),

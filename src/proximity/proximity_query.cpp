@@ -22,6 +22,7 @@ void LinkProximity::reset() {
   distance = kNaN;
   lower_bound = -std::numeric_limits<double>::infinity();
   p_FCl = p_LCl = p_FCo = direction = Eigen::Vector3d::Constant(kNaN);
+  sensor_width = margin = 0.0;
   source = -1;
   point = 0;
 }
@@ -71,9 +72,12 @@ struct ProximityQuery::Impl {
   }
 
   // Counts a link that a deadline left with wider bounds than were asked for.
-  void count_unfinished(const LinkProximity& result) {
+  // @param unfinished_extent  [m] width of the bounds of obstacles' spheres
+  void count_unfinished(const LinkProximity& result, double unfinished_extent) {
     if (result.state == LinkState::kClear) return;
-    const double width = result.distance - result.lower_bound - config.margin;
+    const double width =
+        std::max(result.distance - result.lower_bound - result.sensor_width - config.margin,
+                 unfinished_extent);
     const double asked = std::max(config.tolerance, config.relative_tolerance * result.distance);
     if (width <= asked + kBoundError) return;  // false for NaN: UNKNOWN
     ++statistics.unfinished;
@@ -115,7 +119,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
       continue;
     }
     order.push_back(i);
-    impl_->links[i].begin(X_FL[i], scene, impl_->first_config(), kInfinity,
+    impl_->links[i].begin(X_FL[i], clouds, scene, impl_->first_config(), {},
                           &impl_->link_statistics[i]);
     // Many links and a new cloud may take all of a short deadline here.
     impl_->links[i].warm_start(clouds, !deadline.passed());
@@ -126,7 +130,9 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   for (const std::size_t i : order) {
     if (!is_stopped) complete = impl_->links[i].run(clouds, &deadline) && complete;
     impl_->links[i].answer(clouds, &(*results)[i]);
-    if (!complete) impl_->count_unfinished((*results)[i]);
+    if (!complete) {
+      impl_->count_unfinished((*results)[i], impl_->links[i].extent_width());
+    }
   }
   impl_->add_up_statistics();
   return complete;
@@ -140,7 +146,8 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   result->all_known = true;
   Deadline deadline(impl_->config.deadline);
   const SceneId scene = impl_->scene.identify(clouds);
-  double nearest = kInfinity, proven = kInfinity;
+  LinkQuery::OtherLinks nearest;
+  double proven = kInfinity, proven_points = kInfinity;
   std::size_t best = count;
   bool complete = true, all_in_regions = true;
   // The link that was nearest last time comes first: its upper bound prunes most of the others.
@@ -152,14 +159,16 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
       continue;
     }
     LinkQuery& link = impl_->links[i];
-    link.begin(X_FL[i], scene, impl_->config, nearest, &impl_->statistics);
+    link.begin(X_FL[i], clouds, scene, impl_->config, nearest, &impl_->statistics);
     if (best == count) link.warm_start(clouds);
     complete = impl_->links[i].run(clouds, &deadline) && complete;
     all_in_regions = all_in_regions && link.is_inside_regions();
     proven = std::min(proven, link.proven_bound());
-    if (best == count || link.distance() < nearest) {
+    proven_points = std::min(proven_points, link.proven_points_bound());
+    nearest.extents = std::min(nearest.extents, link.extent_distance());
+    if (best == count || link.distance() < nearest.distance) {
       best = i;
-      nearest = link.distance();
+      nearest.distance = link.distance();
     }
   }
   if (best == count) return complete;
@@ -167,7 +176,9 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
   LinkProximity& answer = result->nearest;
   if (answer.state == LinkState::kNear || answer.state == LinkState::kContact) {
     result->link = static_cast<std::int32_t>(best);
+    const double points = std::min(answer.lower_bound + answer.sensor_width, proven_points);
     answer.lower_bound = std::min(answer.lower_bound, proven);
+    if (answer.sensor_width > 0.0) answer.sensor_width = std::max(points - answer.lower_bound, 0.0);
     impl_->last_nearest = best;
   } else if (!complete || !all_in_regions) {
     answer.reset();
@@ -189,7 +200,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
     return true;
   }
   Deadline deadline(impl_->config.deadline);
-  impl_->links[link].begin(X_FL, impl_->scene.identify(clouds), impl_->config, kInfinity,
+  impl_->links[link].begin(X_FL, clouds, impl_->scene.identify(clouds), impl_->config, {},
                            &impl_->statistics);
   impl_->links[link].warm_start(clouds);
   const bool complete = impl_->links[link].run(clouds, &deadline);

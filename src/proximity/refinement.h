@@ -15,6 +15,8 @@ namespace ist {
 /// allocate nor throw.
 class PointRefinement {
  public:
+  static constexpr bool kHasExtent = false;
+
   PointRefinement(const PointObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
 
@@ -22,7 +24,12 @@ class PointRefinement {
   /// [m] No point in a box of the BVH is nearer, and none inside; -inf: not known.
   /// @param slot   names the box in the BVH
   /// @param child  node, or tile if negative, that the box holds
-  float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max);
+  float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max) {
+    return bound_box(slot, child, min, max, link_.search.prune_bound());
+  }
+  /// @param enough  [m] a bound that is not below this need not be better
+  float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max,
+                  double enough);
   bool is_outside(std::int32_t tile, int lane) {
     const ObstacleId id{tile, lane};
     return side(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id)) == Side::kOutside;
@@ -50,9 +57,10 @@ class PointRefinement {
   double measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
                          double max_distance = std::numeric_limits<double>::infinity());
 
- private:
+  /// By the link's grid; `enough` as above.
   SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
 
+ private:
   const PointObstacles& obstacles_;
   LinkQueryState& link_;
 };
@@ -62,6 +70,8 @@ class PointRefinement {
 /// outside as a whole; if the mesh has holes, the winding number at the box's centre decides.
 class BoxRefinement {
  public:
+  static constexpr bool kHasExtent = false;
+
   BoxRefinement(const BoxObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
 

@@ -51,7 +51,7 @@ bool PointRefinement::is_crowded(std::uint64_t node_pairs) const {
 }
 
 float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const float* min,
-                                 const float* max) {
+                                 const float* max, double enough) {
   constexpr float kNone = -std::numeric_limits<float>::infinity();
   LinkSearch& search = link_.search;
   if (search.measured < kMeasuredBeforeCells || !link_.context.solid().is_closed()) return kNone;
@@ -68,7 +68,7 @@ float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const fl
   part.center_L = obstacles_.X_LO * part.center_O;
   PointTile scratch;
   if (child < 0) part.points = &obstacles_.bvh->tile(static_cast<std::size_t>(~child), &scratch);
-  const SignedDistanceGrid::Bound bound = grid_bound(part, search.prune_bound());
+  const SignedDistanceGrid::Bound bound = grid_bound(part, enough);
   return search.box_bounds.insert(slot,
                                   bound.is_outside ? round_down(bound.signed_distance) : kNone);
 }

@@ -8,6 +8,7 @@
 #include <boost/make_shared.hpp>
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 #include <thread>
 
@@ -21,6 +22,9 @@
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
+#include "ros/input/map_message.h"
+#include "ros/input/memory_source.h"
+#include "ros/input/unknown_space.h"
 #include "ros/input/world_source.h"
 #include "ros/model/contact_loader.h"
 #include "ros/model/counted_links.h"
@@ -37,6 +41,8 @@
 #include "ros/poses/transform_listener.h"
 #include "ros/poses/transforms.h"
 #include "ros/poses/usual_period.h"
+#include "ros/services/link_pair_service.h"
+#include "ros/services/memory_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
@@ -70,6 +76,7 @@ class ProximityServer::Impl {
   ~Impl();
 
  private:
+  void add_source(const SourceConfig& config, const ros::Publisher& filtered);
   void run_cycles();
   bool wait_for_joint_states();
   void run_cycle();
@@ -93,7 +100,10 @@ class ProximityServer::Impl {
   DiagnosticsPublisher diagnostics_;
   TransformBuffer buffer_;
   TransformListener listener_;
+  SourceMemories memories_;
   CloudSources sources_;
+  std::unique_ptr<MemoryService> memory_service_;
+  std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
   ModelLoader loader_;
   ModelServices model_services_;
   LiveParameters live_;
@@ -122,6 +132,7 @@ class ProximityServer::Impl {
 
   std::unique_ptr<QueryService> query_service_;
   std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
+  std::unique_ptr<LinkPairService> link_pairs_;    ///< the same
   std::thread cycle_thread_, diagnostics_thread_;
 };
 
@@ -145,8 +156,9 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
       sources_.push_back(std::make_unique<WorldSource>(source, nh_, private_nh_, buffer_));
       continue;
     }
-    sources_.push_back(std::make_unique<CloudSource>(source, nh_, buffer_, filtered_cloud));
+    add_source(source, filtered_cloud);
   }
+  memory_service_ = std::make_unique<MemoryService>(private_nh_, memories_);
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
       ++joint_states_received_;
@@ -155,10 +167,16 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
     });
   }
   const auto live = [this] { return live_config(); };
-  query_service_ = std::make_unique<QueryService>(private_nh_, config_, sources_, buffer_, live);
+  if (config_.unknown_space != UnknownSpace::kFree) {
+    unknown_space_ =
+        std::make_unique<UnknownSpaceWatch>(memories_, buffer_, config_.query.max_distance);
+  }
+  query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
+                                                  live, unknown_space_.get());
   if (config_.self_collision.enabled) {
     self_proximity_ = std::make_unique<SelfProximity>(nh_, private_nh_, config_, buffer_,
                                                       joint_states_.get(), live);
+    link_pairs_ = std::make_unique<LinkPairService>(nh_, private_nh_, config_);
   }
   cycle_thread_ = std::thread(&Impl::run_cycles, this);
   diagnostics_thread_ = std::thread(&Impl::run_diagnostics, this);
@@ -171,8 +189,25 @@ ProximityServer::Impl::~Impl() {
   diagnostics_thread_.join();
   query_service_.reset();
   self_proximity_.reset();
+  link_pairs_.reset();
   cycle_.reset();
   joint_states_.reset();  // the listener's thread uses members that are destroyed before it
+}
+
+/// Adds a source, and what it remembers.
+void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Publisher& filtered) {
+  std::shared_ptr<SourceMemory> memory;
+  ros::Publisher map;
+  if (config.memory.enabled) {
+    map = advertise_map(&private_nh_, "memory/" + config.name);
+    memory = std::make_shared<SourceMemory>(config, buffer_,
+                                            config_.unknown_space != UnknownSpace::kFree, map);
+    memories_.push_back(memory);
+  }
+  sources_.push_back(std::make_unique<CloudSource>(config, nh_, buffer_, filtered, memory));
+  if (!memory) return;
+  const ObstacleSource& parent = *sources_.back();
+  sources_.push_back(std::make_unique<MemorySource>(parent, memory, map.getTopic()));
 }
 
 /// Waits until a joint state comes, but not for ever. Joint states that came during the last cycle
@@ -218,8 +253,9 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
-  results_.publish(message, nullptr, live_.get().speed_scale,
-                   [](ist_proximity::JointRepulsion*) {});
+  results_.publish(
+      message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
+      [] { return Eigen::AlignedBox3d(); });
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -246,15 +282,20 @@ void ProximityServer::Impl::run_cycle() {
     ++report_.cycles;
   }
   last_stamp_ = message->header.stamp;
-  assert_invariants(*message,
-                    {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
-  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
-    if (cycle_) cycle_->fill_joint_repulsion(*message, efforts);
-  };
+  const double least_when_clear = config_.unknown_space == UnknownSpace::kObstacle
+                                      ? -std::numeric_limits<double>::infinity()
+                                      : config_.query.max_distance;
+  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;
-  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion);
+  const auto fill_joint_repulsion = [&](ist_proximity::JointRepulsion* efforts) {
+    if (!cycle_) return;
+    cycle_->fill_joint_repulsion(*message, results_.summary().self_problem(), self.get(), efforts);
+  };
+  const auto robot_box = [&] { return cycle_ ? cycle_->robot_box() : Eigen::AlignedBox3d(); };
+  const bool drawn =
+      results_.publish(message, self, live.speed_scale, fill_joint_repulsion, robot_box);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
   if (cycle_) report_.parts[kPartPublish].add(watch.lap());
@@ -286,7 +327,7 @@ void ProximityServer::Impl::take_model() {
         model_, config_,
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),
                          JointPoseSource::Which::kTaken),
-        CloudSelection::Reader::kOnly);
+        CloudSelection::Reader::kOnly, unknown_space_.get());
     cycle_->continue_from(last_stamp_);
   } else {
     cycle_.reset();
@@ -298,6 +339,7 @@ void ProximityServer::Impl::take_model() {
   }
   query_service_->set_model(model_);
   if (self_proximity_) self_proximity_->set_model(model_);
+  if (link_pairs_) link_pairs_->set_model(model_);
   spheres_.show(*model_);
   set_source_targets(live_.get().query);
   root_stands_still_ = false;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <random>
 #include <utility>
@@ -33,14 +32,8 @@ std::shared_ptr<std::vector<float>> wall(float depth) {
 }
 
 RawCloud raw_cloud(const std::shared_ptr<std::vector<float>>& xyz, bool is_organized) {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz->data());
-  cloud.width = is_organized ? kWidth : kWidth * kHeight;
-  cloud.height = is_organized ? kHeight : 1;
-  cloud.point_step = 3 * sizeof(float);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
+  RawCloud cloud = is_organized ? packed_cloud(xyz->data(), kWidth, kHeight)
+                                : packed_cloud(xyz->data(), kWidth * kHeight, 1);
   cloud.owner = xyz;
   return cloud;
 }

@@ -106,16 +106,7 @@ TEST(HardCloud, OrderAndDuplicatesDoNotMatter) {
 
 template <typename Scalar>
 RawCloud raw(const std::vector<Scalar>& xyz) {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  cloud.width = xyz.size() / 3;
-  cloud.height = 1;
-  cloud.point_step = 3 * sizeof(Scalar);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.y = sizeof(Scalar);
-  cloud.z = 2 * sizeof(Scalar);
-  cloud.is_double = sizeof(Scalar) == 8;
-  return cloud;
+  return packed_cloud(xyz.data(), xyz.size() / 3, 1);
 }
 
 template <typename Scalar>

@@ -189,6 +189,32 @@ TEST(LaserScan, SelfFilterComparesABeamWithTheRobotOfItsTime) {
   }
 }
 
+// Points of one tile, all of them deep inside where the link was, for half of them at another time.
+TEST(LaserScan, SelfFilterDividesATileByTime) {
+  const auto model = test::make_model({Sphere{0.1}}, 0.005);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 16; ++i) points.emplace_back(1.0F + 1e-4F * i, 0.0F, 0.0F);
+  RawCloud raw;
+  raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
+  raw.width = points.size();
+  raw.height = 1;
+  raw.point_step = sizeof(Eigen::Vector3f);
+  raw.row_step = raw.point_step * raw.width;
+  raw.y = sizeof(float);
+  raw.z = 2 * sizeof(float);
+  IngestConfig config = test::whole_cloud();
+  config.self_filter = true;
+  PosedSolid solid{&model->links[0].tree, &model->links[0].solid};
+  solid.X_FL.translation().x() = 1.0;
+  for (const int last : {0, 7, 14, 15}) {
+    solid.last_point = static_cast<std::uint32_t>(last);
+    CloudSnapshot snapshot;
+    Ingest(config).run(raw, Eigen::Isometry3d::Identity(), {solid}, 0.0, &snapshot);
+    EXPECT_EQ(snapshot.counts.on_robot, static_cast<std::uint32_t>(last + 1));
+    EXPECT_EQ(snapshot.index.size(), points.size() - static_cast<std::size_t>(last + 1));
+  }
+}
+
 // A scan of ten seconds has 400 instants. Its 50,000 beams were compared with every link at each of
 // them, which took 200 times as long as with one.
 TEST(LaserScan, SelfFilterOfALongScanIsBounded) {

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdint>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -40,14 +39,7 @@ std::shared_ptr<std::vector<float>> depth_image(test::Rng* rng) {
 }
 
 RawCloud raw(const std::shared_ptr<std::vector<float>>& pixels) {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(pixels->data());
-  cloud.width = kWidth;
-  cloud.height = kHeight;
-  cloud.point_step = 4 * sizeof(float);
-  cloud.row_step = kWidth * cloud.point_step;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
+  RawCloud cloud = packed_cloud(pixels->data(), kWidth, kHeight, 4);
   cloud.owner = pixels;
   return cloud;
 }

@@ -22,16 +22,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 using Points = std::vector<Eigen::Vector3d>;
 
 RawCloud raw(const Points& points, std::size_t width) {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(points.data());
-  cloud.width = width;
-  cloud.height = points.size() / width;
-  cloud.point_step = sizeof(Eigen::Vector3d);
-  cloud.row_step = width * cloud.point_step;
-  cloud.y = sizeof(double);
-  cloud.z = 2 * sizeof(double);
-  cloud.is_double = true;
-  return cloud;
+  return packed_cloud(reinterpret_cast<const double*>(points.data()), width, points.size() / width);
 }
 
 Points read_all(const RawCloud& cloud) {

@@ -141,6 +141,11 @@ TEST(RepulsionFilter, recognizesNewClouds) {
   CloudSnapshot moved = map;  // the map's frame moves as the robot drives, but it is the same map
   moved.X_FM.translation().x() = 1.0;
   EXPECT_EQ(key, obstacles_key({&a, &moved}));
+  CloudSnapshot next = map;  // of the same boxes, but built anew: the map may have changed
+  auto rebuilt = std::make_shared<BoxIndex>();
+  rebuilt->build({Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 1, 1))});
+  next.boxes = rebuilt;
+  EXPECT_NE(key, obstacles_key({&a, &next}));
   for (const auto& other : {obstacles_key({&b, &map}), obstacles_key({&a}),
                             obstacles_key({&map, &a}), obstacles_key({})}) {
     EXPECT_NE(key, other);

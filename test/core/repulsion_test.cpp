@@ -191,6 +191,31 @@ TEST(Repulsion, agreesWithTheFormula) {
   }
 }
 
+// More spheres than one group of the SIMD kernel holds: each of them pushes.
+TEST(Repulsion, agreesWithTheFormulaForManySpheres) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> u(-0.4, 0.4);
+  std::vector<InnerSphere> spheres;  // a grid that does not overlap: all of them are coarse spheres
+  for (int i = 0; i < 27; ++i) {
+    spheres.push_back(sphere(0.1 * (i % 3), 0.1 * (i / 3 % 3), 0.1 * (i / 9), 0.04));
+  }
+  const Repulsion repulsion(robot_of(spheres));
+  RepulsionConfig config;
+  config.influence_distance = 1.0;
+  config.smoothing = 0.3;
+  for (int trial = 0; trial < 20; ++trial) {
+    std::vector<Vector3d> points;
+    for (int i = 0; i < 100; ++i) points.emplace_back(u(random), u(random), u(random));
+    const CloudSnapshot cloud = cloud_of(points);
+    const Eigen::Isometry3d X_FL = at({u(random), u(random), u(random)});
+    const Expected e = expected(spheres, X_FL, cloud, config.smoothing);
+    const RepulsiveWrench wrench = repulsion.wrench(0, X_FL, {&cloud}, near_by(e.nearest), config);
+    const double length = config.gain * std::min(1.0, 1.0 - e.nearest);
+    ASSERT_LT((wrench.force - length * e.blend).norm(), 2e-4) << trial;
+    ASSERT_LT((wrench.torque - length * e.torque).norm(), 2e-4) << trial;
+  }
+}
+
 // A bar slides between two walls, and past a third. With the nearest pair alone, the direction
 // would jump by 94 degrees and the vector by 0.79 in one step of 0.12 mm where two walls are
 // equally near. The blended vector changes by 0.005 at most.

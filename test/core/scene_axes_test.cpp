@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -26,15 +25,8 @@ struct Image {
   double share[3] = {};  // of the pixels that see a wall across this axis of the room
 
   RawCloud raw(bool as_list) const {
-    RawCloud cloud;
-    cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-    cloud.width = as_list ? xyz.size() / 3 : kWidth;
-    cloud.height = as_list ? 1 : kHeight;
-    cloud.point_step = 3 * sizeof(float);
-    cloud.row_step = cloud.width * cloud.point_step;
-    cloud.y = sizeof(float);
-    cloud.z = 2 * sizeof(float);
-    return cloud;
+    return as_list ? packed_cloud(xyz.data(), xyz.size() / 3, 1)
+                   : packed_cloud(xyz.data(), kWidth, kHeight);
   }
 };
 

@@ -40,14 +40,7 @@ RawCloud message_of(const Points& points_S, std::size_t width) {
     for (int i = 0; i < 3; ++i) floats->push_back(static_cast<float>(p[i]));
     floats->push_back(0.0F);
   }
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(floats->data());
-  cloud.width = width;
-  cloud.height = points_S.size() / width;
-  cloud.point_step = 4 * sizeof(float);
-  cloud.row_step = width * cloud.point_step;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
+  RawCloud cloud = packed_cloud(floats->data(), width, points_S.size() / width, 4);
   cloud.owner = floats;
   return cloud;
 }

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
+#include "proximity/motion_bound.h"
 #include "support/motions.h"
 
 namespace ist {
@@ -72,6 +74,49 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   EXPECT_LE(counts.alarms, 0.01 * counts.motions);
   EXPECT_GT(counts.contacts, counts.motions / 4) << "motions must be hard ones";
   EXPECT_GT(counts.motions - counts.contacts, counts.motions / 10);
+}
+
+// The largest displacement [m] of a point of a sphere on a body between two instants.
+double displacement(const test::Arm& arm, const test::ArmMotion& motion, std::size_t body,
+                    const Eigen::Vector3d& center, double radius, double from, double to) {
+  const Eigen::Isometry3d X_FA = test::sampled_poses(arm, motion, from)[body];
+  const Eigen::Isometry3d X_FB = test::sampled_poses(arm, motion, to)[body];
+  double largest = 0.0;
+  for (int k = 0; k < 26; ++k) {
+    const Eigen::Vector3d n(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    const Eigen::Vector3d p = center + radius * n.normalized();
+    largest = std::max(largest, (X_FA * p - X_FB * p).norm());
+  }
+  return largest;
+}
+
+// During the time that the motion bound allows, no point moves farther than the distance. A folded
+// arm unfolds: the lever of its first joint grows from nothing while the others turn.
+TEST(MotionBound, noPointMovesFarther) {
+  test::Rng rng(68);
+  double closest = 0.0;  // share of the distance that was used
+  for (int i = 0; i < test::scaled(2000); ++i) {
+    const test::Arm arm = test::random_arm(&rng);
+    const test::ArmMotion motion = test::random_motion(&rng, arm);
+    const std::size_t body = arm.bodies[static_cast<std::size_t>(test::uniform(&rng, 0.0, 0.999) *
+                                                                 static_cast<double>(arm.size()))];
+    const double start = test::uniform(&rng, 0.0, 0.5) * motion.joints.duration;
+    const std::vector<Eigen::Isometry3d> X_FB = test::sampled_poses(arm, motion, start);
+    // Every other time the sphere is about a place that an early joint does not move.
+    Eigen::Vector3d center = test::random_vector(&rng, 0.1);
+    if (i % 2 == 0) center = X_FB[body].inverse() * X_FB[arm.bodies[0]].translation();
+    const double radius = i % 3 == 0 ? 0.0 : 0.1;
+    const MotionBound bound(*arm.kinematics, motion.joints, motion.still, body, center, radius);
+    const double distance = test::uniform(&rng, 0.01, 1.0);
+    const double time = std::min(bound.time_for(distance, X_FB), motion.joints.duration - start);
+    for (const double share : {0.25, 0.5, 0.75, 1.0}) {
+      const double moved =
+          displacement(arm, motion, body, center, radius, start, start + share * time);
+      ASSERT_LE(moved, distance * (1.0 + 1e-6)) << "case " << i << ", " << share * time << " s";
+      closest = std::max(closest, moved / distance);
+    }
+  }
+  EXPECT_GT(closest, 0.9);
 }
 
 // Arguments that do not fit the model, as a request can bring about, give no time at all.

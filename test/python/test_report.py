@@ -6,7 +6,6 @@ import pathlib
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -41,21 +40,9 @@ class Page(html.parser.HTMLParser):
         self.sections[self.heading] = self.sections.get(self.heading, '') + data + ' '
 
 
-@pytest.fixture(scope='module', name='wall')
-def fixture_wall(tmp_path_factory):
-    """A wall of points in front of the arm, as ascii PLY."""
-    y, z = np.meshgrid(np.linspace(-0.5, 0.5, 40), np.linspace(0.0, 1.0, 40))
-    lines = [f'0.6 {a:.4f} {b:.4f}' for a, b in zip(y.ravel(), z.ravel())]
-    path = tmp_path_factory.mktemp('scene') / 'wall.ply'
-    path.write_text('ply\nformat ascii 1.0\n' + f'element vertex {len(lines)}\n'
-                    'property float x\nproperty float y\nproperty float z\nend_header\n'
-                    + '\n'.join(lines) + '\n')
-    return path
-
-
-def test_page(wall, tmp_path):
+def test_page(wall_ply, tmp_path):
     output = tmp_path / 'report.html'
-    result = run('--urdf', URDF, '--cloud', wall, '--output', output, '--max-error', 0.01, 0.02,
+    result = run('--urdf', URDF, '--cloud', wall_ply, '--output', output, '--max-error', 0.01, 0.02,
                  '--tolerance', 0.001, 0, '--joints', 'shoulder_pitch=0.4')
     assert result.returncode == 0, result.stderr
     page = Page(output.read_text(encoding='utf-8'))
@@ -79,13 +66,13 @@ def test_page(wall, tmp_path):
     ({'--max-error': '-1'}, 'max_error'),
     ({'--cloud': 'damaged.bag'}, 'bag'),
 ])
-def test_wrong_input(change, message, wall, tmp_path):
-    (tmp_path / 'cut.ply').write_text(wall.read_text()[:300])
+def test_wrong_input(change, message, wall_ply, tmp_path):
+    (tmp_path / 'cut.ply').write_text(wall_ply.read_text()[:300])
     (tmp_path / 'empty.urdf').write_text('<robot name="r"><link name="l"/></robot>')
     (tmp_path / 'robot.urdf.xacro').write_text(
         '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:no_such_macro/></robot>')
     (tmp_path / 'damaged.bag').write_text('#ROSBAG V2.0\nnothing')
-    arguments = {'--urdf': URDF, '--cloud': wall, '--max-error': '0.02', '--tolerance': '0.001'}
+    arguments = {'--urdf': URDF, '--cloud': wall_ply, '--max-error': '0.02', '--tolerance': '0.001'}
     for name, value in change.items():
         arguments[name] = tmp_path / value if '.' in value else value
     result = run('--output', tmp_path / 'report.html',

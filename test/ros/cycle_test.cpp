@@ -5,7 +5,6 @@
 #include <ros/time.h>
 
 #include <cmath>
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,14 +35,7 @@ RawCloud wall(float depth, std::shared_ptr<std::vector<float>>* xyz) {
     (*xyz)->push_back(0.02F * static_cast<float>(i % kWidth) - 0.64F);
     (*xyz)->push_back(0.02F * static_cast<float>(i / kWidth));
   }
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>((*xyz)->data());
-  cloud.width = kWidth;
-  cloud.height = kHeight;
-  cloud.point_step = 3 * sizeof(float);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.y = sizeof(float);
-  cloud.z = 2 * sizeof(float);
+  RawCloud cloud = packed_cloud((*xyz)->data(), kWidth, kHeight);
   cloud.owner = *xyz;
   return cloud;
 }

@@ -136,6 +136,45 @@ WRONG = [
         ],
     ),
     ({"speed_scale": 0.5}, ["~speed_scale is 0.5: a dictionary is needed"]),
+    (
+        {
+            "memory": {
+                "enabled": "yes",
+                "decay": -1,
+                "resolution": 0,
+                "max_nodes": 1e12,
+                "file": "memory.bt",
+            },
+            "unknown_space": "wall",
+        },
+        [
+            "~memory/enabled",
+            "~memory/decay is -1 s: allowed is more than 0, inf included",
+            "~memory/resolution is 0 m: allowed is from 0.001 to 1 m",
+            "~memory/max_nodes",
+            '~memory/file is "memory.bt": an absolute path is needed',
+            '~unknown_space is "wall": allowed is free, obstacle, report',
+        ],
+    ),
+    (
+        {
+            "unknown_space": "report",
+            "sources": {
+                "scan": {"type": "sensor_msgs/LaserScan", "memory": {"enabled": True}},
+                "one": {"memory": {"enabled": True, "file": "/tmp/a.bt", "resolution": 0.01}},
+                "two": {"memory": {"enabled": True, "file": "/tmp/a.bt"}, "self_filter": False},
+                "flat": {"memory": True},
+            },
+        },
+        [
+            "~sources/scan/memory is set: it is for clouds and depth images",
+            "each memory needs a file of its own",
+            "need the same resolution and frame_id",
+            "'two' has self_filter: false",
+            "~sources/flat/memory is True: a dictionary is needed",
+        ],
+    ),
+    ({"unknown_space": "obstacle"}, ["~unknown_space is obstacle", "set ~memory/enabled"]),
     ({"robot_description": pt.urdf()}, ["~robot_description holds a URDF: it must be the name"]),
     ({"robot_description": "the robot"}, ["the robot", "is not valid"]),
     ({"sources": {"a camera": {"timeout": 1.0}}}, ["a camera", "is not valid"]),

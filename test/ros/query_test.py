@@ -97,6 +97,28 @@ class QueryTest(unittest.TestCase):
         self.assertTrue(answer.success)
         self.assertEqual(answer.results, [])
 
+        # Link against link: 2.5 slide + 0.25 between the ball and the box, apart or in contact.
+        self.assertEqual(answer.pairs, [])
+        slides = [0.4, 0.0, 0.2, -0.05]
+        states = [{"turn": 0.5, "slide": slide} for slide in slides]
+        answer = self.ask(*states, self_proximity=True)
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual(len(answer.pairs), len(states))
+        for pair, slide in zip(answer.pairs, slides):
+            self.assertEqual({pair.first, pair.second}, {"ball_link", "box_link"})
+            self.assertEqual(pair.state, 2)
+            truth = 2.5 * slide + 0.25
+            self.assertLessEqual(pair.lower_bound, truth + 1e-9)
+            self.assertGreaterEqual(pair.distance, truth - 1e-9)
+            self.assertLessEqual(pair.distance - pair.lower_bound, 0.001 + 1e-9)
+            apart = pt.vector(pair.point_on_first) - pt.vector(pair.point_on_second)
+            np.testing.assert_allclose(
+                apart, pair.distance * pt.vector(pair.direction), atol=1e-9
+            )
+        (pair,) = self.ask({"turn": 0.5, "slide": -0.2}, self_proximity=True).pairs
+        self.assertEqual(pair.state, 3)
+        self.assertLess(pair.distance, 0.0)
+
         for bad, words in (
             ({"turn": np.nan}, "states[1]: the position of joint 'turn' is NaN"),
             ({"trun": 1.0}, "states[1]: joint 'trun' is not in the URDF"),
@@ -140,6 +162,15 @@ class QueryTest(unittest.TestCase):
             self.assertGreater(impact, first - 0.007)
         answer = self.ask(*states, times=times, links=["box_link"])
         self.assertEqual(answer.impact_links, ["box_link"])
+        # Link against link along a motion: in touch at slide = -0.1, 5/6 of the second part.
+        motion = [{"turn": 0.3, "slide": 0.1}, {"turn": 0.5, "slide": 0.4}, {"turn": 2.0, "slide": -0.2}]
+        answer = self.ask(*motion, times=[1.0, 2.0, 4.0], self_proximity=True)
+        self.assertEqual(len(answer.pairs), 3)
+        (impact,) = answer.pair_impact_times
+        self.assertLessEqual(impact, 2.0 + 2.0 * 5 / 6)
+        self.assertGreater(impact, 2.0 + 2.0 * 5 / 6 - 0.005)
+        answer = self.ask(*motion[:2], times=[1.0, 2.0], self_proximity=True)
+        self.assertEqual(list(answer.pair_impact_times), [np.inf])
         # Nothing moves: in contact, or never.
         answer = self.ask(states[0], states[0], times=[5.0, 6.0])
         for name, impact in zip(answer.impact_links, answer.impact_times):

@@ -70,13 +70,32 @@ class ReconfigureTest(unittest.TestCase):
                 "filter_time": 1.0,
             },
             "penetration": {"stiffness": 1e6},
+            "speed_scale": {
+                "stop_distance": 0.6,
+                "free_distance": 0.6,
+                "hysteresis": 0.1,
+                "slow_distance": 0.6,
+                "slow_scale": 1.0,
+                "self_stop_distance": 0.6,
+                "self_free_distance": 0.6,
+            },
+            "speed_scale/separation": {
+                "enabled": True,
+                "obstacle_speed": 5.0,
+                "robot_speed": 5.0,
+                "reaction_time": 2.0,
+                "stopping_time": 2.0,
+                "intrusion": 1.0,
+                "uncertainty": 0.5,
+            },
         }
+        least = {"deadline": -1.0, "robot_speed": 0.001, "enabled": False}
         for group, expected in ends.items():
             client = self.client(group)
             described = client.get_parameter_descriptions(timeout=30)
             self.assertEqual({d["name"]: d["max"] for d in described}, expected)
             for one in described:
-                self.assertEqual(one["min"], -1.0 if one["name"] == "deadline" else 0.0)
+                self.assertEqual(one["min"], least.get(one["name"], 0.0))
                 name = "~%s/%s" % (group, one["name"])
                 self.assertRegex(one["description"], "^" + name + r"( \[.*\])?: [A-Z].{20,}\.$")
                 self.assertLessEqual(one["default"], one["max"])

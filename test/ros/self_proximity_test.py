@@ -2,6 +2,7 @@
 """~self_proximity: truth, contact, pairs that are left out, and what is missing."""
 
 import sys
+import time
 import unittest
 
 import numpy as np
@@ -9,6 +10,9 @@ import proximity_testing as pt
 import rospy
 from joint_states_test import ARM, JointStatesTest, joint_state
 from proximity_testing import LinkProximity, ProximityArray
+
+from ist_proximity.msg import JointRepulsion, LinkPair
+from ist_proximity.srv import ListLinkPairs
 
 SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
 
@@ -21,7 +25,7 @@ class SelfProximityNode(pt.ProximityNode):
 
 
 class SelfProximityTest(unittest.TestCase):
-    def start(self, case, **parameters):
+    def start(self, case, arm=ARM, **parameters):
         self.namespace = "/self_" + case
         self.q = {"turn": 0.7, "slide": 0.1}
         publisher = JointStatesTest.joint_publisher(self.namespace)
@@ -32,7 +36,7 @@ class SelfProximityTest(unittest.TestCase):
             "max_distance": 2.0,
             **parameters,
         }
-        self.node = SelfProximityNode(self.namespace, parameters, ARM)
+        self.node = SelfProximityNode(self.namespace, parameters, arm)
         return self.node
 
     def tearDown(self):
@@ -69,6 +73,11 @@ class SelfProximityTest(unittest.TestCase):
             one = pt.link(message, "ball_link")
             np.testing.assert_allclose(pt.vector(one.direction), expected, atol=1e-3)
 
+        # The blended push of the one other link, as long as that of a point as near.
+        for name, sign in (("ball_link", 1.0), ("box_link", -1.0)):
+            push = pt.vector(pt.link(message, name).repulsion)
+            np.testing.assert_allclose(push, sign * (1 - 0.25 / 0.3) * np.array(expected), atol=0.005)
+
         # ~query/margin can be set while the node runs, here too.
         rospy.set_param(node.name + "/query/margin", 0.05)
         node.wait_for(
@@ -96,6 +105,70 @@ class SelfProximityTest(unittest.TestCase):
         message = node.wait_for_status(ProximityArray.NO_POSE, "'turn'")
         self.assertTrue(pt.all_unknown(message))
 
+    def link_pairs(self, until=lambda answer: answer.success, **kwargs):
+        """The answer of ~link_pairs, which comes a little after the model."""
+        service = rospy.ServiceProxy(self.node.name + "/link_pairs", ListLinkPairs)
+        service.wait_for_service(pt.TIMEOUT)
+        end = time.monotonic() + pt.TIMEOUT
+        while True:
+            answer = service(**kwargs)
+            if until(answer):
+                return answer
+            self.assertLess(time.monotonic(), end, answer)
+            time.sleep(0.05)
+
+    def test_sampled_pairs(self):
+        """The one pair is watched, and touches in the share of random configurations that it has to."""
+        arm = ARM.replace('lower="0"', 'lower="-0.5"')
+        self.start("sampled", arm, **{"self_collision/samples": 500})
+        answer = self.link_pairs(lambda a: a.configurations > 0, never=True)
+        self.assertEqual(answer.configurations, 500)
+        self.assertEqual(answer.message, "")
+        (pair,) = answer.pairs
+        self.assertEqual({pair.first, pair.second}, {"ball_link", "box_link"})
+        self.assertEqual(pair.reason, LinkPair.WATCHED)
+        self.assertEqual(pair.measured, 500)
+        # The ball is in the box from -0.26 to -0.1 of the slide, which goes from -0.5 to 1.
+        self.assertAlmostEqual(pair.contacts / 500, 0.16 / 1.5, delta=0.05)
+        self.assertEqual(pair.sampled, LinkPair.SOMETIMES)
+        self.assertTrue(answer.srdf.startswith('<?xml version="1.0"?>'))
+        self.assertNotIn("disable_collisions", answer.srdf)
+
+        # Within the limits of the URDF as it is they never touch: an SRDF may say so, if asked.
+        self.tearDown()
+        self.start("never")
+        for never in (False, True):
+            answer = self.link_pairs(lambda a: a.configurations > 0, never=never)
+            self.assertEqual(answer.configurations, 2000)
+            (pair,) = answer.pairs
+            self.assertEqual((pair.sampled, pair.contacts, pair.measured), (LinkPair.NEVER, 0, 2000))
+            self.assertEqual('reason="Never"' in answer.srdf, never)
+
+    def test_joint_repulsion(self):
+        """With in_minimum the links push each other apart in ~joint_repulsion too."""
+        node = self.start("pushed", **{"self_collision/in_minimum": True, "self_filter": False})
+        self.q = {"turn": 0.7, "slide": 0.0}
+        world = pt.World(self.namespace)
+        points = np.array([[9.0, 9.0, 9.0]])
+        world.repeat(20, lambda: world.cloud_publisher.publish(pt.cloud(points, "base")))
+        efforts = []
+        subscriber = rospy.Subscriber(node.name + "/joint_repulsion", JointRepulsion, efforts.append)
+        try:
+            # Each is pushed by 1 - 0.25 / 0.3, and they part by 2.5 m per metre of the slide.
+            wanted = 2.5 * (1 - 0.25 / 0.3)
+            end = time.monotonic() + pt.TIMEOUT
+            while True:
+                time.sleep(0.05)
+                last = efforts[-1] if efforts else None
+                if last and last.status == ProximityArray.OK:
+                    effort = dict(zip(last.joints, last.effort))
+                    if abs(effort["slide"] - wanted) < 0.02:
+                        break
+                self.assertLess(time.monotonic(), end, last)
+        finally:
+            subscriber.unregister()
+            world.stop()
+
     def test_left_out(self):
         for case, parameters in {
             "by_list": {"self_collision/ignore": [["ball_link", "box_link"]]},
@@ -107,6 +180,8 @@ class SelfProximityTest(unittest.TestCase):
                 node = self.start(case, **parameters)
                 message = node.wait_for_status(ProximityArray.OK)
                 self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+                reason = LinkPair.IGNORED if case == "by_list" else LinkPair.SRDF
+                self.assertEqual([pair.reason for pair in self.link_pairs().pairs], [reason])
                 if case == "by_list":
                     self.tearDown()
 

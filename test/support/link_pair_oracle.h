@@ -286,7 +286,7 @@ inline std::vector<Corners3<double>> triangles_of(const LinkGeometry& link) {
 /// @returns [m] no point of those is farther from the triangles
 inline double append_round_shapes(const LinkGeometry& link,
                                   std::vector<Corners3<double>>* triangles) {
-  constexpr int kAround = 200;
+  constexpr int kAround = 160;
   constexpr double kPi = 3.14159265358979323846;
   double inexactness = 0.0;
   // Profiles (radius, z) that turn about z, from below to above.
@@ -308,7 +308,16 @@ inline double append_round_shapes(const LinkGeometry& link,
   for (const GeometryElement& element : link) {
     if (const auto* cylinder = std::get_if<Cylinder>(&element.shape)) {
       const double r = cylinder->radius, h = 0.5 * cylinder->length;
-      turn({{0.0, -h}, {r, -h}, {r, h}, {0.0, h}}, element.X_LE);
+      std::vector<Eigen::Vector2d> profile;  // in pieces, because spheres about slivers are large
+      const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+        const int pieces = static_cast<int>(std::ceil((to - from).norm() / (0.2 * r)));
+        for (int i = 0; i < pieces; ++i) profile.push_back(from + i * (to - from) / pieces);
+      };
+      add({0.0, -h}, {r, -h});
+      add({r, -h}, {r, h});
+      add({r, h}, {0.0, h});
+      profile.emplace_back(0.0, h);
+      turn(profile, element.X_LE);
       inexactness = std::max(inexactness, r * (1.0 - std::cos(kPi / kAround)));
     } else if (const auto* sphere = std::get_if<Sphere>(&element.shape)) {
       std::vector<Eigen::Vector2d> profile;

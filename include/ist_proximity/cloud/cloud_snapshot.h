@@ -9,6 +9,8 @@
 #include <memory>
 #include <vector>
 
+#include "ist_proximity/cloud/point_extent.h"
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/region_of_interest.h"
 #include "ist_proximity/geometry/span.h"
 
@@ -96,11 +98,14 @@ struct IngestCounts {
 /// map of solid boxes in a frame of its own.
 struct CloudSnapshot {
   PointIndex index;                                        ///< all points used
+  PointExtent extent;                                      ///< of the points
   double thinning = 0.01;                                  ///< [m] edge of a voxel
   RegionOfInterest region;                                 ///< points outside were discarded
   std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame
+  double box_extent = 0.0;   ///< [m] 0 to kMaxExtent: each box is larger by this on all sides
   IngestCounts counts;       ///< what was done with the points of the message
+  ViewReport view;           ///< of a self-filter by view
   double stamp = 0.0;        ///< [s] time of acquisition
   double ingest_time = 0.0;  ///< [s] duration of Ingest::run()
 };

@@ -24,13 +24,17 @@ struct DepthImage {
 
 /// A pinhole camera (the members of sensor_msgs/CameraInfo).
 struct CameraModel {
-  std::uint32_t width = 0, height = 0;               ///< [pixels] of the whole sensor
-  std::array<double, 9> K = {};                      ///< row-major; used where P is all zero
-  std::array<double, 12> P = {};                     ///< row-major
-  std::vector<double> D;                             ///< distortion; images are taken for rectified
-  std::uint32_t binning_x = 0, binning_y = 0;        ///< [pixels] of the sensor in one; 0 means 1
-  std::uint32_t roi_x_offset = 0, roi_y_offset = 0;  ///< [pixels] of the sensor
-  std::uint32_t roi_width = 0, roi_height = 0;  ///< [pixels] of the sensor; 0: the whole sensor
+  std::uint32_t width = 0;         ///< [pixels] of the whole sensor
+  std::uint32_t height = 0;        ///< [pixels] of the whole sensor
+  std::array<double, 9> K = {};    ///< row-major; used where P is all zero
+  std::array<double, 12> P = {};   ///< row-major
+  std::vector<double> D;           ///< distortion; images are taken for rectified
+  std::uint32_t binning_x = 0;     ///< columns of the sensor in one of the image; 0 means 1
+  std::uint32_t binning_y = 0;     ///< rows of the sensor in one of the image; 0 means 1
+  std::uint32_t roi_x_offset = 0;  ///< [pixels] of the sensor, to the left of the image
+  std::uint32_t roi_y_offset = 0;  ///< [pixels] of the sensor, above the image
+  std::uint32_t roi_width = 0;     ///< [pixels] of the sensor; 0: the whole sensor
+  std::uint32_t roi_height = 0;    ///< [pixels] of the sensor; 0: the whole sensor
 };
 
 /// The rays of an image's pixels: the pixel in column u and row v sees the points

@@ -6,9 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/point_extent.h"
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 
@@ -57,6 +60,7 @@ struct RawCloud {
   bool swap_bytes = false;                ///< the data's byte order is not the machine's
   DepthType depth = DepthType::kNone;     ///< of a depth image, which has no x, y and z
   std::shared_ptr<const DepthRays> rays;  ///< of a depth image's pixels
+  double pixel_angle = 0.0;  ///< [rad] largest angle between two neighbours; 0: not known
   /// `data` stays unchanged as long as this lives, so that points may be read later, when a query
   /// needs them. Null: `data` is valid during the call only, and all points are read then.
   std::shared_ptr<const void> owner;
@@ -65,16 +69,41 @@ struct RawCloud {
   std::size_t size() const { return width * height; }
 };
 
+/// Views points that lie one after the other in memory, such as an array (height, width, 3).
+/// @param data     x of the first point; its y and z follow. Not owned: see RawCloud::owner
+/// @param width    points in a row
+/// @param height   rows; 1 for a list
+/// @param numbers  from a point to the next, at least 3; those after z are not read
+template <class Scalar>
+RawCloud packed_cloud(const Scalar* data, std::size_t width, std::size_t height,
+                      std::size_t numbers = 3) {
+  static_assert(std::is_same_v<Scalar, float> || std::is_same_v<Scalar, double>);
+  RawCloud cloud;
+  cloud.data = reinterpret_cast<const std::uint8_t*>(data);
+  cloud.width = width;
+  cloud.height = height;
+  cloud.point_step = numbers * sizeof(Scalar);
+  cloud.row_step = width * cloud.point_step;
+  cloud.y = sizeof(Scalar);
+  cloud.z = 2 * sizeof(Scalar);
+  cloud.is_double = std::is_same_v<Scalar, double>;
+  return cloud;
+}
+
 /// The choice of the points of a cloud that are kept.
 struct IngestConfig {
   double min_range = 0.05;            ///< [m] from the sensor; >= 0
   double max_range = 3.0;             ///< [m] from the sensor; > min_range, may be inf
   bool self_filter = true;            ///< drop points on the robot
   double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
+  SelfFilterMode self_filter_mode = SelfFilterMode::kPadding;  ///< how the robot is recognised
+  ViewFilterConfig view;  ///< used where self_filter_mode is kView
   /// Give the cloud a thinned one; without it repulsion and contact volumes see no points. It costs
   /// nothing until they look at a part of the cloud, which is thinned then, once.
   bool thin = true;
   double thinning = 0.01;  ///< [m] at least 1e-9: edge of a voxel of the thinned cloud
+  /// Radius of a point, for lower bounds that hold for the surface in place of its samples.
+  ExtentConfig extent;
   /// >= 1: a cloud of more points is refused. This bounds time and memory of one cloud: five
   /// million points take about 3 s and 700 MB where neighbours in the message lie anywhere in
   /// space.
@@ -118,7 +147,9 @@ class Ingest {
   /// from its sensor's frame (map coordinates); it is subtracted before double becomes float.
   ///
   /// A point is the robot's when its exact distance to one of the solids is at most the padding, or
-  /// when it is inside one.
+  /// when it is inside one. With SelfFilterMode::kView, those of them that the sensor cannot see
+  /// where the robot is are kept, and X_FS is corrected by what the points on the robot say of it
+  /// (CloudSnapshot::view).
   /// @param cloud  checked by check_layout; points in the sensor frame S
   /// @param X_FS   sensor frame -> fixed frame, rigid
   /// @param robot  the robot's links at the cloud's stamp, see posed_solids(); for a measurement

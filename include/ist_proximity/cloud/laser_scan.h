@@ -45,6 +45,7 @@ std::string check_scan(const LaserScan& scan, const ScanLimits& limits = {});
 /// A scan as points in the sensor's frame at the first beam.
 struct ScanPoints {
   std::vector<double> xyz;  ///< [m] three coordinates a beam
+  double beam_angle = 0.0;  ///< [rad] between two beams
   RawCloud raw() const;     ///< views xyz: one point a beam, in the scan's order
 };
 

@@ -76,7 +76,7 @@ class MemoryMap {
   MemoryMap(MemoryMap&&) noexcept;
   MemoryMap& operator=(MemoryMap&&) noexcept;
 
-  const MemoryConfig& config() const;
+  const MemoryConfig& config() const;  ///< the one given to the constructor
 
   /// Voxels outside the cube about the region are not remembered, from the next cloud on.
   /// @param region_M  in the map's frame; infinite: none
@@ -92,6 +92,7 @@ class MemoryMap {
   /// Forgets everything.
   void clear();
 
+  /// What is known of the voxel that holds a point.
   VoxelState state(const Eigen::Vector3d& p_M) const;
   /// Log-odds of a voxel; NaN where it is unknown.
   float log_odds(const Eigen::Vector3d& p_M) const;
@@ -107,7 +108,7 @@ class MemoryMap {
   /// @param spheres  [m] centre in M and radius; voxels with their centre within
   void note_free(Span<const Eigen::Vector4f> spheres, double now);
 
-  MemoryCounts counts() const;
+  MemoryCounts counts() const;  ///< voxels at present
   /// [s] of the last cloud or forget(); NaN: there was none.
   double now() const;
 

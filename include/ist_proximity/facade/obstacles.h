@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
+#include "ist_proximity/cloud/point_extent.h"
 #include "ist_proximity/geometry/span.h"
 
 namespace ist {
@@ -26,6 +27,9 @@ struct ObstaclesConfig {
   const Robot* robot = nullptr;
   std::vector<double> q;              ///< [rad, m] in the order of Robot::joints()
   double self_filter_padding = 0.02;  ///< [m] >= 0: points at most this far from a link are dropped
+  /// Radius of a point, for lower bounds that hold for the surface in place of its samples; zero
+  /// unless set. Where it grows with the range, max_range has to be finite.
+  ExtentConfig extent;
 };
 
 /// Obstacle points, indexed for queries. Points that are not finite are dropped.

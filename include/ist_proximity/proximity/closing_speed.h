@@ -13,6 +13,7 @@ namespace ist {
 /// The speeds [m/s] at which a link and the nearest obstacle get closer, positive when they do; NaN
 /// where a speed cannot be known.
 struct ClosingRates {
+  /// Not known.
   static constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
   double total = kNaN;      ///< robot + obstacles; NaN where either is

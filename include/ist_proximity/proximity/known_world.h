@@ -15,7 +15,7 @@ namespace ist {
 
 /// An object of a known world as it is described: a wall, a table, a link of another robot.
 struct WorldObject {
-  std::string name;
+  std::string name;       ///< not empty; another object of the same name is replaced
   std::string frame;      ///< name of the frame B that it stands still in
   LinkGeometry geometry;  ///< its elements, in the object's frame O; the solid is their union
   Eigen::Isometry3d X_BO = Eigen::Isometry3d::Identity();  ///< object frame O -> B, rigid
@@ -43,10 +43,11 @@ class KnownWorld {
     double margin = 0.0;                                     ///< [m]
     std::vector<std::string> allowed_links;                  ///< links that may touch it
     std::shared_ptr<const LinkGeometry> geometry;            ///< in O
-    std::shared_ptr<const WorldShape> shape;
+    std::shared_ptr<const WorldShape> shape;                 ///< what queries need, in O
     std::uint64_t id = 0;  ///< another one for each shape; the same when the object is moved
   };
 
+  /// The objects, in the order in which they were added.
   const std::vector<Object>& objects() const { return objects_; }
   /// Names of the frames that objects stand in, each once.
   const std::vector<std::string>& frames() const { return frames_; }
@@ -75,6 +76,7 @@ struct WorldFault {
 /// are made. One thread.
 class WorldBuilder {
  public:
+  /// @param limits  of the worlds that it makes
   explicit WorldBuilder(const WorldLimits& limits = {}) : limits_(limits) {}
 
   /// Adds objects; one takes the place of another of the same name. It builds their hierarchies and

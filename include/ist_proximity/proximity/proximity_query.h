@@ -37,13 +37,19 @@ enum class LinkState : std::uint8_t { kUnknown = 0, kClear = 1, kNear = 2, kCont
 /// Answer for one link; vectors and points in the fixed frame F unless said.
 struct LinkProximity {
   LinkState state = LinkState::kUnknown;  ///< decides which of the other members are valid
-  double distance;        ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
-  double lower_bound;     ///< [m] proven; max_distance when CLEAR, -inf when UNKNOWN
+  double distance;  ///< [m] signed, upper bound; +inf when CLEAR, NaN when UNKNOWN
+  /// [m] Proven; max_distance when CLEAR, -inf when UNKNOWN. Where points have an extent
+  /// (PointExtent), it is that of their spheres: it may be negative in NEAR then.
+  double lower_bound;
   Eigen::Vector3d p_FCl;  ///< [m] closest point on the link; NaN unless NEAR or CONTACT
   Eigen::Vector3d p_LCl;  ///< [m] the same in the link's own frame
   Eigen::Vector3d p_FCo;  ///< [m] closest point on the obstacle
   /// Unit vector along which the link moves away: p_FCl - p_FCo = distance * direction.
   Eigen::Vector3d direction;
+  /// [m] The part of distance - lower_bound that is the points' extent; 0 where they have none.
+  double sensor_width;
+  /// [m] The part that is QueryConfig::margin. What remains is the tolerance, and rounding.
+  double margin;
   std::int32_t source = -1;  ///< index of the snapshot that holds the nearest point
   std::uint32_t point = 0;   ///< id of that point in its message
 

@@ -131,7 +131,7 @@ struct PairSampling {
 /// The finding of sampling about a pair. It is evidence, not proof: a pair that was never in
 /// contact may be, in a configuration that was not drawn.
 struct SampledPair {
-  LinkPair pair;
+  LinkPair pair;             ///< the links
   std::size_t contacts = 0;  ///< configurations in which the links are in contact
   std::size_t measured = 0;  ///< configurations in which that is known
   bool always() const { return measured > 0 && contacts == measured; }  ///< always in contact

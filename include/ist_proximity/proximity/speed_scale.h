@@ -13,6 +13,7 @@ namespace ist {
 
 /// Distances of one link that differ from the robot's.
 struct LinkSpeedDistances {
+  /// Stands for the robot's distance.
   static constexpr double kAsRobot = std::numeric_limits<double>::quiet_NaN();
 
   std::string link;                 ///< name in the URDF
@@ -23,7 +24,7 @@ struct LinkSpeedDistances {
 /// The protective separation distance of ISO/TS 15066:2016, 5.5.4, solved for the robot's speed.
 /// This library is not safety-rated; the formula is used, no conformity is claimed.
 struct SeparationConfig {
-  bool enabled = false;
+  bool enabled = false;  ///< false: the distances alone decide
   /// [m/s] >= 0 K of ISO 13855: obstacles are taken to approach at least this fast. 1.6 is a
   /// walking person; ISO 13855 asks for 2.0 where hands are nearer than 0.5 m.
   double obstacle_speed = 1.6;
@@ -44,11 +45,12 @@ struct SpeedScaleConfig {
   /// [m] between stop_distance and free_distance, where the scale is `slow_scale`; 0: none, and the
   /// scale rises along one straight line.
   double slow_distance = 0.0;
-  double slow_scale = 0.3;  ///< 0 to 1
-  std::vector<LinkSpeedDistances> links;
-  /// [m] The same for the distance from link to link, where that counts; see between_links().
-  double self_stop_distance = 0.01, self_free_distance = 0.05;
-  SeparationConfig separation;
+  double slow_scale = 0.3;                ///< 0 to 1
+  std::vector<LinkSpeedDistances> links;  ///< those with distances of their own
+  /// [m] stop_distance from link to link, where that counts; see between_links().
+  double self_stop_distance = 0.01;
+  double self_free_distance = 0.05;  ///< [m] free_distance from link to link
+  SeparationConfig separation;       ///< a second rule; the smaller scale holds
 };
 
 /// The configuration for distances from link to link: its own stop and free distance for every
@@ -76,7 +78,7 @@ enum class SpeedRule : std::uint8_t {
 
 /// One link's part of a speed scale.
 struct SpeedScaleInput {
-  LinkState state = LinkState::kUnknown;
+  LinkState state = LinkState::kUnknown;                          ///< as the query says
   double lower_bound = -std::numeric_limits<double>::infinity();  ///< [m] proven
   /// [m/s] ClosingRates::obstacles; NaN: not known
   double obstacle_speed = std::numeric_limits<double>::quiet_NaN();
@@ -84,9 +86,9 @@ struct SpeedScaleInput {
 
 /// A speed scale, and why.
 struct SpeedScaleAnswer {
-  double scale = 0.0;  ///< 0 to 1; never NaN
-  SpeedRule rule = SpeedRule::kUnknown;
-  std::int32_t link = -1;  ///< the link that decides; -1: none does
+  double scale = 0.0;                    ///< 0 to 1; never NaN
+  SpeedRule rule = SpeedRule::kUnknown;  ///< what decided
+  std::int32_t link = -1;                ///< the link that decides; -1: none does
   /// [m] the bound that was used: the link's own, or a smaller one that hysteresis holds. NaN
   /// where no link decides.
   double bound = std::numeric_limits<double>::quiet_NaN();

@@ -57,6 +57,7 @@ struct WorldQueryStatistics {
 /// One object per thread.
 class WorldQuery {
  public:
+  /// @param robot  its exact surfaces; not null
   explicit WorldQuery(std::shared_ptr<const RobotSurfaces> robot, const QueryConfig& config = {});
   ~WorldQuery();
   WorldQuery(WorldQuery&&) noexcept;

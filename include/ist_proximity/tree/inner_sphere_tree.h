@@ -114,8 +114,10 @@ struct PosedSolid {
   const InnerSphereTree* tree = nullptr;  ///< in the link frame L; not owned, not null
   const Solid* solid = nullptr;           ///< exact geometry in L; not owned, not null
   Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< link frame -> fixed frame, rigid
-  /// The points of the message, by their number in it, that were measured while the link was there.
-  std::uint32_t first_point = 0, last_point = std::numeric_limits<std::uint32_t>::max();
+  /// The first point of the message, by its number in it, that was measured while the link was
+  /// there.
+  std::uint32_t first_point = 0;
+  std::uint32_t last_point = std::numeric_limits<std::uint32_t>::max();  ///< the last such point
 };
 
 }  // namespace ist

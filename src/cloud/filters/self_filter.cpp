@@ -37,13 +37,15 @@ void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3
   links_.clear();
   group_.clear();
   undecided_.clear();
-  for (const PosedSolid& posed : solids) {
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    const PosedSolid& posed = solids[i];
     const InnerSphereTree& tree = *posed.tree;
     if (tree.empty()) continue;
     const Eigen::Isometry3d X_OL = relative_pose(X_FO, posed.X_FL);
     const double clear_distance = std::max(padding_, tree.interior_gap());
     const double size = tree.center().norm() + tree.radius() + clear_distance;
     Link link;
+    link.number = i;
     link.tree = posed.tree;
     link.solid = posed.solid;
     link.X_LO = X_OL.inverse();
@@ -137,13 +139,16 @@ std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile
   for (std::int32_t k = 0; k < tile.count; ++k) {
     if ((measured >> static_cast<std::uint32_t>(k) & 1U) == 0) continue;
     const Eigen::Vector3f p_O(tile.x[k], tile.y[k], tile.z[k]);
-    const Eigen::Vector3d p_L = link.X_LO * p_O.cast<double>();
-    const Verdict verdict = test_spheres(Effort::kDecide, link, p_L, 0.0);
-    const bool on_robot = verdict == Verdict::kOnRobot ||
-                          (verdict == Verdict::kUndecided && test_geometry(link, p_L));
-    mask |= static_cast<std::uint32_t>(on_robot) << k;
+    mask |= static_cast<std::uint32_t>(is_on_link(link, p_O.cast<double>())) << k;
   }
   return mask;
+}
+
+bool SelfFilter::is_on_link(const Link& link, const Eigen::Vector3d& p_O) const {
+  const Eigen::Vector3d p_L = link.X_LO * p_O;
+  const Verdict verdict = test_spheres(Effort::kDecide, link, p_L, 0.0);
+  return verdict == Verdict::kOnRobot ||
+         (verdict == Verdict::kUndecided && test_geometry(link, p_L));
 }
 
 // Tests all points within `radius` of a centre at once. Descends where a cover sphere may be near

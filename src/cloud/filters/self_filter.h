@@ -23,11 +23,33 @@ namespace ist {
 /// memory. Not thread safe.
 class SelfFilter {
  public:
+  /// One of the solids.
+  struct Link {
+    std::size_t number;  ///< in `solids`
+    const InnerSphereTree* tree;
+    const Solid* solid;
+    Eigen::Isometry3d X_LO;                 ///< frame of the points -> link frame
+    Eigen::Vector3f center_O;               ///< [m] of the link's bounding sphere
+    float padded_radius;                    ///< [m] of the bounding sphere, and the clear distance
+    float rounding;                         ///< [m] more than what float rounds off
+    float clear_distance;                   ///< [m] a cover distance above it proves a point clear
+    std::uint32_t first_point, last_point;  ///< ids of the points that the pose is for
+
+    bool is_for_all_points() const {
+      return first_point == 0 && last_point == std::numeric_limits<std::uint32_t>::max();
+    }
+  };
+
   /// @param solids   the robot's links, at one or several instants; viewed until the next call. A
   ///                 point is compared with those that it was measured at
   /// @param X_FO     frame of the points -> fixed frame
   /// @param padding  [m] >= 0
   void set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3d& X_FO, double padding);
+
+  /// Whether a point is the robot's. @param p_O  [m]
+  bool is_on_link(const Link& link, const Eigen::Vector3d& p_O) const;
+  /// The links of the group that began last.
+  const std::vector<const Link*>& group() const { return group_; }
 
   /// Begins a group of neighbouring boxes: finds the links that any of its points may be on.
   /// @param box  holds all boxes of the calls below until the next group
@@ -45,21 +67,6 @@ class SelfFilter {
   std::uint32_t undecided_points_on_robot(const PointTile& tile) const;
 
  private:
-  struct Link {
-    const InnerSphereTree* tree;
-    const Solid* solid;
-    Eigen::Isometry3d X_LO;                 ///< frame of the points -> link frame
-    Eigen::Vector3f center_O;               ///< [m] of the link's bounding sphere
-    float padded_radius;                    ///< [m] of the bounding sphere, and the clear distance
-    float rounding;                         ///< [m] more than what float rounds off
-    float clear_distance;                   ///< [m] a cover distance above it proves a point clear
-    std::uint32_t first_point, last_point;  ///< ids of the points that the pose is for
-
-    bool is_for_all_points() const {
-      return first_point == 0 && last_point == std::numeric_limits<std::uint32_t>::max();
-    }
-  };
-
   static bool may_touch(const Link& link, const Eigen::Vector3f& center_O, float radius);
   enum class Effort { kProveClear, kDecide };
   Verdict test_spheres(Effort effort, const Link& link, const Eigen::Vector3d& center_L,

@@ -129,6 +129,11 @@ std::string check_sizes(const DepthImage& image, std::uint64_t pixel, std::size_
   return {};
 }
 
+// [rad] Between two neighbouring pixels in the middle of the image, where it is largest.
+double spacing(const std::vector<double>& rays) {
+  return rays.size() > 1 ? std::abs(rays[1] - rays[0]) : 0.0;
+}
+
 }  // namespace
 
 std::string check_camera(const CameraModel& camera, std::shared_ptr<const DepthRays>* rays) {
@@ -189,6 +194,7 @@ std::string check_depth_image(const DepthImage& image, const std::shared_ptr<con
   cloud->row_step = image.step;
   cloud->depth = is_float ? DepthType::kFloat32 : DepthType::kUint16;
   cloud->rays = rays;
+  cloud->pixel_angle = std::max(spacing(rays->x), spacing(rays->y));
   cloud->swap_bytes = image.is_bigendian != kMachineIsBigEndian;
   return {};
 }

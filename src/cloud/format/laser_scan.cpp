@@ -69,21 +69,14 @@ std::string check_scan(const LaserScan& scan, const ScanLimits& limits) {
 }
 
 RawCloud ScanPoints::raw() const {
-  RawCloud cloud;
-  cloud.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  cloud.width = xyz.size() / 3;
-  cloud.height = 1;
-  cloud.point_step = 3 * sizeof(double);
-  cloud.row_step = cloud.width * cloud.point_step;
-  cloud.x = 0;
-  cloud.y = sizeof(double);
-  cloud.z = 2 * sizeof(double);
-  cloud.is_double = true;
+  RawCloud cloud = packed_cloud(xyz.data(), xyz.size() / 3, 1);
+  cloud.pixel_angle = beam_angle;
   return cloud;
 }
 
 void to_points(const LaserScan& scan, double min_range, double max_range,
                const Eigen::Isometry3d& X_SE, ScanPoints* points) {
+  points->beam_angle = std::abs(scan.angle_increment);
   const bool moves = scan.count > 1 && scan.time_increment != 0.0;
   const Eigen::Quaterniond q_SE(X_SE.linear());
   points->xyz.resize(3 * scan.count);

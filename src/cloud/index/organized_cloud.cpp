@@ -59,7 +59,7 @@ class RegionTest {
 class OrganizedReader {
  public:
   OrganizedReader(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                  PointBvhBuilder* builder, IngestCounts* counts)
+                  ViewFilter* view, PointBvhBuilder* builder, IngestCounts* counts)
       : cloud_(cloud),
         crop_(crop),
         transform_(crop),
@@ -67,9 +67,13 @@ class OrganizedReader {
         region_(crop),
         holds_floats_(holds_floats(cloud)),
         on_robot_(on_robot),
+        view_(on_robot != nullptr ? view : nullptr),
         builder_(*builder),
         counts_(*counts) {
-    if (on_robot != nullptr) {
+    if (view_ != nullptr) {
+      drop_ = [this](const PointTile& tile, const PaddedBox& /*box*/) { return viewed(tile); };
+      drop_undecided_ = drop_;
+    } else if (on_robot != nullptr) {
       drop_ = [on_robot](const PointTile& tile, const PaddedBox& box) {
         return on_robot->points_on_robot(tile, box);
       };
@@ -87,6 +91,16 @@ class OrganizedReader {
       for (column_ = 0; column_ < cloud_.width; column_ += kBlockSide) read_block();
     }
     return kept_;
+  }
+
+  // Looks at the blocks near the robot, without adding anything. @returns ViewFilter::end_pass()
+  bool look_at_robot() {
+    view_->begin_pass(cloud_, crop_.X_FO * crop_.X_OS);
+    is_looking_ = true;
+    run();
+    is_looking_ = false;
+    kept_ = 0;
+    return view_->end_pass();
   }
 
  private:
@@ -111,10 +125,50 @@ class OrganizedReader {
     const std::size_t kept = state == BlockState::kUnclear ? crop_in_double() : count_kept(state);
     if (kept == 0) return;
     kept_ += kept;
+    if (is_looking_) return look_at_block();
     const std::uint32_t candidates = split_candidates();
     const bool is_near_robot = on_robot_ != nullptr && on_robot_->begin_group(block_box());
     if (state == BlockState::kAll && candidates == 0 && !is_near_robot && add_as_node()) return;
     add_tiles(candidates, is_near_robot);
+  }
+
+  // Shows the view filter the tiles that the self-filter cannot prove to be clear of the robot.
+  void look_at_block() {
+    if (!on_robot_->begin_group(block_box())) return;
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      const std::uint32_t kept = block_.kept[slot];
+      if (kept == 0) continue;
+      const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
+      if (on_robot_->test(box) == SelfFilter::Verdict::kClear) {
+        const Eigen::Vector3f middle = 0.5F * (box.min + box.max).head<3>();
+        view_->add_outside(crop_.X_FO * middle.cast<double>());
+        continue;
+      }
+      view_->add_tile(row_ + tile_row(slot), column_ + tile_column(slot), kept, *on_robot_,
+                      crop_.X_OS);
+    }
+  }
+
+  // Bit k: the view filter takes the point in slot k for the robot's.
+  std::uint32_t viewed(const PointTile& tile) const {
+    std::uint32_t mask = 0;
+    for (std::int32_t k = 0; k < tile.count; ++k) {
+      const std::size_t row = tile.id[k] / cloud_.width, column = tile.id[k] % cloud_.width;
+      const std::uint16_t* robot = view_->robot_mask(row, column);
+      const std::size_t pixel = kTileSide * (row % kTileSide) + column % kTileSide;
+      if (robot != nullptr) mask |= (*robot >> pixel & 1U) << static_cast<std::uint32_t>(k);
+    }
+    return mask;
+  }
+
+  // What is to be done with a tile of a block near the robot.
+  SelfFilter::Verdict judge(std::size_t slot, const PaddedBox& box) {
+    using Verdict = SelfFilter::Verdict;
+    if (view_ == nullptr) return on_robot_->test(box);
+    const std::uint16_t* robot =
+        view_->robot_mask(row_ + tile_row(slot), column_ + tile_column(slot));
+    if (robot == nullptr || *robot == 0) return Verdict::kClear;
+    return *robot == block_.kept[slot] ? Verdict::kOnRobot : Verdict::kUndecided;
   }
 
   std::size_t rows() const { return std::min(kBlockSide, cloud_.height - row_); }
@@ -220,7 +274,7 @@ class OrganizedReader {
       if (kept == 0) continue;
       const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
       const bool may_split = (candidates >> slot & 1U) != 0;
-      const Verdict robot = is_near_robot ? on_robot_->test(box) : Verdict::kClear;
+      const Verdict robot = is_near_robot ? judge(slot, box) : Verdict::kClear;
       if (robot == Verdict::kOnRobot) continue;
       if (kept == kWhole && !may_split && robot == Verdict::kClear) {
         builder_.add_lazy_tile(box, first_pixel(slot));
@@ -299,6 +353,8 @@ class OrganizedReader {
   const RegionTest region_;
   const bool holds_floats_;
   SelfFilter* on_robot_;
+  ViewFilter* view_;
+  bool is_looking_ = false;
   PointFilter drop_, drop_undecided_;
   PointBvhBuilder& builder_;
   IngestCounts& counts_;
@@ -311,10 +367,17 @@ class OrganizedReader {
 
 }  // namespace
 
+bool look_at_robot(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
+                   ViewFilter* view, PointBvhBuilder* builder) {
+  IngestCounts counted_later;
+  return OrganizedReader(cloud, crop, on_robot, view, builder, &counted_later).look_at_robot();
+}
+
 std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                            PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts) {
+                            ViewFilter* view, PointBvhBuilder* builder, PointBvh* bvh,
+                            IngestCounts* counts) {
   builder->start_organized(crop.X_FO, cloud, crop.X_OS, bvh);
-  const std::size_t kept = OrganizedReader(cloud, crop, on_robot, builder, counts).run();
+  const std::size_t kept = OrganizedReader(cloud, crop, on_robot, view, builder, counts).run();
   builder->finish();
   return kept;
 }

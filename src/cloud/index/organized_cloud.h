@@ -4,6 +4,7 @@
 
 #include "cloud/filters/crop.h"
 #include "cloud/filters/self_filter.h"
+#include "cloud/filters/view_filter.h"
 #include "cloud/index/point_bvh_builder.h"
 
 namespace ist {
@@ -18,9 +19,17 @@ bool is_organized(const RawCloud& cloud, const CropParameters& crop);
 /// split, and tiles that no longer fill a node are grouped by where they are. Counts
 /// `not_a_number`, `infinite` and `outside_region`.
 /// @param on_robot  null: no self-filter
+/// @param view      null: the self-filter drops all that is within its padding; else only what the
+///                  view filter, which look_at_robot() has shown the cloud, takes for the robot
 /// @param bvh  overwritten, its buffers reused
 /// @returns how many points are kept, before `on_robot` drops some
 std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                            PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts);
+                            ViewFilter* view, PointBvhBuilder* builder, PointBvh* bvh,
+                            IngestCounts* counts);
+
+/// Shows the view filter the part of a cloud that is near the robot; nothing is indexed.
+/// @returns ViewFilter::end_pass()
+bool look_at_robot(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
+                   ViewFilter* view, PointBvhBuilder* builder);
 
 }  // namespace ist

@@ -27,6 +27,9 @@ constexpr std::size_t kBlockVoxels = std::size_t{1} << (3 * kBlockBits);
 /// A bit for each voxel of a block: word z, bit 8 y + x.
 using BlockBits = std::array<std::uint64_t, kBlockSide>;
 
+/// The number of no block: 39 bits are used.
+constexpr std::uint64_t kNoBlock = ~std::uint64_t{0};
+
 /// Number of a block, from the coordinates of a voxel in it: 13 bits an axis.
 inline std::uint64_t block_id(const VoxelKey& key) {
   return static_cast<std::uint64_t>(key.x >> kBlockBits) |

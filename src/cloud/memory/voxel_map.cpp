@@ -158,13 +158,39 @@ void VoxelMap::mark(const VoxelKey& key, BlockBits VoxelBlock::*bits) {
 
 /// Marks what a ray passes, within the region. A ray that has come into it ends where it leaves it.
 void VoxelMap::mark_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& end) {
-  bool was_inside = false;
-  walk_ray(scale_, origin, end, [&](const VoxelKey& key) {
-    if (!is_inside(key)) return !was_inside;
-    was_inside = true;
-    mark(key, &VoxelBlock::free);
-    return true;
-  });
+  VoxelKey first, last;
+  if (!scale_.key(origin, &first) || !scale_.key(end, &last)) return;
+  // The cursor is here and not a member, so that the compiler keeps it in registers.
+  std::uint64_t id = kNoBlock;
+  VoxelBlock* block = nullptr;
+  std::size_t skipped = 0;
+  const auto mark_free = [&](const VoxelKey& key) {
+    const std::uint64_t here = block_id(key);
+    if (here != id) {
+      id = here;
+      block = block_for(key);
+    }
+    if (block != nullptr) {
+      set_bit(place_in_block(key), &block->free);
+    } else {
+      ++skipped;
+    }
+  };
+  if (is_inside(first) && is_inside(last)) {  // and so is all in between
+    walk_ray(scale_, origin, end, first, last, [&](const VoxelKey& key) {
+      mark_free(key);
+      return true;
+    });
+  } else {
+    bool was_inside = false;
+    walk_ray(scale_, origin, end, first, last, [&](const VoxelKey& key) {
+      if (!is_inside(key)) return !was_inside;
+      was_inside = true;
+      mark_free(key);
+      return true;
+    });
+  }
+  skipped_ += skipped;
 }
 
 /// Marks what lies just behind the end of a ray, in blocks that are there.
@@ -289,7 +315,7 @@ void VoxelMap::make_place() {
 }
 
 void VoxelMap::reset_cursor() {
-  last_id_ = ~std::uint64_t{0};
+  last_id_ = kNoBlock;
   last_block_ = nullptr;
 }
 

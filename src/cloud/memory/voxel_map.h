@@ -72,7 +72,7 @@ class VoxelMap {
   // Of the cloud that is inserted.
   std::vector<VoxelBlock*> touched_;
   KeySet ray_ends_;
-  std::uint64_t last_id_ = ~std::uint64_t{0};
+  std::uint64_t last_id_ = kNoBlock;
   VoxelBlock* last_block_ = nullptr;
 };
 

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -50,40 +48,53 @@ inline double octomap_norm(const Eigen::Vector3f& v) {
   return std::sqrt(static_cast<double>(square));
 }
 
+/// Steps along one axis of a ray: the coordinate of the voxel, and where along the ray [m] the next
+/// border is, with octomap's roundings.
+struct RayAxis {
+  RayAxis(const VoxelScale& scale, std::int32_t key, float origin, float direction) : at(key) {
+    if (direction == 0.0F) return;
+    step = direction > 0.0F ? 1 : -1;
+    double border = scale.middle(key);
+    border += static_cast<double>(static_cast<float>(step * scale.resolution() * 0.5));
+    next = (border - origin) / direction;
+    width = scale.resolution() / std::fabs(static_cast<double>(direction));
+  }
+  void go() {
+    at += step;
+    next += width;
+  }
+
+  std::int32_t at, step = 0;
+  double next = std::numeric_limits<double>::max(), width = next;
+};
+
 /// Visits the voxels that a ray passes from its origin on, but for that of its end (Amanatides and
-/// Woo 1987), with the roundings of octomap's computeRayKeys(), so that the same voxels come.
-/// @param visit  called with each key; false ends the ray
-/// @returns false when an end is outside of all keys
+/// Woo 1987): the same as octomap's computeRayKeys().
+/// @param first, last  the keys of origin and end
+/// @param visit        called with each key; false ends the ray
 template <typename Visit>
-bool walk_ray(const VoxelScale& scale, const Eigen::Vector3f& origin, const Eigen::Vector3f& end,
-              const Visit& visit) {
-  VoxelKey first, last;
-  if (!scale.key(origin, &first) || !scale.key(end, &last)) return false;
-  if (first == last || !visit(first)) return true;
+void walk_ray(const VoxelScale& scale, const Eigen::Vector3f& origin, const Eigen::Vector3f& end,
+              const VoxelKey& first, const VoxelKey& last, const Visit& visit) {
+  if (first == last || !visit(first)) return;
   Eigen::Vector3f direction = end - origin;
   const auto length = static_cast<float>(octomap_norm(direction));
-  std::array<std::int32_t, 3> at = {first.x, first.y, first.z}, step{};
-  std::array<double, 3> next{}, width{};  // [m] along the ray: to the next border, and between two
-  for (int i = 0; i < 3; ++i) {
-    direction[i] /= length;
-    step[i] = direction[i] > 0.0F ? 1 : direction[i] < 0.0F ? -1 : 0;
-    if (step[i] == 0) {
-      next[i] = width[i] = std::numeric_limits<double>::max();
-      continue;
-    }
-    double border = scale.middle(at[i]);
-    border += static_cast<double>(static_cast<float>(step[i] * scale.resolution() * 0.5));
-    next[i] = (border - origin[i]) / direction[i];
-    width[i] = scale.resolution() / std::fabs(static_cast<double>(direction[i]));
-  }
+  for (int i = 0; i < 3; ++i) direction[i] /= length;
+  RayAxis x(scale, first.x, origin.x(), direction.x());
+  RayAxis y(scale, first.y, origin.y(), direction.y());
+  RayAxis z(scale, first.z, origin.z(), direction.z());
   for (;;) {
-    const int axis = next[0] < next[1] ? next[0] < next[2] ? 0 : 2 : next[1] < next[2] ? 1 : 2;
-    at[axis] += step[axis];
-    next[axis] += width[axis];
-    const VoxelKey key{at[0], at[1], at[2]};
-    if (key == last) return true;
-    if (std::min({next[0], next[1], next[2]}) > length) return true;  // the end was missed
-    if (!visit(key)) return true;
+    if (x.next < y.next && x.next < z.next) {
+      x.go();
+    } else if (x.next >= y.next && y.next < z.next) {
+      y.go();
+    } else {
+      z.go();
+    }
+    const VoxelKey key{x.at, y.at, z.at};
+    if (key == last) return;
+    // The end was missed, because roundings add up.
+    if (x.next > length && y.next > length && z.next > length) return;
+    if (!visit(key)) return;
   }
 }
 

@@ -67,6 +67,8 @@ struct NoiseFilter::Impl {
   bool has_neighbors(std::uint32_t point) const;
   bool count_in_tile(const PointTile& tile, std::uint32_t point, int* count) const;
   RawCloud view() const;
+
+  double pixel_angle = 0.0;  ///< [rad] of the cloud
 };
 
 void NoiseFilter::Impl::read(const RawCloud& cloud, double max_range) {
@@ -171,6 +173,7 @@ RawCloud NoiseFilter::Impl::view() const {
   raw.y = sizeof(double);
   raw.z = 2 * sizeof(double);
   raw.is_double = true;
+  raw.pixel_angle = pixel_angle;
   return raw;
 }
 
@@ -183,6 +186,7 @@ NoiseFilter::~NoiseFilter() = default;
 
 RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t* dropped) {
   Impl& my = *impl_;
+  my.pixel_angle = cloud.pixel_angle;
   my.read(cloud, max_range);
   my.find_undecided();
   *dropped = 0;

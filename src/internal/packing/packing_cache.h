@@ -15,6 +15,14 @@ std::string default_cache_directory();
 /// packing algorithm. The same mesh under another file name has the same key.
 std::string packing_key(const Shape& shape, const PackingConfig& config);
 
+/// Writes a file of a cache, which appears by atomic rename. Removes what writers that were killed
+/// an hour ago or earlier have left.
+/// @param directory  created when needed
+/// @param file_name  with the directory
+/// @returns empty, or why it cannot be written
+std::string write_cache_file(const std::string& directory, const std::string& file_name,
+                             const std::string& bytes);
+
 /// Packings on disk, one file per key. A header and a checksum detect files that are truncated,
 /// damaged or of another version; they count as absent. Several processes may share a directory:
 /// files appear by atomic rename. Thread safe.

@@ -28,6 +28,8 @@ class SceneTracker {
     std::uint64_t points = 0, boxes = 0;  ///< build ids; 0: there are none
     Eigen::Matrix<double, 3, 4> X_FM = Eigen::Matrix<double, 3, 4>::Zero();  ///< of the boxes
     RegionOfInterest region;
+    PointExtent extent;
+    double box_extent = 0.0;
   };
   static constexpr std::size_t kMaxClouds = 16;
   static Cloud identity(const CloudSnapshot& cloud);

@@ -16,7 +16,10 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
   selected_.clear();
   held_.clear();
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    const SourceSnapshot* snapshot = newest(sources[i].get(), model, poses_stamp, pose_timeout);
+    const SourceSnapshot* snapshot =
+        sources[i]->parent() != nullptr
+            ? memory_of(sources, i)
+            : newest(sources[i].get(), model, poses_stamp, pose_timeout);
     SourceReport& report = status->sources[i];
     sources[i]->report(&report);
     if (snapshot) {
@@ -51,12 +54,23 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
     }
     clouds_.push_back(&selected_[i]->cloud);
     cloud_sources_.push_back(static_cast<int>(i));
-    cloud_stands_still_.push_back(status->sources[i].is_file ||
-                                  std::isinf(status->sources[i].timeout));
+    const SourceReport& report = status->sources[i];
+    cloud_stands_still_.push_back(report.is_file || report.is_memory || std::isinf(report.timeout));
     const ros::Time& stamp = selected_[i]->stamp;
-    if (status->sources[i].is_file) continue;
+    if (report.is_file || report.is_memory) continue;
     if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
   }
+}
+
+/// What belongs to the snapshot of a source that was taken before: no cloud is ever combined with
+/// what is hidden from another one.
+const SourceSnapshot* CloudSelection::memory_of(const CloudSources& sources,
+                                                std::size_t source) const {
+  for (std::size_t i = 0; i < source; ++i) {
+    if (sources[i].get() != sources[source]->parent()) continue;
+    return selected_[i] != nullptr ? selected_[i]->memory.get() : nullptr;
+  }
+  return nullptr;
 }
 
 const SourceSnapshot* CloudSelection::newest(ObstacleSource* source,

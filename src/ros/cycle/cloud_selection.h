@@ -55,6 +55,7 @@ class CloudSelection {
   void exclude_unfiltered(std::vector<bool>* links) const;
 
  private:
+  const SourceSnapshot* memory_of(const CloudSources& sources, std::size_t source) const;
   const SourceSnapshot* newest(ObstacleSource* source,
                                const std::shared_ptr<const RobotModel>& model,
                                const ros::Time& poses_stamp, double pose_timeout);

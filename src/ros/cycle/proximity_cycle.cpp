@@ -18,6 +18,8 @@ using ist_proximity::ProximityArray;
 
 namespace {
 
+// Of a cycle's deadline: unknown space needs coarse bounds only.
+constexpr double kUnknownShare = 0.2;
 constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
 
 /// When a share of a deadline [s] has passed.
@@ -30,16 +32,23 @@ TimePoint end_of(double deadline, double share, TimePoint begin) {
 }  // namespace
 
 ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                               std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader)
+                               std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
+                               UnknownSpaceWatch* watch)
     : model_(std::move(model)),
       packed_(model_->robot),
       robot_(*model_->robot),
       fixed_frame_(fixed_frame_of(*model_, config)),
       pose_source_(std::move(poses)),
       pose_timeout_(config.pose_timeout),
+      self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
       selection_(reader),
       worlds_(config),
       query_(model_->robot, config.query),
+      unknown_space_(watch == nullptr
+                         ? nullptr
+                         : std::make_unique<UnknownSpaceQuery>(
+                               model_->robot, watch, reader == CloudSelection::Reader::kOnly)),
+      unknown_is_obstacle_(config.unknown_space == UnknownSpace::kObstacle),
       repulsion_(model_->robot),
       filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
@@ -72,6 +81,7 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   const double preparation = watch.lap();
 
   run_query(config, begin);
+  ask_unknown_space(config);
   message->query_time = watch.lap();
   find_urgent_links();
   compute_pushes(config, end_of(deadline_, kRepulsionShare, begin));
@@ -126,6 +136,14 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   cloud_results_ = results_;
   worlds_.combine(selection_.clouds(), &results_);
   note_usage(config);
+}
+
+void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
+  if (!unknown_space_) return;
+  QueryConfig query = config.query;
+  query.deadline *= kUnknownShare;
+  unknown_space_->run(poses_.X_FL, known_, poses_.stamp.toSec(), query,
+                      config.repulsion.influence_distance);
 }
 
 /// The links that matter most are served first, as time may end.
@@ -217,6 +235,11 @@ void ProximityCycle::fill_links(ProximityArray* message) {
                                   is_world ? worlds_.nearest(result) : selection_.nearest(result)),
                 source < 0 ? nowhere : status_input_.sources[static_cast<std::size_t>(source)].name,
                 &message->links[k]);
+    if (unknown_space_ && result.state != LinkState::kUnknown) {
+      assign_unknown_space(unknown_space_->answer(i).seen, unknown_space_->answer(i).lower_bound,
+                           unknown_space_->answer(i).direction, unknown_is_obstacle_,
+                           &message->links[k]);
+    }
   }
 }
 
@@ -259,6 +282,7 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
   }
   packed_ = model->robot;
   query_.set_model(packed_);
+  if (unknown_space_) unknown_space_->set_model(packed_);
   repulsion_ = model->repulsion ? *model->repulsion : Repulsion(packed_);
 }
 
@@ -269,9 +293,46 @@ void ProximityCycle::forget() {
   poses_.stamp = ros::Time();
 }
 
+Eigen::AlignedBox3d ProximityCycle::robot_box() const {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < packed_->links.size(); ++i) {
+    if (i >= poses_.known.size() || !poses_.known[i]) continue;
+    for (const InnerSphere& sphere : packed_->links[i].packing.spheres) {
+      const Eigen::Vector3d p_FS = poses_.X_FL[i] * sphere.center;
+      box.extend(p_FS - Eigen::Vector3d::Constant(sphere.radius));
+      box.extend(p_FS + Eigen::Vector3d::Constant(sphere.radius));
+    }
+  }
+  return box;
+}
+
 void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,
+                                          const std::string& self_problem,
+                                          const ProximityArray* self,
                                           ist_proximity::JointRepulsion* message) {
-  joint_repulsion_.fill(pose_source_.get(), pushes_, proximity, message);
+  all_pushes_ = pushes_;
+  if (self_counts_) add_self_repulsion(self_problem.empty() ? self : nullptr);
+  joint_repulsion_.fill(pose_source_.get(), all_pushes_, proximity, message);
+  if (!self_counts_ || message->status != ProximityArray::OK) return;
+  const bool is_known = self_problem.empty() && self != nullptr;
+  if (is_known && self->status == ProximityArray::OK) return;
+  message->status = is_known ? self->status : static_cast<std::uint8_t>(ProximityArray::NO_POSE);
+  message->status_text = "link against link: " + (is_known ? self->status_text : self_problem);
+}
+
+/// @param self  of the monitored links, or null: not known
+void ProximityCycle::add_self_repulsion(const ProximityArray* self) {
+  for (std::size_t i = 0; i < model_->monitored.size(); ++i) {
+    RepulsiveWrench& push = all_pushes_[model_->monitored[i]];
+    if (self == nullptr || i >= self->links.size()) {
+      push = RepulsiveWrench::unknown();
+      continue;
+    }
+    const auto& own = self->links[i];
+    push.force += Eigen::Vector3d(own.repulsion.x, own.repulsion.y, own.repulsion.z);
+    push.torque +=
+        Eigen::Vector3d(own.repulsion_torque.x, own.repulsion_torque.y, own.repulsion_torque.z);
+  }
 }
 
 }  // namespace ist

@@ -4,6 +4,7 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ros/time.h>
 
+#include <Eigen/Geometry>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
+#include "ros/cycle/unknown_space_query.h"
 #include "ros/cycle/world_answers.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
@@ -33,8 +35,10 @@ class ProximityCycle {
  public:
   /// @param model  ready
   /// @param poses  of model->robot->links; null where the kinematics that it needs is faulty
+  /// @param watch  outlives this; null with ~unknown_space free
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
-                 std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader);
+                 std::unique_ptr<PoseSource> poses, CloudSelection::Reader reader,
+                 UnknownSpaceWatch* watch = nullptr);
 
   /// @param now      the ROS clock's time
   /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
@@ -71,9 +75,18 @@ class ProximityCycle {
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 
+  /// Encloses the inner spheres of all links whose pose the last run() knew, in the fixed frame.
+  /// Looks at each sphere: for pictures, not for every cycle.
+  Eigen::AlignedBox3d robot_box() const;
+
   /// Gives the repulsion of the last run() as joint efforts.
-  /// @param proximity  the message of that run()
+  /// @param proximity     the message of that run()
+  /// @param self_problem  with ~self_collision/in_minimum: why `self` cannot be used; else empty
+  /// @param self          the newest ~self_proximity, whose repulsion is added with
+  ///                      ~self_collision/in_minimum; may be null
   void fill_joint_repulsion(const ist_proximity::ProximityArray& proximity,
+                            const std::string& self_problem,
+                            const ist_proximity::ProximityArray* self,
                             ist_proximity::JointRepulsion* message);
 
  private:
@@ -81,12 +94,14 @@ class ProximityCycle {
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
   void run_query(const LiveConfig& config, TimePoint begin);
+  void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
   RepulsiveWrench push_of_clouds(std::size_t link, const LinkProximity& result,
                                  const LiveConfig& config, TimePoint end, std::uint64_t* key);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
+  void add_self_repulsion(const ist_proximity::ProximityArray* self);
   void fill_links(ist_proximity::ProximityArray* message);
 
   const std::shared_ptr<const ModelState> model_;
@@ -95,9 +110,12 @@ class ProximityCycle {
   std::string fixed_frame_;
   std::unique_ptr<PoseSource> pose_source_;
   const double pose_timeout_;  ///< [s]
+  const bool self_counts_;     ///< ~self_collision/in_minimum
   CloudSelection selection_;
   WorldAnswers worlds_;
   ProximityQuery query_;
+  std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
+  const bool unknown_is_obstacle_;
   Repulsion repulsion_;
   std::vector<KeptRepulsion> blends_;     ///< by link of the robot
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot
@@ -116,6 +134,7 @@ class ProximityCycle {
   std::vector<LinkProximity> results_;        ///< by link of the robot: clouds and worlds
   std::vector<LinkProximity> cloud_results_;  ///< the same of clouds alone
   std::vector<RepulsiveWrench> pushes_;       ///< by link of the robot, filtered
+  std::vector<RepulsiveWrench> all_pushes_;   ///< the same, with those of link against link
   std::vector<Wrench> wrenches_;              ///< by link of the robot
   std::vector<std::size_t> urgent_;           ///< monitored links, the least lower bound first
 };

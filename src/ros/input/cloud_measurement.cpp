@@ -13,6 +13,8 @@ class CloudMeasurement : public Measurement {
                    std::shared_ptr<NoiseFilter> noise)
       : Measurement(header, bytes), points_(points), noise_(std::move(noise)) {}
 
+  const RawCloud* raw_cloud() const override { return &points_; }
+
   void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
     const auto begin = std::chrono::steady_clock::now();
     std::uint32_t dropped = 0;

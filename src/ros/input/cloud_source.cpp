@@ -14,6 +14,7 @@
 #include "ros/common/thread_name.h"
 #include "ros/input/cloud_conversion.h"
 #include "ros/input/map_measurement.h"
+#include "ros/input/view_text.h"
 #include "ros/poses/clock_skew.h"
 
 namespace ist {
@@ -38,11 +39,13 @@ std::string clock_difference(const Measurement& measurement) {
 }  // namespace
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
-                         const TransformBuffer& buffer, const ros::Publisher& filtered)
+                         const TransformBuffer& buffer, const ros::Publisher& filtered,
+                         std::shared_ptr<SourceMemory> memory)
     : config_(config),
       is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
       filtered_(filtered),
+      memory_(std::move(memory)),
       state_(config, config.file.empty() ? nh.resolveName(config.topic) : config.file),
       placer_(config, buffer),
       ingest_(ingest_config(config)),
@@ -326,6 +329,8 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     return problem;
   }
   complete(measurement, placement, &snapshot);
+  snapshot.memory = memory_ ? memory_->take(measurement, placement, target_, snapshot) : nullptr;
+  note_view(placement, snapshot.cloud.view);
   in_use_ = snapshot.stamp;
   if (show) {
     publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
@@ -333,6 +338,30 @@ std::string CloudSource::ingest(const Measurement& measurement) {
   }
   exchange_.publish();
   return "";
+}
+
+/// Notes what a self-filter by view found, and warns where it could not do its work.
+void CloudSource::note_view(const Placement& placement, const ViewReport& view) {
+  if (config_.ingest.self_filter_mode != SelfFilterMode::kView || placement.robot.empty()) return;
+  if (!view.is_used) {
+    ROS_WARN_STREAM_THROTTLE(
+        60.0, "source '" << config_.name << "': self_filter_mode is view, but its "
+                         << noun(config_.type)
+                         << "s are no images seen from their frame's origin: the self-filter drops "
+                            "all that is within its padding");
+  } else if (view.has_drifted) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': " << doubt_of_view(view));
+  }
+  state_.update([&](SourceReport* report) {
+    report->view = view;
+    report->view_links.resize(view.links.size());
+    for (std::size_t i = 0; i < view.links.size(); ++i) {
+      const InnerSphereTree* tree = placement.robot[view.links[i].solid].tree;
+      for (const LinkModel& link : target_.model->links) {
+        if (&link.tree == tree) report->view_links[i] = link.name;
+      }
+    }
+  });
 }
 
 /// Notes what a snapshot was made with.

@@ -17,6 +17,7 @@
 #include "ros/input/obstacle_source.h"
 #include "ros/input/placer.h"
 #include "ros/input/snapshot_exchange.h"
+#include "ros/input/source_memory.h"
 #include "ros/input/source_state.h"
 #include "ros/input/topic_advice.h"
 #include "ros/parameters/source_config.h"
@@ -46,8 +47,9 @@ class CloudSource : public ObstacleSource {
   /// @param nh        in the namespace that the topic is relative to
   /// @param buffer    outlives this
   /// @param filtered  publisher of what queries see, used while it has subscribers
+  /// @param memory    what the source remembers; null: nothing
   CloudSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
-              const ros::Publisher& filtered);
+              const ros::Publisher& filtered, std::shared_ptr<SourceMemory> memory);
   ~CloudSource() override;
   CloudSource(const CloudSource&) = delete;
   CloudSource& operator=(const CloudSource&) = delete;
@@ -79,12 +81,14 @@ class CloudSource : public ObstacleSource {
   std::string ingest(const Measurement& measurement);
   void complete(const Measurement& measurement, const Placement& placement,
                 SourceSnapshot* snapshot) const;
+  void note_view(const Placement& placement, const ViewReport& view);
   void count_publishers();
 
   const SourceConfig config_;
   const bool is_map_;
   const TransformBuffer& buffer_;
   ros::Publisher filtered_;
+  const std::shared_ptr<SourceMemory> memory_;  ///< null: nothing is remembered
   ros::CallbackQueue queue_;
   Subscription subscription_;
   SnapshotExchange exchange_;

@@ -53,6 +53,10 @@ class Measurement {
   /// several for a scan, which takes its time, and none for a map, which stays in its own frame.
   virtual std::vector<ros::Time> instants() const { return {header_.stamp}; }
 
+  /// The points of the message, as long as this lives; null: it has none, or they were measured
+  /// from several places. A memory needs them.
+  virtual const RawCloud* raw_cloud() const { return nullptr; }
+
   /// Makes the snapshot.
   /// @param placement  the poses at instants()
   /// @param snapshot   overwritten, its buffers reused

@@ -38,6 +38,10 @@ class ObstacleSource {
   /// Writes everything but the members about the cloud in use. A report that is used again keeps
   /// the memory of its strings. Thread safe.
   virtual void report(SourceReport* report) = 0;
+
+  /// The source with whose snapshots this one's come, as SourceSnapshot::memory; null: it has its
+  /// own. The parent comes first in CloudSources.
+  virtual const ObstacleSource* parent() const { return nullptr; }
 };
 
 using CloudSources = std::vector<std::unique_ptr<ObstacleSource>>;

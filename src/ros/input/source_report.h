@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
 
@@ -18,12 +19,15 @@ struct SourceReport {
   std::string type = "sensor_msgs/PointCloud2";
   std::string noun = "cloud";                       ///< the word for one message
   bool is_file = false;                             ///< a map file: read once and never stale
+  bool is_memory = false;                           ///< what another source remembers: never stale
   double timeout = 0.5;                             ///< [s]
   std::string timeout_parameter = "cloud_timeout";  ///< its name
   bool required = true;
   /// [m] Points this near to a link are taken for the robot, so obstacles in this skin are not
   /// seen. NaN without self-filter.
   double blind_skin = std::numeric_limits<double>::quiet_NaN();
+  /// Whether the self-filter is to decide by view; `blind_skin` is the padding then.
+  bool by_view = false;
   std::uint64_t messages = 0;      ///< received
   std::uint64_t out_of_order = 0;  ///< dropped: older than the cloud in use
   std::uint64_t overtaken = 0;     ///< dropped: a newer one was ready first
@@ -51,6 +55,9 @@ struct SourceReport {
   ros::Time counts_from;     ///< the age counts from then
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
+  std::size_t memory_voxels = 0, memory_occupied = 0;  ///< of a memory
+  ViewReport view;                                     ///< of a self-filter by view
+  std::vector<std::string> view_links;                 ///< names of view.links
 };
 
 }  // namespace ist

@@ -24,6 +24,8 @@ struct SourceSnapshot {
   std::vector<bool> filtered;
   std::uint64_t generation = 0;        ///< see SourceTarget; 0: not filled yet
   std::string fixed_frame, map_frame;  ///< the frames between which a map is placed
+  /// What the source remembers and the cloud does not show; null: nothing.
+  std::shared_ptr<const SourceSnapshot> memory;
   /// A known world in place of the cloud, and the surfaces of the model's links; null: a cloud.
   PosedWorld world;
   std::shared_ptr<const RobotSurfaces> surfaces;

@@ -16,6 +16,8 @@ SourceState::SourceState(const SourceConfig& config, const std::string& topic)
   report_.timeout_parameter = config.timeout_parameter;
   report_.required = config.required;
   if (config.ingest.self_filter) report_.blind_skin = config.ingest.self_filter_padding;
+  report_.by_view =
+      config.ingest.self_filter && config.ingest.self_filter_mode == SelfFilterMode::kView;
 }
 
 void SourceState::set_target(std::shared_ptr<const RobotModel> model,

@@ -8,7 +8,6 @@
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
-#include "ros/output/label_layout.h"
 #include "ros/output/nearest_summary.h"
 #include "ros/output/nearness_color.h"
 
@@ -22,12 +21,13 @@ using LinkMessage = ist_proximity::LinkProximity;
 constexpr double kLineWidth = 0.005;        // [m]
 constexpr double kPointSize = 0.015;        // [m]
 constexpr double kTextHeight = 0.03;        // [m]
-constexpr double kRow = 2.0 * kTextHeight;  // [m] from a label to the next
+constexpr double kRow = 1.5 * kTextHeight;  // [m] from a label to the next
 constexpr double kLabelled = 0.3;           // [m] farther links have no label
-constexpr double kLabelMoves = 2.0 * kRow;  // [m] that a label may be away from its line
+constexpr std::size_t kLabels = 4;          // the nearest ones
 constexpr double kNumberHeight = 0.09;      // [m]
-constexpr double kNumberFollows = 0.05;     // share of its way that the number moves at a time
-constexpr double kNumberJumps = 2.0;        // [m] farther ways it takes at once
+constexpr double kGap = 0.03;               // [m] from the number to the labels, to the robot
+constexpr double kListFollows = 0.05;       // share of its way that the list moves at a time
+constexpr double kListJumps = 2.0;          // [m] farther ways it takes at once
 constexpr double kArrowPerRepulsion = 0.3;  // [m] for a repulsion of length 1
 
 /// Gives neighbours different colours, by the golden ratio on the circle of hues.
@@ -100,18 +100,14 @@ void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return links[a].distance < links[b].distance;
   });
-  std::vector<Label> labels;
-  for (const std::size_t i : order) {
-    const Eigen::Vector3d middle =
-        (to_vector(links[i].point_on_link) + to_vector(links[i].point_on_obstacle)) / 2;
-    labels.push_back({i, middle});
-  }
-  for (const Label& label : place_labels(labels, kRow, kLabelMoves)) {
-    Marker text = marker("text", static_cast<int>(label.id), Marker::TEXT_VIEW_FACING);
+  for (std::size_t row = 0; row < std::min(order.size(), kLabels); ++row) {
+    const LinkMessage& link = links[order[row]];
+    Marker text = marker("text", static_cast<int>(order[row]), Marker::TEXT_VIEW_FACING);
     scale(0, 0, kTextHeight, &text);
-    text.color = make_color(1, 1, 1, 1);
-    assign(label.position, &text.pose.position);
-    text.text = links[label.id].link + format_text(" %.3f m", links[label.id].distance);
+    text.color = nearness_color(link.distance, max_distance_);
+    const double below = kGap + (static_cast<double>(row) + 0.5) * kRow;
+    assign(list_position_ - Eigen::Vector3d(0, 0, below), &text.pose.position);
+    text.text = link.link + format_text(" %.3f m", link.distance);
     markers->push_back(text);
   }
 }
@@ -119,12 +115,13 @@ void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
 void ProximityMarkers::draw_nearest(const ist_proximity::ProximityArray& proximity,
                                     std::vector<Marker>* markers) {
   const NearestSummary summary = summarize_nearest(proximity, max_distance_, counts_);
-  place_number(proximity);
   Marker text = marker("nearest", 0, Marker::TEXT_VIEW_FACING);
   scale(0, 0, kNumberHeight, &text);
   text.color = summary.color;
-  assign(number_position_, &text.pose.position);
   text.text = summary.text;
+  const auto lines = 1 + std::count(text.text.begin(), text.text.end(), '\n');
+  const double above = 0.5 * kNumberHeight * static_cast<double>(lines);  // rviz centers the text
+  assign(list_position_ + Eigen::Vector3d(0, 0, above), &text.pose.position);
   markers->push_back(text);
   if (summary.link < 0) return;
 
@@ -142,22 +139,21 @@ void ProximityMarkers::draw_nearest(const ist_proximity::ProximityArray& proximi
   markers->push_back(halo);
 }
 
-/// Moves the number slowly to a place above the links' closest points, so that it can be read while
-/// they jump.
-void ProximityMarkers::place_number(const ist_proximity::ProximityArray& proximity) {
-  Eigen::AlignedBox3d box;
-  for (const LinkMessage& link : proximity.links) {
-    if (link.state >= LinkMessage::NEAR) box.extend(to_vector(link.point_on_link));
-  }
-  if (box.isEmpty()) return;
-  Eigen::Vector3d wanted = box.center();
-  wanted.z() = box.max().z() + 4.0 * kNumberHeight;
-  const bool is_far = !((wanted - number_position_).norm() <= kNumberJumps);
-  number_position_ += (is_far ? 1.0 : kNumberFollows) * (wanted - number_position_);
+/// Moves number and labels slowly to a place above the robot, so that they can be read while it
+/// moves. Where the robot is not known they stay.
+void ProximityMarkers::place_list(const Eigen::AlignedBox3d& robot) {
+  if (robot.isEmpty()) return;
+  Eigen::Vector3d wanted = robot.center();
+  wanted.z() = robot.max().z() + 2.0 * kGap + static_cast<double>(kLabels) * kRow;
+  const bool is_far = !is_placed_ || !((wanted - list_position_).norm() <= kListJumps);
+  is_placed_ = true;
+  list_position_ += (is_far ? 1.0 : kListFollows) * (wanted - list_position_);
 }
 
-MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximity) {
+MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximity,
+                                   const Eigen::AlignedBox3d& robot) {
   header_ = proximity.header;
+  place_list(robot);
   MarkerArray result;
   for (std::size_t i = 0; i < proximity.links.size(); ++i) {
     if (proximity.links[i].state >= LinkMessage::NEAR) {

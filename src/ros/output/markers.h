@@ -4,6 +4,7 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <map>
 #include <string>
@@ -16,10 +17,11 @@ namespace ist {
 
 /// Draws a ProximityArray for rviz, in its own frame. Namespaces: "distance" (line from obstacle to
 /// link), "point_on_link", "point_on_obstacle", "repulsion" (violet arrow) and "text" (name and
-/// distance of links within 0.3 m, none over another); the id is the link's place in the array.
+/// distance of the nearest links within 0.3 m); the id is the link's place in the array.
 /// "nearest" has the ids 0 (the nearest link's distance as a large number, or why it is not known),
-/// 1 and 2 (its line and its point, highlighted). Colours are those of nearness_color(). Not thread
-/// safe.
+/// 1 and 2 (its line and its point, highlighted). The number and below it the labels, the nearest
+/// first, are a list above the robot: none lies over another or over the robot in a view from the
+/// side, wherever the viewer stands. Colours are those of nearness_color(). Not thread safe.
 class ProximityMarkers {
  public:
   /// @param max_distance  [m] distance that is drawn green
@@ -32,7 +34,9 @@ class ProximityMarkers {
   void set_counts(const std::vector<bool>& counts) { counts_ = counts; }
 
   /// Draws every link that is NEAR or CONTACT, and deletes the other markers of the last call.
-  visualization_msgs::MarkerArray draw(const ist_proximity::ProximityArray& proximity);
+  /// @param robot  [m] encloses the robot in the message's frame; empty where it is not known
+  visualization_msgs::MarkerArray draw(const ist_proximity::ProximityArray& proximity,
+                                       const Eigen::AlignedBox3d& robot);
 
  private:
   using Key = std::pair<std::string, int>;  // namespace and id
@@ -44,12 +48,15 @@ class ProximityMarkers {
                    std::vector<visualization_msgs::Marker>* markers) const;
   void draw_nearest(const ist_proximity::ProximityArray& proximity,
                     std::vector<visualization_msgs::Marker>* markers);
-  void place_number(const ist_proximity::ProximityArray& proximity);
+  void place_list(const Eigen::AlignedBox3d& robot);
 
   double max_distance_, lifetime_;
   std::vector<bool> counts_;  ///< by link; where its size is not the message's, all count
   std_msgs::Header header_;
-  Eigen::Vector3d number_position_{0.0, 0.0, 1.0};  ///< [m] of the large number
+  /// [m] lower edge of the large number, above the labels; the first place of a robot that is known
+  /// is taken at once
+  Eigen::Vector3d list_position_{0.0, 0.0, 1.0};
+  bool is_placed_ = false;
   std::map<Key, std_msgs::Header> shown_;
 };
 

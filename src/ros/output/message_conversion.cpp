@@ -51,11 +51,23 @@ void assign_link(const std::string& name, const LinkProximity& result,
   assign(repulsion.torque, &message->repulsion_torque);
   assign_wrench(penetration, &message->penetration);
   assign_closing(closing, message);
+  const Eigen::Vector3d nowhere = Eigen::Vector3d::Constant(kNaN);
+  assign_unknown_space({}, kNaN, nowhere, false, message);
   if (result.state >= LinkState::kNear) {
     message->source = source;
   } else {
     message->source.clear();
   }
+}
+
+void assign_unknown_space(const SeenShare& seen, double lower_bound,
+                          const Eigen::Vector3d& direction, bool is_obstacle,
+                          LinkMessage* message) {
+  message->seen_share = seen.share;
+  message->seen_age = seen.age;
+  message->unseen_distance = lower_bound;
+  assign(direction, &message->unseen_direction);
+  if (is_obstacle) message->lower_bound = std::min(message->lower_bound, lower_bound);
 }
 
 LinkMessage to_message(const std::string& name, const LinkProximity& result,

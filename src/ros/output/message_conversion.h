@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/proximity/surroundings.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
@@ -31,6 +32,14 @@ void assign_link(const std::string& name, const LinkProximity& result,
 ist_proximity::LinkProximity to_message(const std::string& name, const LinkProximity& result,
                                         const RepulsiveWrench& repulsion, const Wrench& penetration,
                                         const ClosingRates& closing, const std::string& source);
+
+/// Adds what is known of unknown space.
+/// @param lower_bound    [m] of the distance to it
+/// @param direction      towards it
+/// @param is_obstacle    whether it counts in the link's `lower_bound`
+void assign_unknown_space(const SeenShare& seen, double lower_bound,
+                          const Eigen::Vector3d& direction, bool is_obstacle,
+                          ist_proximity::LinkProximity* message);
 
 /// Makes the message of a source, as assign_link() does.
 /// @param stamp  of the ProximityArray, from which `age` counts

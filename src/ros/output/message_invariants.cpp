@@ -133,8 +133,7 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
       check.that(false, "the state has to be one of the constants", int{link.state});
   }
   if (link.state != LinkMessage::UNKNOWN) {
-    check.that(input.has_repulsion ? v.repulsion.allFinite() : all_nan(v.repulsion),
-               "repulsion has to be finite where it is computed", v.repulsion.transpose());
+    check.that(v.repulsion.allFinite(), "repulsion has to be finite", v.repulsion.transpose());
   }
   return check.broken();
 }

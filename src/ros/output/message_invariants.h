@@ -12,7 +12,6 @@ struct InvariantInput {
   ros::Time now;              ///< the ROS clock's time after the poses were read
   double max_distance = 1.0;  ///< [m] ~max_distance
   double margin = 0.0;        ///< [m] ~query/margin that the message was made with
-  bool has_repulsion = true;  ///< false: repulsion is not computed, as between links
 };
 
 /// Checks what a ProximityArray promises, whatever is missing: a status with a text; a stamp that

@@ -37,6 +37,8 @@ class SpeedScalePublisher {
 
   // The result of the last publish(), for the diagnostics.
   double min_distance() const { return min_distance_; }  ///< [m] NaN: not known
+  /// With ~self_collision/in_minimum: why ~self_proximity cannot be used; else empty.
+  const std::string& self_problem() const { return self_problem_; }
   /// The scale, and the link and the rule that decide, as a sentence. Empty: not enabled.
   std::string summary() const;
 

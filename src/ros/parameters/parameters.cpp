@@ -91,11 +91,41 @@ void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
   reader->read("self_collision/ignore", &config->ignore);
   reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
   reader->read("self_collision/in_minimum", &config->in_minimum);
+  reader->read("self_collision/samples", Range::non_negative("", 1e6), &config->samples);
 }
 
 void read_attach(ParameterReader* reader, AttachConfig* config) {
   reader->read("attach/max_objects", Range::non_negative("", 1e4), &config->max_objects);
   reader->read("attach/max_time", Range::positive("s", 3600.0), &config->max_time);
+}
+
+void read_unknown_space(ParameterReader* reader, ServerConfig* config) {
+  std::string text = "free";
+  reader->read_choice("unknown_space", {"free", "obstacle", "report"}, &text);
+  config->unknown_space = text == "obstacle" ? UnknownSpace::kObstacle
+                          : text == "report" ? UnknownSpace::kReport
+                                             : UnknownSpace::kFree;
+  if (config->unknown_space == UnknownSpace::kFree) return;
+  const SourceMemoryConfig* first = nullptr;
+  for (const SourceConfig& source : config->sources) {
+    const SourceMemoryConfig& memory = source.memory;
+    if (!memory.enabled) continue;
+    if (first == nullptr) first = &memory;
+    if (!source.ingest.self_filter) {
+      reader->add_error("~unknown_space is " + text + ": it needs to know where the robot is; '" +
+                        source.name + "' has self_filter: false");
+    }
+    if (memory.map.resolution != first->map.resolution || memory.frame_id != first->frame_id) {
+      reader->add_error("~unknown_space is " + text +
+                        ": the memories of all sources need the same "
+                        "resolution and frame_id then; '" +
+                        source.name + "' has others");
+    }
+  }
+  if (first == nullptr) {
+    reader->add_error("~unknown_space is " + text +
+                      ": a memory says what has been seen; set ~memory/enabled");
+  }
 }
 
 }  // namespace
@@ -140,6 +170,7 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   }
   read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
+  read_unknown_space(&reader, &config);
   read_self_collision(&reader, &config.self_collision);
   read_attach(&reader, &config.attach);
   if (config.self_collision.in_minimum && !config.self_collision.enabled) {

@@ -14,6 +14,7 @@
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/proximity/speed_scale.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/robot_description.h"
@@ -33,7 +34,10 @@ struct SelfCollisionConfig {
   std::vector<std::pair<std::string, std::string>>
       ignore;                          ///< pairs of links to leave out, besides adjacent ones
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
-  bool in_minimum = false;             ///< its links count in ~min_distance and ~speed_scale
+  /// Its links count in ~min_distance, ~speed_scale and ~joint_repulsion.
+  bool in_minimum = false;
+  /// Random configurations in which ~link_pairs counts contacts; 0: none.
+  int samples = static_cast<int>(PairSampling().configurations);
 };
 
 /// The links whose volumes are packed for `penetration`.
@@ -42,6 +46,10 @@ enum class ContactsWanted {
   kAll,   ///< all, from the start
   kNone
 };
+
+/// What is done about space that no memory knows: nothing; it counts in `lower_bound`; it is
+/// described for each link.
+enum class UnknownSpace { kFree, kObstacle, kReport };
 
 /// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
 /// may take half of the time until the next one, so that no scene makes answers late.
@@ -87,6 +95,7 @@ struct ServerConfig {
   bool speed_scale_enabled = true;
   SpeedScaleConfig speed_scale;
   std::vector<SourceConfig> sources;
+  UnknownSpace unknown_space = UnknownSpace::kFree;  ///< others need a memory
 };
 
 /// Parameters of the wrong type or out of range. The message has one line for each, with its name,

@@ -34,6 +34,7 @@ constexpr Entry kEntries[] = {
     {"speed_scale/slow_scale", 1.0, "The scale at slow_distance."},
     {"speed_scale/self_stop_distance", 0.0, "stop_distance of one link to another."},
     {"speed_scale/self_free_distance", 0.0, "free_distance of one link to another."},
+    {"speed_scale/separation/enabled", 1.0, "Whether the separation distance decides as well."},
     {"speed_scale/separation/obstacle_speed", 5.0,
      "Obstacles are taken to come at least this fast."},
     {"speed_scale/separation/robot_speed", 5.0, "Speed of the robot's fastest point at scale 1."},

@@ -5,6 +5,7 @@
 #include "internal/cloud/noise_filter.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/laser_scan.h"
+#include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/octree.h"
 #include "ros/parameters/world_config.h"
 
@@ -18,6 +19,14 @@ const char* message_type(SourceType type);
 /// The word for one message of a source: "cloud", "image", "scan", "map" or "world".
 const char* noun(SourceType type);
 
+/// What a source remembers (~memory, ~sources/NAME/memory).
+struct SourceMemoryConfig {
+  bool enabled = false;
+  MemoryConfig map;
+  std::string frame_id;  ///< that stands still in the world; empty: the fixed frame
+  std::string file;      ///< absolute path of a .bt file; empty: nothing is kept
+};
+
 /// One entry of ~sources.
 struct SourceConfig {
   std::string name = "cloud";
@@ -30,10 +39,11 @@ struct SourceConfig {
   std::string timeout_parameter = "cloud_timeout";
   bool required = true;  ///< false: the absence of this source shows in its own status only
   IngestConfig ingest;
-  NoiseFilterConfig noise;  ///< used for clouds and depth images
-  ScanLimits scan;          ///< used for scans
-  OctreeLimits map;         ///< used for maps
-  WorldConfig world;        ///< used for known worlds
+  NoiseFilterConfig noise;    ///< used for clouds and depth images
+  ScanLimits scan;            ///< used for scans
+  OctreeLimits map;           ///< used for maps
+  SourceMemoryConfig memory;  ///< used for clouds and depth images
+  WorldConfig world;          ///< used for known worlds
 
   /// Whether a message stays valid for ever and survives jumps of the clock: a map from a file, a
   /// map with an infinite timeout, and the same of a known world.

@@ -1,6 +1,7 @@
 #include "ros/parameters/source_parameters.h"
 
 #include <limits>
+#include <map>
 #include <sstream>
 #include <string>
 
@@ -11,6 +12,23 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
+void read_view(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
+  const bool is_view = ingest->self_filter_mode == SelfFilterMode::kView;
+  std::string mode = is_view ? "view" : "padding";
+  reader->read_choice(prefix + "self_filter_mode", {"padding", "view"}, &mode);
+  ingest->self_filter_mode = mode == "view" ? SelfFilterMode::kView : SelfFilterMode::kPadding;
+  ViewFilterConfig& view = ingest->view;
+  const std::string of = prefix + "self_filter_view/";
+  constexpr double kSmallest = 1e-6;  // errors of a sensor's pose are never less
+  reader->read(of + "noise_constant", Range::non_negative("m", 1.0), &view.noise.constant);
+  reader->read(of + "noise_quadratic", Range::non_negative("1/m", 1.0), &view.noise.quadratic);
+  reader->read(of + "position_error", Range{"m", kSmallest, 1.0}, &view.position_error);
+  reader->read(of + "angle_error", Range{"rad", kSmallest, 1.0}, &view.angle_error);
+  reader->read(of + "model_error", Range::non_negative("m", 1.0), &view.model_error);
+  reader->read(of + "time_error", Range::non_negative("s", 1.0), &view.time_error);
+  reader->read(of + "mixed_pixels", Range::non_negative("pixels", 10.0), &view.mixed_pixels);
+}
+
 void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfig* ingest) {
   const double default_max_range = ingest->max_range;
   reader->read(prefix + "min_range", Range::non_negative("m", 1e4), &ingest->min_range);
@@ -18,6 +36,7 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
   reader->read(prefix + "self_filter", &ingest->self_filter);
   reader->read(prefix + "self_filter_padding", Range::non_negative("m", 1.0),
                &ingest->self_filter_padding);
+  read_view(reader, prefix, ingest);
   if (!(ingest->max_range > ingest->min_range)) {
     std::ostringstream text;
     text << "~" << prefix << "max_range is " << ingest->max_range
@@ -45,6 +64,36 @@ void read_limits(ParameterReader* reader, const std::string& prefix, SourceConfi
       return reader->read(prefix + "max_bytes", Range{"", 1.0, 2e9}, &source->map.max_bytes);
     case SourceType::kWorld:
       break;  // see read_world()
+  }
+}
+
+// The limits are those of MemoryConfig; 10^9 voxels take 8.6 GB.
+void read_memory(ParameterReader* reader, const std::string& prefix, SourceMemoryConfig* memory) {
+  reader->children(prefix + "memory");  // adds an error unless it is a dictionary
+  reader->read(prefix + "memory/enabled", &memory->enabled);
+  reader->read(prefix + "memory/decay", Range::positive("s", kInf, true), &memory->map.decay);
+  reader->read(prefix + "memory/resolution", Range{"m", 0.001, 1.0}, &memory->map.resolution);
+  reader->read(prefix + "memory/max_nodes", Range{"", 4096.0, 1e9}, &memory->map.max_nodes);
+  reader->read(prefix + "memory/max_range", Range::positive("m", 100.0), &memory->map.max_range);
+  reader->read(prefix + "memory/frame_id", &memory->frame_id);
+  reader->read(prefix + "memory/file", &memory->file);
+  if (!memory->file.empty() && memory->file[0] != '/') {
+    reader->add_error("~" + prefix + "memory/file is \"" + memory->file +
+                      "\": an absolute path is needed, for example /home/robot/memory.bt");
+  }
+}
+
+// Each memory has a file of its own.
+void check_memories(ParameterReader* reader, const std::vector<SourceConfig>& sources) {
+  std::map<std::string, std::string> writers;
+  for (const SourceConfig& source : sources) {
+    const std::string& file = source.memory.file;
+    if (!source.memory.enabled || file.empty()) continue;
+    const auto [other, is_new] = writers.emplace(file, source.name);
+    if (is_new) continue;
+    reader->add_error("~sources/" + source.name + "/memory/file is \"" + file +
+                      "\", and so is that of '" + other->second +
+                      "': each memory needs a file of its own");
   }
 }
 
@@ -90,6 +139,16 @@ void read_map(ParameterReader* reader, const std::string& prefix, SourceConfig* 
 
 void read_source(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
   read_type(reader, prefix, &source->type);
+  if (source->type == SourceType::kCloud || source->type == SourceType::kDepthImage) {
+    read_memory(reader, prefix, &source->memory);
+  } else {
+    source->memory.enabled = false;
+    if (reader->has(prefix + "memory")) {
+      reader->add_error("~" + prefix +
+                        "memory is set: it is for clouds and depth images, not for a " +
+                        message_type(source->type));
+    }
+  }
   if (source->type == SourceType::kMap) {
     read_map(reader, prefix, source);
   } else if (source->type == SourceType::kWorld) {
@@ -121,6 +180,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   read_ingest(reader, "", &single.ingest);
   read_noise(reader, "", &single.noise);
   read_limits(reader, "", &single);
+  read_memory(reader, "", &single.memory);
   if (!reader->has("sources")) return {single};
 
   std::vector<SourceConfig> sources;
@@ -133,6 +193,7 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
     read_source(reader, prefix + "/", &source);
     sources.push_back(source);
   }
+  check_memories(reader, sources);
   if (sources.empty() && reader->errors().empty()) {
     reader->add_error("~sources is empty: at least one source is needed, or no ~sources at all");
   }

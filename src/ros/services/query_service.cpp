@@ -39,10 +39,16 @@ std::string check_times(const std::vector<double>& times, std::size_t states) {
 
 }  // namespace
 
-QueryService::QueryService(ros::NodeHandle private_nh, const ServerConfig& config,
-                           const CloudSources& sources, const TransformBuffer& buffer,
-                           std::function<LiveConfig()> live)
-    : config_(config), sources_(sources), buffer_(buffer), live_(std::move(live)) {
+QueryService::QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
+                           const ServerConfig& config, const CloudSources& sources,
+                           const TransformBuffer& buffer, std::function<LiveConfig()> live,
+                           UnknownSpaceWatch* watch)
+    : config_(config),
+      sources_(sources),
+      buffer_(buffer),
+      live_(std::move(live)),
+      watch_(watch),
+      self_(nh, config) {
   private_nh.setCallbackQueue(thread_.queue());
   service_ = private_nh.advertiseService("query", &QueryService::answer, this);
   thread_.start("ist query", [this] { return_memory(); });
@@ -59,11 +65,14 @@ void QueryService::set_model(std::shared_ptr<const ModelState> model) {
 }
 
 /// Bounds the time and the memory of a request.
-std::string QueryService::check_size(std::size_t states) const {
+std::string QueryService::check_size(const Service::Request& request) const {
+  const std::size_t states = request.states.size();
   const auto links = static_cast<std::size_t>(std::count(chosen_.begin(), chosen_.end(), true));
+  const std::size_t pairs = request.self_proximity != 0 ? self_.size() : 0;
   const auto max = static_cast<std::size_t>(config_.max_query_answers);
-  if (states <= max / std::max<std::size_t>(links, 1)) return "";
-  return std::to_string(states) + " states for " + std::to_string(links) + " links are more than " +
+  if (states <= max / std::max<std::size_t>(links + pairs, 1)) return "";
+  return std::to_string(states) + " states for " + std::to_string(links) + " links" +
+         (pairs > 0 ? " and " + std::to_string(pairs) + " pairs" : "") + " are more than " +
          std::to_string(max) +
          " answers (~query/max_answers): ask in several requests, or for fewer links";
 }
@@ -90,6 +99,8 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
     response.results.clear();
     response.impact_links.clear();
     response.impact_times.clear();
+    response.pairs.clear();
+    response.pair_impact_times.clear();
     return true;
   }
   const auto bad =
@@ -129,7 +140,7 @@ std::string QueryService::take_model() {
                                                   link_names(*model_->robot), config_.pose_timeout);
   poses_ = poses.get();
   cycle_ = std::make_unique<ProximityCycle>(model_, config_, std::move(poses),
-                                            CloudSelection::Reader::kOther);
+                                            CloudSelection::Reader::kOther, watch_);
   impacts_ = std::make_unique<TimeOfImpact>(model_->robot, model_->kinematics, config_.query);
   return "";
 }
@@ -155,7 +166,11 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   std::string problem = check_times(request.times, request.states.size());
   if (problem.empty()) problem = take_model();
   if (problem.empty()) problem = choose_links(request.links);
-  if (problem.empty()) problem = check_size(request.states.size());
+  if (problem.empty() && request.self_proximity != 0) {
+    self_.set_model(model_);
+    self_.choose(chosen_);
+  }
+  if (problem.empty()) problem = check_size(request);
   if (!problem.empty()) return problem;
 
   LiveConfig live = live_();
@@ -169,8 +184,8 @@ std::string QueryService::run(const Service::Request& request, Service::Response
     ProximityArray& result = response->results.back();
     cycle_->forget();  // the configurations are no motion, so there is no speed between them
     cycle_->run(ros::Time::now(), sources_, live, "", &result);
-    assert_invariants(result,
-                      {ros::Time::now(), config_.query.max_distance, live.query.margin, true});
+    assert_invariants(result, {ros::Time::now(), config_.query.max_distance, live.query.margin});
+    if (request.self_proximity != 0) self_.add(*poses_, live.query, &response->pairs);
     for (std::size_t link = chosen_.size(); link-- > 0;) {
       if (!chosen_[link]) result.links.erase(result.links.begin() + static_cast<long>(link));
     }
@@ -178,14 +193,14 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   }
   if (request.times.empty()) return "";
   impacts_->set_config(live.query);
-  return find_impact_times(request, positions, response);
+  return find_impact_times(request, positions, live.query, response);
 }
 
 /// Finds the times of impact with the obstacles of the last result, straight from state to state.
 /// @returns empty, or why the motion cannot be answered
 std::string QueryService::find_impact_times(const Service::Request& request,
                                             const std::vector<std::vector<double>>& positions,
-                                            Service::Response* response) {
+                                            const QueryConfig& query, Service::Response* response) {
   const auto& joints = model_->kinematics->joints();
   std::vector<bool> wanted = cycle_->measurable();
   for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -196,6 +211,9 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   std::vector<double> first;
   first.reserve(wanted.size());
   for (const bool one : wanted) first.push_back(one ? kInf : std::nan(""));
+  if (request.self_proximity != 0) self_.begin_motion();
+  JointPoses still;  // nothing is known of the motion while the root link has no pose
+  if (poses_->is_root_known()) still = poses_->joints();
   // Times are found against clouds alone: beside a known world, "never" would not be known.
   if (cycle_->has_worlds()) {
     std::fill(first.begin(), first.end(), std::nan(""));
@@ -211,6 +229,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
              "] and states[" + std::to_string(k + 1) + "] only: a motion has to state it in all";
     }
     impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(), &impacts);
+    if (request.self_proximity != 0) self_.advance(motion, request.times[k], still, query);
     for (std::size_t i = 0; i < wanted.size(); ++i) {
       if (std::isfinite(impacts[i].time)) {
         first[i] = request.times[k] + impacts[i].time;
@@ -227,6 +246,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
     response->impact_links.push_back(model_->links[i]);
     response->impact_times.push_back(first[model_->monitored[i]]);
   }
+  if (request.self_proximity != 0) response->pair_impact_times = self_.impact_times();
   return "";
 }
 

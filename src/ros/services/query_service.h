@@ -15,9 +15,11 @@
 #include "ros/common/callback_thread.h"
 #include "ros/cycle/proximity_cycle.h"
 #include "ros/input/cloud_source.h"
+#include "ros/input/unknown_space.h"
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/stated_pose_source.h"
+#include "ros/services/self_query_answer.h"
 
 namespace ist {
 
@@ -27,9 +29,12 @@ namespace ist {
 class QueryService {
  public:
   /// @param sources, buffer  outlive this
+  /// @param watch            outlives this; null with ~unknown_space free
   /// @param live             gives the present configuration; called from the service's thread
-  QueryService(ros::NodeHandle private_nh, const ServerConfig& config, const CloudSources& sources,
-               const TransformBuffer& buffer, std::function<LiveConfig()> live);
+  /// @param nh               namespace in which, and above which, an SRDF is searched
+  QueryService(const ros::NodeHandle& nh, ros::NodeHandle private_nh, const ServerConfig& config,
+               const CloudSources& sources, const TransformBuffer& buffer,
+               std::function<LiveConfig()> live, UnknownSpaceWatch* watch = nullptr);
   ~QueryService();
   QueryService(const QueryService&) = delete;
   QueryService& operator=(const QueryService&) = delete;
@@ -44,16 +49,17 @@ class QueryService {
   std::string run(const Service::Request& request, Service::Response* response);
   std::string find_impact_times(const Service::Request& request,
                                 const std::vector<std::vector<double>>& positions,
-                                Service::Response* response);
+                                const QueryConfig& query, Service::Response* response);
   std::string take_model();
   std::string choose_links(const std::vector<std::string>& links);
-  std::string check_size(std::size_t states) const;
+  std::string check_size(const Service::Request& request) const;
   void return_memory();
 
   const ServerConfig config_;
   const CloudSources& sources_;
   const TransformBuffer& buffer_;
   const std::function<LiveConfig()> live_;
+  UnknownSpaceWatch* const watch_;  ///< null with ~unknown_space free
   CallbackThread thread_;
   ros::ServiceServer service_;
 
@@ -65,6 +71,7 @@ class QueryService {
   StatedPoseSource* poses_ = nullptr;  ///< owned by the cycle
   std::unique_ptr<ProximityCycle> cycle_;
   std::unique_ptr<TimeOfImpact> impacts_;
+  SelfQueryAnswer self_;
   std::vector<bool> chosen_;  ///< by monitored link
   /// Memory of a large answer is until then returned to the system: roscpp frees it after
   /// answer().

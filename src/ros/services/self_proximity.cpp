@@ -7,14 +7,14 @@
 #include <chrono>
 #include <cmath>
 
-#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/repulsion/self_repulsion.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
-#include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/output/message_conversion.h"
 #include "ros/output/message_invariants.h"
 #include "ros/poses/make_pose_source.h"
+#include "ros/services/pair_choice.h"
 #include "ros/status/status.h"
 
 namespace ist {
@@ -102,53 +102,17 @@ void SelfProximity::take_model() {
   }
   query_.reset();
   if (!model_->robot || !model_->kinematics) return;
-  query_ = std::make_unique<SelfQuery>(model_->robot, choose_pairs(), config_.query);
+  query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query);
   pose_source_ =
       make_pose_source(*model_, config_, buffer_, joints_, JointPoseSource::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
 }
 
-NamePairs SelfProximity::ignored_pairs() const {
-  NamePairs ignored = config_.self_collision.ignore;
-  for (const auto& pair : ignored) {
-    for (const std::string& name : {pair.first, pair.second}) {
-      if (model_->kinematics->find_body(name)) continue;
-      ROS_WARN_STREAM("~self_collision/ignore names '" << name
-                                                       << "', which is no link of the URDF");
-    }
-  }
-  const std::string name = config_.robot_description + "_semantic";
-  std::string key, srdf;
-  if (!nh_.searchParam(name, key) || !nh_.getParam(key, srdf)) return ignored;
-  try {
-    const NamePairs disabled = disabled_collisions(srdf);
-    ignored.insert(ignored.end(), disabled.begin(), disabled.end());
-  } catch (const ModelError& error) {
-    ROS_WARN_STREAM("'" << key << "' is not used: " << error.what());
-  }
-  return ignored;
-}
-
-std::vector<LinkPair> SelfProximity::choose_pairs() const {
-  const RobotModel& robot = *model_->robot;
-  std::vector<LinkPair> pairs =
-      self_collision_pairs(robot, *model_->kinematics, wanted_links(*model_), ignored_pairs());
-  std::vector<std::string> at_rest;
-  if (config_.self_collision.ignore_contact_at_rest) {
-    for (const LinkPair& found : in_contact_at_rest(model_->robot, *model_->kinematics, pairs)) {
-      at_rest.push_back(robot.links[found.first].name + " and " + robot.links[found.second].name);
-      pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                                 [&](const LinkPair& pair) {
-                                   return pair.first == found.first && pair.second == found.second;
-                                 }),
-                  pairs.end());
-    }
-  }
-  ROS_INFO_STREAM("self-collision: "
-                  << pairs.size() << " pairs of links are watched"
-                  << (at_rest.empty() ? "" : "; in contact at rest, and left out: ")
-                  << join(at_rest, ", "));
-  return pairs;
+std::vector<LinkPair> SelfProximity::watched_pairs() const {
+  const PairChoice choice = choose_pairs(nh_, config_, *model_);
+  for (const std::string& warning : choice.warnings) ROS_WARN_STREAM(warning);
+  ROS_INFO_STREAM(choice.text(*model_->robot));
+  return choice.watched();
 }
 
 /// Finds the nearest other link; the answer is UNKNOWN if that of any pair is.
@@ -255,7 +219,7 @@ void SelfProximity::publish_once() {
         input.pose_problems.push_back("link '" + link.name +
                                       "' has no pose: " + poses_.problems[i].text);
       }
-      add_link(i, message.get());
+      add_link(i, live.repulsion, message.get());
     }
     const std::chrono::duration<double> took = Clock::now() - begin;
     message->computation_time = took.count();
@@ -267,19 +231,23 @@ void SelfProximity::publish_once() {
   const Status status = overall_status(input, now.toSec());
   message->status = status.code;
   message->status_text = status.text;
-  assert_invariants(*message,
-                    {ros::Time::now(), config_.query.max_distance, live.query.margin, false});
+  assert_invariants(*message, {ros::Time::now(), config_.query.max_distance, live.query.margin});
   publish(message);
 }
 
-void SelfProximity::add_link(std::size_t link, ProximityArray* message) {
+void SelfProximity::add_link(std::size_t link, const RepulsionConfig& repulsion,
+                             ProximityArray* message) {
   std::size_t other = link;
   const LinkProximity answer = nearest(link, &other);
   const RobotModel& robot = *model_->robot;
   const std::string& other_name = robot.links[other].name;
+  const RepulsiveWrench push =
+      poses_.known[link]
+          ? self_repulsion(link, poses_.X_FL[link], query_->pairs(), results_, repulsion)
+          : RepulsiveWrench::unknown();
   // Both links move, so the speed has no parts.
   const ClosingRates closing = speeds_[link].update_pair(poses_.stamp.toSec(), answer);
-  message->links.push_back(to_message(robot.links[link].name, answer, RepulsiveWrench::unknown(),
+  message->links.push_back(to_message(robot.links[link].name, answer, push,
                                       penetration(link, answer), closing, other_name));
 }
 

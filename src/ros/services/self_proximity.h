@@ -51,10 +51,10 @@ class SelfProximity {
   void publish_failure(const std::string& fault);
   void publish(const ist_proximity::ProximityArrayConstPtr& message);
   void take_model();
-  std::vector<LinkPair> choose_pairs() const;
-  NamePairs ignored_pairs() const;
+  std::vector<LinkPair> watched_pairs() const;
   LinkProximity nearest(std::size_t link, std::size_t* other) const;
-  void add_link(std::size_t link, ist_proximity::ProximityArray* message);
+  void add_link(std::size_t link, const RepulsionConfig& repulsion,
+                ist_proximity::ProximityArray* message);
   bool is_finished(std::size_t link) const;
   void compute_wrenches(const LiveConfig& live);
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;

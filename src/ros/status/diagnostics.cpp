@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ros/common/text.h"
+#include "ros/input/view_text.h"
 #include "ros/poses/clock_skew.h"
 #include "ros/status/diagnostic_values.h"
 
@@ -41,6 +42,16 @@ void add_source_counts(const SourceReport& source, double rate, double now,
                        DiagnosticStatus* status) {
   add_value("topic", source.topic, status);
   add_value("required", source.required ? "true" : "false", status);
+  if (source.is_memory) {
+    if (source.has_snapshot) {
+      add_value("age", format_text("%.3f s", now - source.counts_from.toSec()), status);
+      add_value("boxes in use", source.counts.used, status);
+      add_value("time to remember", milliseconds(source.ingest_time), status);
+    }
+    add_value("voxels occupied", source.memory_occupied, status);
+    add_value("voxels in memory", source.memory_voxels, status);
+    return;
+  }
   add_value("publishers", source.publishers, status);
   add_value("messages received", source.messages, status);
   if (!source.is_file) add_value("rate", format_text("%.1f Hz", rate), status);
@@ -65,6 +76,29 @@ void add_source_counts(const SourceReport& source, double rate, double now,
     add_value("points NaN", source.counts.not_a_number, status);
     add_value("points infinite", source.counts.infinite, status);
     add_value("time to ingest", milliseconds(source.ingest_time), status);
+  }
+}
+
+/// Adds what the self-filter by view found.
+void add_view(const SourceReport& source, DiagnosticStatus* status) {
+  const bool is_used = source.has_snapshot && source.view.is_used;
+  add_value("self-filter",
+            !source.by_view ? "padding"
+            : is_used       ? "view"
+                            : "padding, not an image",
+            status);
+  if (!is_used) return;
+  const ViewReport& view = source.view;
+  add_value("correction of the sensor's pose on the robot", millimetres(view.offset), status);
+  add_value("correction of the sensor's orientation",
+            format_text("%.2f deg", view.angle * 180.0 / 3.14159265358979323846), status);
+  add_value("uncertainty of the corrected pose", millimetres(view.uncertainty), status);
+  add_value("residual of the robot's surface", millimetres(view.residual), status);
+  for (std::size_t i = 0; i < view.links.size() && i < source.view_links.size(); ++i) {
+    const LinkView& link = view.links[i];
+    add_value("blind skin of " + source.view_links[i], millimetres(link.blind_skin), status);
+    add_value("unexplained points in the skin of " + source.view_links[i], link.unexplained,
+              status);
   }
 }
 
@@ -113,7 +147,10 @@ DiagnosticStatus input_diagnostics(const std::string& node, const SourceReport& 
   if (!source.doubt.empty()) raise(DiagnosticStatus::WARN, source.doubt, &status);
   const std::string doubt = doubt_of_self_filter(source);
   if (!doubt.empty()) raise(DiagnosticStatus::WARN, doubt, &status);
+  const std::string drift = doubt_of_view(source.view);
+  if (!drift.empty()) raise(DiagnosticStatus::WARN, drift, &status);
   add_source_counts(source, rate, now, &status);
+  if (!std::isnan(source.blind_skin)) add_view(source, &status);
   return status;
 }
 

@@ -34,6 +34,13 @@ Status file_status(const SourceReport& source) {
                                         (problem.empty() ? "its file is being read" : problem)};
 }
 
+Status memory_status(const SourceReport& source) {
+  if (source.has_snapshot) return {ProximityArray::OK, ""};
+  return {ProximityArray::NO_CLOUD,
+          "source '" + source.name +
+              "': " + (source.problem.empty() ? "nothing is remembered yet" : source.problem)};
+}
+
 Status without_messages(const SourceReport& source) {
   if (source.working > 1.0) {
     return {ProximityArray::NO_CLOUD, title(source) + ": the first " + source.noun +
@@ -119,6 +126,7 @@ Status source_status(const SourceReport& source, double now) {
     return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + source.incomplete};
   }
   if (source.is_file) return file_status(source);
+  if (source.is_memory) return memory_status(source);
   if (source.messages == 0) return without_messages(source);
   if (std::isnan(source.newest)) {  // all stamps are 0 or far in the future
     return {ProximityArray::STALE_CLOUD, title(source) + because(source.problem)};

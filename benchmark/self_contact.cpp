@@ -1,0 +1,92 @@
+// What a self-filter tells of an obstacle that touches the robot, as Markdown: a bar touches the
+// simulated arm at random places, seen by a noisy, late camera whose pose is off.
+//
+// Usage: self_contact [--places N] [--seconds N] [--seed N] [--update-doc doc/self_filter.md]
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "document.h"
+#include "self_view.h"
+#include "support/demo_arm.h"
+#include "touch_view.h"
+
+namespace {
+
+std::string percent(int part, int whole) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f %%", 100.0 * part / (whole > 0 ? whole : 1));
+  return text;
+}
+
+std::string millimetres(double length) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f mm", 1e3 * length);
+  return text;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ist::sim::TouchConfig touch;
+  ist::sim::SelfViewConfig view;
+  std::string document;
+  for (int i = 1; i < argc; ++i) {
+    const bool has_value = i + 1 < argc;
+    if (std::strcmp(argv[i], "--places") == 0 && has_value) {
+      touch.places = std::atoi(argv[++i]);
+    } else if (std::strcmp(argv[i], "--seconds") == 0 && has_value) {
+      view.duration = std::atof(argv[++i]);
+    } else if (std::strcmp(argv[i], "--seed") == 0 && has_value) {
+      touch.seed = view.seed = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
+      document = argv[++i];
+    } else {
+      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
+      return 1;
+    }
+  }
+  const ist::RobotDescription robot = ist::test::demo_robot();
+  const auto model = ist::build_robot_model(robot, {});
+  ist::IngestConfig filter;
+  touch.filters = {filter};
+  filter.self_filter_mode = ist::SelfFilterMode::kView;
+  filter.view.noise = {touch.noise, 0.0};
+  touch.filters.push_back(filter);
+  const std::vector<ist::sim::TouchResult> touches = ist::sim::run_touch(robot, model, touch);
+
+  view.position_error = touch.position_error;
+  view.angle_error = touch.angle_error;
+  view.resolution = touch.resolution;
+  view.view = filter.view;
+  view.paddings = {filter.self_filter_padding};
+  std::string table =
+      "| mode | told while it touches | places | mean distance told | told at 5 cm and more | "
+      "alone: "
+      "false contacts | alone: points not filtered |\n|---|---|---|---|---|---|---|\n";
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    view.mode = touch.filters[i].self_filter_mode;
+    const ist::sim::SelfViewResult alone = ist::sim::run_self_view(robot, model, view).front();
+    const ist::sim::TouchResult& t = touches[i];
+    table += std::string("| ") + (i == 0 ? "`padding`" : "`view`") + " | " +
+             percent(t.told, t.answers) + " | " + std::to_string(t.places_told) + " of " +
+             std::to_string(touch.places) + " | " + millimetres(t.mean) + " | " +
+             std::to_string(t.false_answers) + " of " + std::to_string(t.free_answers) + " | " +
+             std::to_string(alone.contacts) + " of " + std::to_string(alone.answers) + " | " +
+             std::to_string(alone.phantoms) + " |\n";
+  }
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "\nThe correction moves the points on the arm by %.1f mm; the largest blind skin of "
+      "the last cloud is %.1f mm.\n",
+      1e3 * touches[1].offset, 1e3 * touches[1].blind_skin);
+  table += text;
+  std::printf("%s", table.c_str());
+  const bool fails =
+      !document.empty() && !ist::benchmark::write_table(document, "self contact", table);
+  return fails ? 1 : 0;
+}

@@ -1,0 +1,438 @@
+#include "cloud/filters/view_filter.h"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <limits>
+
+#include "cloud/filters/crop.h"
+#include "cloud/format/point_reader.h"
+#include "internal/geometry/ray_cast.h"
+#include "internal/geometry/solid_queries.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr std::size_t kPixels = kTileSide * kTileSide;
+constexpr std::uint32_t kWhole = (1U << kPixels) - 1U;
+
+// Standard deviations of noise. A camera shows the robot in some 10^4 windows thirty times a
+// second: a mean that is five off by chance comes once in ten seconds, one of three next to an
+// obstacle only where there is one.
+constexpr double kCertain = 5.0;
+constexpr double kBesideObstacle = 3.0;
+// Noise never pulls a mean back by more: a mixed pixel or a shadow is no evidence of free space.
+constexpr double kClipped = 3.0;
+// Standard deviations of the sensor's corrected pose.
+constexpr double kPose = 3.0;
+
+constexpr double kFlat = 0.0005;       // [m] a patch of surface deviates less from a plane
+constexpr double kGrazing = 0.15;      // cosine: below it, a patch is looked at pixel by pixel
+constexpr double kUnknownSpeed = 1.0;  // [m/s] of a link that was not there a cloud ago
+constexpr double kLongestStep = 0.5;   // [s] between two clouds, for a speed
+// [m] Edge of a voxel of what was outside the skin: at 30 Hz what moves at 1 m/s stays a neighbour.
+constexpr double kVoxel = 0.04;
+
+double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::sqrt(std::max(2.0 - 2.0 * a.dot(b), 0.0));
+}
+
+// The median of the angles [rad] between neighbours, of some samples; inf: too few were measured.
+class NeighbourAngles {
+ public:
+  void add(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
+    if (count_ == values_.size() || !p.allFinite() || !q.allFinite()) return;
+    const double norms = p.norm() * q.norm();
+    if (norms > 0.0) values_[count_++] = p.cross(q).norm() / norms;
+  }
+  double median() {
+    if (count_ < kFewest) return kInf;
+    const auto middle = values_.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
+    std::nth_element(values_.begin(), middle,
+                     values_.begin() + static_cast<std::ptrdiff_t>(count_));
+    return *middle;
+  }
+
+ private:
+  static constexpr std::size_t kFewest = 8;
+  std::array<double, 256> values_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+bool is_view(const RawCloud& cloud) {
+  if (cloud.width < kTileSide || cloud.height < kTileSide) return false;
+  if (cloud.depth != DepthType::kNone) return true;
+  constexpr std::size_t kSamples = 2048;
+  // An odd stride: the samples are to be spread over the columns.
+  const std::size_t stride = cloud.size() / kSamples | 1U;
+  NeighbourAngles across, down;
+  for (std::size_t i = 0; i < cloud.size(); i += stride) {
+    const std::size_t row = i / cloud.width, column = i % cloud.width;
+    if (row + 1 == cloud.height || column + 1 == cloud.width) continue;
+    const Eigen::Vector3d p = point_at(cloud, row, column);
+    across.add(p, point_at(cloud, row, column + 1));
+    down.add(p, point_at(cloud, row + 1, column));
+  }
+  // All around, neighbours would be 2 pi / width and pi / height apart; cameras see less.
+  constexpr double kPi = 3.14159265358979323846;
+  constexpr double kFewTimes = 2.0;
+  return across.median() <= kFewTimes * 2.0 * kPi / static_cast<double>(cloud.width) &&
+         down.median() <= kFewTimes * kPi / static_cast<double>(cloud.height);
+}
+
+ViewFilter::ViewFilter(const ViewFilterConfig& config, double padding)
+    : config_(config), padding_(padding), calibration_(config) {}
+
+void ViewFilter::begin_cloud(Span<const PosedSolid> solids, double stamp) {
+  links_.swap(last_links_);
+  last_stamp_ = stamp_;
+  stamp_ = stamp;
+  links_.assign(solids.size(), {});
+  const double step = stamp_ - last_stamp_;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    LinkState& link = links_[i];
+    link.tree = solids[i].tree;
+    link.X_FL = solids[i].X_FL;
+    link.speed = kUnknownSpeed;
+    const auto before = std::find_if(last_links_.begin(), last_links_.end(),
+                                     [&](const LinkState& l) { return l.tree == link.tree; });
+    if (before == last_links_.end() || !(step > 0.0 && step < kLongestStep)) continue;
+    const Eigen::Vector3d& center = link.tree->center();
+    const double turned = (link.X_FL.linear() - before->X_FL.linear()).norm();
+    link.speed =
+        ((link.X_FL * center - before->X_FL * center).norm() + link.tree->radius() * turned) / step;
+  }
+  outside_before_.swap(outside_);
+  calibration_.begin_cloud();
+}
+
+void ViewFilter::begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS) {
+  cloud_ = &cloud;
+  X_FS_ = X_FS;
+  const std::size_t wide = (cloud.width + kTileSide - 1) / kTileSide,
+                    high = (cloud.height + kTileSide - 1) / kTileSide;
+  if (wide != tiles_wide_ || high != tiles_high_) {
+    tiles_wide_ = wide;
+    tiles_high_ = high;
+    tile_index_.assign(wide * high, -1);
+  } else {
+    for (const Tile& tile : tiles_) {
+      tile_index_[tile.row / kTileSide * wide + tile.column / kTileSide] = -1;
+    }
+  }
+  tiles_.clear();
+  outside_.clear();
+  calibration_.begin_pass();
+  for (LinkState& link : links_) {
+    link.X_LS = link.X_FL.inverse() * X_FS;
+    const Eigen::Vector3d center_S = link.X_LS.inverse() * link.tree->center();
+    link.tolerance = kPose * calibration_.uncertainty(center_S) + config_.model_error +
+                     link.speed * config_.time_error;
+    const double sigma = config_.noise.sigma(center_S.norm());
+    link.blind_skin =
+        std::min(padding_, link.tolerance + kCertain * sigma / static_cast<double>(kTileSide));
+    link.in_skin = link.unexplained = 0;
+  }
+}
+
+ViewFilter::Sight ViewFilter::look(const Eigen::Vector3d& p_S, const SelfFilter& filter) const {
+  Sight sight;
+  const double range = p_S.norm();
+  sight.direction = p_S / range;
+  sight.t = kInf;
+  sight.link = nullptr;
+  for (const SelfFilter::Link* link : filter.group()) {
+    const Eigen::Isometry3d& X_LS = links_[link->number].X_LS;
+    const RayHit hit = ray_cast(*link->solid, X_LS.translation(), X_LS.linear() * sight.direction);
+    if (!(std::abs(hit.t - range) < std::abs(sight.t - range))) continue;
+    sight.t = hit.t;
+    sight.normal = X_LS.linear().transpose() * hit.normal;
+    sight.link = link;
+  }
+  return sight;
+}
+
+void ViewFilter::add_gap(std::size_t k, double gap, double noise, Tile* tile) const {
+  const auto bit = static_cast<std::uint16_t>(1U << k);
+  tile->gap[k] = static_cast<float>(gap);
+  tile->skin |= bit;
+  tile->robot |= bit;
+  const double tolerance = static_cast<double>(tile->tolerance);
+  if (gap > kCertain * noise + tolerance) tile->obstacle |= bit;
+  tile->sum += static_cast<float>(std::max(gap, -kClipped * noise - tolerance));
+  tile->variance += static_cast<float>(noise * noise);
+  ++tile->count;
+}
+
+// A tile on a smooth part of one link, as most are: four rays say where its plane is.
+bool ViewFilter::add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const SelfFilter& filter,
+                           Tile* tile) {
+  constexpr std::array<std::size_t, 4> kCorners = {0, kTileSide - 1, kPixels - kTileSide,
+                                                   kPixels - 1};
+  std::array<Sight, 4> sights;
+  std::array<Eigen::Vector3d, 4> hits;
+  for (std::size_t i = 0; i < 4; ++i) {
+    sights[i] = look(p_S[kCorners[i]], filter);
+    if (sights[i].link == nullptr || sights[i].link != sights[0].link) return false;
+    hits[i] = sights[i].t * sights[i].direction;
+  }
+  const Eigen::Vector3d across = hits[3] - hits[0], down = hits[2] - hits[1];
+  Eigen::Vector3d normal = across.cross(down);
+  const double size = normal.norm();
+  if (!(size > 0.0)) return false;
+  normal /= normal.dot(sights[0].direction) < 0.0 ? size : -size;
+  const Eigen::Vector3d middle = 0.25 * (hits[0] + hits[1] + hits[2] + hits[3]);
+  const double length = std::max(across.norm(), down.norm());
+  const double bend = std::max(angle_between(sights[0].normal, sights[3].normal),
+                               angle_between(sights[1].normal, sights[2].normal));
+  if (length * bend > 8.0 * kFlat) return false;
+  for (const Eigen::Vector3d& hit : hits) {
+    if (std::abs(normal.dot(hit - middle)) > kFlat) return false;
+  }
+  const double cosine = -normal.dot(middle.normalized());
+  if (cosine < kGrazing) return false;
+  std::array<double, kPixels> gaps;
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    gaps[k] = normal.dot(p_S[k] - middle);
+    // A point that is farther from the surface along its ray may be outside the skin.
+    if (std::abs(gaps[k]) > (padding_ - 2.0 * kFlat) * cosine) return false;
+  }
+  tile->link = sights[0].link;
+  tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
+  const double noise = config_.noise.sigma(middle.norm()) * cosine;
+  for (std::size_t k = 0; k < kPixels; ++k) add_gap(k, gaps[k], noise, tile);
+  tile->is_patch = true;
+  tile->p_S = (middle + tile->sum / static_cast<double>(kPixels) * normal).cast<float>();
+  tile->n_S = normal.cast<float>();
+  return true;
+}
+
+// Whether a point is nowhere near a surface that the ray meets or passes, within what noise, the
+// sensor's pose and blurred edges leave open. Behind the surface's nearest point it is a mixed
+// pixel or a shadow.
+bool ViewFilter::is_obstacle(const Eigen::Vector3d& p_S, const Sight& sight,
+                             const SelfFilter& filter) const {
+  const double range = p_S.norm();
+  const double last = range + kCertain * config_.noise.sigma(range);
+  for (const SelfFilter::Link* link : filter.group()) {
+    const LinkState& state = links_[link->number];
+    const double tolerance = state.tolerance + config_.mixed_pixels * pixel_ * range;
+    const Eigen::Vector3d o_L = state.X_LS.translation(),
+                          d_L = state.X_LS.linear() * sight.direction;
+    if (distance_outside(*link->solid, o_L + last * d_L, tolerance).distance <= tolerance) {
+      return false;
+    }
+    const RayApproach near = nearest_approach(*link->solid, o_L, d_L, range, padding_ + kFlat);
+    if (near.distance <= tolerance && near.t <= last) return false;
+  }
+  return true;
+}
+
+// A tile at an edge of the robot, or with obstacles: each pixel has its own ray.
+void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uint32_t kept,
+                            const SelfFilter& filter, const Eigen::Isometry3d& X_OS,
+                            Tile* tile) const {
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    if ((kept >> k & 1U) == 0) continue;
+    const SelfFilter::Link* in_skin = nullptr;
+    for (const SelfFilter::Link* link : filter.group()) {
+      if (filter.is_on_link(*link, X_OS * p_S[k])) in_skin = link;
+    }
+    if (in_skin == nullptr) continue;
+    const auto bit = static_cast<std::uint16_t>(1U << k);
+    const double range = p_S[k].norm();
+    const Sight sight = look(p_S[k], filter);
+    if (tile->link == nullptr) {
+      tile->link = sight.link != nullptr ? sight.link : in_skin;
+      tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
+      tile->p_S = p_S[k].cast<float>();
+    }
+    if (sight.link == nullptr) {
+      tile->skin |= bit;
+      tile->robot |= bit;
+      if (is_obstacle(p_S[k], sight, filter)) tile->obstacle |= bit;
+      continue;
+    }
+    const double cosine = -sight.normal.dot(sight.direction);
+    const double gap = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
+    const bool is_far = gap > kCertain * noise + static_cast<double>(tile->tolerance);
+    if (is_far && !is_obstacle(p_S[k], sight, filter)) {
+      // At an edge the ray may meet what is behind it: nothing is known of the gap.
+      tile->skin |= bit;
+      tile->robot |= bit;
+      continue;
+    }
+    add_gap(k, gap, noise, tile);
+  }
+}
+
+void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kept,
+                          const SelfFilter& filter, const Eigen::Isometry3d& X_OS) {
+  std::array<Eigen::Vector3d, kPixels> p_S;
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    if ((kept >> k & 1U) == 0) continue;
+    p_S[k] = point_at(*cloud_, row + k / kTileSide, column + k % kTileSide);
+  }
+  if ((kept & 3U) == 3U) pixel_ = p_S[0].cross(p_S[1]).norm() / (p_S[0].norm() * p_S[1].norm());
+  Tile tile;
+  tile.row = static_cast<std::uint32_t>(row);
+  tile.column = static_cast<std::uint32_t>(column);
+  tile.gap.fill(std::numeric_limits<float>::quiet_NaN());
+  if (kept != kWhole || !add_patch(p_S, filter, &tile)) {
+    add_pixels(p_S, kept, filter, X_OS, &tile);
+  }
+  if (tile.skin != kept) {
+    for (std::size_t k = 0; k < kPixels; ++k) {
+      if (((kept & ~static_cast<std::uint32_t>(tile.skin)) >> k & 1U) == 0) continue;
+      add_outside(X_FS_ * p_S[k]);
+      break;  // one place a tile is enough
+    }
+  }
+  tile_index_[row / kTileSide * tiles_wide_ + column / kTileSide] =
+      static_cast<std::int32_t>(tiles_.size());
+  tiles_.push_back(tile);
+}
+
+std::uint64_t ViewFilter::voxel(const Eigen::Vector3d& p_F, int dx, int dy, int dz) const {
+  // 21 bits for each axis: far more than the reach of a robot, about the sensor's neighbourhood.
+  const auto part = [](double x, int shift) {
+    return (static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / kVoxel)) + shift)) &
+           0x1FFFFFU;
+  };
+  return part(p_F.x(), dx) << 42U | part(p_F.y(), dy) << 21U | part(p_F.z(), dz);
+}
+
+void ViewFilter::add_outside(const Eigen::Vector3d& p_F) {
+  outside_.push_back(voxel(p_F, 0, 0, 0));
+}
+
+// Whether an obstacle was beside this tile's points, outside the skin, a cloud ago.
+bool ViewFilter::came_in(const Tile& tile) const {
+  const Eigen::Vector3d p_F = X_FS_ * tile.p_S.cast<double>();
+  for (int i = 0; i < 27; ++i) {
+    if (std::binary_search(outside_before_.begin(), outside_before_.end(),
+                           voxel(p_F, i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1))) {
+      return true;
+    }
+  }
+  return false;
+}
+
+ViewFilter::Tile* ViewFilter::tile_at(std::int64_t row, std::int64_t column) {
+  if (row < 0 || column < 0 || row >= static_cast<std::int64_t>(tiles_high_) ||
+      column >= static_cast<std::int64_t>(tiles_wide_)) {
+    return nullptr;
+  }
+  const std::int32_t index =
+      tile_index_[static_cast<std::size_t>(row) * tiles_wide_ + static_cast<std::size_t>(column)];
+  return index < 0 ? nullptr : &tiles_[static_cast<std::size_t>(index)];
+}
+
+// Whether the mean gap is more than noise and systematic errors make of the robot's own surface.
+bool ViewFilter::is_in_front(double sum, double variance, int count, double tolerance,
+                             double sigmas) const {
+  return count > 0 && sum > sigmas * std::sqrt(variance) + count * tolerance;
+}
+
+// A tile, or a window of two by two tiles, that is in front of the robot for certain.
+void ViewFilter::find_windows(std::size_t index) {
+  std::array<Tile*, 4> window = {};
+  double sum = 0.0, variance = 0.0, tolerance = 0.0;
+  int count = 0;
+  const std::int64_t row = tiles_[index].row / kTileSide, column = tiles_[index].column / kTileSide;
+  for (std::size_t i = 0; i < 4; ++i) {
+    window[i] =
+        tile_at(row + static_cast<std::int64_t>(i / 2), column + static_cast<std::int64_t>(i % 2));
+    if (window[i] == nullptr) continue;
+    const Tile& t = *window[i];
+    sum += static_cast<double>(t.sum);
+    variance += static_cast<double>(t.variance);
+    count += t.count;
+    tolerance = std::max(tolerance, static_cast<double>(t.tolerance));
+  }
+  const bool whole = is_in_front(sum, variance, count, tolerance, kCertain);
+  for (Tile* tile : window) {
+    if (tile == nullptr || tile->is_obstacle) continue;
+    const double own = tile == &tiles_[index] ? kCertain : kInf;
+    const double sigmas = whole ? 0.5 * kBesideObstacle : own;
+    tile->is_obstacle =
+        std::isfinite(sigmas) &&
+        is_in_front(static_cast<double>(tile->sum), static_cast<double>(tile->variance),
+                    tile->count, static_cast<double>(tile->tolerance), sigmas);
+  }
+}
+
+// Next to an obstacle in the image, or to where one was a cloud ago, less evidence is needed.
+void ViewFilter::grow() {
+  front_.clear();
+  const auto is_weak = [this](const Tile& t) {
+    return !t.is_obstacle &&
+           is_in_front(static_cast<double>(t.sum), static_cast<double>(t.variance), t.count,
+                       static_cast<double>(t.tolerance), kBesideObstacle);
+  };
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    Tile& tile = tiles_[i];
+    if (is_weak(tile) && came_in(tile)) tile.is_obstacle = true;
+    if (tile.is_obstacle || tile.obstacle != 0) front_.push_back(i);
+  }
+  while (!front_.empty()) {
+    const Tile& from = tiles_[front_.back()];
+    front_.pop_back();
+    const std::int64_t row = from.row / kTileSide, column = from.column / kTileSide;
+    for (std::int64_t i = 0; i < 9; ++i) {
+      Tile* tile = tile_at(row + i / 3 - 1, column + i % 3 - 1);
+      if (tile == nullptr || !is_weak(*tile)) continue;
+      tile->is_obstacle = true;
+      front_.push_back(static_cast<std::size_t>(tile - tiles_.data()));
+    }
+  }
+}
+
+void ViewFilter::finish(Tile* tile) {
+  if (tile->is_obstacle) {
+    for (std::size_t k = 0; k < kPixels; ++k) {
+      if (tile->gap[k] > 0.0F) tile->obstacle |= static_cast<std::uint16_t>(1U << k);
+    }
+  }
+  tile->robot &= static_cast<std::uint16_t>(~tile->obstacle);
+  if (tile->obstacle != 0) add_outside(X_FS_ * tile->p_S.cast<double>());
+  if (tile->link != nullptr) {
+    LinkState& link = links_[tile->link->number];
+    link.in_skin += static_cast<std::uint32_t>(std::bitset<16>(tile->skin).count());
+    link.unexplained += static_cast<std::uint32_t>(std::bitset<16>(tile->obstacle).count());
+  }
+  if (!tile->is_patch || tile->obstacle != 0) return;
+  const double noise = std::sqrt(static_cast<double>(tile->variance)) / kPixels;
+  calibration_.add(tile->p_S.cast<double>(), tile->n_S.cast<double>(),
+                   static_cast<double>(tile->sum) / kPixels,
+                   std::hypot(noise, std::max(config_.model_error, kFlat)));
+}
+
+bool ViewFilter::end_pass() {
+  for (std::size_t i = 0; i < tiles_.size(); ++i) find_windows(i);
+  grow();
+  for (Tile& tile : tiles_) finish(&tile);
+  std::sort(outside_.begin(), outside_.end());
+  return calibration_.end_pass();
+}
+
+const std::uint16_t* ViewFilter::robot_mask(std::size_t row, std::size_t column) const {
+  const std::int32_t index = tile_index_[row / kTileSide * tiles_wide_ + column / kTileSide];
+  return index < 0 ? nullptr : &tiles_[static_cast<std::size_t>(index)].robot;
+}
+
+void ViewFilter::report(ViewReport* report) const {
+  report->is_used = true;
+  calibration_.report(report);
+  report->links.clear();
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    if (links_[i].in_skin == 0) continue;
+    report->links.push_back({static_cast<std::uint32_t>(i), links_[i].blind_skin, links_[i].in_skin,
+                             links_[i].unexplained});
+  }
+}
+
+}  // namespace ist

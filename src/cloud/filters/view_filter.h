@@ -1,0 +1,124 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "cloud/filters/self_filter.h"
+#include "cloud/filters/view_calibration.h"
+#include "internal/cloud/point_tile.h"
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/cloud/view_filter.h"
+#include "ist_proximity/geometry/span.h"
+
+namespace ist {
+
+/// Whether neighbours in the message were measured along neighbouring rays from the sensor frame's
+/// origin, as those of a camera or a spinning lidar are. Samples some pixels.
+bool is_view(const RawCloud& cloud);
+
+/// Decides which points of an organized cloud are the robot's by where the sensor must see it
+/// (doc/self_filter.md). Only tiles of 4 x 4 pixels with points within the padding of a link are
+/// looked at; of those points it says which are obstacles all the same. What the padding keeps, it
+/// keeps too.
+///
+/// A pass over a cloud is: begin_pass(), add_tile() for every tile near the robot, end_pass(), then
+/// robot_mask(). Keeps its memory. Not thread safe.
+class ViewFilter {
+ public:
+  /// @param padding  [m] of the SelfFilter
+  ViewFilter(const ViewFilterConfig& config, double padding);
+
+  /// Begins a cloud of another instant.
+  /// @param solids  the robot at the cloud's stamp
+  /// @param stamp   [s]
+  void begin_cloud(Span<const PosedSolid> solids, double stamp);
+  /// The estimated correction of the sensor's pose.
+  const Eigen::Isometry3d& X_SC() const { return calibration_.X_SC(); }
+
+  /// @param X_FS  corrected sensor frame -> fixed frame
+  void begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS);
+  /// Adds a tile that may hold points of the robot.
+  /// @param row, column  of its first pixel
+  /// @param kept         bit 4 r + c: the pixel in row r and column c is in range
+  /// @param filter       its group holds the tile
+  /// @param X_OS         sensor frame -> the frame of `filter`
+  void add_tile(std::size_t row, std::size_t column, std::uint32_t kept, const SelfFilter& filter,
+                const Eigen::Isometry3d& X_OS);
+  /// Tells of points near the robot, but outside its skin: what was there a cloud ago and is in the
+  /// skin now is an obstacle that came in.
+  void add_outside(const Eigen::Vector3d& p_F);
+  /// Decides about the tiles. @returns whether another pass over the same cloud is worthwhile,
+  /// because the correction has changed
+  bool end_pass();
+
+  /// Whether a tile was added in this pass, and which of its pixels are the robot's.
+  /// @param row, column  of its first pixel
+  const std::uint16_t* robot_mask(std::size_t row, std::size_t column) const;
+
+  void report(ViewReport* report) const;
+
+ private:
+  struct LinkState {
+    const InnerSphereTree* tree = nullptr;
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity(), X_LS = Eigen::Isometry3d::Identity();
+    double speed = 0.0;       // [m/s] of its fastest point
+    double tolerance = 0.0;   // [m] systematic error of its surface in this view
+    double blind_skin = 0.0;  // [m]
+    std::uint32_t in_skin = 0, unexplained = 0;
+  };
+  // A ray, and where it meets the robot.
+  struct Sight {
+    Eigen::Vector3d direction, normal;  // unit, sensor frame
+    double t;                           // [m] inf: it misses
+    const SelfFilter::Link* link;
+  };
+  struct Tile {
+    std::uint32_t row, column;
+    const SelfFilter::Link* link = nullptr;  // whose surface is expected here
+    std::array<float, 16> gap;               // [m] in front of the surface, by pixel; NaN: not used
+    std::uint16_t robot = 0;                 // pixels that are the robot's unless they are in front
+    std::uint16_t skin = 0;                  // pixels within the padding
+    std::uint16_t obstacle = 0;              // of these, those that are obstacles beyond doubt
+    int count = 0;                           // of gaps
+    float sum = 0.0F, variance = 0.0F;       // [m], [m^2] of gaps, and of their noise
+    float tolerance = 0.0F;                  // [m]
+    bool is_patch = false;                   // a whole patch of smooth surface
+    bool is_obstacle = false;
+    Eigen::Vector3f p_S, n_S;  // middle and normal, where there is a gap
+  };
+
+  Sight look(const Eigen::Vector3d& p_S, const SelfFilter& filter) const;
+  bool add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const SelfFilter& filter, Tile* tile);
+  void add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uint32_t kept,
+                  const SelfFilter& filter, const Eigen::Isometry3d& X_OS, Tile* tile) const;
+  void add_gap(std::size_t k, double gap, double noise, Tile* tile) const;
+  bool is_obstacle(const Eigen::Vector3d& p_S, const Sight& sight, const SelfFilter& filter) const;
+
+  Tile* tile_at(std::int64_t row, std::int64_t column);
+  bool is_in_front(double sum, double variance, int count, double tolerance, double sigmas) const;
+  void find_windows(std::size_t index);
+  void grow();
+  bool came_in(const Tile& tile) const;
+  void finish(Tile* tile);
+  std::uint64_t voxel(const Eigen::Vector3d& p_F, int dx, int dy, int dz) const;
+
+  ViewFilterConfig config_;
+  double padding_;
+  ViewCalibration calibration_;
+  std::vector<LinkState> links_, last_links_;
+  double stamp_ = 0.0, last_stamp_ = 0.0;
+  const RawCloud* cloud_ = nullptr;
+  Eigen::Isometry3d X_FS_ = Eigen::Isometry3d::Identity();
+  double pixel_ = 0.0;  // [rad] between neighbours
+  std::size_t tiles_wide_ = 0, tiles_high_ = 0;
+  std::vector<std::int32_t> tile_index_;  // by place in the image; -1: none
+  std::vector<Tile> tiles_;
+  std::vector<std::size_t> front_;                       // tiles to grow from
+  std::vector<std::uint64_t> outside_, outside_before_;  // sorted voxels with obstacles
+};
+
+}  // namespace ist

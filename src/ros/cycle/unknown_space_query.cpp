@@ -1,0 +1,77 @@
+#include "ros/cycle/unknown_space_query.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace ist {
+namespace {
+
+// Unknown space is known to a voxel, so that closer bounds would say no more.
+constexpr double kTolerance = 0.01;         // [m]
+constexpr double kRelativeTolerance = 0.1;  // of the distance
+
+QueryConfig coarse(QueryConfig config) {
+  config.tolerance = std::max(config.tolerance, kTolerance);
+  config.relative_tolerance = std::max(config.relative_tolerance, kRelativeTolerance);
+  return config;
+}
+
+}  // namespace
+
+UnknownSpaceQuery::UnknownSpaceQuery(std::shared_ptr<const RobotModel> model,
+                                     UnknownSpaceWatch* watch, bool is_only_reader)
+    : model_(std::move(model)),
+      watch_(*watch),
+      is_only_reader_(is_only_reader),
+      query_(model_, {}),
+      answers_(model_->links.size()),
+      surroundings_(model_->links.size()) {}
+
+void UnknownSpaceQuery::set_model(std::shared_ptr<const RobotModel> model) {
+  model_ = std::move(model);
+  query_.set_model(model_);
+}
+
+void UnknownSpaceQuery::run(const std::vector<Eigen::Isometry3d>& X_FL,
+                            const std::vector<bool>& known, double now, const QueryConfig& config,
+                            double influence_distance) {
+  if (!is_only_reader_) held_ = watch_.share();
+  const UnknownSnapshot* unknown = is_only_reader_ ? watch_.newest() : held_.get();
+  for (std::size_t i = 0; unknown == nullptr && i < answers_.size(); ++i) {
+    answers_[i] = UnknownSpaceAnswer();
+    answers_[i].lower_bound = deepest(i);
+  }
+  if (unknown == nullptr) return;
+  query_.set_config(coarse(config));
+  query_.run(X_FL, known, {&unknown->cloud}, &results_);
+  for (std::size_t i = 0; i < answers_.size(); ++i) {
+    answers_[i].lower_bound = std::max(results_[i].lower_bound, deepest(i));  // -inf: out of time
+    answers_[i].direction = -results_[i].direction;  // NaN where nothing is near
+  }
+  if (influence_distance != surroundings_distance_) {
+    surroundings_.assign(surroundings_.size(), std::nullopt);
+    surroundings_distance_ = influence_distance;
+  }
+  if (answers_.empty()) return;
+  next_ = (next_ + 1) % answers_.size();
+  if (known[next_]) look_about(next_, X_FL[next_], now, influence_distance, *unknown);
+}
+
+/// [m] A lower bound of any signed distance: nothing is deeper inside anything than a link is
+/// thick.
+double UnknownSpaceQuery::deepest(std::size_t link) const {
+  return -2.0 * model_->links[link].tree.radius();
+}
+
+/// Finds the seen share of one link a cycle, which is what takes longest.
+void UnknownSpaceQuery::look_about(std::size_t link, const Eigen::Isometry3d& X_FL, double now,
+                                   double influence_distance, const UnknownSnapshot& unknown) {
+  std::optional<Surroundings>& surroundings = surroundings_[link];
+  if (!surroundings) {
+    surroundings.emplace(model_->links[link], watch_.skin(),
+                         std::max(influence_distance, 2.0 * watch_.skin()));
+  }
+  answers_[link].seen = surroundings->look(unknown.seen, unknown.cloud.X_FM.inverse() * X_FL, now);
+}
+
+}  // namespace ist

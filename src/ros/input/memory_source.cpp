@@ -1,0 +1,16 @@
+#include "ros/input/memory_source.h"
+
+namespace ist {
+
+void MemorySource::report(SourceReport* report) {
+  *report = SourceReport();
+  report->name = memory_->config().name + "/memory";
+  report->topic = topic_;
+  report->type = "octomap_msgs/Octomap";
+  report->noun = "memory";
+  report->is_memory = true;
+  report->required = false;
+  memory_->report(report);
+}
+
+}  // namespace ist

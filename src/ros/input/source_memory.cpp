@@ -1,0 +1,211 @@
+#include "ros/input/source_memory.h"
+
+#include <ros/console.h>
+#include <sys/stat.h>
+
+#include <utility>
+#include <vector>
+
+#include "internal/cloud/memory_scan.h"
+#include "ros/common/frame_name.h"
+#include "ros/common/stopwatch.h"
+#include "ros/input/map_message.h"
+#include "ros/poses/transforms.h"
+
+namespace ist {
+namespace {
+
+constexpr std::chrono::milliseconds kPublicationPeriod(500), kCountPeriod(200);
+// [s] Between two looks at where the robot is; it is a few centimetres farther then.
+constexpr double kBodyPeriod = 0.1;
+
+MemoryConfig map_config(const SourceConfig& config) {
+  MemoryConfig map = config.memory.map;
+  map.max_range = std::min(map.max_range, config.ingest.max_range);
+  return map;
+}
+
+bool is_there(const std::string& path) {
+  struct stat ignored {};
+  return ::stat(path.c_str(), &ignored) == 0;
+}
+
+}  // namespace
+
+SourceMemory::SourceMemory(const SourceConfig& config, const TransformBuffer& buffer,
+                           bool wants_body, const ros::Publisher& publisher)
+    : config_(config),
+      buffer_(buffer),
+      wants_body_(wants_body),
+      publisher_(publisher),
+      map_(map_config(config)),
+      body_(map_config(config)) {}
+
+std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& measurement,
+                                                         const Placement& placement,
+                                                         const SourceTarget& target,
+                                                         const SourceSnapshot& cloud) {
+  Stopwatch watch;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  begin_target(target);
+  problem_ = insert(measurement, placement, target, cloud);
+  if (problem_.empty()) newest_ = make_snapshot(cloud);
+  publish_when_due(cloud.stamp);
+  const auto now = std::chrono::steady_clock::now();
+  if (now >= next_count_) {
+    next_count_ = now + kCountPeriod;
+    counts_ = map_.counts();
+  }
+  took_ = watch.lap();
+  return newest_;
+}
+
+/// Forgets everything where the clock or the fixed frame is another one; then, and at the start,
+/// the file is read.
+void SourceMemory::begin_target(const SourceTarget& target) {
+  if (target.generation == generation_ && target.fixed_frame == fixed_frame_) return;
+  generation_ = target.generation;
+  fixed_frame_ = target.fixed_frame;
+  newest_.reset();
+  map_.clear();
+  body_.clear();
+  body_noted_ = 0.0;
+  robot_.setEmpty();
+  const std::string& file = config_.memory.file;
+  if (file.empty() || !is_there(file)) return;  // it is written later
+  file_problem_ = map_.read_file(file, ros::Time::now().toSec());
+  if (!file_problem_.empty()) {
+    ROS_WARN_STREAM("source '" << config_.name << "': the memory begins empty: " << file_problem_);
+  }
+}
+
+/// @returns empty on success, else why the cloud is not remembered
+std::string SourceMemory::insert(const Measurement& measurement, const Placement& placement,
+                                 const SourceTarget& target, const SourceSnapshot& cloud) {
+  for (std::size_t i = 0; i < placement.known.size(); ++i) {
+    const LinkModel& link = target.model->links[i];
+    if (placement.known[i] || !link.usable() || link.tree.empty()) continue;
+    return "the last " + std::string(noun(config_.type)) +
+           " is not remembered: the pose of link '" + link.name +
+           "' was not known, and the robot itself would be";
+  }
+  const std::string frame = without_slash(config_.memory.frame_id);
+  X_MF_ = Eigen::Isometry3d::Identity();
+  if (!frame.empty() && frame != target.fixed_frame) {
+    const std::string fault =
+        look_up(buffer_, frame, target.fixed_frame, measurement.header().stamp, &X_MF_);
+    if (!fault.empty()) {
+      return "the last " + std::string(noun(config_.type)) +
+             " is not remembered (memory/frame_id): " + fault;
+    }
+  }
+  RegionOfInterest region_M = target.region;
+  region_M.center_F = X_MF_ * target.region.center_F;
+  map_.set_region(region_M);
+  read_memory_scan(*measurement.raw_cloud(), cloud.cloud, X_MF_ * placement.X_FS,
+                   config_.ingest.min_range, map_.config().max_range, &scan_);
+  map_.insert(scan_);
+  stamp_ = cloud.cloud.stamp;
+  note_body(placement, X_MF_, cloud.cloud.stamp);
+  return "";
+}
+
+/// The robot's own space is known: nothing else is there.
+void SourceMemory::note_body(const Placement& placement, const Eigen::Isometry3d& X_MF,
+                             double stamp) {
+  if (!wants_body_ || stamp - body_noted_ < kBodyPeriod) return;
+  body_noted_ = stamp;
+  robot_.setEmpty();
+  std::vector<Eigen::Vector4f> spheres;
+  for (const PosedSolid& solid : placement.robot) {
+    const Eigen::Isometry3f X_ML = (X_MF * solid.X_FL).cast<float>();
+    for (const SphereLeaf& leaf : solid.tree->leaves()) {
+      for (int k = 0; k < leaf.count; ++k) {
+        const Eigen::Vector3f c = X_ML * Eigen::Vector3f(leaf.x[k], leaf.y[k], leaf.z[k]);
+        const float radius = leaf.cover_radius[k] + static_cast<float>(skin());
+        spheres.emplace_back(c.x(), c.y(), c.z(), radius);
+        robot_.extend((c.array() - radius).matrix().cast<double>());
+        robot_.extend((c.array() + radius).matrix().cast<double>());
+      }
+    }
+  }
+  body_.note_free(spheres, stamp);
+}
+
+std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
+    const SourceSnapshot& cloud) const {
+  VoxelBoxes boxes;
+  map_.hidden_boxes(&boxes);
+  auto index = std::make_shared<BoxIndex>();
+  index->build(boxes);
+  auto snapshot = std::make_shared<SourceSnapshot>();
+  snapshot->cloud.boxes = index;
+  snapshot->cloud.X_FM = X_MF_.inverse();
+  snapshot->cloud.counts.received = static_cast<std::uint32_t>(counts_.known);
+  snapshot->cloud.counts.used = static_cast<std::uint32_t>(boxes.size());
+  snapshot->cloud.stamp = cloud.cloud.stamp;
+  snapshot->cloud.ingest_time = took_;
+  snapshot->stamp = cloud.stamp;
+  snapshot->counts_from = cloud.counts_from;
+  snapshot->generation = cloud.generation;
+  return snapshot;
+}
+
+void SourceMemory::publish_when_due(const ros::Time& stamp) {
+  const auto now = std::chrono::steady_clock::now();
+  if (publisher_.getNumSubscribers() == 0 || now < next_publication_) return;
+  next_publication_ = now + kPublicationPeriod;
+  std_msgs::Header header;
+  header.stamp = stamp;
+  header.frame_id = config_.memory.frame_id.empty() ? fixed_frame_ : config_.memory.frame_id;
+  publish_map(publisher_, header, map_.config().resolution, map_.octree_bytes());
+}
+
+std::string SourceMemory::shortage() const {
+  if (counts_.forgotten == 0 && counts_.skipped == 0) return "";
+  return "memory is short: " + std::to_string(counts_.forgotten) +
+         " voxels were forgotten before their time; raise ~memory/max_nodes, which is " +
+         std::to_string(map_.config().max_nodes) + ", or lower decay, max_range or the resolution";
+}
+
+void SourceMemory::report(SourceReport* report) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  report->problem = problem_;
+  report->doubt = file_problem_.empty() ? shortage() : file_problem_;
+  report->memory_voxels = counts_.nodes;
+  report->memory_occupied = counts_.occupied;
+}
+
+std::string SourceMemory::save(bool* is_saved) const {
+  *is_saved = false;
+  const std::string& file = config_.memory.file;
+  if (file.empty()) {
+    return "source '" + config_.name + "' has no memory/file to write to";
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::string fault = map_.write_file(file);
+  *is_saved = fault.empty();
+  return fault.empty() ? "source '" + config_.name + "': " + file : fault;
+}
+
+bool SourceMemory::add_to(SeenSpace* seen, KnownSpace* known) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (std::isnan(map_.now()) || robot_.isEmpty()) return false;
+  const double now = ros::Time::now().toSec();
+  map_.forget(now);
+  body_.forget(now);
+  seen->add(map_);
+  seen->add(body_);
+  known->robot = robot_;
+  known->X_FM = X_MF_.inverse();
+  known->stamp = stamp_;
+  return true;
+}
+
+double SourceMemory::skin() const {
+  // A voxel belongs to the skin where any of it may be on the robot.
+  constexpr double kHalfDiagonal = 0.87;  // of a voxel
+  return config_.ingest.self_filter_padding + kHalfDiagonal * config_.memory.map.resolution;
+}
+
+}  // namespace ist

@@ -1,0 +1,95 @@
+#include "ros/input/unknown_space.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "ros/common/exceptions.h"
+#include "ros/common/stopwatch.h"
+#include "ros/common/thread_name.h"
+
+namespace ist {
+namespace {
+
+// The robot may move so far [m] until the next look.
+constexpr double kMotion = 0.5;
+constexpr double kShortestPeriod = 0.1;  // [s]
+// The thread looks for at most this share of its time.
+constexpr double kWorkingShare = 0.25;
+// One million boxes take 0.5 s and 150 MB. Where there are more, the region becomes smaller.
+constexpr std::size_t kMaxBoxes = 1000000;
+constexpr double kSmaller = 0.8;
+
+}  // namespace
+
+UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, const TransformBuffer& buffer,
+                                     double range)
+    : memories_(std::move(memories)), buffer_(buffer), range_(range) {
+  for (const auto& memory : memories_) skin_ = std::max(skin_, memory->skin());
+  thread_ = std::thread(&UnknownSpaceWatch::run, this);
+}
+
+UnknownSpaceWatch::~UnknownSpaceWatch() {
+  stop_.stop();
+  thread_.join();
+}
+
+const UnknownSnapshot* UnknownSpaceWatch::newest() {
+  channel_.update();
+  return channel_.front().get();
+}
+
+std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::share() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return shared_;
+}
+
+void UnknownSpaceWatch::run() {
+  name_thread("ist unknown");
+  double wait = kShortestPeriod;
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  while (stop_.sleep_until(now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                       std::chrono::duration<double>(wait)))) {
+    Stopwatch watch;
+    std::shared_ptr<const UnknownSnapshot> snapshot;
+    const std::string fault = exception_of([&] { snapshot = look(); });
+    if (!fault.empty()) {
+      ROS_ERROR_STREAM_THROTTLE(5.0, "unknown space could not be found: " << fault);
+    }
+    // Without a snapshot nothing counts as seen.
+    channel_.back() = snapshot;
+    channel_.publish();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    shared_ = snapshot;
+    wait = std::max(kShortestPeriod, watch.lap() / kWorkingShare);
+  }
+}
+
+std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() const {
+  auto snapshot = std::make_shared<UnknownSnapshot>();
+  Eigen::AlignedBox3d robot;
+  bool any = false;
+  for (const auto& memory : memories_) {
+    KnownSpace known;
+    if (!memory->add_to(&snapshot->seen, &known)) continue;
+    any = true;
+    robot.extend(known.robot);
+    snapshot->cloud.X_FM = known.X_FM;
+    snapshot->cloud.stamp = std::max(snapshot->cloud.stamp, known.stamp);
+  }
+  if (!any || robot.isEmpty()) return nullptr;
+  double radius = 0.5 * robot.diagonal().norm() + range_ + kMotion;
+  VoxelBoxes boxes;
+  while (!snapshot->seen.unknown_boxes(robot.center(), radius, kMaxBoxes, &boxes)) {
+    radius *= kSmaller;
+  }
+  auto index = std::make_shared<BoxIndex>();
+  index->build(boxes);
+  snapshot->cloud.boxes = index;
+  snapshot->cloud.region.center_F = snapshot->cloud.X_FM * robot.center();
+  snapshot->cloud.region.radius = radius;
+  return snapshot;
+}
+
+}  // namespace ist

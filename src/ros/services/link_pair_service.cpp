@@ -1,0 +1,177 @@
+#include "ros/services/link_pair_service.h"
+
+#include <ros/console.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "internal/proximity/pair_samples_cache.h"
+#include "ros/common/exceptions.h"
+#include "ros/common/thread_name.h"
+#include "ros/common/thread_priority.h"
+
+namespace ist {
+namespace {
+
+using PairMessage = ist_proximity::LinkPair;
+
+std::uint8_t word_of(const SampledPair& pair) {
+  if (pair.measured == 0) return PairMessage::NOT_KNOWN;
+  if (pair.never()) return PairMessage::NEVER;
+  return pair.always() ? PairMessage::ALWAYS : PairMessage::SOMETIMES;
+}
+
+// Says how many pairs were found to be what.
+std::string text_of(const std::vector<SampledPair>& sampled, std::size_t configurations) {
+  std::size_t counts[4] = {};
+  for (const SampledPair& pair : sampled) ++counts[word_of(pair)];
+  return "self-collision: in " + std::to_string(configurations) + " random configurations " +
+         std::to_string(counts[PairMessage::NEVER]) + " pairs of links were never in contact, " +
+         std::to_string(counts[PairMessage::ALWAYS]) + " always, " +
+         std::to_string(counts[PairMessage::SOMETIMES]) + " sometimes (~link_pairs lists them)";
+}
+
+}  // namespace
+
+LinkPairService::LinkPairService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
+                                 const ServerConfig& config)
+    : config_(config), nh_(nh) {
+  private_nh.setCallbackQueue(callbacks_.queue());
+  service_ = private_nh.advertiseService("link_pairs", &LinkPairService::answer, this);
+  callbacks_.start("ist link pairs");
+  thread_ = std::thread(&LinkPairService::run, this);
+}
+
+LinkPairService::~LinkPairService() {
+  stop_signal_.stop();
+  thread_.join();
+  callbacks_.stop();
+  service_.shutdown();
+}
+
+void LinkPairService::set_model(std::shared_ptr<const ModelState> model) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    // Finer packings change nothing here.
+    if (newest_model_ && model && is_refinement(*newest_model_, *model)) return;
+    newest_model_ = std::move(model);
+    is_new_ = true;
+    findings_.reset();
+  }
+  stop_signal_.notify();
+}
+
+void LinkPairService::run() {
+  name_thread("ist sampling");
+  lower_thread_priority();
+  constexpr std::chrono::hours kLong(1);
+  const auto has_model = [this] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return is_new_;
+  };
+  while (stop_signal_.sleep_until(StopSignal::Clock::now() + kLong, has_model)) {
+    const std::string fault = exception_of([this] { sample_newest(); });
+    if (!fault.empty()) ROS_ERROR_STREAM("link pairs are not listed: " << fault);
+  }
+}
+
+void LinkPairService::sample_newest() {
+  Findings findings;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_new_ = false;
+    findings.model = newest_model_;
+  }
+  const auto& model = findings.model;
+  if (!model || !model->robot || !model->kinematics) return;
+  findings.chosen = choose_pairs(nh_, config_, *model).all;
+  findings.problem = "the pairs are being sampled";
+  const auto show = [&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (newest_model_ == model) findings_ = std::make_shared<const Findings>(findings);
+  };
+  show();
+  sample(&findings);
+  show();
+}
+
+bool LinkPairService::is_outdated(const ModelState& model) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return stop_signal_.stopped() || newest_model_.get() != &model;
+}
+
+void LinkPairService::sample(Findings* findings) {
+  const ModelState& model = *findings->model;
+  PairSampling sampling;
+  sampling.configurations = static_cast<std::size_t>(config_.self_collision.samples);
+  findings->problem.clear();
+  if (sampling.configurations == 0) {
+    findings->problem = "~self_collision/samples is 0: pairs are not sampled";
+  } else if (!model.objects.empty()) {
+    findings->problem = "pairs are sampled without attached objects only";
+  }
+  if (!findings->problem.empty()) return;
+  std::vector<LinkPair> pairs;
+  for (const ChosenPair& chosen : findings->chosen) {
+    const bool is_sampled =
+        chosen.reason != PairReason::kAdjacent && chosen.reason != PairReason::kUnusable;
+    if (is_sampled) pairs.push_back(chosen.pair);
+  }
+  const PairSamplesCache cache(config_.model.cache_directory);
+  const std::string key =
+      pair_samples_key(*model.description, *model.robot, *model.kinematics, pairs, sampling);
+  std::string warning;
+  auto kept = cache.load(key, pairs, &warning);
+  if (!kept) {
+    findings->sampled = sample_pairs(model.robot, *model.kinematics, pairs, sampling,
+                                     [&] { return is_outdated(model); });
+    if (is_outdated(model)) return;
+    cache.store(key, findings->sampled, &warning);
+  } else {
+    findings->sampled = std::move(*kept);
+  }
+  if (!warning.empty()) ROS_WARN_STREAM(warning);
+  ROS_INFO_STREAM(text_of(findings->sampled, sampling.configurations));
+}
+
+bool LinkPairService::answer(Service::Request& request, Service::Response& response) {
+  std::shared_ptr<const Findings> findings;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    findings = findings_;
+    if (!findings) {
+      const bool is_ready = newest_model_ && newest_model_->phase == ModelState::Phase::kReady;
+      response.message = is_ready && newest_model_->kinematics ? "the pairs are being chosen"
+                         : is_ready                            ? no_kinematics(*newest_model_)
+                         : newest_model_                       ? newest_model_->problem
+                                         : "the robot's model is not ready yet";
+    }
+  }
+  if (!findings) return true;
+  response.success = true;
+  response.message = findings->problem;
+  const RobotModel& robot = *findings->model->robot;
+  for (const ChosenPair& chosen : findings->chosen) {
+    PairMessage pair;
+    pair.first = robot.links[chosen.pair.first].name;
+    pair.second = robot.links[chosen.pair.second].name;
+    pair.reason = static_cast<std::uint8_t>(chosen.reason);
+    for (const SampledPair& sampled : findings->sampled) {
+      if (sampled.pair.first != chosen.pair.first || sampled.pair.second != chosen.pair.second) {
+        continue;
+      }
+      pair.sampled = word_of(sampled);
+      pair.contacts = static_cast<std::uint32_t>(sampled.contacts);
+      pair.measured = static_cast<std::uint32_t>(sampled.measured);
+    }
+    response.pairs.push_back(pair);
+  }
+  if (!findings->sampled.empty()) {
+    response.configurations = static_cast<std::uint32_t>(config_.self_collision.samples);
+  }
+  response.srdf =
+      to_srdf(robot, *findings->model->kinematics, findings->sampled, request.never != 0);
+  return true;
+}
+
+}  // namespace ist

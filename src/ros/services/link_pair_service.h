@@ -1,0 +1,64 @@
+#pragma once
+
+#include <ist_proximity/ListLinkPairs.h>
+#include <ros/node_handle.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "ist_proximity/proximity/self_query.h"
+#include "ros/common/callback_thread.h"
+#include "ros/common/stop_signal.h"
+#include "ros/model/model_state.h"
+#include "ros/parameters/parameters.h"
+#include "ros/services/pair_choice.h"
+
+namespace ist {
+
+/// Answers ~link_pairs: which pairs of links are watched, why the others are not, and what sampling
+/// found. A thread of low priority samples the pairs of each new model, or reads the result from
+/// the cache. Sampling informs; it leaves no pair out.
+class LinkPairService {
+ public:
+  LinkPairService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
+                  const ServerConfig& config);
+  ~LinkPairService();
+  LinkPairService(const LinkPairService&) = delete;
+  LinkPairService& operator=(const LinkPairService&) = delete;
+
+  /// Thread safe.
+  void set_model(std::shared_ptr<const ModelState> model);
+
+ private:
+  using Service = ist_proximity::ListLinkPairs;
+
+  /// What is known of one model.
+  struct Findings {
+    std::shared_ptr<const ModelState> model;
+    std::vector<ChosenPair> chosen;
+    std::vector<SampledPair> sampled;  ///< of all pairs that are not adjacent; empty: not yet
+    std::string problem;               ///< why there are no samples
+  };
+
+  void run();
+  void sample_newest();
+  void sample(Findings* findings);
+  bool is_outdated(const ModelState& model) const;
+  bool answer(Service::Request& request, Service::Response& response);
+
+  const ServerConfig config_;
+  ros::NodeHandle nh_;
+  CallbackThread callbacks_;
+  ros::ServiceServer service_;
+  StopSignal stop_signal_;    ///< a new model is its event
+  mutable std::mutex mutex_;  ///< guards the next three members
+  std::shared_ptr<const ModelState> newest_model_;
+  bool is_new_ = false;
+  std::shared_ptr<const Findings> findings_;  ///< null before the first model
+  std::thread thread_;
+};
+
+}  // namespace ist

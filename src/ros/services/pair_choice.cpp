@@ -1,0 +1,110 @@
+#include "ros/services/pair_choice.h"
+
+#include <algorithm>
+
+#include "ist_proximity/geometry/error.h"
+#include "ros/common/text.h"
+
+namespace ist {
+namespace {
+
+bool holds(const std::vector<LinkPair>& pairs, const LinkPair& pair) {
+  return std::any_of(pairs.begin(), pairs.end(), [&](const LinkPair& other) {
+    return other.first == pair.first && other.second == pair.second;
+  });
+}
+
+NamePairs srdf_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
+                     std::vector<std::string>* warnings) {
+  const std::string name = config.robot_description + "_semantic";
+  std::string key, srdf;
+  if (!nh.searchParam(name, key) || !nh.getParam(key, srdf)) return {};
+  try {
+    return disabled_collisions(srdf);
+  } catch (const ModelError& error) {
+    warnings->push_back("'" + key + "' is not used: " + error.what());
+  }
+  return {};
+}
+
+std::vector<std::string> unknown_names(const ServerConfig& config, const Kinematics& kinematics) {
+  std::vector<std::string> warnings;
+  for (const auto& pair : config.self_collision.ignore) {
+    for (const std::string& name : {pair.first, pair.second}) {
+      if (kinematics.find_body(name)) continue;
+      warnings.push_back("~self_collision/ignore names '" + name +
+                         "', which is no link of the URDF");
+    }
+  }
+  return warnings;
+}
+
+}  // namespace
+
+std::vector<LinkPair> PairChoice::watched() const {
+  std::vector<LinkPair> pairs;
+  for (const ChosenPair& chosen : all) {
+    if (chosen.reason == PairReason::kWatched) pairs.push_back(chosen.pair);
+  }
+  return pairs;
+}
+
+std::string PairChoice::text(const RobotModel& robot) const {
+  const auto count = [&](PairReason reason) {
+    return std::to_string(std::count_if(
+        all.begin(), all.end(), [&](const ChosenPair& chosen) { return chosen.reason == reason; }));
+  };
+  std::vector<std::string> at_rest;
+  for (const ChosenPair& chosen : all) {
+    if (chosen.reason != PairReason::kAtRest) continue;
+    at_rest.push_back(robot.links[chosen.pair.first].name + " and " +
+                      robot.links[chosen.pair.second].name);
+  }
+  return "self-collision: " + count(PairReason::kWatched) +
+         " pairs of links are watched; left out: " + count(PairReason::kAdjacent) + " adjacent, " +
+         count(PairReason::kIgnored) + " by ~self_collision/ignore, " + count(PairReason::kSrdf) +
+         " by the SRDF, " + count(PairReason::kUnusable) + " of unusable geometry, " +
+         count(PairReason::kAtRest) + " in contact at rest" + (at_rest.empty() ? "" : ": ") +
+         join(at_rest, ", ");
+}
+
+PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
+                        const ModelState& model) {
+  PairChoice choice;
+  const RobotModel& robot = *model.robot;
+  choice.warnings = unknown_names(config, *model.kinematics);
+  const NamePairs srdf = srdf_pairs(nh, config, &choice.warnings);
+  const std::vector<bool> wanted = wanted_links(model);
+  const auto pairs_without = [&](const NamePairs& ignored) {
+    return self_collision_pairs(robot, *model.kinematics, wanted, ignored);
+  };
+  const std::vector<LinkPair> candidates = pairs_without({});
+  const std::vector<LinkPair> not_ignored = pairs_without(config.self_collision.ignore);
+  const std::vector<LinkPair> not_srdf = pairs_without(srdf);
+  std::vector<LinkPair> left;
+  for (const LinkPair& pair : not_ignored) {
+    if (holds(not_srdf, pair)) left.push_back(pair);
+  }
+  std::vector<LinkPair> at_rest;
+  if (config.self_collision.ignore_contact_at_rest) {
+    at_rest = in_contact_at_rest(model.robot, *model.kinematics, left);
+  }
+  const auto reason_of = [&](const LinkPair& pair) {
+    if (!wanted[pair.first] || !wanted[pair.second]) return PairReason::kUnusable;
+    if (!holds(candidates, pair)) return PairReason::kAdjacent;
+    if (!holds(not_ignored, pair)) return PairReason::kIgnored;
+    if (!holds(not_srdf, pair)) return PairReason::kSrdf;
+    return holds(at_rest, pair) ? PairReason::kAtRest : PairReason::kWatched;
+  };
+  std::vector<std::size_t> links = model.monitored;
+  std::sort(links.begin(), links.end());
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    for (std::size_t k = i + 1; k < links.size(); ++k) {
+      const LinkPair pair{links[i], links[k]};
+      choice.all.push_back({pair, reason_of(pair)});
+    }
+  }
+  return choice;
+}
+
+}  // namespace ist

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <ros/node_handle.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/proximity/self_query.h"
+#include "ros/model/model_state.h"
+#include "ros/parameters/parameters.h"
+
+namespace ist {
+
+/// Why a pair of links is watched or left out; the values are those of LinkPair.msg.
+enum class PairReason { kWatched, kAdjacent, kIgnored, kSrdf, kAtRest, kUnusable };
+
+struct ChosenPair {
+  LinkPair pair;
+  PairReason reason;
+};
+
+/// Decides about every pair of monitored links.
+struct PairChoice {
+  std::vector<ChosenPair> all;
+  std::vector<std::string> warnings;  ///< one sentence each
+
+  std::vector<LinkPair> watched() const;
+  std::string text(const RobotModel& robot) const;  ///< a sentence for the log
+};
+
+/// @param nh     namespace in which, and above which, `robot_description_semantic` is searched
+/// @param model  ready, with kinematics
+PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
+                        const ModelState& model);
+
+}  // namespace ist

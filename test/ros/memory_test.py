@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+"""What left the view is remembered and forgotten, and what was never seen is told (~unknown_space).
+
+The camera is at the origin of `base` and looks along x. Its clouds are patches of points; a near patch
+hides a far one from it.
+"""
+
+import os
+import sys
+import tempfile
+import unittest
+
+import genpy.dynamic
+import numpy as np
+import proximity_testing as pt
+import rospy
+from proximity_testing import LinkProximity, ProximityArray
+from std_srvs.srv import Trigger
+
+VOXEL = 0.02
+DECAY = 4.0
+BALL = (1.5, 0.6, 0.0)
+
+
+def patch(distance, half, step=0.008):
+    """A square across the camera's axis."""
+    side = np.arange(-half, half + step / 2, step)
+    y, z = np.meshgrid(side, side)
+    return np.column_stack([np.full(y.size, distance), y.ravel(), z.ravel()])
+
+
+FAR = patch(1.5, 0.12)
+NEAR = patch(0.4, 0.05)  # hides the far one, and is out of the ball's range
+BEHIND = patch(2.6, 0.25, 0.012)  # seen through where the far one was; out of the ball's range
+
+
+def distance_to(points):
+    return np.linalg.norm(points - np.array(BALL), axis=1).min() - pt.BALL_RADIUS
+
+
+class MemoryTest(unittest.TestCase):
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = pt.World(self.namespace)
+        self.world.stand(pt.transform(BALL), pt.transform((0, 0, 5)))
+        self.world.start_tf()
+        self.world.points = FAR
+        self.clouds = self.world.start_clouds()
+        self.node = None
+
+    def tearDown(self):
+        self.world.stop()
+        if self.node:
+            self.assertEqual(self.node.stop(), 0)
+
+    def start(self, **parameters):
+        parameters.setdefault("links", ["ball_link"])
+        parameters.setdefault("max_distance", 0.8)
+        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+
+    def ball(self, message):
+        return pt.link(message, "ball_link")
+
+    def is_from(self, source):
+        return lambda m: m.status == ProximityArray.OK and self.ball(m).source == source
+
+    def is_clear(self, message):
+        ok = message.status == ProximityArray.OK
+        return ok and self.ball(message).state == LinkProximity.CLEAR
+
+    def test_hidden_is_remembered_and_forgotten(self):
+        memory = {"enabled": True, "decay": DECAY, "resolution": VOXEL}
+        self.start(memory=memory)
+        seen = self.node.wait_for(self.is_from("cloud"), "the far patch in view")
+        self.assertAlmostEqual(self.ball(seen).distance, distance_to(FAR), delta=2e-3)
+        self.assertEqual([s.name for s in seen.sources], ["cloud", "cloud/memory"])
+
+        hidden_since = rospy.Time.now().to_sec()
+        self.world.points = NEAR
+        first = len(self.node.messages)
+        hidden = self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered")
+        for message in self.node.messages[first:]:  # no gap while it is handed over
+            self.assertEqual(self.ball(message).state, LinkProximity.NEAR)
+        self.assertAlmostEqual(self.ball(hidden).distance, distance_to(FAR), delta=2 * VOXEL)
+        self.assertLessEqual(self.ball(hidden).lower_bound, distance_to(FAR))
+        memory_status = hidden.sources[1]
+        self.assertEqual(memory_status.status, ProximityArray.OK)
+        self.assertGreater(memory_status.points_used, 0)
+        self.assertGreater(memory_status.stamp, rospy.Time(0))
+
+        forgotten = self.node.wait_for(self.is_clear, "the far patch forgotten")
+        took = forgotten.header.stamp.to_sec() - hidden_since
+        self.assertGreater(took, DECAY - 0.5)
+        self.assertLess(took, DECAY + 1.0)
+
+        # What the camera sees through is answered by the cloud at once, and cleared soon.
+        self.world.points = FAR
+        self.node.wait_for(self.is_from("cloud"), "the far patch again")
+        rospy.sleep(1.0)  # until it is as occupied as can be
+        self.world.points = BEHIND
+        self.node.wait_for(self.is_clear, "nothing near where the camera sees through")
+        rospy.sleep(1.5)  # 0.5 s at 20 clouds a second, and what a busy machine is late
+        first = len(self.node.messages)
+        self.world.points = NEAR
+        self.node.wait_for(lambda m: len(self.node.messages) > first + 50, "50 answers")
+        for message in self.node.messages[first:]:
+            self.assertTrue(self.is_clear(message), message)
+        self.node.wait_until(
+            lambda: self.node.diagnostic("input cloud/memory", "voxels in memory") not in ("", "0"),
+            "the memory in the diagnostics",
+        )
+
+    def test_saved_read_and_shown(self):
+        path = os.path.join(tempfile.mkdtemp(), "memory.bt")
+        memory = {"enabled": True, "decay": float("inf"), "resolution": VOXEL, "file": path}
+        self.start(memory=memory)
+        maps = []
+        subscriber = rospy.Subscriber(
+            self.node.name + "/memory/cloud", rospy.AnyMsg, maps.append, queue_size=2
+        )
+        self.node.wait_for(self.is_from("cloud"), "the far patch in view")
+        self.node.wait_until(lambda: maps, "a map for rviz")
+        header = maps[0]._connection_header
+        self.assertEqual(header["type"], "octomap_msgs/Octomap")
+        kinds = genpy.dynamic.generate_dynamic(header["type"], header["message_definition"])
+        shown = kinds[header["type"]]().deserialize(maps[0]._buff)
+        self.assertEqual((shown.id, shown.binary, shown.resolution), ("OcTree", True, VOXEL))
+        self.assertEqual(shown.header.frame_id, "base")
+        subscriber.unregister()
+        save = rospy.ServiceProxy(self.node.name + "/save_memory", Trigger)
+        save.wait_for_service(pt.TIMEOUT)
+        answer = save()
+        self.assertTrue(answer.success, answer.message)
+        self.assertTrue(os.path.getsize(path) > 100)
+        self.assertEqual(self.node.stop(), 0)
+
+        self.world.points = NEAR  # the far patch is never seen by the next node
+        self.start(memory=memory)
+        message = self.node.wait_for(self.is_from("cloud/memory"), "the patch of the file")
+        self.assertAlmostEqual(self.ball(message).distance, distance_to(FAR), delta=2 * VOXEL)
+        self.assertEqual(self.node.stop(), 0)
+
+        with open(path, "r+b") as file:  # cut off
+            file.truncate(os.path.getsize(path) - 5)
+        self.start(memory=memory)
+        self.node.wait_for(self.is_clear, "answers of the camera alone")
+        self.node.wait_until(
+            lambda: path in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
+            "the file's fault in the diagnostics",
+        )
+
+    def test_a_frame_that_tf_does_not_know(self):
+        self.start(memory={"enabled": True, "frame_id": "nowhere"})
+        message = self.node.wait_for(
+            lambda m: self.is_from("cloud")(m) and m.sources[1].status == ProximityArray.NO_CLOUD,
+            "answers of the camera, and no memory",
+        )
+        self.assertTrue(np.isfinite(self.ball(message).distance))
+        self.node.wait_until(
+            lambda: "nowhere"
+            in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
+            "the frame in the diagnostics",
+        )
+
+    def test_too_little_memory_is_told(self):
+        self.start(memory={"enabled": True, "resolution": 0.005, "max_nodes": 5000})
+        self.node.wait_for(self.is_from("cloud"), "answers of the camera")
+        self.node.wait_until(
+            lambda: "max_nodes"
+            in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
+            "max_nodes in the diagnostics",
+        )
+
+    # The camera sees a cone of half width 0.3 x; the ball moves in it towards its side.
+    def move_in_cone(self, unknown_space):
+        self.world.points = patch(2.4, 0.72, 0.015)
+        middle, side = (1.0, 0.0, 0.0), (1.0, 0.12, 0.0)
+        self.world.stand(pt.transform(middle), pt.transform((0, 0, 5)))
+        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
+        self.start(memory=memory, unknown_space=unknown_space, max_distance=2.0)
+        is_in_middle = lambda m: (  # noqa: E731
+            self.is_from("cloud")(m) and self.ball(m).unseen_distance > 0.17
+        )
+        before = self.ball(self.node.wait_for(is_in_middle, "the ball in seen space"))
+        self.world.stand(pt.transform(side), pt.transform((0, 0, 5)))
+        is_at_side = lambda m: (  # noqa: E731
+            self.is_from("cloud")(m)
+            and abs(self.ball(m).point_on_link.y) > 0.1
+            and self.ball(m).unseen_distance < before.unseen_distance - 0.06
+            and self.ball(m).seen_share < before.seen_share - 0.02
+        )
+        after = self.ball(self.node.wait_for(is_at_side, "the ball near unseen space"))
+        # The side of the cone is as much nearer as its slope says.
+        for ball, y in ((before, 0.0), (after, 0.12)):
+            to_side = (0.3 - y) / np.hypot(1.0, 0.3) - pt.BALL_RADIUS
+            self.assertLess(ball.unseen_distance, to_side + 2 * VOXEL)
+            self.assertGreater(ball.unseen_distance, to_side - 3 * VOXEL)
+            self.assertAlmostEqual(ball.distance, 2.4 - 1.0 - pt.BALL_RADIUS, delta=0.01)
+            self.assertTrue(0.0 < ball.seen_share < 1.0)
+            self.assertTrue(0.0 <= ball.seen_age < 1000.0)
+        direction = pt.vector(after.unseen_direction)
+        self.assertAlmostEqual(np.linalg.norm(direction), 1.0, places=6)
+        self.assertGreater(direction[1], 0.8)
+        return before, after
+
+    def test_unknown_space_is_an_obstacle(self):
+        for ball in self.move_in_cone("obstacle"):
+            self.assertEqual(ball.state, LinkProximity.NEAR)
+            self.assertAlmostEqual(ball.lower_bound, ball.unseen_distance, places=9)
+
+    def test_unknown_space_is_reported(self):
+        for ball in self.move_in_cone("report"):
+            self.assertAlmostEqual(ball.lower_bound, ball.distance, delta=0.002)
+
+    def test_unknown_space_is_free(self):
+        self.start(memory={"enabled": True})
+        ball = self.ball(self.node.wait_for(self.is_from("cloud"), "answers"))
+        self.assertTrue(np.isnan([ball.seen_share, ball.seen_age, ball.unseen_distance]).all())
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("memory_test", anonymous=True)
+    rostest.rosrun("ist_proximity", "memory", MemoryTest, sys.argv)
