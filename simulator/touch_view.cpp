@@ -93,7 +93,7 @@ Obstacle bar_at(const Place& place) {
 }
 
 // [m] The least distance to the arm of the bar's points that a perfect camera sees.
-double visible_gap(const View& view, const Obstacle& bar) {
+double visible_distance(const View& view, const Obstacle& bar) {
   const Eigen::Isometry3d X_FO = bar.pose(0.0), X_OF = X_FO.inverse();
   GeometryElement element;
   element.shape = bar.shape;
@@ -148,7 +148,7 @@ bool find_place(const RobotModel& model, const Arm& arm, const DepthCameraConfig
       overlap = std::min(overlap, distance(model.links[k].solid, X_FL[k], bar, bar.pose(0.0), 0.1));
     }
     if (overlap < -1e-4 || overlap > 1e-4) continue;
-    if (visible_gap(view, bar) <= in_view) return true;
+    if (visible_distance(view, bar) <= in_view) return true;
   }
   return false;
 }

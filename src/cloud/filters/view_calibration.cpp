@@ -45,24 +45,24 @@ void ViewCalibration::begin_cloud() { passes_ = 0; }
 
 void ViewCalibration::begin_pass() {
   sum_.setZero();
-  sum_gap_.setZero();
+  sum_height_.setZero();
   sum_p_.setZero();
   sum_sq_ = 0.0;
   count_ = 0;
 }
 
-void ViewCalibration::add(const Eigen::Vector3d& p_S, const Eigen::Vector3d& n_S, double gap,
+void ViewCalibration::add(const Eigen::Vector3d& p_S, const Eigen::Vector3d& n_S, double height,
                           double sigma) {
-  // A point that is gap + n.(w x p + v) in front of the surface after a twist (w, v) is to be 0.
+  // A point that is height + n.(w x p + v) in front of the surface after a twist (w, v) is to be 0.
   Vector6 row;
   row << p_S.cross(n_S), n_S;
   const double expected = std::sqrt(sigma * sigma + row.dot(covariance_ * row));
   const double limit = kHuber * expected;
-  const double weight = std::min(1.0, limit / std::max(std::abs(gap), 1e-12)) / (sigma * sigma);
+  const double weight = std::min(1.0, limit / std::max(std::abs(height), 1e-12)) / (sigma * sigma);
   sum_ += weight * row * row.transpose();
-  sum_gap_ += weight * gap * row;
+  sum_height_ += weight * height * row;
   sum_p_ += p_S;
-  sum_sq_ += std::min(gap * gap, 9.0 * expected * expected);
+  sum_sq_ += std::min(height * height, 9.0 * expected * expected);
   ++count_;
 }
 
@@ -74,7 +74,7 @@ bool ViewCalibration::end_pass() {
   const Matrix6 stated = stated_.asDiagonal();
   const Matrix6 kept = kKept * information_, fresh = (1.0 - kKept) * stated;
   const Matrix6 information = kept + fresh + sum_;
-  const Vector6 right = -sum_gap_ - kept * (applied_ - before_) - fresh * applied_;
+  const Vector6 right = -sum_height_ - kept * (applied_ - before_) - fresh * applied_;
   const Eigen::LDLT<Matrix6> solver(information);
   const Vector6 step = solver.solve(right);
   now_ = applied_ + step;

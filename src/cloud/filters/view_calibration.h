@@ -24,9 +24,9 @@ class ViewCalibration {
   /// Adds a patch of the robot's surface.
   /// @param p_S    [m] middle of its measured points, as measured
   /// @param n_S    outward unit normal of the surface
-  /// @param gap    [m] mean distance of the points in front of the surface
+  /// @param height    [m] mean distance of the points in front of the surface
   /// @param sigma  [m] > 0: its standard deviation
-  void add(const Eigen::Vector3d& p_S, const Eigen::Vector3d& n_S, double gap, double sigma);
+  void add(const Eigen::Vector3d& p_S, const Eigen::Vector3d& n_S, double height, double sigma);
 
   /// Ends a pass. @returns whether the points moved so far that another pass is worthwhile
   bool end_pass();
@@ -52,7 +52,7 @@ class ViewCalibration {
   Vector6 applied_;         // what the points of this pass are corrected by
   Matrix6 covariance_;      // of `now_`
   Matrix6 sum_;             // of this pass: normal matrix
-  Vector6 sum_gap_;         // of this pass: right-hand side
+  Vector6 sum_height_;      // of this pass: right-hand side
   Eigen::Vector3d sum_p_;   // of this pass [m]
   Eigen::Vector3d middle_;  // [m] of the points on the robot
   double sum_sq_ = 0.0, residual_ = 0.0;

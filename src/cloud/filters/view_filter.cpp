@@ -24,6 +24,8 @@ constexpr double kCertain = 5.0;
 constexpr double kBesideObstacle = 3.0;
 // Noise never pulls a mean back by more: a mixed pixel or a shadow is no evidence of free space.
 constexpr double kClipped = 3.0;
+// Pixels of an obstacle, its part outside the skin included.
+constexpr int kFewestPixels = 3;
 // Standard deviations of the sensor's corrected pose.
 constexpr double kPose = 3.0;
 
@@ -155,14 +157,14 @@ ViewFilter::Sight ViewFilter::look(const Eigen::Vector3d& p_S, const SelfFilter&
   return sight;
 }
 
-void ViewFilter::add_gap(std::size_t k, double gap, double noise, Tile* tile) const {
+void ViewFilter::add_height(std::size_t k, double height, double noise, Tile* tile) const {
   const auto bit = static_cast<std::uint16_t>(1U << k);
-  tile->gap[k] = static_cast<float>(gap);
+  tile->height[k] = static_cast<float>(height);
   tile->skin |= bit;
   tile->robot |= bit;
   const double tolerance = static_cast<double>(tile->tolerance);
-  if (gap > kCertain * noise + tolerance) tile->obstacle |= bit;
-  tile->sum += static_cast<float>(std::max(gap, -kClipped * noise - tolerance));
+  if (height > kCertain * noise + tolerance) tile->obstacle |= bit;
+  tile->sum += static_cast<float>(std::max(height, -kClipped * noise - tolerance));
   tile->variance += static_cast<float>(noise * noise);
   ++tile->count;
 }
@@ -194,41 +196,43 @@ bool ViewFilter::add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const Sel
   }
   const double cosine = -normal.dot(middle.normalized());
   if (cosine < kGrazing) return false;
-  std::array<double, kPixels> gaps;
+  std::array<double, kPixels> heights;
   for (std::size_t k = 0; k < kPixels; ++k) {
-    gaps[k] = normal.dot(p_S[k] - middle);
+    heights[k] = normal.dot(p_S[k] - middle);
     // A point that is farther from the surface along its ray may be outside the skin.
-    if (std::abs(gaps[k]) > (padding_ - 2.0 * kFlat) * cosine) return false;
+    if (std::abs(heights[k]) > (padding_ - 2.0 * kFlat) * cosine) return false;
   }
   tile->link = sights[0].link;
   tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
   const double noise = config_.noise.sigma(middle.norm()) * cosine;
-  for (std::size_t k = 0; k < kPixels; ++k) add_gap(k, gaps[k], noise, tile);
+  for (std::size_t k = 0; k < kPixels; ++k) add_height(k, heights[k], noise, tile);
   tile->is_patch = true;
   tile->p_S = (middle + tile->sum / static_cast<double>(kPixels) * normal).cast<float>();
   tile->n_S = normal.cast<float>();
   return true;
 }
 
-// Whether a point is nowhere near a surface that the ray meets or passes, within what noise, the
-// sensor's pose and blurred edges leave open. Behind the surface's nearest point it is a mixed
-// pixel or a shadow.
-bool ViewFilter::is_obstacle(const Eigen::Vector3d& p_S, const Sight& sight,
-                             const SelfFilter& filter) const {
+// Judges a point whose ray passes the links, or meets them far behind it: an obstacle is nowhere
+// near a surface, within what noise, the sensor's pose and blurred edges leave open. Behind the
+// nearest point of a surface it is a mixed pixel or a shadow.
+ViewFilter::Passing ViewFilter::pass(const Eigen::Vector3d& p_S, const Sight& sight,
+                                     const SelfFilter& filter) const {
   const double range = p_S.norm();
   const double last = range + kCertain * config_.noise.sigma(range);
+  const double blur = config_.mixed_pixels * pixel_ * range;
+  Passing passing = Passing::kObstacle;
   for (const SelfFilter::Link* link : filter.group()) {
     const LinkState& state = links_[link->number];
-    const double tolerance = state.tolerance + config_.mixed_pixels * pixel_ * range;
     const Eigen::Vector3d o_L = state.X_LS.translation(),
                           d_L = state.X_LS.linear() * sight.direction;
-    if (distance_outside(*link->solid, o_L + last * d_L, tolerance).distance <= tolerance) {
-      return false;
-    }
+    const double limit = state.tolerance + blur;
     const RayApproach near = nearest_approach(*link->solid, o_L, d_L, range, padding_ + kFlat);
-    if (near.distance <= tolerance && near.t <= last) return false;
+    double distance = distance_outside(*link->solid, o_L + last * d_L, limit).distance;
+    if (near.t <= last) distance = std::min(distance, near.distance);
+    if (distance <= state.tolerance) return Passing::kRobot;
+    if (distance <= limit) passing = Passing::kBlurred;
   }
-  return true;
+  return passing;
 }
 
 // A tile at an edge of the robot, or with obstacles: each pixel has its own ray.
@@ -250,22 +254,21 @@ void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uin
       tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
       tile->p_S = p_S[k].cast<float>();
     }
-    if (sight.link == nullptr) {
-      tile->skin |= bit;
-      tile->robot |= bit;
-      if (is_obstacle(p_S[k], sight, filter)) tile->obstacle |= bit;
-      continue;
+    const bool misses = sight.link == nullptr;
+    const double cosine = misses ? 1.0 : -sight.normal.dot(sight.direction);
+    const double height = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
+    if (misses || height > kCertain * noise + static_cast<double>(tile->tolerance)) {
+      const Passing passing = pass(p_S[k], sight, filter);
+      if (misses || passing != Passing::kObstacle) {
+        // At an edge the ray may meet what is behind it: nothing is known of the height.
+        tile->skin |= bit;
+        tile->robot |= bit;
+        if (passing == Passing::kObstacle) tile->obstacle |= bit;
+        if (passing == Passing::kBlurred) tile->blurred |= bit;
+        continue;
+      }
     }
-    const double cosine = -sight.normal.dot(sight.direction);
-    const double gap = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
-    const bool is_far = gap > kCertain * noise + static_cast<double>(tile->tolerance);
-    if (is_far && !is_obstacle(p_S[k], sight, filter)) {
-      // At an edge the ray may meet what is behind it: nothing is known of the gap.
-      tile->skin |= bit;
-      tile->robot |= bit;
-      continue;
-    }
-    add_gap(k, gap, noise, tile);
+    add_height(k, height, noise, tile);
   }
 }
 
@@ -278,9 +281,10 @@ void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kep
   }
   if ((kept & 3U) == 3U) pixel_ = p_S[0].cross(p_S[1]).norm() / (p_S[0].norm() * p_S[1].norm());
   Tile tile;
+  tile.kept = static_cast<std::uint16_t>(kept);
   tile.row = static_cast<std::uint32_t>(row);
   tile.column = static_cast<std::uint32_t>(column);
-  tile.gap.fill(std::numeric_limits<float>::quiet_NaN());
+  tile.height.fill(std::numeric_limits<float>::quiet_NaN());
   if (kept != kWhole || !add_patch(p_S, filter, &tile)) {
     add_pixels(p_S, kept, filter, X_OS, &tile);
   }
@@ -331,7 +335,11 @@ ViewFilter::Tile* ViewFilter::tile_at(std::int64_t row, std::int64_t column) {
   return index < 0 ? nullptr : &tiles_[static_cast<std::size_t>(index)];
 }
 
-// Whether the mean gap is more than noise and systematic errors make of the robot's own surface.
+const ViewFilter::Tile* ViewFilter::tile_at(std::int64_t row, std::int64_t column) const {
+  return const_cast<ViewFilter*>(this)->tile_at(row, column);  // NOLINT: the same, without a change
+}
+
+// Whether the mean height is more than noise and systematic errors make of the robot's own surface.
 bool ViewFilter::is_in_front(double sum, double variance, int count, double tolerance,
                              double sigmas) const {
   return count > 0 && sum > sigmas * std::sqrt(variance) + count * tolerance;
@@ -391,12 +399,62 @@ void ViewFilter::grow() {
   }
 }
 
-void ViewFilter::finish(Tile* tile) {
-  if (tile->is_obstacle) {
-    for (std::size_t k = 0; k < kPixels; ++k) {
-      if (tile->gap[k] > 0.0F) tile->obstacle |= static_cast<std::uint16_t>(1U << k);
+// The pixels of a tile and its neighbours that are obstacles, in the skin or out of it.
+int ViewFilter::count_obstacles(std::int64_t row, std::int64_t column) const {
+  int count = 0;
+  for (std::int64_t i = 0; i < 9; ++i) {
+    const Tile* tile = tile_at(row + i / 3 - 1, column + i % 3 - 1);
+    if (tile == nullptr) continue;
+    const unsigned outside = static_cast<unsigned>(tile->kept) & ~static_cast<unsigned>(tile->skin);
+    count += static_cast<int>(std::bitset<16>(outside | tile->obstacle).count());
+  }
+  return count;
+}
+
+// In a minute a camera sees some 10^8 pixels of the robot, of which chance takes a few for
+// obstacles, each by itself.
+void ViewFilter::drop_speckles() {
+  for (Tile& tile : tiles_) {
+    tile.near = tile.obstacle;
+    if (tile.obstacle == 0 || tile.is_obstacle) continue;
+    if (count_obstacles(tile.row / kTileSide, tile.column / kTileSide) < kFewestPixels) {
+      tile.near = 0;
     }
   }
+  for (Tile& tile : tiles_) tile.obstacle = tile.near;
+}
+
+// A pixel that may be blurred, or that is one standard deviation in front, is an obstacle next to a
+// pixel that is one.
+void ViewFilter::grow_pixels() {
+  const auto is_obstacle = [this](std::int64_t row, std::int64_t column) {
+    if (row < 0 || column < 0) return false;
+    const Tile* tile = tile_at(row / static_cast<std::int64_t>(kTileSide),
+                               column / static_cast<std::int64_t>(kTileSide));
+    if (tile == nullptr) return false;
+    const auto k = static_cast<unsigned>(row % static_cast<std::int64_t>(kTileSide) *
+                                             static_cast<std::int64_t>(kTileSide) +
+                                         column % static_cast<std::int64_t>(kTileSide));
+    return (static_cast<unsigned>(tile->obstacle) >> k & 1U) != 0;
+  };
+  for (Tile& tile : tiles_) {
+    if (count_obstacles(tile.row / kTileSide, tile.column / kTileSide) == 0) continue;
+    const float noise =
+        tile.count > 0 ? std::sqrt(tile.variance / static_cast<float>(tile.count)) : 0.0F;
+    for (std::size_t k = 0; k < kPixels; ++k) {
+      const auto bit = static_cast<std::uint16_t>(1U << k);
+      if ((tile.blurred & bit) == 0 && !(tile.height[k] > noise)) continue;
+      const auto row = static_cast<std::int64_t>(tile.row + k / kTileSide),
+                 column = static_cast<std::int64_t>(tile.column + k % kTileSide);
+      for (std::int64_t i = 0; i < 9; ++i) {
+        if (is_obstacle(row + i / 3 - 1, column + i % 3 - 1)) tile.near |= bit;
+      }
+    }
+  }
+  for (Tile& tile : tiles_) tile.obstacle |= tile.near;
+}
+
+void ViewFilter::finish(Tile* tile) {
   tile->robot &= static_cast<std::uint16_t>(~tile->obstacle);
   if (tile->obstacle != 0) add_outside(X_FS_ * tile->p_S.cast<double>());
   if (tile->link != nullptr) {
@@ -414,6 +472,13 @@ void ViewFilter::finish(Tile* tile) {
 bool ViewFilter::end_pass() {
   for (std::size_t i = 0; i < tiles_.size(); ++i) find_windows(i);
   grow();
+  for (Tile& tile : tiles_) {
+    for (std::size_t k = 0; tile.is_obstacle && k < kPixels; ++k) {
+      if (tile.height[k] > 0.0F) tile.obstacle |= static_cast<std::uint16_t>(1U << k);
+    }
+  }
+  drop_speckles();
+  grow_pixels();
   for (Tile& tile : tiles_) finish(&tile);
   std::sort(outside_.begin(), outside_.end());
   return calibration_.end_pass();

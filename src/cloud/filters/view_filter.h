@@ -79,30 +79,38 @@ class ViewFilter {
   struct Tile {
     std::uint32_t row, column;
     const SelfFilter::Link* link = nullptr;  // whose surface is expected here
-    std::array<float, 16> gap;               // [m] in front of the surface, by pixel; NaN: not used
+    std::array<float, 16> height;            // [m] in front of the surface, by pixel; NaN: not used
+    std::uint16_t kept = 0;                  // pixels in range
     std::uint16_t robot = 0;                 // pixels that are the robot's unless they are in front
     std::uint16_t skin = 0;                  // pixels within the padding
     std::uint16_t obstacle = 0;              // of these, those that are obstacles beyond doubt
-    int count = 0;                           // of gaps
-    float sum = 0.0F, variance = 0.0F;       // [m], [m^2] of gaps, and of their noise
-    float tolerance = 0.0F;                  // [m]
-    bool is_patch = false;                   // a whole patch of smooth surface
+    std::uint16_t blurred = 0;  // pixels that pass a link by no more than the blur of its edge
+    std::uint16_t near = 0;     // pixels that are obstacles, those next to others included
+    int count = 0;              // of heights
+    float sum = 0.0F, variance = 0.0F;  // [m], [m^2] of heights, and of their noise
+    float tolerance = 0.0F;             // [m]
+    bool is_patch = false;              // a whole patch of smooth surface
     bool is_obstacle = false;
-    Eigen::Vector3f p_S, n_S;  // middle and normal, where there is a gap
+    Eigen::Vector3f p_S, n_S;  // middle and normal, where there is a height
   };
 
   Sight look(const Eigen::Vector3d& p_S, const SelfFilter& filter) const;
   bool add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const SelfFilter& filter, Tile* tile);
   void add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uint32_t kept,
                   const SelfFilter& filter, const Eigen::Isometry3d& X_OS, Tile* tile) const;
-  void add_gap(std::size_t k, double gap, double noise, Tile* tile) const;
-  bool is_obstacle(const Eigen::Vector3d& p_S, const Sight& sight, const SelfFilter& filter) const;
+  void add_height(std::size_t k, double height, double noise, Tile* tile) const;
+  enum class Passing { kObstacle, kBlurred, kRobot };
+  Passing pass(const Eigen::Vector3d& p_S, const Sight& sight, const SelfFilter& filter) const;
 
   Tile* tile_at(std::int64_t row, std::int64_t column);
+  const Tile* tile_at(std::int64_t row, std::int64_t column) const;
   bool is_in_front(double sum, double variance, int count, double tolerance, double sigmas) const;
   void find_windows(std::size_t index);
   void grow();
   bool came_in(const Tile& tile) const;
+  void drop_speckles();
+  void grow_pixels();
+  int count_obstacles(std::int64_t row, std::int64_t column) const;
   void finish(Tile* tile);
   std::uint64_t voxel(const Eigen::Vector3d& p_F, int dx, int dy, int dz) const;
 
