@@ -28,21 +28,10 @@ const std::vector<ist::test::PairBody>& bodies() {
   return kBodies;
 }
 
-/// A query of one pair. The hierarchies of all pairs are built once.
+/// A query of one pair.
 ist::SelfQuery query_of(const ist::LinkPair& pair, bool is_coarse) {
-  const auto model = [](bool coarse) {
-    return coarse ? ist::fuzz::link_bank().coarse : ist::fuzz::link_bank().fine;
-  };
-  static const ist::SelfQuery kAll(model(true),
-                                   [] {
-                                     std::vector<ist::LinkPair> pairs;
-                                     for (std::size_t i = 0; i < bodies().size(); ++i) {
-                                       pairs.push_back({i, (i + 1) % bodies().size()});
-                                     }
-                                     return pairs;
-                                   }(),
-                                   {});
-  return {model(is_coarse), {pair}, {}, &kAll};
+  const ist::fuzz::LinkBank& bank = ist::fuzz::link_bank();
+  return {is_coarse ? bank.coarse : bank.fine, {pair}, {}};
 }
 
 ist::QueryConfig config_from(ByteReader* in) {
