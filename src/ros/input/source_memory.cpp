@@ -3,6 +3,7 @@
 #include <ros/console.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,13 @@ MemoryConfig map_config(const SourceConfig& config) {
   MemoryConfig map = config.memory.map;
   map.max_range = std::min(map.max_range, config.ingest.max_range);
   return map;
+}
+
+// [m] Of points that were put into voxels: the radius of the farthest one.
+double extent_of_voxels(const PointExtent& extent, double max_range) {
+  return extent.is_zero()
+             ? 0.0
+             : std::min(extent.radius(std::min(max_range, extent.max_range)), kMaxExtent);
 }
 
 bool is_there(const std::string& path) {
@@ -141,6 +149,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
   auto snapshot = std::make_shared<SourceSnapshot>();
   snapshot->cloud.boxes = index;
   snapshot->cloud.X_FM = X_MF_.inverse();
+  snapshot->cloud.box_extent = extent_of_voxels(cloud.cloud.extent, map_.config().max_range);
   snapshot->cloud.counts.received = static_cast<std::uint32_t>(counts_.known);
   snapshot->cloud.counts.used = static_cast<std::uint32_t>(boxes.size());
   snapshot->cloud.stamp = cloud.cloud.stamp;
