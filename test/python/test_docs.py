@@ -84,7 +84,7 @@ def test_yaml(text):
         for key, value in tree.items():
             assert names_are_free or re.search(rf'\b{key}:', known), key
             if isinstance(value, dict):
-                check(value, key in ('sources', 'links'))
+                check(value, key in ('sources', 'links', 'objects'))
 
     check(yaml.safe_load(text), False)
 
