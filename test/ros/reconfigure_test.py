@@ -109,7 +109,8 @@ class ReconfigureTest(unittest.TestCase):
         rospy.set_param(self.node.name + "/max_distance", 2.0)
         self.node.wait_until(lambda: words in self.node.log(), words)
         self.node.wait_until(
-            lambda: words in self.node.diagnostics["query"].message, "the diagnostics"
+            lambda: words in getattr(self.node.diagnostics.get("query"), "message", ""),
+            "the diagnostics",
         )
         self.assertIn("the node has to be restarted", self.node.log())
         rospy.set_param(self.node.name + "/query/margin", 0.03)  # has effect
