@@ -183,8 +183,12 @@ class LaunchFilesTest(unittest.TestCase):
             self.assertLessEqual({"/shown/near/markers", "/shown/near/spheres"}, topics)
             robots = [d["Robot Description"] for d in displays if d["Class"] == "rviz/RobotModel"]
             self.assertEqual(robots, ["shown/robot_description"])
+        self.assertFalse(any("world" in topic for topic in topics if topic))
         rospy.set_param("/shown/near/fixed_frame", "odom")
+        rospy.set_param("/shown/near/sources", {"cell": {"type": "world"}, "camera": {"topic": "c"}})
         manager = configuration("proximity.rviz")["Visualization Manager"]
+        worlds = [d["Marker Topic"] for d in manager["Displays"] if "Known world" in d["Name"]]
+        self.assertEqual(worlds, ["/shown/near/world/cell"])
         self.assertEqual(manager["Global Options"]["Fixed Frame"], "odom")
         for display in manager["Displays"]:  # "<Fixed Frame>" of a display stays
             if "Reference Frame" in display:
