@@ -124,7 +124,6 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
   Check check("link '" + link.link + "' in state " + std::to_string(link.state) + ": ");
   const Vectors v(link);
   check_closing(link, &check);
-  check_interval(link, &check);
   switch (link.state) {
     case LinkMessage::UNKNOWN:
       check.that(std::isnan(link.distance), "distance has to be NaN", link.distance);
@@ -149,6 +148,7 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
     default:
       check.that(false, "the state has to be one of the constants", int{link.state});
   }
+  check_interval(link, &check);
   if (link.state != LinkMessage::UNKNOWN) {
     check.that(v.repulsion.allFinite(), "repulsion has to be finite", v.repulsion.transpose());
   }
