@@ -8,13 +8,14 @@ namespace ist::test {
 /// size, so that each is packed by itself.
 inline std::string long_chain_urdf(int links) {
   static const char* const kMeshes[] = {"upper_arm.stl", "shoulder_fork.stl", "gripper.dae"};
+  static constexpr double kMetres[] = {1.0, 0.001, 1.0};  // the fork is drawn in millimetres
   std::string urdf = "<robot name=\"long_chain\">\n";
   for (int i = 0; i < links; ++i) {
     const std::string name = "link" + std::to_string(i);
     const std::string size = std::to_string(0.05 + 0.001 * i);
     std::string shape;
     if (i % 3 == 0) {
-      const std::string scale = std::to_string(0.5 + 0.01 * i);
+      const std::string scale = std::to_string((0.5 + 0.01 * i) * kMetres[i / 3 % 3]);
       shape = std::string("<mesh filename=\"package://ist_proximity/demo/meshes/") +
               kMeshes[i / 3 % 3] + "\" scale=\"" + scale + " " + scale + " " + scale + "\"/>";
     } else if (i % 3 == 1) {
