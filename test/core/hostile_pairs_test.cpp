@@ -12,44 +12,23 @@
 #include "ist_proximity/proximity/self_query.h"
 #include "support/broken_promise.h"
 #include "support/random_links.h"
+#include "support/random_numbers.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {
 namespace {
 
-double power_of_ten(test::Rng* rng, double low, double high) {
-  return std::pow(10.0, test::uniform(rng, low, high));
-}
-
-bool chance(test::Rng* rng, double probability) {
-  return test::uniform(rng, 0.0, 1.0) < probability;
-}
-
-std::size_t below(test::Rng* rng, std::size_t count) {
-  return std::min(count - 1,
-                  static_cast<std::size_t>(test::uniform(rng, 0.0, static_cast<double>(count))));
-}
-
 QueryConfig random_config(test::Rng* rng) {
   constexpr double kTolerances[] = {0.0, 0.0, 0.0, 1e-5, 0.001, 0.01};
   QueryConfig config;
-  config.tolerance = kTolerances[below(rng, 6)];
-  config.max_distance = power_of_ten(rng, -2.0, 1.0);
-  config.margin = chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 0.05);
-  config.relative_tolerance = chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 1.0);
-  if (chance(rng, 0.3)) config.deadline = chance(rng, 0.3) ? 1e-12 : power_of_ten(rng, -6.5, -4.0);
+  config.tolerance = kTolerances[test::below(rng, 6)];
+  config.max_distance = test::power_of_ten(rng, -2.0, 1.0);
+  config.margin = test::chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 0.05);
+  config.relative_tolerance = test::chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 1.0);
+  if (test::chance(rng, 0.3))
+    config.deadline = test::chance(rng, 0.3) ? 1e-12 : test::power_of_ten(rng, -6.5, -4.0);
   return config;
-}
-
-Eigen::Isometry3d small_motion(test::Rng* rng) {
-  const double size = power_of_ten(rng, -8.0, -1.3);
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.linear() = Eigen::AngleAxisd(test::uniform(rng, 0.0, 5.0) * size,
-                                 test::random_vector(rng, 1.0).normalized())
-                   .toRotationMatrix();
-  X.translation() = test::random_vector(rng, size);
-  return X;
 }
 
 TEST(HostilePairs, BoundsHold) {
@@ -62,8 +41,8 @@ TEST(HostilePairs, BoundsHold) {
   const int sequences = test::scaled(400);
   int answers = 0, contacts = 0, stopped = 0;
   for (int i = 0; i < sequences && !testing::Test::HasFailure(); ++i) {
-    const std::size_t a = below(&rng, links.size());
-    const std::size_t b = (a + 1 + below(&rng, links.size() - 1)) % links.size();
+    const std::size_t a = test::below(&rng, links.size());
+    const std::size_t b = (a + 1 + test::below(&rng, links.size() - 1)) % links.size();
     SCOPED_TRACE("sequence " + std::to_string(i) + ", links " + std::to_string(a) + ", " +
                  std::to_string(b));
     std::vector<Eigen::Isometry3d> X_FL(links.size(), test::random_pose(&rng, 1.0));
@@ -72,10 +51,10 @@ TEST(HostilePairs, BoundsHold) {
     QueryConfig config = random_config(&rng);
     SelfQuery query(model, {{a, b}}, config);
     for (int step = 0; step < 20 && !testing::Test::HasFailure(); ++step) {
-      if (chance(&rng, 0.3)) query.set_config(config = random_config(&rng));
-      Eigen::Isometry3d& X = X_FL[chance(&rng, 0.5) ? a : b];
-      if (chance(&rng, 0.7)) X = X * small_motion(&rng);
-      if (chance(&rng, 0.05)) X = X * test::random_pose(&rng, 0.2);
+      if (test::chance(&rng, 0.3)) query.set_config(config = random_config(&rng));
+      Eigen::Isometry3d& X = X_FL[test::chance(&rng, 0.5) ? a : b];
+      if (test::chance(&rng, 0.7)) X = X * test::small_motion(&rng, -1.3);
+      if (test::chance(&rng, 0.05)) X = X * test::random_pose(&rng, 0.2);
       std::vector<PairProximity> found;
       const bool is_complete = query.run(X_FL, known, &found);
       test::PairTruth truth = test::pair_truth(bodies[a], bodies[b], X_FL[a].inverse() * X_FL[b],

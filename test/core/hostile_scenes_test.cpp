@@ -15,6 +15,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/broken_promise.h"
 #include "support/random_links.h"
+#include "support/random_numbers.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
@@ -22,19 +23,6 @@
 
 namespace ist {
 namespace {
-
-double power_of_ten(test::Rng* rng, double low, double high) {
-  return std::pow(10.0, test::uniform(rng, low, high));
-}
-
-bool chance(test::Rng* rng, double probability) {
-  return test::uniform(rng, 0.0, 1.0) < probability;
-}
-
-std::size_t below(test::Rng* rng, std::size_t count) {
-  return std::min(count - 1,
-                  static_cast<std::size_t>(test::uniform(rng, 0.0, static_cast<double>(count))));
-}
 
 /// One of the links as a robot of its own, in packings that take each other's place.
 struct Robot {
@@ -72,10 +60,10 @@ struct Cloud {
 std::vector<Eigen::Vector3d> shell(test::Rng* rng, const LinkGeometry& link, int count) {
   const auto* mesh = std::get_if<TriangleMesh>(&link[0].shape);
   if (mesh == nullptr) return test::random_points(rng, link, count);
-  const double offset = power_of_ten(rng, -6.0, -1.5) * (chance(rng, 0.5) ? 1.0 : -1.0);
+  const double offset = test::power_of_ten(rng, -6.0, -1.5) * (test::chance(rng, 0.5) ? 1.0 : -1.0);
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < count; ++i) {
-    const std::size_t t = below(rng, mesh->triangles.size());
+    const std::size_t t = test::below(rng, mesh->triangles.size());
     const Eigen::Vector3d a = mesh->corner(t, 0), b = mesh->corner(t, 1), c = mesh->corner(t, 2);
     const Eigen::Vector3d n = (b - a).cross(c - a);
     const double u = test::uniform(rng, 0.0, 1.0), v = test::uniform(rng, 0.0, 1.0 - u);
@@ -89,10 +77,11 @@ std::vector<Eigen::Vector3d> shell(test::Rng* rng, const LinkGeometry& link, int
 void ingest(test::Rng* rng, Cloud* cloud) {
   const std::size_t size = cloud->points.size();
   const std::size_t width =
-      chance(rng, 0.5) ? size : std::max<std::size_t>(1, static_cast<std::size_t>(std::sqrt(size)));
+      test::chance(rng, 0.5) ? size
+                             : std::max<std::size_t>(1, static_cast<std::size_t>(std::sqrt(size)));
   const std::size_t height = size / width;
   cloud->points.resize(width * height);
-  const Eigen::Isometry3d X_FS = test::random_pose(rng, power_of_ten(rng, -1.0, 1.0));
+  const Eigen::Isometry3d X_FS = test::random_pose(rng, test::power_of_ten(rng, -1.0, 1.0));
   const Eigen::Isometry3d X_SF = X_FS.inverse();
   cloud->message = std::make_shared<std::vector<float>>();
   for (Eigen::Vector3d& p_F : cloud->points) {
@@ -117,9 +106,9 @@ std::unique_ptr<Cloud> random_cloud(test::Rng* rng, const LinkGeometry& link,
   auto cloud = std::make_unique<Cloud>();
   const int count = 1 + static_cast<int>(std::pow(test::uniform(rng, 0.0, 1.0), 3.0) * 150.0);
   cloud->points =
-      chance(rng, 0.3) ? shell(rng, link, count) : test::random_points(rng, link, count);
+      test::chance(rng, 0.3) ? shell(rng, link, count) : test::random_points(rng, link, count);
   for (Eigen::Vector3d& p : cloud->points) p = X_FL * p;
-  if (chance(rng, 0.3)) {
+  if (test::chance(rng, 0.3)) {
     ingest(rng, cloud.get());
   } else {
     cloud->snapshot = test::make_snapshot(cloud->points, test::random_vector(rng, 1.0));
@@ -130,18 +119,19 @@ std::unique_ptr<Cloud> random_cloud(test::Rng* rng, const LinkGeometry& link,
 QueryConfig random_config(test::Rng* rng) {
   constexpr double kTolerances[] = {0.0, 0.0, 0.0, 1e-5, 0.001, 0.01, 0.1};
   QueryConfig config;
-  config.tolerance = kTolerances[below(rng, 7)];
-  config.max_distance = power_of_ten(rng, -2.0, 0.5);
-  config.margin = chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 0.05);
-  config.relative_tolerance = chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 1.0);
-  if (chance(rng, 0.4)) config.deadline = chance(rng, 0.3) ? 1e-12 : power_of_ten(rng, -6.5, -4.0);
+  config.tolerance = kTolerances[test::below(rng, 7)];
+  config.max_distance = test::power_of_ten(rng, -2.0, 0.5);
+  config.margin = test::chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 0.05);
+  config.relative_tolerance = test::chance(rng, 0.7) ? 0.0 : test::uniform(rng, 0.0, 1.0);
+  if (test::chance(rng, 0.4))
+    config.deadline = test::chance(rng, 0.3) ? 1e-12 : test::power_of_ten(rng, -6.5, -4.0);
   return config;
 }
 
 /// All settings change, or one of them.
 QueryConfig changed(test::Rng* rng, QueryConfig config) {
   const QueryConfig other = random_config(rng);
-  switch (below(rng, 6)) {
+  switch (test::below(rng, 6)) {
     case 0:
       config.tolerance = other.tolerance;
       return config;
@@ -159,33 +149,23 @@ QueryConfig changed(test::Rng* rng, QueryConfig config) {
   }
 }
 
-Eigen::Isometry3d small_motion(test::Rng* rng) {
-  const double size = power_of_ten(rng, -8.0, -1.5);
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.linear() = Eigen::AngleAxisd(test::uniform(rng, 0.0, 5.0) * size,
-                                 test::random_vector(rng, 1.0).normalized())
-                   .toRotationMatrix();
-  X.translation() = test::random_vector(rng, size);
-  return X;
-}
-
 class HostileScenes : public testing::Test {
  protected:
   void run_sequence(const Robot& robot) {
-    Eigen::Isometry3d X_FL = test::random_pose(&rng_, power_of_ten(&rng_, -2.0, 0.7));
+    Eigen::Isometry3d X_FL = test::random_pose(&rng_, test::power_of_ten(&rng_, -2.0, 0.7));
     std::vector<std::unique_ptr<Cloud>> clouds;
-    for (std::size_t i = 1 + below(&rng_, 4) / 2; i > 0; --i) {
+    for (std::size_t i = 1 + test::below(&rng_, 4) / 2; i > 0; --i) {
       clouds.push_back(random_cloud(&rng_, robot.geometry, X_FL));
     }
     ProximityQuery query(robot.packings[0], random_config(&rng_));
     for (int step = 0; step < 15 && !HasFailure(); ++step) {
-      if (chance(&rng_, 0.4)) query.set_config(changed(&rng_, query.config()));
-      if (chance(&rng_, 0.2)) query.set_model(robot.packings[below(&rng_, 2)]);
-      if (chance(&rng_, 0.1)) {
-        clouds[below(&rng_, clouds.size())] = random_cloud(&rng_, robot.geometry, X_FL);
+      if (test::chance(&rng_, 0.4)) query.set_config(changed(&rng_, query.config()));
+      if (test::chance(&rng_, 0.2)) query.set_model(robot.packings[test::below(&rng_, 2)]);
+      if (test::chance(&rng_, 0.1)) {
+        clouds[test::below(&rng_, clouds.size())] = random_cloud(&rng_, robot.geometry, X_FL);
       }
-      if (chance(&rng_, 0.6)) X_FL = X_FL * small_motion(&rng_);
-      if (chance(&rng_, 0.05)) X_FL = X_FL * test::random_pose(&rng_, 0.2);
+      if (test::chance(&rng_, 0.6)) X_FL = X_FL * test::small_motion(&rng_, -1.5);
+      if (test::chance(&rng_, 0.05)) X_FL = X_FL * test::random_pose(&rng_, 0.2);
       check(robot, X_FL, clouds, &query);
     }
   }
@@ -215,8 +195,8 @@ class HostileScenes : public testing::Test {
   bool ask(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, ProximityQuery* query,
            LinkProximity* answer) {
     const std::vector<Eigen::Isometry3d> poses = {X_FL};
-    if (chance(&rng_, 0.25)) return query->run_link(0, X_FL, clouds, answer);
-    if (chance(&rng_, 0.3)) {
+    if (test::chance(&rng_, 0.25)) return query->run_link(0, X_FL, clouds, answer);
+    if (test::chance(&rng_, 0.3)) {
       RobotProximity nearest;
       const bool is_complete = query->run_minimum(poses, {true}, clouds, &nearest);
       *answer = nearest.nearest;

@@ -34,7 +34,7 @@ struct MemoryConfig {
   double clamp_max = 0.971;   ///< probabilities never go above; 0.5 to 1
 };
 
-/// What one cloud says of space, in the map's frame M. Points are finite.
+/// The occupied and free space of one cloud, in the map's frame M. Points are finite.
 struct MemoryScan {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();  ///< [m] the sensor
   std::vector<Eigen::Vector3f>
@@ -92,7 +92,7 @@ class MemoryMap {
   /// Forgets everything.
   void clear();
 
-  /// What is known of the voxel that holds a point.
+  /// The state of the voxel that holds a point.
   VoxelState state(const Eigen::Vector3d& p_M) const;
   /// Log-odds of a voxel; NaN where it is unknown.
   float log_odds(const Eigen::Vector3d& p_M) const;

@@ -11,9 +11,9 @@ namespace ist {
 /// How the self-filter decides which points are the robot's.
 enum class SelfFilterMode : std::uint8_t {
   kPadding,  ///< whatever is within the padding of a link
-  /// Of these, what agrees with where the sensor must see the robot (doc/self_filter.md). Points
-  /// that do not lie on rays from the sensor frame's origin, and clouds that are no image, are
-  /// filtered by padding.
+  /// The ones of these that agree with where the sensor must see the robot (doc/self_filter.md).
+  /// Points that do not lie on rays from the sensor frame's origin, and clouds that are no image,
+  /// are filtered by padding.
   kView,
 };
 
@@ -26,7 +26,7 @@ struct RangeNoise {
   double sigma(double range) const { return constant + quadratic * range * range; }
 };
 
-/// What the view of the robot is compared with, and how well it is known.
+/// The errors of what the view of the robot is compared with.
 struct ViewFilterConfig {
   RangeNoise noise;  ///< of each pixel, independent of its neighbours
   /// [m] and [rad]: standard deviations of the sensor's pose as tf gives it. The correction that is
@@ -38,7 +38,7 @@ struct ViewFilterConfig {
   double mixed_pixels = 1.0;      ///< [pixels] >= 0: an edge of the robot is blurred by as much
 };
 
-/// What a view says about one link.
+/// The view of one link.
 struct LinkView {
   std::uint32_t solid = 0;  ///< its number in the robot that Ingest was given
   /// [m] An obstacle of four by four pixels whose visible side is nearer to the link's than this
