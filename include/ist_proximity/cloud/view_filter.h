@@ -48,7 +48,7 @@ struct LinkView {
   std::uint32_t unexplained = 0;  ///< of these, points that the link does not explain: obstacles
 };
 
-/// What a self-filter by view found in one cloud.
+/// The findings of a self-filter by view in one cloud.
 struct ViewReport {
   bool is_used = false;  ///< false: the cloud was filtered by padding
   /// The sensor's pose is corrected by this, as estimated from the points on the robot: X_FS as

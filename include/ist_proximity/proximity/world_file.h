@@ -16,8 +16,8 @@ namespace ist {
 /// @param radius, length  [m] > 0
 TriangleMesh cone(double radius, double length);
 
-/// What lies below a plane n.x = offset, as a box of 100 m x 100 m and 10 m thickness. Queries have
-/// no shape without end.
+/// A box of 100 m x 100 m and 10 m thickness for the half-space below a plane n.x = offset. Queries
+/// have no shape without end.
 /// @param n       unit, out of the ground
 /// @param offset  [m]
 GeometryElement half_space(const Eigen::Vector3d& n, double offset);

@@ -48,8 +48,8 @@ struct WorldQueryStatistics {
 /// box first, and only those whose box is nearer than what was measured are measured. The search of
 /// each measured pair is kept from run to run, for the last 24 objects of each link.
 ///
-/// With a deadline, each link gets the bound of its boxes and one distance first; then the link
-/// with the least bound goes on. Every bound holds at any time.
+/// Each link gets the bound of its boxes and one distance first where there is a deadline; then the
+/// link with the least bound goes on. Every bound holds at any time.
 ///
 /// run() never throws and locks nothing. It allocates nothing while the worlds are the same; where
 /// a world is another than at the last run, it allocates for objects that are more than ever

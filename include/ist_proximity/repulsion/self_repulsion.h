@@ -12,8 +12,8 @@ namespace ist {
 /// The repulsive wrench on a link from the other links of its robot, in the fixed frame, about the
 /// link's origin.
 ///
-/// With d the distance of a pair, n its unit vector away from the other link, and d_min the least
-/// distance of this link's pairs,
+/// A pair has the distance d and the unit vector n away from the other link, and d_min is the least
+/// distance of this link's pairs:
 ///   u = sum(w n) / sum(w),  w = max(0, 1 - (d - d_min) / smoothing)^2,
 /// over the pairs; force and torque are that of Repulsion: gain * s * u at the witnesses on the
 /// link, s = 1 - d_min / influence_distance from 0 to 1. Another link that comes near does not make

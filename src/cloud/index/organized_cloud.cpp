@@ -161,7 +161,7 @@ class OrganizedReader {
     return mask;
   }
 
-  // What is to be done with a tile of a block near the robot.
+  // The treatment of a tile of a block near the robot.
   SelfFilter::Verdict judge(std::size_t slot, const PaddedBox& box) {
     using Verdict = SelfFilter::Verdict;
     if (view_ == nullptr) return on_robot_->test(box);
