@@ -237,6 +237,7 @@ class SingleTreeSearch {
     }
     int next;
     while ((next = tile_.most_promising(search_.prune_bound())) >= 0) {
+      if ((is_stopped_ = search_.deadline->passed())) break;
       tile_.is_open[static_cast<std::size_t>(next)] = false;
       measure({tile_index, next});
     }
