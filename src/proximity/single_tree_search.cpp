@@ -191,6 +191,7 @@ class SingleTreeSearch {
     const Bound by_cover = cover_bound(part.center_L, part.radius);
     if (by_cover.now >= search_.prune_bound()) return by_cover;
     if (cell != nullptr || part.radius > kLargestBox * grid_.plane_radius()) return by_cover;
+    if (search_.deadline->passed()) return by_cover;
     cell = grid_.measure(part.center_L);
     return cell == nullptr ? by_cover : bound(grid_bound(cell, part), kInfinity);
   }
