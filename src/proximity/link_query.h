@@ -32,8 +32,9 @@ class LinkQuery {
   void begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneId scene,
              const QueryConfig& config, const OtherLinks& other_links, QueryStatistics* statistics);
 
-  /// Proves a first lower bound of the link's distance, where none is kept: it takes about a
-  /// microsecond, and is kept for the poses to come.
+  /// Proves a first lower bound of the link's distance, where none is kept: it takes some
+  /// microseconds, and is kept for the poses to come. A link that is too near for it is not tried
+  /// again at every step.
   void prove_first_bound(SnapshotSpan clouds);
 
   /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a
