@@ -25,6 +25,7 @@ void PairProximity::reset() {
   lower_bound = -std::numeric_limits<double>::infinity();
   p_FCa = p_FCb = direction = Eigen::Vector3d::Constant(kNaN);
   finished = true;
+  decided = false;
 }
 
 struct SelfQuery::Impl {
