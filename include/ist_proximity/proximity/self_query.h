@@ -78,8 +78,10 @@ class SelfQuery {
  public:
   /// Builds a hierarchy for each link: up to a second for a million triangles. Queries share the
   /// hierarchies of links of the same `solid`, also between models that differ in their packings.
+  /// @param cancelled  asked every few milliseconds; true ends the building, and every pair is
+  ///                   UNKNOWN. It may be empty
   SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-            const QueryConfig& config);
+            const QueryConfig& config, const std::function<bool()>& cancelled = {});
   ~SelfQuery();
   SelfQuery(SelfQuery&&) noexcept;
   SelfQuery& operator=(SelfQuery&&) noexcept;
