@@ -7,6 +7,7 @@
 
 #include "proximity/depth_search.h"
 #include "proximity/dual_tree.h"
+#include "proximity/first_bound.h"
 #include "proximity/refinement.h"
 #include "proximity/single_tree_search.h"
 
@@ -436,11 +437,39 @@ void LinkQuery::set_link(const LinkModel& link) {
 
 void LinkQuery::keep_bound() {
   const LinkSearch& search = link_.search;
-  double bound = search.lower_bound() - search.index_error;
+  keep_bound(search.lower_bound(), std::min(search.cover_bound, search.pruned_bound));
+}
+
+// @param bound           [m] of the stored obstacles' signed distances
+// @param cover_distance  [m] of the stored obstacles
+void LinkQuery::keep_bound(double bound, double cover_distance) {
+  const LinkSearch& search = link_.search;
+  bound -= search.index_error;
   // Float loses more, the farther.
   if (bound > search.range()) bound -= kFloatError * (bound - search.range());
-  link_.kept.bound.prove(search.scene, search.X_FL, bound,
-                         std::min(search.cover_bound, search.pruned_bound), search.max_coordinate);
+  link_.kept.bound.prove(search.scene, search.X_FL, bound, cover_distance, search.max_coordinate);
+}
+
+// Obstacles that are farther from the cover spheres than the interior gap are outside the link.
+void LinkQuery::prove_first_bound(SnapshotSpan clouds) {
+  LinkSearch& search = link_.search;
+  if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
+  const InnerSphereTree& tree = link_.context.tree();
+  const double gap = tree.interior_gap();
+  double bound = kInfinity;
+  bool is_outside = true;
+  const auto bound_index = [&](const auto& obstacles) {
+    enter(obstacles);
+    const double of_index = static_cast<double>(first_bound(
+        PosedSpheres(tree, obstacles.X_OL), obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+    is_outside = is_outside && of_index > gap;  // false for NaN
+    bound = std::min(bound, of_index);
+  };
+  for (std::size_t i = 0; i < clouds.size() && is_outside; ++i) {
+    for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL, bound_index);
+  }
+  bound -= search.rounding;
+  if (is_outside && bound > gap) keep_bound(bound, bound);
 }
 
 // The error of a distance by the coordinates of stored points and by poses that are not quite
