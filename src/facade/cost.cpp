@@ -53,7 +53,7 @@ CycleCost measure_cycles(const Robot& robot, Span<const double> q,
   ProximityQuery query(robot.model(), query_config);
   const Repulsion repulsion(robot.model());
   std::vector<KeptRepulsion> blends;  // as the node keeps them
-  for (std::size_t i = 0; i < links; ++i) blends.emplace_back(*robot.model(), i);
+  for (std::size_t i = 0; i < links; ++i) blends.emplace_back(i);
   std::vector<LinkProximity> answers(links);
   CycleCost cost;
   for (std::size_t k = 0; k * joints < q.size(); ++k) {
