@@ -13,9 +13,10 @@ body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; marg
 h1 { margin-bottom: 0; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ddd; }
 table { border-collapse: collapse; margin: 1rem 0; } th, td { padding: .2rem .7rem; text-align: right;
   border-bottom: 1px solid #eee; } th:first-child, td:first-child { text-align: left; }
-.wide { overflow-x: auto; } svg { width: 100%; max-width: 36rem; display: block; } svg text { font: 12px system-ui, sans-serif; }
+.wide { overflow-x: auto; } svg { display: block; } svg.chart { width: 36rem; }
+svg text { font: 12px system-ui, sans-serif; }
 svg .grid { stroke: #ddd; } .links { display: flex; flex-wrap: wrap; gap: 1rem; }
-.links figure { margin: 0; width: 11.5rem; } .links svg { width: 11rem; } figcaption { font-size: 13px; }
+.links figure { margin: 0; width: 10rem; } .links svg { width: 10rem; } figcaption { font-size: 13px; }
 .warning { background: #fff4e0; border-left: 4px solid #e69500; padding: .3rem .8rem; margin: .4rem 0; }
 code, pre { background: #f5f5f5; padding: .1rem .3rem; } pre { padding: .6rem .9rem; }
 .note { color: #666; font-size: 13px; }
@@ -23,7 +24,8 @@ code, pre { background: #f5f5f5; padding: .1rem .3rem; } pre { padding: .6rem .9
 
 
 def _table(head, rows):
-    lines = ['<div class="wide"><table><tr>' + ''.join(f'<th>{html.escape(h)}</th>' for h in head) + '</tr>']
+    cells = ''.join(f'<th>{html.escape(name)}</th>' for name in head)
+    lines = [f'<div class="wide"><table><tr>{cells}</tr>']
     for row in rows:
         lines.append('<tr>' + ''.join(f'<td>{html.escape(str(cell))}</td>' for cell in row) + '</tr>')
     return '\n'.join(lines) + '</table></div>'
@@ -71,19 +73,20 @@ def _packing(report):
             continue
         name, count = link['link'], len(link['radii'])
         share = more['filled_volume'] / max(more['solid_volume'], 1e-12)
-        rows.append((name, link['triangles'], more['open_edges'], count, _mm(link['max_gap']),
+        rows.append((name, link['triangles'] or '-', more['open_edges'], count, _mm(link['max_gap']),
                      _mm(link['mean_gap']), f'{1e6 * more["solid_volume"]:.0f}', f'{share:.0%}'))
         figures.append(f'<figure>{drawing.spheres(link["centers"], link["radii"])}'
                        f'<figcaption>{html.escape(name)}: {count} spheres</figcaption></figure>')
     head = ('link', 'triangles', 'open edges', 'spheres', 'largest gap [mm]', 'mean gap [mm]',
             'volume [cm³]', 'filled')
     return (_table(head, rows) + '<div class="links">' + ''.join(figures) + '</div>'
-            f'<p class="note">Packed in {report.packing_time:.1f} s of processor time.</p>')
+            '<p class="note">A link without triangles is made of boxes, cylinders and spheres. Packed in '
+            f'{report.packing_time:.1f} s of processor time.</p>')
 
 
 def _speed(report):
     rows, lines = [], {}
-    for cost in report.costs:
+    for cost in sorted(report.costs, key=lambda one: (one.max_error, one.tolerance)):
         half, high, largest = np.percentile(cost.cycle, (50, 99, 100))
         rows.append((f'{1e3 * cost.max_error:g}', f'{1e3 * cost.tolerance:g}', _us(half), _us(high),
                      _us(largest), _us(np.median(cost.repulsion)), _mm(cost.width.max())))
@@ -103,7 +106,7 @@ def _deadlines(report):
     chart = drawing.log_chart([('mean width', [1e6 * row[1] for row in report.deadlines],
                                 [max(1e3 * row[2], 1e-3) for row in report.deadlines])],
                               'deadline [µs]', 'widest bound of a cycle, mean [mm]')
-    return _table(('of the median query', 'deadline [µs]', 'widest bound, mean [mm]',
+    return _table(('of the 99th percentile', 'deadline [µs]', 'widest bound, mean [mm]',
                    'cycles with every link known'), rows) + chart
 
 
@@ -138,10 +141,10 @@ def render(report, rate, error, version):
     sections = [
         ('Recommended parameters', _summary(report, rate, error)),
         ('Warnings', warnings or '<p>None.</p>'),
-        ('What it costs', _cost(report, rate) + '<p class="note">The recommended setting as a node runs it, in one thread '
-         f'of this machine: {rate:g} cycles a second with query and repulsion of every link, asleep between '
-         f'them, and {measure.CLOUD_RATE:g} new clouds a second, indexed by another thread. Without '
-         'messages.</p>'),
+        ('What it costs', _cost(report, rate) +
+         '<p class="note">The recommended setting as a node runs it, in one thread of this machine: '
+         f'{rate:g} cycles a second with query and repulsion of every link, asleep between them, and '
+         f'{measure.CLOUD_RATE:g} new clouds a second, indexed by another thread. Without messages.</p>'),
         ('Speed against error', _speed(report) +
          f'<p class="note">{steps} steps of {measure.PIECES} random motions within the limits of the '
          f'joints, in steps of 1 ms and up to {measure.SPEED:g} rad/s, with a new cloud every '
