@@ -278,3 +278,21 @@ def test_cycle_cost_of_a_file(robot, wall_pcd):
     cost = robot.cycle_cost(q, obstacles)
     expected = robot.distances(q[0], obstacles).lower_bound.min()
     assert np.abs(cost['smallest'] - expected).max() <= 0.002
+
+
+def test_direction_is_the_gradient_of_the_distance(robot):
+    """direction^T J, as doc/messages.md builds a constraint from it, is how the distance changes."""
+    cloud, configurations = random_scene(robot, 12, points=60)
+    obstacles, step, checked = ist.Obstacles(cloud), 1e-5, 0
+    for q in configurations[:8]:
+        answer, X = robot.distances(q, obstacles, tolerance=0.0), robot.link_poses(q)
+        moved = q + step * np.eye(len(q))
+        X_moved, after = robot.link_poses(moved), robot.distances(moved, obstacles, tolerance=0.0)
+        for i in np.flatnonzero(answer.state == ist.NEAR):
+            p = np.append(answer.point_on_link_local[i], 1.0)
+            J = ((X_moved[:, i] @ p - X[i] @ p) / step)[:, :3].T
+            same = after.point[:, i] == answer.point[i]
+            change = (after.distance[:, i] - answer.distance[i]) / step
+            assert np.abs(answer.direction[i] @ J - change)[same].max(initial=0.0) < 0.02
+            checked += same.sum()
+    assert checked > 100
