@@ -25,8 +25,8 @@ struct CycleConfig {
   /// [s] >= 0: a cycle begins this long after the last one began, and the thread sleeps between
   /// them, as a controller's does. Caches are cold then, and cycles take longer. 0: no sleep
   double period = 0.0;
-  QueryConfig query;
-  RepulsionConfig repulsion;
+  QueryConfig query;          ///< what a cycle asks
+  RepulsionConfig repulsion;  ///< what is computed from the answers
 };
 
 /// Measures the cycles of a node along a motion.
