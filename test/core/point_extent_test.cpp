@@ -462,6 +462,17 @@ TEST(ExtentConfig, WhatMakesNoSenseIsNamed) {
       EXPECT_THROW(Ingest{ingest}, std::invalid_argument);
     }
   }
+  // Alone, too: a number that is negative or NaN is not taken for no extent.
+  for (const double bad : {-0.1, kNaN}) {
+    IngestConfig radius, noise, latency;
+    radius.extent.footprint = ExtentConfig::Footprint::kRadius;
+    radius.extent.footprint_radius = bad;
+    noise.extent.noise_quadratic = bad;
+    latency.extent.latency = bad;
+    for (const IngestConfig& ingest : {radius, noise, latency}) {
+      EXPECT_THROW(Ingest{ingest}, std::invalid_argument);
+    }
+  }
   ExtentConfig config;
   config.noise_constant = -0.5;
   EXPECT_EQ(check_extent(config, 3.0), "noise_constant is -0.5 m: it must be from 0 to 1 m");
