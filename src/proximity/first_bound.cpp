@@ -102,16 +102,31 @@ namespace ist {
 
 HWY_EXPORT(FirstBound);
 
-PosedSpheres::PosedSpheres(const InnerSphereTree& tree, const Eigen::Isometry3d& X_OL)
-    : count(tree.nodes().front().count) {
+PosedSpheres::PosedSpheres(const InnerSphereTree& tree, const Eigen::Isometry3d& X_OL,
+                           bool is_fine) {
   const SphereNode& root = tree.nodes().front();
-  for (int k = 0; k < count; ++k) {
-    const Eigen::Vector3d center = X_OL * Eigen::Vector3d(root.x[k], root.y[k], root.z[k]);
-    x[k] = static_cast<float>(center.x());
-    y[k] = static_cast<float>(center.y());
-    z[k] = static_cast<float>(center.z());
-    radius[k] = root.radius[k];
+  for (int k = 0; k < root.count; ++k) {
+    const std::int32_t child = root.child[k];
+    if (!is_fine) {
+      add(root, root.radius, k, X_OL);
+    } else if (child >= 0) {
+      const SphereNode& node = tree.nodes()[static_cast<std::size_t>(child)];
+      for (int i = 0; i < node.count; ++i) add(node, node.radius, i, X_OL);
+    } else {
+      const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
+      for (int i = 0; i < leaf.count; ++i) add(leaf, leaf.cover_radius, i, X_OL);
+    }
   }
+}
+
+template <class Spheres>
+void PosedSpheres::add(const Spheres& spheres, const float* radii, int k,
+                       const Eigen::Isometry3d& X_OL) {
+  const Eigen::Vector3d center = X_OL * Eigen::Vector3d(spheres.x[k], spheres.y[k], spheres.z[k]);
+  x[count] = static_cast<float>(center.x());
+  y[count] = static_cast<float>(center.y());
+  z[count] = static_cast<float>(center.z());
+  radius[count++] = radii[k];
 }
 
 float first_bound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root) {

@@ -8,18 +8,25 @@
 
 namespace ist {
 
-/// A link's largest bounding spheres, posed in the frame O of an index, all in float.
+/// Spheres that enclose a link's cover spheres, posed in the frame O of an index, all in float: the
+/// children of the tree's root, or finer their children.
 struct PosedSpheres {
   /// @param tree  not empty
-  PosedSpheres(const InnerSphereTree& tree, const Eigen::Isometry3d& X_OL);
+  PosedSpheres(const InnerSphereTree& tree, const Eigen::Isometry3d& X_OL, bool is_fine);
 
-  float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth], radius[kSphereWidth];  // [m]
-  int count;
+  static constexpr int kMax = kSphereWidth * kSphereWidth;
+  float x[kMax], y[kMax], z[kMax], radius[kMax];  // [m]
+  int count = 0;
+
+ private:
+  template <class Spheres>
+  void add(const Spheres& spheres, const float* radii, int k, const Eigen::Isometry3d& X_OL);
 };
 
 /// A lower bound of the distance between some spheres and all obstacles below a box node: the boxes
-/// with the least bounds are divided first, for a bounded number of steps. It takes about a
-/// microsecond, so that a query can have a bound for each link before it refines any.
+/// with the least bounds are divided first, for a bounded number of steps. It takes a microsecond
+/// or two, five with fine spheres, so that a query can have a bound for each link before it refines
+/// any.
 /// @param nodes  of the hierarchy
 /// @param root   index of the node
 /// @returns [m] rounding is not taken off

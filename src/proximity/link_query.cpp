@@ -28,6 +28,11 @@ constexpr double kRounding = 1e-12;
 constexpr double kNearInGaps = 2.0;
 // So does one at a distance that is about that of the last crowded search, by this factor.
 constexpr double kSameCrowd = 1.5;
+// A link that is nearer than so many radii of its bounding sphere gets its first bound by more and
+// smaller spheres.
+constexpr double kFineSpheresWithin = 0.5;
+// [m] A link that no first bound was found for is tried again when it has moved so far.
+constexpr double kFirstBoundAgain = 0.02;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
@@ -457,14 +462,25 @@ void LinkQuery::keep_bound(double bound, double cover_distance) {
 void LinkQuery::prove_first_bound(SnapshotSpan clouds) {
   LinkSearch& search = link_.search;
   if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
+  auto& last = link_.kept.first_bound;
+  if (last.scene == search.scene && search.scene != kUnknownScene &&
+      link_.context.displacement.between(last.X_FL, search.X_FL) < kFirstBoundAgain) {
+    return;
+  }
+  last.scene = search.scene;
+  last.X_FL = search.X_FL;
   const InnerSphereTree& tree = link_.context.tree();
   const double gap = tree.interior_gap();
   double bound = kInfinity;
   bool is_outside = true;
   const auto bound_index = [&](const auto& obstacles) {
     enter(obstacles);
-    const double of_index = static_cast<double>(first_bound(
-        PosedSpheres(tree, obstacles.X_OL), obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+    const auto by_spheres = [&](bool is_fine) {
+      return static_cast<double>(first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine),
+                                             obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+    };
+    double of_index = by_spheres(false);
+    if (of_index < kFineSpheresWithin * tree.radius()) of_index = by_spheres(true);
     is_outside = is_outside && of_index > gap;  // false for NaN
     bound = std::min(bound, of_index);
   };

@@ -33,8 +33,9 @@ class LinkQuery {
              const QueryConfig& config, const OtherLinks& other_links, QueryStatistics* statistics,
              Deadline* deadline);
 
-  /// Proves a first lower bound of the link's distance, where none is kept: it takes about a
-  /// microsecond, and is kept for the poses to come.
+  /// Proves a first lower bound of the link's distance, where none is kept: it takes some
+  /// microseconds, and is kept for the poses to come. A link that is too near for it is not tried
+  /// again at every step.
   void prove_first_bound(SnapshotSpan clouds);
 
   /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a

@@ -55,7 +55,7 @@ TEST(FirstBound, IsNeverAboveTheTruthAndSeldomFarBelow) {
     const PointBvh& bvh = cloud.index.bvh();
     const Eigen::Isometry3d X_OL = bvh.X_FO().inverse() * test::random_pose(&rng, 1.0);
     for (const LinkModel& link : model->links) {
-      const PosedSpheres spheres(link.tree, X_OL);
+      const PosedSpheres spheres(link.tree, X_OL, i % 2 == 1);
       const auto bound = static_cast<double>(first_bound(spheres, bvh.nodes().data(), bvh.root()));
       double truth = std::numeric_limits<double>::infinity();
       for (std::size_t tile = 0; tile < bvh.tile_count(); ++tile) {
