@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "proximity/depth_search.h"
 #include "proximity/dual_tree.h"
@@ -61,7 +62,7 @@ int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
 
 void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneId scene,
                       const QueryConfig& config, const OtherLinks& other_links,
-                      QueryStatistics* statistics) {
+                      QueryStatistics* statistics, Deadline* deadline) {
   LinkSearch& search = link_.search;
   const auto& answered = link_.kept.answered;
   const RigidPose rigid = nearest_rigid(X_FL);
@@ -72,6 +73,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneI
   search.config = config;
   search.other_links = other_links.distance;
   search.statistics = statistics;
+  search.deadline = deadline;
   search.closest = ClosestObstacle();
   search.refined_bound = kInfinity;
   search.region_bound = kInfinity;
@@ -107,9 +109,10 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
     count_outside_region();
     return true;
   }
-  search.deadline = deadline;
+  Deadline* const of_question = std::exchange(search.deadline, deadline);
   const bool has_points = search_points(clouds, deadline);
   const bool has_extents = bound_extents(clouds, deadline);
+  search.deadline = of_question;  // the caller's own may not outlive this call
   if (has_points && has_extents) keep_answer();
   return has_points && has_extents;
 }

@@ -140,7 +140,7 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
     }
     order.push_back(i);
     impl_->links[i].begin(X_FL[i], clouds, scene, impl_->first_config(), {},
-                          &impl_->link_statistics[i]);
+                          &impl_->link_statistics[i], &deadline);
   }
   impl_->start(clouds, &deadline);
   if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
@@ -178,7 +178,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
       continue;
     }
     LinkQuery& link = impl_->links[i];
-    link.begin(X_FL[i], clouds, scene, impl_->config, nearest, &impl_->statistics);
+    link.begin(X_FL[i], clouds, scene, impl_->config, nearest, &impl_->statistics, &deadline);
     if (best == count) link.warm_start(clouds);
     complete = impl_->links[i].run(clouds, &deadline) && complete;
     all_in_regions = all_in_regions && link.is_inside_regions();
@@ -220,7 +220,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
   }
   Deadline deadline(impl_->config.deadline);
   impl_->links[link].begin(X_FL, clouds, impl_->scene.identify(clouds), impl_->config, {},
-                           &impl_->statistics);
+                           &impl_->statistics, &deadline);
   impl_->links[link].warm_start(clouds);
   const bool complete = impl_->links[link].run(clouds, &deadline);
   impl_->links[link].answer(clouds, result);
