@@ -57,6 +57,9 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   const Eigen::Isometry3d X_BA = relative_pose(X_FB.X, X_FA.X);
   const double moved =
       has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInf;
+  const double since_search =
+      has_pose_ ? relative_displacement(surface_a_, surface_b_, surfaces_.searched_pose(), X_BA)
+                : kInf;
   openings_a_.note_motion(moved);
   openings_b_.note_motion(moved);
   // Surfaces that are apart stay apart while no point moves as far as the other surface, or an
@@ -70,7 +73,7 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   config_ = config;
   range_ = config.max_distance + config.margin;
   range_ += pose_uncertainty(range_);
-  surfaces_.move_to(X_BA, moved);
+  surfaces_.move_to(X_BA, since_search);
   stage_ = Stage::kSurfaces;
   are_in_contact_ = false;
 }

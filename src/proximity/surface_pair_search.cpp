@@ -27,6 +27,9 @@ constexpr int kManyPairs = 4096;
 // The plane between the closest points is tried after so many pairs, and when twice as many more
 // have been looked at.
 constexpr int kFirstPlane = 12;
+// A search from a kept front goes on to this part of the tolerance, and to this much more than the
+// range [m].
+constexpr double kSearchedShare = 0.25, kRangeSlack = 0.01;
 
 constexpr std::size_t kStackCapacity =
     stack_capacity(2 * SurfaceBvh::kMaxLevels, SurfaceBvh::kWidth);
@@ -56,107 +59,138 @@ OrientedBox posed_box(const SurfaceBvh& bvh, SurfaceBvh::Slot slot, const Eigen:
 }  // namespace
 
 SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity)
-    : a_(a), b_(b), capacity_(capacity) {
-  assert(capacity >= 2 * SurfaceBvh::kWidth);
-  front_.reserve(capacity);
-  measured_.reserve(capacity);
-  start_anew();
-}
+    : SurfacePairSearch(a, b, capacity, {}, {}) {}
 
 SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
                                      SurfacePairSearch&& memory)
-    : a_(a),
-      b_(b),
-      capacity_(capacity),
-      front_(std::move(memory.front_)),
-      measured_(std::move(memory.measured_)) {
+    : SurfacePairSearch(a, b, capacity, std::move(memory.queue_), std::move(memory.kept_)) {}
+
+SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
+                                     std::vector<Entry> queue, std::vector<Entry> kept)
+    : a_(a), b_(b), capacity_(capacity), queue_(std::move(queue)), kept_(std::move(kept)) {
   assert(capacity >= 2 * SurfaceBvh::kWidth);
-  front_.reserve(capacity);
-  measured_.reserve(capacity);
+  queue_.reserve(capacity);
+  kept_.reserve(capacity);
   start_anew();
 }
 
 void SurfacePairSearch::start_anew() {
-  front_.clear();
-  measured_.clear();
-  path_ = plane_path_ = plane_bound_ = 0.0;
+  queue_.clear();
+  kept_.clear();
+  least_kept_ = kInf;
+  path_ = moved_ = plane_path_ = plane_bound_ = 0.0;
   if (!a_.empty() && !b_.empty()) {
-    front_.push_back({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
+    keep({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
   }
 }
 
 void SurfacePairSearch::move_to(const Eigen::Isometry3d& X_BA, double displacement) {
   X_BA_ = X_BA;
-  const Eigen::Isometry3d X_AB = X_BA.inverse();
-  R_BA_ = X_BA.linear().cast<float>();
-  p_BA_ = X_BA.translation().cast<float>();
-  R_AB_ = X_AB.linear().cast<float>();
-  p_AB_ = X_AB.translation().cast<float>();
+  moved_ = displacement >= 0.0 ? displacement : kInf;
+  is_searching_ = has_boxes_ = false;
   const double scale = X_BA.translation().norm() + a_.extent() + b_.extent();
   rounding_ = kBoxRounding * scale;
   exact_rounding_ = 2.0 * kLostInLength * scale;
+  closest_ = {};
+  if (has_witness_) {
+    measure({0.0, witness_a_, witness_b_});
+  } else if (!a_.empty() && !b_.empty()) {
+    descend();
+  }
+}
+
+// What boxes are compared with, in float.
+void SurfacePairSearch::prepare_boxes() {
+  if (has_boxes_) return;
+  has_boxes_ = true;
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  R_BA_ = X_BA_.linear().cast<float>();
+  p_BA_ = X_BA_.translation().cast<float>();
+  R_AB_ = X_AB.linear().cast<float>();
+  p_AB_ = X_AB.translation().cast<float>();
+  set_direction();
+}
+
+void SurfacePairSearch::begin_search() {
   // A front that costs more than to start anew has become too fine for what is near now.
   if (is_new_) cost_of_new_ = looked_at_;
   const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
-  const bool is_crowded = 4 * (front_.size() + measured_.size()) > 3 * capacity_;
-  is_new_ = !(displacement <= kJump) || is_worn || is_crowded;
+  const bool is_crowded = 4 * (queue_.size() + kept_.size()) > 3 * capacity_;
+  const bool has_jumped = !(moved_ <= kJump);
+  is_new_ = has_jumped || is_worn || is_crowded;
+  wants_slack_ = !has_jumped;
   looked_at_ = next_plane_ = 0;
   plane_tried_ = 0.0;
   if (is_new_) {
     start_anew();
   } else {
-    keep_measured();
-    path_ += displacement;
+    path_ += moved_;
+    moved_ = 0.0;
     if (path_ > kLongestPath) rebase_path();
   }
-  closest_ = {};
-  if (has_witness_) {
-    measure({0.0, witness_a_, witness_b_});
-  } else {
-    set_direction();
-  }
-  if (!(displacement <= kJump) && !front_.empty()) descend();
+  is_searching_ = true;
+  searched_X_BA_ = X_BA_;
+  prepare_boxes();
+  if (has_jumped) descend();
+  update_prune_bound();
+  sort_front();
 }
 
-void SurfacePairSearch::keep_measured() {
-  for (const Entry& entry : measured_) {
-    front_.push_back(entry);
-    std::push_heap(front_.begin(), front_.end());
+// Divides the front into what is wanted and what is not.
+void SurfacePairSearch::sort_front() {
+  kept_.insert(kept_.end(), queue_.begin(), queue_.end());
+  queue_.clear();
+  least_kept_ = kInf;
+  std::size_t count = 0;
+  for (const Entry& entry : kept_) {
+    if (is_wanted(bound_at(entry.key))) {
+      queue_.push_back(entry);
+    } else {
+      least_kept_ = std::min(least_kept_, entry.key);
+      kept_[count++] = entry;
+    }
   }
-  measured_.clear();
+  kept_.resize(count);
+  std::make_heap(queue_.begin(), queue_.end());
 }
 
 void SurfacePairSearch::rebase_path() {
   // A key that was below the path by now proves nothing.
-  for (Entry& entry : front_) entry.key = entry.key > path_ ? entry.key - path_ : kUnproven;
-  std::make_heap(front_.begin(), front_.end());
+  for (std::vector<Entry>* entries : {&queue_, &kept_}) {
+    for (Entry& entry : *entries) entry.key = entry.key > path_ ? entry.key - path_ : kUnproven;
+  }
   plane_bound_ -= path_ - plane_path_;
   path_ = plane_path_ = 0.0;
 }
 
-double SurfacePairSearch::bound_of(const Entry& entry) const {
-  return entry.key < 0.0 ? 0.0 : std::max(entry.key - path_ * (1.0 + 1e-14), 0.0);
+// [m] The bound that is left of a key.
+double SurfacePairSearch::bound_at(double key) const {
+  return key < 0.0 ? 0.0 : std::max(key - path() * (1.0 + 1e-14), 0.0);
+}
+
+double SurfacePairSearch::plane_bound() const {
+  return plane_bound_ - (path() - plane_path_) * (1.0 + 1e-14);
 }
 
 double SurfacePairSearch::lower_bound() const {
-  double bound = closest_.distance;
-  if (!front_.empty()) bound = std::min(bound, bound_of(front_.front()));
-  for (const Entry& entry : measured_) bound = std::min(bound, bound_of(entry));
-  const double by_plane = plane_bound_ - (path_ - plane_path_) * (1.0 + 1e-14);
-  return std::max({bound, std::min(by_plane, closest_.distance), 0.0});
+  double key = least_kept_;
+  if (!queue_.empty()) key = std::min(key, queue_.front().key);
+  return std::max(std::min(std::max(bound_at(key), plane_bound()), closest_.distance), 0.0);
 }
 
 double SurfacePairSearch::tolerance_at(double distance) const {
   const double resolved = 1e-12 * distance + 4.0 * exact_rounding_;
+  const double share = is_searching_ && wants_slack_ ? kSearchedShare : 1.0;
   const double tolerance =
-      std::max({goal_.tolerance, goal_.relative_tolerance * distance, resolved});
+      std::max({share * goal_.tolerance, share * goal_.relative_tolerance * distance, resolved});
   return looked_at_ > kManyPairs ? std::max(tolerance, 2.0 * rounding_) : tolerance;
 }
 
 void SurfacePairSearch::update_prune_bound() {
   const double distance = closest_.distance;
-  prune_bound_ =
-      distance < goal_.range ? std::max(distance - tolerance_at(distance), 0.0) : goal_.range;
+  const double range = goal_.range + (is_searching_ && wants_slack_ ? kRangeSlack : 0.0);
+  const double near = std::max(distance - tolerance_at(distance), 0.0);
+  prune_bound_ = distance < goal_.range ? near : std::min(std::max(near, goal_.range), range);
 }
 
 bool SurfacePairSearch::is_wanted(double bound) const {
@@ -219,7 +253,7 @@ double SurfacePairSearch::measure(const Pair& pair) {
     witness_a_ = pair.a;
     witness_b_ = pair.b;
     has_witness_ = true;
-    set_direction();
+    if (has_boxes_) set_direction();
     update_prune_bound();
   }
   return std::max(found.lower_bound - exact_rounding_, 0.0);
@@ -231,6 +265,7 @@ const ConvexPart& SurfacePairSearch::part_b() const { return part_of(b_, witness
 
 // Finds an upper bound: from the roots on, always the child with the least bound.
 void SurfacePairSearch::descend() {
+  prepare_boxes();
   Pair pair{-1.0, SurfaceBvh::kRoot, SurfaceBvh::kRoot};
   while (!is_leaf(pair)) {
     Pair children[SurfaceBvh::kWidth];
@@ -243,8 +278,14 @@ void SurfacePairSearch::descend() {
 }
 
 void SurfacePairSearch::push(const Entry& entry) {
-  front_.push_back(entry);
-  std::push_heap(front_.begin(), front_.end());
+  if (!is_wanted(bound_at(entry.key))) return keep(entry);
+  queue_.push_back(entry);
+  std::push_heap(queue_.begin(), queue_.end());
+}
+
+void SurfacePairSearch::keep(const Entry& entry) {
+  kept_.push_back(entry);
+  least_kept_ = std::min(least_kept_, entry.key);
 }
 
 // The distance of the surfaces along the line through the closest points, if these have changed.
@@ -258,23 +299,27 @@ void SurfacePairSearch::prove_by_plane() {
   const double below = b_.support(n_B);
   const double above = n_B.dot(X_BA_.translation()) - a_.support(-n_A);
   const double bound = above - below - exact_rounding_;
-  if (bound < plane_bound_ - (path_ - plane_path_)) return;
+  if (bound < plane_bound()) return;
   plane_bound_ = bound;
-  plane_path_ = path_;
+  plane_path_ = path();
 }
 
 bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   goal_ = goal;
   update_prune_bound();
-  while (!front_.empty() && closest_.distance > 0.0) {
-    const Entry entry = front_.front();
-    if (!is_wanted(bound_of(entry))) return true;
+  if (!is_searching_) {
+    if (closest_.distance <= 0.0 || !is_wanted(lower_bound())) return true;
+    begin_search();
+  }
+  while (!queue_.empty() && closest_.distance > 0.0) {
+    const Entry entry = queue_.front();
+    if (!is_wanted(bound_at(entry.key))) return true;
     if (*steps <= 0) return false;
     if (looked_at_ >= next_plane_) prove_by_plane();
-    if (!is_wanted(plane_bound_ - (path_ - plane_path_) * (1.0 + 1e-14))) return true;
-    std::pop_heap(front_.begin(), front_.end());
-    front_.pop_back();
-    if (front_.size() + measured_.size() + SurfaceBvh::kWidth > capacity_) {
+    if (!is_wanted(plane_bound())) return true;
+    std::pop_heap(queue_.begin(), queue_.end());
+    queue_.pop_back();
+    if (queue_.size() + kept_.size() + SurfaceBvh::kWidth > capacity_) {
       visit_depth_first(entry, steps);
     } else {
       visit(entry, steps);
@@ -286,21 +331,23 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
 void SurfacePairSearch::visit(const Entry& entry, int* steps) {
   --*steps;
   ++looked_at_;
-  const Pair pair{bound_of(entry) > 0.0 ? bound_of(entry) : -1e30, entry.a, entry.b};
+  const double known = bound_at(entry.key);
+  const Pair pair{known > 0.0 ? known : -1e30, entry.a, entry.b};
   if (is_leaf(pair)) {
     const double bound = measure(pair);
-    measured_.push_back({bound > 0.0 ? bound + path_ : kUnproven, pair.a, pair.b});
+    keep({bound > 0.0 ? bound + path() : kUnproven, pair.a, pair.b});
     return;
   }
   Pair children[SurfaceBvh::kWidth];
   const int count = expand(pair, children);
   for (int k = 0; k < count; ++k) {
     const Pair& child = children[k];
-    push({child.bound > 0.0 ? child.bound + path_ : child.bound, child.a, child.b});
+    push({child.bound > 0.0 ? child.bound + path() : child.bound, child.a, child.b});
   }
 }
 
 bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) {
+  prepare_boxes();
   TraversalStack<Pair, kStackCapacity> stack;
   if (!a_.empty() && !b_.empty()) stack.push({-1e30, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
   while (!stack.empty()) {
@@ -326,7 +373,7 @@ bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) 
 // The pair comes back with the least bound that pruned what is below it.
 void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
   TraversalStack<Pair, kStackCapacity> stack;
-  const double known = bound_of(entry);
+  const double known = bound_at(entry.key);
   stack.push({known > 0.0 ? known : -1e30, entry.a, entry.b});
   double least = kInf;
   while (!stack.empty()) {
@@ -336,7 +383,8 @@ void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
       continue;
     }
     if (closest_.distance <= 0.0 || *steps <= 0) {  // what is known holds
-      push(entry);
+      queue_.push_back(entry);
+      std::push_heap(queue_.begin(), queue_.end());
       return;
     }
     --*steps;
@@ -351,7 +399,7 @@ void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
     for (int k = 0; k < count; ++k) stack.push_least_on_top<&Pair::bound>(first, children[k]);
   }
   // It was searched at this pose, and is not wanted again before the next one.
-  measured_.push_back({least > 0.0 ? least + path_ : kUnproven, entry.a, entry.b});
+  keep({least > 0.0 ? least + path() : kUnproven, entry.a, entry.b});
 }
 
 }  // namespace ist
