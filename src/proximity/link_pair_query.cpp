@@ -57,8 +57,8 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   const Eigen::Isometry3d X_BA = relative_pose(X_FB.X, X_FA.X);
   const double moved =
       has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInf;
-  const double since_search =
-      has_pose_ ? relative_displacement(surface_a_, surface_b_, surfaces_.searched_pose(), X_BA)
+  const double since_reference =
+      has_pose_ ? relative_displacement(surface_a_, surface_b_, surfaces_.reference_pose(), X_BA)
                 : kInf;
   openings_a_.note_motion(moved);
   openings_b_.note_motion(moved);
@@ -73,7 +73,7 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   config_ = config;
   range_ = config.max_distance + config.margin;
   range_ += pose_uncertainty(range_);
-  surfaces_.move_to(X_BA, since_search);
+  surfaces_.move_to(X_BA, since_reference);
   stage_ = Stage::kSurfaces;
   are_in_contact_ = false;
 }

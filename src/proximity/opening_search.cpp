@@ -123,7 +123,7 @@ OpeningSearch::Answer OpeningSearch::decide(const Eigen::Isometry3d& X_BA, int* 
   goal.range = kFarEnough;
   goal.tolerance = 0.5 * kFarEnough;
   const bool is_found = search_.run(goal, &left);
-  if (search_.is_searched()) moved_ = 0.0;
+  if (search_.is_at_reference()) moved_ = 0.0;
   Answer answer = Answer::kUnknown;
   if (is_found && search_.lower_bound() > 0.0) {
     clearance_ = search_.lower_bound();

@@ -38,7 +38,7 @@ class OpeningSearch {
   const bool is_closed_;
   SurfacePairSearch search_;
   double clearance_ = 0.0;  // [m] lower bound of the distance of openings and surface
-  double moved_;            // [m] since search_.searched_pose()
+  double moved_;            // [m] since search_.reference_pose()
 };
 
 }  // namespace ist

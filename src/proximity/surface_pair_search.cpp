@@ -87,7 +87,7 @@ void SurfacePairSearch::start_anew() {
 void SurfacePairSearch::move_to(const Eigen::Isometry3d& X_BA, double displacement) {
   X_BA_ = X_BA;
   moved_ = displacement >= 0.0 ? displacement : kInf;
-  is_searching_ = has_boxes_ = false;
+  is_at_reference_ = is_searching_ = has_boxes_ = false;
   const double scale = X_BA.translation().norm() + a_.extent() + b_.extent();
   rounding_ = kBoxRounding * scale;
   exact_rounding_ = 2.0 * kLostInLength * scale;
@@ -111,27 +111,35 @@ void SurfacePairSearch::prepare_boxes() {
   set_direction();
 }
 
-void SurfacePairSearch::begin_search() {
-  // A front that costs more than to start anew has become too fine for what is near now.
-  if (is_new_) cost_of_new_ = looked_at_;
-  const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
-  const bool is_crowded = 4 * (queue_.size() + kept_.size()) > 3 * capacity_;
-  const bool has_jumped = !(moved_ <= kJump);
-  is_new_ = has_jumped || is_worn || is_crowded;
-  wants_slack_ = !has_jumped;
-  looked_at_ = next_plane_ = 0;
-  plane_tried_ = 0.0;
-  if (is_new_) {
+// What is proven from here on is proven at this pose.
+void SurfacePairSearch::set_reference() {
+  has_jumped_ = !(moved_ <= kJump);
+  if (has_jumped_) {
     start_anew();
   } else {
     path_ += moved_;
     moved_ = 0.0;
     if (path_ > kLongestPath) rebase_path();
   }
+  reference_X_BA_ = X_BA_;
+  is_at_reference_ = true;
+  wants_slack_ = false;
+  plane_tried_ = 0.0;
+}
+
+void SurfacePairSearch::begin_search() {
+  // A front that costs more than to start anew has become too fine for what is near now.
+  if (is_new_) cost_of_new_ = looked_at_;
+  const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
+  const bool is_crowded = 4 * (queue_.size() + kept_.size()) > 3 * capacity_;
+  is_new_ = has_jumped_ || is_worn || is_crowded;
+  if (is_new_ && !has_jumped_) start_anew();
+  wants_slack_ = !has_jumped_;
+  looked_at_ = 0;
+  next_plane_ = kFirstPlane;
   is_searching_ = true;
-  searched_X_BA_ = X_BA_;
   prepare_boxes();
-  if (has_jumped) descend();
+  if (has_jumped_) descend();
   update_prune_bound();
   sort_front();
 }
@@ -296,12 +304,41 @@ void SurfacePairSearch::prove_by_plane() {
   plane_tried_ = closest_.distance;
   const Eigen::Vector3d n_B = (closest_.on_p - closest_.on_q) / closest_.distance;
   const Eigen::Vector3d n_A = X_BA_.linear().transpose() * n_B;
-  const double below = b_.support(n_B);
-  const double above = n_B.dot(X_BA_.translation()) - a_.support(-n_A);
-  const double bound = above - below - exact_rounding_;
+  const HullCoreset &hull_a = a_.hull(), &hull_b = b_.hull();
+  const double middle = n_B.dot(X_BA_.translation());
+  if (!hull_a.empty() && !hull_b.empty()) {
+    const double below = n_B.dot(hull_b.point(hull_b.farthest(n_B)));
+    const double above = n_A.dot(hull_a.point(hull_a.farthest(-n_A)));
+    const double gap = middle + above - below;
+    keep_plane(gap - (hull_a.error() + hull_b.error()) * (1.0 + 1e-9) - exact_rounding_);
+    // The coresets' hulls are no larger than the surfaces.
+    if (is_wanted(gap + exact_rounding_) || !is_wanted(plane_bound())) return;
+  }
+  keep_plane(middle - a_.support(-n_A) - b_.support(n_B) - exact_rounding_);
+}
+
+void SurfacePairSearch::keep_plane(double bound) {
   if (bound < plane_bound()) return;
   plane_bound_ = bound;
   plane_path_ = path();
+}
+
+// Tries the plane between the closest parts found last, then that between the hulls, then that
+// between the parts nearest to the hulls' closest points. @returns whether that is the answer
+bool SurfacePairSearch::prove_by_hulls() {
+  if (!has_jumped_ || a_.hull().empty() || b_.hull().empty()) prove_by_plane();
+  if (!is_wanted(plane_bound())) return true;
+  if (a_.hull().empty() || b_.hull().empty()) return false;
+  const double precision = std::max(kSearchedShare * tolerance_at(closest_.distance), 1e-9);
+  const HullDistance hulls = hull_distance(a_.hull(), b_.hull(), X_BA_, precision, &hull_support_);
+  keep_plane(hulls.lower_bound - exact_rounding_);
+  if (!is_wanted(plane_bound())) return true;
+  if (!(hulls.lower_bound > 0.0)) return false;
+  const SurfaceBvh::Slot on_a = a_.nearest_part(X_BA_.inverse() * hulls.on_a, a_.hull().error());
+  const SurfaceBvh::Slot on_b = b_.nearest_part(hulls.on_b, b_.hull().error());
+  measure({0.0, on_a, on_b});
+  if (is_wanted(plane_bound())) prove_by_plane();
+  return !is_wanted(plane_bound());
 }
 
 bool SurfacePairSearch::run(const Goal& goal, int* steps) {
@@ -309,6 +346,12 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   update_prune_bound();
   if (!is_searching_) {
     if (closest_.distance <= 0.0 || !is_wanted(lower_bound())) return true;
+    if (!is_at_reference_) {
+      if (*steps <= 0) return false;
+      --*steps;
+      set_reference();
+      if (prove_by_hulls() || closest_.distance <= 0.0) return true;
+    }
     begin_search();
   }
   while (!queue_.empty() && closest_.distance > 0.0) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "internal/geometry/convex_part.h"
+#include "internal/geometry/hull_distance.h"
 #include "internal/geometry/surface_bvh.h"
 
 namespace ist {
@@ -23,10 +24,11 @@ namespace ist {
 /// measured. A search from a kept front goes on to a part of the tolerance, so that the next poses
 /// have slack.
 ///
-/// Where the links lie on both sides of a plane between the closest points, as convex bodies do,
-/// their supports prove the distance at once. The closest parts found last give the first upper
-/// bound at a new pose. Where the memory is full, pairs are searched depth first, which needs none
-/// but a bounded stack: nothing is allocated after construction.
+/// Before pairs are searched, the convex hulls are asked: their distance is a lower bound, and
+/// where the parts nearest to its ends are as near, it is the answer (convex bodies, and most
+/// others that are apart). The closest parts found last give the first upper bound at a new pose.
+/// Where the memory is full, pairs are searched depth first, which needs none but a bounded stack:
+/// nothing is allocated after construction.
 class SurfacePairSearch {
  public:
   /// @param a, b      outlive this
@@ -48,7 +50,7 @@ class SurfacePairSearch {
   /// The pose of the next runs.
   /// @param X_BA          A's frame -> B's, rigid
   /// @param displacement  [m] no point of A is farther from where it was in B's frame at
-  ///                      searched_pose(); inf: not known, everything is searched anew
+  ///                      reference_pose(); inf: not known, everything is searched anew
   void move_to(const Eigen::Isometry3d& X_BA, double displacement);
 
   /// Searches until the goal is reached.
@@ -56,10 +58,10 @@ class SurfacePairSearch {
   /// @returns false when the steps were used up first; the next call continues
   bool run(const Goal& goal, int* steps);
 
-  /// A's frame -> B's, where the last search was: the pose at the last run() that looked at pairs.
-  const Eigen::Isometry3d& searched_pose() const { return searched_X_BA_; }
-  /// Whether pairs were looked at since move_to(): searched_pose() is this pose.
-  bool is_searched() const { return is_searching_; }
+  /// A's frame -> B's at the last run() that what was known did not answer.
+  const Eigen::Isometry3d& reference_pose() const { return reference_X_BA_; }
+  /// Whether reference_pose() is this pose.
+  bool is_at_reference() const { return is_at_reference_; }
 
   /// Visits parts that are near one another.
   class Visitor {
@@ -104,6 +106,7 @@ class SurfacePairSearch {
   SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
                     std::vector<Entry> queue, std::vector<Entry> kept);
   void start_anew();
+  void set_reference();
   void begin_search();
   void prepare_boxes();
   void sort_front();
@@ -121,6 +124,8 @@ class SurfacePairSearch {
   double measure(const Pair& pair);
   void descend();
   void prove_by_plane();
+  bool prove_by_hulls();
+  void keep_plane(double bound);
   void visit(const Entry& entry, int* steps);
   void visit_depth_first(const Entry& entry, int* steps);
   void push(const Entry& entry);
@@ -131,11 +136,14 @@ class SurfacePairSearch {
   // The front: pairs that are wanted, a heap, and all others.
   std::vector<Entry> queue_, kept_;
   double least_kept_ = std::numeric_limits<double>::infinity();  // [m] key of kept_
-  double path_ = 0.0;                                            // [m] at the last search
+  double path_ = 0.0;                                            // [m] at the reference
   double moved_ = 0.0;                                           // [m] since then
-  bool is_searching_ = false;                                    // at this pose
-  bool has_boxes_ = false;  // prepare_boxes() was called at this pose
-  Eigen::Isometry3d searched_X_BA_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d reference_X_BA_ = Eigen::Isometry3d::Identity();
+  bool is_at_reference_ = false;
+  bool has_jumped_ = false;    // to the reference: the front was dropped
+  bool is_searching_ = false;  // at this pose
+  bool has_boxes_ = false;     // prepare_boxes() was called at this pose
+  HullSupport hull_support_;
   Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity();
   Eigen::Matrix3f R_BA_, R_AB_;
   Eigen::Vector3f p_BA_, p_AB_;

@@ -1,0 +1,149 @@
+#include "internal/geometry/hull_coreset.h"
+
+#include <algorithm>
+#include <limits>
+#include <tuple>
+
+#include "internal/geometry/float_rounding.h"
+#include "internal/geometry/hull_distance.h"
+
+namespace ist {
+namespace {
+
+// More points cost more for each support than they gain.
+constexpr std::size_t kMaxPoints = 512;
+// Errors that are aimed at one after the other, as shares of the size, while there are points left.
+constexpr double kErrors[] = {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-9};
+// Float's error in a sum of three products: the point that is chosen may be this share of its
+// coordinates less far than the farthest.
+constexpr double kFloatRounding = 1e-6;
+constexpr int kMaxSteps = 40;
+
+std::vector<Eigen::Vector3d> corners_of(const std::vector<ConvexPart>& parts) {
+  std::vector<Eigen::Vector3d> corners;
+  corners.reserve(3 * parts.size());
+  for (const ConvexPart& part : parts) {
+    if (part.kind != ConvexPart::Kind::kTriangle) return {};
+    for (const Eigen::Vector3d& corner : {part.a, part.b, part.c}) corners.push_back(corner);
+  }
+  const auto place = [](const Eigen::Vector3d& p) { return std::make_tuple(p.x(), p.y(), p.z()); };
+  std::sort(corners.begin(), corners.end(),
+            [&](const auto& p, const auto& q) { return place(p) < place(q); });
+  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+  return corners;
+}
+
+}  // namespace
+
+// Adds the corner that is farthest outside, until all are near enough.
+class HullCoreset::Builder {
+ public:
+  Builder(std::vector<Eigen::Vector3d> corners, HullCoreset* set)
+      : corners_(std::move(corners)),
+        distances_(corners_.size(), std::numeric_limits<double>::infinity()),
+        set_(*set) {
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : corners_) {
+      box.extend(p);
+      extent_ = std::max(extent_, p.norm());
+    }
+    size_ = box.sizes().norm();
+  }
+
+  void run() {
+    set_.add(corners_.front());
+    for (int x = -1; x <= 1; ++x) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int z = -1; z <= 1; ++z) add_farthest({1.0 * x, 1.0 * y, 1.0 * z});
+      }
+    }
+    for (const double share : kErrors) improve_to(share * size_);
+    double error = 0.0;
+    for (const double distance : distances_) error = std::max(error, distance);
+    // A point of the hull is at most the largest of its corners' distances from the coreset's hull.
+    set_.error_ = error + (kFloatRounding + kLostInLength) * extent_;
+  }
+
+ private:
+  void improve_to(double error) {
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      while (distances_[i] > error) {
+        const Eigen::Vector3d outward = measure(i);
+        if (!(distances_[i] > error) || set_.size() >= kMaxPoints) break;
+        if (!add_farthest(outward)) break;
+      }
+    }
+  }
+
+  // Where the coreset is full, its points have to do. @returns whether the point was a new one
+  bool add_farthest(const Eigen::Vector3d& n) {
+    const auto farthest =
+        std::max_element(corners_.begin(), corners_.end(),
+                         [&](const auto& p, const auto& q) { return n.dot(p) < n.dot(q); });
+    const auto& points = set_.points_;
+    if (std::find(points.begin(), points.end(), *farthest) != points.end()) return false;
+    set_.add(*farthest);
+    return true;
+  }
+
+  // The distance of a corner to the coreset's hull, or more. @returns the direction out of the hull
+  Eigen::Vector3d measure(std::size_t i) {
+    const Eigen::Vector3d& p = corners_[i];
+    DifferenceSimplex simplex;
+    const auto add_corner = [&](std::uint32_t b) {
+      simplex.corner[simplex.size++] = {p - set_.point(b), p, set_.point(b), 0, b};
+      simplex.reduce();
+    };
+    add_corner(last_);
+    Eigen::Vector3d v = simplex.nearest();
+    for (int step = 0; step < kMaxSteps && simplex.size < 4 && v.norm() > 0.0; ++step) {
+      const std::uint32_t next = set_.farthest(v);
+      if (v.dot(p - set_.point(next)) >= (1.0 - 1e-6) * v.squaredNorm()) break;
+      const DifferenceSimplex smaller = simplex;
+      add_corner(next);
+      if (simplex.size > 0 && simplex.nearest().squaredNorm() < v.squaredNorm()) {
+        v = simplex.nearest();
+        continue;
+      }
+      simplex = smaller;
+      break;
+    }
+    last_ = simplex.corner[0].b;
+    distances_[i] = std::min(distances_[i], v.norm() + kLostInLength * extent_);
+    return v;
+  }
+
+  const std::vector<Eigen::Vector3d> corners_;
+  std::vector<double> distances_;  // [m] of each corner to the coreset's hull, at most
+  HullCoreset& set_;
+  double extent_ = 0.0, size_ = 0.0;  // [m] from the origin, and across
+  std::uint32_t last_ = 0;
+};
+
+HullCoreset::HullCoreset(const std::vector<ConvexPart>& parts) {
+  std::vector<Eigen::Vector3d> corners = corners_of(parts);
+  if (corners.empty()) return;
+  Builder(std::move(corners), this).run();
+}
+
+void HullCoreset::add(const Eigen::Vector3d& point) {
+  points_.push_back(point);
+  const std::size_t count = coreset_lanes(points_.size());
+  lanes_.resize(3 * count);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3d& p = points_[i < points_.size() ? i : 0];
+      lanes_[axis * count + i] = static_cast<float>(p[static_cast<Eigen::Index>(axis)]);
+    }
+  }
+}
+
+std::uint32_t HullCoreset::farthest(const Eigen::Vector3d& n) const {
+  const float direction[3] = {static_cast<float>(n.x()), static_cast<float>(n.y()),
+                              static_cast<float>(n.z())};
+  const std::size_t count = lanes_.size() / 3;
+  const std::uint32_t index = farthest_of_lanes(lanes_.data(), count, direction);
+  return index < points_.size() ? index : 0;
+}
+
+}  // namespace ist
