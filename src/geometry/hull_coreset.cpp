@@ -10,8 +10,9 @@
 namespace ist {
 namespace {
 
-// More points cost more for each support than they gain.
-constexpr std::size_t kMaxPoints = 512;
+// Points of a coreset, at most: of a large mesh fewer, since each costs a look at all corners
+// (about this many in all).
+constexpr std::size_t kMaxPoints = 2048, kMinPoints = 128, kMaxLooks = 40000000;
 // Errors that are aimed at one after the other, as shares of the size, while there are points left.
 constexpr double kErrors[] = {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-9};
 // Float's error in a sum of three products: the point that is chosen may be this share of its
@@ -41,7 +42,8 @@ class HullCoreset::Builder {
   Builder(std::vector<Eigen::Vector3d> corners, HullCoreset* set)
       : corners_(std::move(corners)),
         distances_(corners_.size(), std::numeric_limits<double>::infinity()),
-        set_(*set) {
+        set_(*set),
+        max_points_(std::clamp(kMaxLooks / corners_.size(), kMinPoints, kMaxPoints)) {
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : corners_) {
       box.extend(p);
@@ -69,7 +71,7 @@ class HullCoreset::Builder {
     for (std::size_t i = 0; i < corners_.size(); ++i) {
       while (distances_[i] > error) {
         const Eigen::Vector3d outward = measure(i);
-        if (!(distances_[i] > error) || set_.size() >= kMaxPoints) break;
+        if (!(distances_[i] > error) || set_.size() >= max_points_) break;
         if (!add_farthest(outward)) break;
       }
     }
@@ -88,34 +90,15 @@ class HullCoreset::Builder {
 
   // The distance of a corner to the coreset's hull, or more. @returns the direction out of the hull
   Eigen::Vector3d measure(std::size_t i) {
-    const Eigen::Vector3d& p = corners_[i];
-    DifferenceSimplex simplex;
-    const auto add_corner = [&](std::uint32_t b) {
-      simplex.corner[simplex.size++] = {p - set_.point(b), p, set_.point(b), 0, b};
-      simplex.reduce();
-    };
-    add_corner(last_);
-    Eigen::Vector3d v = simplex.nearest();
-    for (int step = 0; step < kMaxSteps && simplex.size < 4 && v.norm() > 0.0; ++step) {
-      const std::uint32_t next = set_.farthest(v);
-      if (v.dot(p - set_.point(next)) >= (1.0 - 1e-6) * v.squaredNorm()) break;
-      const DifferenceSimplex smaller = simplex;
-      add_corner(next);
-      if (simplex.size > 0 && simplex.nearest().squaredNorm() < v.squaredNorm()) {
-        v = simplex.nearest();
-        continue;
-      }
-      simplex = smaller;
-      break;
-    }
-    last_ = simplex.corner[0].b;
-    distances_[i] = std::min(distances_[i], v.norm() + kLostInLength * extent_);
-    return v;
+    const Eigen::Vector3d off = set_.offset(corners_[i], &last_);
+    distances_[i] = std::min(distances_[i], off.norm() + kLostInLength * extent_);
+    return off;
   }
 
   const std::vector<Eigen::Vector3d> corners_;
   std::vector<double> distances_;  // [m] of each corner to the coreset's hull, at most
   HullCoreset& set_;
+  const std::size_t max_points_;
   double extent_ = 0.0, size_ = 0.0;  // [m] from the origin, and across
   std::uint32_t last_ = 0;
 };
@@ -124,6 +107,36 @@ HullCoreset::HullCoreset(const std::vector<ConvexPart>& parts) {
   std::vector<Eigen::Vector3d> corners = corners_of(parts);
   if (corners.empty()) return;
   Builder(std::move(corners), this).run();
+}
+
+// From the point of the coreset's hull that was found nearest to p, to p: GJK from a point of the
+// coreset on, which is replaced by one of the last ones. @returns [m]
+Eigen::Vector3d HullCoreset::offset(const Eigen::Vector3d& p, std::uint32_t* point_index) const {
+  DifferenceSimplex simplex;
+  const auto add_corner = [&](std::uint32_t b) {
+    simplex.corner[simplex.size++] = {p - points_[b], p, points_[b], 0, b};
+    simplex.reduce();
+  };
+  add_corner(*point_index);
+  Eigen::Vector3d v = simplex.nearest();
+  for (int step = 0; step < kMaxSteps && simplex.size < 4 && v.norm() > 0.0; ++step) {
+    const std::uint32_t next = farthest(v);
+    if (v.dot(p - points_[next]) >= (1.0 - 1e-6) * v.squaredNorm()) break;
+    const DifferenceSimplex smaller = simplex;
+    add_corner(next);
+    if (simplex.size == 0 || !(simplex.nearest().squaredNorm() < v.squaredNorm())) {
+      simplex = smaller;
+      break;
+    }
+    v = simplex.nearest();
+  }
+  *point_index = simplex.corner[0].b;
+  return v;
+}
+
+double HullCoreset::distance_at_most(const Eigen::Vector3d& p) const {
+  std::uint32_t start = 0;
+  return offset(p, &start).norm() * (1.0 + 1e-9) + kLostInLength * (p.norm() + points_[0].norm());
 }
 
 void HullCoreset::add(const Eigen::Vector3d& point) {

@@ -97,12 +97,23 @@ void LinkPairQuery::decide_contact(int* steps) {
   are_in_contact_ = surfaces_.distance() <= 0.0;
   are_apart_ = are_apart_ && !are_in_contact_;
   if (are_in_contact_ || are_apart_ || !(surfaces_.lower_bound() > 0.0)) return;
+  if (are_hulls_apart()) return;
   are_in_contact_ = is_inside_other();
   if (are_in_contact_) return;
   const Answer into_a = openings_a_.decide(X_BA_, steps);
   const Answer into_b = openings_b_.decide(X_BA_.inverse(), steps);
   are_in_contact_ = into_a == Answer::kInside || into_b == Answer::kInside;
   are_apart_ = into_a == Answer::kApart && into_b == Answer::kApart;
+}
+
+// Whether the insides of both lie on the two sides of a slab.
+bool LinkPairQuery::are_hulls_apart() {
+  const double clearance =
+      surfaces_.separation() - surface_a_.opening_margin - surface_b_.opening_margin;
+  if (!(clearance > 0.0)) return false;
+  openings_a_.note_clearance(clearance);
+  openings_b_.note_clearance(clearance);
+  return are_apart_ = true;
 }
 
 // Tells whether a component of one is inside the other, where the surfaces are apart.

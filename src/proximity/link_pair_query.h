@@ -43,6 +43,7 @@ class LinkPairQuery {
   enum class Stage { kSurfaces, kInside, kDone };
 
   void decide_contact(int* steps);
+  bool are_hulls_apart();
   bool is_inside_other() const;
   void measure_depth(std::vector<LinkPairSearch::Entry>* queue);
   void keep_deepest(const LinkPairSearch& search, bool of_a);

@@ -58,6 +58,25 @@ OrientedBox posed_box(const SurfaceBvh& bvh, SurfaceBvh::Slot slot, const Eigen:
 
 }  // namespace
 
+// [m] The bound that is left of a key.
+inline double SurfacePairSearch::bound_at(double key) const {
+  return key < 0.0 ? 0.0 : std::max(key - path() * (1.0 + 1e-14), 0.0);
+}
+
+inline bool SurfacePairSearch::is_wanted(double bound) const {
+  return bound < prune_bound_ || bound <= 0.0;
+}
+
+inline bool SurfacePairSearch::is_leaf(const Pair& pair) const {
+  return a_.child(pair.a) < 0 && b_.child(pair.b) < 0;
+}
+
+// A number below 0 for boxes that overlap, which orders small ones first: they lead to an
+// intersection soonest.
+inline double SurfacePairSearch::overlap_order(const Pair& pair) const {
+  return -1.0 / (a_.radius(pair.a) + b_.radius(pair.b) + 1e-30);
+}
+
 SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity)
     : SurfacePairSearch(a, b, capacity, {}, {}) {}
 
@@ -80,7 +99,7 @@ void SurfacePairSearch::start_anew() {
   least_kept_ = kInf;
   path_ = moved_ = plane_path_ = plane_bound_ = 0.0;
   if (!a_.empty() && !b_.empty()) {
-    keep({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
+    keep({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot, 0});
   }
 }
 
@@ -171,15 +190,6 @@ void SurfacePairSearch::rebase_path() {
   path_ = plane_path_ = 0.0;
 }
 
-// [m] The bound that is left of a key.
-double SurfacePairSearch::bound_at(double key) const {
-  return key < 0.0 ? 0.0 : std::max(key - path() * (1.0 + 1e-14), 0.0);
-}
-
-double SurfacePairSearch::plane_bound() const {
-  return plane_bound_ - (path() - plane_path_) * (1.0 + 1e-14);
-}
-
 double SurfacePairSearch::lower_bound() const {
   double key = least_kept_;
   if (!queue_.empty()) key = std::min(key, queue_.front().key);
@@ -201,10 +211,6 @@ void SurfacePairSearch::update_prune_bound() {
   prune_bound_ = distance < goal_.range ? near : std::min(std::max(near, goal_.range), range);
 }
 
-bool SurfacePairSearch::is_wanted(double bound) const {
-  return bound < prune_bound_ || bound <= 0.0;
-}
-
 void SurfacePairSearch::set_direction() {
   Eigen::Vector3d n = closest_.on_p - closest_.on_q;
   if (!(closest_.distance > 1e-9 && closest_.distance < kInf)) {
@@ -219,20 +225,10 @@ void SurfacePairSearch::set_direction() {
   n_A_ = R_AB_ * n_B_;
 }
 
-bool SurfacePairSearch::is_leaf(const Pair& pair) const {
-  return a_.child(pair.a) < 0 && b_.child(pair.b) < 0;
-}
-
-// A bound of boxes, or for boxes that overlap a number below 0 that orders small ones first: they
-// lead to an intersection soonest.
-double SurfacePairSearch::bound(double measured, const Pair& pair) const {
-  const double bound = measured - rounding_;
-  if (bound > 0.0) return bound;
-  return -1.0 / (a_.radius(pair.a) + b_.radius(pair.b) + 1e-30);
-}
-
-// The children of the larger box beside the smaller one.
-int SurfacePairSearch::expand(const Pair& pair, Pair children[SurfaceBvh::kWidth]) {
+// The children of the larger box beside the smaller one: those that are wanted.
+// @param children  by bit, 0 for all
+SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::uint8_t children,
+                                                       double prune_bound) {
   const std::int32_t child_a = a_.child(pair.a), child_b = b_.child(pair.b);
   const bool of_a = child_b < 0 || (child_a >= 0 && a_.radius(pair.a) >= b_.radius(pair.b));
   alignas(32) float bounds[SurfaceBvh::kWidth];
@@ -243,13 +239,25 @@ int SurfacePairSearch::expand(const Pair& pair, Pair children[SurfaceBvh::kWidth
     oriented_box_bounds(node, posed_box(a_, pair.a, R_BA_, p_BA_, -n_B_), bounds);
   }
   const auto first = static_cast<SurfaceBvh::Slot>((of_a ? child_a : child_b) * SurfaceBvh::kWidth);
+  Expansion result;
+  result.count = 0;
+  result.unwanted = 0;
+  result.least_unwanted = kInf;
   for (int k = 0; k < node.count; ++k) {
-    Pair& child = children[k];
+    const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(k));
+    if (children != 0 && (children & bit) == 0) continue;
+    const double bound = std::max(static_cast<double>(bounds[k]) - rounding_, pair.bound);
+    if (bound > 0.0 && bound >= prune_bound) {
+      result.unwanted = static_cast<std::uint8_t>(result.unwanted | bit);
+      result.least_unwanted = std::min(result.least_unwanted, bound);
+      continue;
+    }
+    Pair& child = result.wanted[result.count++];
     child = pair;
     (of_a ? child.a : child.b) = first + static_cast<SurfaceBvh::Slot>(k);
-    child.bound = std::max(bound(bounds[k], child), pair.bound);
+    child.bound = bound > 0.0 ? bound : overlap_order(child);
   }
-  return node.count;
+  return result;
 }
 
 // Measures two parts. @returns [m] a lower bound of their distance
@@ -276,19 +284,12 @@ void SurfacePairSearch::descend() {
   prepare_boxes();
   Pair pair{-1.0, SurfaceBvh::kRoot, SurfaceBvh::kRoot};
   while (!is_leaf(pair)) {
-    Pair children[SurfaceBvh::kWidth];
-    const int count = expand(pair, children);
-    pair = *std::min_element(children, children + count,
+    const Expansion children = expand(pair, 0, kInf);
+    pair = *std::min_element(children.wanted, children.wanted + children.count,
                              [](const Pair& p, const Pair& q) { return p.bound < q.bound; });
     pair.bound = -1e30;
   }
   measure(pair);
-}
-
-void SurfacePairSearch::push(const Entry& entry) {
-  if (!is_wanted(bound_at(entry.key))) return keep(entry);
-  queue_.push_back(entry);
-  std::push_heap(queue_.begin(), queue_.end());
 }
 
 void SurfacePairSearch::keep(const Entry& entry) {
@@ -362,7 +363,7 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
     if (!is_wanted(plane_bound())) return true;
     std::pop_heap(queue_.begin(), queue_.end());
     queue_.pop_back();
-    if (queue_.size() + kept_.size() + SurfaceBvh::kWidth > capacity_) {
+    if (queue_.size() + kept_.size() + SurfaceBvh::kWidth + 1 > capacity_) {
       visit_depth_first(entry, steps);
     } else {
       visit(entry, steps);
@@ -378,14 +379,17 @@ void SurfacePairSearch::visit(const Entry& entry, int* steps) {
   const Pair pair{known > 0.0 ? known : -1e30, entry.a, entry.b};
   if (is_leaf(pair)) {
     const double bound = measure(pair);
-    keep({bound > 0.0 ? bound + path() : kUnproven, pair.a, pair.b});
+    keep({bound > 0.0 ? bound + path() : kUnproven, pair.a, pair.b, 0});
     return;
   }
-  Pair children[SurfaceBvh::kWidth];
-  const int count = expand(pair, children);
-  for (int k = 0; k < count; ++k) {
-    const Pair& child = children[k];
-    push({child.bound > 0.0 ? child.bound + path() : child.bound, child.a, child.b});
+  const Expansion children = expand(pair, entry.children, prune_bound_);
+  if (children.unwanted != 0) {
+    keep({children.least_unwanted + path(), pair.a, pair.b, children.unwanted});
+  }
+  for (int k = 0; k < children.count; ++k) {
+    const Pair& child = children.wanted[k];
+    queue_.push_back({child.bound > 0.0 ? child.bound + path() : child.bound, child.a, child.b, 0});
+    std::push_heap(queue_.begin(), queue_.end());
   }
 }
 
@@ -397,11 +401,8 @@ bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) 
     const Pair pair = stack.pop();
     if (--*steps < 0) return false;
     if (!is_leaf(pair)) {
-      Pair children[SurfaceBvh::kWidth];
-      const int count = expand(pair, children);
-      for (int k = 0; k < count; ++k) {
-        if (children[k].bound <= margin) stack.push(children[k]);
-      }
+      const Expansion children = expand(pair, 0, std::nextafter(margin, kInf));
+      for (int k = 0; k < children.count; ++k) stack.push(children.wanted[k]);
       continue;
     }
     const ConvexPart part_a = posed(part_of(a_, pair.a), X_BA_);
@@ -419,6 +420,7 @@ void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
   const double known = bound_at(entry.key);
   stack.push({known > 0.0 ? known : -1e30, entry.a, entry.b});
   double least = kInf;
+  std::uint8_t mask = entry.children;  // of the first pair
   while (!stack.empty()) {
     const Pair pair = stack.pop();
     if (!is_wanted(pair.bound)) {
@@ -436,13 +438,16 @@ void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
       least = std::min(least, measure(pair));
       continue;
     }
-    Pair children[SurfaceBvh::kWidth];
-    const int count = expand(pair, children);
+    const Expansion children = expand(pair, mask, prune_bound_);
+    mask = 0;
+    least = std::min(least, children.least_unwanted);
     const std::size_t first = stack.size();
-    for (int k = 0; k < count; ++k) stack.push_least_on_top<&Pair::bound>(first, children[k]);
+    for (int k = 0; k < children.count; ++k) {
+      stack.push_least_on_top<&Pair::bound>(first, children.wanted[k]);
+    }
   }
   // It was searched at this pose, and is not wanted again before the next one.
-  keep({least > 0.0 ? least + path() : kUnproven, entry.a, entry.b});
+  keep({least > 0.0 ? least + path() : kUnproven, entry.a, entry.b, entry.children});
 }
 
 }  // namespace ist

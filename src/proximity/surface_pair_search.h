@@ -81,6 +81,9 @@ class SurfacePairSearch {
   double distance() const { return closest_.distance; }
   /// [m] Proven for this pose, at any time; 0 or more.
   double lower_bound() const;
+  /// [m] Proven for this pose: a slab of this width lies between the convex hulls of A and B; 0 or
+  /// less: not known.
+  double separation() const { return plane_bound(); }
   /// The closest points found: on_p is on A and on_q on B, in B's frame.
   const ConvexDistance& closest() const { return closest_; }
   /// The parts that they are on, in B's frame; there must be any.
@@ -95,12 +98,20 @@ class SurfacePairSearch {
     /// boxes the nearer to 0
     double key;
     SurfaceBvh::Slot a, b;
+    std::uint8_t children;  ///< by bit, those that it is about; 0: the pair itself
     bool operator<(const Entry& other) const { return key > other.key; }  ///< least on top
   };
   /// A pair and its bound at this pose.
   struct Pair {
     double bound;
     SurfaceBvh::Slot a, b;
+  };
+  /// The children of a pair.
+  struct Expansion {
+    Pair wanted[SurfaceBvh::kWidth];
+    int count;              ///< of wanted ones
+    std::uint8_t unwanted;  ///< by bit
+    double least_unwanted;  ///< [m] least bound of those; inf: none
   };
 
   SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
@@ -113,14 +124,14 @@ class SurfacePairSearch {
   void rebase_path();
   double path() const { return path_ + moved_; }
   double bound_at(double key) const;
-  double plane_bound() const;
+  double plane_bound() const { return plane_bound_ - (path() - plane_path_) * (1.0 + 1e-14); }
   bool is_wanted(double bound) const;
   void update_prune_bound();
   double tolerance_at(double distance) const;
   void set_direction();
   bool is_leaf(const Pair& pair) const;
-  int expand(const Pair& pair, Pair children[SurfaceBvh::kWidth]);
-  double bound(double measured, const Pair& pair) const;
+  Expansion expand(const Pair& pair, std::uint8_t children, double prune_bound);
+  double overlap_order(const Pair& pair) const;
   double measure(const Pair& pair);
   void descend();
   void prove_by_plane();
@@ -128,7 +139,6 @@ class SurfacePairSearch {
   void keep_plane(double bound);
   void visit(const Entry& entry, int* steps);
   void visit_depth_first(const Entry& entry, int* steps);
-  void push(const Entry& entry);
   void keep(const Entry& entry);
 
   const SurfaceBvh &a_, &b_;

@@ -27,9 +27,12 @@ class HullCoreset {
   /// there is none.
   std::uint32_t farthest(const Eigen::Vector3d& n) const;
   const Eigen::Vector3d& point(std::uint32_t index) const { return points_[index]; }  ///< [m]
+  /// [m] The surface's hull is no farther from a point. Not to be called where there is no point.
+  double distance_at_most(const Eigen::Vector3d& p) const;
 
  private:
   class Builder;
+  Eigen::Vector3d offset(const Eigen::Vector3d& p, std::uint32_t* point_index) const;
   void add(const Eigen::Vector3d& point);
 
   std::vector<Eigen::Vector3d> points_;
