@@ -159,4 +159,16 @@ std::uint32_t HullCoreset::farthest(const Eigen::Vector3d& n) const {
   return index < points_.size() ? index : 0;
 }
 
+std::uint32_t HullCoreset::farthest_in_double(const Eigen::Vector3d& n) const {
+  std::size_t best = 0;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const double along = n.dot(points_[i]);
+    if (!(along > largest)) continue;
+    largest = along;
+    best = i;
+  }
+  return static_cast<std::uint32_t>(best);
+}
+
 }  // namespace ist

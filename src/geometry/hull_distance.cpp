@@ -136,25 +136,21 @@ class Gjk {
   HullDistance run(double precision) {
     HullDistance result;
     Eigen::Vector3d v = simplex_.nearest();
-    double distance = v.norm();
-    for (int step = 0; step < kMaxSteps && simplex_.size < 4 && distance > 1e-9; ++step) {
+    for (int step = 0; step < kMaxSteps && simplex_.size < 4 && v.norm() > 1e-9; ++step) {
+      const double distance = v.norm();
       const Eigen::Vector3d n = v / distance;
-      const Corner next = corner(a_.farthest(-(R_BA_.transpose() * n)), b_.farthest(n));
+      const Corner next = farthest(n);
       const double bound = n.dot(next.w);
       if (bound > result.lower_bound || step == 0) {
         result.lower_bound = bound;
         result.direction = n;
       }
-      if (result.lower_bound >= distance - precision || is_known(next)) break;
-      DifferenceSimplex larger = simplex_;
-      larger.corner[larger.size++] = next;
-      larger.reduce();
-      if (larger.size == 0) break;  // no number
-      const Eigen::Vector3d nearer = larger.nearest();
-      if (!(nearer.squaredNorm() < v.squaredNorm())) break;  // by rounding alone
-      simplex_ = larger;
-      v = nearer;
-      distance = v.norm();
+      if (bound >= distance - precision || !move_on(next)) {
+        // Float has chosen the points so far.
+        if (is_exact_ || precision > a_.error() + b_.error()) break;
+        is_exact_ = true;
+      }
+      v = simplex_.nearest();
     }
     result.on_a = simplex_.on_a();
     result.on_b = simplex_.on_b();
@@ -185,6 +181,25 @@ class Gjk {
     return c;
   }
 
+  Corner farthest(const Eigen::Vector3d& n) const {
+    const Eigen::Vector3d n_A = -(R_BA_.transpose() * n);
+    return is_exact_ ? corner(a_.farthest_in_double(n_A), b_.farthest_in_double(n))
+                     : corner(a_.farthest(n_A), b_.farthest(n));
+  }
+
+  // @returns whether the corner leads nearer to the origin
+  bool move_on(const Corner& next) {
+    if (is_known(next)) return false;
+    DifferenceSimplex larger = simplex_;
+    larger.corner[larger.size++] = next;
+    larger.reduce();
+    if (larger.size == 0 || !(larger.nearest().squaredNorm() < simplex_.nearest().squaredNorm())) {
+      return false;
+    }
+    simplex_ = larger;
+    return true;
+  }
+
   bool is_known(const Corner& c) const {
     for (std::size_t i = 0; i < simplex_.size; ++i) {
       if (simplex_.corner[i].a == c.a && simplex_.corner[i].b == c.b) return true;
@@ -196,6 +211,7 @@ class Gjk {
   const Eigen::Matrix3d R_BA_;
   const Eigen::Vector3d p_BA_;
   DifferenceSimplex simplex_;
+  bool is_exact_ = false;  // the farthest points are chosen in double
 };
 
 }  // namespace

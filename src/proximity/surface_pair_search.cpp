@@ -330,13 +330,13 @@ bool SurfacePairSearch::prove_by_hulls() {
   if (!has_jumped_ || a_.hull().empty() || b_.hull().empty()) prove_by_plane();
   if (!is_wanted(plane_bound())) return true;
   if (a_.hull().empty() || b_.hull().empty()) return false;
-  const double precision = std::max(kSearchedShare * tolerance_at(closest_.distance), 1e-9);
+  const double precision = kSearchedShare * tolerance_at(std::min(closest_.distance, goal_.range));
   const HullDistance hulls = hull_distance(a_.hull(), b_.hull(), X_BA_, precision, &hull_support_);
   keep_plane(hulls.lower_bound - exact_rounding_);
   if (!is_wanted(plane_bound())) return true;
   if (!(hulls.lower_bound > 0.0)) return false;
-  const SurfaceBvh::Slot on_a = a_.nearest_part(X_BA_.inverse() * hulls.on_a, a_.hull().error());
-  const SurfaceBvh::Slot on_b = b_.nearest_part(hulls.on_b, b_.hull().error());
+  const SurfaceBvh::Slot on_a = a_.nearest_part(X_BA_.inverse() * hulls.on_a, precision);
+  const SurfaceBvh::Slot on_b = b_.nearest_part(hulls.on_b, precision);
   measure({0.0, on_a, on_b});
   if (is_wanted(plane_bound())) prove_by_plane();
   return !is_wanted(plane_bound());

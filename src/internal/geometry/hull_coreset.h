@@ -26,6 +26,8 @@ class HullCoreset {
   /// The index of the point that is farthest along a direction, to rounding. Not to be called where
   /// there is none.
   std::uint32_t farthest(const Eigen::Vector3d& n) const;
+  /// The same in double: slower, for the last digits.
+  std::uint32_t farthest_in_double(const Eigen::Vector3d& n) const;
   const Eigen::Vector3d& point(std::uint32_t index) const { return points_[index]; }  ///< [m]
   /// [m] The surface's hull is no farther from a point. Not to be called where there is no point.
   double distance_at_most(const Eigen::Vector3d& p) const;
