@@ -30,9 +30,9 @@ constexpr int kFirstPlane = 12;
 // A search from a kept front goes on to this part of the tolerance, and to this much more than the
 // range [m].
 constexpr double kSearchedShare = 0.25, kRangeSlack = 0.01;
-// After so many pairs, or twice as many as a search without slack looks at, a search is content
-// with the tolerance: where thousands are about equally near, slack is found in bursts.
-constexpr int kSlackPairs = 1400;
+// After so many pairs a search is content with the tolerance. Where that comes often, there is no
+// slack, and every pose is searched: half of this doubled the time of motions with many ties.
+constexpr int kSlackPairs = 8192;
 
 constexpr std::size_t kStackCapacity =
     stack_capacity(2 * SurfaceBvh::kMaxLevels, SurfaceBvh::kWidth);
@@ -152,8 +152,6 @@ void SurfacePairSearch::set_reference() {
 void SurfacePairSearch::begin_search() {
   // A front that costs more than to start anew has become too fine for what is near now.
   if (is_new_) cost_of_new_ = looked_at_;
-  if (was_jump_) cost_of_jump_ = looked_at_;
-  was_jump_ = has_jumped_;
   const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
   const bool is_crowded = 4 * (queue_.size() + kept_.size()) > 3 * capacity_;
   is_new_ = has_jumped_ || is_worn || is_crowded;
@@ -362,7 +360,7 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   }
   while (!queue_.empty() && closest_.distance > 0.0) {
     const Entry entry = queue_.front();
-    if (wants_slack_ && looked_at_ >= std::max(kSlackPairs, 2 * cost_of_jump_)) {
+    if (wants_slack_ && looked_at_ >= kSlackPairs) {
       wants_slack_ = false;
       update_prune_bound();
     }

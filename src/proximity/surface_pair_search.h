@@ -165,8 +165,6 @@ class SurfacePairSearch {
   int looked_at_ = 0;         // pairs, in the last search
   bool is_new_ = true;        // the front was started in the last search
   int cost_of_new_ = 0;       // pairs that were looked at when the front was started
-  bool was_jump_ = false;     // the last search was the first one after a jump
-  int cost_of_jump_ = 0;      // pairs that were looked at in the last search after a jump
   double plane_bound_ = 0.0;  // [m] of both surfaces, by the plane between the closest points
   double plane_path_ = 0.0;   // [m] where it was proven
   int next_plane_ = 0;        // when looked_at_ is this, the plane is tried
