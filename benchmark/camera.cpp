@@ -71,7 +71,7 @@ class Node {
  public:
   explicit Node(const Robot& robot)
       : robot_(robot), ingest_({}), query_(robot.model, {}), repulsion_(robot.model) {
-    for (std::size_t i = 0; i < robot.model->links.size(); ++i) kept_.emplace_back(*robot.model, i);
+    for (std::size_t i = 0; i < robot.model->links.size(); ++i) kept_.emplace_back(i);
   }
 
   void ingest(const Frame& frame, const Poses& X_FL) {

@@ -54,11 +54,11 @@ def without_robot(where, robot, q):
     return points
 
 
-def prediction(robot, where, q):
-    """(steps, costs) of the report, for the setting in use."""
-    scenes = [ist.Obstacles(where.points, sensor_pose=where.sensor_pose, max_range=3.0) for _ in range(2)]
-    steps = measure.motion(robot, q)
-    return steps, robot.cycle_cost(steps, scenes, tolerance=TOLERANCE, per_cloud=measure.PER_CLOUD)
+def prediction(robot, where, steps, rate):
+    """Costs as the report measures them for the setting in use, at the node's rate."""
+    obstacles = ist.Obstacles(where.points, sensor_pose=where.sensor_pose, max_range=3.0)
+    return robot.cycle_cost(steps, obstacles, tolerance=TOLERANCE, per_cloud=measure.PER_CLOUD,
+                            period=1.0 / rate)
 
 
 def cloud_message(testing, points, frame):
@@ -132,7 +132,8 @@ def main():
             where = scene.load(bag, robot.root_link)
             q = measure.configuration(robot, where.positions)
             where.points = without_robot(where, robot, q)
-            steps, cost = prediction(robot, where, q)
+            steps = measure.motion(robot, q)
+            cost = prediction(robot, where, steps, options.rate)
             ours = np.asarray(cost['query']) + np.asarray(cost['repulsion'])
             taken = measured(master, f'/case{number}', robot, urdf, where, steps, options.rate)
             node = taken[:, 0] + taken[:, 1]

@@ -1,11 +1,14 @@
 // What a self-filter tells of an obstacle that touches the robot, as Markdown: a bar touches the
 // simulated arm at random places, seen by a noisy, late camera whose pose is off.
 //
-// Usage: self_contact [--places N] [--seconds N] [--seed N] [--update-doc doc/self_filter.md]
+// Usage: self_contact [--places N] [--seconds N] [--seeds N] [--update-doc doc/self_filter.md]
 
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
+#include <future>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -28,29 +31,18 @@ std::string millimetres(double length) {
   return text;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+struct Config {
   ist::sim::TouchConfig touch;
   ist::sim::SelfViewConfig view;
-  std::string document;
-  for (int i = 1; i < argc; ++i) {
-    const bool has_value = i + 1 < argc;
-    if (std::strcmp(argv[i], "--places") == 0 && has_value) {
-      touch.places = std::atoi(argv[++i]);
-    } else if (std::strcmp(argv[i], "--seconds") == 0 && has_value) {
-      view.duration = std::atof(argv[++i]);
-    } else if (std::strcmp(argv[i], "--seed") == 0 && has_value) {
-      touch.seed = view.seed = static_cast<std::uint64_t>(std::atoll(argv[++i]));
-    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
-      document = argv[++i];
-    } else {
-      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
-      return 1;
-    }
-  }
-  const ist::RobotDescription robot = ist::test::demo_robot();
-  const auto model = ist::build_robot_model(robot, {});
+};
+
+// Both modes with one seed: rows of the table.
+std::string rows(const ist::RobotDescription& robot,
+                 const std::shared_ptr<const ist::RobotModel>& model, Config config,
+                 std::uint64_t seed) {
+  ist::sim::TouchConfig& touch = config.touch;
+  ist::sim::SelfViewConfig& view = config.view;
+  touch.seed = view.seed = seed;
   ist::IngestConfig filter;
   touch.filters = {filter};
   filter.self_filter_mode = ist::SelfFilterMode::kView;
@@ -63,28 +55,54 @@ int main(int argc, char** argv) {
   view.resolution = touch.resolution;
   view.view = filter.view;
   view.paddings = {filter.self_filter_padding};
-  std::string table =
-      "| mode | told while it touches | places | mean distance told | told at 5 cm and more | "
-      "alone: "
-      "false contacts | alone: points not filtered |\n|---|---|---|---|---|---|---|\n";
+  std::string table;
   for (std::size_t i = 0; i < touches.size(); ++i) {
     view.mode = touch.filters[i].self_filter_mode;
     const ist::sim::SelfViewResult alone = ist::sim::run_self_view(robot, model, view).front();
     const ist::sim::TouchResult& t = touches[i];
-    table += std::string("| ") + (i == 0 ? "`padding`" : "`view`") + " | " +
-             percent(t.told, t.answers) + " | " + std::to_string(t.places_told) + " of " +
-             std::to_string(touch.places) + " | " + millimetres(t.mean) + " | " +
-             std::to_string(t.false_answers) + " of " + std::to_string(t.free_answers) + " | " +
-             std::to_string(alone.contacts) + " of " + std::to_string(alone.answers) + " | " +
-             std::to_string(alone.phantoms) + " |\n";
+    table += std::string("| ") + (i == 0 ? "`padding`" : "`view`") + " | " + std::to_string(seed) +
+             " | " + millimetres(touches[1].offset) + " | " + percent(t.told, t.answers) + " | " +
+             std::to_string(t.places_told) + " of " + std::to_string(touch.places) + " | " +
+             millimetres(t.mean) + " | " + std::to_string(t.false_answers) + " of " +
+             std::to_string(t.free_answers) + " | " + std::to_string(alone.contacts) + " of " +
+             std::to_string(alone.answers) + " | " + std::to_string(alone.phantoms) + " |\n";
   }
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
-      "\nThe correction moves the points on the arm by %.1f mm; the largest blind skin of "
-      "the last cloud is %.1f mm.\n",
-      1e3 * touches[1].offset, 1e3 * touches[1].blind_skin);
-  table += text;
+  return table;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Config config;
+  std::string document;
+  int seeds = 4;
+  for (int i = 1; i < argc; ++i) {
+    const bool has_value = i + 1 < argc;
+    if (std::strcmp(argv[i], "--places") == 0 && has_value) {
+      config.touch.places = std::atoi(argv[++i]);
+    } else if (std::strcmp(argv[i], "--seconds") == 0 && has_value) {
+      config.view.duration = std::atof(argv[++i]);
+    } else if (std::strcmp(argv[i], "--seeds") == 0 && has_value) {
+      seeds = std::atoi(argv[++i]);
+    } else if (std::strcmp(argv[i], "--update-doc") == 0 && has_value) {
+      document = argv[++i];
+    } else {
+      std::fprintf(stderr, "unknown argument: %s\n", argv[i]);
+      return 1;
+    }
+  }
+  const ist::RobotDescription robot = ist::test::demo_robot();
+  const auto model = ist::build_robot_model(robot, {});
+  std::vector<std::future<std::string>> runs;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    runs.push_back(std::async(std::launch::async, rows, std::cref(robot), std::cref(model), config,
+                              static_cast<std::uint64_t>(seed)));
+  }
+  std::string table =
+      "| mode | seed | correction at the arm | told while it touches | places | mean distance told "
+      "| told at 5 cm and more | alone: false contacts | alone: points not filtered |\n"
+      "|---|---|---|---|---|---|---|---|---|\n";
+  for (std::future<std::string>& run : runs) table += run.get();
   std::printf("%s", table.c_str());
   const bool fails =
       !document.empty() && !ist::benchmark::write_table(document, "self contact", table);

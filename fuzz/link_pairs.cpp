@@ -1,8 +1,9 @@
 // Two links of one robot, poses one after the other, with deadlines, against brute force in double.
 // Covers: src/proximity/self_query.cpp src/proximity/link_pair_query.cpp
-// src/proximity/link_pair_search.cpp src/proximity/surface_pair_search.cpp
-// src/proximity/opening_search.cpp src/proximity/link_surface.cpp src/geometry/surface_bvh.cpp
-// src/geometry/triangle_distance.cpp Longest input: 200
+// Covers: src/proximity/link_pair_search.cpp src/proximity/surface_pair_search.cpp
+// Covers: src/proximity/opening_search.cpp src/proximity/link_surface.cpp
+// Covers: src/geometry/surface_bvh.cpp src/geometry/triangle_distance.cpp src/geometry/openings.cpp
+// Longest input: 200
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include "support/byte_reader.h"
 #include "support/check.h"
 #include "support/link_bank.h"
+#include "support/query_config_from_bytes.h"
 
 namespace {
 
@@ -32,18 +34,6 @@ const std::vector<ist::test::PairBody>& bodies() {
 ist::SelfQuery query_of(const ist::LinkPair& pair, bool is_coarse) {
   const ist::fuzz::LinkBank& bank = ist::fuzz::link_bank();
   return {is_coarse ? bank.coarse : bank.fine, {pair}, {}};
-}
-
-ist::QueryConfig config_from(ByteReader* in) {
-  constexpr double kTolerances[] = {0.0, 0.0, 1e-4, 0.001, 0.01};
-  ist::QueryConfig config;
-  config.tolerance = kTolerances[in->below(5)];
-  config.max_distance = in->between(0.01, 1.0);
-  config.margin = in->flag() ? in->between(0.0, 0.05) : 0.0;
-  config.relative_tolerance = in->flag() ? in->between(0.0, 1.0) : 0.0;
-  const std::uint8_t kind = in->byte();
-  config.deadline = kind > 220 ? 1e-12 : kind > 160 ? 1e3 : 0.0;
-  return config;
 }
 
 /// Whether every place is inside or outside of a link for certain.
@@ -63,16 +53,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   known[first] = known[second] = true;
   X_FL[first] = in.pose(1.0);
   X_FL[second] = X_FL[first] * in.pose(0.3);
-  ist::QueryConfig config = config_from(&in);
+  ist::QueryConfig config = ist::fuzz::query_config_from(&in);
   std::vector<ist::PairProximity> answers;
   for (std::size_t step = 1 + in.below(6); step > 0; --step) {
     const std::uint8_t changes = in.byte();
     Eigen::Isometry3d& X = X_FL[(changes & 1U) != 0 ? first : second];
     if ((changes & 6U) != 0) X = X * in.pose(std::pow(10.0, in.between(-7.0, -0.7)));
-    if ((changes & 24U) == 24U) config = config_from(&in);
+    if ((changes & 24U) == 24U) config = ist::fuzz::query_config_from(&in);
     query.set_config(config);
     const bool is_complete = query.run(X_FL, known, &answers);
-    FUZZ_CHECK(is_complete || config.deadline == 1e-12, "there was time, and not complete");
+    FUZZ_CHECK(is_complete || config.deadline == ist::fuzz::kPassed,
+               "there was time, and not complete");
     const ist::test::PairTruth truth = ist::test::pair_truth(bodies()[first], bodies()[second],
                                                              X_FL[first].inverse() * X_FL[second],
                                                              is_closed(first) && is_closed(second));

@@ -1,8 +1,9 @@
 // Queries near a link and inside it, where the single-tree traversal takes over: points next to the
 // surface, poses one after the other, packings and clouds that change in between, deadlines that
-// have passed, against brute force in double. Covers: src/proximity/single_tree_search.cpp
-// src/proximity/link_query.cpp src/proximity/signed_distance_grid.cpp
-// src/proximity/refinement_points.cpp src/proximity/coherence src/geometry/outside_margin.cpp
+// have passed, against brute force in double.
+// Covers: src/proximity/single_tree_search.cpp src/proximity/link_query.cpp
+// Covers: src/proximity/signed_distance_grid.cpp src/proximity/refinement_points.cpp
+// Covers: src/proximity/coherence src/geometry/outside_margin.cpp
 // Longest input: 500
 
 #include <Eigen/Geometry>
@@ -21,6 +22,7 @@
 #include "support/check.h"
 #include "support/link_bank.h"
 #include "support/meshes_from_bytes.h"
+#include "support/query_config_from_bytes.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 
@@ -66,18 +68,6 @@ Cloud cloud_from(ByteReader* in, const ist::LinkGeometry& link, const Eigen::Iso
   return cloud;
 }
 
-ist::QueryConfig config_from(ByteReader* in) {
-  constexpr double kTolerances[] = {0.0, 0.0, 1e-4, 0.001, 0.01};
-  ist::QueryConfig config;
-  config.tolerance = kTolerances[in->below(5)];
-  config.max_distance = in->between(0.01, 1.0);
-  config.margin = in->flag() ? in->between(0.0, 0.05) : 0.0;
-  config.relative_tolerance = in->flag() ? in->between(0.0, 1.0) : 0.0;
-  // Either there is time, or the deadline has passed when the query asks first.
-  config.deadline = in->byte() > 220 ? 1e-12 : 0.0;
-  return config;
-}
-
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -89,12 +79,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     clouds.push_back(cloud_from(&in, *link.geometry, X_FL));
   }
   ist::ProximityQuery query(in.flag() ? link.coarse : link.fine, {});
-  ist::QueryConfig config = config_from(&in);
+  ist::QueryConfig config = ist::fuzz::query_config_from(&in);
   ist::LinkProximity answer;
   for (std::size_t step = 2 + in.below(6); step > 0; --step) {
     const std::uint8_t changes = in.byte();
     if ((changes & 1U) != 0) X_FL = X_FL * in.pose(std::pow(10.0, in.between(-7.0, -0.7)));
-    if ((changes & 2U) != 0) config = config_from(&in);
+    if ((changes & 2U) != 0) config = ist::fuzz::query_config_from(&in);
     if ((changes & 4U) != 0) query.set_model((changes & 8U) != 0 ? link.coarse : link.fine);
     if ((changes & 16U) != 0 && (changes & 32U) != 0) {
       clouds[in.below(clouds.size())] = cloud_from(&in, *link.geometry, X_FL);
@@ -119,7 +109,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else {
       is_complete = query.run_link(0, X_FL, span, &answer);
     }
-    FUZZ_CHECK(is_complete || config.deadline > 0.0, "no deadline, and not complete");
+    FUZZ_CHECK(is_complete || config.deadline == ist::fuzz::kPassed,
+               "there was time, and not complete");
     const std::string broken = ist::test::broken_promise(answer, truth, config, is_complete);
     FUZZ_CHECK(broken.empty(), "%s", broken.c_str());
   }

@@ -23,6 +23,7 @@
 #include "support/byte_reader.h"
 #include "support/check.h"
 #include "support/meshes_from_bytes.h"
+#include "support/robot_of_links.h"
 #include "support/scene.h"
 #include "support/shape_oracle.h"
 #include "support/truth_interval.h"
@@ -83,18 +84,6 @@ ist::RobotModelConfig packing_from(const std::vector<ist::LinkGeometry>& links, 
   return config;
 }
 
-std::shared_ptr<const ist::RobotModel> build(const std::vector<ist::LinkGeometry>& links,
-                                             const ist::RobotModelConfig& config) {
-  ist::RobotDescription description;
-  for (const ist::LinkGeometry& geometry : links) {
-    ist::LinkDescription link;
-    link.name = "link" + std::to_string(description.links.size());
-    link.geometry = geometry;
-    description.links.push_back(std::move(link));
-  }
-  return ist::build_robot_model(description, config);
-}
-
 /// The model of links and a packing, kept from execution to execution: most inputs that libFuzzer
 /// tries differ from others in what comes after the links.
 /// @param key  the bytes that the links were made of
@@ -109,7 +98,8 @@ std::shared_ptr<const ist::RobotModel> model_of(const std::string& key,
   const auto found = kept.find(whole_key);
   if (found != kept.end()) return found->second;
   if (kept.size() >= kKept) kept.clear();
-  return kept.emplace(whole_key, build(links, config)).first->second;
+  return kept.emplace(whole_key, ist::build_robot_model(ist::test::robot_of(links), config))
+      .first->second;
 }
 
 using ist::test::truth_interval;

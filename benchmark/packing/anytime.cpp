@@ -1,5 +1,7 @@
 // Anytime models over their first minute: the first answer after the URDF, then spheres, memory and
-// the time of a query while packing goes on in a thread of low priority.
+// the time of a query while packing goes on in a thread of low priority. The same motion is then
+// run again with the last model and without packing, because the times of queries follow the motion
+// more than anything else.
 
 #include <sys/resource.h>
 
@@ -118,8 +120,46 @@ struct MovingRobot {
   }
 };
 
-void add_row(const std::string& robot, double second, const RobotModel& model, double first_wall,
-             double first_processor, const std::vector<double>& us, Table* table) {
+// What is measured up to one moment.
+struct Stage {
+  double second = 0.0;
+  std::shared_ptr<const RobotModel> model;
+  double resident = 0.0;   // [MB]
+  std::vector<double> us;  // of the queries since the stage before
+};
+
+// Queries at 1 kHz along the motion, with the newest model.
+std::vector<Stage> run_stages(const MovingRobot& robot, const CloudSnapshot& cloud,
+                              const NewestModel& newest) {
+  std::vector<Stage> stages;
+  std::shared_ptr<const RobotModel> model = newest.get()->robot();
+  ProximityQuery query(model, {});
+  const std::vector<bool> known(model->links.size(), true);
+  std::vector<LinkProximity> results;
+  std::vector<double> us;
+  const auto begin = Clock::now();
+  for (std::size_t cycle = 0; stages.size() < std::size(kSeconds); ++cycle) {
+    std::this_thread::sleep_until(begin + cycle * kPeriod);
+    const double time = 1e-3 * static_cast<double>(cycle), second = kSeconds[stages.size()];
+    const auto poses = robot.poses(*model, time);
+    const auto newer = newest.get()->robot();
+    ThreadTimer timer;
+    if (newer != model) query.set_model(newer);
+    query.run(poses, known, {&cloud}, &results);
+    us.push_back(timer.lap());
+    model = newer;
+    constexpr double kFirst = 0.2;  // [s] of queries that the first row is about
+    if (time < second + (stages.empty() ? kFirst : 0.0)) continue;
+    stages.push_back({second, model, resident(), us});
+    us.clear();
+  }
+  return stages;
+}
+
+void add_row(const std::string& robot, const Stage& stage, const Stage& later, double first_wall,
+             double first_processor, Table* table) {
+  const RobotModel& model = *stage.model;
+  const double second = stage.second;
   std::size_t spheres = 0, final = 0;
   double gap = 0.0;
   for (const LinkModel& link : model.links) {
@@ -130,8 +170,10 @@ void add_row(const std::string& robot, double second, const RobotModel& model, d
   table->add({robot, text("%g", second),
               second == 0.0 ? text("%.2f", first_wall) + " / " + text("%.2f", first_processor) : "",
               std::to_string(final) + " of " + std::to_string(model.links.size()),
-              std::to_string(spheres), text("%.1f", 1e3 * gap), text("%.0f", resident()),
-              text("%.0f", quantile(us, 0.5)), text("%.0f", quantile(us, 0.99))});
+              std::to_string(spheres), text("%.1f", 1e3 * gap), text("%.0f", stage.resident),
+              text("%.0f", quantile(stage.us, 0.5)), text("%.0f", quantile(stage.us, 0.99)),
+              text("%.0f", quantile(later.us, 0.5)), text("%.0f", quantile(later.us, 0.99)),
+              text("%.2f", quantile(stage.us, 0.99) / quantile(later.us, 0.99))});
 }
 
 void measure_robot(const std::string& name, const std::string& urdf, const Options& options,
@@ -161,28 +203,13 @@ void measure_robot(const std::string& name, const std::string& urdf, const Optio
   Ingest(test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &cloud);
   std::atomic<bool> stop{false};
   std::thread packing(refine, &newest, std::cref(stop));
-  std::shared_ptr<const RobotModel> model = newest.get()->robot();
-  ProximityQuery query(model, {});
-  const std::vector<bool> known(model->links.size(), true);
-  std::vector<LinkProximity> results;
-  std::vector<double> us;
-  std::size_t next = 0;
-  const auto begin = Clock::now();
-  for (auto due = begin; next < std::size(kSeconds); due += kPeriod) {
-    std::this_thread::sleep_until(due);
-    const double time = 1e-6 * microseconds_since(begin);
-    const auto poses = robot.poses(*model, time);
-    ThreadTimer timer;
-    if (const auto newer = newest.get()->robot(); newer != model) query.set_model(model = newer);
-    query.run(poses, known, {&cloud}, &results);
-    us.push_back(timer.lap());
-    constexpr double kFirst = 0.2;  // [s] of queries that the first row is about
-    if (time < kSeconds[next] + (next == 0 ? kFirst : 0.0)) continue;
-    add_row(name, kSeconds[next++], *model, first_wall, first_processor, us, table);
-    us.clear();
-  }
+  const std::vector<Stage> packing_stages = run_stages(robot, cloud, newest);
   stop = true;
   packing.join();
+  const std::vector<Stage> later = run_stages(robot, cloud, newest);
+  for (std::size_t i = 0; i < later.size(); ++i) {
+    add_row(name, packing_stages[i], later[i], first_wall, first_processor, table);
+  }
 }
 
 }  // namespace
@@ -191,7 +218,8 @@ Table anytime_table() {
   Table table(
       "anytime",
       {"robot", "after [s]", "first model, clock / processor [s]", "links final", "spheres",
-       "largest gap [mm]", "resident memory [MB]", "query, median [us]", "99th percentile [us]"},
+       "largest gap [mm]", "resident memory [MB]", "query, median [us]", "99th percentile [us]",
+       "the same motion afterwards, median [us]", "99th percentile [us]", "ratio of these"},
       2);
   for (const char* robot : kRobots) {
     for (const double second : kSeconds) table.place({robot, text("%g", second)});

@@ -4,13 +4,13 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "internal/bvh/build_id.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
+#include "support/robot_of_links.h"
 
 /// Links that are packed once for all executions of a fuzz target: packing takes a hundred times as
 /// long as the queries of a small case.
@@ -53,18 +53,11 @@ struct LinkBank {
 
 inline std::shared_ptr<RobotModel> pack_bank(const std::vector<LinkGeometry>& geometries,
                                              double max_error) {
-  RobotDescription description;
-  for (const LinkGeometry& geometry : geometries) {
-    LinkDescription link;
-    link.name = "link" + std::to_string(description.links.size());
-    link.geometry = geometry;
-    description.links.push_back(std::move(link));
-  }
   RobotModelConfig config;
   config.packing.max_error = max_error;
   config.packing.max_spheres = 100;
   config.threads = 1;
-  return std::make_shared<RobotModel>(*build_robot_model(description, config));
+  return std::make_shared<RobotModel>(*build_robot_model(test::robot_of(geometries), config));
 }
 
 inline const LinkBank& link_bank() {

@@ -8,8 +8,8 @@
 The messages of the ROS package are in ist_proximity.msg and ist_proximity.srv.
 """
 
-_NAMES = ('CLEAR', 'CONTACT', 'Distances', 'ModelError', 'Nearest', 'NEAR', 'Obstacles', 'Robot',
-          'UNKNOWN')
+_NAMES = ('CLEAR', 'CONTACT', 'Distances', 'Extent', 'ModelError', 'Nearest', 'NEAR', 'Obstacles',
+          'Robot', 'UNKNOWN')
 
 __all__ = list(_NAMES)
 

@@ -27,13 +27,14 @@ struct Limit {
 
 }  // namespace
 
+// A number that is negative or NaN is not zero, so that check_extent() refuses it.
 bool ExtentConfig::is_zero() const {
-  const bool has_noise = sigmas > 0.0 && (noise_constant > 0.0 || noise_quadratic > 0.0);
+  const bool has_noise = sigmas != 0.0 && (noise_constant != 0.0 || noise_quadratic != 0.0);
   const bool has_footprint = footprint == Footprint::kCamera ||
-                             (footprint == Footprint::kRadius && footprint_radius > 0.0) ||
-                             (footprint == Footprint::kAngle && footprint_angle > 0.0);
+                             (footprint == Footprint::kRadius && footprint_radius != 0.0) ||
+                             (footprint == Footprint::kAngle && footprint_angle != 0.0);
   return !has_noise && !has_footprint && calibration == 0.0 && calibration_angle == 0.0 &&
-         !(latency > 0.0 && speed > 0.0);
+         !(latency != 0.0 && speed != 0.0);
 }
 
 std::string check_extent(const ExtentConfig& config, double max_range) {

@@ -2,28 +2,14 @@
 
 #include <utility>
 
-#include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/facade/robot.h"
+#include "obstacle_ingest.h"
 
 namespace ist {
 namespace {
 
 std::shared_ptr<const CloudSnapshot> index(const RawCloud& cloud, const ObstaclesConfig& config) {
-  IngestConfig ingest_config;
-  ingest_config.min_range = config.min_range;
-  ingest_config.max_range = config.max_range;
-  ingest_config.self_filter = config.robot != nullptr;
-  ingest_config.self_filter_padding = config.self_filter_padding;
-  ingest_config.extent = config.extent;
-  Ingest ingest(ingest_config);
-  LinkPoses poses;
-  std::vector<PosedSolid> robot;
-  if (config.robot != nullptr) {
-    poses = config.robot->link_poses(config.q);
-    robot = posed_solids(*config.robot->model(), poses.X_FL, poses.known);
-  }
   auto snapshot = std::make_shared<CloudSnapshot>();
-  ingest.run(cloud, config.X_FS, robot, 0.0, snapshot.get());
+  ObstacleIngest(config).run(cloud, snapshot.get());
   return snapshot;
 }
 
@@ -39,6 +25,28 @@ std::shared_ptr<const CloudSnapshot> index_image(const T* xyz, std::size_t width
 }
 
 }  // namespace
+
+IngestConfig to_ingest_config(const ObstaclesConfig& config) {
+  IngestConfig result;
+  result.min_range = config.min_range;
+  result.max_range = config.max_range;
+  result.self_filter = config.robot != nullptr;
+  result.self_filter_padding = config.self_filter_padding;
+  result.extent = config.extent;
+  return result;
+}
+
+ObstacleIngest::ObstacleIngest(const ObstaclesConfig& config)
+    : X_FS_(config.X_FS), ingest_(to_ingest_config(config)) {
+  if (config.robot == nullptr) return;
+  const LinkPoses poses = config.robot->link_poses(config.q);
+  model_ = config.robot->model();
+  robot_ = posed_solids(*model_, poses.X_FL, poses.known);
+}
+
+void ObstacleIngest::run(const RawCloud& cloud, CloudSnapshot* snapshot) {
+  ingest_.run(cloud, X_FS_, robot_, 0.0, snapshot);
+}
 
 Obstacles::Obstacles(std::shared_ptr<const CloudSnapshot> snapshot)
     : snapshot_(std::move(snapshot)) {}

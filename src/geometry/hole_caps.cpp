@@ -13,9 +13,10 @@ namespace {
 using Loop = std::vector<std::uint32_t>;
 
 // Follows open edges; whenever the path returns to one of its vertices, it closes a loop.
-std::vector<Loop> find_loops(const std::vector<OpenEdge>& open) {
+std::vector<Loop> find_loops(const std::vector<OpenEdge>& open, CancelWatch* watch) {
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> next;
   for (const OpenEdge& edge : open) {
+    watch->step();
     for (int i = 0; i < edge.count; ++i) next[edge.from].push_back(edge.to);
   }
   std::vector<Loop> loops;
@@ -24,6 +25,7 @@ std::vector<Loop> find_loops(const std::vector<OpenEdge>& open) {
     Loop path = {edge.from};
     index_in_path = {{edge.from, 0}};
     for (auto* edges = &next[edge.from]; !edges->empty(); edges = &next[path.back()]) {
+      watch->step();
       const std::uint32_t vertex = edges->back();
       edges->pop_back();
       const auto known = index_in_path.find(vertex);
@@ -52,7 +54,7 @@ struct Diagonal {
 };
 
 // Triangulates a loop, shortest diagonal first.
-void close(const Loop& loop, TriangleMesh* caps) {
+void close(const Loop& loop, CancelWatch* watch, TriangleMesh* caps) {
   const auto n = static_cast<std::uint32_t>(loop.size());
   std::vector<std::uint32_t> before(n), after(n);
   std::priority_queue<Diagonal> shortest;
@@ -68,6 +70,7 @@ void close(const Loop& loop, TriangleMesh* caps) {
   for (std::uint32_t i = 0; i < n; ++i) push(i);
   constexpr auto kRemoved = static_cast<std::uint32_t>(-1);
   for (std::uint32_t remaining = n; remaining >= 3;) {
+    watch->step();
     const Diagonal cut = shortest.top();
     shortest.pop();
     const std::uint32_t i = cut.cut_off;
@@ -85,10 +88,12 @@ void close(const Loop& loop, TriangleMesh* caps) {
 
 }  // namespace
 
-TriangleMesh hole_caps(const TriangleMesh& mesh, const std::vector<OpenEdge>& open) {
+TriangleMesh hole_caps(const TriangleMesh& mesh, const std::vector<OpenEdge>& open,
+                       const CancelRequest& cancelled) {
+  CancelWatch watch(cancelled);
   TriangleMesh caps;
   caps.vertices = mesh.vertices;
-  for (const Loop& loop : find_loops(open)) close(loop, &caps);
+  for (const Loop& loop : find_loops(open, &watch)) close(loop, &watch, &caps);
   return caps;
 }
 

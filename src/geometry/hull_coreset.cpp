@@ -52,14 +52,14 @@ class HullCoreset::Builder {
     size_ = box.sizes().norm();
   }
 
-  void run() {
+  void run(const CancelRequest& cancelled) {
     set_.add(corners_.front());
     for (int x = -1; x <= 1; ++x) {
       for (int y = -1; y <= 1; ++y) {
         for (int z = -1; z <= 1; ++z) add_farthest({1.0 * x, 1.0 * y, 1.0 * z});
       }
     }
-    for (const double share : kErrors) improve_to(share * size_);
+    for (const double share : kErrors) improve_to(share * size_, cancelled);
     double error = 0.0;
     for (const double distance : distances_) error = std::max(error, distance);
     // A point of the hull is at most the largest of its corners' distances from the coreset's hull.
@@ -67,8 +67,10 @@ class HullCoreset::Builder {
   }
 
  private:
-  void improve_to(double error) {
+  void improve_to(double error, const CancelRequest& cancelled) {
+    constexpr std::size_t kAskEvery = 256;
     for (std::size_t i = 0; i < corners_.size(); ++i) {
+      if (i % kAskEvery == 0) throw_if(cancelled);
       while (distances_[i] > error) {
         const Eigen::Vector3d outward = measure(i);
         if (!(distances_[i] > error) || set_.size() >= max_points_) break;
@@ -103,10 +105,10 @@ class HullCoreset::Builder {
   std::uint32_t last_ = 0;
 };
 
-HullCoreset::HullCoreset(const std::vector<ConvexPart>& parts) {
+HullCoreset::HullCoreset(const std::vector<ConvexPart>& parts, const CancelRequest& cancelled) {
   std::vector<Eigen::Vector3d> corners = corners_of(parts);
   if (corners.empty()) return;
-  Builder(std::move(corners), this).run();
+  Builder(std::move(corners), this).run(cancelled);
 }
 
 // From the point of the coreset's hull that was found nearest to p, to p: GJK from a point of the

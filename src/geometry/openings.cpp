@@ -71,31 +71,33 @@ double sum_of(const std::vector<Piece>& pieces, const Eigen::Vector3d& center, d
 
 }  // namespace
 
-Openings::Openings(const Solid& solid) : solid_(solid) {
+Openings::Openings(const Solid& solid, const CancelRequest& cancelled) : solid_(solid) {
   const std::vector<SolidElement>& elements = elements_of(solid);
   for (std::size_t i = 0; i < elements.size(); ++i) {
     if (elements[i].is_closed || !elements[i].is_mesh()) continue;
-    const Eigen::AlignedBox3d box = add_element(i);
+    const Eigen::AlignedBox3d box = add_element(i, cancelled);
     if (elements_.back().holes.empty()) {
       elements_.pop_back();
     } else {
-      add_cells(static_cast<std::uint32_t>(elements_.size() - 1), box);
+      add_cells(static_cast<std::uint32_t>(elements_.size() - 1), box, cancelled);
     }
   }
 }
 
 // Collects the holes of a mesh. @returns a box that holds all openings
-Eigen::AlignedBox3d Openings::add_element(std::size_t index) {
+Eigen::AlignedBox3d Openings::add_element(std::size_t index, const CancelRequest& cancelled) {
   const SolidElement& solid = elements_of(solid_)[index];
   const TriangleMesh mesh = mesh_of(solid.bvh);
-  const std::vector<OpenEdge> open = open_edges(mesh);
-  const TriangleMesh caps = hole_caps(mesh, open);
+  const std::vector<OpenEdge> open = open_edges(mesh, cancelled);
+  const TriangleMesh caps = hole_caps(mesh, open, cancelled);
   Forest forest(mesh.vertices.size());
+  CancelWatch watch(cancelled);
   for (const OpenEdge& edge : open) forest.join(edge.from, edge.to);
   std::map<std::size_t, Hole> holes;
   std::map<std::size_t, Eigen::AlignedBox3d> boxes;
   Eigen::AlignedBox3d box;
   for (const OpenEdge& edge : open) {
+    watch.step();
     const Eigen::Vector3d from = solid.X_LE * mesh.vertices[edge.from];
     const Eigen::Vector3d to = solid.X_LE * mesh.vertices[edge.to];
     const double length = (to - from).norm();
@@ -107,6 +109,7 @@ Eigen::AlignedBox3d Openings::add_element(std::size_t index) {
   }
   double area = 0.0;
   for (const TriangleMesh::Triangle& t : caps.triangles) {
+    watch.step();
     const Eigen::Vector3d a = solid.X_LE * caps.vertices[t[0]],
                           b = solid.X_LE * caps.vertices[t[1]],
                           c = solid.X_LE * caps.vertices[t[2]], middle = (a + b + c) / 3.0;
@@ -119,6 +122,7 @@ Eigen::AlignedBox3d Openings::add_element(std::size_t index) {
   }
   elements_.push_back({index, {}});
   for (auto& [root, hole] : holes) {
+    watch.step();
     const Eigen::Vector3d middle = boxes[root].center();
     const double radius = 0.5 * boxes[root].sizes().norm();
     hole.edges = hole.caps = {middle, radius, 0.0, Eigen::Vector3d::Zero()};
@@ -186,7 +190,8 @@ bool Openings::may_hold_opening(const Element& element, double winding,
 }
 
 // Level by level, as long as there are not too many cells and they are not small.
-void Openings::add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box) {
+void Openings::add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box,
+                         const CancelRequest& cancelled) {
   const Element& element = elements_[number];
   const SolidElement& solid = elements_of(solid_)[element.index];
   const double per_half = std::sqrt(3.0) * (1.0 + 1e-9);
@@ -196,6 +201,7 @@ void Openings::add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box) {
     std::vector<Eigen::Vector3d> smaller;
     half *= 0.5;
     for (const Eigen::Vector3d& center : cells) {
+      throw_if(cancelled);
       for (int corner = 0; corner < 8; ++corner) {
         const Eigen::Vector3d at =
             center + half * Eigen::Vector3d((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1,

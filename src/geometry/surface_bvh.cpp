@@ -15,6 +15,9 @@ namespace {
 
 using Kind = ConvexPart::Kind;
 
+// Parts of a node that are divided in some milliseconds.
+constexpr std::uint32_t kAskFrom = 4096;
+
 Eigen::Vector3d center_of(const ConvexPart& part) {
   return part.kind == Kind::kTriangle ? Eigen::Vector3d((part.a + part.b + part.c) / 3.0) : part.a;
 }
@@ -161,11 +164,18 @@ Fit fit(const std::vector<ConvexPart>& parts, std::uint32_t first, std::uint32_t
 
 }  // namespace
 
-SurfaceBvh::SurfaceBvh(const Solid& solid) : parts_(parts_of(solid)), hull_(parts_) { build(); }
+SurfaceBvh::SurfaceBvh(const Solid& solid, const CancelRequest& cancelled)
+    : parts_(parts_of(solid)), hull_(parts_, cancelled) {
+  build(cancelled);
+}
 
-SurfaceBvh::SurfaceBvh(std::vector<ConvexPart> parts) : parts_(std::move(parts)) { build(); }
+SurfaceBvh::SurfaceBvh(std::vector<ConvexPart> parts, const CancelRequest& cancelled)
+    : parts_(std::move(parts)) {
+  build(cancelled);
+}
 
-void SurfaceBvh::build() {
+void SurfaceBvh::build(const CancelRequest& cancelled) {
+  throw_if(cancelled);
   if (parts_.empty()) return;
   for (const ConvexPart& part : parts_) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -183,9 +193,13 @@ void SurfaceBvh::build() {
   Node root{};
   const Range all{0, static_cast<std::uint32_t>(parts_.size())};
   set_box(all, &root, 0);
-  for (int slot = 1; slot < kWidth; ++slot) set_box(all, &root, slot);
+  for (int slot = 1; slot < kWidth; ++slot) {
+    throw_if(cancelled);
+    set_box(all, &root, slot);
+  }
+  throw_if(cancelled);
   root.count = 1;
-  root.child[0] = parts_.size() == 1 ? ~0 : add_node(all);
+  root.child[0] = parts_.size() == 1 ? ~0 : add_node(all, cancelled);
   nodes_[0] = root;
 }
 
@@ -209,7 +223,7 @@ std::uint32_t halve(std::vector<ConvexPart>* parts, std::uint32_t first, std::ui
 
 }  // namespace
 
-std::int32_t SurfaceBvh::add_node(const Range& range) {
+std::int32_t SurfaceBvh::add_node(const Range& range, const CancelRequest& cancelled) {
   const std::size_t index = nodes_.size();
   nodes_.emplace_back();
   std::vector<Range> groups{range};
@@ -220,6 +234,7 @@ std::int32_t SurfaceBvh::add_node(const Range& range) {
         halves.push_back(group);
         continue;
       }
+      if (group.second - group.first >= kAskFrom) throw_if(cancelled);
       const std::uint32_t middle = halve(&parts_, group.first, group.second);
       halves.push_back({group.first, middle});
       halves.push_back({middle, group.second});
@@ -231,10 +246,12 @@ std::int32_t SurfaceBvh::add_node(const Range& range) {
   for (int slot = 0; slot < kWidth; ++slot) {
     const bool used = slot < node.count;
     const Range& group = groups[used ? static_cast<std::size_t>(slot) : 0];
+    if (group.second - group.first >= kAskFrom) throw_if(cancelled);
     set_box(group, &node, slot);
     if (!used) continue;
     const bool is_part = group.second - group.first == 1;
-    node.child[slot] = is_part ? ~static_cast<std::int32_t>(group.first) : add_node(group);
+    node.child[slot] =
+        is_part ? ~static_cast<std::int32_t>(group.first) : add_node(group, cancelled);
   }
   nodes_[index] = node;
   return static_cast<std::int32_t>(index);

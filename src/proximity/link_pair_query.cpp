@@ -35,7 +35,10 @@ LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkS
       surface_b_(surface_b),
       surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity),
       openings_a_(surface_a, surface_b),
-      openings_b_(surface_b, surface_a) {}
+      openings_b_(surface_b, surface_a),
+      are_closed_(a.solid.is_closed() && b.solid.is_closed()),
+      kept_bound_(depth_limit()),
+      depth_bound_(depth_limit()) {}
 
 LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkSurface& surface_a,
                              const LinkSurface& surface_b, LinkPairQuery&& memory)
@@ -45,7 +48,15 @@ LinkPairQuery::LinkPairQuery(const LinkModel& a, const LinkModel& b, const LinkS
       surface_b_(surface_b),
       surfaces_(surface_a.surface, surface_b.surface, kFrontCapacity, std::move(memory.surfaces_)),
       openings_a_(surface_a, surface_b, std::move(memory.openings_a_)),
-      openings_b_(surface_b, surface_a, std::move(memory.openings_b_)) {}
+      openings_b_(surface_b, surface_a, std::move(memory.openings_b_)),
+      are_closed_(a.solid.is_closed() && b.solid.is_closed()),
+      kept_bound_(depth_limit()),
+      depth_bound_(depth_limit()) {}
+
+// [m] No point of one is deeper inside the other.
+double LinkPairQuery::depth_limit() const {
+  return -std::max(surface_a_.depth_limit, surface_b_.depth_limit);
+}
 
 // [m] The error of a distance by poses that are not quite rigid.
 double LinkPairQuery::pose_uncertainty(double distance) const {
@@ -60,6 +71,7 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   const double since_reference =
       has_pose_ ? relative_displacement(surface_a_, surface_b_, surfaces_.reference_pose(), X_BA)
                 : kInf;
+  kept_bound_ = are_closed_ && has_pose_ ? lower_bound() - moved : depth_limit();
   openings_a_.note_motion(moved);
   openings_b_.note_motion(moved);
   // Surfaces that are apart stay apart while no point moves as far as the other surface, or an
@@ -75,7 +87,8 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   range_ += pose_uncertainty(range_);
   surfaces_.move_to(X_BA, since_reference);
   stage_ = Stage::kSurfaces;
-  are_in_contact_ = false;
+  are_in_contact_ = has_inside_ = false;
+  depth_bound_ = depth_limit();
 }
 
 bool LinkPairQuery::advance(int* steps, std::vector<LinkPairSearch::Entry>* queue) {
@@ -86,7 +99,8 @@ bool LinkPairQuery::advance(int* steps, std::vector<LinkPairSearch::Entry>* queu
   }
   if (stage_ == Stage::kInside) {
     decide_contact(steps);
-    if (are_in_contact_) measure_depth(queue);
+    if (!are_apart_) search_spheres(queue);
+    if (are_in_contact_) measure_depth();
     stage_ = Stage::kDone;
   }
   return true;
@@ -102,7 +116,9 @@ void LinkPairQuery::decide_contact(int* steps) {
   if (are_in_contact_) return;
   const Answer into_a = openings_a_.decide(X_BA_, steps);
   const Answer into_b = openings_b_.decide(X_BA_.inverse(), steps);
-  are_in_contact_ = into_a == Answer::kInside || into_b == Answer::kInside;
+  if (into_a == Answer::kInside) note_inside(openings_a_.inside_B(), false);
+  if (into_b == Answer::kInside) note_inside(openings_b_.inside_B(), true);
+  are_in_contact_ = has_inside_;
   are_apart_ = into_a == Answer::kApart && into_b == Answer::kApart;
 }
 
@@ -117,19 +133,29 @@ bool LinkPairQuery::are_hulls_apart() {
 }
 
 // Tells whether a component of one is inside the other, where the surfaces are apart.
-bool LinkPairQuery::is_inside_other() const {
+bool LinkPairQuery::is_inside_other() {
   const Eigen::Isometry3d X_AB = X_BA_.inverse();
   const auto holds = [](const LinkModel& link, const SurfaceBvh& surface,
                         const Eigen::Vector3d& p) {
     return surface.bounds().contains(p) && link.solid.is_inside(p);
   };
   for (const Eigen::Vector3d& p_A : surface_a_.component_points) {
-    if (holds(b_, surface_b_.surface, X_BA_ * p_A)) return true;
+    if (!holds(b_, surface_b_.surface, X_BA_ * p_A)) continue;
+    note_inside(p_A, true);
+    return true;
   }
   for (const Eigen::Vector3d& p_B : surface_b_.component_points) {
-    if (holds(a_, surface_a_.surface, X_AB * p_B)) return true;
+    if (!holds(a_, surface_a_.surface, X_AB * p_B)) continue;
+    note_inside(p_B, false);
+    return true;
   }
   return false;
+}
+
+void LinkPairQuery::note_inside(const Eigen::Vector3d& p, bool of_a) {
+  has_inside_ = true;
+  is_inside_of_a_ = of_a;
+  inside_ = p;
 }
 
 // Keeps the witnesses of a search for the depth if they are deeper.
@@ -148,8 +174,11 @@ void LinkPairQuery::keep_deepest(const LinkPairSearch& search, bool of_a) {
   }
 }
 
-void LinkPairQuery::measure_depth(std::vector<LinkPairSearch::Entry>* queue) {
-  depth_bound_ = 0.0;
+// Bounds the depth by the spheres of both, also where it is not decided whether there is one: less
+// than a nanometre from touch, or where a surface is next to an opening. A point that is found
+// inside both decides that.
+void LinkPairQuery::search_spheres(std::vector<LinkPairSearch::Entry>* queue) {
+  depth_bound_ = kInf;
   depth_distance_ = kInf;
   QueryConfig config = config_;
   config.max_distance = range_;
@@ -159,10 +188,30 @@ void LinkPairQuery::measure_depth(std::vector<LinkPairSearch::Entry>* queue) {
   LinkPairSearch of_b(b_, a_, X_BA_.inverse(), config, queue);
   of_b.run(kDepthSteps);
   keep_deepest(of_b, false);
+  // No point of either is inside the other.
+  are_apart_ = !are_in_contact_ && depth_bound_ > 0.0 && surfaces_.lower_bound() > 0.0;
+  are_in_contact_ = are_in_contact_ || depth_distance_ < 0.0;
+  depth_bound_ = std::max({std::min(depth_bound_, 0.0), kept_bound_, depth_limit()});
+}
+
+void LinkPairQuery::measure_depth() {
+  if (has_inside_) measure_inside_point();
   if (!(depth_distance_ < 0.0)) search_from_touch();
   if (!(depth_distance_ < 0.0)) search_along_parts();
-  depth_bound_ = std::max(depth_bound_, -std::max(surface_a_.depth_limit, surface_b_.depth_limit));
   depth_bound_ = std::min(depth_bound_, depth_distance_);
+}
+
+// The surfaces may be far apart where one link reaches into the other through an opening, and the
+// spheres may show no point inside both.
+void LinkPairQuery::measure_inside_point() {
+  const Eigen::Vector3d q_B = is_inside_of_a_ ? Eigen::Vector3d(X_BA_ * inside_) : inside_;
+  const SignedDistance found = is_inside_of_a_ ? b_.solid.signed_distance(q_B)
+                                               : a_.solid.signed_distance(X_BA_.inverse() * q_B);
+  if (!(found.distance < std::min(depth_distance_, 0.0))) return;
+  depth_distance_ = found.distance;
+  on_a_ = is_inside_of_a_ ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
+  on_b_ = is_inside_of_a_ ? found.witness : q_B;
+  direction_ = is_inside_of_a_ ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
 }
 
 // Steps from a point where the surfaces meet, alternately into the one and the other: solids that
@@ -220,13 +269,14 @@ void LinkPairQuery::search_along_parts() {
 
 double LinkPairQuery::lower_bound() const {
   if (are_in_contact_) return depth_bound_;
-  if (are_apart_) return surfaces_.lower_bound();
-  return -std::max(surface_a_.depth_limit, surface_b_.depth_limit);
+  if (are_apart_) return std::max(surfaces_.lower_bound(), kept_bound_);
+  return std::max(depth_bound_, kept_bound_);
 }
 
 void LinkPairQuery::report(PairProximity* result) const {
   result->reset();
   result->finished = stage_ == Stage::kDone;
+  result->decided = is_decided();
   const double lower = lower_bound();
   if (lower >= range_) {
     result->state = LinkState::kClear;

@@ -36,6 +36,8 @@ class LinkPairQuery {
 
   /// [m] Proven at this pose, whatever has been done so far; the margin is not taken off.
   double lower_bound() const;
+  /// Whether it is known if one is inside the other.
+  bool is_decided() const { return are_in_contact_ || are_apart_ || lower_bound() > 0.0; }
   /// The bounds that are known, at any time.
   void report(PairProximity* result) const;
 
@@ -44,12 +46,16 @@ class LinkPairQuery {
 
   void decide_contact(int* steps);
   bool are_hulls_apart();
-  bool is_inside_other() const;
-  void measure_depth(std::vector<LinkPairSearch::Entry>* queue);
+  bool is_inside_other();
+  void note_inside(const Eigen::Vector3d& p, bool of_a);
+  void search_spheres(std::vector<LinkPairSearch::Entry>* queue);
+  void measure_depth();
+  void measure_inside_point();
   void keep_deepest(const LinkPairSearch& search, bool of_a);
   void search_from_touch();
   void search_along_parts();
   double pose_uncertainty(double distance) const;
+  double depth_limit() const;
 
   const LinkModel &a_, &b_;
   const LinkSurface &surface_a_, &surface_b_;
@@ -58,14 +64,21 @@ class LinkPairQuery {
   Stage stage_ = Stage::kSurfaces;
   bool are_apart_ = false;  // no point of one is inside the other, at this pose
   bool are_in_contact_ = false;
+  const bool are_closed_;  // both
+  // [m] Of closed links, by the last pose: the distance changes no faster than they move.
+  double kept_bound_;
   QueryConfig config_;
   double range_ = 0.0;  // [m] of the search: bounds lose the margin and the poses' errors later
   double drift_ = 0.0;  // of both poses
   Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity(), X_FB_ = Eigen::Isometry3d::Identity();
   bool has_pose_ = false;
-  // In contact: the deepest point found, in B's frame.
-  double depth_bound_ = 0.0, depth_distance_ = 0.0;  // [m]
+  // Where the links are not known to be apart: a proven bound, and the deepest point found, in B's
+  // frame.
+  double depth_bound_, depth_distance_ = 0.0;  // [m]
   Eigen::Vector3d on_a_, on_b_, direction_;
+  // A point of one link that was found inside the other, in the frame of its link.
+  bool has_inside_ = false, is_inside_of_a_ = false;
+  Eigen::Vector3d inside_;
 };
 
 }  // namespace ist

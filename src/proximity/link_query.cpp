@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include "proximity/depth_search.h"
 #include "proximity/dual_tree.h"
+#include "proximity/first_bound.h"
 #include "proximity/refinement.h"
 #include "proximity/single_tree_search.h"
 
@@ -26,6 +28,11 @@ constexpr double kRounding = 1e-12;
 constexpr double kNearInGaps = 2.0;
 // So does one at a distance that is about that of the last crowded search, by this factor.
 constexpr double kSameCrowd = 1.5;
+// A link that is nearer than so many radii of its bounding sphere gets its first bound by more and
+// smaller spheres.
+constexpr double kFineSpheresWithin = 0.5;
+// [m] A link that no first bound was found for is tried again when it has moved so far.
+constexpr double kFirstBoundAgain = 0.02;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
@@ -55,7 +62,7 @@ int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
 
 void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneId scene,
                       const QueryConfig& config, const OtherLinks& other_links,
-                      QueryStatistics* statistics) {
+                      QueryStatistics* statistics, Deadline* deadline) {
   LinkSearch& search = link_.search;
   const auto& answered = link_.kept.answered;
   const RigidPose rigid = nearest_rigid(X_FL);
@@ -66,6 +73,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneI
   search.config = config;
   search.other_links = other_links.distance;
   search.statistics = statistics;
+  search.deadline = deadline;
   search.closest = ClosestObstacle();
   search.refined_bound = kInfinity;
   search.region_bound = kInfinity;
@@ -101,9 +109,10 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
     count_outside_region();
     return true;
   }
-  search.deadline = deadline;
+  Deadline* const of_question = std::exchange(search.deadline, deadline);
   const bool has_points = search_points(clouds, deadline);
   const bool has_extents = bound_extents(clouds, deadline);
+  search.deadline = of_question;  // the caller's own may not outlive this call
   if (has_points && has_extents) keep_answer();
   return has_points && has_extents;
 }
@@ -436,11 +445,50 @@ void LinkQuery::set_link(const LinkModel& link) {
 
 void LinkQuery::keep_bound() {
   const LinkSearch& search = link_.search;
-  double bound = search.lower_bound() - search.index_error;
+  keep_bound(search.lower_bound(), std::min(search.cover_bound, search.pruned_bound));
+}
+
+// @param bound           [m] of the stored obstacles' signed distances
+// @param cover_distance  [m] of the stored obstacles
+void LinkQuery::keep_bound(double bound, double cover_distance) {
+  const LinkSearch& search = link_.search;
+  bound -= search.index_error;
   // Float loses more, the farther.
   if (bound > search.range()) bound -= kFloatError * (bound - search.range());
-  link_.kept.bound.prove(search.scene, search.X_FL, bound,
-                         std::min(search.cover_bound, search.pruned_bound), search.max_coordinate);
+  link_.kept.bound.prove(search.scene, search.X_FL, bound, cover_distance, search.max_coordinate);
+}
+
+// Obstacles that are farther from the cover spheres than the interior gap are outside the link.
+void LinkQuery::prove_first_bound(SnapshotSpan clouds) {
+  LinkSearch& search = link_.search;
+  if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
+  auto& last = link_.kept.first_bound;
+  if (last.scene == search.scene && search.scene != kUnknownScene &&
+      link_.context.displacement.between(last.X_FL, search.X_FL) < kFirstBoundAgain) {
+    return;
+  }
+  last.scene = search.scene;
+  last.X_FL = search.X_FL;
+  const InnerSphereTree& tree = link_.context.tree();
+  const double gap = tree.interior_gap();
+  double bound = kInfinity;
+  bool is_outside = true;
+  const auto bound_index = [&](const auto& obstacles) {
+    enter(obstacles);
+    const auto by_spheres = [&](bool is_fine) {
+      return static_cast<double>(first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine),
+                                             obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+    };
+    double of_index = by_spheres(false);
+    if (of_index < kFineSpheresWithin * tree.radius()) of_index = by_spheres(true);
+    is_outside = is_outside && of_index > gap;  // false for NaN
+    bound = std::min(bound, of_index);
+  };
+  for (std::size_t i = 0; i < clouds.size() && is_outside; ++i) {
+    for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL, bound_index);
+  }
+  bound -= search.rounding;
+  if (is_outside && bound > gap) keep_bound(bound, bound);
 }
 
 // The error of a distance by the coordinates of stored points and by poses that are not quite

@@ -30,7 +30,13 @@ class LinkQuery {
     double extents = std::numeric_limits<double>::infinity();   ///< [m] of obstacles' spheres
   };
   void begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneId scene,
-             const QueryConfig& config, const OtherLinks& other_links, QueryStatistics* statistics);
+             const QueryConfig& config, const OtherLinks& other_links, QueryStatistics* statistics,
+             Deadline* deadline);
+
+  /// Proves a first lower bound of the link's distance, where none is kept: it takes some
+  /// microseconds, and is kept for the poses to come. A link that is too near for it is not tried
+  /// again at every step.
+  void prove_first_bound(SnapshotSpan clouds);
 
   /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a
   /// point that is near to where it was.
@@ -41,6 +47,7 @@ class LinkQuery {
   /// the upper bound.
   void tighten(const QueryConfig& config);
 
+  /// @param deadline  for this call in place of the question's
   /// @returns false: the deadline passed first; what is known by then still holds
   bool run(SnapshotSpan clouds, Deadline* deadline);
 
@@ -82,6 +89,7 @@ class LinkQuery {
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
   void keep_bound();
+  void keep_bound(double bound, double cover_distance);
   void keep_answer();
   void count_outside_region();
   void take_kept_bound();

@@ -100,6 +100,11 @@ struct LinkCoherence {
     QueryConfig config;
     SearchResult result;
   } answered;
+  /// Where a first bound was looked for.
+  struct {
+    SceneId scene = kUnknownScene;  ///< unknown: nowhere
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+  } first_bound;
   SupportCache supports;
   Eigen::Vector3d plane_normal_L = Eigen::Vector3d::Zero();  ///< of `supports`; zero: none yet
 
@@ -107,6 +112,7 @@ struct LinkCoherence {
     last.build_id = 0;
     nearest_extent.build_id = 0;
     answered.scene = kUnknownScene;
+    first_bound.scene = kUnknownScene;
     bound.forget();
     extents.forget();
     nodes.forget();

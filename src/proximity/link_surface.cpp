@@ -44,10 +44,13 @@ class Components {
   std::vector<Eigen::Vector3d> points_;
 };
 
-std::vector<Eigen::Vector3d> points_of_components(const SurfaceBvh& surface) {
+std::vector<Eigen::Vector3d> points_of_components(const SurfaceBvh& surface,
+                                                  const CancelRequest& cancelled) {
+  CancelWatch watch(cancelled);
   std::vector<Eigen::Vector3d> points;
   Components components;
   for (const ConvexPart& part : surface.parts()) {
+    watch.step();
     if (part.kind != ConvexPart::Kind::kTriangle) {
       points.push_back(part.a);
       continue;
@@ -91,17 +94,18 @@ Eigen::AlignedBox3d box_of(const LinkModel& link, const SurfaceBvh& surface,
 
 }  // namespace
 
-LinkSurface::LinkSurface(const LinkModel& link)
+LinkSurface::LinkSurface(const LinkModel& link, const CancelRequest& cancelled)
     : solid(link.solid),
-      surface(link.solid),
-      openings(link.solid),
-      opening_cells(openings.cells()),
+      surface(link.solid, cancelled),
+      openings(link.solid, cancelled),
+      opening_cells(openings.cells(), cancelled),
       opening_margin(opening_margin_of(surface, opening_cells)),
-      component_points(points_of_components(surface)),
+      component_points(points_of_components(surface, cancelled)),
       displacement(box_of(link, surface, opening_cells)),
       depth_limit(depth_limit_of(link, surface)) {}
 
-std::shared_ptr<const LinkSurface> LinkSurface::of(const LinkModel& link) {
+std::shared_ptr<const LinkSurface> LinkSurface::of(const LinkModel& link,
+                                                   const CancelRequest& cancelled) {
   static std::mutex mutex;
   static std::vector<std::weak_ptr<const LinkSurface>> in_use;
   const std::lock_guard<std::mutex> lock(mutex);  // two threads would make the same one
@@ -112,7 +116,7 @@ std::shared_ptr<const LinkSurface> LinkSurface::of(const LinkModel& link) {
     auto surface = kept.lock();
     if (surface && is_same_solid(surface->solid, link.solid)) return surface;
   }
-  auto made = std::make_shared<const LinkSurface>(link);
+  auto made = std::make_shared<const LinkSurface>(link, cancelled);
   in_use.push_back(made);
   return made;
 }

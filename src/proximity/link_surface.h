@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/openings.h"
 #include "internal/geometry/surface_bvh.h"
 #include "ist_proximity/robot/robot_model.h"
@@ -13,11 +14,14 @@ namespace ist {
 
 /// The surface of a link for its distances to other links, in its frame L. Immutable.
 struct LinkSurface {
-  explicit LinkSurface(const LinkModel& link);
+  /// @throws Cancelled when the request says so
+  explicit LinkSurface(const LinkModel& link, const CancelRequest& cancelled = {});
 
   /// The surface of a link; all that ask for one of the same solid share it while it is in use.
   /// The first one takes up to some tenths of a second. Thread safe.
-  static std::shared_ptr<const LinkSurface> of(const LinkModel& link);
+  /// @throws Cancelled when the request says so
+  static std::shared_ptr<const LinkSurface> of(const LinkModel& link,
+                                               const CancelRequest& cancelled = {});
 
   Solid solid;
   SurfaceBvh surface;

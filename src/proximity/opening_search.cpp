@@ -38,6 +38,7 @@ class CellVisitor : public SurfacePairSearch::Visitor {
   }
 
   bool found_inside() const { return found_inside_; }
+  const Eigen::Vector3d& inside_B() const { return inside_B_; }
 
  private:
   using Triangle = std::array<Eigen::Vector3d, 3>;
@@ -45,7 +46,10 @@ class CellVisitor : public SurfacePairSearch::Visitor {
   Openings::Side test(const ConvexPart& cell_B, const Eigen::Vector3d& center_B, double radius) {
     ++tests_;
     const Openings::Side side = openings_.side(cell_B.number, X_AB_ * center_B, radius + slack_);
-    found_inside_ = found_inside_ || side == Openings::Side::kInside;
+    if (side == Openings::Side::kInside) {
+      found_inside_ = true;
+      inside_B_ = center_B;
+    }
     return side;
   }
 
@@ -87,6 +91,7 @@ class CellVisitor : public SurfacePairSearch::Visitor {
   const double slack_;
   int tests_ = 0;
   bool found_inside_ = false;
+  Eigen::Vector3d inside_B_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace
@@ -133,7 +138,10 @@ OpeningSearch::Answer OpeningSearch::decide(const Eigen::Isometry3d& X_BA, int* 
     for (const double slack : {kSlack, 0.0}) {
       CellVisitor visitor(a_.openings, X_AB, slack);
       const bool all_outside = search_.visit_near(slack, &visitor, &left);
-      if (visitor.found_inside()) answer = Answer::kInside;
+      if (visitor.found_inside()) {
+        answer = Answer::kInside;
+        inside_B_ = visitor.inside_B();
+      }
       if (!all_outside && !visitor.found_inside()) continue;
       if (all_outside) answer = Answer::kApart;
       clearance_ = all_outside ? slack : 0.0;

@@ -35,6 +35,8 @@ class OpeningSearch {
   /// @param X_BA  frame of A -> that of B, rigid
   /// @param steps  reduced by the pairs of boxes that were looked at
   Answer decide(const Eigen::Isometry3d& X_BA, int* steps);
+  /// [m] A point of B that is inside A, in B's frame; where the last answer was kInside.
+  const Eigen::Vector3d& inside_B() const { return inside_B_; }
 
  private:
   const LinkSurface& a_;
@@ -42,6 +44,7 @@ class OpeningSearch {
   SurfacePairSearch search_;
   double clearance_ = 0.0;  // [m] lower bound of the distance of openings and surface
   double moved_;            // [m] since search_.reference_pose()
+  Eigen::Vector3d inside_B_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace ist

@@ -13,6 +13,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m] A finished lower bound may be this much lower than the tolerance asks for: 0.2 um by rounding
 // for each metre of coordinates, of which there are no more than ten in a robot's work.
 constexpr double kBoundError = 2e-6;
+// [s] Links of which nothing is known yet may exceed the deadline by so much together: an answer
+// that is as late is worth more than none.
+constexpr double kFirstAnswers = 5e-5;
 
 }  // namespace
 
@@ -54,16 +57,35 @@ struct ProximityQuery::Impl {
   }
 
   // A query that has a deadline first asks every link to within half of its distance, which takes
-  // little time, so that no link is left without a bound.
+  // little time.
   QueryConfig first_config() const {
     QueryConfig first = config;
     if (config.deadline > 0.0) first.relative_tolerance = std::max(0.5, config.relative_tolerance);
     return first;
   }
 
-  // The links in `order` are sorted by what is proven then: those that may be nearest come first.
+  // Before any link is refined, every one in `order` gets a first lower bound and an obstacle that
+  // was measured.
+  void start(SnapshotSpan clouds, Deadline* deadline) {
+    for (const std::size_t i : order) {
+      const bool has_time = !deadline->passed_by(kFirstAnswers);
+      if (config.deadline > 0.0 && has_time) links[i].prove_first_bound(clouds);
+      links[i].warm_start(clouds, has_time);
+    }
+  }
+
+  // The links that seem to be nearest come first, and none takes more than its share of the time
+  // that is left. Afterwards the links in `order` are sorted by what is proven: those that may be
+  // nearest come first.
   void run_coarsely(SnapshotSpan clouds, Deadline* deadline) {
-    for (const std::size_t i : order) links[i].run(clouds, deadline);
+    std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+      return links[a].distance() < links[b].distance();
+    });
+    std::size_t left = order.size();
+    for (const std::size_t i : order) {
+      Deadline share(deadline, left--);
+      links[i].run(clouds, &share);
+    }
     std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
       return links[a].proven_bound() < links[b].proven_bound();
     });
@@ -107,8 +129,6 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
   impl_->statistics = {};
   Deadline deadline(impl_->config.deadline);
   const SceneId scene = impl_->scene.identify(clouds);
-  // All warm starts precede the first traversal, so that every link has an answer if the deadline
-  // passes.
   std::vector<std::size_t>& order = impl_->order;
   order.clear();
   std::fill(impl_->link_statistics.begin(), impl_->link_statistics.end(), QueryStatistics());
@@ -120,10 +140,9 @@ bool ProximityQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<b
     }
     order.push_back(i);
     impl_->links[i].begin(X_FL[i], clouds, scene, impl_->first_config(), {},
-                          &impl_->link_statistics[i]);
-    // Many links and a new cloud may take all of a short deadline here.
-    impl_->links[i].warm_start(clouds, !deadline.passed());
+                          &impl_->link_statistics[i], &deadline);
   }
+  impl_->start(clouds, &deadline);
   if (impl_->config.deadline > 0.0) impl_->run_coarsely(clouds, &deadline);
   const bool is_stopped = deadline.has_passed();
   bool complete = !is_stopped;
@@ -159,7 +178,7 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
       continue;
     }
     LinkQuery& link = impl_->links[i];
-    link.begin(X_FL[i], clouds, scene, impl_->config, nearest, &impl_->statistics);
+    link.begin(X_FL[i], clouds, scene, impl_->config, nearest, &impl_->statistics, &deadline);
     if (best == count) link.warm_start(clouds);
     complete = impl_->links[i].run(clouds, &deadline) && complete;
     all_in_regions = all_in_regions && link.is_inside_regions();
@@ -201,7 +220,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
   }
   Deadline deadline(impl_->config.deadline);
   impl_->links[link].begin(X_FL, clouds, impl_->scene.identify(clouds), impl_->config, {},
-                           &impl_->statistics);
+                           &impl_->statistics, &deadline);
   impl_->links[link].warm_start(clouds);
   const bool complete = impl_->links[link].run(clouds, &deadline);
   impl_->links[link].answer(clouds, result);

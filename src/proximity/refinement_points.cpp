@@ -93,14 +93,17 @@ PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d
   return Side::kOutside;
 }
 
-// A cell costs as much as a few points: where few have to be measured, it does not pay.
+// A cell costs as much as a few points: where few have to be measured, it does not pay. After the
+// deadline there is no time for one, nor for its plane.
 SignedDistanceGrid::Bound PointRefinement::grid_bound(const SignedDistanceGrid::Part& part,
                                                       double enough) {
   SignedDistanceGrid& grid = link_.context.grid;
-  SignedDistanceGrid::Cell* cell = link_.search.measured < kMeasuredBeforeCells
-                                       ? grid.find(part.center_L)
-                                       : grid.measure(part.center_L);
-  return cell == nullptr ? SignedDistanceGrid::Bound() : grid.bound(cell, part, enough);
+  SignedDistanceGrid::Cell* cell = grid.find(part.center_L);
+  if (cell == nullptr && link_.search.measured >= kMeasuredBeforeCells && !deadline_passed()) {
+    cell = grid.measure(part.center_L);
+  }
+  if (cell == nullptr) return {};
+  return grid.bound(cell, part, link_.search.deadline->has_passed() ? -kInfinity : enough);
 }
 
 bool PointRefinement::update_planes(SupportingPlanes* planes) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/relative_pose.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/link_pair_query.h"
@@ -25,6 +26,7 @@ void PairProximity::reset() {
   lower_bound = -std::numeric_limits<double>::infinity();
   p_FCa = p_FCb = direction = Eigen::Vector3d::Constant(kNaN);
   finished = true;
+  decided = false;
 }
 
 struct SelfQuery::Impl {
@@ -35,7 +37,7 @@ struct SelfQuery::Impl {
     bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
   };
 
-  void prepare();
+  void prepare(const CancelRequest& cancelled);
   bool finish(std::size_t pair, int steps);
   bool finish_by(Deadline* deadline);
 
@@ -51,7 +53,7 @@ struct SelfQuery::Impl {
   std::vector<LinkPairSearch::Entry> depth_queue;       // scratch
 };
 
-void SelfQuery::Impl::prepare() {
+void SelfQuery::Impl::prepare(const CancelRequest& cancelled) {
   const auto& links = model->links;
   surfaces.resize(links.size());
   X_FL.resize(links.size());
@@ -61,7 +63,7 @@ void SelfQuery::Impl::prepare() {
     if (std::max(pair.first, pair.second) >= links.size()) continue;
     if (!can_query(links[pair.first]) || !can_query(links[pair.second])) continue;
     for (const std::size_t i : {pair.first, pair.second}) {
-      if (!surfaces[i]) surfaces[i] = LinkSurface::of(links[i]);
+      if (!surfaces[i]) surfaces[i] = LinkSurface::of(links[i], cancelled);
       entries = std::max(entries, (links[i].tree.nodes().size() + 1) * kSphereWidth);
     }
     queries.back() = std::make_unique<LinkPairQuery>(links[pair.first], links[pair.second],
@@ -72,12 +74,17 @@ void SelfQuery::Impl::prepare() {
 }
 
 SelfQuery::SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-                     const QueryConfig& config)
+                     const QueryConfig& config, const std::function<bool()>& cancelled)
     : impl_(std::make_unique<Impl>()) {
   impl_->model = std::move(model);
   impl_->pairs = std::move(pairs);
   impl_->config = config;
-  impl_->prepare();
+  try {
+    impl_->prepare(cancelled);
+  } catch (const Cancelled&) {
+    impl_->queries.clear();
+    impl_->queries.resize(impl_->pairs.size());
+  }
 }
 SelfQuery::~SelfQuery() = default;
 SelfQuery::SelfQuery(SelfQuery&&) noexcept = default;

@@ -191,6 +191,7 @@ class SingleTreeSearch {
     const Bound by_cover = cover_bound(part.center_L, part.radius);
     if (by_cover.now >= search_.prune_bound()) return by_cover;
     if (cell != nullptr || part.radius > kLargestBox * grid_.plane_radius()) return by_cover;
+    if (search_.deadline->passed()) return by_cover;
     cell = grid_.measure(part.center_L);
     return cell == nullptr ? by_cover : bound(grid_bound(cell, part), kInfinity);
   }
@@ -237,6 +238,7 @@ class SingleTreeSearch {
     }
     int next;
     while ((next = tile_.most_promising(search_.prune_bound())) >= 0) {
+      if ((is_stopped_ = search_.deadline->passed())) break;
       tile_.is_open[static_cast<std::size_t>(next)] = false;
       measure({tile_index, next});
     }

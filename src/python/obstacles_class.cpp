@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "arrays.h"
+#include "extent_class.h"
 #include "ist_proximity/facade/robot.h"
 
 namespace ist::python {
@@ -20,6 +21,8 @@ sensor_pose: (4, 4), frame of the points -> root link's frame; None: they are in
 min_range, max_range: [m] points nearer to or farther from the origin of their frame are dropped.
 robot, q, self_filter_padding: points at most the padding [m] from the robot at configuration q are
   dropped.
+extent: how large points are, so that lower bounds hold for the surface in place of its samples: an
+  Extent, or a number: their radius [m]. None: points are points.
 
 Raises ValueError for a wrong shape or setting, ModelError for a file that cannot be read.
 Immutable; threads may share it; it pickles.)";
@@ -37,33 +40,34 @@ Eigen::Isometry3d to_pose(const DoubleArray& X) {
   return pose;
 }
 
-/// Indexes an array without holding the GIL.
+/// Views a C-contiguous array.
 template <class T>
-Obstacles from_array(const py::array_t<T, py::array::c_style | py::array::forcecast>& points,
-                     const ObstaclesConfig& config) {
-  using Vector = Eigen::Matrix<T, 3, 1>;
-  const T* data = points.data();
-  if (points.ndim() == 2 && points.shape(1) == 3) {
-    const auto count = static_cast<std::size_t>(points.shape(0));
-    const py::gil_scoped_release unlocked;
-    return Obstacles(Span<const Vector>(reinterpret_cast<const Vector*>(data), count), config);
+PointArray view(const py::array& given) {
+  auto points = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(given);
+  if (!points) throw py::error_already_set();
+  const bool is_list = points.ndim() == 2 && points.shape(1) == 3;
+  if (!is_list && !(points.ndim() == 3 && points.shape(2) == 3)) {
+    throw py::value_error("points have the shape (n, 3) or (h, w, 3); an array of shape " +
+                          to_string(points) + " was given");
   }
-  if (points.ndim() == 3 && points.shape(2) == 3) {
-    const auto width = static_cast<std::size_t>(points.shape(1));
-    const auto height = static_cast<std::size_t>(points.shape(0));
-    const py::gil_scoped_release unlocked;
-    return Obstacles::from_image(data, width, height, config);
-  }
-  throw py::value_error("points have the shape (n, 3) or (h, w, 3); an array of shape " +
-                        to_string(points) + " was given");
+  const auto height = is_list ? 1 : static_cast<std::size_t>(points.shape(0));
+  const auto width = static_cast<std::size_t>(points.shape(is_list ? 0 : 1));
+  PointArray result;
+  result.cloud = packed_cloud(points.data(), width, height);
+  result.array = std::move(points);
+  return result;
 }
 
-Obstacles index(const py::object& points, const ObstaclesConfig& config) {
+PointArray read(const py::object& points) {
   const bool is_path = py::isinstance<py::str>(points) || py::hasattr(points, "__fspath__");
   if (is_path) {
     const std::string path = py::str(points);
+    PointArray result;
     const py::gil_scoped_release unlocked;
-    return Obstacles::from_file(path, config);
+    result.file = read_points(path);
+    const double* data = result.file.points.empty() ? nullptr : result.file.points.data()->data();
+    result.cloud = packed_cloud(data, result.file.width, result.file.height);
+    return result;
   }
   const py::array array = py::array::ensure(points);
   if (!array ||
@@ -71,20 +75,34 @@ Obstacles index(const py::object& points, const ObstaclesConfig& config) {
     PyErr_Clear();
     throw py::type_error("points are an array of numbers of shape (n, 3) or (h, w, 3), or a path");
   }
-  if (array.dtype().kind() == 'f' && array.itemsize() == sizeof(float)) {
-    return from_array<float>(array, config);
-  }
-  return from_array<double>(array, config);
+  if (array.dtype().kind() == 'f' && array.itemsize() == sizeof(float)) return view<float>(array);
+  return view<double>(array);
 }
 
-PyObstacles make(const py::object& points, const py::object& sensor_pose, double min_range,
-                 double max_range, const py::object& robot, const py::object& q,
-                 double self_filter_padding) {
+template <class T>
+Obstacles index_as(const RawCloud& cloud, const ObstaclesConfig& config) {
+  using Vector = Eigen::Matrix<T, 3, 1>;
+  const auto* data = reinterpret_cast<const T*>(cloud.data);
+  if (cloud.height != 1) return Obstacles::from_image(data, cloud.width, cloud.height, config);
+  return Obstacles(Span<const Vector>(reinterpret_cast<const Vector*>(data), cloud.width), config);
+}
+
+/// Indexes points without holding the GIL.
+Obstacles index(const PointArray& points, const ObstaclesConfig& config) {
+  const py::gil_scoped_release unlocked;
+  return points.cloud.is_double ? index_as<double>(points.cloud, config)
+                                : index_as<float>(points.cloud, config);
+}
+
+ObstaclesConfig config_of(const py::dict& arguments) {
   ObstaclesConfig config;
+  const py::object sensor_pose = arguments["sensor_pose"], robot = arguments["robot"],
+                   q = arguments["q"], extent = arguments["extent"];
   if (!sensor_pose.is_none()) config.X_FS = to_pose(py::cast<DoubleArray>(sensor_pose));
-  config.min_range = min_range;
-  config.max_range = max_range;
-  config.self_filter_padding = self_filter_padding;
+  config.min_range = py::cast<double>(arguments["min_range"]);
+  config.max_range = py::cast<double>(arguments["max_range"]);
+  config.self_filter_padding = py::cast<double>(arguments["self_filter_padding"]);
+  if (!extent.is_none()) config.extent = to_extent(extent);
   if (!robot.is_none()) {
     config.robot = py::cast<const Robot*>(robot);
     const auto positions = py::cast<DoubleArray>(
@@ -93,6 +111,12 @@ PyObstacles make(const py::object& points, const py::object& sensor_pose, double
                 "q has one position for each of the robot's joints");
     config.q.assign(positions.data(), positions.data() + positions.size());
   }
+  return config;
+}
+
+PyObstacles make(const py::object& points, const py::object& sensor_pose, double min_range,
+                 double max_range, const py::object& robot, const py::object& q,
+                 double self_filter_padding, const py::object& extent) {
   py::dict arguments;
   arguments["sensor_pose"] = sensor_pose;
   arguments["min_range"] = min_range;
@@ -100,10 +124,15 @@ PyObstacles make(const py::object& points, const py::object& sensor_pose, double
   arguments["robot"] = robot;
   arguments["q"] = q;
   arguments["self_filter_padding"] = self_filter_padding;
-  return {index(points, config), points, arguments};
+  arguments["extent"] = extent;
+  return {index(read(points), config_of(arguments)), points, arguments};
 }
 
 }  // namespace
+
+PointArray read_again(const PyObstacles& obstacles) { return read(obstacles.points); }
+
+ObstaclesConfig config_of(const PyObstacles& obstacles) { return config_of(obstacles.arguments); }
 
 void define_obstacles(py::module_* module) {
   const ObstaclesConfig defaults;
@@ -111,7 +140,8 @@ void define_obstacles(py::module_* module) {
       .def(py::init(&make), py::arg("points"), py::kw_only(), py::arg("sensor_pose") = py::none(),
            py::arg("min_range") = defaults.min_range, py::arg("max_range") = kInfinity,
            py::arg("robot") = py::none(), py::arg("q") = py::none(),
-           py::arg("self_filter_padding") = defaults.self_filter_padding)
+           py::arg("self_filter_padding") = defaults.self_filter_padding,
+           py::arg("extent") = py::none())
       .def("__len__", [](const PyObstacles& one) { return one.obstacles.size(); })
       .def_property_readonly(
           "counts",

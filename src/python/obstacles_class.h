@@ -2,6 +2,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/facade/obstacles.h"
 
 namespace ist::python {
@@ -12,6 +13,18 @@ struct PyObstacles {
   pybind11::object points;   ///< the array or path
   pybind11::dict arguments;  ///< keyword arguments
 };
+
+/// Points in memory, which stay as they are as long as this lives.
+struct PointArray {
+  pybind11::object array;  ///< keeps the points of an array
+  PointFile file;          ///< keeps the points of a file
+  RawCloud cloud;          ///< views them
+};
+
+/// The points that an Obstacles object was made of. A file is read again.
+PointArray read_again(const PyObstacles& obstacles);
+/// The settings that it was made with. A robot among them lives as long as the object.
+ObstaclesConfig config_of(const PyObstacles& obstacles);
 
 /// Defines the class Obstacles; Robot is declared.
 void define_obstacles(pybind11::module_* module);

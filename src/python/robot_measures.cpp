@@ -67,26 +67,25 @@ py::list measure_packing_of(const Robot& robot) {
   return links;
 }
 
-py::dict cycle_cost(const Robot& robot, const DoubleArray& q, const py::list& scenes, int per_cloud,
-                    double max_distance, double tolerance, double deadline,
-                    double influence_distance) {
+py::dict cycle_cost(const Robot& robot, const DoubleArray& q, const PyObstacles& obstacles,
+                    int per_cloud, double period, double max_distance, double tolerance,
+                    double deadline, double influence_distance) {
   check_shape(q, 2, static_cast<py::ssize_t>(robot.joints().size()),
               "q has the shape (n, joints), joints being the number of Robot.joints");
-  std::vector<Obstacles> snapshots;
-  for (const py::handle scene : scenes) {
-    snapshots.push_back(py::cast<const PyObstacles&>(scene).obstacles);
-  }
-  QueryConfig query;
-  query.max_distance = max_distance;
-  query.tolerance = tolerance;
-  query.deadline = deadline;
-  RepulsionConfig repulsion;
-  repulsion.influence_distance = influence_distance;
+  CycleConfig config;
+  config.per_cloud = per_cloud;
+  config.period = period;
+  config.query.max_distance = max_distance;
+  config.query.tolerance = tolerance;
+  config.query.deadline = deadline;
+  config.repulsion.influence_distance = influence_distance;
+  const PointArray points = read_again(obstacles);
+  const ObstaclesConfig settings = config_of(obstacles);
   const Span<const double> values(q.data(), static_cast<std::size_t>(q.size()));
   CycleCost cost;
   {
     const py::gil_scoped_release unlocked;
-    cost = measure_cycles(robot, values, snapshots, per_cloud, query, repulsion);
+    cost = measure_cycles(robot, values, points.cloud, settings, config);
   }
   py::dict result;
   result["query"] = py::array(py::cast(cost.query));
@@ -107,14 +106,17 @@ void define_measures(py::class_<Robot>* type) {
       "measure_packing", &measure_packing_of,
       "For each link a dictionary: solid_volume, filled_volume [m^3] and protrusion [m], from "
       "samples, and the number of open_edges of its meshes.");
-  type->def("cycle_cost", &cycle_cost, py::arg("q"), py::arg("scenes"), py::kw_only(),
-            py::arg("per_cloud") = 33, py::arg("max_distance") = QueryConfig().max_distance,
+  const CycleConfig defaults;
+  type->def("cycle_cost", &cycle_cost, py::arg("q"), py::arg("obstacles"), py::kw_only(),
+            py::arg("per_cloud") = defaults.per_cloud, py::arg("period") = defaults.period,
+            py::arg("max_distance") = QueryConfig().max_distance,
             py::arg("tolerance") = QueryConfig().tolerance, py::arg("deadline") = 0.0,
             py::arg("influence_distance") = RepulsionConfig().influence_distance,
             R"(The times of a control loop's cycles along a motion, on one thread of this machine.
 
-q: (n, joints), the motion. scenes: a list of Obstacles; the next one takes its turn every per_cloud
-cycles. Returns a dictionary of arrays (n,): query and repulsion [s]; width [m], the largest
+q: (n, joints), the motion. obstacles: its points come again as a new cloud every per_cloud cycles,
+indexed by another thread. period: [s] of the cycles, between which the thread sleeps; 0: no sleep.
+Returns a dictionary of arrays (n,): query and repulsion [s]; width [m], the largest
 distance - lower_bound; smallest [m], the smallest lower bound; unknown, a number of links.)");
 }
 

@@ -33,6 +33,61 @@ HWY_INLINE float NearestPair(const Index& index, const PosedSpheres& spheres, fl
   return limit;
 }
 
+// The nearest points of a group's spheres.
+HWY_INLINE void KeepNearest(const ThinnedTile& tile, const PosedGroup& group, std::size_t g,
+                            NearestPoints* points) {
+  const Tag d;
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    const std::size_t slot = g * kWidth + k;
+    const V radius = hn::Load(d, group.radius + k);
+    V nearest = hn::Load(d, points->distance + slot);
+    V x = hn::Load(d, points->offset[0] + slot), y = hn::Load(d, points->offset[1] + slot),
+      z = hn::Load(d, points->offset[2] + slot);
+    for (int i = 0; i < tile.count; ++i) {
+      const Offset o = ToSpheres(tile, i, group, k);
+      const V distance = hn::Sub(hn::Sqrt(SquaredNorm(o)), radius);
+      const auto is_nearer = hn::Lt(distance, nearest);
+      nearest = hn::Min(distance, nearest);
+      x = hn::IfThenElse(is_nearer, o.x, x);
+      y = hn::IfThenElse(is_nearer, o.y, y);
+      z = hn::IfThenElse(is_nearer, o.z, z);
+    }
+    hn::Store(nearest, d, points->distance + slot);
+    hn::Store(x, d, points->offset[0] + slot);
+    hn::Store(y, d, points->offset[1] + slot);
+    hn::Store(z, d, points->offset[2] + slot);
+  }
+}
+
+// [m] The least distance of a group's nearest points.
+HWY_INLINE float Least(const NearestPoints& points, std::size_t g) {
+  const Tag d;
+  V least = hn::Set(d, kFarAway);
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    least = hn::Min(least, hn::Load(d, points.distance + g * kWidth + k));
+  }
+  return hn::GetLane(hn::MinOfLanes(d, least));
+}
+
+HWY_INLINE float NearestBySphere(const ThinnedCloud& cloud, const PosedSpheres& spheres,
+                                 float limit, Deadline* deadline, float slack,
+                                 NearestPoints* points) {
+  PosedLink link;
+  Pose(spheres, &link);
+  std::fill_n(points->distance, kCoarseSpheres, kFarAway);
+  std::fill_n(&points->offset[0][0], 3 * kCoarseSpheres, 0.0F);
+  float nearest = limit, within = limit + slack;
+  VisitTiles(cloud, link, within, deadline, [&](const ThinnedTile& tile, std::uint32_t groups) {
+    for (; groups != 0; groups &= groups - 1) {
+      const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
+      KeepNearest(tile, link.groups[g], g, points);
+      nearest = std::min(nearest, Least(*points, g));
+      within = nearest + slack;
+    }
+  });
+  return nearest;
+}
+
 // The weight of each point: how much of its cell a surface through it covers.
 HWY_INLINE void CellWeights(const ThinnedTile& tile, float* weights) {
   const Tag d;
@@ -47,7 +102,7 @@ HWY_INLINE void CellWeights(const ThinnedTile& tile, float* weights) {
 }
 
 // The sums of each sphere of a group.
-struct SphereSums {
+struct GroupSums {
   alignas(64) float x[kWidth] = {}, y[kWidth] = {}, z[kWidth] = {};
   alignas(64) float weight[kWidth] = {}, undirected[kWidth] = {};
 };
@@ -55,7 +110,7 @@ struct SphereSums {
 // weights: by point, or box.
 template <class Tile>
 HWY_INLINE void AddTile(const Tile& tile, const float* weights, const PosedGroup& group,
-                        float nearest, float per_smoothing, SphereSums* sums) {
+                        float nearest, float per_smoothing, GroupSums* sums) {
   const Tag d;
   // A shorter offset has no direction but noise; its weight moves over to the fallback smoothly.
   constexpr float kTiny = 1e-6F;  // [m]
@@ -90,9 +145,88 @@ HWY_INLINE void AddTile(const Tile& tile, const float* weights, const PosedGroup
   }
 }
 
+// The middle of some points, each with its weight.
+struct Middle {
+  float x = 0.0F, y = 0.0F, z = 0.0F, weight = 0.0F;
+};
+
+HWY_INLINE Middle FindMiddle(const ThinnedTile& tile, int begin, int end, const float* weights) {
+  Middle middle;
+  for (int i = begin; i < end; ++i) {
+    middle.x += weights[i] * tile.x[i];
+    middle.y += weights[i] * tile.y[i];
+    middle.z += weights[i] * tile.z[i];
+    middle.weight += weights[i];
+  }
+  const float scale = middle.weight > 0.0F ? 1.0F / middle.weight : 0.0F;
+  middle.x *= scale;
+  middle.y *= scale;
+  middle.z *= scale;
+  return middle;
+}
+
+HWY_INLINE void Accumulate(V v, float* sum) {
+  const Tag d;
+  hn::Store(hn::Add(hn::Load(d, sum), v), d, sum);
+}
+
+// The slopes of a group's sums.
+HWY_INLINE void AddSlopes(const Middle& middle, const PosedGroup& group, std::size_t g,
+                          float nearest, float per_smoothing, SphereSums* sums) {
+  const Tag d;
+  // [m] Nearer to a centre than the points of a tile are to one another, slopes mean nothing.
+  constexpr float kLeast = 5e-3F;
+  const V slope = hn::Set(d, per_smoothing);
+  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
+    const std::size_t slot = g * kWidth + k;
+    const Offset o = {hn::Sub(hn::Load(d, group.x + k), hn::Set(d, middle.x)),
+                      hn::Sub(hn::Load(d, group.y + k), hn::Set(d, middle.y)),
+                      hn::Sub(hn::Load(d, group.z + k), hn::Set(d, middle.z))};
+    const V squared = hn::Max(SquaredNorm(o), hn::Set(d, kLeast * kLeast));
+    const V inverse = InverseRoot(squared);
+    const V d_min = hn::Add(hn::Load(d, group.radius + k), hn::Set(d, nearest));
+    const V root = hn::Max(
+        hn::MulAdd(hn::NegMulAdd(squared, inverse, d_min), slope, hn::Set(d, 1.0F)), hn::Zero(d));
+    const V part = hn::Mul(root, hn::Set(d, middle.weight));
+    const V per_length = hn::Mul(hn::Mul(part, root), inverse);
+    const V weight_slope = hn::Mul(part, hn::Set(d, -2.0F * per_smoothing));
+    const V over_sq = hn::Mul(hn::Sub(weight_slope, per_length), hn::Mul(inverse, inverse));
+    const V over = hn::Mul(weight_slope, inverse);
+    const V x = hn::Mul(over_sq, o.x), y = hn::Mul(over_sq, o.y), z = hn::Mul(over_sq, o.z);
+    Accumulate(per_length, sums->per_length + slot);
+    Accumulate(weight_slope, sums->weight_slope + slot);
+    Accumulate(hn::Mul(over, o.x), sums->slope[0] + slot);
+    Accumulate(hn::Mul(over, o.y), sums->slope[1] + slot);
+    Accumulate(hn::Mul(over, o.z), sums->slope[2] + slot);
+    Accumulate(hn::Mul(x, o.x), sums->outer[0] + slot);
+    Accumulate(hn::Mul(y, o.y), sums->outer[1] + slot);
+    Accumulate(hn::Mul(z, o.z), sums->outer[2] + slot);
+    Accumulate(hn::Mul(x, o.y), sums->outer[3] + slot);
+    Accumulate(hn::Mul(y, o.z), sums->outer[4] + slot);
+    Accumulate(hn::Mul(z, o.x), sums->outer[5] + slot);
+  }
+}
+
+// Neighbours are taken for one point where the tile is small, as in a dense cloud.
+HWY_INLINE void AddTileSlopes(const ThinnedTile& tile, const float* weights,
+                              const PosedGroup& group, std::size_t g, const Band& band,
+                              SphereSums* sums) {
+  constexpr float kSmall = 0.6F;  // of the smoothing
+  constexpr int kNeighbours = 4;
+  const SingleBox& box = tile.box;
+  const float x = box.max_x[0] - box.min_x[0], y = box.max_y[0] - box.min_y[0],
+              z = box.max_z[0] - box.min_z[0];
+  const float small = kSmall * band.smoothing;
+  const int step = x * x + y * y + z * z < small * small ? kNeighbours : 1;
+  for (int i = 0; i < tile.count; i += step) {
+    const Middle middle = FindMiddle(tile, i, std::min(i + step, tile.count), weights);
+    AddSlopes(middle, group, g, band.nearest, 1.0F / band.smoothing, sums);
+  }
+}
+
 HWY_INLINE float Sum(V v) { return hn::GetLane(hn::SumOfLanes(Tag(), v)); }
 
-HWY_INLINE PairSums Total(const SphereSums& sums, const PosedGroup& group) {
+HWY_INLINE PairSums Total(const GroupSums& sums, const PosedGroup& group) {
   const Tag d;
   PairSums total;
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
@@ -117,10 +251,11 @@ HWY_INLINE PairSums Total(const SphereSums& sums, const PosedGroup& group) {
 
 template <class Index>
 HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, const Band& band,
-                               Deadline* deadline) {
+                               Deadline* deadline, SphereSums* by_sphere) {
+  if (by_sphere != nullptr) *by_sphere = {};
   PosedLink link;
   Pose(spheres, &link);
-  std::array<SphereSums, kMaxGroups> sums;
+  std::array<GroupSums, kMaxGroups> sums;
   const float limit = band.nearest + band.smoothing;
   alignas(64) float weights[kWidth];
   std::fill_n(weights, kWidth, 1.0F);
@@ -129,10 +264,19 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, 
     for (; groups != 0; groups &= groups - 1) {
       const std::size_t g = hwy::Num0BitsBelowLS1Bit_Nonzero32(groups);
       AddTile(tile, weights, link.groups[g], band.nearest, 1.0F / band.smoothing, &sums[g]);
+      if constexpr (std::is_same_v<Index, ThinnedCloud>) {
+        if (by_sphere != nullptr) AddTileSlopes(tile, weights, link.groups[g], g, band, by_sphere);
+      }
     }
   });
   PairSums total;
   for (std::size_t g = 0; g < link.count; ++g) total.add(Total(sums[g], link.groups[g]));
+  for (std::size_t g = 0; by_sphere != nullptr && g < link.count; ++g) {
+    std::copy_n(sums[g].x, kWidth, by_sphere->force[0] + g * kWidth);
+    std::copy_n(sums[g].y, kWidth, by_sphere->force[1] + g * kWidth);
+    std::copy_n(sums[g].z, kWidth, by_sphere->force[2] + g * kWidth);
+    std::copy_n(sums[g].weight, kWidth, by_sphere->weight + g * kWidth);
+  }
   return total;
 }
 
@@ -140,7 +284,10 @@ HWY_INLINE PairSums BlendPairs(const Index& index, const PosedSpheres& spheres, 
 
 // HWY_EXPORT asks for these here.
 float NearestPointPair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
-                       Deadline* deadline) {
+                       Deadline* deadline, float slack, NearestPoints* points) {
+  if (points != nullptr) {
+    return blend::NearestBySphere(cloud, spheres, limit, deadline, slack, points);
+  }
   return blend::NearestPair(cloud, spheres, limit, deadline);
 }
 float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
@@ -148,12 +295,12 @@ float NearestBoxPair(const BoxBvh& index, const PosedSpheres& spheres, float lim
   return blend::NearestPair(index, spheres, limit, deadline);
 }
 PairSums BlendPointPairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
-                         Deadline* deadline) {
-  return blend::BlendPairs(cloud, spheres, band, deadline);
+                         Deadline* deadline, SphereSums* by_sphere) {
+  return blend::BlendPairs(cloud, spheres, band, deadline, by_sphere);
 }
 PairSums BlendBoxPairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
-                       Deadline* deadline) {
-  return blend::BlendPairs(index, spheres, band, deadline);
+                       Deadline* deadline, SphereSums* by_sphere) {
+  return blend::BlendPairs(index, spheres, band, deadline, by_sphere);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -179,9 +326,9 @@ void PairSums::add(const PairSums& other) {
 }
 
 float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
-                   Deadline* deadline) {
+                   Deadline* deadline, float slack, NearestPoints* points) {
   if (cloud.empty()) return limit;
-  return HWY_DYNAMIC_DISPATCH(NearestPointPair)(cloud, spheres, limit, deadline);
+  return HWY_DYNAMIC_DISPATCH(NearestPointPair)(cloud, spheres, limit, deadline, slack, points);
 }
 
 float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
@@ -191,15 +338,15 @@ float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit
 }
 
 PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
-                     Deadline* deadline) {
+                     Deadline* deadline, SphereSums* by_sphere) {
   if (cloud.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(cloud, spheres, band, deadline);
+  return HWY_DYNAMIC_DISPATCH(BlendPointPairs)(cloud, spheres, band, deadline, by_sphere);
 }
 
 PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
-                     Deadline* deadline) {
+                     Deadline* deadline, SphereSums* by_sphere) {
   if (index.empty()) return {};
-  return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band, deadline);
+  return HWY_DYNAMIC_DISPATCH(BlendBoxPairs)(index, spheres, band, deadline, by_sphere);
 }
 
 }  // namespace ist

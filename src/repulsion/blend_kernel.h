@@ -31,10 +31,33 @@ struct PairSums {
   void add(const PairSums& other);
 };
 
+/// Numbers by sphere, in the order of the groups' slots; in O where they are vectors.
+using BySphere = float[kCoarseSpheres];
+
+/// The nearest point of each sphere.
+struct alignas(64) NearestPoints {
+  BySphere distance;   ///< [m] negative in the sphere; kFarAway where none was found
+  BySphere offset[3];  ///< [m] from the point to the sphere's centre
+};
+
+/// What a blend is made of, and how that changes as the spheres move. d is a pair's distance, w'
+/// the derivative of its weight by d.
+struct alignas(64) SphereSums {
+  BySphere force[3];  ///< of w n
+  BySphere weight;    ///< of w
+  // Sums in which neighbouring points may be taken for one in their middle.
+  BySphere per_length;    ///< [1/m] of w over the distance from the point to the centre, h
+  BySphere outer[6];      ///< [1/m] of (w' - w / h) n n^T: xx, yy, zz, xy, yz, zx
+  BySphere slope[3];      ///< [1/m] of w' n
+  BySphere weight_slope;  ///< [1/m] of w'
+};
+
 /// [m] The smallest distance of a pair, negative where a point is in a sphere; `limit` where no
 /// pair is nearer than that. Once the deadline has passed, the result may be too large.
+/// @param points  may be null; overwritten with the nearest point of each sphere for which that is
+///                no more than `slack` [m] farther than the result
 float nearest_pair(const ThinnedCloud& cloud, const PosedSpheres& spheres, float limit,
-                   Deadline* deadline);
+                   Deadline* deadline, float slack = 0.0F, NearestPoints* points = nullptr);
 float nearest_pair(const BoxBvh& index, const PosedSpheres& spheres, float limit,
                    Deadline* deadline);
 
@@ -53,9 +76,10 @@ constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
 
 /// The sums over all pairs nearer than nearest + smoothing; w = (1 - (d - nearest) / smoothing)^2
 /// times the points' weight. Once the deadline has passed, pairs are missing.
+/// @param by_sphere  may be null; overwritten. Slopes are 0 for boxes, which are not known
 PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
-                     Deadline* deadline);
+                     Deadline* deadline, SphereSums* by_sphere = nullptr);
 PairSums blend_pairs(const BoxBvh& index, const PosedSpheres& spheres, const Band& band,
-                     Deadline* deadline);
+                     Deadline* deadline, SphereSums* by_sphere = nullptr);
 
 }  // namespace ist

@@ -1,13 +1,12 @@
 #include "ist_proximity/repulsion/kept_repulsion.h"
 
-#include <cmath>
+#include <algorithm>
 #include <cstring>
+
+#include "repulsion/blend_expansion.h"
 
 namespace ist {
 namespace {
-
-// A shorter vector does not tell its direction well enough to be kept.
-constexpr double kLeastLength = 1e-6;
 
 // obstacles_key(), and where maps are: those of a robot that drives are placed anew in every cycle.
 std::uint64_t placed_obstacles_key(SnapshotSpan clouds) {
@@ -24,22 +23,19 @@ std::uint64_t placed_obstacles_key(SnapshotSpan clouds) {
   return key;
 }
 
+// An expansion may make the mean of unit vectors longer than they are.
+RepulsiveWrench mean(const BlendExpansion::Sums& sums, double length) {
+  const double scale = length / std::max(sums.weight, sums.wrench.force.norm() * (1.0 - 1e-6));
+  return {scale * sums.wrench.force, scale * sums.wrench.torque};
+}
+
 }  // namespace
 
-KeptRepulsion::KeptRepulsion(const RobotModel& model, std::size_t link) : link_(link) {
-  const InnerSphereTree& tree = model.links[link].tree;
-  if (tree.empty()) return;
-  center_ = tree.center();
-  radius_ = tree.radius();
-}
-
-// [m] No point of the bounding sphere has moved farther since the last blend: its centre's motion,
-// and the chord that the rotation makes at its radius (the largest singular value of a difference
-// of two rotations is its Frobenius norm over the root of 2).
-double KeptRepulsion::moved(const Eigen::Isometry3d& X_FL) const {
-  return (X_FL * center_ - X_FL_ * center_).norm() +
-         std::sqrt(0.5) * (X_FL.linear() - X_FL_.linear()).norm() * radius_;
-}
+KeptRepulsion::KeptRepulsion(std::size_t link)
+    : link_(link), blend_(std::make_unique<BlendExpansion>()) {}
+KeptRepulsion::~KeptRepulsion() = default;
+KeptRepulsion::KeptRepulsion(KeptRepulsion&&) noexcept = default;
+KeptRepulsion& KeptRepulsion::operator=(KeptRepulsion&&) noexcept = default;
 
 RepulsiveWrench KeptRepulsion::update(const Repulsion& repulsion, const Eigen::Isometry3d& X_FL,
                                       SnapshotSpan clouds, const LinkProximity& proximity,
@@ -51,18 +47,19 @@ RepulsiveWrench KeptRepulsion::update(const Repulsion& repulsion, const Eigen::I
   const double length = config.gain * repulsion_strength(proximity, config);
   if (!(length > 0.0)) return {};
   const std::uint64_t obstacles = placed_obstacles_key(clouds);
-  // Written so that a pose that is NaN keeps nothing.
+  const double strength = repulsion_strength(proximity, config);
+  BlendExpansion::Sums sums;
   if (is_kept_ && obstacles == obstacles_ && config.smoothing == smoothing_ &&
-      moved(X_FL) <= kKeptMotion * smoothing_) {
-    return {length * per_length_.force, length * per_length_.torque};
+      blend_->find(X_FL, kKeptMotion * smoothing_ / strength, kMostKeptMotion * smoothing_,
+                   &sums)) {
+    return mean(sums, length);
   }
-  const RepulsiveWrench blend = repulsion.wrench(link_, X_FL, clouds, proximity, config, end);
-  is_kept_ = blend.force.allFinite() && length > kLeastLength;
-  if (!is_kept_) return blend;
-  X_FL_ = X_FL;
+  is_kept_ = false;
+  const RepulsiveWrench blend =
+      repulsion.blend(link_, X_FL, clouds, proximity, config, end, blend_.get());
+  is_kept_ = blend.force.allFinite() && !blend_->empty();
   obstacles_ = obstacles;
   smoothing_ = config.smoothing;
-  per_length_ = {blend.force / length, blend.torque / length};
   return blend;
 }
 

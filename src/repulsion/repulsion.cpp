@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "internal/cloud/point_bvh.h"
 #include "internal/geometry/relative_pose.h"
+#include "ist_proximity/repulsion/kept_repulsion.h"
+#include "repulsion/blend_expansion.h"
 #include "repulsion/blend_kernel.h"
 #include "repulsion/coarse_spheres.h"
 
@@ -15,6 +18,11 @@ namespace {
 
 // [m] A smaller smoothing would be lost in the rounding of float coordinates far from the origin.
 constexpr double kLeastSmoothing = 1e-3;
+
+// Of the smoothing: for an expansion, the nearest points of spheres are found that are this much
+// farther than the nearest pair. A sphere that is farther does not become the nearest one while
+// spheres move by half of this, KeptRepulsion::kMostKeptMotion.
+constexpr auto kSlack = static_cast<float>(2.0 * KeptRepulsion::kMostKeptMotion);
 
 PosedSpheres posed(const std::vector<SphereGroup>& groups, const Eigen::Isometry3d& X_OL) {
   PosedSpheres spheres;
@@ -64,6 +72,34 @@ struct Total {
   }
 };
 
+// The nearest pair, and where an expansion is wanted the nearest point of each sphere.
+float find_nearest(const ThinnedCloud& cloud, const PosedSpheres& spheres,
+                   const Eigen::Matrix3d& R_FO, const Band& band, Deadline* deadline,
+                   BlendExpansion* expansion) {
+  if (expansion == nullptr) return nearest_pair(cloud, spheres, band.nearest, deadline);
+  NearestPoints points;
+  const float slack = kSlack * band.smoothing;
+  const float nearest = nearest_pair(cloud, spheres, band.nearest, deadline, slack, &points);
+  expansion->add(points, R_FO);
+  return nearest;
+}
+float find_nearest(const BoxBvh& map, const PosedSpheres& spheres, const Eigen::Matrix3d& /*R_FO*/,
+                   const Band& band, Deadline* deadline, BlendExpansion* /*expansion*/) {
+  return nearest_pair(map, spheres, band.nearest, deadline);
+}
+
+// The sums over pairs, and where an expansion is wanted those of each sphere. A map has no slopes:
+// the point of a box that is nearest to a sphere moves along with it.
+template <class Index>
+PairSums sum_pairs(const Index& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO,
+                   const Band& band, Deadline* deadline, BlendExpansion* expansion) {
+  if (expansion == nullptr) return blend_pairs(index, spheres, band, deadline);
+  SphereSums by_sphere;
+  const PairSums sums = blend_pairs(index, spheres, band, deadline, &by_sphere);
+  expansion->add(by_sphere, R_FO, std::is_same_v<Index, ThinnedCloud>);
+  return sums;
+}
+
 RepulsiveWrench scaled(const RepulsiveWrench& wrench, double factor) {
   return {factor * wrench.force, factor * wrench.torque};
 }
@@ -105,6 +141,13 @@ Repulsion::Repulsion(const std::shared_ptr<const RobotModel>& model) {
 RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_FL,
                                   SnapshotSpan clouds, const LinkProximity& proximity,
                                   const RepulsionConfig& config, TimePoint end) const {
+  return blend(link, X_FL, clouds, proximity, config, end, nullptr);
+}
+
+RepulsiveWrench Repulsion::blend(std::size_t link, const Eigen::Isometry3d& X_FL,
+                                 SnapshotSpan clouds, const LinkProximity& proximity,
+                                 const RepulsionConfig& config, TimePoint end,
+                                 BlendExpansion* expansion) const {
   const bool has_link = link < spheres_->by_link.size();
   if (proximity.state == LinkState::kUnknown || !has_link) return RepulsiveWrench::unknown();
   const double strength = repulsion_strength(proximity, config);
@@ -113,21 +156,26 @@ RepulsiveWrench Repulsion::wrench(std::size_t link, const Eigen::Isometry3d& X_F
   if (deadline.passed()) return RepulsiveWrench::unknown();
 
   const std::vector<SphereGroup>& groups = spheres_->by_link[link];
+  const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
+  if (expansion != nullptr) expansion->begin(groups, X_FL);
   float nearest = std::numeric_limits<float>::infinity();
-  for_each_index(clouds, groups, X_FL,
-                 [&](const auto& index, const PosedSpheres& spheres, const auto&) {
-                   nearest = nearest_pair(index, spheres, nearest, &deadline);
-                 });
+  for_each_index(
+      clouds, groups, X_FL,
+      [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO) {
+        nearest = find_nearest(index, spheres, R_FO, {nearest, smoothing}, &deadline, expansion);
+      });
   if (deadline.has_passed()) return RepulsiveWrench::unknown();
   const double length = config.gain * strength;
   if (!std::isfinite(nearest)) return nearest_repulsion(X_FL, proximity, config);
   Total total{proximity.direction, {}, 0.0};
-  const auto smoothing = static_cast<float>(std::max(config.smoothing, kLeastSmoothing));
   for_each_index(clouds, groups, X_FL,
                  [&](const auto& index, const PosedSpheres& spheres, const Eigen::Matrix3d& R_FO) {
-                   total.add(blend_pairs(index, spheres, {nearest, smoothing}, &deadline), R_FO);
+                   total.add(
+                       sum_pairs(index, spheres, R_FO, {nearest, smoothing}, &deadline, expansion),
+                       R_FO);
                  });
   if (deadline.has_passed()) return RepulsiveWrench::unknown();
+  if (expansion != nullptr) expansion->end({total.wrench, total.weight}, nearest);
   return scaled(total.wrench, length / total.weight);
 }
 

@@ -11,6 +11,7 @@
 #include "support/allocations.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
+#include "support/sanitizers.h"
 
 namespace ist {
 namespace {
@@ -140,11 +141,13 @@ TEST(ContactVolume, DependsLittleOnTheDensityOfTheCloud) {
     return contact_volume(link.link(), *link.body, X_FL, {&cloud});
   };
   const ContactVolume base = volume(0.002);
+  // Fewer and larger spheres weigh the same points less evenly.
+  const double allowed = test::kSanitized ? 0.1 : 0.05;
   for (const double spacing : {0.001, 0.0014, 0.0028, 0.004}) {
     const ContactVolume other = volume(spacing);
-    EXPECT_NEAR(other.volume, base.volume, 0.05 * base.volume) << spacing;
+    EXPECT_NEAR(other.volume, base.volume, allowed * base.volume) << spacing;
     EXPECT_LT((other.weighted_normal - base.weighted_normal).norm(),
-              0.05 * base.weighted_normal.norm())
+              allowed * base.weighted_normal.norm())
         << spacing;
   }
 }

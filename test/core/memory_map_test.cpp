@@ -60,6 +60,23 @@ TEST(MemoryMap, HiddenBehindSomethingNearerStays) {
   EXPECT_TRUE(holds(boxes, {0.51, 0.05, 0.05}));
 }
 
+// A board hides half of a wall. The cloud answers for the half that it shows, and the memory for
+// the other one, also where both lie in one block of voxels.
+TEST(MemoryMap, WhatABoardHidesBesideWhatIsSeenStays) {
+  MemoryMap map{{}};
+  map.insert(wall(1.0F, 0.0));
+  MemoryScan scan;
+  scan.stamp = 0.1;
+  for (const Eigen::Vector3f& p : wall(1.0F, 0.0).hits) {
+    scan.hits.push_back(p.y() < 0.05F ? p : Eigen::Vector3f(0.5F * p));
+  }
+  map.insert(scan);
+  VoxelBoxes boxes;
+  map.hidden_boxes(&boxes);
+  for (double y = 0.09; y < 0.18; y += 0.02) EXPECT_TRUE(holds(boxes, {1.01, y, 0.1})) << y;
+  for (double y = -0.15; y < 0.02; y += 0.02) EXPECT_FALSE(holds(boxes, {1.01, y, 0.1})) << y;
+}
+
 TEST(MemoryMap, WhatIsSeenThroughIsAnsweredByTheCloudAtOnceAndClearedSoon) {
   MemoryMap map{{}};
   VoxelBoxes boxes;

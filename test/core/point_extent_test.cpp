@@ -415,7 +415,7 @@ TEST(ExtentConfig, FootprintCoversThePatchBetweenPixels) {
   config.footprint = ExtentConfig::Footprint::kCamera;
   const PointExtent extent = point_extent(config, angle, 3.0);
   double largest = 0.0;
-  for (int i = 0; i < test::scaled(2000); ++i) {
+  for (int i = 0; i < 2000; ++i) {
     // A plane through (0, 0, z), inclined by at most the incidence in any direction.
     const double z = test::uniform(&rng, 0.3, 2.5), turn = test::uniform(&rng, 0.0, 6.3);
     const double tilt = test::uniform(&rng, 0.0, config.incidence - 0.02);
@@ -459,6 +459,17 @@ TEST(ExtentConfig, WhatMakesNoSenseIsNamed) {
       EXPECT_NE(check_extent(config, 3.0), "");
       IngestConfig ingest;
       ingest.extent = config;
+      EXPECT_THROW(Ingest{ingest}, std::invalid_argument);
+    }
+  }
+  // Alone, too: a number that is negative or NaN is not taken for no extent.
+  for (const double bad : {-0.1, kNaN}) {
+    IngestConfig radius, noise, latency;
+    radius.extent.footprint = ExtentConfig::Footprint::kRadius;
+    radius.extent.footprint_radius = bad;
+    noise.extent.noise_quadratic = bad;
+    latency.extent.latency = bad;
+    for (const IngestConfig& ingest : {radius, noise, latency}) {
       EXPECT_THROW(Ingest{ingest}, std::invalid_argument);
     }
   }

@@ -175,6 +175,19 @@ TEST(ThinnedCloud, ManyPointsInAVoxel) {
   }
 }
 
+// A voxel of 1 mm at a distance of 1074 km has a number that no integer of 32 bits holds.
+TEST(ThinnedCloud, PointsBeyondTheIntegersOfVoxelsStayApart) {
+  Points points;
+  for (const double x : {2e6, 3e6, 4e6, -2e6, -3e6}) {
+    points.emplace_back(x, 0.0, 0.0);
+    points.emplace_back(0.0, x, 0.0);
+  }
+  points.emplace_back(0.5, 0.0, 0.0);
+  const CloudSnapshot snapshot =
+      snapshot_of(message_of(points, points.size()), Eigen::Isometry3d::Identity(), 0.001);
+  EXPECT_EQ(found(snapshot.index).size(), points.size());
+}
+
 TEST(ThinnedCloud, EmptyClouds) {
   const CloudSnapshot none = snapshot_of(RawCloud(), Eigen::Isometry3d::Identity());
   EXPECT_TRUE(none.index.bvh().thinned().empty());

@@ -226,6 +226,45 @@ TEST(ViewFilter, whatTouchesIsNoPartOfTheRobot) {
   }
 }
 
+// A ramp rises from the robot's face, out of the padding. Its foot, which is no higher than the
+// noise, is continued from what is higher. A plate that hangs 60 mm in front of the face is no
+// ramp: nothing is told nearer than 40 mm, nor is any of the face in its shadow.
+TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
+  const std::vector<Body> robot = arm();
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d face = robot[0].X_FL * at(0.0, 0.0, -0.1);
+  Eigen::Isometry3d X_FR = face * at(0.0, 0.0, -0.02);
+  X_FR.rotate(Eigen::AngleAxisd(-0.9, Eigen::Vector3d::UnitY()));
+  const Body ramp(Box{{0.05, 0.08, 0.004}}, X_FR);
+  const Body plate(Box{{0.05, 0.05, 0.004}}, face * at(0.0, 0.0, -0.06));
+  Image image;
+  Ingest at_ramp(config_of(SelfFilterMode::kView)), at_plate(config_of(SelfFilterMode::kView));
+  Share foot;
+  CloudSnapshot viewed;
+  for (int i = 0; i < 10; ++i) {
+    image = picture(pointers(robot, {ramp}), X_FS, kNoise, i);
+    at_ramp.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
+    const std::set<std::uint32_t> kept = kept_of(viewed);
+    for (std::size_t k = 0; k < image.seen.size(); ++k) {
+      const Eigen::Vector3d p_F(image.xyz[3 * k], image.xyz[3 * k + 1], image.xyz[3 * k + 2]);
+      if (image.seen[k] != 3 || (face.inverse() * p_F).z() < -0.012) continue;
+      ++foot.pixels;
+      foot.kept += static_cast<int>(kept.count(static_cast<std::uint32_t>(k)));
+    }
+  }
+  EXPECT_GT(foot.kept, 0.75 * foot.pixels);
+
+  viewed = run(&at_plate, robot, {plate}, X_FS, X_FS, 3, &image);
+  EXPECT_GT(share_of(image, kept_of(viewed), 3, 3).kept, 100);
+  for (const PointTile& tile : test::tiles_of(viewed.index)) {
+    for (int k = 0; k < tile.count; ++k) {
+      const Eigen::Vector3d p_F = viewed.index.X_FO() * tile.point(k);
+      const double height = -(face.inverse() * p_F).z();
+      if (p_F.z() < 2.0) EXPECT_GT(height, 0.04);
+    }
+  }
+}
+
 // What the padding keeps, the view keeps; of what the padding drops, the view drops the robot.
 TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
   const std::vector<Body> robot = arm();

@@ -4,6 +4,7 @@ import os
 import pathlib
 import pickle
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -215,3 +216,83 @@ def test_progress_rises_and_an_exception_ends_the_packing():
 
     with pytest.raises(KeyboardInterrupt):
         ist.Robot(str(URDF), max_error=0.0005, progress=stop)
+
+
+def test_extent(robot):
+    """Points with extent: the bound is that of spheres about the points, the distance stays."""
+    cloud, configurations = random_scene(robot, 9)
+    points = ist.Obstacles(cloud)
+    for extent, smallest in ((0.02, 0.02), (ist.Extent(footprint_radius=0.02), 0.02),
+                             (ist.Extent('kinect_v1', sigmas=2.0), 0.0024),
+                             (ist.Extent(noise_quadratic=0.002, latency=0.01, speed=2.0), 0.02)):
+        spheres = pickle.loads(pickle.dumps(ist.Obstacles(cloud, extent=extent, max_range=3.0)))
+        for q in configurations[:5]:
+            plain, wide = robot.distances(q, points), robot.distances(q, spheres)
+            near = (plain.state == ist.NEAR) & (wide.state == ist.NEAR)
+            assert near.any()
+            assert np.abs(plain.distance - wide.distance)[near].max() <= 0.001  # the tolerance
+            assert (wide.lower_bound <= plain.distance - smallest + 1e-9)[near].all()
+            # No sphere is larger than that of the farthest point.
+            largest = {0.0024: 2 * (0.0012 * 1.2 + 0.0019 * 9.0)}.get(smallest, 0.02 + 3 * 0.002 * 9.0)
+            assert (wide.lower_bound >= plain.distance - largest - 0.003)[near].all()
+    assert 'kinect_v1' in ist.Extent.sensors
+    assert ist.Extent('kinect_v1', noise_constant=0.5).noise_constant == 0.5
+
+
+@pytest.mark.parametrize('make, error, message', [
+    (lambda: ist.Extent('kinect_9'), ValueError, 'realsense_d435'),
+    (lambda: ist.Extent(footprint_radius=0.1, footprint_angle=0.1), ValueError, 'one of them'),
+    (lambda: ist.Obstacles(np.zeros((1, 3)), extent='large'), TypeError, 'a str was given'),
+    (lambda: ist.Obstacles(np.zeros((1, 3)), extent=-0.1), ValueError, 'footprint_radius is -0.1'),
+    (lambda: ist.Obstacles(np.zeros((1, 3)), extent=float('nan')), ValueError, 'footprint_radius'),
+    (lambda: ist.Obstacles(np.zeros((1, 3)), extent=ist.Extent('kinect_v1')), ValueError, 'max_range'),
+])
+def test_wrong_extent(make, error, message):
+    with pytest.raises(error, match=message):
+        make()
+
+
+def test_cycle_cost(robot):
+    """The first cycle after a new cloud costs more: nothing of the last answer holds for it."""
+    y, z = np.meshgrid(np.linspace(-1, 1, 320), np.linspace(0, 1.5, 240))
+    image = np.stack([np.full_like(y, 0.6), y, z], axis=-1).astype(np.float32)
+    obstacles = ist.Obstacles(image)
+    steps = np.linspace(0.0, 0.2, 200)[:, None] * np.ones(len(robot.joints))
+    cost = robot.cycle_cost(steps, obstacles, per_cloud=20)
+    assert all(len(cost[name]) == 200 for name in ('query', 'repulsion', 'width', 'smallest', 'unknown'))
+    is_first = np.arange(200) % 20 == 0
+    assert np.median(cost['query'][is_first]) > np.median(cost['query'][~is_first])
+    expected = [robot.distances(q, obstacles).lower_bound.min() for q in steps[::20]]
+    assert np.abs(cost['smallest'][::20] - expected).max() <= 0.002  # two tolerances
+    begin = time.monotonic()
+    robot.cycle_cost(steps[:50], obstacles, period=0.01)
+    assert time.monotonic() - begin >= 0.45
+    for wrong in ({'per_cloud': 0}, {'period': -1.0}, {'period': float('nan')}, {'period': 100.0}):
+        with pytest.raises(ValueError, match='0 to 10 s'):
+            robot.cycle_cost(steps, obstacles, **wrong)
+
+
+def test_cycle_cost_of_a_file(robot, wall_pcd):
+    obstacles = ist.Obstacles(str(wall_pcd))
+    q = np.zeros((3, len(robot.joints)))
+    cost = robot.cycle_cost(q, obstacles)
+    expected = robot.distances(q[0], obstacles).lower_bound.min()
+    assert np.abs(cost['smallest'] - expected).max() <= 0.002
+
+
+def test_direction_is_the_gradient_of_the_distance(robot):
+    """direction^T J, as doc/messages.md builds a constraint from it, is how the distance changes."""
+    cloud, configurations = random_scene(robot, 12, points=60)
+    obstacles, step, checked = ist.Obstacles(cloud), 1e-5, 0
+    for q in configurations[:8]:
+        answer, X = robot.distances(q, obstacles, tolerance=0.0), robot.link_poses(q)
+        moved = q + step * np.eye(len(q))
+        X_moved, after = robot.link_poses(moved), robot.distances(moved, obstacles, tolerance=0.0)
+        for i in np.flatnonzero(answer.state == ist.NEAR):
+            p = np.append(answer.point_on_link_local[i], 1.0)
+            J = ((X_moved[:, i] @ p - X[i] @ p) / step)[:, :3].T
+            same = after.point[:, i] == answer.point[i]
+            change = (after.distance[:, i] - answer.distance[i]) / step
+            assert np.abs(answer.direction[i] @ J - change)[same].max(initial=0.0) < 0.02
+            checked += same.sum()
+    assert checked > 100

@@ -104,7 +104,9 @@ def test_the_check_finds_mistakes(tmp_path):
     page = copy / 'doc' / 'start.md'
     page.write_text(page.read_text(encoding='utf-8').replace('cloud:=/camera', 'clout:=/camera', 1)
                     + '\n```bash\nscripts/build --quick\nrostopic echo /proximity/distances\n```\n'
-                    '[nowhere](nowhere.md) [no heading](messages.md#nothing)\n', encoding='utf-8')
+                    '[nowhere](nowhere.md) [no heading](messages.md#nothing) [no address][manual]\n'
+                    '## Speeds\n<!-- speeds -->\n<!-- end of speeds -->\n',
+                    encoding='utf-8')
     page = copy / 'doc' / 'troubleshooting.md'
     page.write_text(page.read_text(encoding='utf-8').replace('no pose either for', 'none for'),
                     encoding='utf-8')
@@ -113,6 +115,7 @@ def test_the_check_finds_mistakes(tmp_path):
     assert result.returncode != 0
     for mistake in ('has no argument clout', 'has no option --quick', 'no topic /proximity/distances',
                     'nowhere.md: no such file', 'messages.md#nothing: no such heading',
-                    'lacks "no pose either for"'):
+                    'lacks "no pose either for"', 'no command beside the table "speeds"',
+                    '[manual] is not defined'):
         assert mistake in result.stderr, result.stderr
-    assert len(result.stderr.splitlines()) == 6, result.stderr
+    assert len(result.stderr.splitlines()) == 8, result.stderr

@@ -6,7 +6,10 @@ import pathlib
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+
+from ist_proximity.report import measure
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 URDF = ROOT / 'demo' / 'demo_arm.urdf'
@@ -53,6 +56,20 @@ def test_page(wall_ply, tmp_path):
     for link in ('base_link', 'gripper_link'):
         assert link in page.sections['Packing']
     assert '10' in page.sections['Speed against error'] and '20' in page.sections['Speed against error']
+
+
+def test_recommended_setting():
+    """The setting in use stays where no other is clearly faster; wider bounds than wanted never are."""
+    def cost(max_error, tolerance, seconds):
+        times = np.full(100, seconds)
+        return measure.Cost(max_error, tolerance, times, times, times, times)
+
+    in_use, other = cost(0.005, 0.001, 100e-6), cost(0.002, 0.0, 95e-6)
+    coarse, fast = cost(0.005, 0.005, 10e-6), cost(0.01, 0.001, 50e-6)
+    assert measure.recommend([in_use, coarse, other], 0.001) is in_use
+    assert measure.recommend([in_use, coarse, other, fast], 0.001) is fast
+    assert measure.recommend([in_use, coarse, other, fast], 0.005) is coarse
+    assert measure.recommend([coarse], 0.001) is coarse  # none other was measured
 
 
 @pytest.mark.parametrize('change, message', [

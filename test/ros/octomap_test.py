@@ -151,7 +151,8 @@ class OctomapTest(unittest.TestCase):
             self.assertEqual(self.node.stop(), 0)
 
     def start(self, sources, **parameters):
-        parameters.update({"sources": sources, "query/tolerance": 0.0})
+        # Without a deadline: on a slow machine it would pass, which is not what these tests are about.
+        parameters.update({"sources": sources, "query/tolerance": 0.0, "query/deadline": 0.0})
         self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
         return self.node
 

@@ -88,6 +88,7 @@ class TriangleGroups {
  public:
   explicit TriangleGroups(std::vector<Corners3<double>> triangles)
       : triangles_(std::move(triangles)) {
+    if (triangles_.empty()) return;  // a link of curved shapes
     divide(0, triangles_.size());
     for (const auto& t : triangles_) {
       for (const auto& p : t.p) box_.extend(p);
@@ -100,7 +101,7 @@ class TriangleGroups {
   /// [m] The distance of the surfaces; the other one is posed.
   double distance(const TriangleGroups& other, const Eigen::Isometry3d& X) const {
     double best = std::numeric_limits<double>::infinity();
-    descend(0, other, 0, X, &best);
+    if (!groups_.empty() && !other.groups_.empty()) descend(0, other, 0, X, &best);
     return best;
   }
 

@@ -8,6 +8,7 @@
 #include "ist_proximity/robot/robot_model.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
+#include "support/robot_of_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 
@@ -72,16 +73,9 @@ inline std::vector<LinkGeometry> random_links(Rng* rng) {
 
 inline std::shared_ptr<const RobotModel> model_of(const std::vector<LinkGeometry>& links,
                                                   double max_error) {
-  RobotDescription description;
-  for (const LinkGeometry& geometry : links) {
-    LinkDescription link;
-    link.name = "link" + std::to_string(description.links.size());
-    link.geometry = geometry;
-    description.links.push_back(std::move(link));
-  }
   RobotModelConfig config;
   config.packing.max_error = packed_to(max_error);
-  return build_robot_model(description, config);
+  return build_robot_model(robot_of(links), config);
 }
 
 /// Points about a link: in a volume, a plane, a line, a cluster, or next to its own surface.

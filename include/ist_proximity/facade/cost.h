@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/facade/obstacles.h"
 #include "ist_proximity/facade/robot.h"
 #include "ist_proximity/repulsion/repulsion.h"
 
@@ -17,13 +19,27 @@ struct CycleCost {
   std::vector<int> unknown;       ///< links that are UNKNOWN
 };
 
-/// Measures the cycles of a node along a motion, with a new snapshot every `per_cloud` cycles.
+/// How the cycles follow each other, and what each of them asks.
+struct CycleConfig {
+  int per_cloud = 33;  ///< >= 1: cycles for each cloud
+  /// [s] >= 0: a cycle begins this long after the last one began, and the thread sleeps between
+  /// them, as a controller's does. Caches are cold then, and cycles take longer. 0: no sleep
+  double period = 0.0;
+  QueryConfig query;          ///< what a cycle asks
+  RepulsionConfig repulsion;  ///< what is computed from the answers
+};
+
+/// Measures the cycles of a node along a motion.
+///
+/// As in the node, every cloud is copied and indexed anew by another thread, so that the first
+/// cycles after it pay for what a new cloud costs a query: its points are read when they are first
+/// needed, and nothing of the last answer holds for them.
 /// @param q          n configurations one after the other
-/// @param scenes     snapshots that take turns: two of the same scene act as a camera's stream
-/// @param per_cloud  >= 1
-/// @throws std::invalid_argument as Robot::distances(), and where there is no scene
-CycleCost measure_cycles(const Robot& robot, Span<const double> q,
-                         const std::vector<Obstacles>& scenes, int per_cloud,
-                         const QueryConfig& query, const RepulsionConfig& repulsion);
+/// @param cloud      the points of each of the clouds, valid during the call; owner is not needed
+/// @param obstacles  how they are indexed
+/// @throws std::invalid_argument as Robot::distances() and Obstacles, and where config is out of
+///         its range
+CycleCost measure_cycles(const Robot& robot, Span<const double> q, const RawCloud& cloud,
+                         const ObstaclesConfig& obstacles, const CycleConfig& config);
 
 }  // namespace ist

@@ -21,7 +21,8 @@ struct QueryConfig {
   double max_distance = 1.0;
   /// [m] largest `distance - lower_bound`; 0 asks for the exact distance. >= 0.
   double tolerance = 0.001;
-  /// [s] from the start of run(); 0: none. A query that it stops returns bounds that hold.
+  /// [s] from the start of run(); 0: none. A query that it stops returns bounds that hold. Links
+  /// that nothing is known of yet may exceed it by 50 us together.
   double deadline = 0.0;
   /// [m] >= 0, subtracted from every lower bound to allow for sensor noise, calibration, latency.
   double margin = 0.0;
@@ -85,9 +86,9 @@ struct QueryStatistics {
 /// takes over: a grid of signed distances about the link bounds boxes and points for the whole
 /// link.
 ///
-/// A query that has a deadline asks every link twice: first to within half of its distance, and
-/// then to within the tolerance, the link that may be nearest first. So no link is left without a
-/// bound.
+/// A query that has a deadline first proves a bound of every link and measures one obstacle for it;
+/// then it asks every link to within half of its distance, and then to within the tolerance, the
+/// link that may be nearest first.
 ///
 /// Queries allocate nothing, lock nothing and never throw; one object per thread. The last answer
 /// gives the next query its first upper bound (warm start). While the snapshots stay the same,

@@ -34,6 +34,10 @@ struct PairProximity {
   Eigen::Vector3d direction;
   /// False: a deadline passed before the tolerance was reached. The bounds hold all the same.
   bool finished = true;
+  /// False: it is not known whether one link is inside the other, because a surface is next to an
+  /// opening of a mesh, or less than some nanometres from touch; or that was not asked in time. The
+  /// state is NEAR then, and `lower_bound`, which holds, is that of the links' spheres.
+  bool decided = false;
 
   PairProximity() { reset(); }
   void reset();  ///< to UNKNOWN
@@ -52,9 +56,9 @@ struct SelfQueryStatistics {
 ///
 /// Apart: branch and bound over pairs of oriented boxes finds the candidates; triangles, spheres
 /// and cylinders are then measured exactly (a cylinder is a cylinder, not its tessellation).
-/// `distance` is that of two real points, and `distance - lower_bound` is at most the tolerance; at
-/// tolerance 0 it is the distance itself, to rounding: some 1e-14 of the coordinates, or 4e-6 of
-/// them where more than thousands of parts are equally near.
+/// `distance` is that of two real points, and `distance - lower_bound` is at most the tolerance
+/// where `decided`; at tolerance 0 it is the distance itself, to rounding: some 1e-14 of the
+/// coordinates, or 4e-6 of them where more than thousands of parts are equally near.
 ///
 /// Contact: where surfaces intersect, or where one link is inside the other. `distance` is then the
 /// signed distance of a point that is inside both links; the deepest point may be deeper, but no
@@ -74,8 +78,10 @@ class SelfQuery {
  public:
   /// Builds a hierarchy for each link: up to a second for a million triangles. Queries share the
   /// hierarchies of links of the same `solid`, also between models that differ in their packings.
+  /// @param cancelled  asked every few milliseconds; true ends the building, and every pair is
+  ///                   UNKNOWN. It may be empty
   SelfQuery(std::shared_ptr<const RobotModel> model, std::vector<LinkPair> pairs,
-            const QueryConfig& config);
+            const QueryConfig& config, const std::function<bool()>& cancelled = {});
   ~SelfQuery();
   SelfQuery(SelfQuery&&) noexcept;
   SelfQuery& operator=(SelfQuery&&) noexcept;

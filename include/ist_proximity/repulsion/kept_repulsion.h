@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 
 #include "ist_proximity/repulsion/repulsion.h"
 
@@ -12,18 +13,25 @@ namespace ist {
 /// something that matters.
 ///
 /// The blend is continuous in the link's pose. While the clouds and the maps' poses are the same,
-/// and no point of the link has moved by more than kKeptMotion of the smoothing since the blend was
-/// computed (1 mm with the default), its direction is kept, and so is its torque per length. The
-/// length follows the distance at once. So the steps of the direction are no larger than those that
-/// a motion of that size makes, as a fast robot makes it from one cycle to the next. Errors do not
+/// and the link has moved little since its blend was computed, the blend follows the link's motion
+/// by its first-order Taylor expansion, and its length follows the distance at once. How far off
+/// the expansion may be is bounded in terms of a motion: never more than the direction changes
+/// where a link moves by kKeptMotion of the smoothing (1 mm with the default), as a fast robot does
+/// from one cycle to the next; where the vector is short, by that over its length per gain. Beside
+/// maps there is no expansion: the direction is kept as it is, with the same bound. Errors do not
 /// add up. One thread.
 class KeptRepulsion {
  public:
-  /// In units of the smoothing.
+  /// In units of the smoothing: the error that is allowed.
   static constexpr double kKeptMotion = 0.01;
+  /// The same: no sphere of the link moves farther before the blend is computed anew.
+  static constexpr double kMostKeptMotion = 0.08;
 
-  /// @param link  index in the model that the repulsion was made with
-  KeptRepulsion(const RobotModel& model, std::size_t link);
+  /// @param link  index in the model that the repulsion is made with
+  explicit KeptRepulsion(std::size_t link);
+  ~KeptRepulsion();
+  KeptRepulsion(KeptRepulsion&&) noexcept;
+  KeptRepulsion& operator=(KeptRepulsion&&) noexcept;
 
   /// @param end  when a new blend has to end
   /// The others are as for Repulsion::wrench().
@@ -36,18 +44,13 @@ class KeptRepulsion {
   void forget() { is_kept_ = false; }
 
  private:
-  double moved(const Eigen::Isometry3d& X_FL) const;
-
   std::size_t link_;
-  Eigen::Vector3d center_ = Eigen::Vector3d::Zero();  ///< [m] of the bounding sphere, link frame
-  double radius_ = 0.0;                               ///< [m]
 
   // The last blend.
   bool is_kept_ = false;
-  Eigen::Isometry3d X_FL_ = Eigen::Isometry3d::Identity();
   std::uint64_t obstacles_ = 0;  ///< key of the clouds, and of the places of maps
   double smoothing_ = 0.0;       ///< [m]
-  RepulsiveWrench per_length_;
+  std::unique_ptr<BlendExpansion> blend_;
 };
 
 }  // namespace ist

@@ -34,6 +34,8 @@ struct RepulsiveWrench {
   static RepulsiveWrench unknown();  ///< NaN
 };
 
+class BlendExpansion;
+
 /// Blended repulsion, continuous in the robot's motion.
 ///
 /// A fixed, coarse set of its inner spheres stands for a link, and the thinned points for a cloud;
@@ -80,7 +82,14 @@ class Repulsion {
   }
 
  private:
+  friend class KeptRepulsion;
   struct Spheres;
+
+  /// As wrench(). @param expansion  may be null; overwritten, and empty where nothing was blended
+  RepulsiveWrench blend(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
+                        const LinkProximity& proximity, const RepulsionConfig& config,
+                        TimePoint end, BlendExpansion* expansion) const;
+
   std::shared_ptr<const Spheres> spheres_;  ///< of all links; copies share them
 };
 

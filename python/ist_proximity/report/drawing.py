@@ -24,7 +24,8 @@ def log_chart(lines, x_label, y_label, width=560, height=320):
         v = (np.log10(y) - span[1][0]) / max(span[1][1] - span[1][0], 1.0)
         return (left + u * (width - left - right), height - bottom - v * (height - top - bottom))
 
-    parts = [f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{html.escape(y_label)}">']
+    parts = [f'<div class="wide"><svg class="chart" viewBox="0 0 {width} {height}" role="img" '
+             f'aria-label="{html.escape(y_label)}">']
     for axis in (0, 1):
         for exponent in np.arange(span[axis][0], span[axis][1] + 1):
             value = 10.0 ** exponent
@@ -46,7 +47,7 @@ def log_chart(lines, x_label, y_label, width=560, height=320):
     parts.append(f'<text x="{(left + width - right) / 2}" y="{height - 8}" text-anchor="middle">'
                  f'{html.escape(x_label)}</text>')
     parts.append(f'<text transform="translate(14 {height / 2}) rotate(-90)" text-anchor="middle">'
-                 f'{html.escape(y_label)}</text></svg>')
+                 f'{html.escape(y_label)}</text></svg></div>')
     return ''.join(parts)
 
 

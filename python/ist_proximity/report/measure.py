@@ -10,8 +10,11 @@ import ist_proximity as ist
 PIECES = 8  # pieces of motion
 STEPS = 330  # steps of a piece; at 1 kHz ten images of a camera
 SPEED = 1.0  # [rad/s, m/s] of the fastest joint
-PER_CLOUD = 33  # cycles for each image
-DEADLINES = (0.1, 0.25, 0.5, 1.0, 2.0)  # as shares of the median query
+CLOUD_RATE = 30.0  # [Hz] of a camera
+PER_CLOUD = 33  # cycles for each image, at 1 kHz
+PACED_TIME = 10.0  # [s] for cycles at the wanted rate
+SAME = 0.15  # as a share: 99th percentiles that differ less may be the same in another run
+DEADLINES = (0.1, 0.25, 0.5, 1.0, 2.0)  # as shares of the 99th percentile of a query
 
 
 @dataclasses.dataclass
@@ -40,7 +43,9 @@ class Report:
     warnings: list
     packing: list  # one dictionary for each link
     packing_time: float  # [s]
-    costs: list  # of Cost, by packing and tolerance
+    costs: list  # of Cost, by packing and tolerance, one cycle at once after the other
+    best: object  # Cost of the recommended setting among them
+    paced: object  # Cost of the recommended setting at the wanted rate, asleep between cycles
     deadlines: list  # (share, deadline [s], mean width [m], share of steps with all links known)
     ingest: np.ndarray  # [s]
     memory: dict  # [bytes] by what
@@ -60,19 +65,27 @@ def configuration(robot, positions):
     return np.clip(q, robot.lower_limits, robot.upper_limits)
 
 
-def motion(robot, q, seed=0):
-    """(n, joints): pieces of motion at 1 kHz within the joints' limits; the first begins at q."""
+def motion(robot, q, seed=0, rate=1000.0, steps=STEPS):
+    """(n, joints): pieces of motion at `rate` [Hz] within the joints' limits; the first begins at q."""
     rng = np.random.default_rng(seed)
     low = np.maximum(robot.lower_limits, -np.pi)
     high = np.minimum(robot.upper_limits, np.pi)
     pieces = []
-    for piece in range(PIECES):
-        begin = q if piece == 0 else rng.uniform(low, high)
+    for number in range(PIECES):
+        begin = q if number == 0 else rng.uniform(low, high)
         way = rng.uniform(low, high) - begin
         way *= SPEED / max(np.abs(way).max(initial=0.0), 1e-9)
-        steps = begin + np.arange(STEPS)[:, None] * 1e-3 * way
-        pieces.append(np.clip(steps, robot.lower_limits, robot.upper_limits))
+        piece = begin + np.arange(steps)[:, None] / rate * way
+        pieces.append(np.clip(piece, robot.lower_limits, robot.upper_limits))
     return np.vstack(pieces)
+
+
+def paced_cycles(robot, q, obstacles, rate, tolerance):
+    """Cycles as a node runs them: at `rate` [Hz], asleep between them, 30 new clouds a second."""
+    steps = int(np.clip(PACED_TIME * rate / PIECES, 1, STEPS))
+    per_cloud = max(1, round(rate / CLOUD_RATE))
+    return robot.cycle_cost(motion(robot, q, rate=rate, steps=steps), obstacles, tolerance=tolerance,
+                            per_cloud=per_cloud, period=1.0 / rate)
 
 
 def warn_about(robot, packing, counts):
@@ -108,22 +121,23 @@ def warn_about(robot, packing, counts):
     return warnings
 
 
-def measure_deadlines(robot, steps, scenes, tolerance, median):
-    """Widths of the bounds for deadlines of several shares of the median query."""
+def measure_deadlines(robot, steps, obstacles, tolerance, high):
+    """Widths of the bounds for deadlines of several shares of the 99th percentile `high` [s]."""
     rows = []
     for share in DEADLINES:
-        deadline = max(share * median, 1e-6)
-        cost = robot.cycle_cost(steps, scenes, tolerance=tolerance, deadline=deadline,
+        deadline = max(share * high, 1e-6)
+        cost = robot.cycle_cost(steps, obstacles, tolerance=tolerance, deadline=deadline,
                                 per_cloud=PER_CLOUD)
         rows.append((share, deadline, cost['width'].mean(), (cost['unknown'] == 0).mean()))
     return rows
 
 
-def run(make_robot, scene, max_errors, tolerances, padding, tell):
+def run(make_robot, scene, max_errors, tolerances, padding, rate, error, tell):
     """Measures everything.
 
     make_robot(max_error, progress, warning): a Robot. max_errors, tolerances: [m], the first of
-    each is the one that is used. tell(text, share): shows progress.
+    each is the one that is used. rate [Hz], error [m]: what is wanted. tell(text, share): shows
+    progress.
     """
     warnings, before = [], resident_memory()
     robots = {}
@@ -142,34 +156,42 @@ def run(make_robot, scene, max_errors, tolerances, padding, tell):
 
     tell('reading the scene', 0.52)
     before = resident_memory()
-    scenes = [ist.Obstacles(scene.points, **keywords) for _ in range(2)]
-    cloud_bytes = (resident_memory() - before) // 2
+    obstacles = ist.Obstacles(scene.points, **keywords)
+    cloud_bytes = resident_memory() - before
     ingest = np.array([ist.Obstacles(scene.points, **keywords).ingest_time for _ in range(10)])
 
     steps = motion(robot, q)
     costs = []
     for max_error in max_errors:
         for tolerance in tolerances:
-            share = 0.55 + 0.3 * len(costs) / (len(max_errors) * len(tolerances))
+            share = 0.55 + 0.27 * len(costs) / (len(max_errors) * len(tolerances))
             tell(f'measuring {1e3 * max_error:g} mm, tolerance {1e3 * tolerance:g} mm', share)
-            result = robots[max_error].cycle_cost(steps, scenes, tolerance=tolerance,
+            result = robots[max_error].cycle_cost(steps, obstacles, tolerance=tolerance,
                                                   per_cloud=PER_CLOUD)
-            costs.append(Cost(max_error, tolerance, result['query'], result['repulsion'],
-                              result['width'], result['unknown']))
+            costs.append(Cost(max_error, tolerance, **_columns(result)))
+    best = recommend(costs, error)
+    tell(f'{rate:g} cycles a second', 0.85)
+    paced = Cost(best.max_error, best.tolerance, **_columns(
+        paced_cycles(robots[best.max_error], q, obstacles, rate, best.tolerance)))
     tell('measuring deadlines', 0.88)
-    median = float(np.median(costs[0].query))
-    deadlines = measure_deadlines(robot, steps, scenes, tolerances[0], median)
+    high = float(np.percentile(costs[0].query, 99))
+    deadlines = measure_deadlines(robot, steps, obstacles, tolerances[0], high)
     tell('measuring the packing', 0.95)
     packing = robot.measure_packing()
-    warnings += warn_about(robot, packing, scenes[0].counts)
+    warnings += warn_about(robot, packing, obstacles.counts)
     memory = {'robots of this report (all packings)': model_bytes, 'one indexed cloud': cloud_bytes}
     packing_time = sum(link['packing_time'] for link in robot.packing)
-    return Report(robot, scene, scenes[0], warnings, packing, packing_time, costs, deadlines, ingest,
-                  memory, robot.distances(q, scenes[0]), q)
+    return Report(robot, scene, obstacles, warnings, packing, packing_time, costs, best, paced,
+                  deadlines, ingest, memory, robot.distances(q, obstacles), q)
 
 
-def recommend(costs, rate, error):
-    """The setting with the least 99th percentile among those whose bounds are as wide as wanted."""
+def recommend(costs, error):
+    """The first setting that is about the fastest of those whose bounds are as wide as wanted."""
     fitting = [cost for cost in costs if cost.tolerance <= error] or costs
-    best = min(fitting, key=lambda cost: np.percentile(cost.cycle, 99))
-    return best, 0.5 / rate
+    high = [np.percentile(cost.cycle, 99) for cost in fitting]
+    return next(cost for cost, own in zip(fitting, high) if own <= (1.0 + SAME) * min(high))
+
+
+def _columns(result):
+    """What a Cost keeps of a measurement."""
+    return {name: result[name] for name in ('query', 'repulsion', 'width', 'unknown')}

@@ -17,15 +17,11 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 constexpr std::size_t kPixels = kTileSide * kTileSide;
 constexpr std::uint32_t kWhole = (1U << kPixels) - 1U;
 
-// Standard deviations of noise. A camera shows the robot in some 10^4 windows thirty times a
-// second: a mean that is five off by chance comes once in ten seconds, one of three next to an
-// obstacle only where there is one.
-constexpr double kCertain = 5.0;
-constexpr double kBesideObstacle = 3.0;
 // Noise never pulls a mean back by more: a mixed pixel or a shadow is no evidence of free space.
 constexpr double kClipped = 3.0;
-// Pixels of an obstacle, its part outside the skin included.
-constexpr int kFewestPixels = 3;
+// A pixel outside the skin belongs to an obstacle in the skin if it is in front of the robot by no
+// more than this many standard deviations beyond the padding.
+constexpr double kFront = 3.0;
 // Standard deviations of the sensor's corrected pose.
 constexpr double kPose = 3.0;
 
@@ -245,10 +241,16 @@ void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uin
     for (const SelfFilter::Link* link : filter.group()) {
       if (filter.is_on_link(*link, X_OS * p_S[k])) in_skin = link;
     }
-    if (in_skin == nullptr) continue;
     const auto bit = static_cast<std::uint16_t>(1U << k);
     const double range = p_S[k].norm();
     const Sight sight = look(p_S[k], filter);
+    if (in_skin == nullptr) {
+      // Close in front of the robot there is nothing but an obstacle.
+      const double limit = padding_ + kFront * config_.noise.sigma(range);
+      const double depth = sight.t - range;
+      if (sight.link != nullptr && depth > padding_ && depth < limit) tile->front |= bit;
+      continue;
+    }
     if (tile->link == nullptr) {
       tile->link = sight.link != nullptr ? sight.link : in_skin;
       tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
@@ -313,18 +315,6 @@ void ViewFilter::add_outside(const Eigen::Vector3d& p_F) {
   outside_.push_back(voxel(p_F, 0, 0, 0));
 }
 
-// Whether an obstacle was beside this tile's points, outside the skin, a cloud ago.
-bool ViewFilter::came_in(const Tile& tile) const {
-  const Eigen::Vector3d p_F = X_FS_ * tile.p_S.cast<double>();
-  for (int i = 0; i < 27; ++i) {
-    if (std::binary_search(outside_before_.begin(), outside_before_.end(),
-                           voxel(p_F, i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1))) {
-      return true;
-    }
-  }
-  return false;
-}
-
 ViewFilter::Tile* ViewFilter::tile_at(std::int64_t row, std::int64_t column) {
   if (row < 0 || column < 0 || row >= static_cast<std::int64_t>(tiles_high_) ||
       column >= static_cast<std::int64_t>(tiles_wide_)) {
@@ -339,121 +329,6 @@ const ViewFilter::Tile* ViewFilter::tile_at(std::int64_t row, std::int64_t colum
   return const_cast<ViewFilter*>(this)->tile_at(row, column);  // NOLINT: the same, without a change
 }
 
-// Whether the mean height is more than noise and systematic errors make of the robot's own surface.
-bool ViewFilter::is_in_front(double sum, double variance, int count, double tolerance,
-                             double sigmas) const {
-  return count > 0 && sum > sigmas * std::sqrt(variance) + count * tolerance;
-}
-
-// A tile, or a window of two by two tiles, that is in front of the robot for certain.
-void ViewFilter::find_windows(std::size_t index) {
-  std::array<Tile*, 4> window = {};
-  double sum = 0.0, variance = 0.0, tolerance = 0.0;
-  int count = 0;
-  const std::int64_t row = tiles_[index].row / kTileSide, column = tiles_[index].column / kTileSide;
-  for (std::size_t i = 0; i < 4; ++i) {
-    window[i] =
-        tile_at(row + static_cast<std::int64_t>(i / 2), column + static_cast<std::int64_t>(i % 2));
-    if (window[i] == nullptr) continue;
-    const Tile& t = *window[i];
-    sum += static_cast<double>(t.sum);
-    variance += static_cast<double>(t.variance);
-    count += t.count;
-    tolerance = std::max(tolerance, static_cast<double>(t.tolerance));
-  }
-  const bool whole = is_in_front(sum, variance, count, tolerance, kCertain);
-  for (Tile* tile : window) {
-    if (tile == nullptr || tile->is_obstacle) continue;
-    const double own = tile == &tiles_[index] ? kCertain : kInf;
-    const double sigmas = whole ? 0.5 * kBesideObstacle : own;
-    tile->is_obstacle =
-        std::isfinite(sigmas) &&
-        is_in_front(static_cast<double>(tile->sum), static_cast<double>(tile->variance),
-                    tile->count, static_cast<double>(tile->tolerance), sigmas);
-  }
-}
-
-// Next to an obstacle in the image, or to where one was a cloud ago, less evidence is needed.
-void ViewFilter::grow() {
-  front_.clear();
-  const auto is_weak = [this](const Tile& t) {
-    return !t.is_obstacle &&
-           is_in_front(static_cast<double>(t.sum), static_cast<double>(t.variance), t.count,
-                       static_cast<double>(t.tolerance), kBesideObstacle);
-  };
-  for (std::size_t i = 0; i < tiles_.size(); ++i) {
-    Tile& tile = tiles_[i];
-    if (is_weak(tile) && came_in(tile)) tile.is_obstacle = true;
-    if (tile.is_obstacle || tile.obstacle != 0) front_.push_back(i);
-  }
-  while (!front_.empty()) {
-    const Tile& from = tiles_[front_.back()];
-    front_.pop_back();
-    const std::int64_t row = from.row / kTileSide, column = from.column / kTileSide;
-    for (std::int64_t i = 0; i < 9; ++i) {
-      Tile* tile = tile_at(row + i / 3 - 1, column + i % 3 - 1);
-      if (tile == nullptr || !is_weak(*tile)) continue;
-      tile->is_obstacle = true;
-      front_.push_back(static_cast<std::size_t>(tile - tiles_.data()));
-    }
-  }
-}
-
-// The pixels of a tile and its neighbours that are obstacles, in the skin or out of it.
-int ViewFilter::count_obstacles(std::int64_t row, std::int64_t column) const {
-  int count = 0;
-  for (std::int64_t i = 0; i < 9; ++i) {
-    const Tile* tile = tile_at(row + i / 3 - 1, column + i % 3 - 1);
-    if (tile == nullptr) continue;
-    const unsigned outside = static_cast<unsigned>(tile->kept) & ~static_cast<unsigned>(tile->skin);
-    count += static_cast<int>(std::bitset<16>(outside | tile->obstacle).count());
-  }
-  return count;
-}
-
-// In a minute a camera sees some 10^8 pixels of the robot, of which chance takes a few for
-// obstacles, each by itself.
-void ViewFilter::drop_speckles() {
-  for (Tile& tile : tiles_) {
-    tile.near = tile.obstacle;
-    if (tile.obstacle == 0 || tile.is_obstacle) continue;
-    if (count_obstacles(tile.row / kTileSide, tile.column / kTileSide) < kFewestPixels) {
-      tile.near = 0;
-    }
-  }
-  for (Tile& tile : tiles_) tile.obstacle = tile.near;
-}
-
-// A pixel that may be blurred, or that is one standard deviation in front, is an obstacle next to a
-// pixel that is one.
-void ViewFilter::grow_pixels() {
-  const auto is_obstacle = [this](std::int64_t row, std::int64_t column) {
-    if (row < 0 || column < 0) return false;
-    const Tile* tile = tile_at(row / static_cast<std::int64_t>(kTileSide),
-                               column / static_cast<std::int64_t>(kTileSide));
-    if (tile == nullptr) return false;
-    const auto k = static_cast<unsigned>(row % static_cast<std::int64_t>(kTileSide) *
-                                             static_cast<std::int64_t>(kTileSide) +
-                                         column % static_cast<std::int64_t>(kTileSide));
-    return (static_cast<unsigned>(tile->obstacle) >> k & 1U) != 0;
-  };
-  for (Tile& tile : tiles_) {
-    if (count_obstacles(tile.row / kTileSide, tile.column / kTileSide) == 0) continue;
-    const float noise =
-        tile.count > 0 ? std::sqrt(tile.variance / static_cast<float>(tile.count)) : 0.0F;
-    for (std::size_t k = 0; k < kPixels; ++k) {
-      const auto bit = static_cast<std::uint16_t>(1U << k);
-      if ((tile.blurred & bit) == 0 && !(tile.height[k] > noise)) continue;
-      const auto row = static_cast<std::int64_t>(tile.row + k / kTileSide),
-                 column = static_cast<std::int64_t>(tile.column + k % kTileSide);
-      for (std::int64_t i = 0; i < 9; ++i) {
-        if (is_obstacle(row + i / 3 - 1, column + i % 3 - 1)) tile.near |= bit;
-      }
-    }
-  }
-  for (Tile& tile : tiles_) tile.obstacle |= tile.near;
-}
-
 void ViewFilter::finish(Tile* tile) {
   tile->robot &= static_cast<std::uint16_t>(~tile->obstacle);
   if (tile->obstacle != 0) add_outside(X_FS_ * tile->p_S.cast<double>());
@@ -462,7 +337,9 @@ void ViewFilter::finish(Tile* tile) {
     link.in_skin += static_cast<std::uint32_t>(std::bitset<16>(tile->skin).count());
     link.unexplained += static_cast<std::uint32_t>(std::bitset<16>(tile->obstacle).count());
   }
-  if (!tile->is_patch || tile->obstacle != 0) return;
+  // What is only continued from its neighbours still says where the sensor is. Otherwise a wrong
+  // pose, which puts parts of the robot in front of itself, would never be corrected.
+  if (!tile->is_patch || tile->certain != 0) return;
   const double noise = std::sqrt(static_cast<double>(tile->variance)) / kPixels;
   calibration_.add(tile->p_S.cast<double>(), tile->n_S.cast<double>(),
                    static_cast<double>(tile->sum) / kPixels,
@@ -470,15 +347,7 @@ void ViewFilter::finish(Tile* tile) {
 }
 
 bool ViewFilter::end_pass() {
-  for (std::size_t i = 0; i < tiles_.size(); ++i) find_windows(i);
-  grow();
-  for (Tile& tile : tiles_) {
-    for (std::size_t k = 0; tile.is_obstacle && k < kPixels; ++k) {
-      if (tile.height[k] > 0.0F) tile.obstacle |= static_cast<std::uint16_t>(1U << k);
-    }
-  }
-  drop_speckles();
-  grow_pixels();
+  find_obstacles();
   for (Tile& tile : tiles_) finish(&tile);
   std::sort(outside_.begin(), outside_.end());
   return calibration_.end_pass();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <functional>
 
@@ -18,5 +19,23 @@ using CancelRequest = std::function<bool()>;
 inline void throw_if(const CancelRequest& cancelled) {
   if (cancelled && cancelled()) throw Cancelled();
 }
+
+/// Asks now and then, in a loop of many short steps.
+class CancelWatch {
+ public:
+  /// @param cancelled  outlives this
+  explicit CancelWatch(const CancelRequest& cancelled) : cancelled_(cancelled) {
+    throw_if(cancelled);
+  }
+  /// @throws Cancelled when the request says so
+  void step() {
+    constexpr std::uint32_t kAskEvery = 1U << 13U;  // steps of up to a microsecond
+    if (++steps_ % kAskEvery == 0) throw_if(cancelled_);
+  }
+
+ private:
+  const CancelRequest& cancelled_;
+  std::uint32_t steps_ = 0;
+};
 
 }  // namespace ist

@@ -38,8 +38,8 @@ struct ConvexDistance {
 /// The distance of two triangles, also of degenerate ones. The closest points are an edge's and an
 /// edge's, or a corner's and a triangle's, unless an edge of one pierces the other. Whatever
 /// rounding does to the choice between these, `lower_bound` holds: it is the width of the slab
-/// between the two triangles that is perpendicular to the line through the closest points, and a
-/// slab of any direction separates convex sets.
+/// between the two triangles that is perpendicular to the line through the closest points, to a
+/// triangle's normal or to two edges, and a slab of any direction separates convex sets.
 ConvexDistance triangle_distance(const ConvexPart& p, const ConvexPart& q);
 
 /// The distance of two parts of any kind. Cylinders are measured by GJK (Gilbert, Johnson and

@@ -14,6 +14,8 @@ namespace ist {
 /// intersect the mesh and each other.
 /// @param open  open_edges(mesh)
 /// @returns with the vertices of the mesh
-TriangleMesh hole_caps(const TriangleMesh& mesh, const std::vector<OpenEdge>& open);
+/// @throws Cancelled when the request says so
+TriangleMesh hole_caps(const TriangleMesh& mesh, const std::vector<OpenEdge>& open,
+                       const CancelRequest& cancelled = {});
 
 }  // namespace ist

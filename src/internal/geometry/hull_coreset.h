@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/convex_part.h"
 
 namespace ist {
@@ -17,7 +18,8 @@ class HullCoreset {
  public:
   HullCoreset() = default;
   /// Takes some milliseconds for ten thousand triangles. Empty where a part is no triangle.
-  explicit HullCoreset(const std::vector<ConvexPart>& parts);
+  /// @throws Cancelled  soon after `cancelled` returned true
+  explicit HullCoreset(const std::vector<ConvexPart>& parts, const CancelRequest& cancelled = {});
 
   bool empty() const { return points_.empty(); }
   std::size_t size() const { return points_.size(); }

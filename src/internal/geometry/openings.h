@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/convex_part.h"
 #include "ist_proximity/geometry/solid.h"
 
@@ -23,7 +24,8 @@ class Openings {
  public:
   Openings() = default;
   /// Takes up to some tenths of a second for a mesh with thousands of open edges.
-  explicit Openings(const Solid& solid);
+  /// @throws Cancelled when the request says so
+  explicit Openings(const Solid& solid, const CancelRequest& cancelled = {});
 
   /// Spheres, in the link's frame, that hold all openings; `number` is the place of the element's
   /// entry. Empty for closed links.
@@ -57,10 +59,11 @@ class Openings {
     std::size_t index;  ///< in the solid
     std::vector<Hole> holes;
   };
-  Eigen::AlignedBox3d add_element(std::size_t index);
+  Eigen::AlignedBox3d add_element(std::size_t index, const CancelRequest& cancelled);
   static bool may_hold_opening(const Element& element, double winding,
                                const Eigen::Vector3d& center_L, double radius);
-  void add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box);
+  void add_cells(std::uint32_t number, const Eigen::AlignedBox3d& box,
+                 const CancelRequest& cancelled);
 
   Solid solid_;
   std::vector<Element> elements_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "internal/bvh/traversal_stack.h"
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/convex_part.h"
 #include "internal/geometry/hull_coreset.h"
 #include "ist_proximity/geometry/solid.h"
@@ -37,9 +38,10 @@ class SurfaceBvh {
   static constexpr Slot kRoot = 0;  ///< the only slot of node 0 holds everything
 
   SurfaceBvh() = default;
-  explicit SurfaceBvh(const Solid& solid);
+  /// @throws Cancelled when the request says so
+  explicit SurfaceBvh(const Solid& solid, const CancelRequest& cancelled = {});
   /// Over any parts, in their order of numbers.
-  explicit SurfaceBvh(std::vector<ConvexPart> parts);
+  explicit SurfaceBvh(std::vector<ConvexPart> parts, const CancelRequest& cancelled = {});
 
   bool empty() const { return parts_.empty(); }
   const Node& node(std::int32_t index) const { return nodes_[static_cast<std::size_t>(index)]; }
@@ -63,8 +65,8 @@ class SurfaceBvh {
 
  private:
   using Range = std::pair<std::uint32_t, std::uint32_t>;
-  void build();
-  std::int32_t add_node(const Range& range);
+  void build(const CancelRequest& cancelled);
+  std::int32_t add_node(const Range& range, const CancelRequest& cancelled);
   void set_box(const Range& range, Node* node, int slot) const;
 
   std::vector<Node> nodes_;

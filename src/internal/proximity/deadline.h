@@ -25,15 +25,37 @@ class Deadline {
                std::chrono::duration<double>(std::min(seconds, kLongest)));
   }
 
+  /// A share of the time that is left: it passes when a deadline that many times nearer would, and
+  /// with the whole one at the latest.
+  /// @param whole    outlives the share
+  /// @param divisor  > 0
+  Deadline(Deadline* whole, std::size_t divisor)
+      : end_(whole->end_), limited_(whole->limited_), whole_(whole) {
+    if (!limited_) return;
+    const auto now = std::chrono::steady_clock::now();
+    if (end_ > now) end_ = now + (end_ - now) / static_cast<std::int64_t>(divisor);
+  }
+
   /// Whether passed() has been true.
   bool has_passed() const { return passed_; }
 
   /// Once true, always true.
   bool passed() {
     if (!limited_ || passed_) return passed_;
-    passed_ = asks_left_for_test >= 0 ? asks_left_for_test-- == 0
-                                      : std::chrono::steady_clock::now() >= end_;
+    const TimePoint now = std::chrono::steady_clock::now();
+    if (whole_ != nullptr) {
+      passed_ = whole_->passed() || now >= end_;
+    } else {
+      passed_ = asks_left_for_test >= 0 ? asks_left_for_test-- == 0 : now >= end_;
+    }
+    if (passed_) passed_at_ = now;
     return passed_;
+  }
+
+  /// Whether so much time has gone by since passed() was true for the first time.
+  bool passed_by(double seconds) {
+    return passed() &&
+           std::chrono::steady_clock::now() - passed_at_ >= std::chrono::duration<double>(seconds);
   }
 
   /// The same for steps that take no longer than the clock does: looks at it every `interval`
@@ -45,7 +67,9 @@ class Deadline {
  private:
   static constexpr double kLongest = 1e6;  ///< [s] what the clock can represent
   TimePoint end_;
+  TimePoint passed_at_;  ///< when passed() was true for the first time
   bool limited_;
+  Deadline* whole_ = nullptr;  ///< of which this is a share
   bool passed_ = false;
   std::uint32_t calls_ = 0;  ///< of passed_now_and_then()
 };

@@ -59,7 +59,7 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
   status_input_.model_problem = model_->problem;
-  for (std::size_t i = 0; i < robot_.links.size(); ++i) blends_.emplace_back(robot_, i);
+  for (std::size_t i = 0; i < robot_.links.size(); ++i) blends_.emplace_back(i);
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
     if (!link.usable()) status_input_.link_errors.push_back(link.error);
@@ -277,7 +277,7 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     if (model->robot->links[i].packing_id != packed_->links[i].packing_id) {
       filters_[i].expect_jump();
-      blends_[i] = KeptRepulsion(*model->robot, i);
+      blends_[i] = KeptRepulsion(i);
     }
   }
   packed_ = model->robot;

@@ -10,6 +10,7 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/robot_description.h"
 #include "ros/common/exceptions.h"
+#include "ros/common/memory.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/model/progress_report.h"
@@ -268,6 +269,7 @@ void ModelLoader::load(const std::string& urdf) {
            description.name.c_str(), took.count(), link_counts(state).c_str(),
            static_cast<std::size_t>(coarse));
   set_state(std::move(state));
+  return_free_memory();  // of the meshes' text and of packing: megabytes
 }
 
 /// Shows which mesh is being read: a large one, or one on a slow disk, takes long.

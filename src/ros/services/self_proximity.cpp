@@ -89,6 +89,7 @@ void SelfProximity::publish_failure(const std::string& fault) {
 }
 
 void SelfProximity::take_model() {
+  const auto is_stopped = [this] { return stop_signal_.stopped(); };
   bool is_refined = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -97,12 +98,12 @@ void SelfProximity::take_model() {
     model_ = newest_model_;
   }
   if (is_refined) {
-    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query);
+    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, is_stopped);
     return;
   }
   query_.reset();
   if (!model_->robot || !model_->kinematics) return;
-  query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query);
+  query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query, is_stopped);
   pose_source_ =
       make_pose_source(*model_, config_, buffer_, joints_, JointPoseSource::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());

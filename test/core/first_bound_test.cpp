@@ -1,0 +1,222 @@
+// First lower bounds, and what a query knows when there is next to no time.
+
+#include "proximity/first_bound.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "internal/cloud/point_bvh.h"
+#include "internal/proximity/deadline.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+
+// Clusters, sheets and single points, from 0 to 3 m away.
+Points random_points(test::Rng* rng, int kind) {
+  Points points;
+  const int count = 1 << (kind % 13);  // 1 to 4096
+  const Eigen::Vector3d center = test::random_vector(rng, kind % 3 == 0 ? 0.3 : 2.0);
+  const double size = std::pow(10.0, test::uniform(rng, -6.0, 0.3));
+  for (int i = 0; i < count; ++i) {
+    Eigen::Vector3d p = test::random_vector(rng, size);
+    if (kind % 4 == 1) p.z() = 0.0;
+    if (kind % 4 == 2) p.setZero();  // all points are one
+    points.push_back(center + p);
+  }
+  return points;
+}
+
+double distance_to_spheres(const PosedSpheres& spheres, const Eigen::Vector3d& p_O) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < spheres.count; ++k) {
+    const Eigen::Vector3d center(spheres.x[k], spheres.y[k], spheres.z[k]);
+    least = std::min(least, (p_O - center).norm() - static_cast<double>(spheres.radius[k]));
+  }
+  return least;
+}
+
+// The bound is never above the truth, and where the points are far it is near the truth.
+TEST(FirstBound, IsNeverAboveTheTruthAndSeldomFarBelow) {
+  const auto model =
+      test::make_model({Box{{0.2, 0.1, 0.6}}, Sphere{0.1}, test::torus(0.2, 0.04, 24, 12)}, 0.005);
+  test::Rng rng(161);
+  int far = 0, close = 0;
+  for (int i = 0; i < test::scaled(3000); ++i) {
+    const CloudSnapshot cloud = test::make_snapshot(random_points(&rng, i));
+    const PointBvh& bvh = cloud.index.bvh();
+    const Eigen::Isometry3d X_OL = bvh.X_FO().inverse() * test::random_pose(&rng, 1.0);
+    for (const LinkModel& link : model->links) {
+      const PosedSpheres spheres(link.tree, X_OL, i % 2 == 1);
+      const auto bound = static_cast<double>(first_bound(spheres, bvh.nodes().data(), bvh.root()));
+      double truth = std::numeric_limits<double>::infinity();
+      for (std::size_t tile = 0; tile < bvh.tile_count(); ++tile) {
+        PointTile scratch;
+        const PointTile& points = bvh.tile(tile, &scratch);
+        for (int k = 0; k < points.count; ++k) {
+          truth = std::min(truth, distance_to_spheres(spheres, points.point(k)));
+        }
+      }
+      ASSERT_LE(bound, truth + 1e-6 * (1.0 + std::abs(truth))) << "case " << i;
+      if (truth < 0.1) continue;
+      ++far;
+      close += bound > 0.6 * truth ? 1 : 0;
+    }
+  }
+  EXPECT_GT(far, test::scaled(2000));
+  EXPECT_GT(close, 0.98 * far);
+}
+
+// Three links, and clouds that no query has met before.
+class NoTime : public ::testing::Test {
+ protected:
+  NoTime() {
+    meshes_ = {test::torus(0.1, 0.03, 12, 6), test::open_box({0.1, 0.1, 0.15}),
+               test::l_shape(0.2, 0.05)};
+    std::vector<Shape> shapes(meshes_.begin(), meshes_.end());
+    model_ = test::make_model(shapes, 0.005);
+    known_.assign(meshes_.size(), true);
+  }
+
+  // A wall, and in a second cloud points near one link.
+  void next_scene() {
+    X_FL_.assign(meshes_.size(), Eigen::Isometry3d());
+    for (Eigen::Isometry3d& X : X_FL_) X = test::random_pose(&rng_, 0.5);
+    Points points;
+    for (int i = 0; i < 200; ++i) {
+      points.emplace_back(1.0, test::uniform(&rng_, -1.0, 1.0), test::uniform(&rng_, -1.0, 1.0));
+    }
+    wall_ = test::make_snapshot(points);
+    points.clear();
+    for (int i = 0; i < 10; ++i) {
+      points.push_back(X_FL_[0].translation() + test::random_vector(&rng_, 0.02));
+    }
+    near_ = test::make_snapshot(points);
+  }
+
+  double truth(std::size_t link) const {
+    Points points_L;
+    for (const CloudSnapshot* cloud : {&wall_, &near_}) {
+      const PointBvh& bvh = cloud->index.bvh();
+      const Eigen::Isometry3d X_LO = X_FL_[link].inverse() * bvh.X_FO();
+      for (std::size_t tile = 0; tile < bvh.tile_count(); ++tile) {
+        PointTile scratch;
+        const PointTile& points = bvh.tile(tile, &scratch);
+        for (int k = 0; k < points.count; ++k) points_L.push_back(X_LO * points.point(k));
+      }
+    }
+    return test::oracle_minimum(meshes_[link], points_L);
+  }
+
+  test::Rng rng_{163};
+  std::vector<TriangleMesh> meshes_;
+  std::shared_ptr<RobotModel> model_;
+  std::vector<bool> known_;
+  std::vector<Eigen::Isometry3d> X_FL_;
+  CloudSnapshot wall_, near_;
+};
+
+// A deadline that is over at once: before, only a link whose last obstacle was still there got an
+// answer, and its bound was minus the link's size. Now all of them are measured, and nearly all
+// that are free of contact are known to be.
+TEST_F(NoTime, EveryLinkHasAnObstacleAndABound) {
+  int unknown = 0, free = 0, proven = 0, links = 0;
+  QueryConfig config;
+  config.max_distance = 5.0;
+  config.deadline = 1e-9;
+  for (int i = 0; i < test::scaled(100); ++i) {
+    next_scene();
+    ProximityQuery query(model_, config);
+    std::vector<LinkProximity> results;
+    EXPECT_FALSE(query.run(X_FL_, known_, {&wall_, &near_}, &results));
+    for (std::size_t k = 0; k < results.size(); ++k) {
+      ++links;
+      unknown += results[k].state == LinkState::kUnknown ? 1 : 0;
+      if (results[k].state == LinkState::kUnknown) continue;
+      const double exact = truth(k);
+      ASSERT_LE(results[k].lower_bound, exact + 1e-9);
+      ASSERT_GE(results[k].distance, exact - 1e-6);
+      free += exact > 0.1 ? 1 : 0;
+      proven += exact > 0.1 && results[k].lower_bound > 0.0 ? 1 : 0;
+    }
+  }
+  // Another process may take the processor, and then the time is over before all are measured.
+  if (!test::kSanitized) EXPECT_LT(unknown, 0.3 * links);
+  EXPECT_GT(free, test::kSanitized ? -1 : links / 5);
+  EXPECT_GE(proven, 0.9 * free);
+}
+
+// A link in range of nothing is CLEAR, though there is no time to measure anything.
+TEST_F(NoTime, ClearLinksAreClear) {
+  QueryConfig config;
+  config.max_distance = 0.2;
+  config.deadline = 1e3;
+  int clear = 0;
+  for (int i = 0; i < test::scaled(50); ++i) {
+    next_scene();
+    ProximityQuery query(model_, config);
+    std::vector<LinkProximity> results;
+    Deadline::asks_left_for_test = 0;
+    query.run(X_FL_, known_, {&wall_, &near_}, &results);
+    Deadline::asks_left_for_test = -1;
+    for (std::size_t k = 0; k < results.size(); ++k) {
+      if (results[k].state != LinkState::kClear) continue;
+      ++clear;
+      ASSERT_GT(truth(k), config.max_distance - 1e-6);
+    }
+  }
+  EXPECT_GT(clear, test::scaled(20));
+}
+
+// A bound that was proven for one cloud is not taken for another, nor for a pose far away.
+TEST_F(NoTime, FirstBoundsBelongToTheirScene) {
+  QueryConfig config;
+  config.max_distance = 5.0;
+  config.deadline = 1e3;
+  ProximityQuery query(model_, config);
+  for (int i = 0; i < test::scaled(100); ++i) {
+    next_scene();
+    for (int step = 0; step < 3; ++step) {
+      std::vector<LinkProximity> results;
+      Deadline::asks_left_for_test = (i + step) % 4;
+      query.run(X_FL_, known_, {&wall_, &near_}, &results);
+      Deadline::asks_left_for_test = -1;
+      for (std::size_t k = 0; k < results.size(); ++k) {
+        ASSERT_LE(results[k].lower_bound, truth(k) + 1e-9) << "scene " << i;
+      }
+      for (Eigen::Isometry3d& X : X_FL_) {
+        X.translation() += test::random_vector(&rng_, step == 0 ? 0.01 : 0.5);
+      }
+    }
+  }
+}
+
+// A share of a deadline passes no later than the whole one, and not before its time.
+TEST(FirstBound, SharesOfADeadline) {
+  Deadline never(0.0);
+  EXPECT_FALSE(Deadline(&never, 10).passed());
+  Deadline whole(1000.0);
+  EXPECT_FALSE(Deadline(&whole, 1).passed());
+  EXPECT_FALSE(Deadline(&whole, 10).passed());
+  Deadline small(&whole, 1000000000);
+  while (!small.passed()) {
+  }
+  EXPECT_FALSE(whole.has_passed());
+  EXPECT_FALSE(small.passed_by(100.0));
+  Deadline over(1e-9);
+  Deadline rest(&over, 2);
+  EXPECT_TRUE(rest.passed());
+  EXPECT_TRUE(rest.passed_by(0.0));
+  EXPECT_TRUE(over.has_passed());
+}
+
+}  // namespace
+}  // namespace ist

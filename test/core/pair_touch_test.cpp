@@ -1,0 +1,184 @@
+// Link against link where it is hard to tell whether they touch: less than nanometres apart, and
+// next to the opening of a mesh.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "internal/geometry/convex_part.h"
+#include "ist_proximity/proximity/self_query.h"
+#include "support/hard_shapes.h"
+#include "support/meshes.h"
+#include "support/random_links.h"
+#include "support/random_numbers.h"
+#include "support/scene.h"
+#include "support/shape_oracle.h"
+
+namespace ist {
+namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;
+
+/// Two links and their poses.
+struct Pair {
+  Pair(const Shape& first, const Shape& second, double max_error = 0.02)
+      : links{test::one(first), test::one(second)}, model(test::model_of(links, max_error)) {}
+
+  PairProximity run(SelfQuery* query) const {
+    std::vector<PairProximity> results;
+    query->run(X_FL, {true, true}, &results);
+    return results[0];
+  }
+  PairProximity run_fresh() const {
+    SelfQuery query = make_query();
+    return run(&query);
+  }
+  SelfQuery make_query() const {
+    QueryConfig config;
+    config.max_distance = 1.0;
+    config.tolerance = 0.0;
+    return {model, {{0, 1}}, config};
+  }
+  /// Moves the first link along the shortest line until the distance is this one.
+  void approach(double distance) {
+    for (int i = 0; i < 3; ++i) {
+      const PairProximity now = run_fresh();
+      ASSERT_EQ(now.state, LinkState::kNear);
+      X_FL[0].translation() -= (now.distance - distance) * now.direction;
+    }
+  }
+
+  std::vector<LinkGeometry> links;
+  std::shared_ptr<const RobotModel> model;
+  Poses X_FL = Poses(2, Eigen::Isometry3d::Identity());
+};
+
+// The line through the closest points is known to rounding over distance: at 0.1 nm that turns a
+// slab of 0.1 m by 10 um, and proves nothing. The triangles' own axes do.
+TEST(PairTouch, TrianglesTenthsOfANanometreApartAreProvenApart) {
+  test::Rng rng(151);
+  int cases = 0, proven = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const auto corner = [&] { return test::random_vector(&rng, 0.1); };
+    ConvexPart p, q;
+    p.a = corner(), p.b = corner(), p.c = corner();
+    q.a = corner(), q.b = corner(), q.c = corner();
+    const ConvexDistance before = triangle_distance(p, q);
+    if (!(before.distance > 1e-3)) continue;
+    const double distance = test::power_of_ten(&rng, -10.0, -7.0);
+    const Eigen::Vector3d n = (before.on_p - before.on_q) / before.distance;
+    const Eigen::Vector3d shift = (before.distance - distance) * n;
+    for (Eigen::Vector3d* corner_p : {&p.a, &p.b, &p.c}) *corner_p -= shift;
+    const ConvexDistance found = triangle_distance(p, q);
+    ASSERT_NEAR(found.distance, distance, 1e-14) << i;
+    ASSERT_LE(found.lower_bound, found.distance) << i;
+    ++cases;
+    proven += found.lower_bound > 0.1 * distance ? 1 : 0;
+  }
+  EXPECT_GT(cases, 5000);
+  EXPECT_GT(proven, cases - cases / 100);
+}
+
+// A bound of minus 25 mm at 0.2 nm was what a box has at most as its depth.
+TEST(PairTouch, FreshAndKeptSearchesAgreeNextToTouch) {
+  test::Rng rng(152);
+  for (int i = 0; i < 40; ++i) {
+    Pair pair(test::l_shape(0.2, 0.04), test::random_lump(&rng));
+    pair.X_FL[0] = test::random_pose(&rng, 0.3);
+    pair.X_FL[1] = pair.X_FL[0];
+    pair.X_FL[1].translation() += 0.5 * test::random_vector(&rng, 1.0).normalized();
+    pair.X_FL[1].linear() = test::random_pose(&rng, 0.0).linear();
+    SelfQuery kept = pair.make_query();
+    for (const double distance : {1e-3, 1e-7, 1e-9, 3e-10}) {
+      ASSERT_NO_FATAL_FAILURE(pair.approach(distance));
+      const PairProximity warm = pair.run(&kept), fresh = pair.run_fresh();
+      for (const PairProximity& answer : {warm, fresh}) {
+        EXPECT_EQ(answer.state, LinkState::kNear) << i << " at " << distance;
+        EXPECT_TRUE(answer.decided);
+        EXPECT_NEAR(answer.distance, distance, 1e-12);
+        EXPECT_GT(answer.lower_bound, distance > 1e-8 ? 0.99 * distance : 0.0)
+            << i << " at " << distance;
+        EXPECT_LE(answer.lower_bound, answer.distance);
+      }
+    }
+  }
+}
+
+// The distance of closed links changes no faster than they move, so a kept bound loses the motion
+// when they touch, and not all that their spheres leave open.
+TEST(PairTouch, AKeptBoundLosesNoMoreThanTheMotionWhenLinksTouch) {
+  test::Rng rng(153);
+  for (int i = 0; i < 20; ++i) {
+    Pair pair(test::box({0.2, 0.1, 0.05}), test::random_lump(&rng));
+    pair.X_FL[1].translation() = 0.5 * test::random_vector(&rng, 1.0).normalized();
+    ASSERT_NO_FATAL_FAILURE(pair.approach(1e-6));
+    SelfQuery kept = pair.make_query();
+    const PairProximity before = pair.run(&kept);
+    ASSERT_GT(before.lower_bound, 0.0);
+    double moved = 0.0;
+    for (int step = 0; step < 5; ++step) {
+      constexpr double kStep = 1e-5;  // [m]
+      pair.X_FL[0].translation() -= kStep * before.direction;
+      moved += kStep;
+      const PairProximity after = pair.run(&kept);
+      ASSERT_EQ(after.state, LinkState::kContact) << i;
+      EXPECT_TRUE(after.decided);
+      EXPECT_GE(after.lower_bound, before.lower_bound - moved - 1e-9) << i;
+      EXPECT_LE(after.lower_bound, after.distance);
+      for (const Eigen::Vector3d& p : std::get<TriangleMesh>(pair.links[1][0].shape).vertices) {
+        const Eigen::Vector3d p_A = pair.X_FL[0].inverse() * (pair.X_FL[1] * p);
+        EXPECT_LE(after.lower_bound, test::oracle_signed_distance(pair.links[0], p_A) + 1e-12);
+      }
+    }
+  }
+}
+
+// The tip of a needle is inside a box without a lid, 50 mm from all of its walls: spheres of 20 mm
+// do not show it, and there is no place where surfaces touch.
+TEST(PairTouch, AContactThroughAnOpeningHasADepthAndPointsOnTheLinks) {
+  int contacts = 0;
+  for (const double depth : {0.001, 0.005, 0.02}) {
+    Pair pair(test::open_box({0.1, 0.1, 0.1}), test::needle(0.3, 0.005));
+    pair.X_FL[1].linear() = Eigen::AngleAxisd(EIGEN_PI, Eigen::Vector3d::UnitX()).matrix();
+    pair.X_FL[1].translation() = Eigen::Vector3d(0.0, 0.0, 0.05 - depth);
+    const double truth = test::oracle_signed_distance(pair.links[0], pair.X_FL[1].translation());
+    const PairProximity answer = pair.run_fresh();
+    SCOPED_TRACE("depth " + std::to_string(depth) + ", truth " + std::to_string(truth));
+    if (!(truth < 0.0)) continue;
+    ++contacts;
+    EXPECT_EQ(answer.state, LinkState::kContact);
+    EXPECT_TRUE(answer.decided);
+    EXPECT_LT(answer.distance, -0.01);
+    EXPECT_LE(answer.lower_bound, truth);
+    EXPECT_NEAR((answer.p_FCa - answer.p_FCb).norm(), -answer.distance, 1e-9);
+    EXPECT_NEAR(std::abs(test::oracle_signed_distance(pair.links[0], answer.p_FCa)), 0.0, 1e-9);
+  }
+  EXPECT_GT(contacts, 0);
+}
+
+// Behind a sheet the winding number is a half, so nobody can tell the side. The spheres bound the
+// distance all the same; minus 0.33 m was what a link of this size has at most as its depth.
+TEST(PairTouch, AnUndecidedOpeningHasTheBoundOfTheSpheres) {
+  Pair pair(test::sheet(0.2), Sphere{0.02}, 0.005);
+  int undecided = 0;
+  for (const double height : {-0.03, -0.025, -0.0225, 0.0225, 0.025, 0.03}) {
+    pair.X_FL[1].translation() = Eigen::Vector3d(0.0, 0.0, height);
+    const PairProximity answer = pair.run_fresh();
+    EXPECT_EQ(answer.state, LinkState::kNear) << height;
+    EXPECT_TRUE(answer.finished);
+    EXPECT_NEAR(answer.distance, std::abs(height) - 0.02, 1e-9);
+    EXPECT_LE(answer.lower_bound, answer.distance);
+    EXPECT_GT(answer.lower_bound, -0.1) << height;
+    EXPECT_EQ(answer.decided, answer.lower_bound > 0.0) << height;
+    undecided += answer.decided ? 0 : 1;
+  }
+  EXPECT_GT(undecided, 0);
+}
+
+}  // namespace
+}  // namespace ist
