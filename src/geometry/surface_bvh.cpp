@@ -165,7 +165,7 @@ Fit fit(const std::vector<ConvexPart>& parts, std::uint32_t first, std::uint32_t
 }  // namespace
 
 SurfaceBvh::SurfaceBvh(const Solid& solid, const CancelRequest& cancelled)
-    : parts_(parts_of(solid)) {
+    : parts_(parts_of(solid)), hull_(parts_, cancelled) {
   build(cancelled);
 }
 
@@ -286,21 +286,27 @@ void SurfaceBvh::set_box(const Range& range, Node* node, int slot) const {
   node->radius[slot] = round_up(best.half.norm() * (1.0 + 1e-6));
 }
 
+namespace {
+
+struct BoundedChild {
+  double bound;  // [m]
+  std::int32_t child;
+  SurfaceBvh::Slot slot;
+};
+
+}  // namespace
+
 // Branch and bound: float decides which parts are measured in double.
 double SurfaceBvh::support(const Eigen::Vector3d& n_L) const {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   if (parts_.empty()) return -kInf;
   const double rounding = 2e-6 * extent_;
   const Eigen::Vector3f n = n_L.cast<float>();
-  struct Entry {
-    double bound;
-    std::int32_t child;
-  };
-  TraversalStack<Entry, stack_capacity(kMaxLevels, kWidth)> stack;
-  stack.push({kInf, nodes_[0].child[0]});
-  double largest = -kInf;
+  TraversalStack<BoundedChild, stack_capacity(kMaxLevels, kWidth)> stack;
+  stack.push({kInf, nodes_[0].child[0], kRoot});
+  double largest = hull_.empty() ? -kInf : n_L.dot(hull_.point(hull_.farthest(n_L)));
   while (!stack.empty()) {
-    const Entry entry = stack.pop();
+    const BoundedChild entry = stack.pop();
     if (entry.bound <= largest) continue;
     if (entry.child < 0) {
       const ConvexPart& part = parts_[static_cast<std::size_t>(~entry.child)];
@@ -314,11 +320,48 @@ double SurfaceBvh::support(const Eigen::Vector3d& n_L) const {
     for (int k = 0; k < node.count; ++k) {
       const double bound = static_cast<double>(supports[k]) + rounding;
       if (bound > largest) {
-        stack.push_greatest_on_top<&Entry::bound>(first, {bound, node.child[k]});
+        stack.push_greatest_on_top<&BoundedChild::bound>(first, {bound, node.child[k], 0});
       }
     }
   }
   return largest;
+}
+
+// Depth first, the nearest box first.
+SurfaceBvh::Slot SurfaceBvh::nearest_part(const Eigen::Vector3d& p_L, double enough) const {
+  const double rounding = 2e-6 * (extent_ + p_L.norm());
+  const ConvexPart point{Kind::kSphere, p_L, p_L, p_L, 0.0, 0};
+  OrientedBox box{};
+  Eigen::Map<Eigen::Vector3f>(box.center) = p_L.cast<float>();
+  for (int i = 0; i < 3; ++i) box.axis[i][i] = 1.0F;
+  TraversalStack<BoundedChild, stack_capacity(kMaxLevels, kWidth)> stack;
+  stack.push({-1.0, nodes_[0].child[0], kRoot});
+  double least = std::numeric_limits<double>::infinity();
+  Slot nearest = kRoot;
+  while (!stack.empty() && least > enough) {
+    const BoundedChild entry = stack.pop();
+    if (entry.bound >= least) continue;
+    if (entry.child < 0) {
+      const ConvexPart& part = parts_[static_cast<std::size_t>(~entry.child)];
+      const double distance = convex_distance(point, part).distance;
+      if (!(distance < least)) continue;
+      least = distance;
+      nearest = entry.slot;
+      continue;
+    }
+    const Node& node = nodes_[static_cast<std::size_t>(entry.child)];
+    alignas(32) float bounds[kWidth];
+    oriented_box_bounds(node, box, bounds);
+    const std::size_t first = stack.size();
+    const auto slots = static_cast<Slot>(entry.child) * kWidth;
+    for (int k = 0; k < node.count; ++k) {
+      const double bound = static_cast<double>(bounds[k]) - rounding;
+      if (bound >= least) continue;
+      stack.push_least_on_top<&BoundedChild::bound>(
+          first, {bound, node.child[k], slots + static_cast<Slot>(k)});
+    }
+  }
+  return nearest;
 }
 
 }  // namespace ist

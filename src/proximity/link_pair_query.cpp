@@ -68,6 +68,9 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   const Eigen::Isometry3d X_BA = relative_pose(X_FB.X, X_FA.X);
   const double moved =
       has_pose_ ? relative_displacement(surface_a_, surface_b_, X_BA_, X_BA) : kInf;
+  const double since_reference =
+      has_pose_ ? relative_displacement(surface_a_, surface_b_, surfaces_.reference_pose(), X_BA)
+                : kInf;
   kept_bound_ = are_closed_ && has_pose_ ? lower_bound() - moved : depth_limit();
   openings_a_.note_motion(moved);
   openings_b_.note_motion(moved);
@@ -82,7 +85,7 @@ void LinkPairQuery::move_to(const RigidPose& X_FA, const RigidPose& X_FB,
   config_ = config;
   range_ = config.max_distance + config.margin;
   range_ += pose_uncertainty(range_);
-  surfaces_.move_to(X_BA, moved);
+  surfaces_.move_to(X_BA, since_reference);
   stage_ = Stage::kSurfaces;
   are_in_contact_ = has_inside_ = false;
   depth_bound_ = depth_limit();
@@ -108,6 +111,7 @@ void LinkPairQuery::decide_contact(int* steps) {
   are_in_contact_ = surfaces_.distance() <= 0.0;
   are_apart_ = are_apart_ && !are_in_contact_;
   if (are_in_contact_ || are_apart_ || !(surfaces_.lower_bound() > 0.0)) return;
+  if (are_hulls_apart()) return;
   are_in_contact_ = is_inside_other();
   if (are_in_contact_) return;
   const Answer into_a = openings_a_.decide(X_BA_, steps);
@@ -116,6 +120,16 @@ void LinkPairQuery::decide_contact(int* steps) {
   if (into_b == Answer::kInside) note_inside(openings_b_.inside_B(), true);
   are_in_contact_ = has_inside_;
   are_apart_ = into_a == Answer::kApart && into_b == Answer::kApart;
+}
+
+// Whether the insides of both lie on the two sides of a slab.
+bool LinkPairQuery::are_hulls_apart() {
+  const double clearance =
+      surfaces_.separation() - surface_a_.opening_margin - surface_b_.opening_margin;
+  if (!(clearance > 0.0)) return false;
+  openings_a_.note_clearance(clearance);
+  openings_b_.note_clearance(clearance);
+  return are_apart_ = true;
 }
 
 // Tells whether a component of one is inside the other, where the surfaces are apart.

@@ -45,6 +45,7 @@ class LinkPairQuery {
   enum class Stage { kSurfaces, kInside, kDone };
 
   void decide_contact(int* steps);
+  bool are_hulls_apart();
   bool is_inside_other();
   void note_inside(const Eigen::Vector3d& p, bool of_a);
   void search_spheres(std::vector<LinkPairSearch::Entry>* queue);

@@ -27,6 +27,9 @@ struct LinkSurface {
   SurfaceBvh surface;
   Openings openings;         ///< none for closed links
   SurfaceBvh opening_cells;  ///< over the cells of `openings`
+  /// [m] No cell protrudes farther from the convex hull of the surface; inf: not known. The inside
+  /// ends at the surface or in a cell, so it does not protrude farther either.
+  double opening_margin = 0.0;
   /// One point of each connected component of the surface: where surfaces are apart, all of a
   /// component is inside another link, or nothing of it.
   std::vector<Eigen::Vector3d> component_points;

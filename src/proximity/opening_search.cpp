@@ -123,12 +123,12 @@ void OpeningSearch::note_motion(double displacement) {
 OpeningSearch::Answer OpeningSearch::decide(const Eigen::Isometry3d& X_BA, int* steps) {
   if (is_closed_ || stays_apart()) return Answer::kApart;
   search_.move_to(X_BA, moved_);
-  moved_ = 0.0;
   int left = kMaxSteps;
   SurfacePairSearch::Goal goal;
   goal.range = kFarEnough;
   goal.tolerance = 0.5 * kFarEnough;
   const bool is_found = search_.run(goal, &left);
+  if (search_.is_at_reference()) moved_ = 0.0;
   Answer answer = Answer::kUnknown;
   if (is_found && search_.lower_bound() > 0.0) {
     clearance_ = search_.lower_bound();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
 
 #include "internal/geometry/openings.h"
@@ -27,6 +28,8 @@ class OpeningSearch {
 
   /// [m] No point of A has moved farther in B's frame since the last call.
   void note_motion(double displacement);
+  /// [m] Openings and surface are proven to be no nearer.
+  void note_clearance(double clearance) { clearance_ = std::max(clearance_, clearance); }
   /// Whether openings and surface are apart for certain, without a search.
   bool stays_apart() const { return clearance_ > 0.0; }
   /// @param X_BA  frame of A -> that of B, rigid
@@ -40,7 +43,7 @@ class OpeningSearch {
   const bool is_closed_;
   SurfacePairSearch search_;
   double clearance_ = 0.0;  // [m] lower bound of the distance of openings and surface
-  double moved_;            // [m] since the search's pose
+  double moved_;            // [m] since search_.reference_pose()
   Eigen::Vector3d inside_B_ = Eigen::Vector3d::Zero();
 };
 

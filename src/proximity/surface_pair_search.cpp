@@ -27,6 +27,12 @@ constexpr int kManyPairs = 4096;
 // The plane between the closest points is tried after so many pairs, and when twice as many more
 // have been looked at.
 constexpr int kFirstPlane = 12;
+// A search from a kept front goes on to this part of the tolerance, and to this much more than the
+// range [m].
+constexpr double kSearchedShare = 0.25, kRangeSlack = 0.01;
+// After so many pairs a search is content with the tolerance. Where that comes often, there is no
+// slack, and every pose is searched: half of this doubled the time of motions with many ties.
+constexpr int kSlackPairs = 8192;
 
 constexpr std::size_t kStackCapacity =
     stack_capacity(2 * SurfaceBvh::kMaxLevels, SurfaceBvh::kWidth);
@@ -55,112 +61,157 @@ OrientedBox posed_box(const SurfaceBvh& bvh, SurfaceBvh::Slot slot, const Eigen:
 
 }  // namespace
 
-SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity)
-    : a_(a), b_(b), capacity_(capacity) {
-  assert(capacity >= 2 * SurfaceBvh::kWidth);
-  front_.reserve(capacity);
-  measured_.reserve(capacity);
-  start_anew();
+// [m] The bound that is left of a key.
+inline double SurfacePairSearch::bound_at(double key) const {
+  return key < 0.0 ? 0.0 : std::max(key - path() * (1.0 + 1e-14), 0.0);
 }
+
+inline bool SurfacePairSearch::is_wanted(double bound) const {
+  return bound < prune_bound_ || bound <= 0.0;
+}
+
+inline bool SurfacePairSearch::is_leaf(const Pair& pair) const {
+  return a_.child(pair.a) < 0 && b_.child(pair.b) < 0;
+}
+
+// A number below 0 for boxes that overlap, which orders small ones first: they lead to an
+// intersection soonest.
+inline double SurfacePairSearch::overlap_order(const Pair& pair) const {
+  return -1.0 / (a_.radius(pair.a) + b_.radius(pair.b) + 1e-30);
+}
+
+SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity)
+    : SurfacePairSearch(a, b, capacity, {}, {}) {}
 
 SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
                                      SurfacePairSearch&& memory)
-    : a_(a),
-      b_(b),
-      capacity_(capacity),
-      front_(std::move(memory.front_)),
-      measured_(std::move(memory.measured_)) {
+    : SurfacePairSearch(a, b, capacity, std::move(memory.queue_), std::move(memory.kept_)) {}
+
+SurfacePairSearch::SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
+                                     std::vector<Entry> queue, std::vector<Entry> kept)
+    : a_(a), b_(b), capacity_(capacity), queue_(std::move(queue)), kept_(std::move(kept)) {
   assert(capacity >= 2 * SurfaceBvh::kWidth);
-  front_.reserve(capacity);
-  measured_.reserve(capacity);
+  queue_.reserve(capacity);
+  kept_.reserve(capacity);
   start_anew();
 }
 
 void SurfacePairSearch::start_anew() {
-  front_.clear();
-  measured_.clear();
-  path_ = plane_path_ = plane_bound_ = 0.0;
+  queue_.clear();
+  kept_.clear();
+  least_kept_ = kInf;
+  path_ = moved_ = plane_path_ = plane_bound_ = 0.0;
   if (!a_.empty() && !b_.empty()) {
-    front_.push_back({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
+    keep({kUnproven, SurfaceBvh::kRoot, SurfaceBvh::kRoot, 0});
   }
 }
 
 void SurfacePairSearch::move_to(const Eigen::Isometry3d& X_BA, double displacement) {
   X_BA_ = X_BA;
-  const Eigen::Isometry3d X_AB = X_BA.inverse();
-  R_BA_ = X_BA.linear().cast<float>();
-  p_BA_ = X_BA.translation().cast<float>();
-  R_AB_ = X_AB.linear().cast<float>();
-  p_AB_ = X_AB.translation().cast<float>();
+  moved_ = displacement >= 0.0 ? displacement : kInf;
+  is_at_reference_ = is_searching_ = has_boxes_ = false;
   const double scale = X_BA.translation().norm() + a_.extent() + b_.extent();
   rounding_ = kBoxRounding * scale;
   exact_rounding_ = 2.0 * kLostInLength * scale;
-  // A front that costs more than to start anew has become too fine for what is near now.
-  if (is_new_) cost_of_new_ = looked_at_;
-  const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
-  const bool is_crowded = 4 * (front_.size() + measured_.size()) > 3 * capacity_;
-  is_new_ = !(displacement <= kJump) || is_worn || is_crowded;
-  looked_at_ = next_plane_ = 0;
-  plane_tried_ = 0.0;
-  if (is_new_) {
-    start_anew();
-  } else {
-    keep_measured();
-    path_ += displacement;
-    if (path_ > kLongestPath) rebase_path();
-  }
   closest_ = {};
   if (has_witness_) {
     measure({0.0, witness_a_, witness_b_});
-  } else {
-    set_direction();
+  } else if (!a_.empty() && !b_.empty()) {
+    descend();
   }
-  if (!(displacement <= kJump) && !front_.empty()) descend();
 }
 
-void SurfacePairSearch::keep_measured() {
-  for (const Entry& entry : measured_) {
-    front_.push_back(entry);
-    std::push_heap(front_.begin(), front_.end());
+// What boxes are compared with, in float.
+void SurfacePairSearch::prepare_boxes() {
+  if (has_boxes_) return;
+  has_boxes_ = true;
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  R_BA_ = X_BA_.linear().cast<float>();
+  p_BA_ = X_BA_.translation().cast<float>();
+  R_AB_ = X_AB.linear().cast<float>();
+  p_AB_ = X_AB.translation().cast<float>();
+  set_direction();
+}
+
+// What is proven from here on is proven at this pose.
+void SurfacePairSearch::set_reference() {
+  has_jumped_ = !(moved_ <= kJump);
+  if (has_jumped_) {
+    start_anew();
+  } else {
+    path_ += moved_;
+    moved_ = 0.0;
+    if (path_ > kLongestPath) rebase_path();
   }
-  measured_.clear();
+  reference_X_BA_ = X_BA_;
+  is_at_reference_ = true;
+  wants_slack_ = false;
+  plane_tried_ = 0.0;
+}
+
+void SurfacePairSearch::begin_search() {
+  // A front that costs more than to start anew has become too fine for what is near now.
+  if (is_new_) cost_of_new_ = looked_at_;
+  const bool is_worn = !is_new_ && looked_at_ > cost_of_new_;
+  const bool is_crowded = 4 * (queue_.size() + kept_.size()) > 3 * capacity_;
+  is_new_ = has_jumped_ || is_worn || is_crowded;
+  if (is_new_ && !has_jumped_) start_anew();
+  wants_slack_ = !has_jumped_;
+  looked_at_ = 0;
+  next_plane_ = kFirstPlane;
+  is_searching_ = true;
+  prepare_boxes();
+  if (has_jumped_) descend();
+  update_prune_bound();
+  sort_front();
+}
+
+// Divides the front into what is wanted and what is not.
+void SurfacePairSearch::sort_front() {
+  kept_.insert(kept_.end(), queue_.begin(), queue_.end());
+  queue_.clear();
+  least_kept_ = kInf;
+  std::size_t count = 0;
+  for (const Entry& entry : kept_) {
+    if (is_wanted(bound_at(entry.key))) {
+      queue_.push_back(entry);
+    } else {
+      least_kept_ = std::min(least_kept_, entry.key);
+      kept_[count++] = entry;
+    }
+  }
+  kept_.resize(count);
+  std::make_heap(queue_.begin(), queue_.end());
 }
 
 void SurfacePairSearch::rebase_path() {
   // A key that was below the path by now proves nothing.
-  for (Entry& entry : front_) entry.key = entry.key > path_ ? entry.key - path_ : kUnproven;
-  std::make_heap(front_.begin(), front_.end());
+  for (std::vector<Entry>* entries : {&queue_, &kept_}) {
+    for (Entry& entry : *entries) entry.key = entry.key > path_ ? entry.key - path_ : kUnproven;
+  }
   plane_bound_ -= path_ - plane_path_;
   path_ = plane_path_ = 0.0;
 }
 
-double SurfacePairSearch::bound_of(const Entry& entry) const {
-  return entry.key < 0.0 ? 0.0 : std::max(entry.key - path_ * (1.0 + 1e-14), 0.0);
-}
-
 double SurfacePairSearch::lower_bound() const {
-  double bound = closest_.distance;
-  if (!front_.empty()) bound = std::min(bound, bound_of(front_.front()));
-  for (const Entry& entry : measured_) bound = std::min(bound, bound_of(entry));
-  const double by_plane = plane_bound_ - (path_ - plane_path_) * (1.0 + 1e-14);
-  return std::max({bound, std::min(by_plane, closest_.distance), 0.0});
+  double key = least_kept_;
+  if (!queue_.empty()) key = std::min(key, queue_.front().key);
+  return std::max(std::min(std::max(bound_at(key), plane_bound()), closest_.distance), 0.0);
 }
 
 double SurfacePairSearch::tolerance_at(double distance) const {
   const double resolved = 1e-12 * distance + 4.0 * exact_rounding_;
+  const double share = is_searching_ && wants_slack_ ? kSearchedShare : 1.0;
   const double tolerance =
-      std::max({goal_.tolerance, goal_.relative_tolerance * distance, resolved});
+      std::max({share * goal_.tolerance, share * goal_.relative_tolerance * distance, resolved});
   return looked_at_ > kManyPairs ? std::max(tolerance, 2.0 * rounding_) : tolerance;
 }
 
 void SurfacePairSearch::update_prune_bound() {
   const double distance = closest_.distance;
-  prune_bound_ =
-      distance < goal_.range ? std::max(distance - tolerance_at(distance), 0.0) : goal_.range;
-}
-
-bool SurfacePairSearch::is_wanted(double bound) const {
-  return bound < prune_bound_ || bound <= 0.0;
+  const double range = goal_.range + (is_searching_ && wants_slack_ ? kRangeSlack : 0.0);
+  const double near = std::max(distance - tolerance_at(distance), 0.0);
+  prune_bound_ = distance < goal_.range ? near : std::min(std::max(near, goal_.range), range);
 }
 
 void SurfacePairSearch::set_direction() {
@@ -177,20 +228,10 @@ void SurfacePairSearch::set_direction() {
   n_A_ = R_AB_ * n_B_;
 }
 
-bool SurfacePairSearch::is_leaf(const Pair& pair) const {
-  return a_.child(pair.a) < 0 && b_.child(pair.b) < 0;
-}
-
-// A bound of boxes, or for boxes that overlap a number below 0 that orders small ones first: they
-// lead to an intersection soonest.
-double SurfacePairSearch::bound(double measured, const Pair& pair) const {
-  const double bound = measured - rounding_;
-  if (bound > 0.0) return bound;
-  return -1.0 / (a_.radius(pair.a) + b_.radius(pair.b) + 1e-30);
-}
-
-// The children of the larger box beside the smaller one.
-int SurfacePairSearch::expand(const Pair& pair, Pair children[SurfaceBvh::kWidth]) {
+// The children of the larger box beside the smaller one: those that are wanted.
+// @param children  by bit, 0 for all
+SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::uint8_t children,
+                                                       double prune_bound) {
   const std::int32_t child_a = a_.child(pair.a), child_b = b_.child(pair.b);
   const bool of_a = child_b < 0 || (child_a >= 0 && a_.radius(pair.a) >= b_.radius(pair.b));
   alignas(32) float bounds[SurfaceBvh::kWidth];
@@ -201,13 +242,25 @@ int SurfacePairSearch::expand(const Pair& pair, Pair children[SurfaceBvh::kWidth
     oriented_box_bounds(node, posed_box(a_, pair.a, R_BA_, p_BA_, -n_B_), bounds);
   }
   const auto first = static_cast<SurfaceBvh::Slot>((of_a ? child_a : child_b) * SurfaceBvh::kWidth);
+  Expansion result;
+  result.count = 0;
+  result.unwanted = 0;
+  result.least_unwanted = kInf;
   for (int k = 0; k < node.count; ++k) {
-    Pair& child = children[k];
+    const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(k));
+    if (children != 0 && (children & bit) == 0) continue;
+    const double bound = std::max(static_cast<double>(bounds[k]) - rounding_, pair.bound);
+    if (bound > 0.0 && bound >= prune_bound) {
+      result.unwanted = static_cast<std::uint8_t>(result.unwanted | bit);
+      result.least_unwanted = std::min(result.least_unwanted, bound);
+      continue;
+    }
+    Pair& child = result.wanted[result.count++];
     child = pair;
     (of_a ? child.a : child.b) = first + static_cast<SurfaceBvh::Slot>(k);
-    child.bound = std::max(bound(bounds[k], child), pair.bound);
+    child.bound = bound > 0.0 ? bound : overlap_order(child);
   }
-  return node.count;
+  return result;
 }
 
 // Measures two parts. @returns [m] a lower bound of their distance
@@ -219,7 +272,7 @@ double SurfacePairSearch::measure(const Pair& pair) {
     witness_a_ = pair.a;
     witness_b_ = pair.b;
     has_witness_ = true;
-    set_direction();
+    if (has_boxes_) set_direction();
     update_prune_bound();
   }
   return std::max(found.lower_bound - exact_rounding_, 0.0);
@@ -231,20 +284,20 @@ const ConvexPart& SurfacePairSearch::part_b() const { return part_of(b_, witness
 
 // Finds an upper bound: from the roots on, always the child with the least bound.
 void SurfacePairSearch::descend() {
+  prepare_boxes();
   Pair pair{-1.0, SurfaceBvh::kRoot, SurfaceBvh::kRoot};
   while (!is_leaf(pair)) {
-    Pair children[SurfaceBvh::kWidth];
-    const int count = expand(pair, children);
-    pair = *std::min_element(children, children + count,
+    const Expansion children = expand(pair, 0, kInf);
+    pair = *std::min_element(children.wanted, children.wanted + children.count,
                              [](const Pair& p, const Pair& q) { return p.bound < q.bound; });
     pair.bound = -1e30;
   }
   measure(pair);
 }
 
-void SurfacePairSearch::push(const Entry& entry) {
-  front_.push_back(entry);
-  std::push_heap(front_.begin(), front_.end());
+void SurfacePairSearch::keep(const Entry& entry) {
+  kept_.push_back(entry);
+  least_kept_ = std::min(least_kept_, entry.key);
 }
 
 // The distance of the surfaces along the line through the closest points, if these have changed.
@@ -255,26 +308,69 @@ void SurfacePairSearch::prove_by_plane() {
   plane_tried_ = closest_.distance;
   const Eigen::Vector3d n_B = (closest_.on_p - closest_.on_q) / closest_.distance;
   const Eigen::Vector3d n_A = X_BA_.linear().transpose() * n_B;
-  const double below = b_.support(n_B);
-  const double above = n_B.dot(X_BA_.translation()) - a_.support(-n_A);
-  const double bound = above - below - exact_rounding_;
-  if (bound < plane_bound_ - (path_ - plane_path_)) return;
+  const HullCoreset &hull_a = a_.hull(), &hull_b = b_.hull();
+  const double middle = n_B.dot(X_BA_.translation());
+  if (!hull_a.empty() && !hull_b.empty()) {
+    const double below = n_B.dot(hull_b.point(hull_b.farthest(n_B)));
+    const double above = n_A.dot(hull_a.point(hull_a.farthest(-n_A)));
+    const double gap = middle + above - below;
+    keep_plane(gap - (hull_a.error() + hull_b.error()) * (1.0 + 1e-9) - exact_rounding_);
+    // The coresets' hulls are no larger than the surfaces.
+    if (is_wanted(gap + exact_rounding_) || !is_wanted(plane_bound())) return;
+  }
+  keep_plane(middle - a_.support(-n_A) - b_.support(n_B) - exact_rounding_);
+}
+
+void SurfacePairSearch::keep_plane(double bound) {
+  if (bound < plane_bound()) return;
   plane_bound_ = bound;
-  plane_path_ = path_;
+  plane_path_ = path();
+}
+
+// Tries the plane between the closest parts found last, then that between the hulls, then that
+// between the parts nearest to the hulls' closest points. @returns whether that is the answer
+bool SurfacePairSearch::prove_by_hulls() {
+  if (!has_jumped_ || a_.hull().empty() || b_.hull().empty()) prove_by_plane();
+  if (!is_wanted(plane_bound())) return true;
+  if (a_.hull().empty() || b_.hull().empty()) return false;
+  const double precision = kSearchedShare * tolerance_at(std::min(closest_.distance, goal_.range));
+  const HullDistance hulls = hull_distance(a_.hull(), b_.hull(), X_BA_, precision, &hull_support_);
+  keep_plane(hulls.lower_bound - exact_rounding_);
+  if (!is_wanted(plane_bound())) return true;
+  if (!(hulls.lower_bound > 0.0)) return false;
+  const SurfaceBvh::Slot on_a = a_.nearest_part(X_BA_.inverse() * hulls.on_a, precision);
+  const SurfaceBvh::Slot on_b = b_.nearest_part(hulls.on_b, precision);
+  measure({0.0, on_a, on_b});
+  if (is_wanted(plane_bound())) prove_by_plane();
+  return !is_wanted(plane_bound());
 }
 
 bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   goal_ = goal;
   update_prune_bound();
-  while (!front_.empty() && closest_.distance > 0.0) {
-    const Entry entry = front_.front();
-    if (!is_wanted(bound_of(entry))) return true;
+  if (!is_searching_) {
+    if (closest_.distance <= 0.0 || !is_wanted(lower_bound())) return true;
+    if (!is_at_reference_) {
+      if (*steps <= 0) return false;
+      --*steps;
+      set_reference();
+      if (prove_by_hulls() || closest_.distance <= 0.0) return true;
+    }
+    begin_search();
+  }
+  while (!queue_.empty() && closest_.distance > 0.0) {
+    const Entry entry = queue_.front();
+    if (wants_slack_ && looked_at_ >= kSlackPairs) {
+      wants_slack_ = false;
+      update_prune_bound();
+    }
+    if (!is_wanted(bound_at(entry.key))) return true;
     if (*steps <= 0) return false;
     if (looked_at_ >= next_plane_) prove_by_plane();
-    if (!is_wanted(plane_bound_ - (path_ - plane_path_) * (1.0 + 1e-14))) return true;
-    std::pop_heap(front_.begin(), front_.end());
-    front_.pop_back();
-    if (front_.size() + measured_.size() + SurfaceBvh::kWidth > capacity_) {
+    if (!is_wanted(plane_bound())) return true;
+    std::pop_heap(queue_.begin(), queue_.end());
+    queue_.pop_back();
+    if (queue_.size() + kept_.size() + SurfaceBvh::kWidth + 1 > capacity_) {
       visit_depth_first(entry, steps);
     } else {
       visit(entry, steps);
@@ -286,32 +382,34 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
 void SurfacePairSearch::visit(const Entry& entry, int* steps) {
   --*steps;
   ++looked_at_;
-  const Pair pair{bound_of(entry) > 0.0 ? bound_of(entry) : -1e30, entry.a, entry.b};
+  const double known = bound_at(entry.key);
+  const Pair pair{known > 0.0 ? known : -1e30, entry.a, entry.b};
   if (is_leaf(pair)) {
     const double bound = measure(pair);
-    measured_.push_back({bound > 0.0 ? bound + path_ : kUnproven, pair.a, pair.b});
+    keep({bound > 0.0 ? bound + path() : kUnproven, pair.a, pair.b, 0});
     return;
   }
-  Pair children[SurfaceBvh::kWidth];
-  const int count = expand(pair, children);
-  for (int k = 0; k < count; ++k) {
-    const Pair& child = children[k];
-    push({child.bound > 0.0 ? child.bound + path_ : child.bound, child.a, child.b});
+  const Expansion children = expand(pair, entry.children, prune_bound_);
+  if (children.unwanted != 0) {
+    keep({children.least_unwanted + path(), pair.a, pair.b, children.unwanted});
+  }
+  for (int k = 0; k < children.count; ++k) {
+    const Pair& child = children.wanted[k];
+    queue_.push_back({child.bound > 0.0 ? child.bound + path() : child.bound, child.a, child.b, 0});
+    std::push_heap(queue_.begin(), queue_.end());
   }
 }
 
 bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) {
+  prepare_boxes();
   TraversalStack<Pair, kStackCapacity> stack;
   if (!a_.empty() && !b_.empty()) stack.push({-1e30, SurfaceBvh::kRoot, SurfaceBvh::kRoot});
   while (!stack.empty()) {
     const Pair pair = stack.pop();
     if (--*steps < 0) return false;
     if (!is_leaf(pair)) {
-      Pair children[SurfaceBvh::kWidth];
-      const int count = expand(pair, children);
-      for (int k = 0; k < count; ++k) {
-        if (children[k].bound <= margin) stack.push(children[k]);
-      }
+      const Expansion children = expand(pair, 0, std::nextafter(margin, kInf));
+      for (int k = 0; k < children.count; ++k) stack.push(children.wanted[k]);
       continue;
     }
     const ConvexPart part_a = posed(part_of(a_, pair.a), X_BA_);
@@ -326,9 +424,10 @@ bool SurfacePairSearch::visit_near(double margin, Visitor* visitor, int* steps) 
 // The pair comes back with the least bound that pruned what is below it.
 void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
   TraversalStack<Pair, kStackCapacity> stack;
-  const double known = bound_of(entry);
+  const double known = bound_at(entry.key);
   stack.push({known > 0.0 ? known : -1e30, entry.a, entry.b});
   double least = kInf;
+  std::uint8_t mask = entry.children;  // of the first pair
   while (!stack.empty()) {
     const Pair pair = stack.pop();
     if (!is_wanted(pair.bound)) {
@@ -336,7 +435,8 @@ void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
       continue;
     }
     if (closest_.distance <= 0.0 || *steps <= 0) {  // what is known holds
-      push(entry);
+      queue_.push_back(entry);
+      std::push_heap(queue_.begin(), queue_.end());
       return;
     }
     --*steps;
@@ -345,13 +445,16 @@ void SurfacePairSearch::visit_depth_first(const Entry& entry, int* steps) {
       least = std::min(least, measure(pair));
       continue;
     }
-    Pair children[SurfaceBvh::kWidth];
-    const int count = expand(pair, children);
+    const Expansion children = expand(pair, mask, prune_bound_);
+    mask = 0;
+    least = std::min(least, children.least_unwanted);
     const std::size_t first = stack.size();
-    for (int k = 0; k < count; ++k) stack.push_least_on_top<&Pair::bound>(first, children[k]);
+    for (int k = 0; k < children.count; ++k) {
+      stack.push_least_on_top<&Pair::bound>(first, children.wanted[k]);
+    }
   }
   // It was searched at this pose, and is not wanted again before the next one.
-  measured_.push_back({least > 0.0 ? least + path_ : kUnproven, entry.a, entry.b});
+  keep({least > 0.0 ? least + path() : kUnproven, entry.a, entry.b, entry.children});
 }
 
 }  // namespace ist

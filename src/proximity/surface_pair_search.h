@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "internal/geometry/convex_part.h"
+#include "internal/geometry/hull_distance.h"
 #include "internal/geometry/surface_bvh.h"
 
 namespace ist {
@@ -15,14 +16,19 @@ namespace ist {
 /// The distance of two surfaces A and B, kept from pose to pose: branch and bound over pairs of
 /// boxes of their hierarchies, best first.
 ///
-/// The pairs that were pruned or measured stay in a queue, the BVTT front. Each has the bound that
-/// was proven for it and the path length at which it was: no point of A moves farther in B's frame
-/// than the path grows. So a bound holds later, less the path since, and a pair is looked at again
-/// only when its slack is used up (an event of expiry). Where the links lie on both sides of a
-/// plane between the closest points, as convex bodies do, their supports prove the distance at
-/// once. The closest parts found last give the first
-/// upper bound at a new pose. Where the queue is full, pairs are searched depth first, which needs
-/// no memory but a bounded stack: nothing is allocated after construction.
+/// The pairs that were pruned or measured are kept, the BVTT front. Each has the bound that was
+/// proven for it and the path length at which it was: no point of A moves farther in B's frame than
+/// the path grows. So a bound holds later, less the path since, and a pair is looked at again only
+/// when its slack is used up (an event of expiry). The path grows from search to search, not from
+/// pose to pose: where the least bound of all still answers, only the closest parts found last are
+/// measured. A search from a kept front goes on to a part of the tolerance, so that the next poses
+/// have slack.
+///
+/// Before pairs are searched, the convex hulls are asked: their distance is a lower bound, and
+/// where the parts nearest to its ends are as near, it is the answer (convex bodies, and most
+/// others that are apart). The closest parts found last give the first upper bound at a new pose.
+/// Where the memory is full, pairs are searched depth first, which needs none but a bounded stack:
+/// nothing is allocated after construction.
 class SurfacePairSearch {
  public:
   /// @param a, b      outlive this
@@ -43,14 +49,19 @@ class SurfacePairSearch {
 
   /// The pose of the next runs.
   /// @param X_BA          A's frame -> B's, rigid
-  /// @param displacement  [m] no point of A is farther from where it was in B's frame at the last
-  ///                      pose; inf: not known, everything is searched anew
+  /// @param displacement  [m] no point of A is farther from where it was in B's frame at
+  ///                      reference_pose(); inf: not known, everything is searched anew
   void move_to(const Eigen::Isometry3d& X_BA, double displacement);
 
   /// Searches until the goal is reached.
   /// @param steps  how many pairs may be looked at; reduced by those that were
   /// @returns false when the steps were used up first; the next call continues
   bool run(const Goal& goal, int* steps);
+
+  /// A's frame -> B's at the last run() that what was known did not answer.
+  const Eigen::Isometry3d& reference_pose() const { return reference_X_BA_; }
+  /// Whether reference_pose() is this pose.
+  bool is_at_reference() const { return is_at_reference_; }
 
   /// Visits parts that are near one another.
   class Visitor {
@@ -70,6 +81,9 @@ class SurfacePairSearch {
   double distance() const { return closest_.distance; }
   /// [m] Proven for this pose, at any time; 0 or more.
   double lower_bound() const;
+  /// [m] Proven for this pose: a slab of this width lies between the convex hulls of A and B; 0 or
+  /// less: not known.
+  double separation() const { return plane_bound(); }
   /// The closest points found: on_p is on A and on_q on B, in B's frame.
   const ConvexDistance& closest() const { return closest_; }
   /// The parts that they are on, in B's frame; there must be any.
@@ -84,6 +98,7 @@ class SurfacePairSearch {
     /// boxes the nearer to 0
     double key;
     SurfaceBvh::Slot a, b;
+    std::uint8_t children;  ///< by bit, those that it is about; 0: the pair itself
     bool operator<(const Entry& other) const { return key > other.key; }  ///< least on top
   };
   /// A pair and its bound at this pose.
@@ -91,30 +106,54 @@ class SurfacePairSearch {
     double bound;
     SurfaceBvh::Slot a, b;
   };
+  /// The children of a pair.
+  struct Expansion {
+    Pair wanted[SurfaceBvh::kWidth];
+    int count;              ///< of wanted ones
+    std::uint8_t unwanted;  ///< by bit
+    double least_unwanted;  ///< [m] least bound of those; inf: none
+  };
 
+  SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
+                    std::vector<Entry> queue, std::vector<Entry> kept);
   void start_anew();
-  void keep_measured();
+  void set_reference();
+  void begin_search();
+  void prepare_boxes();
+  void sort_front();
   void rebase_path();
-  double bound_of(const Entry& entry) const;
+  double path() const { return path_ + moved_; }
+  double bound_at(double key) const;
+  double plane_bound() const { return plane_bound_ - (path() - plane_path_) * (1.0 + 1e-14); }
   bool is_wanted(double bound) const;
   void update_prune_bound();
   double tolerance_at(double distance) const;
   void set_direction();
   bool is_leaf(const Pair& pair) const;
-  int expand(const Pair& pair, Pair children[SurfaceBvh::kWidth]);
-  double bound(double measured, const Pair& pair) const;
+  Expansion expand(const Pair& pair, std::uint8_t children, double prune_bound);
+  double overlap_order(const Pair& pair) const;
   double measure(const Pair& pair);
   void descend();
   void prove_by_plane();
+  bool prove_by_hulls();
+  void keep_plane(double bound);
   void visit(const Entry& entry, int* steps);
   void visit_depth_first(const Entry& entry, int* steps);
-  void push(const Entry& entry);
+  void keep(const Entry& entry);
 
   const SurfaceBvh &a_, &b_;
   const std::size_t capacity_;
-  std::vector<Entry> front_;     // a heap of pairs that were not measured at this pose
-  std::vector<Entry> measured_;  // pairs of parts that were
-  double path_ = 0.0;            // [m]
+  // The front: pairs that are wanted, a heap, and all others.
+  std::vector<Entry> queue_, kept_;
+  double least_kept_ = std::numeric_limits<double>::infinity();  // [m] key of kept_
+  double path_ = 0.0;                                            // [m] at the reference
+  double moved_ = 0.0;                                           // [m] since then
+  Eigen::Isometry3d reference_X_BA_ = Eigen::Isometry3d::Identity();
+  bool is_at_reference_ = false;
+  bool has_jumped_ = false;    // to the reference: the front was dropped
+  bool is_searching_ = false;  // at this pose
+  bool has_boxes_ = false;     // prepare_boxes() was called at this pose
+  HullSupport hull_support_;
   Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity();
   Eigen::Matrix3f R_BA_, R_AB_;
   Eigen::Vector3f p_BA_, p_AB_;
@@ -122,8 +161,9 @@ class SurfacePairSearch {
   double rounding_ = 0.0, exact_rounding_ = 0.0;  // [m] of boxes and of parts
   Goal goal_;
   double prune_bound_ = 0.0;
-  int looked_at_ = 0;         // pairs, at this pose
-  bool is_new_ = true;        // the front was started at this pose
+  bool wants_slack_ = false;  // this search goes on to a part of the tolerance
+  int looked_at_ = 0;         // pairs, in the last search
+  bool is_new_ = true;        // the front was started in the last search
   int cost_of_new_ = 0;       // pairs that were looked at when the front was started
   double plane_bound_ = 0.0;  // [m] of both surfaces, by the plane between the closest points
   double plane_path_ = 0.0;   // [m] where it was proven

@@ -9,6 +9,7 @@
 #include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/cancelled.h"
 #include "internal/geometry/convex_part.h"
+#include "internal/geometry/hull_coreset.h"
 #include "ist_proximity/geometry/solid.h"
 
 namespace ist {
@@ -53,6 +54,11 @@ class SurfaceBvh {
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< of all parts, in L
   /// [m] The support function: the largest n.x of all points, in double. @param n_L  unit
   double support(const Eigen::Vector3d& n_L) const;
+  /// Of the surface of a solid; empty where a part is no triangle, or where parts were given.
+  const HullCoreset& hull() const { return hull_; }
+  /// A part that is near a point: the nearest one, or the first that is no farther than `enough`
+  /// [m]. There must be any. @param p_L  [m] in L
+  Slot nearest_part(const Eigen::Vector3d& p_L, double enough) const;
 
   /// Levels of nodes, at most: the root's, and one for each division of 2^32 parts by eight.
   static constexpr std::size_t kMaxLevels = 12;
@@ -65,6 +71,7 @@ class SurfaceBvh {
 
   std::vector<Node> nodes_;
   std::vector<ConvexPart> parts_;
+  HullCoreset hull_;
   Eigen::AlignedBox3d bounds_;
   double extent_ = 0.0;
 };
