@@ -316,6 +316,8 @@ class ProximityNode:
             raise AssertionError("the node does not end: " + self.log())
         finally:
             shutil.rmtree(self._cache, ignore_errors=True)
+        if code != 0:  # a sanitizer's report, for example
+            print(self.log())
         return code
 
 

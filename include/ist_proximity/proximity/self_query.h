@@ -76,7 +76,7 @@ struct SelfQueryStatistics {
 /// run() never throws, locks nothing and allocates nothing. One object per thread.
 class SelfQuery {
  public:
-  /// Builds a hierarchy for each link: up to a second for a million triangles. Queries share the
+  /// Builds a hierarchy and a hull for each link: 3 s for a million triangles. Queries share the
   /// hierarchies of links of the same `solid`, also between models that differ in their packings.
   /// @param cancelled  asked every few milliseconds; true ends the building, and every pair is
   ///                   UNKNOWN. It may be empty

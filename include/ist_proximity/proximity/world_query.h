@@ -15,7 +15,7 @@ namespace ist {
 /// The surfaces of a robot's links, for distances to objects. Immutable, thread safe.
 struct RobotSurfaces;
 
-/// Builds a hierarchy for each link: up to a second for a million triangles.
+/// Builds a hierarchy and a hull for each link: 3 s for a million triangles.
 std::shared_ptr<const RobotSurfaces> make_robot_surfaces(std::shared_ptr<const RobotModel> model);
 
 /// An object of a world that a link is near.
