@@ -79,7 +79,7 @@ class CloudStream {
 
   RawCloud cloud_;
   ObstacleIngest ingest_;
-  // As many as the node has: one is in use, the next is filled, and its memory is used again.
+  // The node has as many: one is in use, the next is filled, and its memory is used again.
   std::array<CloudSnapshot, 3> snapshots_;
   std::size_t newest_ = 0;
 };

@@ -31,7 +31,7 @@ struct CycleConfig {
 
 /// Measures the cycles of a node along a motion.
 ///
-/// As in the node, every cloud is copied and indexed anew by another thread, so that the first
+/// Every cloud is copied and indexed anew by another thread, as in the node, so that the first
 /// cycles after it pay for what a new cloud costs a query: its points are read when they are first
 /// needed, and nothing of the last answer holds for them.
 /// @param q          n configurations one after the other

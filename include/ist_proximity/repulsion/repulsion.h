@@ -85,7 +85,8 @@ class Repulsion {
   friend class KeptRepulsion;
   struct Spheres;
 
-  /// As wrench(). @param expansion  may be null; overwritten, and empty where nothing was blended
+  /// The wrench as wrench() has it, and how it changes with the pose.
+  /// @param expansion  may be null; overwritten, and empty where nothing was blended
   RepulsiveWrench blend(std::size_t link, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds,
                         const LinkProximity& proximity, const RepulsionConfig& config,
                         TimePoint end, BlendExpansion* expansion) const;

@@ -337,8 +337,8 @@ void ViewFilter::finish(Tile* tile) {
     link.in_skin += static_cast<std::uint32_t>(std::bitset<16>(tile->skin).count());
     link.unexplained += static_cast<std::uint32_t>(std::bitset<16>(tile->obstacle).count());
   }
-  // What is only continued from its neighbours still says where the sensor is. Otherwise a wrong
-  // pose, which puts parts of the robot in front of itself, would never be corrected.
+  // Pixels that are only continued from their neighbours count for the sensor's pose. Otherwise a
+  // wrong pose, which puts parts of the robot in front of itself, would never be corrected.
   if (!tile->is_patch || tile->certain != 0) return;
   const double noise = std::sqrt(static_cast<double>(tile->variance)) / kPixels;
   calibration_.add(tile->p_S.cast<double>(), tile->n_S.cast<double>(),

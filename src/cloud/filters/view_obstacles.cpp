@@ -1,5 +1,5 @@
-// Which of the points near the robot are obstacles, from what each tile of the image shows: means
-// of heights, and pixels next to one another.
+// This decides which points near the robot are obstacles, by the means of heights in tiles of the
+// image, and by pixels next to one another.
 
 #include <algorithm>
 #include <array>
