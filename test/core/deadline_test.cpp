@@ -225,7 +225,8 @@ TEST(Deadline, IsAskedBeforeEachCellOfTheGrid) {
       overruns.push_back(thread_time() - begin - config.deadline);
       ASSERT_LE(results[is_open ? 1 : 0].lower_bound, -0.002);
     }
-    EXPECT_LT(quantile(overruns, 0.5), 4.0 * exact) << is_open;
+    // The factor is of steps that sanitizers slow down unevenly.
+    if (!test::kSanitized) EXPECT_LT(quantile(overruns, 0.5), 4.0 * exact) << is_open;
   }
 }
 

@@ -54,7 +54,7 @@ TEST(LinkPairSearch, StoppedBoundsHold) {
       stopped += bound < whole - 1e-6 ? 1 : 0;
     }
   }
-  EXPECT_GT(stopped, 100) << "the searches must be longer than their steps";
+  EXPECT_GT(stopped, test::scaled(100)) << "the searches must be longer than their steps";
 }
 
 }  // namespace
