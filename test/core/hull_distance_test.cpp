@@ -12,6 +12,7 @@
 #include "support/link_pair_oracle.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -106,8 +107,8 @@ TEST(HullDistance, IsALowerBoundAndTightForConvexMeshes) {
       }
     }
   }
-  EXPECT_GT(apart, 500);
-  EXPECT_GT(tight, 30);
+  EXPECT_GT(apart, test::scaled(500));
+  EXPECT_GT(tight, test::scaled(30));
 }
 
 TEST(SurfaceBvh, NearestPart) {

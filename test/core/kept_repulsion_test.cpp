@@ -10,6 +10,7 @@
 
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/contact_oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {
@@ -137,6 +138,8 @@ TEST_F(KeptRepulsionTest, FollowsSmallMotionsToFirstOrder) {
     return repulsion_.wrench(0, X_FL, {&cloud_}, here, config_);
   };
   const RepulsiveWrench before = wrench_at(Eigen::Isometry3d::Identity());
+  // Fewer and larger spheres, as under sanitizers, bend the field more.
+  const double allowed = test::kSanitized ? 0.2 : 0.1;
   for (int motion = 0; motion < 6; ++motion) {
     for (const double size : {1e-4, 1e-3}) {
       Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
@@ -147,9 +150,10 @@ TEST_F(KeptRepulsionTest, FollowsSmallMotionsToFirstOrder) {
       kept_.update(repulsion_, Eigen::Isometry3d::Identity(), {&cloud_}, here, config_);
       const RepulsiveWrench found = kept_.update(repulsion_, X_FL, {&cloud_}, here, config_),
                             truth = wrench_at(X_FL);
-      EXPECT_LT((found.force - truth.force).norm(), 0.1 * (truth.force - before.force).norm())
+      EXPECT_LT((found.force - truth.force).norm(), allowed * (truth.force - before.force).norm())
           << motion << ", " << size;
-      EXPECT_LT((found.torque - truth.torque).norm(), 0.1 * (truth.torque - before.torque).norm())
+      EXPECT_LT((found.torque - truth.torque).norm(),
+                allowed * (truth.torque - before.torque).norm())
           << motion << ", " << size;
       EXPECT_NE(found.force, truth.force) << "kept";
     }

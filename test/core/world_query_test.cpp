@@ -337,6 +337,22 @@ TEST(WorldQuery, FarObjectsCostLittle) {
   EXPECT_EQ(searched, 200U);
 }
 
+// Objects out of range come near in small steps while the link stands still.
+TEST(WorldQuery, ObjectsThatComeIntoRangeAreFound) {
+  std::vector<WorldObject> objects = {object_of("cart", cube(0.2))};
+  objects[0].frame = "cart";
+  PosedWorld world = posed(objects);
+  WorldQuery query(ball());
+  for (double x = 3.0; x > 0.4; x -= 0.02) {
+    world.X_FB[0] = at(x, 0.0, 0.0);
+    const LinkProximity r = answer_at(&query, world);
+    const double truth = x - 0.1 - 0.1;
+    EXPECT_EQ(r.state, truth < 1.0 ? LinkState::kNear : LinkState::kClear) << x;
+    EXPECT_LE(r.lower_bound, std::max(truth, 1.0) + 1e-9);
+    if (truth < 1.0) EXPECT_LE(r.lower_bound, truth + 1e-9);
+  }
+}
+
 // More objects are near than searches are kept.
 TEST(WorldQuery, ManyNearObjects) {
   std::vector<WorldObject> objects;
