@@ -79,7 +79,7 @@ class HullCoreset::Builder {
     }
   }
 
-  // Where the coreset is full, its points have to do. @returns whether the point was a new one
+  // A full coreset takes no more points. @returns whether the point was a new one
   bool add_farthest(const Eigen::Vector3d& n) {
     const auto farthest =
         std::max_element(corners_.begin(), corners_.end(),
@@ -111,8 +111,8 @@ HullCoreset::HullCoreset(const std::vector<ConvexPart>& parts, const CancelReque
   Builder(std::move(corners), this).run(cancelled);
 }
 
-// From the point of the coreset's hull that was found nearest to p, to p: GJK from a point of the
-// coreset on, which is replaced by one of the last ones. @returns [m]
+// Finds the point of the coreset's hull that is nearest to p, by GJK from a point of the coreset
+// on, which is replaced by one of the last ones. @returns [m] the vector from there to p
 Eigen::Vector3d HullCoreset::offset(const Eigen::Vector3d& p, std::uint32_t* point_index) const {
   DifferenceSimplex simplex;
   const auto add_corner = [&](std::uint32_t b) {

@@ -72,8 +72,8 @@ class LinkPairQuery {
   double drift_ = 0.0;  // of both poses
   Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity(), X_FB_ = Eigen::Isometry3d::Identity();
   bool has_pose_ = false;
-  // Where the links are not known to be apart: a proven bound, and the deepest point found, in B's
-  // frame.
+  // A proven bound, and the deepest point found, in B's frame. They hold where the links are not
+  // known to be apart.
   double depth_bound_, depth_distance_ = 0.0;  // [m]
   Eigen::Vector3d on_a_, on_b_, direction_;
   // A point of one link that was found inside the other, in the frame of its link.

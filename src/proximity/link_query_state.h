@@ -100,7 +100,7 @@ struct LinkCoherence {
     QueryConfig config;
     SearchResult result;
   } answered;
-  /// Where a first bound was looked for.
+  /// The scene and the pose that a first bound was looked for in.
   struct {
     SceneId scene = kUnknownScene;  ///< unknown: nowhere
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();

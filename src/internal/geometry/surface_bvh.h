@@ -54,7 +54,7 @@ class SurfaceBvh {
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< of all parts, in L
   /// [m] The support function: the largest n.x of all points, in double. @param n_L  unit
   double support(const Eigen::Vector3d& n_L) const;
-  /// Of the surface of a solid; empty where a part is no triangle, or where parts were given.
+  /// The hull of the surface of a solid; empty where a part is no triangle, or parts were given.
   const HullCoreset& hull() const { return hull_; }
   /// A part that is near a point: the nearest one, or the first that is no farther than `enough`
   /// [m]. There must be any. @param p_L  [m] in L
