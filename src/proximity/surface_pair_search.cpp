@@ -34,6 +34,9 @@ constexpr double kSearchedShare = 0.25, kRangeSlack = 0.01;
 // slack, and every pose is searched: half of this doubled the time of motions with many ties.
 constexpr int kSlackPairs = 8192;
 
+// After so many questions to hulls of nodes of a size, one of so many has to be answered.
+constexpr int kHullsAsked = 8, kHullsPerAnswer = 4;
+
 constexpr std::size_t kStackCapacity =
     stack_capacity(2 * SurfaceBvh::kMaxLevels, SurfaceBvh::kWidth);
 
@@ -158,6 +161,7 @@ void SurfacePairSearch::begin_search() {
   if (is_new_ && !has_jumped_) start_anew();
   wants_slack_ = !has_jumped_;
   looked_at_ = 0;
+  hull_answers_.fill({});
   next_plane_ = kFirstPlane;
   is_searching_ = true;
   prepare_boxes();
@@ -381,9 +385,16 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
 
 // [m] A lower bound of a pair by the hulls of what is below it; 0: there are none, or they are no
 // farther apart than what is asked for.
-double SurfacePairSearch::bound_by_hulls(const Pair& pair) const {
+double SurfacePairSearch::bound_by_hulls(const Pair& pair) {
   const HullCoreset *hull_a = a_.hull_of(pair.a), *hull_b = b_.hull_of(pair.b);
   if (hull_a == nullptr || hull_b == nullptr) return 0.0;
+  // Where hulls of this size do not answer, they are asked no longer.
+  const double share = (a_.radius(pair.a) + b_.radius(pair.b)) / (a_.extent() + b_.extent());
+  HullAnswers& answers =
+      hull_answers_[static_cast<std::size_t>(std::clamp(-std::ilogb(share), 0, kHullSizes - 1))];
+  if (answers.asked >= kHullsAsked && kHullsPerAnswer * answers.answered < answers.asked)
+    return 0.0;
+  ++answers.asked;
   HullSupport support;
   support.size = 1;
   support.a[0] = hull_a->farthest(-n_A_.cast<double>());
@@ -391,7 +402,9 @@ double SurfacePairSearch::bound_by_hulls(const Pair& pair) const {
   const double errors = hull_a->error() + hull_b->error() + 2.0 * exact_rounding_;
   const HullDistance hulls =
       hull_distance(*hull_a, *hull_b, X_BA_, 0.0, &support, prune_bound_ + errors);
-  return std::max(hulls.lower_bound - exact_rounding_, 0.0);
+  const double bound = std::max(hulls.lower_bound - exact_rounding_, 0.0);
+  answers.answered += is_wanted(bound) ? 0 : 1;
+  return bound;
 }
 
 void SurfacePairSearch::visit(const Entry& entry, int* steps) {
@@ -404,13 +417,10 @@ void SurfacePairSearch::visit(const Entry& entry, int* steps) {
     keep({bound > 0.0 ? bound + path() : kUnproven, pair.a, pair.b, 0});
     return;
   }
-  const double by_hulls = bound_by_hulls(pair);
-  if (by_hulls > 0.0) {
-    pair.bound = std::max(pair.bound, by_hulls);
-    if (!is_wanted(by_hulls)) {
-      keep({by_hulls + path(), pair.a, pair.b, entry.children});
-      return;
-    }
+  pair.bound = std::max(pair.bound, bound_by_hulls(pair));
+  if (!is_wanted(pair.bound)) {
+    keep({pair.bound + path(), pair.a, pair.b, entry.children});
+    return;
   }
   const Expansion children = expand(pair, entry.children, prune_bound_);
   if (children.unwanted != 0) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -115,6 +116,13 @@ class SurfacePairSearch {
     double least_unwanted;  ///< [m] least bound of those; inf: none
   };
 
+  /// Questions to the hulls of nodes.
+  struct HullAnswers {
+    int asked = 0, answered = 0;
+  };
+  /// Sizes that are told apart, by powers of two.
+  static constexpr int kHullSizes = 8;
+
   SurfacePairSearch(const SurfaceBvh& a, const SurfaceBvh& b, std::size_t capacity,
                     std::vector<Entry> queue, std::vector<Entry> kept);
   void start_anew();
@@ -133,7 +141,7 @@ class SurfacePairSearch {
   bool is_leaf(const Pair& pair) const;
   Expansion expand(const Pair& pair, std::uint8_t children, double prune_bound);
   double overlap_order(const Pair& pair) const;
-  double bound_by_hulls(const Pair& pair) const;
+  double bound_by_hulls(const Pair& pair);
   double measure(const Pair& pair);
   void descend();
   void prove_by_plane();
@@ -165,7 +173,8 @@ class SurfacePairSearch {
   double prune_bound_ = 0.0;
   bool wants_slack_ = false;  // this search goes on to a part of the tolerance
   int looked_at_ = 0;         // pairs, in the last search
-  bool is_new_ = true;        // the front was started in the last search
+  std::array<HullAnswers, kHullSizes> hull_answers_{};  // by size, in the last search
+  bool is_new_ = true;                                  // the front was started in the last search
   int cost_of_new_ = 0;       // pairs that were looked at when the front was started
   double plane_bound_ = 0.0;  // [m] of both surfaces, by the plane between the closest points
   double plane_path_ = 0.0;   // [m] where it was proven
