@@ -97,6 +97,8 @@ ContactGeometry make_contact_geometry(const LinkGeometry& geometry, const Solid&
   for (const SphereLeaf& leaf : spheres.tree.leaves()) {
     spheres.leaves.push_back(make_leaf(leaf, tight.spheres, cells, field));
   }
+  spheres.elements = VolumeElements(solid, field);
+  spheres.solid = solid;
   result.spheres = std::make_shared<const ContactSpheres>(std::move(spheres));
   result.sphere_count = tight.spheres.size();
   result.volume = cells.volume;

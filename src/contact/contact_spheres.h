@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "contact/volume_elements.h"
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/geometry/solid.h"
 #include "ist_proximity/packing/packing.h"
@@ -19,10 +20,13 @@ struct alignas(32) ContactLeaf {
   float gradient[9][kSphereWidth];  ///< [1/m] of the outward field, row-major
 };
 
-/// The spheres that a link's contact volumes are summed over.
+/// What a link's contact volumes are summed over: spheres against clouds and maps, elements
+/// against other links.
 struct ContactSpheres {
   InnerSphereTree tree;             ///< over the spheres that have a volume
   std::vector<ContactLeaf> leaves;  ///< the same leaves as the tree's
+  VolumeElements elements;
+  Solid solid;  ///< the link's exact geometry
 };
 
 /// Measures the power cells and the outward field of a packing that is there.

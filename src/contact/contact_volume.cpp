@@ -186,6 +186,40 @@ FieldSphere field_sphere(const ContactLeaf& leaf, int k, const Eigen::Isometry3d
   return sphere;
 }
 
+// Lens by lens: exact where the spheres fill both links.
+ContactVolume lens_volumes(const ContactSpheres& spheres_a, const ContactSpheres& spheres_b,
+                           const Eigen::Isometry3d& X_AB) {
+  ContactVolume sum;
+  TraversalStack<std::int32_t, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
+  stack.push(0);
+  while (!stack.empty()) {
+    const std::int32_t child = stack.pop();
+    if (child < 0) {
+      const ContactLeaf& leaf = spheres_b.leaves[static_cast<std::size_t>(~child)];
+      for (int k = 0; k < kSphereWidth; ++k) {
+        if (!(leaf.radius[k] > 0.0F)) continue;
+        sum.add(sphere_contact(spheres_a, field_sphere(leaf, k, X_AB)),
+                static_cast<double>(leaf.cell_ratio[k]));
+      }
+      continue;
+    }
+    const SphereNode& node = spheres_b.tree.nodes()[static_cast<std::size_t>(child)];
+    for (int k = 0; k < node.count; ++k) {
+      const Eigen::Vector3d center = X_AB * Eigen::Vector3d(node.x[k], node.y[k], node.z[k]);
+      if (intersects(spheres_a.tree, center, static_cast<double>(node.radius[k]))) {
+        stack.push(node.child[k]);
+      }
+    }
+  }
+  return sum;
+}
+
+// Whether the spheres have no voids between them: the link is a ball, or some that are apart.
+bool is_filled(const ContactGeometry& geometry) {
+  constexpr double kShare = 0.999;
+  return geometry.packed_volume > kShare * geometry.volume;
+}
+
 }  // namespace
 
 void ContactVolume::add(const ContactVolume& other, double weight) {
@@ -214,32 +248,22 @@ ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geome
   return sum;
 }
 
+// The mean of what either link's elements have inside the other one.
 ContactVolume contact_volume(const ContactGeometry& a, const ContactGeometry& b,
                              const Eigen::Isometry3d& X_AB) {
   ContactVolume sum;
   if (!a.has_volume() || !b.has_volume()) return sum;
-  const ContactSpheres &spheres_a = *a.spheres, &spheres_b = *b.spheres;
-  TraversalStack<std::int32_t, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
-  stack.push(0);
-  while (!stack.empty()) {
-    const std::int32_t child = stack.pop();
-    if (child < 0) {
-      const ContactLeaf& leaf = spheres_b.leaves[static_cast<std::size_t>(~child)];
-      for (int k = 0; k < kSphereWidth; ++k) {
-        if (!(leaf.radius[k] > 0.0F)) continue;
-        sum.add(sphere_contact(spheres_a, field_sphere(leaf, k, X_AB)),
-                static_cast<double>(leaf.cell_ratio[k]));
-      }
-      continue;
-    }
-    const SphereNode& node = spheres_b.tree.nodes()[static_cast<std::size_t>(child)];
-    for (int k = 0; k < node.count; ++k) {
-      const Eigen::Vector3d center = X_AB * Eigen::Vector3d(node.x[k], node.y[k], node.z[k]);
-      if (intersects(spheres_a.tree, center, static_cast<double>(node.radius[k]))) {
-        stack.push(node.child[k]);
-      }
-    }
-  }
+  const ContactSpheres &in_a = *a.spheres, &in_b = *b.spheres;
+  if (is_filled(a) && is_filled(b)) return lens_volumes(in_a, in_b, X_AB);
+  const ContactVolume of_a = in_a.elements.inside(in_b.solid, in_b.elements.box(), X_AB.inverse());
+  const ContactVolume of_b = in_b.elements.inside(in_a.solid, in_a.elements.box(), X_AB);
+  const Eigen::Vector3d force_b = X_AB.linear() * of_b.weighted_normal;
+  const Eigen::Vector3d moment_b =
+      X_AB.linear() * of_b.weighted_moment + X_AB.translation().cross(force_b);
+  sum.volume = 0.5 * (of_a.volume + of_b.volume);
+  sum.weighted_normal = 0.5 * (force_b - of_a.weighted_normal);
+  sum.weighted_moment = 0.5 * (moment_b - of_a.weighted_moment);
+  sum.spheres = of_b.spheres;
   return sum;
 }
 

@@ -44,31 +44,68 @@ TEST(ContactOfLinks, BallsShareTheirLens) {
   }
 }
 
-// A box that stands in another one: area times depth, a force along the face's normal that acts in
-// the middle of the shared part; and the other box gets the opposite wrench.
+// A box that stands in another one, from a hair to deep, few spheres and many: area times depth, a
+// force along the face's normal that acts in the middle of the shared part; and the other box gets
+// the opposite wrench. Inner spheres have 0.42 of this volume at 10 mm.
 TEST(ContactOfLinks, BoxesShareAreaTimesDepth) {
-  const ContactLink plate(one(Box{{0.3, 0.3, 0.1}}), 1000), post(one(Box{{0.1, 0.1, 0.3}}), 1000);
-  for (const double depth : {0.02, 0.03, 0.04}) {
-    const Eigen::Isometry3d X = at({0.05, -0.03, 0.05 + 0.15 - depth});
-    const ContactVolume found = contact_volume(*plate.body, *post.body, X);
-    EXPECT_NEAR(found.volume / (0.1 * 0.1 * depth), 1.0, 0.1) << depth;
-    const Eigen::Vector3d n = found.weighted_normal / found.volume;
-    EXPECT_LT(n.z(), -0.6) << depth;
-    EXPECT_LT(n.head<2>().norm(), 0.05) << depth;
-    // p x F with F along -z.
-    const Eigen::Vector3d arm = found.weighted_moment / -found.weighted_normal.z();
-    EXPECT_NEAR(arm.x(), 0.03, 0.005) << depth;
-    EXPECT_NEAR(arm.y(), 0.05, 0.005) << depth;
+  for (const int spheres : {50, 200}) {
+    const ContactLink plate(one(Box{{0.3, 0.3, 0.1}}), spheres);
+    const ContactLink post(one(Box{{0.1, 0.1, 0.3}}), spheres);
+    for (const double depth : {0.0005, 0.002, 0.005, 0.01, 0.02, 0.04}) {
+      const Eigen::Isometry3d X = at({0.05, -0.03, 0.05 + 0.15 - depth});
+      const ContactVolume found = contact_volume(*plate.body, *post.body, X);
+      const double truth = 0.1 * 0.1 * depth;
+      EXPECT_NEAR(found.volume / truth, 1.0, 0.1) << depth;
+      const Eigen::Vector3d n = found.weighted_normal / found.volume;
+      EXPECT_LT(n.z(), -0.6) << depth;
+      EXPECT_LT(n.head<2>().norm(), 0.1) << depth;
+      // p x F with F along -z.
+      const Eigen::Vector3d arm = found.weighted_moment / -found.weighted_normal.z();
+      EXPECT_NEAR(arm.x(), 0.03, 0.01) << depth;
+      EXPECT_NEAR(arm.y(), 0.05, 0.01) << depth;
 
-    PenetrationConfig stiffness;
-    const Wrench on_plate = contact_wrench(found, Eigen::Isometry3d::Identity(), stiffness);
-    const Wrench on_post = reaction(on_plate, -X.translation());
-    const ContactVolume back = contact_volume(*post.body, *plate.body, X.inverse());
-    const Wrench same = contact_wrench(back, X, stiffness);
-    EXPECT_NEAR(back.volume, found.volume, 1e-4 * found.volume);
-    EXPECT_LT((same.force - on_post.force).norm(), 1e-3 * on_post.force.norm());
-    EXPECT_LT((same.torque - on_post.torque).norm(), 1e-3 * on_post.force.norm() * 0.2);
+      PenetrationConfig stiffness;
+      const Wrench on_plate = contact_wrench(found, Eigen::Isometry3d::Identity(), stiffness);
+      const Wrench on_post = reaction(on_plate, -X.translation());
+      const ContactVolume back = contact_volume(*post.body, *plate.body, X.inverse());
+      const Wrench same = contact_wrench(back, X, stiffness);
+      EXPECT_NEAR(back.volume, found.volume, 1e-4 * found.volume);
+      EXPECT_LT((same.force - on_post.force).norm(), 1e-3 * on_post.force.norm());
+      EXPECT_LT((same.torque - on_post.torque).norm(), 1e-3 * on_post.force.norm() * 0.2);
+    }
+    // Apart there is none.
+    EXPECT_EQ(contact_volume(*plate.body, *post.body, at({0.05, -0.03, 0.2001})).volume, 0.0);
   }
+}
+
+// A cylinder's cap in a box, and two crossed cylinders beside dense sampling, a few millimetres
+// deep.
+TEST(ContactOfLinks, CylindersShareWhatDenseSamplingCounts) {
+  const LinkGeometry rod = one(Cylinder{0.05, 0.2}), block = one(Box{{0.3, 0.3, 0.1}});
+  const ContactLink cylinder(rod), box(block);
+  for (const double depth : {0.001, 0.005, 0.01, 0.03}) {
+    const ContactVolume cap = contact_volume(*box.body, *cylinder.body, at({0, 0, 0.15 - depth}));
+    EXPECT_NEAR(cap.volume / (kPi * 0.0025 * depth), 1.0, 0.1) << depth;
+  }
+  Eigen::Isometry3d X = at({0.1 - 0.01, 0, 0});  // axes cross at a right angle, 10 mm deep
+  X.linear() = Eigen::AngleAxisd(0.5 * kPi, Eigen::Vector3d::UnitX()).matrix();
+  constexpr int kAlong = 120;
+  int both = 0;
+  for (int i = 0; i < kAlong * kAlong * kAlong; ++i) {
+    const Eigen::Array3d cell(i % kAlong, i / kAlong % kAlong, i / kAlong / kAlong);
+    const Eigen::Vector3d p =
+        Eigen::Vector3d(0.045, 0, 0) + 0.1 * ((cell + 0.5) / kAlong - 0.5).matrix();
+    both += test::oracle_signed_distance(rod, p) < 0.0 &&
+                    test::oracle_signed_distance(rod, X.inverse() * p) < 0.0
+                ? 1
+                : 0;
+  }
+  const double truth = both * std::pow(0.1 / kAlong, 3);
+  ASSERT_GT(truth, 0.0);
+  const ContactVolume found = contact_volume(*cylinder.body, *cylinder.body, X);
+  EXPECT_NEAR(found.volume / truth, 1.0, 0.15);
+  EXPECT_LT(found.weighted_normal.x(), -0.6 * found.volume);
+  EXPECT_LT(found.weighted_normal.tail<2>().norm(), 0.05 * found.volume);
 }
 
 // Random pairs of links with a few hundred spheres each, beside 216,000 points of a cube about the

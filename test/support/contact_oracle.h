@@ -122,8 +122,8 @@ inline ContactVolume oracle_contact(const LinkModel& link, const ContactGeometry
 }
 
 /// The contact volume of two links, from all pairs of spheres.
-inline ContactVolume oracle_contact(const ContactGeometry& a, const ContactGeometry& b,
-                                    const Eigen::Isometry3d& X_AB) {
+inline ContactVolume oracle_lenses(const ContactGeometry& a, const ContactGeometry& b,
+                                   const Eigen::Isometry3d& X_AB) {
   ContactVolume sum;
   const std::vector<OracleSphere> second = spheres_of(b);
   for (const OracleSphere& sphere : spheres_of(a)) {
@@ -143,6 +143,46 @@ inline ContactVolume oracle_contact(const ContactGeometry& a, const ContactGeome
       sum.weighted_moment += middle.cross(push);
     }
   }
+  return sum;
+}
+
+/// What all elements of a link have inside another one, each measured alone.
+/// @param X_AB  frame of the elements -> frame A of the other link
+/// @returns in A, about its origin
+inline ContactVolume oracle_elements(const ContactGeometry& elements, const ContactGeometry& other,
+                                     const Eigen::Isometry3d& X_AB) {
+  ContactVolume sum;
+  for (const VolumeElement& element : elements.spheres->elements.elements()) {
+    const Eigen::Vector3d p = X_AB * element.center.cast<double>();
+    const SignedDistance found = other.spheres->solid.signed_distance(p);
+    const Eigen::Matrix3d covariance =
+        X_AB.linear() * element.covariance.cast<double>() * X_AB.linear().transpose();
+    const double width = std::sqrt(12.0 * found.normal.dot(covariance * found.normal));
+    const double share = std::clamp(0.5 - found.distance / width, 0.0, 1.0);
+    const double volume = share * static_cast<double>(element.volume);
+    const Eigen::Vector3d outward = X_AB.linear() * element.outward.cast<double>();
+    const double outside = std::max(1.0 - 2.0 * share, 0.0);
+    const Eigen::Vector3d force = volume * ((1.0 - outside) * outward - outside * found.normal);
+    sum.volume += volume;
+    sum.weighted_normal += force;
+    sum.weighted_moment += (p - 0.5 * (1.0 - share) * width * found.normal).cross(force);
+  }
+  return sum;
+}
+
+/// The contact volume of two links: lenses of balls, or else the mean of both ways.
+inline ContactVolume oracle_contact(const ContactGeometry& a, const ContactGeometry& b,
+                                    const Eigen::Isometry3d& X_AB) {
+  const bool are_balls = a.packed_volume > 0.999 * a.volume && b.packed_volume > 0.999 * b.volume;
+  if (are_balls) return oracle_lenses(a, b, X_AB);
+  ContactVolume sum;
+  sum.add(oracle_elements(b, a, X_AB), 0.5);
+  const ContactVolume of_a = oracle_elements(a, b, X_AB.inverse());  // in B
+  const Eigen::Vector3d force = X_AB.linear() * of_a.weighted_normal;
+  sum.volume += 0.5 * of_a.volume;
+  sum.weighted_normal -= 0.5 * force;
+  sum.weighted_moment -=
+      0.5 * (X_AB.linear() * of_a.weighted_moment + X_AB.translation().cross(force));
   return sum;
 }
 

@@ -1,0 +1,155 @@
+#include "contact/volume_elements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "internal/geometry/solid_queries.h"
+
+namespace ist {
+namespace {
+
+// Cells of the grid over the link's box. A cell is divided in kParts^3 where the surface cuts it.
+constexpr double kCells = 4000.0;
+constexpr int kParts = 3;
+// Cells along each side of a block.
+constexpr int kBlock = 4;
+// An outward field shorter than this has no direction any more: it shortens to 0 and does not turn.
+constexpr double kUndecided = 0.2;
+
+Eigen::AlignedBox3d box_of(const Solid& solid) {
+  Eigen::AlignedBox3d box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d n = Eigen::Vector3d::Unit(axis);
+    box.max()[axis] = support(solid, n);
+    box.min()[axis] = -support(solid, -n);
+  }
+  return box;
+}
+
+// Sums over parts of a cell.
+struct Mass {
+  double volume = 0.0;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+
+  void add(const Eigen::Vector3d& p, const Eigen::Vector3d& size, double weight) {
+    volume += weight;
+    first += weight * p;
+    second += weight * p * p.transpose();
+    second.diagonal() += weight / 12.0 * size.cwiseAbs2();
+  }
+};
+
+// The part of a cell behind the solid's surface.
+Mass mass_of(const Solid& solid, const Eigen::Vector3d& center, const Eigen::Vector3d& size) {
+  Mass mass;
+  const double distance = solid.signed_distance(center).distance;
+  if (distance >= 0.5 * size.norm()) return mass;
+  if (distance <= -0.5 * size.norm()) {
+    mass.add(center, size, size.prod());
+    return mass;
+  }
+  const Eigen::Vector3d part = size / kParts;
+  for (int i = 0; i < kParts * kParts * kParts; ++i) {
+    const Eigen::Array3d at(i % kParts, i / kParts % kParts, i / kParts / kParts);
+    const Eigen::Vector3d p = center + ((at + 0.5 - 0.5 * kParts) * part.array()).matrix();
+    const SignedDistance found = solid.signed_distance(p);
+    const double width = found.normal.cwiseAbs().dot(part);
+    const double share = width > 0.0 ? std::clamp(0.5 - found.distance / width, 0.0, 1.0) : 0.0;
+    if (!(share > 0.0)) continue;
+    // What is cut off lies outward.
+    const Eigen::Vector3d inner = p - 0.5 * (1.0 - share) * width * found.normal;
+    mass.add(inner, part * std::cbrt(share), share * part.prod());
+  }
+  return mass;
+}
+
+}  // namespace
+
+VolumeElements::VolumeElements(const Solid& solid, const OutwardField& field) {
+  const Eigen::AlignedBox3d box = box_ = box_of(solid);
+  const double step = std::cbrt(box.volume() / kCells);
+  if (!(step > 0.0)) return;
+  const Eigen::Array3i counts = (box.sizes().array() / step).ceil().max(1.0).cast<int>();
+  const Eigen::Vector3d size = box.sizes().array() / counts.cast<double>();
+  const Eigen::Array3i blocks = (counts + kBlock - 1) / kBlock;
+  for (int b = 0; b < blocks.prod(); ++b) {
+    const Eigen::Array3i corner =
+        kBlock *
+        Eigen::Array3i(b % blocks.x(), b / blocks.x() % blocks.y(), b / blocks.x() / blocks.y());
+    Block block;
+    block.first = elements_.size();
+    for (int i = 0; i < kBlock * kBlock * kBlock; ++i) {
+      const Eigen::Array3i cell =
+          corner + Eigen::Array3i(i % kBlock, i / kBlock % kBlock, i / kBlock / kBlock);
+      if ((cell >= counts).any()) continue;
+      const Eigen::Vector3d center =
+          box.min() + ((cell.cast<double>() + 0.5) * size.array()).matrix();
+      const Mass mass = mass_of(solid, center, size);
+      if (!(mass.volume > 1e-6 * size.prod())) continue;
+      const Eigen::Vector3d mean = mass.first / mass.volume;
+      const Eigen::Vector3d o = field.at(mean);
+      VolumeElement element;
+      element.center = mean.cast<float>();
+      element.volume = static_cast<float>(mass.volume);
+      element.covariance = (mass.second / mass.volume - mean * mean.transpose()).cast<float>();
+      element.outward = (o / std::sqrt(o.squaredNorm() + kUndecided * kUndecided)).cast<float>();
+      elements_.push_back(element);
+      block.center += mean;
+    }
+    block.last = elements_.size();
+    if (block.last == block.first) continue;
+    block.center /= static_cast<double>(block.last - block.first);
+    for (std::size_t i = block.first; i < block.last; ++i) {
+      block.radius =
+          std::max(block.radius, (elements_[i].center.cast<double>() - block.center).norm());
+    }
+    block.radius += size.norm();
+    blocks_.push_back(block);
+  }
+}
+
+ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,
+                                     const Eigen::Isometry3d& X_SL) const {
+  ContactVolume sum;
+  for (const Block& block : blocks_) {
+    const Eigen::Vector3d center = X_SL * block.center;
+    if (solid_box.exteriorDistance(center) >= block.radius) continue;
+    // In a mesh with holes the signed distance jumps where its inside ends without a surface.
+    const double depth = solid.is_closed() ? -solid.signed_distance(center).distance : 0.0;
+    if (-depth >= block.radius) continue;
+    const bool is_inside = depth >= block.radius;
+    for (std::size_t i = block.first; i < block.last; ++i) {
+      add(elements_[i], is_inside ? nullptr : &solid, X_SL, &sum);
+    }
+  }
+  return sum;
+}
+
+// @param solid  null where all of the element is inside
+void VolumeElements::add(const VolumeElement& element, const Solid* solid,
+                         const Eigen::Isometry3d& X_SL, ContactVolume* sum) {
+  Eigen::Vector3d p = element.center.cast<double>(), o = element.outward.cast<double>();
+  double share = 1.0;
+  if (solid != nullptr) {
+    const SignedDistance found = solid->signed_distance(X_SL * p);
+    const Eigen::Vector3d n = X_SL.linear().transpose() * found.normal;
+    const double width =
+        std::sqrt(12.0 * std::max(n.dot(element.covariance.cast<double>() * n), 0.0));
+    share = width > 0.0 ? std::clamp(0.5 - found.distance / width, 0.0, 1.0)
+                        : (found.distance < 0.0 ? 1.0 : 0.0);
+    if (!(share > 0.0)) return;
+    p -= 0.5 * (1.0 - share) * width * n;  // the middle of the share
+    // Inside, the solid's normal jumps where two faces are equally near, from the edges on.
+    const double outside = std::max(1.0 - 2.0 * share, 0.0);
+    o = (1.0 - outside) * o - outside * n;
+  }
+  const double volume = share * static_cast<double>(element.volume);
+  sum->volume += volume;
+  sum->weighted_normal += volume * o;
+  sum->weighted_moment += p.cross(volume * o);
+  ++sum->spheres;
+}
+
+}  // namespace ist
