@@ -220,7 +220,7 @@ HullDistance hull_distance(const HullCoreset& a, const HullCoreset& b,
                            const Eigen::Isometry3d& X_BA, double precision, HullSupport* support) {
   Gjk gjk(a, b, X_BA);
   gjk.start(*support);
-  const HullDistance result = gjk.run(precision);
+  HullDistance result = gjk.run(precision);
   *support = gjk.support();
   return result;
 }
