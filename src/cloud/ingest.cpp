@@ -94,10 +94,14 @@ PointExtent extent_of(const RawCloud& cloud, const IngestConfig& config) {
     }
   }
   extent = point_extent(config.extent, angle > 0.0 ? angle : 0.0, farthest_point(config));
-  if (!(extent.radius(std::min(extent.max_range, kLargestRange)) <= kMaxExtent)) {
+  const double range = std::min(extent.max_range, kLargestRange);
+  if (!(extent.radius(range) <= kMaxExtent && extent.growth(range) <= kMaxExtentGrowth)) {
     std::ostringstream text;
-    text << "the footprint of a pixel makes points at max_range, " << extent.max_range
-         << " m, larger than " << kMaxExtent << " m. Lower max_range.";
+    text << "the footprint of a pixel of " << angle << " rad gives points at max_range, "
+         << extent.max_range << " m, a radius of " << extent.radius(range)
+         << " m: allowed are at most " << kMaxExtent << " m, and a growth of at most "
+         << kMaxExtentGrowth << " m for each metre of range. Lower max_range, or give the "
+         << "footprint as an angle or a radius.";
     throw std::invalid_argument(text.str());
   }
   return extent;
