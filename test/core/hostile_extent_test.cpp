@@ -12,6 +12,7 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/point_extent.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "support/box_oracle.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -172,6 +173,32 @@ TEST(HostileExtent, WhatIsKeptHoldsBeyondTheRangeThatItWasFoundFor) {
     X_FL.translation().x() = x;
     ASSERT_TRUE(query.run(Poses{X_FL}, {true}, all, &results));
     EXPECT_LE(results[0].lower_bound, truth_of(test::one(shapes[0]), X_FL, clouds) + 1e-9) << x;
+  }
+}
+
+// The same of a map's boxes, of which one is measured and proves no more than the range, because
+// the spheres of a coarse link say too little of it.
+TEST(HostileExtent, WhatIsKeptOfABoxHoldsBeyondTheRange) {
+  const std::vector<Shape> shapes = {Box{{0.2, 0.2, 0.2}}};
+  const auto model = test::make_model(shapes, 0.05);
+  QueryConfig config;
+  config.max_distance = 1.0;
+  std::vector<LinkProximity> results;
+  for (int i = 1; i < 80; ++i) {
+    const double distance = 1.45 + 0.001 * i;
+    std::vector<CloudSnapshot> clouds = {
+        test::make_map({Eigen::AlignedBox3d(Eigen::Vector3d(0.1 + distance, -0.1, -0.1),
+                                            Eigen::Vector3d(0.2 + distance, 0.1, 0.1))}),
+        test::make_snapshot({{-1.5, 0.0, 0.0}}, Eigen::Vector3d::Zero())};
+    clouds[0].box_extent = 0.45;
+    ProximityQuery query(model, config);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    for (const double x : {0.0, 0.2}) {
+      X_FL.translation().x() = x;
+      ASSERT_TRUE(query.run(Poses{X_FL}, {true}, {&clouds[0], &clouds[1]}, &results));
+      ASSERT_LE(results[0].lower_bound, distance - x - clouds[0].box_extent + 1e-6)
+          << distance << ", " << x;
+    }
   }
 }
 

@@ -10,11 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "internal/cloud/memory_body.h"
 #include "internal/cloud/memory_scan.h"
 #include "ist_proximity/cloud/depth_image.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/seen_space.h"
+#include "support/demo_arm.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/temp_dir.h"
 
@@ -233,6 +236,49 @@ TEST(HostileMemory, ABodyIsFreeWithinItsSpheresAlone) {
     if (outside < -0.0174) ASSERT_TRUE(is_known) << p.transpose();
   }
   EXPECT_GT(known, 500);
+}
+
+// The robot's own space is that of its exact solids and a skin, as promised. The cover spheres of
+// this arm reach 34 mm out of it, and coarse ones 50 mm, to where nothing has been seen.
+TEST(HostileMemory, TheBodyIsNoLargerThanTheRobotAndItsSkin) {
+  constexpr double kSkin = 0.0374;
+  const double half_voxel = 0.0174;  // [m] of its diagonal
+  for (const double max_error : {0.005, 0.05}) {
+    RobotModelConfig config;
+    config.packing.max_error = max_error;
+    const auto model = build_robot_model(test::demo_robot(), config);
+    test::Rng rng(15);
+    const Eigen::Isometry3d X_MF = test::random_pose(&rng, 1.0);
+    std::vector<PosedSolid> robot;
+    for (const LinkModel& link : model->links) {
+      if (!link.usable() || link.tree.empty()) continue;
+      robot.emplace_back();
+      robot.back().tree = &link.tree;
+      robot.back().solid = &link.solid;
+      robot.back().X_FL = test::random_pose(&rng, 0.4);
+    }
+    ASSERT_GT(robot.size(), 5U);
+    MemoryMap body{{}};
+    const Eigen::AlignedBox3d box = note_body(robot, X_MF, kSkin, 1.0, &body);
+    int known = 0, inside = 0;
+    for (int i = 0; i < test::scaled(60000); ++i) {
+      const Eigen::Vector3d p_F = test::random_vector(&rng, 0.9);
+      double distance = kInfinity;
+      for (const PosedSolid& solid : robot) {
+        distance =
+            std::min(distance, solid.solid->signed_distance(solid.X_FL.inverse() * p_F).distance);
+      }
+      const Eigen::Vector3d p_M = X_MF * p_F;
+      const bool is_known = body.state(p_M) == VoxelState::kFree;
+      known += is_known ? 1 : 0;
+      inside += distance < 0.0 ? 1 : 0;
+      if (distance > kSkin + half_voxel) ASSERT_FALSE(is_known) << distance;
+      if (distance < kSkin - half_voxel) ASSERT_TRUE(is_known) << distance;
+      if (distance < kSkin) ASSERT_TRUE(box.contains(p_M)) << distance;
+    }
+    EXPECT_GT(known, inside);
+    EXPECT_GT(inside, test::scaled(100));
+  }
 }
 
 // A pixel says nothing where it is NaN, negative or zero, and the other ones are not misread.
