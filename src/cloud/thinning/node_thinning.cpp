@@ -40,7 +40,7 @@ void write_unused(ThinnedTile* tile) {
   for (int k = tile->count; k < kPointWidth; ++k) {
     tile->x[k] = tile->y[k] = tile->z[k] = kFarAway;
     tile->id[k] = 0;
-    tile->offset_sq[k] = 0.0F;
+    tile->weight[k] = 0.0F;
   }
 }
 
@@ -54,6 +54,25 @@ void find_box(ThinnedTile* tile) {
   range(tile->x, tile->box.min_x, tile->box.max_x);
   range(tile->y, tile->box.min_y, tile->box.max_y);
   range(tile->z, tile->box.min_z, tile->box.max_z);
+}
+
+void find_moments(ThinnedTile* tile) {
+  PointMoments moments = {};
+  const auto n = static_cast<std::size_t>(tile->count);
+  for (std::size_t k = 0; k < n; ++k) {
+    moments.weight += tile->weight[k];
+    moments.middle[0] += tile->weight[k] * tile->x[k];
+    moments.middle[1] += tile->weight[k] * tile->y[k];
+    moments.middle[2] += tile->weight[k] * tile->z[k];
+  }
+  for (float& m : moments.middle) m /= moments.weight;
+  for (std::size_t k = 0; k < n; ++k) {
+    const float x = tile->x[k] - moments.middle[0], y = tile->y[k] - moments.middle[1],
+                z = tile->z[k] - moments.middle[2], w = tile->weight[k];
+    const float products[6] = {x * x, y * y, z * z, x * y, y * z, z * x};
+    for (int i = 0; i < 6; ++i) moments.spread[i] += w * products[i];
+  }
+  tile->moments = moments;
 }
 
 }  // namespace
@@ -243,11 +262,12 @@ void NodeThinning::write(ThinnedNode* thinned) const {
     tile->y[k] = candidate.y;
     tile->z[k] = candidate.z;
     tile->id[k] = candidate.id;
-    tile->offset_sq[k] = candidate.offset_sq;
+    tile->weight[k] = cell_weight(candidate.offset_sq);
   }
   for (std::uint32_t i = 0; i < thinned->count; ++i) {
     write_unused(&thinned->tiles[i]);
     find_box(&thinned->tiles[i]);
+    find_moments(&thinned->tiles[i]);
   }
 }
 
