@@ -257,7 +257,8 @@ void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
   }
 }
 
-// Measures an obstacle that is near a place, though perhaps not the nearest.
+// Measures an obstacle that is near a place, though perhaps not the nearest: of the points of one
+// tile, the one nearest to the last closest point of the link. Noise has moved all of them.
 void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ) {
   const Eigen::Vector3d p_OQ = obstacles.X_FO.inverse() * p_FQ;
   std::int32_t child = obstacles.bvh->root();
@@ -268,9 +269,11 @@ void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen:
   enter(obstacles);
   PointTile scratch;
   const PointTile& tile = obstacles.bvh->tile(static_cast<std::size_t>(~child), &scratch);
+  const auto& last = link_.kept.last;
+  const Eigen::Vector3d p_OC = last.has_place ? obstacles.X_OL * last.p_LCl : p_OQ;
   int nearest = 0;
   for (int k = 1; k < tile.count; ++k) {
-    if ((tile.point(k) - p_OQ).squaredNorm() < (tile.point(nearest) - p_OQ).squaredNorm()) {
+    if ((tile.point(k) - p_OC).squaredNorm() < (tile.point(nearest) - p_OC).squaredNorm()) {
       nearest = k;
     }
   }
