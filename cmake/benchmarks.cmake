@@ -125,6 +125,9 @@ target_sources(benchmark_peers PRIVATE
   benchmark/peers/signed_grid.cpp
   benchmark/peers/synthetic.cpp)
 target_sources(benchmark_answers PRIVATE benchmark/peers/scene.cpp)
+target_sources(benchmark_kept_repulsion PRIVATE
+  benchmark/peers/kinect.cpp
+  benchmark/peers/scene.cpp)
 target_sources(benchmark_self_pasted PRIVATE benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
 target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_ingest PRIVATE

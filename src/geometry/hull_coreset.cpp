@@ -145,7 +145,7 @@ class HullCoreset::Builder {
 
   // The distance of a corner to the coreset's hull, or more. @returns the direction out of the hull
   Eigen::Vector3d measure(std::size_t i) {
-    const Eigen::Vector3d off = set_.offset(corners_[i], &last_);
+    Eigen::Vector3d off = set_.offset(corners_[i], &last_);
     distances_[i] = std::min(distances_[i], off.norm() + kLostInLength * extent_);
     return off;
   }

@@ -222,7 +222,7 @@ HullDistance hull_distance(const HullCoreset& a, const HullCoreset& b,
                            double enough) {
   Gjk gjk(a, b, X_BA);
   gjk.start(*support);
-  const HullDistance result = gjk.run(precision, enough);
+  HullDistance result = gjk.run(precision, enough);
   *support = gjk.support();
   return result;
 }

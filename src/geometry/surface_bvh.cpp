@@ -99,7 +99,7 @@ struct Spread {
     const Eigen::Vector3d center = mean / area;
     const Eigen::Matrix3d covariance = square / area - center * center.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-    const Eigen::Matrix3d axes = solver.eigenvectors();
+    const Eigen::Matrix3d& axes = solver.eigenvectors();
     return axes.allFinite() ? axes : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   }
 };
