@@ -225,12 +225,12 @@ const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight
 }
 
 // A tile at an edge of the robot, or with obstacles: each pixel has its own ray.
-void ViewFilter::add_pixels(const Skin& skin, Tile* tile) const {
+void ViewFilter::add_pixels(const Skin& skin, Tile* tile) {
   for (std::size_t k = 0; k < kPixels; ++k) {
     if (!view_.is_kept(k)) continue;
     const auto bit = static_cast<std::uint16_t>(1U << k);
     const double range = view_.range(k);
-    const TileView::Sight sight = view_.look(k);
+    const TileView::Sight& sight = view_.look(k);
     const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
     if (in_skin == nullptr) {
       // Close in front of the robot there is nothing but an obstacle.
