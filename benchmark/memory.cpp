@@ -139,6 +139,7 @@ std::string watch_memory(std::vector<ist::MemoryScan> scans, double minutes) {
   ist::MemoryMap map(memory_config(true));
   ist::VoxelBoxes boxes;
   std::string text = "| minute | voxels in memory | occupied | process |\n|---|---|---|---|\n";
+  std::fputs(text.c_str(), stdout);
   const auto clouds = static_cast<std::size_t>(60.0 * 30.0 * minutes);
   for (std::size_t i = 0; i < clouds; ++i) {
     ist::MemoryScan& scan = scans[i % scans.size()];
