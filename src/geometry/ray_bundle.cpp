@@ -6,26 +6,11 @@
 #include <limits>
 
 #include "geometry/mesh_ray.h"
+#include "geometry/ray_kernels.h"
 #include "geometry/solid_element.h"
 
 namespace ist {
 namespace {
-
-constexpr float kFar = 1e18F;  // [m]
-
-// The points origin + t d with d in a box of directions, as inequalities: in each axis,
-// t high >= box.min - origin and t low <= box.max - origin. Each bounds t from one side.
-struct Beam {
-  struct Bound {
-    float reciprocal;  // of the direction
-    bool is_lower;     // whether it bounds t from below
-  };
-  std::array<float, 3> origin;   // [m] from the middle of the mesh
-  std::array<Bound, 3> at_high;  // of box.min - origin
-  std::array<Bound, 3> at_low;   // of box.max - origin
-  float last;
-  float margin;  // [m] more than what float rounds off of a coordinate
-};
 
 // 1 / d, with the sign of d, finite.
 float reciprocal_of(float d) {
@@ -54,50 +39,6 @@ Beam beam_of(const Eigen::Vector3d& o, const Eigen::AlignedBox3d& directions, do
   return beam;
 }
 
-// The parameters at which the beam enters the children's boxes; infinite where it misses them.
-void enter_boxes(const TriangleBvh::Boxes& boxes, const Beam& beam,
-                 float enter[TriangleBvh::kWidth]) {
-  float first[TriangleBvh::kWidth], last[TriangleBvh::kWidth];
-  for (std::size_t k = 0; k < TriangleBvh::kWidth; ++k) {
-    first[k] = 0.0F;
-    last[k] = beam.last;
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (const bool is_min : {true, false}) {
-      const Beam::Bound& bound = is_min ? beam.at_high[i] : beam.at_low[i];
-      const float* plane = is_min ? boxes.min[i] : boxes.max[i];
-      const float shift = beam.origin[i] + (is_min ? beam.margin : -beam.margin);
-      float* t = bound.is_lower ? first : last;
-      const float sign = bound.is_lower ? 1.0F : -1.0F;
-      for (std::size_t k = 0; k < TriangleBvh::kWidth; ++k) {
-        const float crossing = sign * (plane[k] - shift) * bound.reciprocal;
-        t[k] = sign * std::max(sign * t[k], crossing);
-      }
-    }
-  }
-  for (std::size_t k = 0; k < TriangleBvh::kWidth; ++k) {
-    const float slack = 1e-6F * (std::abs(first[k]) + std::abs(last[k]));
-    enter[k] = first[k] <= last[k] + slack ? std::max(first[k] - slack, 0.0F)
-                                           : std::numeric_limits<float>::infinity();
-  }
-}
-
-// Copies a leaf and its box to a slot; those before it are used.
-void copy_child(const TriangleBvh::Boxes& from, std::size_t k, TriangleBvh::Boxes* to,
-                std::size_t slot) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    to->min[i][slot] = from.min[i][k];
-    to->max[i][slot] = from.max[i][k];
-  }
-  to->child[slot] = from.child[k];
-  to->count = static_cast<std::int32_t>(slot + 1);
-  if (slot != 0) return;
-  // The other slots are far away.
-  for (std::size_t rest = 1; rest < TriangleBvh::kWidth; ++rest) {
-    for (std::size_t i = 0; i < 3; ++i) to->min[i][rest] = to->max[i][rest] = kFar;
-  }
-}
-
 }  // namespace
 
 std::size_t TriangleBvh::leaves_on_rays(const Eigen::Vector3d& origin_M,
@@ -106,30 +47,7 @@ std::size_t TriangleBvh::leaves_on_rays(const Eigen::Vector3d& origin_M,
   if (triangles_.empty()) return 0;
   const Beam beam =
       beam_of(origin_M - bounds_.center(), directions_M, 0.5 * bounds_.sizes().norm(), max_t);
-  struct Entry {
-    std::int32_t node;
-    float enter;
-  };
-  Stack<Entry> stack;
-  stack.push({0, 0.0F});
-  std::size_t count = 0;
-  while (!stack.empty()) {
-    const Boxes& boxes = boxes_[static_cast<std::size_t>(stack.pop().node)];
-    float enter[kWidth];
-    enter_boxes(boxes, beam, enter);
-    const std::size_t siblings = stack.size();
-    for (std::size_t k = 0; k < static_cast<std::size_t>(boxes.count); ++k) {
-      if (!std::isfinite(enter[k])) continue;
-      if (boxes.child[k] >= 0) {
-        stack.push_least_on_top<&Entry::enter>(siblings, {boxes.child[k], enter[k]});
-        continue;
-      }
-      if (count == kWidth * capacity) return count + 1;
-      copy_child(boxes, k, leaves + count / kWidth, count % kWidth);
-      ++count;
-    }
-  }
-  return count;
+  return find_leaves(view(), beam, leaves, capacity);
 }
 
 TriangleBvh::RayCrossing TriangleBvh::first_crossing(const Boxes* leaves, std::size_t count,
@@ -137,33 +55,17 @@ TriangleBvh::RayCrossing TriangleBvh::first_crossing(const Boxes* leaves, std::s
                                                      const Eigen::Vector3d& direction_M,
                                                      double max_t) const {
   // As in the search for one ray, its origin is moved near the mesh, where float is exact enough.
-  RayCrossing best;
   const Eigen::Vector3d middle = bounds_.center();
   const double radius = 0.5 * bounds_.sizes().norm();
   const double shift = (middle - origin_M).dot(direction_M) / direction_M.squaredNorm();
   const Eigen::Vector3d o_M = origin_M + shift * direction_M;
-  if ((o_M - middle).norm() > radius * (1.0 + 1e-6)) return best;
-  const double first = -shift;
-  double limit = max_t - shift;
-  mesh_ray::FloatRay ray = mesh_ray::float_ray(o_M - middle, direction_M, radius, first, limit);
-  for (std::size_t i = 0; i < count; ++i) {
-    float enter[kWidth];
-    mesh_ray::enter_boxes(leaves[i], ray, enter);
-    for (std::size_t k = 0; k < static_cast<std::size_t>(leaves[i].count); ++k) {
-      if (enter[k] > ray.last) continue;
-      const Leaf& leaf = leaves_[static_cast<std::size_t>(~leaves[i].child[k])];
-      const std::uint32_t bits = mesh_ray::crossed(leaf, ray);
-      for (std::uint32_t j = 0; bits >> j != 0; ++j) {
-        if ((bits >> j & 1U) == 0) continue;
-        const double t = mesh_ray::cross_triangle(triangles_[leaf.first + j], o_M, direction_M);
-        if (!(t >= first && t <= limit)) continue;
-        limit = t;
-        best = {std::max(t + shift, 0.0), leaf.first + j};
-        ray.last = mesh_ray::last_of(t);
-      }
-    }
-  }
-  return best;
+  if ((o_M - middle).norm() > radius * (1.0 + 1e-6)) return {};
+  const double first = -shift, last = max_t - shift;
+  const mesh_ray::FloatRay ray =
+      mesh_ray::float_ray(o_M - middle, direction_M, radius, first, last);
+  RayCrossing crossing = find_crossing(view(), leaves, count, ray, o_M, direction_M, first, last);
+  if (std::isfinite(crossing.t)) crossing.t = std::max(crossing.t + shift, 0.0);
+  return crossing;
 }
 
 void RayBundle::begin(const Solid& solid, const Eigen::Vector3d& origin_L,

@@ -22,6 +22,7 @@ void TileView::read(const RawCloud& cloud, std::size_t row, std::size_t column,
 
 void TileView::begin(double behind) {
   behind_ = behind;
+  looked_ = 0;
   bundles_.clear();
 }
 
@@ -38,8 +39,11 @@ void TileView::add_link(const SelfFilter::Link& link, const Eigen::Isometry3d& X
   if (bundle.rays.empty()) bundles_.pop_back();
 }
 
-TileView::Sight TileView::look(std::size_t k) const {
-  Sight sight;
+const TileView::Sight& TileView::look(std::size_t k) {
+  Sight& sight = sights_[k];
+  if ((looked_ >> k & 1U) != 0) return sight;
+  looked_ |= 1U << k;
+  sight = {};
   for (const Bundle& bundle : bundles_) {
     const RayHit hit = bundle.rays.cast(bundle.R_LS * direction_[k], range_[k] + behind_);
     if (!(std::abs(hit.t - range_[k]) < std::abs(sight.t - range_[k]))) continue;

@@ -43,7 +43,7 @@ class TileView {
   void add_link(const SelfFilter::Link& link, const Eigen::Isometry3d& X_LS);
 
   /// The ray of pixel k: where it first meets the link whose surface is nearest to the point.
-  Sight look(std::size_t k) const;
+  const Sight& look(std::size_t k);
 
   std::uint32_t kept() const { return kept_; }
   bool is_kept(std::size_t k) const { return (kept_ >> k & 1U) != 0; }
@@ -62,6 +62,8 @@ class TileView {
   std::uint32_t kept_ = 0;
   std::array<Eigen::Vector3d, kPixels> p_S_, direction_;
   std::array<double, kPixels> range_;
+  std::array<Sight, kPixels> sights_;
+  std::uint32_t looked_ = 0;              // bits of the pixels whose sights are known
   double behind_ = 0.0, farthest_ = 0.0;  // [m]
   std::vector<Bundle> bundles_;           // of links that a ray of the tile may meet
 };

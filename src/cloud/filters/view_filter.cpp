@@ -224,42 +224,39 @@ const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight
   return on == links.end() ? nullptr : *on;
 }
 
-// A tile at an edge of the robot, or with obstacles: each pixel has its own ray.
-void ViewFilter::add_pixels(const Skin& skin, Tile* tile) const {
-  for (std::size_t k = 0; k < kPixels; ++k) {
-    if (!view_.is_kept(k)) continue;
-    const auto bit = static_cast<std::uint16_t>(1U << k);
-    const double range = view_.range(k);
-    const TileView::Sight sight = view_.look(k);
-    const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
-    if (in_skin == nullptr) {
-      // Close in front of the robot there is nothing but an obstacle.
-      const double limit = padding_ + kFront * config_.noise.sigma(range);
-      const double depth = sight.t - range;
-      if (sight.link != nullptr && depth > padding_ && depth < limit) tile->front |= bit;
-      continue;
-    }
-    if (tile->link == nullptr) {
-      tile->link = sight.link != nullptr ? sight.link : in_skin;
-      tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
-      tile->p_S = view_.p_S(k).cast<float>();
-    }
-    const bool misses = sight.link == nullptr;
-    const double cosine = misses ? 1.0 : -sight.normal.dot(view_.direction(k));
-    const double height = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
-    if (misses || height > kCertain * noise + static_cast<double>(tile->tolerance)) {
-      const Passing passing = pass(k, skin.filter);
-      if (misses || passing != Passing::kObstacle) {
-        // At an edge the ray may meet what is behind it: nothing is known of the height.
-        tile->skin |= bit;
-        tile->robot |= bit;
-        if (passing == Passing::kObstacle) tile->obstacle |= bit;
-        if (passing == Passing::kBlurred) tile->blurred |= bit;
-        continue;
-      }
-    }
-    add_height(k, height, noise, tile);
+// A pixel of a tile at an edge of the robot, or with obstacles: it has its own ray.
+void ViewFilter::add_pixel(std::size_t k, const Skin& skin, Tile* tile) {
+  const auto bit = static_cast<std::uint16_t>(1U << k);
+  const double range = view_.range(k);
+  const TileView::Sight& sight = view_.look(k);
+  const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
+  if (in_skin == nullptr) {
+    // Close in front of the robot there is nothing but an obstacle.
+    const double limit = padding_ + kFront * config_.noise.sigma(range);
+    const double depth = sight.t - range;
+    if (sight.link != nullptr && depth > padding_ && depth < limit) tile->front |= bit;
+    return;
   }
+  if (tile->link == nullptr) {
+    tile->link = sight.link != nullptr ? sight.link : in_skin;
+    tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
+    tile->p_S = view_.p_S(k).cast<float>();
+  }
+  const bool misses = sight.link == nullptr;
+  const double cosine = misses ? 1.0 : -sight.normal.dot(view_.direction(k));
+  const double height = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
+  if (misses || height > kCertain * noise + static_cast<double>(tile->tolerance)) {
+    const Passing passing = pass(k, skin.filter);
+    if (misses || passing != Passing::kObstacle) {
+      // At an edge the ray may meet what is behind it: nothing is known of the height.
+      tile->skin |= bit;
+      tile->robot |= bit;
+      if (passing == Passing::kObstacle) tile->obstacle |= bit;
+      if (passing == Passing::kBlurred) tile->blurred |= bit;
+      return;
+    }
+  }
+  add_height(k, height, noise, tile);
 }
 
 void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kept,
@@ -277,7 +274,10 @@ void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kep
   tile.column = static_cast<std::uint32_t>(column);
   tile.height.fill(std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < kPixels; ++k) tile.range[k] = static_cast<float>(view_.range(k));
-  if (kept != kWhole || !add_patch(&tile)) add_pixels({filter, verdict, X_OS}, &tile);
+  const bool is_patch = kept == kWhole && add_patch(&tile);
+  for (std::size_t k = 0; !is_patch && k < kPixels; ++k) {
+    if (view_.is_kept(k)) add_pixel(k, {filter, verdict, X_OS}, &tile);
+  }
   if (tile.skin != kept) {
     for (std::size_t k = 0; k < kPixels; ++k) {
       if (((kept & ~static_cast<std::uint32_t>(tile.skin)) >> k & 1U) == 0) continue;

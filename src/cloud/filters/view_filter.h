@@ -112,7 +112,7 @@ class ViewFilter {
   const SelfFilter::Link* skin_of(std::size_t k, const TileView::Sight& sight,
                                   const Skin& skin) const;
   bool add_patch(Tile* tile);
-  void add_pixels(const Skin& skin, Tile* tile) const;
+  void add_pixel(std::size_t k, const Skin& skin, Tile* tile);
   void add_height(std::size_t k, double height, double noise, Tile* tile) const;
   enum class Passing { kObstacle, kBlurred, kRobot };
   Passing pass(std::size_t k, const SelfFilter& filter) const;

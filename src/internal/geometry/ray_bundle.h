@@ -41,7 +41,7 @@ class RayBundle {
     std::size_t first, last;  // in leaves_; equal: the whole element
   };
 
-  void add_element(std::size_t element, const Eigen::Vector3d& origin_L,
+  void add_element(std::size_t index, const Eigen::Vector3d& origin_L,
                    const Eigen::AlignedBox3d& directions_L, double max_t);
 
   const Solid* solid_ = nullptr;
