@@ -315,6 +315,17 @@ TEST(HostileMemory, DepthsThatSayNothingClearNothing) {
   EXPECT_TRUE(scan.free_ends.empty());
 }
 
+// Two ends on both sides of a voxel's border, so close that the square of their distance is zero in
+// float: the ray has no direction, and its walk never ended.
+TEST(HostileMemory, ARayThatHasNoLengthInFloatEnds) {
+  MemoryConfig config;
+  config.discretize = false;
+  MemoryMap map(config);
+  map.insert(ray({-1e-30F, 0.01F, 0.01F}, {1e-30F, 0.01F, 0.01F}, 0.0));
+  EXPECT_EQ(map.state({1e-30, 0.01, 0.01}), VoxelState::kOccupied);
+  EXPECT_LE(map.counts().known, 2U);
+}
+
 // An obstacle that a file remembers is an obstacle.
 TEST(HostileMemory, ObstaclesOfAFileAreHidden) {
   const test::TempDir folder;
