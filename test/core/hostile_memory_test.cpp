@@ -131,6 +131,24 @@ TEST(HostileMemory, WithoutMemoryObstaclesComeBeforeFreeSpace) {
   }
 }
 
+// What is hidden stays for all of the decay, also when the memory is older than that.
+TEST(HostileMemory, NothingIsForgottenBeforeTheDecay) {
+  MemoryConfig config;
+  config.decay = 2.0;
+  MemoryMap map(config);
+  map.insert(ray({0, 0, 0}, {0, 1, 0}, 100.0));
+  for (int i = 0; i < 50; ++i) {
+    const double stamp = 110.0 + 3.0 * i;
+    map.insert(ray({0, 0, 0}, {1, 0, 0}, stamp));
+    for (const double later : {0.5, 1.0, 1.5, 1.98}) {
+      map.insert(ray({0, 0, 0}, {0, 1, 0}, stamp + later));
+      ASSERT_EQ(map.state({1, 0, 0}), VoxelState::kOccupied) << later;
+    }
+    map.forget(stamp + 2.02);
+    ASSERT_EQ(map.state({1, 0, 0}), VoxelState::kUnknown);
+  }
+}
+
 // Old free space fills the memory. An obstacle that is seen once, and hidden from then on, is there
 // all the same; other obstacles stay.
 TEST(HostileMemory, AnObstacleTakesThePlaceOfOldFreeSpaceAtOnce) {
