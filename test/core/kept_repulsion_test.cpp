@@ -88,11 +88,11 @@ TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendOfThePose) {
 TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendBesideNearPoints) {
   double largest = 0.0;
   int kept_blends = 0;
-  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
     test::Rng rng(seed);
     std::vector<Eigen::Vector3d> points;
     for (int i = 0; i < 3; ++i) {
-      points.emplace_back(0.05 + test::uniform(&rng, 0.003, 0.02), test::uniform(&rng, -0.09, 0.09),
+      points.emplace_back(0.05 + test::uniform(&rng, 0.002, 0.05), test::uniform(&rng, -0.09, 0.09),
                           test::uniform(&rng, -0.14, 0.14));
     }
     cloud_ = test::thinned(points, 0.001);
@@ -107,8 +107,8 @@ TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendBesideNearPoints) {
       kept_blends += found.force != truth.force ? 1 : 0;
     }
   }
-  EXPECT_GT(kept_blends, 20);
-  EXPECT_LT(largest, 0.03);
+  EXPECT_GT(kept_blends, 1000);
+  EXPECT_LT(largest, 0.02) << "1.3 % when this was written, 2.7 % where blends are kept for 8 mm";
 }
 
 TEST_F(KeptRepulsionTest, LengthFollowsTheDistanceAtOnce) {
