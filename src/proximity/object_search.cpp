@@ -32,10 +32,7 @@ void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
 }
 
 ObjectSearch::ObjectSearch(const RobotSurfaces& robot, std::size_t link)
-    : robot_(robot),
-      link_(link),
-      model_(robot.model->links[link]),
-      surface_(robot.surfaces[link].get()) {
+    : link_(link), model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
   if (surface_ == nullptr) return;
   const Eigen::AlignedBox3d& box = robot.boxes[link];
   center_L_ = box.center();

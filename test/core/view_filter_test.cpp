@@ -266,6 +266,36 @@ TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
   }
 }
 
+// A plate lies on a link that stands behind another one: in the image it ends at the front link's
+// outline, 0.4 m behind it. Nothing of the front link is a part of it, though every sixth of its
+// pixels is in front of its surface by a standard deviation. Nor is the rest of a link, behind a
+// board 0.2 m in front of it that touches the link's neighbour there.
+TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
+  std::vector<Body> robot = {Body(Cylinder{0.05, 0.5}, at(0.0, 0.0, 0.9)),
+                             Body(Box{{0.6, 0.6, 0.1}}, at(0.0, 0.0, 1.4)),
+                             Body(Box{{0.1, 0.1, 0.1}}, at(0.0, 0.25, 1.15))};
+  robot[0].X_FL.rotate(Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitX()));
+  const Body plate(Box{{0.3, 0.3, 0.012}}, at(0.0, 0.0, 1.344)),
+      board(Box{{0.1, 0.04, 0.004}}, at(0.0, 0.2, 1.098));
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  Ingest ingest(config_of(SelfFilterMode::kView));
+  CloudSnapshot viewed;
+  Share front, others;
+  for (int i = 0; i < 10; ++i) {
+    const Image image = picture(pointers(robot, {plate, board}), X_FS, kNoise, i);
+    ingest.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
+    const Share link = share_of(image, kept_of(viewed), 0, 0),
+                plates = share_of(image, kept_of(viewed), 3, 4);
+    front.pixels += link.pixels;
+    front.kept += link.kept;
+    others.pixels += plates.pixels;
+    others.kept += plates.kept;
+  }
+  EXPECT_GT(front.pixels, 30000);
+  EXPECT_EQ(front.kept, 0);
+  EXPECT_GT(others.kept, 0.9 * others.pixels);
+}
+
 // What the padding keeps, the view keeps; of what the padding drops, the view drops the robot.
 TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
   const std::vector<Body> robot = arm();
