@@ -155,7 +155,8 @@ TEST(HostileMemory, AnObstacleTakesThePlaceOfOldFreeSpaceAtOnce) {
   MemoryConfig config;
   config.max_nodes = 512 * 40;
   MemoryMap map(config);
-  map.insert(ray({0.0F, 0.0F, 0.01F}, {0.3F, 0.01F, 0.01F}, 0.0));
+  // The second cloud adds nothing, so that no place is made for the next one.
+  for (int i = 0; i < 2; ++i) map.insert(ray({0.0F, 0.0F, 0.01F}, {0.3F, 0.01F, 0.01F}, 0.0));
   std::vector<Eigen::Vector4f> spheres;  // one voxel each, in blocks of their own
   for (int i = 0; i < 64; ++i) {
     spheres.emplace_back(0.09F + 0.16F * static_cast<float>(i % 8),
@@ -189,6 +190,36 @@ TEST(HostileMemory, ACloudOfMoreObstaclesThanFitsFillsTheMemoryWithObstacles) {
     map.insert(scan);
     EXPECT_EQ(map.counts().occupied, 16U) << frame;
     EXPECT_GE(map.counts().skipped, 84U) << frame;
+    if (frame > 0) continue;
+    for (const Eigen::Vector3f& p : scan.hits) {  // each is hit once
+      if (map.state(p.cast<double>()) == VoxelState::kUnknown) continue;
+      EXPECT_NEAR(map.log_odds(p.cast<double>()), std::log(0.7 / 0.3), 1e-5);
+    }
+  }
+}
+
+// Rays that need more memory than there is take that of free space alone.
+TEST(HostileMemory, FreeSpaceNeverTakesThePlaceOfObstacles) {
+  MemoryConfig config;
+  config.max_nodes = 512 * 16;
+  MemoryMap map(config);
+  MemoryScan scan;
+  for (int i = 0; i < 12; ++i) {  // each in a block of its own, at the sensor
+    scan.origin = {0.05F + 0.32F * static_cast<float>(i % 4),
+                   5.05F + 0.32F * static_cast<float>(i / 4), 0.05F};
+    scan.hits = {scan.origin + Eigen::Vector3f(0.03F, 0.0F, 0.0F)};
+    map.insert(scan);
+  }
+  ASSERT_EQ(map.counts().occupied, 12U);
+  for (int frame = 0; frame < 30; ++frame) {
+    scan.stamp = 0.1 * frame;
+    scan.origin = Eigen::Vector3f::Zero();
+    const float angle = 0.1F * static_cast<float>(frame);
+    scan.hits.clear();
+    scan.free_ends = {{4.0F * std::cos(angle), -4.0F * std::sin(angle), -1.0F}};
+    map.insert(scan);
+    ASSERT_EQ(map.counts().occupied, 12U) << frame;
+    EXPECT_GT(map.counts().skipped, 0U);
   }
 }
 
