@@ -119,6 +119,23 @@ def octrees():
     write("octree", "full_file", b"\1# Octomap OcTree file\n" + header.format(3).encode() + full)
 
 
+def scenes():
+    pose = "0.5 0 0.2\n0 0 0 1\n"
+    colour = "0 0 0 0\n"
+    mesh = "mesh\n4 4\n" + "".join("%g %g %g\n" % v for v in VERTICES)
+    mesh += "".join("%d %d %d\n" % t for t in TRIANGLES)
+    shapes = ["box\n0.2 0.3 0.4\n", "sphere\n0.1\n", "cylinder\n0.1 0.5\n", "cone\n0.1 0.5\n",
+              "plane\n0 0 1 0\n", mesh]
+    new = "a cell\n"
+    for i, shape in enumerate(shapes):
+        new += f"* object {i}\n{pose}1\n{shape}{pose}{colour}0\n"
+    write("world_scene", "every_shape.scene", new + ".\n")
+    old = "old\n* wall\n2\n" + "".join(s + pose + colour for s in shapes[:2])
+    write("world_scene", "without_poses.scene", old + ".\n")
+    write("world_scene", "twice.scene", f"x\n* wall\n1\n{shapes[1]}{pose}{colour}* wall\n1\n"
+          f"{shapes[1]}{pose}{colour}.\n")
+
+
 def packings():
     # Byte 0: 1 a packing from the rest, 2 a file whose checksum is made right.
     spheres = b"".join(struct.pack("<5d", x, 0, 0, 0.05, 0.06) for x in (0.0, 0.1))
@@ -132,7 +149,9 @@ meshes()
 urdfs()
 srdfs()
 octrees()
+scenes()
 packings()
+pseudo_random("memory_map", [60, 400], 8)
 pseudo_random("packing_cache", [200])
 pseudo_random("cloud_layout", [40, 400], 8)
 pseudo_random("laser_scan", [60, 400])

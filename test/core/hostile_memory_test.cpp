@@ -131,13 +131,32 @@ TEST(HostileMemory, WithoutMemoryObstaclesComeBeforeFreeSpace) {
   }
 }
 
+// What is hidden stays for all of the decay, also when the memory is older than that.
+TEST(HostileMemory, NothingIsForgottenBeforeTheDecay) {
+  MemoryConfig config;
+  config.decay = 2.0;
+  MemoryMap map(config);
+  map.insert(ray({0, 0, 0}, {0, 1, 0}, 100.0));
+  for (int i = 0; i < 50; ++i) {
+    const double stamp = 110.0 + 3.0 * i;
+    map.insert(ray({0, 0, 0}, {1, 0, 0}, stamp));
+    for (const double later : {0.5, 1.0, 1.5, 1.98}) {
+      map.insert(ray({0, 0, 0}, {0, 1, 0}, stamp + later));
+      ASSERT_EQ(map.state({1, 0, 0}), VoxelState::kOccupied) << later;
+    }
+    map.forget(stamp + 2.02);
+    ASSERT_EQ(map.state({1, 0, 0}), VoxelState::kUnknown);
+  }
+}
+
 // Old free space fills the memory. An obstacle that is seen once, and hidden from then on, is there
 // all the same; other obstacles stay.
 TEST(HostileMemory, AnObstacleTakesThePlaceOfOldFreeSpaceAtOnce) {
   MemoryConfig config;
   config.max_nodes = 512 * 40;
   MemoryMap map(config);
-  map.insert(ray({0.0F, 0.0F, 0.01F}, {0.3F, 0.01F, 0.01F}, 0.0));
+  // The second cloud adds nothing, so that no place is made for the next one.
+  for (int i = 0; i < 2; ++i) map.insert(ray({0.0F, 0.0F, 0.01F}, {0.3F, 0.01F, 0.01F}, 0.0));
   std::vector<Eigen::Vector4f> spheres;  // one voxel each, in blocks of their own
   for (int i = 0; i < 64; ++i) {
     spheres.emplace_back(0.09F + 0.16F * static_cast<float>(i % 8),
@@ -171,6 +190,36 @@ TEST(HostileMemory, ACloudOfMoreObstaclesThanFitsFillsTheMemoryWithObstacles) {
     map.insert(scan);
     EXPECT_EQ(map.counts().occupied, 16U) << frame;
     EXPECT_GE(map.counts().skipped, 84U) << frame;
+    if (frame > 0) continue;
+    for (const Eigen::Vector3f& p : scan.hits) {  // each is hit once
+      if (map.state(p.cast<double>()) == VoxelState::kUnknown) continue;
+      EXPECT_NEAR(map.log_odds(p.cast<double>()), std::log(0.7 / 0.3), 1e-5);
+    }
+  }
+}
+
+// Rays that need more memory than there is take that of free space alone.
+TEST(HostileMemory, FreeSpaceNeverTakesThePlaceOfObstacles) {
+  MemoryConfig config;
+  config.max_nodes = 512 * 16;
+  MemoryMap map(config);
+  MemoryScan scan;
+  for (int i = 0; i < 12; ++i) {  // each in a block of its own, at the sensor
+    scan.origin = {0.05F + 0.32F * static_cast<float>(i % 4),
+                   5.05F + 0.32F * static_cast<float>(i / 4), 0.05F};
+    scan.hits = {scan.origin + Eigen::Vector3f(0.03F, 0.0F, 0.0F)};
+    map.insert(scan);
+  }
+  ASSERT_EQ(map.counts().occupied, 12U);
+  for (int frame = 0; frame < 30; ++frame) {
+    scan.stamp = 0.1 * frame;
+    scan.origin = Eigen::Vector3f::Zero();
+    const float angle = 0.1F * static_cast<float>(frame);
+    scan.hits.clear();
+    scan.free_ends = {{4.0F * std::cos(angle), -4.0F * std::sin(angle), -1.0F}};
+    map.insert(scan);
+    ASSERT_EQ(map.counts().occupied, 12U) << frame;
+    EXPECT_GT(map.counts().skipped, 0U);
   }
 }
 
@@ -313,6 +362,17 @@ TEST(HostileMemory, DepthsThatSayNothingClearNothing) {
   read_memory_scan(packed_cloud(points, 4, 1), snapshot, snapshot.X_FS, 0.05, 3.0, &scan);
   EXPECT_TRUE(scan.hits.empty());
   EXPECT_TRUE(scan.free_ends.empty());
+}
+
+// Two ends on both sides of a voxel's border, so close that the square of their distance is zero in
+// float: the ray has no direction, and its walk never ended.
+TEST(HostileMemory, ARayThatHasNoLengthInFloatEnds) {
+  MemoryConfig config;
+  config.discretize = false;
+  MemoryMap map(config);
+  map.insert(ray({-1e-30F, 0.01F, 0.01F}, {1e-30F, 0.01F, 0.01F}, 0.0));
+  EXPECT_EQ(map.state({1e-30, 0.01, 0.01}), VoxelState::kOccupied);
+  EXPECT_LE(map.counts().known, 2U);
 }
 
 // An obstacle that a file remembers is an obstacle.

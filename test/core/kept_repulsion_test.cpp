@@ -83,6 +83,34 @@ TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendOfThePose) {
   EXPECT_LT(largest_step, 0.03);
 }
 
+// The same of a link that slides past a few points close to it. Directions to points that are near
+// turn faster than to first order: there a blend may be kept for less than the 8 mm of others.
+TEST_F(KeptRepulsionTest, IsNeverFarFromTheBlendBesideNearPoints) {
+  double largest = 0.0;
+  int kept_blends = 0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    test::Rng rng(seed);
+    std::vector<Eigen::Vector3d> points;
+    for (int i = 0; i < 3; ++i) {
+      points.emplace_back(0.05 + test::uniform(&rng, 0.002, 0.05), test::uniform(&rng, -0.09, 0.09),
+                          test::uniform(&rng, -0.14, 0.14));
+    }
+    cloud_ = test::thinned(points, 0.001);
+    const Eigen::Vector3d step = 1e-3 * test::random_vector(&rng, 1.0).normalized();
+    for (int i = 0; i < 12; ++i) {
+      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      X_FL.translation() = Eigen::Vector3d(-1e-4 * i, step.y() * i, step.z() * i);
+      const RepulsiveWrench found = kept(X_FL), truth = exact(X_FL);
+      const double length = config_.gain * repulsion_strength(answer(X_FL), config_);
+      if (!(length > 0.0)) continue;
+      largest = std::max(largest, (found.force - truth.force).norm() / length);
+      kept_blends += found.force != truth.force ? 1 : 0;
+    }
+  }
+  EXPECT_GT(kept_blends, 1000);
+  EXPECT_LT(largest, 0.02) << "1.3 % when this was written, 2.7 % where blends are kept for 8 mm";
+}
+
 TEST_F(KeptRepulsionTest, LengthFollowsTheDistanceAtOnce) {
   const LinkProximity here = answer(at(0.0));
   kept(at(0.0));

@@ -162,6 +162,26 @@ class MemoryTest(unittest.TestCase):
             "the frame in the diagnostics",
         )
 
+    # While a pose is unknown, clouds are not remembered. What left the view with the first of them
+    # is an obstacle all the same.
+    def test_hidden_while_a_pose_is_unknown(self):
+        self.start(memory={"enabled": True, "decay": 1000.0, "resolution": VOXEL})
+        self.node.wait_for(self.is_from("cloud"), "the far patch in view")
+        rospy.sleep(0.5)
+        del self.world.poses["box_link"]
+        rospy.sleep(0.2)
+        self.world.points = NEAR
+        self.node.wait_until(
+            lambda: "'box_link' was not known"
+            in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
+            "that the clouds are not remembered, in the diagnostics",
+        )
+        first = len(self.node.messages)
+        self.node.wait_for(lambda m: len(self.node.messages) > first + 20, "20 answers")
+        for message in self.node.messages[first:]:
+            self.assertEqual(self.ball(message).source, "cloud/memory")
+            self.assertAlmostEqual(self.ball(message).distance, distance_to(FAR), delta=2 * VOXEL)
+
     def test_too_little_memory_is_told(self):
         self.start(memory={"enabled": True, "resolution": 0.005, "max_nodes": 5000})
         self.node.wait_for(self.is_from("cloud"), "answers of the camera")

@@ -77,7 +77,12 @@ class WorldTest(unittest.TestCase):
                         },
                         "allowed_contacts": [["ball_link", "bench"], ["box_link", "bench"]],
                     },
-                    "parts": {"type": "world", "topic": "parts", "max_objects": 500},
+                    "parts": {
+                        "type": "world",
+                        "topic": "parts",
+                        "max_objects": 500,
+                        "max_triangles": 3000,
+                    },
                 },
                 "links": ["ball_link"],
             },
@@ -174,6 +179,16 @@ class WorldTest(unittest.TestCase):
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "600 objects; allowed are 500")
         self.send(replace_all=True)
         self.is_at_table()
+        # What exceeds a limit is refused as a whole, also where it is to replace all objects: the
+        # part of before stays.
+        self.send(box("part", 0.0, 0.3))
+        self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part")
+        self.send(*[box("object %d" % i, 5.0) for i in range(300)], replace_all=True)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "3600 triangles; allowed are 3000")
+        self.send()
+        self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part of before")
+        self.send(replace_all=True)
+        self.is_at_table()
 
     def test_6_query_service(self):
         self.is_at_table()
@@ -217,6 +232,23 @@ class OtherRobotTest(unittest.TestCase):
             stop(world)
             old = node.wait_for_status(ProximityArray.NO_CLOUD, "head")
             self.assertEqual(pt.link(old, "ball_link").state, LinkProximity.UNKNOWN)
+        finally:
+            node.stop()
+            world.stop()
+
+    def test_a_name_that_is_stated_twice(self):
+        """A table of the parameters and one of the file: neither vanishes in silence."""
+        path = os.path.join(tempfile.mkdtemp(), "cell.scene")
+        with open(path, "w") as file:
+            file.write(SCENE)
+        world = pt.World("/twice").stand()
+        world.start_tf()
+        shelf = {"shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.5, 0, 0]}
+        cell = {"type": "world", "file": path, "objects": {"shelf": shelf}}
+        node = pt.ProximityNode("/twice", {"sources": {"cell": cell}, "links": ["ball_link"]}, pt.urdf())
+        try:
+            told = node.wait_for_status(ProximityArray.NO_CLOUD, "'shelf' is stated twice")
+            self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
         finally:
             node.stop()
             world.stop()

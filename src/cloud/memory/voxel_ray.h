@@ -78,6 +78,8 @@ void walk_ray(const VoxelScale& scale, const Eigen::Vector3f& origin, const Eige
   if (first == last || !visit(first)) return;
   Eigen::Vector3f direction = end - origin;
   const auto length = static_cast<float>(octomap_norm(direction));
+  // Ends so close that their distance is zero in float have no direction.
+  if (!(length > 0.0F)) return;
   for (int i = 0; i < 3; ++i) direction[i] /= length;
   RayAxis x(scale, first.x, origin.x(), direction.x());
   RayAxis y(scale, first.y, origin.y(), direction.y());

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "internal/cloud/memory_body.h"
 #include "internal/cloud/memory_scan.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stopwatch.h"
@@ -57,7 +58,13 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   const std::lock_guard<std::mutex> lock(mutex_);
   begin_target(target);
   problem_ = insert(measurement, placement, target, cloud);
-  if (problem_.empty()) newest_ = make_snapshot(cloud);
+  if (problem_.empty()) {
+    newest_ = make_snapshot(cloud, &MemoryMap::hidden_boxes);
+  } else if (newest_) {
+    // What the last remembered cloud answered for may be out of this one's view.
+    map_.forget(cloud.cloud.stamp);
+    newest_ = make_snapshot(cloud, &MemoryMap::occupied_boxes);
+  }
   publish_when_due(cloud.stamp);
   const auto now = std::chrono::steady_clock::now();
   if (now >= next_count_) {
@@ -98,15 +105,16 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
            "' was not known, and the robot itself would be";
   }
   const std::string frame = without_slash(config_.memory.frame_id);
-  X_MF_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d X_MF = Eigen::Isometry3d::Identity();
   if (!frame.empty() && frame != target.fixed_frame) {
     const std::string fault =
-        look_up(buffer_, frame, target.fixed_frame, measurement.header().stamp, &X_MF_);
+        look_up(buffer_, frame, target.fixed_frame, measurement.header().stamp, &X_MF);
     if (!fault.empty()) {
       return "the last " + std::string(noun(config_.type)) +
              " is not remembered (memory/frame_id): " + fault;
     }
   }
+  X_MF_ = X_MF;
   RegionOfInterest region_M = target.region;
   region_M.center_F = X_MF_ * target.region.center_F;
   map_.set_region(region_M);
@@ -123,27 +131,14 @@ void SourceMemory::note_body(const Placement& placement, const Eigen::Isometry3d
                              double stamp) {
   if (!wants_body_ || stamp - body_noted_ < kBodyPeriod) return;
   body_noted_ = stamp;
-  robot_.setEmpty();
-  std::vector<Eigen::Vector4f> spheres;
-  for (const PosedSolid& solid : placement.robot) {
-    const Eigen::Isometry3f X_ML = (X_MF * solid.X_FL).cast<float>();
-    for (const SphereLeaf& leaf : solid.tree->leaves()) {
-      for (int k = 0; k < leaf.count; ++k) {
-        const Eigen::Vector3f c = X_ML * Eigen::Vector3f(leaf.x[k], leaf.y[k], leaf.z[k]);
-        const float radius = leaf.cover_radius[k] + static_cast<float>(skin());
-        spheres.emplace_back(c.x(), c.y(), c.z(), radius);
-        robot_.extend((c.array() - radius).matrix().cast<double>());
-        robot_.extend((c.array() + radius).matrix().cast<double>());
-      }
-    }
-  }
-  body_.note_free(spheres, stamp);
+  robot_ = ist::note_body(placement.robot, X_MF, skin(), stamp, &body_);
 }
 
+/// @param find_boxes  of MemoryMap: the boxes that queries get beside the cloud
 std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
-    const SourceSnapshot& cloud) const {
+    const SourceSnapshot& cloud, void (MemoryMap::*find_boxes)(VoxelBoxes*) const) const {
   VoxelBoxes boxes;
-  map_.hidden_boxes(&boxes);
+  (map_.*find_boxes)(&boxes);
   auto index = std::make_shared<BoxIndex>();
   index->build(boxes);
   auto snapshot = std::make_shared<SourceSnapshot>();

@@ -61,7 +61,9 @@ class SourceMemory {
                      const SourceTarget& target, const SourceSnapshot& cloud);
   void begin_target(const SourceTarget& target);
   void note_body(const Placement& placement, const Eigen::Isometry3d& X_MF, double stamp);
-  std::shared_ptr<const SourceSnapshot> make_snapshot(const SourceSnapshot& cloud) const;
+  std::shared_ptr<const SourceSnapshot> make_snapshot(const SourceSnapshot& cloud,
+                                                      void (MemoryMap::*find_boxes)(VoxelBoxes*)
+                                                          const) const;
   void publish_when_due(const ros::Time& stamp);
   std::string shortage() const;
 

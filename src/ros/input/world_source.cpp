@@ -32,6 +32,7 @@ constexpr const char* kConfigured = "(configured)";
 constexpr const char* kMessage = "(message)";
 constexpr const char* kRobot = "(other robot)";
 constexpr const char* kWork = "(work)";  // of the thread, until it succeeds
+constexpr const char* kMany = "(many)";  // more faults than are kept, until all are replaced
 
 std::string frame_or_fixed(const std::string& frame) {
   const std::string name = without_slash(frame);
@@ -147,6 +148,14 @@ void WorldSource::guard(const char* what, const std::function<void()>& function)
 
 void WorldSource::note_fault(const std::string& object, const std::string& fault) {
   ROS_ERROR_STREAM("source '" << config_.name << "': " << fault);
+  // Names that are never sent again would fill the memory.
+  if (faults_.size() >= config_.world.limits.max_objects && faults_.count(object) == 0 &&
+      object != kMessage) {
+    faults_[kMany] = "more objects than max_objects, which is " +
+                     std::to_string(config_.world.limits.max_objects) +
+                     ", could not be used; replace all of them";
+    return;
+  }
   faults_[object] = fault;
 }
 
@@ -218,13 +227,29 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
     return show_faults();
   }
   faults_.erase(kMessage);
-  if (message.replace_all) {
-    for (const std::string& name : from_topic_) {
-      builder_.remove(name);
-      faults_.erase(name);
-    }
-    from_topic_.clear();
+  if (!message.replace_all) return change_all(message);
+  WorldBuilder builder = builder_;
+  std::set<std::string> from_topic = from_topic_;
+  std::map<std::string, std::string> faults = faults_;
+  for (const std::string& name : from_topic_) {
+    builder_.remove(name);
+    faults_.erase(name);
   }
+  from_topic_.clear();
+  faults_.erase(kMany);
+  is_changed_ = true;
+  change_all(message);
+  const auto refused = faults_.find(kMessage);
+  if (refused == faults_.end()) return;
+  // A limit is exceeded: the objects of before stay.
+  faults[kMessage] = refused->second;
+  builder_ = std::move(builder);
+  from_topic_ = std::move(from_topic);
+  faults_ = std::move(faults);
+  show_faults();
+}
+
+void WorldSource::change_all(const ist_proximity::WorldObjects& message) {
   std::vector<WorldObject> added;
   for (const ist_proximity::WorldObject& object : message.objects) {
     const std::string name = printable(object.id);
@@ -243,7 +268,9 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
                          std::vector<WorldObject>* added) {
   using Message = ist_proximity::WorldObject;
   if (message.operation == Message::ADD) {
-    from_topic_.insert(message.id);
+    // Of names that were never built there are no more than of their faults.
+    const std::size_t most = 2 * config_.world.limits.max_objects;
+    if (from_topic_.size() < most) from_topic_.insert(message.id);
     added->push_back(to_world_object(message, config_.world, [this] { return !running_.load(); }));
     return;
   }
@@ -278,11 +305,20 @@ void WorldSource::allow_contacts(WorldObject* object) const {
 
 /// @param what  the key of a fault of all of them
 void WorldSource::add(const char* what, const std::vector<WorldObject>& objects) {
-  std::vector<WorldObject> complete = objects;
-  for (WorldObject& object : complete) {
-    object.frame = frame_or_fixed(object.frame);
+  std::vector<WorldObject> complete;
+  std::set<std::string> names;
+  for (const WorldObject& object : objects) {
+    const bool is_twice = builder_.contains(object.name) || !names.insert(object.name).second;
+    if (what != kMessage && is_twice) {
+      note_fault(object.name, "object '" + printable(object.name) +
+                                  "' is stated twice, by parameters, the file or the other robot; "
+                                  "names must be unique in a source");
+      continue;
+    }
+    complete.push_back(object);
+    complete.back().frame = frame_or_fixed(object.frame);
     faults_.erase(object.name);
-    allow_contacts(&object);
+    allow_contacts(&complete.back());
   }
   const std::vector<WorldFault> faults =
       builder_.add(complete, [this] { return !running_.load(); });

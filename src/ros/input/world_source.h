@@ -63,6 +63,7 @@ class WorldSource : public ObstacleSource {
   void read_robot();
   void receive(const ist_proximity::WorldObjects& message);
   void apply(const ist_proximity::WorldObjects& message);
+  void change_all(const ist_proximity::WorldObjects& message);
   void change(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
   void count_publishers();
   void add(const char* what, const std::vector<WorldObject>& objects);
