@@ -279,20 +279,23 @@ void print_ingest(const DataSet& set, const Robot& robot) {
 
 // Runs under a profiler that counts within the library's functions.
 void count(const DataSet& set, const Robot& robot, const std::string& what) {
-  const Scene& scene = set.scenes[0];
-  std::size_t links = 0;
-  const Poses& near = set.motion[half_near(set, scene, robot, &links)];
-  Node node(robot);
   if (what == "frame") {
-    for (std::size_t begin = 0; begin + kCycles <= set.motion.size(); begin += 10 * kCycles) {
-      node.ingest(scene.frame, set.motion[begin]);
-      for (std::size_t k = begin; k < begin + kCycles; ++k) {
-        node.query(set.motion[k]);
-        node.repel(set.motion[k]);
+    for (const Scene& scene : set.scenes) {
+      Node node(robot);
+      for (std::size_t begin = 0; begin + kCycles <= set.motion.size(); begin += 3 * kCycles) {
+        node.ingest(scene.frame, set.motion[begin]);
+        for (std::size_t k = begin; k < begin + kCycles; ++k) {
+          node.query(set.motion[k]);
+          node.repel(set.motion[k]);
+        }
       }
     }
     return;
   }
+  const Scene& scene = set.scenes[0];
+  std::size_t links = 0;
+  const Poses& near = set.motion[half_near(set, scene, robot, &links)];
+  Node node(robot);
   const Frame frame = what == "list" ? shuffled(scene.frame) : scene.frame;
   for (int i = 0; i < 10; ++i) node.ingest(frame, near);
 }

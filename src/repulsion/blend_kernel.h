@@ -45,7 +45,8 @@ struct alignas(64) NearestPoints {
 struct alignas(64) SphereSums {
   BySphere force[3];  ///< of w n
   BySphere weight;    ///< of w
-  // Sums in which neighbouring points may be taken for one in their middle.
+  // Sums in which the points of a small tile, and neighbours in others, are taken for one in their
+  // middle.
   BySphere per_length;    ///< [1/m] of w over the distance from the point to the centre, h
   BySphere outer[6];      ///< [1/m] of (w' - w / h) n n^T: xx, yy, zz, xy, yz, zx
   BySphere slope[3];      ///< [1/m] of w' n
@@ -67,15 +68,10 @@ struct Band {
   float smoothing;  ///< [m]
 };
 
-/// A thinned point stands for the part of a surface through it that lies within its cell: with rho
-/// its distance from the cell's centre over that of a corner, about (1 - rho^2)^2 of the largest
-/// section. So a cell that a surface only just cuts, where the number of points decides whether
-/// one is in it, counts little. It counts something, so that every sum of weights is positive.
-constexpr float kLeastCellWeight = 0.01F;
-constexpr float kCornerSquared = 0.75F;  ///< [cells^2] from a cell's centre
-
 /// The sums over all pairs nearer than nearest + smoothing; w = (1 - (d - nearest) / smoothing)^2
-/// times the points' weight. Once the deadline has passed, pairs are missing.
+/// times the points' weight. A tile of points that is small beside its distance from all spheres of
+/// a group, and beside the smoothing, enters as its Taylor expansion about the points' weighted
+/// mean, to second order. Once the deadline has passed, pairs are missing.
 /// @param by_sphere  may be null; overwritten. Slopes are 0 for boxes, which are not known
 PairSums blend_pairs(const ThinnedCloud& cloud, const PosedSpheres& spheres, const Band& band,
                      Deadline* deadline, SphereSums* by_sphere = nullptr);

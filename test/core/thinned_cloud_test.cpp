@@ -68,14 +68,14 @@ Points depth_image(std::size_t width, std::size_t height, test::Rng* rng) {
   return points;
 }
 
-using Thinned = std::map<std::uint32_t, std::array<float, 4>>;  // point and offset_sq by id
+using Thinned = std::map<std::uint32_t, std::array<float, 4>>;  // point and weight by id
 
 Thinned found(const PointIndex& index) {
   Thinned all;
   for (const ThinnedTile& tile : test::thinned_tiles_of(index)) {
     for (int k = 0; k < tile.count; ++k) {
-      EXPECT_TRUE(all.emplace(tile.id[k], std::array<float, 4>{tile.x[k], tile.y[k], tile.z[k],
-                                                               tile.offset_sq[k]})
+      EXPECT_TRUE(all.emplace(tile.id[k],
+                              std::array<float, 4>{tile.x[k], tile.y[k], tile.z[k], tile.weight[k]})
                       .second)
           << "point " << tile.id[k] << " is in two nodes";
       EXPECT_TRUE(tile.box.min_x[0] <= tile.x[k] && tile.x[k] <= tile.box.max_x[0]);
@@ -105,7 +105,7 @@ Thinned expected(const CloudSnapshot& snapshot) {
   Thinned all;
   for (const auto& [voxel, best] : voxels) {
     const auto& [offset_sq, x, y, z, id] = best;
-    all[id] = {x, y, z, offset_sq};
+    all[id] = {x, y, z, cell_weight(offset_sq)};
   }
   return all;
 }

@@ -1,6 +1,5 @@
 #include "cloud/thinning/node_thinning.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -15,13 +14,6 @@ namespace {
 
 // Bound of the rounding of a point's place in the grid, as a share of the coordinates involved.
 constexpr double kRounding = 1e-6;
-
-// Eigen turns them into SIMD.
-constexpr std::size_t kLanes = 8;
-using Lanes = Eigen::Array<float, kLanes, 1>;
-using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
-using Slots = Eigen::Array<float, kBoxWidth, 1>;
-using SlotMap = Eigen::Map<const Slots, Eigen::Aligned16>;
 
 // The integer of a voxel's number along an axis, which is a whole float. Numbers from 2^30 on have
 // the integers of their bits, which are larger: no two numbers share one, however far a point is,
@@ -40,7 +32,7 @@ void write_unused(ThinnedTile* tile) {
   for (int k = tile->count; k < kPointWidth; ++k) {
     tile->x[k] = tile->y[k] = tile->z[k] = kFarAway;
     tile->id[k] = 0;
-    tile->offset_sq[k] = 0.0F;
+    tile->weight[k] = 0.0F;
   }
 }
 
@@ -54,6 +46,25 @@ void find_box(ThinnedTile* tile) {
   range(tile->x, tile->box.min_x, tile->box.max_x);
   range(tile->y, tile->box.min_y, tile->box.max_y);
   range(tile->z, tile->box.min_z, tile->box.max_z);
+}
+
+void find_moments(ThinnedTile* tile) {
+  PointMoments moments = {};
+  const auto n = static_cast<std::size_t>(tile->count);
+  for (std::size_t k = 0; k < n; ++k) {
+    moments.weight += tile->weight[k];
+    moments.middle[0] += tile->weight[k] * tile->x[k];
+    moments.middle[1] += tile->weight[k] * tile->y[k];
+    moments.middle[2] += tile->weight[k] * tile->z[k];
+  }
+  for (float& m : moments.middle) m /= moments.weight;
+  for (std::size_t k = 0; k < n; ++k) {
+    const float x = tile->x[k] - moments.middle[0], y = tile->y[k] - moments.middle[1],
+                z = tile->z[k] - moments.middle[2], w = tile->weight[k];
+    const float products[6] = {x * x, y * y, z * z, x * y, y * z, z * x};
+    for (int i = 0; i < 6; ++i) moments.spread[i] += w * products[i];
+  }
+  tile->moments = moments;
 }
 
 }  // namespace
@@ -121,8 +132,10 @@ void NodeThinning::add(const Candidate& candidate) {
 
 // The places that are no farther from the centre of a candidate's voxel than itself.
 void NodeThinning::set_spheres() {
-  std::fill_n(min_, 3, std::numeric_limits<float>::max());
-  std::fill_n(max_, 3, std::numeric_limits<float>::lowest());
+  RivalSpheres& s = spheres_;
+  s.count = count_;
+  std::fill_n(s.min, 3, std::numeric_limits<float>::max());
+  std::fill_n(s.max, 3, std::numeric_limits<float>::lowest());
   for (std::size_t i = 0; i < count_; ++i) {
     const Candidate& c = candidates_[i];
     const double p[3] = {c.x, c.y, c.z};
@@ -138,7 +151,7 @@ void NodeThinning::set_spheres() {
     const double rounding =
         kRounding * (std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]) + 2.0 * grid_.edge);
     const double radius = grid_.edge * std::sqrt(static_cast<double>(c.offset_sq)) + rounding;
-    float* const center[3] = {x_.data(), y_.data(), z_.data()};
+    float* const center[3] = {s.x.data(), s.y.data(), s.z.data()};
     for (int k = 0; k < 3; ++k) {
       // The transpose of R, which is a rotation over the edge, is its inverse over the edge's
       // square.
@@ -148,44 +161,15 @@ void NodeThinning::set_spheres() {
       }
       const double place = p[k] + grid_.edge * grid_.edge * moved;
       center[k][i] = static_cast<float>(place);
-      min_[k] = std::min(min_[k], static_cast<float>(place - radius));
-      max_[k] = std::max(max_[k], static_cast<float>(place + radius));
+      s.min[k] = std::min(s.min[k], static_cast<float>(place - radius));
+      s.max[k] = std::max(s.max[k], static_cast<float>(place + radius));
     }
-    radius_sq_[i] = static_cast<float>(radius * radius);
+    s.radius_sq[i] = static_cast<float>(radius * radius);
   }
-  for (std::size_t i = count_; i % kLanes != 0; ++i) {
-    x_[i] = y_[i] = z_[i] = kFarAway;
-    radius_sq_[i] = 0.0F;
+  for (std::size_t i = count_; i % kPointWidth != 0; ++i) {
+    s.x[i] = s.y[i] = s.z[i] = kFarAway;
+    s.radius_sq[i] = 0.0F;
   }
-}
-
-// The least squared distance of a child's box from a sphere's centre, less the squared radius
-// [m^2]; up to 0 where the box meets a sphere.
-float NodeThinning::least_gap(const BoxNode& boxes, int child) const {
-  const auto off = [](float min, float max, const float* v) {
-    return Lanes((min - LaneMap(v)).max(LaneMap(v) - max).max(0.0F));
-  };
-  Lanes least = Lanes::Constant(kFarAway);
-  for (std::size_t i = 0; i < count_; i += kLanes) {
-    const Lanes x = off(boxes.min_x[child], boxes.max_x[child], &x_[i]);
-    const Lanes y = off(boxes.min_y[child], boxes.max_y[child], &y_[i]);
-    const Lanes z = off(boxes.min_z[child], boxes.max_z[child], &z_[i]);
-    least = least.min(x * x + y * y + z * z - LaneMap(&radius_sq_[i]));
-  }
-  return least.minCoeff();
-}
-
-// Bit k: child k meets the box of all spheres.
-std::uint32_t NodeThinning::children_near(const BoxNode& node) const {
-  const auto off = [](const float* min, const float* max, float low, float high) {
-    return Slots((SlotMap(min) - high).max(low - SlotMap(max)));
-  };
-  const Slots off_all = off(node.min_x, node.max_x, min_[0], max_[0])
-                            .max(off(node.min_y, node.max_y, min_[1], max_[1]))
-                            .max(off(node.min_z, node.max_z, min_[2], max_[2]));
-  std::uint32_t near = 0;
-  for (int k = 0; k < node.count; ++k) near |= static_cast<std::uint32_t>(off_all[k] <= 0.0F) << k;
-  return near;
 }
 
 // Visits the tiles of other nodes that may hold a rival, the most likely first, until every
@@ -210,21 +194,21 @@ void NodeThinning::find_rivals(std::int32_t own_node) {
     }
     const BoxNode& node = all_.nodes()[static_cast<std::size_t>(child)];
     const std::size_t first = stack.size();
-    const std::uint32_t near = children_near(node);
+    float gaps[kBoxWidth];
+    const std::uint32_t near = find_rival_children(node, spheres_, gaps);
     for (int k = 0; near >> k != 0; ++k) {
       if ((near >> k & 1U) == 0) continue;
-      const float gap = least_gap(node, k);
-      if (gap <= 0.0F) stack.push_least_on_top<&Entry::gap>(first, {node.child[k], gap});
+      stack.push_least_on_top<&Entry::gap>(first, {node.child[k], gaps[k]});
     }
   }
 }
 
 void NodeThinning::challenge(const Candidate& rival) {
   const std::uint16_t entry = *find(rival);
-  if (entry == kEmpty || radius_sq_[entry] < 0.0F) return;
+  if (entry == kEmpty || spheres_.radius_sq[entry] < 0.0F) return;
   if (!rival.is_better_than(candidates_[entry])) return;
-  x_[entry] = y_[entry] = z_[entry] = kFarAway;
-  radius_sq_[entry] = -1.0F;
+  spheres_.x[entry] = spheres_.y[entry] = spheres_.z[entry] = kFarAway;
+  spheres_.radius_sq[entry] = -1.0F;
   --undefeated_;
 }
 
@@ -232,7 +216,7 @@ void NodeThinning::write(ThinnedNode* thinned) const {
   thinned->count = 0;
   ThinnedTile* tile = nullptr;
   for (std::size_t i = 0; i < count_; ++i) {
-    if (radius_sq_[i] < 0.0F) continue;
+    if (spheres_.radius_sq[i] < 0.0F) continue;
     if (tile == nullptr || tile->count == kPointWidth) {
       tile = &thinned->tiles[thinned->count++];
       tile->count = 0;
@@ -243,11 +227,12 @@ void NodeThinning::write(ThinnedNode* thinned) const {
     tile->y[k] = candidate.y;
     tile->z[k] = candidate.z;
     tile->id[k] = candidate.id;
-    tile->offset_sq[k] = candidate.offset_sq;
+    tile->weight[k] = cell_weight(candidate.offset_sq);
   }
   for (std::uint32_t i = 0; i < thinned->count; ++i) {
     write_unused(&thinned->tiles[i]);
     find_box(&thinned->tiles[i]);
+    find_moments(&thinned->tiles[i]);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "cloud/thinning/rival_kernel.h"
 #include "internal/cloud/point_bvh.h"
 #include "internal/cloud/thinned_cloud.h"
 #include "internal/cloud/voxel_grid.h"
@@ -27,7 +28,7 @@ class NodeThinning {
   void run(std::int32_t node, ThinnedNode* thinned);
 
  private:
-  static constexpr std::size_t kMost = std::size_t{kBoxWidth} * kPointWidth;  // points of a node
+  static constexpr std::size_t kMost = RivalSpheres::kMost;
   static constexpr std::size_t kTableSize = 2 * kMost;
   static constexpr std::uint16_t kEmpty = 0xFFFF;
 
@@ -48,8 +49,6 @@ class NodeThinning {
   void add(const Candidate& candidate);
   void find_rivals(std::int32_t own_node);
   void set_spheres();
-  float least_gap(const BoxNode& boxes, int child) const;
-  std::uint32_t children_near(const BoxNode& node) const;
   void challenge(const Candidate& rival);
   void write(ThinnedNode* thinned) const;
 
@@ -58,10 +57,7 @@ class NodeThinning {
   std::array<std::uint16_t, kTableSize> table_;  // open addressing: number of a candidate
   std::array<Candidate, kMost> candidates_;
   std::size_t count_ = 0, undefeated_ = 0;
-  // Spheres that hold the rivals of each candidate, in O [m]; those of the defeated are far away.
-  // The arrays are filled up to whole vectors.
-  alignas(64) std::array<float, kMost> x_, y_, z_, radius_sq_;
-  float min_[3], max_[3];  // the box of all spheres
+  RivalSpheres spheres_;  // by candidate; those of the defeated are far away, of radius_sq -1
 };
 
 }  // namespace ist

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -21,10 +22,31 @@ struct SingleBox {
   float max_x[1], max_y[1], max_z[1];
 };
 
+/// The weight of a thinned point, which stands for the part of a surface through it that lies
+/// within its cell: with rho its distance from the cell's centre over that of a corner, about (1 -
+/// rho^2)^2 of the largest section. So a cell that a surface only just cuts, where the number of
+/// points decides whether one is in it, counts little. It counts something, so that every sum of
+/// weights is positive.
+/// @param offset_sq  squared distance to the cell's centre, in cells
+inline float cell_weight(float offset_sq) {
+  constexpr float kLeast = 0.01F;
+  constexpr float kCornerSquared = 0.75F;  // cells^2 from a cell's centre
+  const float section = std::max(1.0F - offset_sq / kCornerSquared, 0.0F);
+  return kLeast + (1.0F - kLeast) * section * section;
+}
+
+/// Weighted points as they act from afar.
+struct PointMoments {
+  float weight;     ///< sum of the weights
+  float middle[3];  ///< [m] weighted mean
+  float spread[6];  ///< [m^2] weighted sum of products about the middle: xx, yy, zz, xy, yz, zx
+};
+
 /// Points of the thinned cloud.
 struct ThinnedTile : PointTile {
-  float offset_sq[kPointWidth];  ///< squared distance to the voxel's centre, in voxels
-  SingleBox box;                 ///< [m] in O; of exactly its points
+  float weight[kPointWidth];  ///< by point, see cell_weight(); 0 in unused slots
+  SingleBox box;              ///< [m] in O; of exactly its points
+  PointMoments moments;       ///< of exactly its points, in O
 };
 
 /// The thinned points of a node of the lowest level; no more tiles than the node has.
