@@ -97,10 +97,10 @@ def peers_table(rows):
     return table(
         ["method", "ingest", "query, median / p99 / largest",
          "no link in contact, median / p99 / largest",
-         "error mean (least … largest) [mm]", "one 30 Hz frame"],
+         "error mean (least … largest) [mm]", "one 30 Hz frame, median / p99 / largest"],
         [[label(r), time(r["ingest_us"])] + (["", "", "", ""] if r["kind"] == "floor" else [
             times(r, "query"), times(r, "free_query"),
-            error(r), time(frame(r))]) for r in rows])
+            error(r), times(r, "frame") if r["frame_us"] else time(frame(r))]) for r in rows])
 
 
 def short_table(rows):

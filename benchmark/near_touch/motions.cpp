@@ -130,17 +130,6 @@ std::vector<MovingRobot> demo_arms() {
           demo_arm("demo arm, level", arm, 0.03, {0.0, 0.5 * EIGEN_PI, 0.0, 0.0, 0.0, 0.0})};
 }
 
-Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
-  Frame next = frame;
-  std::normal_distribution<double> normal;
-  for (std::size_t i = 0; i < next.data.size(); i += 4) {
-    const auto z = static_cast<double>(next.data[i + 2]);
-    const auto scale = static_cast<float>(1.0 + noise * z * normal(*rng));
-    for (std::size_t k = 0; k < 3; ++k) next.data[i + k] *= scale;
-  }
-  return next;
-}
-
 std::vector<HardScene> recorded_scenes(const std::filesystem::path& data,
                                        const std::string& cache_directory) {
   const MovingRobot robot = pandas(data).front();

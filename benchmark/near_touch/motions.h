@@ -28,14 +28,6 @@ std::vector<MovingRobot> pandas(const std::filesystem::path& data);
 /// The demo arm, on a motion of all its joints, and stretched out level with the table.
 std::vector<MovingRobot> demo_arms();
 
-/// [1/m] A Kinect's noise along the ray, over the depth squared (Khoshelham and Elberink 2012).
-constexpr double kKinectNoise = 1.425e-3;
-
-/// The frame as the sensor's next image of a still scene: Gaussian noise along the ray, of standard
-/// deviation noise * z^2.
-/// @param noise  [1/m]
-Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng);
-
 /// The Panda with its visual meshes, on parts of the recorded motion, among the recorded frames.
 std::vector<HardScene> recorded_scenes(const std::filesystem::path& data,
                                        const std::string& cache_directory);

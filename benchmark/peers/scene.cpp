@@ -30,6 +30,17 @@ Frame shuffled(const Frame& frame) {
   return result;
 }
 
+Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
+  Frame next = frame;
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < next.data.size(); i += 4) {
+    const auto z = static_cast<double>(next.data[i + 2]);
+    const auto scale = static_cast<float>(1.0 + noise * z * normal(*rng));
+    for (std::size_t k = 0; k < 3; ++k) next.data[i + k] *= scale;
+  }
+  return next;
+}
+
 void Points::read(const Frame& frame) {
   const std::size_t n = frame.width * frame.height;
   x.resize(n);

@@ -29,6 +29,14 @@ struct Frame {
 /// The same points in one row, in an order that is random and always the same.
 Frame shuffled(const Frame& frame);
 
+/// [1/m] A Kinect's noise along the ray, over the depth squared (Khoshelham and Elberink 2012).
+constexpr double kKinectNoise = 1.425e-3;
+
+/// The frame as the sensor's next image of a still scene: Gaussian noise along the ray, of standard
+/// deviation noise * z^2.
+/// @param noise  [1/m]
+Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng);
+
 /// The finite points of a frame, in the fixed frame. Most methods start from them.
 struct Points {
   std::vector<float> x, y, z;  ///< [m]

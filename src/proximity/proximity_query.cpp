@@ -16,7 +16,7 @@ constexpr double kBoundError = 2e-6;
 // [s] Links of which nothing is known yet may exceed the deadline by so much together, until each
 // has an obstacle that was measured, and until each has a bound: an answer that is as late is worth
 // more than none.
-constexpr double kFirstObstacles = 6e-5, kFirstBounds = 7.5e-5;
+constexpr double kFirstObstacles = 5e-5, kFirstBounds = 6e-5;
 
 }  // namespace
 
