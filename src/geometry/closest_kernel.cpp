@@ -248,13 +248,14 @@ class ClosestPointSearch {
       if (distance_sq[k] < distance_sq[nearest]) nearest = k;
     }
     if (Prune(distance_sq[nearest])) return;
-    VisitTriangle(bvh_.triangles[leaf.first + nearest]);
+    VisitTriangle(leaf.first + nearest);
     for (std::uint32_t k = 0; k < leaf.count; ++k) {
-      if (k != nearest && !Prune(distance_sq[k])) VisitTriangle(bvh_.triangles[leaf.first + k]);
+      if (k != nearest && !Prune(distance_sq[k])) VisitTriangle(leaf.first + k);
     }
   }
 
-  void VisitTriangle(const TriangleBvh::Triangle& triangle) {
+  void VisitTriangle(std::uint32_t slot) {
+    const TriangleBvh::Triangle triangle = bvh_.triangle(slot);
     const Eigen::Vector3d q = closest_point_on_triangle(p_, triangle.a, triangle.b, triangle.c);
     const double exact_sq = (q - p_).squaredNorm();
     const bool is_first = result_.distance_sq == std::numeric_limits<double>::infinity();
@@ -263,7 +264,7 @@ class ClosestPointSearch {
     result_.point = q;
     result_.distance_sq = exact_sq;
     result_.triangle = triangle.index;
-    result_.slot = static_cast<std::uint32_t>(&triangle - bvh_.triangles);
+    result_.slot = slot;
     UpdatePruneBound();
     if (exact_sq > 0.0) SetOutward((p_ - q) / std::sqrt(exact_sq));
   }

@@ -71,7 +71,7 @@ BoxDistance TriangleBvh::closest_to_box(const Eigen::AlignedBox3d& box_O,
     if (entry.child < 0) {
       const Leaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
       for (std::uint32_t k = 0; k < leaf.count; ++k) {
-        visit_triangle(triangles_[leaf.first + k], box_O, X_OM, &upper_bound_sq, &best);
+        visit_triangle(triangle(leaf.first + k), box_O, X_OM, &upper_bound_sq, &best);
       }
       continue;
     }

@@ -24,7 +24,7 @@ constexpr double kSmallCell = 1e-3;
 TriangleMesh mesh_of(const TriangleBvh& bvh) {
   TriangleMesh mesh;
   for (std::uint32_t slot = 0; slot < bvh.size(); ++slot) {
-    const TriangleBvh::Triangle& t = bvh.triangle(slot);
+    const TriangleBvh::Triangle t = bvh.triangle(slot);
     const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.insert(mesh.vertices.end(), {t.a, t.b, t.c});
     mesh.triangles.push_back({first, first + 1, first + 2});

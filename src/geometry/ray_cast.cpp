@@ -166,7 +166,7 @@ RayHit cast_mesh(const TriangleBvh& bvh, const Eigen::Vector3d& o, const Eigen::
                  double max_t) {
   const TriangleBvh::RayCrossing crossing = bvh.first_crossing(o, d, max_t);
   if (!std::isfinite(crossing.t)) return {};
-  const TriangleBvh::Triangle& triangle = bvh.triangle(crossing.slot);
+  const TriangleBvh::Triangle triangle = bvh.triangle(crossing.slot);
   return {crossing.t, (triangle.b - triangle.a).cross(triangle.c - triangle.a).normalized()};
 }
 
@@ -217,7 +217,7 @@ TriangleBvh::RayCrossing TriangleBvh::first_crossing(const Eigen::Vector3d& orig
       const std::uint32_t bits = crossed(leaf, ray);
       for (std::uint32_t k = 0; bits >> k != 0; ++k) {
         if ((bits >> k & 1U) == 0) continue;
-        const double t = cross_triangle(triangles_[leaf.first + k], o_M, direction_M);
+        const double t = cross_triangle(triangle(leaf.first + k), o_M, direction_M);
         if (!(t >= first && t <= limit)) continue;
         limit = t;
         best = {t + shift, leaf.first + k};

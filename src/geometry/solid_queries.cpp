@@ -78,7 +78,7 @@ BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O
 double distance_to_triangle(const Solid& solid, std::uint32_t triangle,
                             const Eigen::Vector3d& p_L) {
   const SolidElement& element = elements_of(solid).front();
-  const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);
+  const TriangleBvh::Triangle t = element.bvh.triangle(triangle);
   const Eigen::Vector3d p_E = element.X_EL * p_L;
   return (closest_point_on_triangle(p_E, t.a, t.b, t.c) - p_E).norm();
 }

@@ -138,7 +138,7 @@ class SupportSearch {
     }
     if (Prune(hn::GetLane(hn::MaxOfLanes(d, support)))) return;
     for (std::uint32_t k = leaf.first; k < leaf.first + leaf.count; ++k) {
-      const TriangleBvh::Triangle& t = bvh_.triangles[k];
+      const TriangleBvh::Triangle t = bvh_.triangle(k);
       largest_ = sphere_ == nullptr ? std::max({largest_, n_.dot(t.a), n_.dot(t.b), n_.dot(t.c)})
                                     : std::max(largest_, SupportInSphere(t, *sphere_, n_));
     }

@@ -25,7 +25,7 @@ Eigen::Vector3d center_of(const ConvexPart& part) {
 void append_triangles(const TriangleBvh& bvh, const Eigen::Isometry3d& X_LE,
                       std::vector<ConvexPart>* parts) {
   for (std::uint32_t slot = 0; slot < bvh.size(); ++slot) {
-    const TriangleBvh::Triangle& t = bvh.triangle(slot);
+    const TriangleBvh::Triangle t = bvh.triangle(slot);
     parts->push_back({Kind::kTriangle, X_LE * t.a, X_LE * t.b, X_LE * t.c, 0.0, 0});
   }
 }

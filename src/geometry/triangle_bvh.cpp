@@ -20,13 +20,8 @@ TriangleBvh::TriangleBvh(const TriangleMesh& mesh, const CancelRequest& cancelle
 }
 
 TriangleBvh::View TriangleBvh::view() const {
-  return {boxes_.data(),
-          slabs_.data(),
-          moments_.data(),
-          leaves_.data(),
-          triangles_.data(),
-          bounds_.center(),
-          0.5 * bounds_.sizes().norm()};
+  return {boxes_.data(),     slabs_.data(),    moments_.data(),  leaves_.data(),
+          triangles_.data(), vertices_.data(), bounds_.center(), 0.5 * bounds_.sizes().norm()};
 }
 
 ClosestPoint TriangleBvh::closest(const Eigen::Vector3d& p_M, double max_distance_sq,

@@ -14,9 +14,8 @@ constexpr float kFar = 1e9F;
 
 Eigen::Vector3d centroid(const TriangleBvh::Triangle& t) { return (t.a + t.b + t.c) / 3.0; }
 
-// A triangle with its corners in the same sense, a opposite the longest edge: there the angle is
-// largest and the normal most certain.
-TriangleBvh::Triangle from_largest_angle(const TriangleMesh& mesh, std::uint32_t t) {
+// The corner opposite the longest edge: there the angle is largest and the normal most certain.
+int apex_of(const TriangleMesh& mesh, std::uint32_t t) {
   int apex = 0;
   double longest_sq = -1.0;
   for (int k = 0; k < 3; ++k) {
@@ -26,6 +25,12 @@ TriangleBvh::Triangle from_largest_angle(const TriangleMesh& mesh, std::uint32_t
     longest_sq = edge_sq;
     apex = k;
   }
+  return apex;
+}
+
+// A triangle with its corners in the same sense, a being the apex.
+TriangleBvh::Triangle from_apex(const TriangleMesh& mesh, std::uint32_t t) {
+  const int apex = apex_of(mesh, t);
   return {mesh.corner(t, apex), mesh.corner(t, (apex + 1) % 3), mesh.corner(t, (apex + 2) % 3), t};
 }
 
@@ -36,21 +41,45 @@ Eigen::Vector3d area_normal(const TriangleBvh::Triangle& t) {
 }  // namespace
 
 void TriangleBvhBuilder::run() {
-  bvh_.triangles_.reserve(mesh_.triangles.size());
+  triangles_.reserve(mesh_.triangles.size());
   for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
-    bvh_.triangles_.push_back(from_largest_angle(mesh_, t));
+    triangles_.push_back(from_apex(mesh_, t));
     for (int k = 0; k < 3; ++k) bvh_.bounds_.extend(mesh_.corner(t, k));
   }
-  if (bvh_.triangles_.empty()) return;
+  if (triangles_.empty()) return;
   origin_ = bvh_.bounds_.center();
-  add_node({0, static_cast<std::uint32_t>(bvh_.triangles_.size())});
+  add_node({0, static_cast<std::uint32_t>(triangles_.size())});
+  store_triangles();
+}
+
+// Vertices are in the order of their first triangle, so that those of a leaf are near each other.
+void TriangleBvhBuilder::store_triangles() {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place(mesh_.vertices.size(), kNone);
+  std::uint32_t used = 0;
+  const auto find = [&](std::uint32_t vertex) {
+    if (place[vertex] == kNone) place[vertex] = used++;
+    return place[vertex];
+  };
+  bvh_.triangles_.reserve(triangles_.size());
+  for (const TriangleBvh::Triangle& triangle : triangles_) {
+    const TriangleMesh::Triangle& vertices = mesh_.triangles[triangle.index];
+    const auto apex = static_cast<std::size_t>(apex_of(mesh_, triangle.index));
+    const std::uint32_t a = find(vertices[apex]), b = find(vertices[(apex + 1) % 3]),
+                        c = find(vertices[(apex + 2) % 3]);
+    bvh_.triangles_.push_back({a, b, c, triangle.index});
+  }
+  bvh_.vertices_.resize(used);
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    if (place[i] != kNone) bvh_.vertices_[place[i]] = mesh_.vertices[i];
+  }
 }
 
 // Splits at the median along the longest axis of the centroids' box.
 std::uint32_t TriangleBvhBuilder::split(const Range& range) {
   constexpr std::uint32_t kAskFrom = 4096;  // triangles; smaller parts take microseconds
   if (range.second - range.first >= kAskFrom) throw_if(cancelled_);
-  std::vector<TriangleBvh::Triangle>& triangles = bvh_.triangles_;
+  std::vector<TriangleBvh::Triangle>& triangles = triangles_;
   Eigen::AlignedBox3d box;
   for (std::uint32_t t = range.first; t < range.second; ++t) box.extend(centroid(triangles[t]));
   Eigen::Index axis;
@@ -118,7 +147,7 @@ std::int32_t TriangleBvhBuilder::add_leaf(const Range& range) {
   for (std::uint32_t slot = 0; slot < TriangleBvh::kWidth; ++slot) {
     // Unused slots repeat one corner of the last triangle three times, which has no solid angle.
     const bool used = slot < leaf.count;
-    const TriangleBvh::Triangle& t = bvh_.triangles_[range.first + std::min(slot, leaf.count - 1)];
+    const TriangleBvh::Triangle& t = triangles_[range.first + std::min(slot, leaf.count - 1)];
     const Eigen::Vector3d corners[3] = {t.a, used ? t.b : t.a, used ? t.c : t.a};
     for (int corner = 0; corner < 3; ++corner) {
       for (int axis = 0; axis < 3; ++axis) {
@@ -135,7 +164,7 @@ void TriangleBvhBuilder::set_box(const Range& range, TriangleBvh::Boxes* boxes,
                                  std::size_t slot) const {
   Eigen::AlignedBox3d box;
   for (std::uint32_t t = range.first; t < range.second; ++t) {
-    const TriangleBvh::Triangle& triangle = bvh_.triangles_[t];
+    const TriangleBvh::Triangle& triangle = triangles_[t];
     box.extend(triangle.a).extend(triangle.b).extend(triangle.c);
   }
   for (int axis = 0; axis < 3; ++axis) {
@@ -148,15 +177,14 @@ void TriangleBvhBuilder::set_slab(const Range& range, TriangleBvh::Slabs* slabs,
                                   std::size_t slot) const {
   constexpr double kLength = 127.0;  // the largest std::int8_t
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (std::uint32_t t = range.first; t < range.second; ++t)
-    mean += area_normal(bvh_.triangles_[t]);
+  for (std::uint32_t t = range.first; t < range.second; ++t) mean += area_normal(triangles_[t]);
   const double largest = mean.cwiseAbs().maxCoeff();
   if (!(largest > 0.0) || !std::isfinite(largest)) return;
   // The squares of an area below 1e-154 m^2 are 0.
   const Eigen::Vector3d direction = (kLength * (mean / largest).normalized()).array().round();
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (std::uint32_t t = range.first; t < range.second; ++t) {
-    const TriangleBvh::Triangle& triangle = bvh_.triangles_[t];
+    const TriangleBvh::Triangle& triangle = triangles_[t];
     for (const Eigen::Vector3d& corner : {triangle.a, triangle.b, triangle.c}) {
       const double along = direction.dot(corner - origin_);
       low = std::min(low, along);
@@ -177,8 +205,8 @@ void TriangleBvhBuilder::set_moments(const Range& range, TriangleBvh::Moments* m
   Eigen::Vector3d weighted = Eigen::Vector3d::Zero(), plain = Eigen::Vector3d::Zero();
   Eigen::Vector3d dipole = Eigen::Vector3d::Zero();
   for (std::uint32_t i = range.first; i < range.second; ++i) {
-    const Eigen::Vector3d n = area_normal(bvh_.triangles_[i]);
-    const Eigen::Vector3d middle = centroid(bvh_.triangles_[i]) - origin_;
+    const Eigen::Vector3d n = area_normal(triangles_[i]);
+    const Eigen::Vector3d middle = centroid(triangles_[i]) - origin_;
     area += n.norm();
     weighted += n.norm() * middle;
     plain += middle;
@@ -190,7 +218,7 @@ void TriangleBvhBuilder::set_moments(const Range& range, TriangleBvh::Moments* m
   Eigen::Matrix3d quadrupole = Eigen::Matrix3d::Zero();
   double radius_sq = 0.0;
   for (std::uint32_t i = range.first; i < range.second; ++i) {
-    const TriangleBvh::Triangle& t = bvh_.triangles_[i];
+    const TriangleBvh::Triangle& t = triangles_[i];
     quadrupole += (centroid(t) - origin_ - center) * area_normal(t).transpose();
     for (const Eigen::Vector3d& corner : {t.a, t.b, t.c}) {
       radius_sq = std::max(radius_sq, (corner - origin_ - center).squaredNorm());

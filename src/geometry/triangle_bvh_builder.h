@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "internal/geometry/triangle_bvh.h"
 
@@ -17,6 +19,7 @@ class TriangleBvhBuilder {
  private:
   using Range = std::pair<std::uint32_t, std::uint32_t>;
 
+  void store_triangles();
   std::int32_t add_node(const Range& range);
   std::int32_t add_leaf(const Range& range);
   std::uint32_t split(const Range& range);
@@ -27,6 +30,7 @@ class TriangleBvhBuilder {
   const TriangleMesh& mesh_;
   const CancelRequest& cancelled_;
   TriangleBvh& bvh_;
+  std::vector<TriangleBvh::Triangle> triangles_;  ///< in the order of the leaves, once all are made
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 

@@ -65,7 +65,7 @@ void AddInDouble(const TriangleBvh::View& bvh, const TriangleBvh::Leaf& leaf,
     angles->sum +=
         terms.is_precise[lane] != 0.0F
             ? std::atan2(static_cast<double>(terms.im[lane]), static_cast<double>(terms.re[lane]))
-            : HalfAngle(bvh.triangles[leaf.first + k + lane], p_M);
+            : HalfAngle(bvh.triangle(leaf.first + static_cast<std::uint32_t>(k + lane)), p_M);
     angles->sum += std::atan2(static_cast<double>(angles->im[k + lane]),
                               static_cast<double>(angles->re[k + lane]));
   }

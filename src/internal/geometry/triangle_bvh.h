@@ -139,21 +139,27 @@ class TriangleBvh {
     std::uint32_t count;
   };
 
-  /// The same triangles in double, their corners in the same order.
+  /// A triangle of a leaf in double, its corners in the same order.
   struct Triangle {
     Eigen::Vector3d a, b, c;
     std::uint32_t index;  ///< in the mesh
+  };
+
+  /// The same as it is stored: neighbours share their corners.
+  struct Corners {
+    std::uint32_t a, b, c;  ///< vertices
+    std::uint32_t index;    ///< in the mesh
   };
 
   /// [bytes] of the hierarchy and its triangles.
   std::size_t memory() const {
     return boxes_.capacity() * sizeof(Boxes) + slabs_.capacity() * sizeof(Slabs) +
            moments_.capacity() * sizeof(Moments) + leaves_.capacity() * sizeof(Leaf) +
-           triangles_.capacity() * sizeof(Triangle);
+           triangles_.capacity() * sizeof(Corners) + vertices_.capacity() * sizeof(vertices_[0]);
   }
 
   /// A triangle by its place in the hierarchy.
-  const Triangle& triangle(std::uint32_t slot) const { return triangles_[slot]; }
+  Triangle triangle(std::uint32_t slot) const { return view().triangle(slot); }
 
   /// The arrays that the SIMD kernels read.
   struct View {
@@ -161,9 +167,15 @@ class TriangleBvh {
     const Slabs* slabs;      ///< by node
     const Moments* moments;  ///< by node
     const Leaf* leaves;
-    const Triangle* triangles;
-    Eigen::Vector3d origin;  ///< [m] centre of the mesh's bounding box
-    double radius;           ///< [m] half its diagonal
+    const Corners* triangles;
+    const Eigen::Vector3d* vertices;  ///< [m]
+    Eigen::Vector3d origin;           ///< [m] centre of the mesh's bounding box
+    double radius;                    ///< [m] half its diagonal
+
+    Triangle triangle(std::uint32_t slot) const {
+      const Corners& t = triangles[slot];
+      return {vertices[t.a], vertices[t.b], vertices[t.c], t.index};
+    }
   };
 
  private:
@@ -174,7 +186,8 @@ class TriangleBvh {
   std::vector<Slabs> slabs_;      // by node
   std::vector<Moments> moments_;  // by node
   std::vector<Leaf> leaves_;
-  std::vector<Triangle> triangles_;
+  std::vector<Corners> triangles_;
+  std::vector<Eigen::Vector3d> vertices_;  // those of the mesh that triangles have
   Eigen::AlignedBox3d bounds_;
 };
 
