@@ -30,6 +30,8 @@ class DistanceCache {
   void store(std::uint64_t build_id, Quantity quantity, std::uint32_t key,
              const Eigen::Vector3d& p_LQ, double lower_bound);
 
+  std::size_t memory() const { return entries_.capacity() * sizeof(Entry); }  ///< [bytes]
+
  private:
   struct Entry {
     std::uint64_t build_id = 0;
