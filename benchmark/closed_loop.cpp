@@ -181,50 +181,69 @@ bool parse(int argc, char** argv, Options* options) {
   return true;
 }
 
+// One scene in all modes.
+SceneResult run_scene(const ist::RobotDescription& robot,
+                      const std::shared_ptr<const ist::RobotModel>& model, std::uint64_t seed,
+                      const Options& options) {
+  ist::sim::ClosedLoopConfig config;
+  const auto nominal = [&](const ist::sim::Scene& scene) {
+    return ist::sim::nominal_motion(robot, scene, config.controller);
+  };
+  ist::sim::Scene scene = ist::sim::make_scene(robot, seed, {}, nominal);
+  for (ist::sim::DepthCameraConfig& camera : scene.cameras) {
+    if (options.noise >= 0.0) camera.noise = options.noise;
+  }
+  config.check_self = options.only_self;
+  SceneResult result;
+  for (std::size_t m = 0; m < kModeCount; ++m) {
+    config.avoidance = kModes[m].avoidance;
+    config.scale_speed = kModes[m].scale_speed;
+    if (options.only_self && m != kSelfMode) continue;
+    result.modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
+  }
+  return result;
+}
+
+void run_scenes(const Options& options, std::vector<SceneResult>* results) {
+  const ist::RobotDescription robot = ist::test::demo_robot();
+  const auto model = ist::build_robot_model(robot, {});
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < options.count; i = next++) {
+      (*results)[i] = run_scene(robot, model, options.first + i, options);
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int t = 1; t < options.threads; ++t) pool.emplace_back(work);
+  work();
+  for (std::thread& thread : pool) thread.join();
+}
+
+// The measurements of earlier runs. @returns false, with a message, unless all are there
+bool load_scenes(const Options& options, std::vector<SceneResult>* results) {
+  std::size_t loaded = 0;
+  for (const std::string& path : options.from) {
+    if (load(path, options.first, results, &loaded)) continue;
+    std::fprintf(stderr, "%s: no measurements of these seeds\n", path.c_str());
+    return false;
+  }
+  if (loaded == options.count * kModeCount) return true;
+  std::fprintf(stderr, "%zu measurements instead of %zu\n", loaded, options.count * kModeCount);
+  return false;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   Options options;
   if (!parse(argc, argv, &options)) return 1;
 
-  const ist::RobotDescription robot = ist::test::demo_robot();
-  const auto model = ist::build_robot_model(robot, {});
   std::vector<SceneResult> results(options.count);
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < options.count; i = next++) {
-      ist::sim::ClosedLoopConfig config;
-      const auto nominal = [&](const ist::sim::Scene& scene) {
-        return ist::sim::nominal_motion(robot, scene, config.controller);
-      };
-      const std::uint64_t seed = options.first + i;
-      ist::sim::Scene scene = ist::sim::make_scene(robot, seed, {}, nominal);
-      for (ist::sim::DepthCameraConfig& camera : scene.cameras) {
-        if (options.noise >= 0.0) camera.noise = options.noise;
-      }
-      config.check_self = options.only_self;
-      for (std::size_t m = 0; m < kModeCount; ++m) {
-        config.avoidance = kModes[m].avoidance;
-        config.scale_speed = kModes[m].scale_speed;
-        if (options.only_self && m != kSelfMode) continue;
-        results[i].modes[m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
-      }
-    }
-  };
-  std::size_t loaded = 0;
-  for (const std::string& path : options.from) {
-    if (load(path, options.first, &results, &loaded)) continue;
-    std::fprintf(stderr, "%s: no measurements of these seeds\n", path.c_str());
+  if (options.from.empty()) {
+    run_scenes(options, &results);
+  } else if (!load_scenes(options, &results)) {
     return 1;
   }
-  if (!options.from.empty() && loaded != options.count * kModeCount) {
-    std::fprintf(stderr, "%zu measurements instead of %zu\n", loaded, options.count * kModeCount);
-    return 1;
-  }
-  std::vector<std::thread> pool;
-  for (int t = 1; t < options.threads && options.from.empty(); ++t) pool.emplace_back(work);
-  if (options.from.empty()) work();
-  for (std::thread& thread : pool) thread.join();
   if (!options.save.empty() && !save(options.save, results, options.first)) return 1;
 
   if (options.only_self) {

@@ -53,38 +53,47 @@ std::string table(const std::vector<Result>& results) {
   return text;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+struct Options {
   std::uint64_t first = 1;
   std::size_t count = 50, threads = 1;
   bool each = false;
   std::string document;
+};
+
+Options parse(int argc, char** argv) {
+  Options options;
   for (int i = 1; i < argc; ++i) {
     const std::string name = argv[i];
     const char* value = i + 1 < argc ? argv[i + 1] : "";
     if (name == "--each") {
-      each = true;
+      options.each = true;
       continue;
     }
-    if (name == "--first") first = std::strtoull(value, nullptr, 10);
-    if (name == "--count") count = std::strtoul(value, nullptr, 10);
-    if (name == "--threads") threads = std::strtoul(value, nullptr, 10);
-    if (name == "--update-doc") document = value;
+    if (name == "--first") options.first = std::strtoull(value, nullptr, 10);
+    if (name == "--count") options.count = std::strtoul(value, nullptr, 10);
+    if (name == "--threads") options.threads = std::strtoul(value, nullptr, 10);
+    if (name == "--update-doc") options.document = value;
     ++i;
   }
+  return options;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Options options = parse(argc, argv);
   const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
-  std::vector<Result> results(count);
+  std::vector<Result> results(options.count);
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t i = next++; i < count; i = next++) {
+    for (std::size_t i = next++; i < options.count; i = next++) {
       ist::sim::ClosedLoopConfig config;
       config.memory.decay = 5.0;
       const auto nominal = [&](const ist::sim::Scene& scene) {
         return ist::sim::nominal_motion(robot, scene, config.controller);
       };
-      const std::uint64_t seed = first + i;
+      const std::uint64_t seed = options.first + i;
       const ist::sim::SceneRules rules;
       const ist::sim::Scene scene = ist::sim::hidden_half_of_the_time(
           ist::sim::make_scene(robot, seed, rules, nominal), rules, {});
@@ -92,7 +101,7 @@ int main(int argc, char** argv) {
         config.remember = m == 1;
         results[i][m] = ist::sim::run_closed_loop(robot, model, scene, seed, config);
         const ClosedLoopResult& r = results[i][m];
-        if (!each) continue;
+        if (!options.each) continue;
         std::printf("seed %d, %s: %.1f mm at %.2f s, %s, %s; %d goals\n", static_cast<int>(seed),
                     kNames[m], 1e3 * r.smallest_distance, r.when, r.link.c_str(),
                     r.obstacle.c_str(), r.goals);
@@ -101,10 +110,10 @@ int main(int argc, char** argv) {
     }
   };
   std::vector<std::thread> pool;
-  for (std::size_t t = 1; t < threads; ++t) pool.emplace_back(work);
+  for (std::size_t t = 1; t < options.threads; ++t) pool.emplace_back(work);
   work();
   for (std::thread& thread : pool) thread.join();
   std::printf("\n%s", table(results).c_str());
-  if (document.empty()) return 0;
-  return ist::benchmark::write_table(document, "hidden obstacles", table(results)) ? 0 : 1;
+  if (options.document.empty()) return 0;
+  return ist::benchmark::write_table(options.document, "hidden obstacles", table(results)) ? 0 : 1;
 }

@@ -20,6 +20,8 @@
 #include "document.h"
 #include "ist_proximity/proximity/self_query.h"
 #include "ist_proximity/robot/link_poses.h"
+#include "link_pairs/peers.h"
+#include "link_pairs/robot.h"
 #include "support.h"
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
@@ -27,216 +29,141 @@
 #include "support/meshes.h"
 #include "support/scene.h"
 #include "truth_scenes.h"
-#ifdef IST_PROXIMITY_HAS_FCL
-#include <fcl/fcl.h>
-#endif
 
 namespace {
 
 using ist::LinkPair;
 using ist::LinkState;
 using ist::PairProximity;
+using ist::benchmark::make_robot;
+using ist::benchmark::PairPeer;
+using ist::benchmark::panda;
 using ist::benchmark::quantile;
+using ist::benchmark::Robot;
 
-struct Robot {
-  std::string name;
-  ist::RobotDescription description;
-  std::shared_ptr<const ist::RobotModel> model;
-  std::shared_ptr<const ist::Kinematics> kinematics;
-  std::vector<LinkPair> pairs;
-  std::vector<std::vector<ist::test::Corners3<double>>> triangles;  // by link
-  // [m] By link: the triangles of its cylinders and spheres are at most this far inside them.
-  std::vector<double> inexactness;
-  bool is_meshes = true;  // no cylinders and spheres, which FCL would measure as triangles
-
-  std::vector<double> random_position(ist::test::Rng* rng) const {
-    std::vector<double> q;
-    for (const auto& joint : kinematics->joints()) {
-      const double low = std::max(joint.lower, -3.1), high = std::min(joint.upper, 3.1);
-      q.push_back(joint.is_free() ? ist::test::uniform(rng, low, high) : 0.0);
-    }
-    return q;
-  }
-};
-
-Robot make_robot(std::string name, ist::RobotDescription description) {
-  Robot robot;
-  robot.name = std::move(name);
-  robot.description = std::move(description);
-  ist::RobotModelConfig config;
-  config.packing.max_error = 0.01;
-  robot.model = ist::build_robot_model(robot.description, config);
-  robot.kinematics = std::make_shared<const ist::Kinematics>(robot.description);
-  const std::vector<bool> all(robot.model->links.size(), true);
-  robot.pairs = ist::self_collision_pairs(*robot.model, *robot.kinematics, all, {});
-  for (const ist::LinkModel& link : robot.model->links) {
-    for (const ist::LinkDescription& described : robot.description.links) {
-      if (described.name != link.name) continue;
-      robot.triangles.push_back(ist::test::triangles_of(described.geometry));
-      robot.inexactness.push_back(
-          ist::test::append_round_shapes(described.geometry, &robot.triangles.back()));
-      for (const ist::GeometryElement& element : described.geometry) {
-        robot.is_meshes = robot.is_meshes &&
-                          !std::holds_alternative<ist::Cylinder>(element.shape) &&
-                          !std::holds_alternative<ist::Sphere>(element.shape);
-      }
-    }
-  }
-  return robot;
-}
-
-Robot panda(const std::filesystem::path& data, ist::GeometrySource source, std::string name) {
-  const std::string package = ist::test::franka_package(data);
-  std::ifstream file(package + "/robots/panda.urdf");
-  std::stringstream text;
-  text << file.rdbuf();
-  return make_robot(std::move(name), ist::parse_urdf(text.str(), source,
-                                                     [&](const std::string&) { return package; }));
-}
-
-#ifdef IST_PROXIMITY_HAS_FCL
-class Peer {
- public:
-  explicit Peer(const Robot& robot) : pairs_(robot.pairs) {
-    for (const auto& triangles : robot.triangles) {
-      std::vector<Eigen::Vector3d> vertices;
-      std::vector<fcl::Triangle> faces;
-      for (const auto& t : triangles) {
-        const std::size_t first = vertices.size();
-        vertices.insert(vertices.end(), t.p, t.p + 3);
-        faces.emplace_back(first, first + 1, first + 2);
-      }
-      models_.push_back(std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>());
-      models_.back()->beginModel();
-      models_.back()->addSubModel(vertices, faces);
-      models_.back()->endModel();
-    }
-  }
-  // Exact, each query anew.
-  void run(const std::vector<Eigen::Isometry3d>& X_FL) {
-    for (const LinkPair& pair : pairs_) {
-      fcl::DistanceResultd result;
-      distance(pair, X_FL, 0.0, &result);
-    }
-  }
-  // To 1 mm, and never more than what the last answer's triangles have at these poses.
-  void run_warm(const std::vector<Eigen::Isometry3d>& X_FL) {
-    last_.resize(pairs_.size());
-    for (std::size_t k = 0; k < pairs_.size(); ++k) {
-      fcl::DistanceResultd result;
-      if (last_[k].min_distance < 1e9) {
-        result.b1 = last_[k].b1;
-        result.b2 = last_[k].b2;
-        result.min_distance = of_triangles(pairs_[k], X_FL, last_[k]) * (1.0 + 1e-9) + 1e-12;
-      }
-      distance(pairs_[k], X_FL, 0.001, &result);
-      last_[k] = result;
-    }
-  }
-
- private:
-  void distance(const LinkPair& pair, const std::vector<Eigen::Isometry3d>& X_FL, double tolerance,
-                fcl::DistanceResultd* result) const {
-    fcl::DistanceRequestd request;
-    request.enable_nearest_points = true;
-    request.abs_err = tolerance;
-    request.rel_err = tolerance > 0.0 ? 1e9 : 0.0;  // both errors have to be met
-    fcl::distance(models_[pair.first].get(), X_FL[pair.first], models_[pair.second].get(),
-                  X_FL[pair.second], request, *result);
-  }
-
-  double of_triangles(const LinkPair& pair, const std::vector<Eigen::Isometry3d>& X_FL,
-                      const fcl::DistanceResultd& at) const {
-    fcl::Vector3d t[2][3], p, q;
-    const std::size_t links[2] = {pair.first, pair.second};
-    const std::intptr_t numbers[2] = {at.b1, at.b2};
-    for (int side = 0; side < 2; ++side) {
-      const auto& model = *models_[links[side]];
-      for (std::size_t k = 0; k < 3; ++k) {
-        t[side][k] = X_FL[links[side]] * model.vertices[model.tri_indices[numbers[side]][k]];
-      }
-    }
-    return fcl::detail::TriangleDistance<double>::triDistance(t[0], t[1], p, q);
-  }
-
-  std::vector<LinkPair> pairs_;
-  std::vector<std::shared_ptr<fcl::BVHModel<fcl::OBBRSSd>>> models_;
-  std::vector<fcl::DistanceResultd> last_;  // by pair
-};
-#endif
+// Seeds of the motions that are timed, one row each.
+constexpr unsigned kMotions[] = {1, 2, 3, 4, 5, 6};
 
 std::string ratio(double peer, double ours) {
   char text[64] = "-";
-  if (peer > 0.0) std::snprintf(text, sizeof text, "%.0f", peer / ours);
+  if (peer > 0.0) std::snprintf(text, sizeof text, "%.*f", peer < 10.0 * ours ? 1 : 0, peer / ours);
   return text;
 }
 
-// Times of all pairs: ours to 1 mm, ours exact, and FCL's, exact and to 1 mm.
-std::string measure_time(const Robot& robot, int random_count) {
-  ist::test::Rng rng(7);
+std::vector<std::unique_ptr<PairPeer>> make_peers(const Robot& robot) {
+  std::vector<std::unique_ptr<PairPeer>> peers;
+  if (!robot.is_meshes) return peers;  // they would measure other shapes
+  const auto append = [&](std::vector<std::unique_ptr<PairPeer>> more) {
+    for (auto& peer : more) peers.push_back(std::move(peer));
+  };
+#ifdef IST_PROXIMITY_HAS_FCL
+  append(ist::benchmark::fcl_peers(robot));
+#endif
+#ifdef IST_PROXIMITY_HAS_BULLET
+  append(ist::benchmark::bullet_peers(robot));
+#endif
+  return peers;
+}
+
+// Times and answers of one library.
+struct Measured {
+  std::vector<double> us;
+  std::vector<double> distances;  // [m] by pair, of the last run
+  int near = 0, wrong = 0, below = 0;
+
+  // Compares with the exact distances where links are apart.
+  // @param tolerance  [m] the library's own
+  void compare(const std::vector<PairProximity>& exact, double tolerance) {
+    constexpr double kFloat = 2e-5;  // [m]
+    for (std::size_t k = 0; k < exact.size(); ++k) {
+      if (exact[k].state != LinkState::kNear) continue;
+      ++near;
+      below += distances[k] < exact[k].distance - 0.001 ? 1 : 0;
+      wrong += std::abs(distances[k] - exact[k].distance) > tolerance + kFloat ? 1 : 0;
+    }
+  }
+};
+
+// The next configuration of a motion towards another one, each joint at up to 0.5 rad/s.
+void step_towards(const std::vector<double>& to, std::vector<double>* q) {
+  for (std::size_t j = 0; j < q->size(); ++j) (*q)[j] += 5e-4 * std::tanh(4.0 * (to[j] - (*q)[j]));
+}
+
+// Rows of a table of times, and of peers.
+struct TimeRows {
+  std::string ours, peers;
+};
+
+// Times of all pairs: ours to 1 mm and exact, and the peers', in the same run.
+// @param seed    of the configurations, or of the motion
+void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, TimeRows* rows) {
+  ist::test::Rng rng(seed);
   ist::ForwardKinematics forward(*robot.model, robot.kinematics);
   std::vector<PairProximity> results;
-  std::string rows;
-  for (const bool is_motion : {false, true}) {
-    std::vector<double> ours[2], peers[2], searched, steps;
-    std::vector<std::unique_ptr<ist::SelfQuery>> queries;
-    for (const double tolerance : {0.001, 0.0}) {
-      ist::QueryConfig config;
-      config.max_distance = 10.0;
-      config.tolerance = tolerance;
-      queries.push_back(std::make_unique<ist::SelfQuery>(robot.model, robot.pairs, config));
-    }
-#ifdef IST_PROXIMITY_HAS_FCL
-    Peer peer(robot);
-#endif
-    ist::benchmark::ThreadTimer timer;
-    std::vector<double> q = robot.random_position(&rng), to = robot.random_position(&rng);
-    const int count = is_motion ? 1000 : random_count;
-    for (int i = 0; i < count; ++i) {
-      if (!is_motion) q = robot.random_position(&rng);
-      // Towards another configuration, each joint at up to 0.5 rad/s.
-      for (std::size_t j = 0; is_motion && j < q.size(); ++j) {
-        q[j] += 5e-4 * std::tanh(4.0 * (to[j] - q[j]));
-      }
-      const ist::LinkPoses& poses = forward.run(q);
-      for (std::size_t k = 0; k < 2; ++k) {
-        timer.lap();
-        queries[k]->run(poses.X_FL, poses.known, &results);
-        ours[k].push_back(timer.lap());
-        if (k == 0) {
-          searched.push_back(100.0 * static_cast<double>(queries[k]->statistics().pairs_searched) /
-                             static_cast<double>(robot.pairs.size()));
-          steps.push_back(static_cast<double>(queries[k]->statistics().steps));
-        }
-      }
-#ifdef IST_PROXIMITY_HAS_FCL
-      // On the motion, steps in a row, so that its warm start is that of the step before.
-      if (robot.is_meshes && (!is_motion || i % 100 < 5)) {
-        timer.lap();
-        peer.run(poses.X_FL);
-        peers[0].push_back(timer.lap());
-        peer.run_warm(poses.X_FL);
-        const double us = timer.lap();
-        if (!is_motion || i % 100 > 0) peers[1].push_back(us);
-      }
-#endif
-    }
-    const double of_peer = quantile(peers[0], 0.5), of_warm_peer = quantile(peers[1], 0.5);
-    char row[320];
-    std::snprintf(
-        row, sizeof row,
-        "| %s, %zu pairs | %s | %.0f | %.0f | %.0f | %.0f | %s | %s | %s | %.0f | %.0f |\n",
-        robot.name.c_str(), robot.pairs.size(), is_motion ? "1 kHz motion" : "random",
-        quantile(ours[0], 0.5), quantile(ours[1], 0.5), of_peer, of_warm_peer,
-        ratio(of_peer, quantile(ours[0], 0.5)).c_str(),
-        ratio(of_warm_peer, quantile(ours[0], 0.5)).c_str(),
-        ratio(of_peer, quantile(ours[1], 0.5)).c_str(), ist::benchmark::mean(searched),
-        ist::benchmark::mean(steps));
-    rows += row;
-    std::printf("%s", row);
-    std::fflush(stdout);
+  std::vector<double> ours[2], searched, steps;
+  std::vector<std::unique_ptr<ist::SelfQuery>> queries;
+  for (const double tolerance : {0.001, 0.0}) {
+    ist::QueryConfig config;
+    config.max_distance = 10.0;
+    config.tolerance = tolerance;
+    queries.push_back(std::make_unique<ist::SelfQuery>(robot.model, robot.pairs, config));
   }
-  return rows;
+  const auto peers = make_peers(robot);
+  std::vector<Measured> measured(peers.size());
+  ist::benchmark::ThreadTimer timer;
+  std::vector<double> q = robot.random_position(&rng), to = robot.random_position(&rng);
+  for (int i = 0; i < count; ++i) {
+    if (is_motion) {
+      step_towards(to, &q);
+    } else {
+      q = robot.random_position(&rng);
+    }
+    const ist::LinkPoses& poses = forward.run(q);
+    for (std::size_t k = 0; k < 2; ++k) {
+      timer.lap();
+      queries[k]->run(poses.X_FL, poses.known, &results);
+      ours[k].push_back(timer.lap());
+      if (k > 0) continue;
+      searched.push_back(100.0 * static_cast<double>(queries[k]->statistics().pairs_searched) /
+                         static_cast<double>(robot.pairs.size()));
+      steps.push_back(static_cast<double>(queries[k]->statistics().steps));
+    }
+    // On the motion, steps in a row, so that a warm start is that of the step before.
+    if (is_motion && i % 100 >= 5) continue;
+    for (std::size_t k = 0; k < peers.size(); ++k) {
+      measured[k].distances.resize(robot.pairs.size());
+      timer.lap();
+      peers[k]->run(poses.X_FL, &measured[k].distances);
+      const double us = timer.lap();
+      if (!is_motion || !peers[k]->is_warm() || i % 100 > 0) measured[k].us.push_back(us);
+      measured[k].compare(results, peers[k]->tolerance());
+    }
+  }
+  char name[160], row[400];
+  if (is_motion) {
+    std::snprintf(name, sizeof name, "1 kHz motion %u", seed);
+  } else {
+    std::snprintf(name, sizeof name, "%d random", count);
+  }
+  const double to_1_mm = quantile(ours[0], 0.5), exact = quantile(ours[1], 0.5);
+  std::snprintf(row, sizeof row, "| %s | %s | %.0f | %.0f | %.0f | %.0f | %.0f | %.0f |\n",
+                robot.name.c_str(), name, to_1_mm, quantile(ours[0], 0.99),
+                ist::benchmark::mean(ours[0]), exact, ist::benchmark::mean(searched),
+                ist::benchmark::mean(steps));
+  rows->ours += row;
+  std::printf("%s", row);
+  for (std::size_t k = 0; k < peers.size(); ++k) {
+    const double us = quantile(measured[k].us, 0.5);
+    std::snprintf(
+        row, sizeof row, "| %s | %s | %s | %.0f | %s | %s | %s | %.2f | %.2f |\n",
+        robot.name.c_str(), name, peers[k]->name().c_str(), us, ratio(us, to_1_mm).c_str(),
+        ratio(ist::benchmark::mean(measured[k].us), ist::benchmark::mean(ours[0])).c_str(),
+        ratio(us, exact).c_str(), 100.0 * measured[k].wrong / measured[k].near,
+        100.0 * measured[k].below / measured[k].near);
+    rows->peers += row;
+    std::printf("%s", row);
+  }
+  std::fflush(stdout);
 }
 
 // All pairs of a robot's links beside its links against a cloud, on one motion at 1 kHz, to 1 mm
@@ -258,7 +185,7 @@ std::string measure_beside_cloud(const Robot& robot) {
   ist::benchmark::ThreadTimer timer;
   std::vector<double> q = robot.random_position(&rng), to = robot.random_position(&rng);
   for (int i = 0; i < 2000; ++i) {
-    for (std::size_t j = 0; j < q.size(); ++j) q[j] += 5e-4 * std::tanh(4.0 * (to[j] - q[j]));
+    step_towards(to, &q);
     const ist::LinkPoses& poses = forward.run(q);
     timer.lap();
     pairs.run(poses.X_FL, poses.known, &of_pairs);
@@ -466,18 +393,25 @@ int main(int argc, char** argv) {
         "p99 "
         "| distance [mm] |\n|---|---|---|---|---|---|---|---|---|\n";
     ties += measure_ties();
-    std::string time =
-        "| robot | poses | ours to 1 mm [us] | ours exact [us] | FCL [us] | FCL to 1 mm, "
-        "warm [us] | FCL / ours | FCL to 1 mm / ours | FCL / exact | pairs looked at [%] | steps "
-        "|\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|\n";
-    for (const Robot& robot : robots) time += measure_time(robot, std::min(configurations, 200));
+    TimeRows time;
+    time.ours =
+        "| robot | poses | to 1 mm, median [us] | p99 [us] | mean [us] | exact, median [us] | "
+        "pairs "
+        "looked at [%] | steps |\n|---|---|---|---|---|---|---|---|\n";
+    time.peers =
+        "| robot | poses | peer | median [us] | peer / ours to 1 mm | the same of means | peer / "
+        "ours exact | not within its tolerance [%] | too small by more than 1 mm [%] |\n"
+        "|---|---|---|---|---|---|---|---|---|\n";
+    for (const Robot& robot : robots) {
+      measure_time(robot, false, 7, std::min(configurations, 200), &time);
+      for (const unsigned seed : kMotions) measure_time(robot, true, seed, 1000, &time);
+    }
     std::string beside =
         "| robot | pairs | all pairs, median / p99 [us] | pairs looked at [%] | links | against a "
         "cloud, median / p99 [us] | pairs / cloud |\n|---|---|---|---|---|---|---|\n";
     for (const Robot& robot : robots) beside += measure_beside_cloud(robot);
-    written = write("link pairs", time) && write("link pair ties", ties) &&
-              write("link pairs beside a cloud", beside);
+    written = write("link pairs", time.ours) && write("link pair peers", time.peers) &&
+              write("link pair ties", ties) && write("link pairs beside a cloud", beside);
   }
   if (part == "all" || part == "accuracy") {
     std::string accuracy =

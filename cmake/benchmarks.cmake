@@ -49,6 +49,7 @@ if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
   target_link_libraries(benchmark_octomap PRIVATE
     ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
   target_compile_definitions(benchmark_link_pairs PRIVATE IST_PROXIMITY_HAS_FCL)
+  target_sources(benchmark_link_pairs PRIVATE benchmark/link_pairs/fcl.cpp)
   target_include_directories(benchmark_link_pairs SYSTEM PRIVATE
     ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
   target_link_libraries(benchmark_link_pairs PRIVATE
@@ -60,6 +61,21 @@ if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
     ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
 else()
   message(STATUS "ist_proximity: benchmark/octomap, link_pairs and world without FCL (apt install libfcl-dev)")
+endif()
+
+# Bullet, where it is installed. Debian's default libraries are in single precision.
+find_path(BULLET_INCLUDE_DIR btBulletCollisionCommon.h PATH_SUFFIXES bullet)
+find_library(BULLET_COLLISION_LIBRARY BulletCollision)
+find_library(BULLET_MATH_LIBRARY LinearMath)
+mark_as_advanced(BULLET_INCLUDE_DIR BULLET_COLLISION_LIBRARY BULLET_MATH_LIBRARY)
+if(BULLET_INCLUDE_DIR AND BULLET_COLLISION_LIBRARY AND BULLET_MATH_LIBRARY)
+  target_sources(benchmark_link_pairs PRIVATE benchmark/link_pairs/bullet.cpp)
+  target_compile_definitions(benchmark_link_pairs PRIVATE IST_PROXIMITY_HAS_BULLET)
+  target_include_directories(benchmark_link_pairs SYSTEM PRIVATE ${BULLET_INCLUDE_DIR})
+  target_link_libraries(benchmark_link_pairs PRIVATE
+    ${BULLET_COLLISION_LIBRARY} ${BULLET_MATH_LIBRARY})
+else()
+  message(STATUS "ist_proximity: benchmark/link_pairs without Bullet (apt install libbullet-dev)")
 endif()
 
 target_sources(benchmark_repulsion PRIVATE

@@ -163,6 +163,24 @@ example::Reading Perception::reading(const Simulation& world, const example::Con
   return reading;
 }
 
+namespace {
+
+/// Keeps the smallest true distance so far, and where it was.
+void note_distance(const Simulation& world, const RobotDescription& robot, const Scene& scene,
+                   ClosedLoopResult* result) {
+  const Simulation::Truth truth = world.nearest(std::min(result->smallest_distance, kTruthRange));
+  if (!(truth.distance < result->smallest_distance)) return;
+  if (truth.distance <= 0.0 && result->smallest_distance > 0.0) {
+    result->speed_at_touch = world.arm().velocities().cwiseAbs().maxCoeff();
+  }
+  result->smallest_distance = truth.distance;
+  result->when = world.time();
+  result->link = robot.links[truth.link].name;
+  result->obstacle = scene.obstacles[truth.obstacle].name;
+}
+
+}  // namespace
+
 ClosedLoopResult run_closed_loop(const RobotDescription& robot,
                                  const std::shared_ptr<const RobotModel>& model, const Scene& scene,
                                  std::uint64_t seed, const ClosedLoopConfig& config) {
@@ -203,16 +221,7 @@ ClosedLoopResult run_closed_loop(const RobotDescription& robot,
       result.smallest_self_distance =
           std::min(result.smallest_self_distance, self.smallest(world.link_poses()));
     }
-    const Simulation::Truth truth = world.nearest(std::min(result.smallest_distance, kTruthRange));
-    if (truth.distance < result.smallest_distance) {
-      if (truth.distance <= 0.0 && result.smallest_distance > 0.0) {
-        result.speed_at_touch = world.arm().velocities().cwiseAbs().maxCoeff();
-      }
-      result.smallest_distance = truth.distance;
-      result.when = world.time();
-      result.link = robot.links[truth.link].name;
-      result.obstacle = scene.obstacles[truth.obstacle].name;
-    }
+    note_distance(world, robot, scene, &result);
   }
   result.acceleration_noise = noise(accelerations);
   result.largest_command_step = quantile(command_steps, 0.999);

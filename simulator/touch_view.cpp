@@ -193,6 +193,55 @@ void count(double distance, bool touches, bool is_away, Trial* trial) {
   }
 }
 
+/// The places that are in view. A place begins when the one before it has ended.
+std::vector<Place> find_places(const RobotModel& model, const Arm& arm,
+                               const DepthCameraConfig& camera, const TouchConfig& config,
+                               double stop) {
+  Rng rng(config.seed);
+  std::vector<Place> places;
+  for (int i = 0; i < config.places; ++i) {
+    Place place;
+    place.arm_time = kStart + kBetween * i;
+    place.begin = place.arm_time + stop * i;
+    if (!find_place(model, arm, camera, config.in_view, &rng, &place)) continue;
+    place.begin = place.arm_time + stop * static_cast<double>(places.size());
+    places.push_back(place);
+  }
+  return places;
+}
+
+/// One bar for each place, which is out of view at all other times.
+std::vector<Obstacle> bars_at(const std::vector<Place>& places, double hold) {
+  std::vector<Obstacle> bars;
+  bars.reserve(places.size());
+  for (const Place& place : places) {
+    Obstacle bar = bar_at(place);
+    bar.path = [place, hold, at = bar.from](double t) -> Eigen::Vector3d {
+      const double away = bar_distance(place, hold, t);
+      return std::isfinite(away) ? Eigen::Vector3d(at + away * place.n_F)
+                                 : Eigen::Vector3d(0.0, 0.0, -50.0);
+    };
+    bars.push_back(bar);
+  }
+  return bars;
+}
+
+/// Whether nothing is near the arm, now and when the newest cloud was taken.
+bool is_all_away(const Simulation& world, double then) {
+  return !(world.nearest_then(kAway, then).distance < kAway) &&
+         !(world.nearest(kAway).distance < kAway);
+}
+
+TouchResult result_of(const Trial& trial) {
+  TouchResult result = trial.result;
+  result.mean /= std::max(result.answers, 1);
+  result.offset = trial.cloud.view.offset;
+  for (const LinkView& link : trial.cloud.view.links) {
+    result.blind_skin = std::max(result.blind_skin, link.blind_skin);
+  }
+  return result;
+}
+
 }  // namespace
 
 Eigen::Isometry3d with_error(const Eigen::Isometry3d& X_FS, double position, double angle,
@@ -218,30 +267,9 @@ std::vector<TouchResult> run_touch(const RobotDescription& robot,
       with_error(camera.X_FC, config.position_error, config.angle_error, config.seed);
 
   const Arm arm(robot, demo_arm());
-  Rng rng(config.seed);
-  std::vector<Place> places;
   const double hold = config.latency + camera.period + config.hold, stop = 2.0 * coming() + hold;
-  for (int i = 0; i < config.places; ++i) {
-    Place place;
-    place.arm_time = kStart + kBetween * i;
-    place.begin = place.arm_time + stop * i;
-    if (!find_place(*model, arm, camera, config.in_view, &rng, &place)) continue;
-    place.begin = place.arm_time + stop * static_cast<double>(places.size());
-    places.push_back(place);
-  }
-
-  // One bar for each place, which is out of view at all other times.
-  std::vector<Obstacle> bars;
-  for (const Place& place : places) {
-    Obstacle bar = bar_at(place);
-    bar.path = [place, hold, at = bar.from](double t) -> Eigen::Vector3d {
-      const double away = bar_distance(place, hold, t);
-      return std::isfinite(away) ? Eigen::Vector3d(at + away * place.n_F)
-                                 : Eigen::Vector3d(0.0, 0.0, -50.0);
-    };
-    bars.push_back(bar);
-  }
-  Simulation world(robot, demo_arm(), bars, {camera}, config.seed);
+  const std::vector<Place> places = find_places(*model, arm, camera, config, stop);
+  Simulation world(robot, demo_arm(), bars_at(places, hold), {camera}, config.seed);
   world.arm().reset(self_view_positions(0.0));
   std::vector<Trial> trials;
   for (const IngestConfig& filter : config.filters) trials.emplace_back(model, filter);
@@ -270,8 +298,7 @@ std::vector<TouchResult> run_touch(const RobotDescription& robot,
     const double since = t - places[at].begin - coming();
     const bool touches = since >= config.latency + camera.period && since <= hold;
     const double then = t - config.latency - camera.period;
-    const bool is_away = !(world.nearest_then(kAway, then).distance < kAway) &&
-                         !(world.nearest(kAway).distance < kAway);
+    const bool is_away = is_all_away(world, then);
     if (!touches && !is_away) continue;
     const std::vector<Eigen::Isometry3d> X_FL = world.link_poses();
     for (Trial& trial : trials) {
@@ -282,12 +309,7 @@ std::vector<TouchResult> run_touch(const RobotDescription& robot,
   std::vector<TouchResult> results;
   for (Trial& trial : trials) {
     if (at < places.size()) trial.end_place();
-    trial.result.mean /= std::max(trial.result.answers, 1);
-    trial.result.offset = trial.cloud.view.offset;
-    for (const LinkView& link : trial.cloud.view.links) {
-      trial.result.blind_skin = std::max(trial.result.blind_skin, link.blind_skin);
-    }
-    results.push_back(trial.result);
+    results.push_back(result_of(trial));
   }
   return results;
 }

@@ -77,10 +77,9 @@ void check(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, const IngestCon
   }
 }
 
-// The extent of a cloud's points.
+// The extent of a cloud's points, without the sensor's place.
 // @throws std::invalid_argument where it follows from a camera, and the cloud is no camera's
-PointExtent extent_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
-                      const IngestConfig& config) {
+PointExtent extent_of(const RawCloud& cloud, const IngestConfig& config) {
   PointExtent extent;
   if (config.extent.is_zero()) return extent;
   double angle = 0.0;
@@ -95,13 +94,16 @@ PointExtent extent_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
     }
   }
   extent = point_extent(config.extent, angle > 0.0 ? angle : 0.0, farthest_point(config));
-  if (!(extent.radius(std::min(extent.max_range, kLargestRange)) <= kMaxExtent)) {
+  const double range = std::min(extent.max_range, kLargestRange);
+  if (!(extent.radius(range) <= kMaxExtent && extent.growth(range) <= kMaxExtentGrowth)) {
     std::ostringstream text;
-    text << "the footprint of a pixel makes points at max_range, " << extent.max_range
-         << " m, larger than " << kMaxExtent << " m. Lower max_range.";
+    text << "the footprint of a pixel of " << angle << " rad gives points at max_range, "
+         << extent.max_range << " m, a radius of " << extent.radius(range)
+         << " m: allowed are at most " << kMaxExtent << " m, and a growth of at most "
+         << kMaxExtentGrowth << " m for each metre of range. Lower max_range, or give the "
+         << "footprint as an angle or a radius.";
     throw std::invalid_argument(text.str());
   }
-  extent.p_FS = X_FS.translation();
   return extent;
 }
 
@@ -121,18 +123,22 @@ struct Ingest::Impl {
   }
 
   // Shows a cloud to the view filter, again where that has corrected the sensor's pose by much.
-  // @param organized, crop  as for X_FS; `crop` is corrected
-  void look_at_robot(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
-                     Span<const PosedSolid> robot, double stamp, CropParameters* crop) {
+  // @param crop  overwritten: that of the corrected pose
+  // @returns the corrected pose by which the cloud is placed
+  Eigen::Isometry3d look_at_robot(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
+                                  Span<const PosedSolid> robot, double stamp,
+                                  CropParameters* crop) {
     view->begin_cloud(robot, stamp);
+    Eigen::Isometry3d X_FC;
     bool again = true;
     while (again) {
-      const Eigen::Isometry3d X_FC = X_FS * view->X_SC();
+      X_FC = X_FS * view->X_SC();
       *crop = crop_of(cloud, X_FC);
       set_axes(scene_axes(cloud, X_FC.linear(), true), crop);
       self_filter.set_poses(robot, crop->X_FO, config.self_filter_padding);
       again = ist::look_at_robot(cloud, *crop, &self_filter, view.get(), &builder);
     }
+    return X_FC;
   }
 };
 
@@ -162,20 +168,21 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   const auto start = std::chrono::steady_clock::now();
   const IngestConfig& config = impl_->config;
   check(cloud, X_FS, config);
-  const PointExtent extent = extent_of(cloud, X_FS, config);
+  PointExtent extent = extent_of(cloud, config);
   CropParameters crop = impl_->crop_of(cloud, X_FS);
   bool organized = is_organized(cloud, crop);
   SelfFilter* on_robot = nullptr;
   ViewFilter* view = nullptr;
   snapshot->view.is_used = false;
   snapshot->view.links.clear();
+  Eigen::Isometry3d X_FC = X_FS;  // as a view of the robot corrects it
   if (config.self_filter && !robot.empty()) {
     on_robot = &impl_->self_filter;
     if (impl_->view != nullptr && is_view(cloud)) view = impl_->view.get();
   }
   if (view != nullptr) {
     organized = true;  // its pixels are asked about by their places in the image
-    impl_->look_at_robot(cloud, X_FS, robot, stamp, &crop);
+    X_FC = impl_->look_at_robot(cloud, X_FS, robot, stamp, &crop);
     view->report(&snapshot->view);
   } else {
     set_axes(scene_axes(cloud, X_FS.linear(), organized), &crop);
@@ -197,7 +204,9 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
                         counts.outside_region - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
+  if (!extent.is_zero()) extent.p_FS = X_FC.translation();
   snapshot->extent = extent;
+  snapshot->X_FS = X_FC;
   snapshot->thinning = config.thinning;
   snapshot->region = impl_->region;
   if (config.thin) snapshot->index.bvh().set_thinning(config.thinning);

@@ -64,8 +64,9 @@ std::string check_extent(const ExtentConfig& config, double max_range) {
          << " m";
     return text.str();
   }
-  const double growth = extent.linear + 2.0 * extent.quadratic * max_range;
-  if (extent.radius(max_range) <= kMaxExtent && growth <= kMaxExtentGrowth) return "";
+  if (extent.radius(max_range) <= kMaxExtent && extent.growth(max_range) <= kMaxExtentGrowth) {
+    return "";
+  }
   text << "the radius of a point at max_range, " << max_range << " m, is "
        << extent.radius(max_range) << " m: allowed are at most " << kMaxExtent
        << " m, and a growth of at most " << kMaxExtentGrowth
@@ -99,7 +100,7 @@ PointExtent point_extent(const ExtentConfig& config, double pixel_angle, double 
 void PointExtent::allow_for(double movement) {
   max_range += movement;
   if (linear == 0.0 && quadratic == 0.0) return;
-  constant += movement * (linear + 2.0 * quadratic * max_range);
+  constant += movement * growth(max_range);
 }
 
 double pixel_angle(const RawCloud& cloud, double field_of_view) {

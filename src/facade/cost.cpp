@@ -1,12 +1,11 @@
 #include "ist_proximity/facade/cost.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <ctime>
 #include <future>
 #include <limits>
 #include <memory>

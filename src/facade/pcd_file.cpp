@@ -94,7 +94,7 @@ std::string read_header(TextScanner* in, Header* header) {
     if (in->at_end()) return "ends before a line DATA";
     const std::vector<std::string> words = in->words();
     if (words.empty() || words[0][0] == '#') continue;
-    const std::string problem = read_line(words, header);
+    std::string problem = read_line(words, header);
     if (!problem.empty()) return problem;
   }
   if (header->width == 0 && header->height == 0) header->width = header->points;

@@ -173,7 +173,7 @@ std::string read_vertices(const Element& element, NumberReader* in, PointFile* f
 std::string parse_ply(const std::string& bytes, PointFile* file) {
   TextScanner in(bytes);
   Header header;
-  const std::string problem = read_header(&in, &header);
+  std::string problem = read_header(&in, &header);
   if (!problem.empty()) return problem;
   if (header.encoding != "ascii" && header.encoding != "binary_little_endian" &&
       header.encoding != "binary_big_endian") {

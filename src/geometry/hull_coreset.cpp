@@ -1,6 +1,7 @@
 #include "internal/geometry/hull_coreset.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -10,9 +11,8 @@
 namespace ist {
 namespace {
 
-// Points of a coreset, at most: of a large mesh fewer, since each costs a look at all corners
-// (about this many in all).
-constexpr std::size_t kMaxPoints = 2048, kMinPoints = 128, kMaxLooks = 40000000;
+// A large mesh gets fewer points, since each costs a look at all corners (about this many in all).
+constexpr std::size_t kMinPoints = 128, kMaxLooks = 40000000;
 // Errors that are aimed at one after the other, as shares of the size, while there are points left.
 constexpr double kErrors[] = {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-9};
 // Float's error in a sum of three products: the point that is chosen may be this share of its
@@ -20,17 +20,70 @@ constexpr double kErrors[] = {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-9};
 constexpr double kFloatRounding = 1e-6;
 constexpr int kMaxSteps = 40;
 
-std::vector<Eigen::Vector3d> corners_of(const std::vector<ConvexPart>& parts) {
-  std::vector<Eigen::Vector3d> corners;
-  corners.reserve(3 * parts.size());
-  for (const ConvexPart& part : parts) {
-    if (part.kind != ConvexPart::Kind::kTriangle) return {};
-    for (const Eigen::Vector3d& corner : {part.a, part.b, part.c}) corners.push_back(corner);
+// Points about the rim of a cylinder's cap, and from pole to pole of a sphere.
+constexpr int kRimPoints = 128, kMeridianPoints = 48;
+
+// Points whose hull is that of the parts, but for an error of those that are round.
+struct Corners {
+  std::vector<Eigen::Vector3d> points;
+  double error = 0.0;  // [m] no part protrudes farther from the hull of the points
+
+  void add(const ConvexPart& part) {
+    if (part.kind == ConvexPart::Kind::kTriangle) {
+      points.insert(points.end(), {part.a, part.b, part.c});
+    } else if (part.kind == ConvexPart::Kind::kCylinder) {
+      add_cylinder(part);
+    } else {
+      add_sphere(part);
+    }
   }
+
+ private:
+  // Points of two rims: between two of them the circle rises above their chord.
+  void add_cylinder(const ConvexPart& cylinder) {
+    const Eigen::Vector3d axis =
+        cylinder.b.norm() > 0.0 ? cylinder.b.normalized() : Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
+    for (int i = 0; i < kRimPoints; ++i) {
+      const double angle = 2.0 * M_PI * i / kRimPoints;
+      const Eigen::Vector3d radial = cylinder.radius * (std::cos(angle) * u + std::sin(angle) * v);
+      points.push_back(cylinder.a + cylinder.b + radial);
+      points.push_back(cylinder.a - cylinder.b + radial);
+    }
+    note(cylinder.radius * (1.0 - std::cos(M_PI / kRimPoints)));
+  }
+
+  // Points of parallels. From any direction, half a step along its meridian and at most half a step
+  // along the parallel there lead to a point, so that one is within a step of each direction.
+  void add_sphere(const ConvexPart& sphere) {
+    const double step = M_PI / kMeridianPoints;
+    for (int i = 0; i <= kMeridianPoints; ++i) {
+      const double polar = step * i;
+      const int count =
+          std::max(1, static_cast<int>(std::ceil(2.0 * kMeridianPoints * std::sin(polar))));
+      for (int k = 0; k < count; ++k) {
+        const double angle = 2.0 * M_PI * k / count;
+        points.push_back(sphere.a +
+                         sphere.radius * Eigen::Vector3d(std::sin(polar) * std::cos(angle),
+                                                         std::sin(polar) * std::sin(angle),
+                                                         std::cos(polar)));
+      }
+    }
+    note(sphere.radius * (1.0 - std::cos(step)));
+  }
+
+  void note(double protrusion) { error = std::max(error, protrusion * (1.0 + 1e-9)); }
+};
+
+Corners corners_of(Span<const ConvexPart> parts) {
+  Corners corners;
+  corners.points.reserve(3 * parts.size());
+  for (const ConvexPart& part : parts) corners.add(part);
+  auto& points = corners.points;
   const auto place = [](const Eigen::Vector3d& p) { return std::make_tuple(p.x(), p.y(), p.z()); };
-  std::sort(corners.begin(), corners.end(),
+  std::sort(points.begin(), points.end(),
             [&](const auto& p, const auto& q) { return place(p) < place(q); });
-  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
   return corners;
 }
 
@@ -39,11 +92,11 @@ std::vector<Eigen::Vector3d> corners_of(const std::vector<ConvexPart>& parts) {
 // Adds the corner that is farthest outside, until all are near enough.
 class HullCoreset::Builder {
  public:
-  Builder(std::vector<Eigen::Vector3d> corners, HullCoreset* set)
+  Builder(std::vector<Eigen::Vector3d> corners, std::size_t max_points, HullCoreset* set)
       : corners_(std::move(corners)),
         distances_(corners_.size(), std::numeric_limits<double>::infinity()),
         set_(*set),
-        max_points_(std::clamp(kMaxLooks / corners_.size(), kMinPoints, kMaxPoints)) {
+        max_points_(std::min(max_points, std::max(kMaxLooks / corners_.size(), kMinPoints))) {
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : corners_) {
       box.extend(p);
@@ -92,7 +145,7 @@ class HullCoreset::Builder {
 
   // The distance of a corner to the coreset's hull, or more. @returns the direction out of the hull
   Eigen::Vector3d measure(std::size_t i) {
-    const Eigen::Vector3d off = set_.offset(corners_[i], &last_);
+    Eigen::Vector3d off = set_.offset(corners_[i], &last_);
     distances_[i] = std::min(distances_[i], off.norm() + kLostInLength * extent_);
     return off;
   }
@@ -105,10 +158,12 @@ class HullCoreset::Builder {
   std::uint32_t last_ = 0;
 };
 
-HullCoreset::HullCoreset(const std::vector<ConvexPart>& parts, const CancelRequest& cancelled) {
-  std::vector<Eigen::Vector3d> corners = corners_of(parts);
-  if (corners.empty()) return;
-  Builder(std::move(corners), this).run(cancelled);
+HullCoreset::HullCoreset(Span<const ConvexPart> parts, const CancelRequest& cancelled,
+                         std::size_t max_points) {
+  Corners corners = corners_of(parts);
+  if (corners.points.empty()) return;
+  Builder(std::move(corners.points), max_points, this).run(cancelled);
+  error_ += corners.error;
 }
 
 // Finds the point of the coreset's hull that is nearest to p, by GJK from a point of the coreset

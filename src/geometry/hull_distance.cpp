@@ -133,7 +133,7 @@ class Gjk {
     simplex_.reduce();
   }
 
-  HullDistance run(double precision) {
+  HullDistance run(double precision, double enough) {
     HullDistance result;
     Eigen::Vector3d v = simplex_.nearest();
     for (int step = 0; step < kMaxSteps && simplex_.size < 4 && v.norm() > 1e-9; ++step) {
@@ -145,6 +145,7 @@ class Gjk {
         result.lower_bound = bound;
         result.direction = n;
       }
+      if (enough > 0.0 && (bound >= enough || distance < enough)) break;
       if (bound >= distance - precision || !move_on(next)) {
         // Float has chosen the points so far.
         if (is_exact_ || precision > a_.error() + b_.error()) break;
@@ -217,10 +218,11 @@ class Gjk {
 }  // namespace
 
 HullDistance hull_distance(const HullCoreset& a, const HullCoreset& b,
-                           const Eigen::Isometry3d& X_BA, double precision, HullSupport* support) {
+                           const Eigen::Isometry3d& X_BA, double precision, HullSupport* support,
+                           double enough) {
   Gjk gjk(a, b, X_BA);
   gjk.start(*support);
-  const HullDistance result = gjk.run(precision);
+  HullDistance result = gjk.run(precision, enough);
   *support = gjk.support();
   return result;
 }

@@ -17,6 +17,11 @@ using Kind = ConvexPart::Kind;
 
 // Parts of a node that are divided in some milliseconds.
 constexpr std::uint32_t kAskFrom = 4096;
+// The children of nodes of so many levels have hulls of at most so many points, where they hold so
+// many triangles; or a round part, which takes more points.
+constexpr int kHullLevels = 3;
+constexpr std::size_t kHullPoints = 64, kRoundHullPoints = 512;
+constexpr std::uint32_t kHullParts = 16;
 
 Eigen::Vector3d center_of(const ConvexPart& part) {
   return part.kind == Kind::kTriangle ? Eigen::Vector3d((part.a + part.b + part.c) / 3.0) : part.a;
@@ -94,7 +99,7 @@ struct Spread {
     const Eigen::Vector3d center = mean / area;
     const Eigen::Matrix3d covariance = square / area - center * center.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-    const Eigen::Matrix3d axes = solver.eigenvectors();
+    const Eigen::Matrix3d& axes = solver.eigenvectors();
     return axes.allFinite() ? axes : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   }
 };
@@ -165,7 +170,7 @@ Fit fit(const std::vector<ConvexPart>& parts, std::uint32_t first, std::uint32_t
 }  // namespace
 
 SurfaceBvh::SurfaceBvh(const Solid& solid, const CancelRequest& cancelled)
-    : parts_(parts_of(solid)), hull_(parts_, cancelled) {
+    : parts_(parts_of(solid)), hull_(parts_, cancelled), has_hulls_(true) {
   build(cancelled);
 }
 
@@ -199,7 +204,7 @@ void SurfaceBvh::build(const CancelRequest& cancelled) {
   }
   throw_if(cancelled);
   root.count = 1;
-  root.child[0] = parts_.size() == 1 ? ~0 : add_node(all, cancelled);
+  root.child[0] = parts_.size() == 1 ? ~0 : add_node(all, 1, cancelled);
   nodes_[0] = root;
 }
 
@@ -223,7 +228,19 @@ std::uint32_t halve(std::vector<ConvexPart>* parts, std::uint32_t first, std::ui
 
 }  // namespace
 
-std::int32_t SurfaceBvh::add_node(const Range& range, const CancelRequest& cancelled) {
+// A hull of a part of a surface: where the surface is not convex, its parts often are nearly so.
+void SurfaceBvh::add_hull(const Range& range, Slot slot, const CancelRequest& cancelled) {
+  const Span<const ConvexPart> parts(&parts_[range.first], range.second - range.first);
+  const bool has_round = std::any_of(parts.begin(), parts.end(), [](const ConvexPart& part) {
+    return part.kind != Kind::kTriangle;
+  });
+  if (!has_round && parts.size() < kHullParts) return;
+  if (hull_of_.size() <= slot) hull_of_.resize(slot + 1, -1);
+  hull_of_[slot] = static_cast<std::int32_t>(hulls_.size());
+  hulls_.emplace_back(parts, cancelled, has_round ? kRoundHullPoints : kHullPoints);
+}
+
+std::int32_t SurfaceBvh::add_node(const Range& range, int depth, const CancelRequest& cancelled) {
   const std::size_t index = nodes_.size();
   nodes_.emplace_back();
   std::vector<Range> groups{range};
@@ -250,8 +267,11 @@ std::int32_t SurfaceBvh::add_node(const Range& range, const CancelRequest& cance
     set_box(group, &node, slot);
     if (!used) continue;
     const bool is_part = group.second - group.first == 1;
+    if (has_hulls_ && depth <= kHullLevels) {
+      add_hull(group, static_cast<Slot>(kWidth * index) + static_cast<Slot>(slot), cancelled);
+    }
     node.child[slot] =
-        is_part ? ~static_cast<std::int32_t>(group.first) : add_node(group, cancelled);
+        is_part ? ~static_cast<std::int32_t>(group.first) : add_node(group, depth + 1, cancelled);
   }
   nodes_[index] = node;
   return static_cast<std::int32_t>(index);

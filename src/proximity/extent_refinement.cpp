@@ -44,8 +44,8 @@ float PointExtentRefinement::refine(std::int32_t tile, int lane, float lower_bou
   }
   if (!search.visited.insert(id.key())) return traversal_prune_bound();
   const Eigen::Vector3d p_LQ = obstacles_.X_LO * p_OQ;
-  const double kept = link_.kept.distances.find(obstacles_.bvh->build_id(),
-                                                DistanceCache::Quantity::kUnsigned, id.key(), p_LQ);
+  const double kept = link_.kept.distances.find(DistanceCache::Quantity::kUnsigned,
+                                                coherent_key(obstacles_, id), p_LQ);
   const double enough = search_.prune_bound() + r;
   double bound = std::max(kept, search_.points_bound);
   if (bound < enough) bound = std::max(bound, points_.grid_bound({p_LQ}, enough).surface_distance);
@@ -73,8 +73,8 @@ void PointExtentRefinement::measure(ObstacleId id, const Eigen::Vector3d& p_OQ,
   const SignedDistance exact = distance_outside(
       link_.context.solid(), p_LQ, limit,
       has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L, 0.0, &lower_bound);
-  link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
-                             id.key(), p_LQ, lower_bound);
+  link_.kept.distances.store(DistanceCache::Quantity::kUnsigned, coherent_key(obstacles_, id), p_LQ,
+                             lower_bound);
   search_.refined = std::min(search_.refined, std::max(lower_bound, search_.points_bound) - r);
   if (!(exact.distance - r < search_.upper)) return;
   search_.upper = exact.distance - r;

@@ -41,6 +41,13 @@ struct LinkExtent {
     }
     return largest;
   }
+
+  /// [m] Where no point is nearer to the link than `distance`, no sphere is nearer than that less
+  /// this, however far out: distances grow faster than radii.
+  double largest_radius_beyond(double distance) const {
+    const double range = farthest_part + std::max(distance, 0.0);
+    return range < points.max_range ? radius(range) : largest_radius();
+  }
 };
 
 /// The search for the sphere that is nearest to a link, of those that stand for the points of all

@@ -44,7 +44,7 @@ std::string object_fault(const WorldObject& object) {
   if (!unnamed.empty()) return "its name " + unnamed;
   const std::string unplaced = name_fault(object.frame);
   if (!unplaced.empty()) return "its frame " + unplaced;
-  const std::string misplaced = pose_fault(object.X_BO);
+  std::string misplaced = pose_fault(object.X_BO);
   if (!misplaced.empty()) return misplaced;
   if (!(object.margin >= 0.0 && object.margin <= kMaxLength)) {
     std::ostringstream text;
@@ -53,7 +53,7 @@ std::string object_fault(const WorldObject& object) {
   }
   if (object.geometry.empty()) return "it has no shape";
   for (const GeometryElement& element : object.geometry) {
-    const std::string fault = element_fault(element);
+    std::string fault = element_fault(element);
     if (!fault.empty()) return fault;
   }
   return "";

@@ -10,6 +10,7 @@
 #include "proximity/dual_tree.h"
 #include "proximity/first_bound.h"
 #include "proximity/refinement.h"
+#include "proximity/separating_planes.h"
 #include "proximity/single_tree_search.h"
 
 namespace ist {
@@ -31,6 +32,8 @@ constexpr double kSameCrowd = 1.5;
 // A link that is nearer than so many radii of its bounding sphere gets its first bound by more and
 // smaller spheres.
 constexpr double kFineSpheresWithin = 0.5;
+// Nodes that are divided for a first bound by a supporting plane.
+constexpr int kQuickSteps = 16;
 // [m] A link that no first bound was found for is tried again when it has moved so far.
 constexpr double kFirstBoundAgain = 0.02;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
@@ -257,7 +260,8 @@ void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
   }
 }
 
-// Measures an obstacle that is near a place, though perhaps not the nearest.
+// Measures an obstacle that is near a place, though perhaps not the nearest: of the points of one
+// tile, the one nearest to the last closest point of the link. Noise has moved all of them.
 void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ) {
   const Eigen::Vector3d p_OQ = obstacles.X_FO.inverse() * p_FQ;
   std::int32_t child = obstacles.bvh->root();
@@ -268,9 +272,11 @@ void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen:
   enter(obstacles);
   PointTile scratch;
   const PointTile& tile = obstacles.bvh->tile(static_cast<std::size_t>(~child), &scratch);
+  const auto& last = link_.kept.last;
+  const Eigen::Vector3d p_OC = last.has_place ? obstacles.X_OL * last.p_LCl : p_OQ;
   int nearest = 0;
   for (int k = 1; k < tile.count; ++k) {
-    if ((tile.point(k) - p_OQ).squaredNorm() < (tile.point(nearest) - p_OQ).squaredNorm()) {
+    if ((tile.point(k) - p_OC).squaredNorm() < (tile.point(nearest) - p_OC).squaredNorm()) {
       nearest = k;
     }
   }
@@ -458,37 +464,88 @@ void LinkQuery::keep_bound(double bound, double cover_distance) {
   link_.kept.bound.prove(search.scene, search.X_FL, bound, cover_distance, search.max_coordinate);
 }
 
-// Obstacles that are farther from the cover spheres than the interior gap are outside the link.
-void LinkQuery::prove_first_bound(SnapshotSpan clouds) {
+// Keeps the least of the bounds of all indices, if it is positive.
+// @param bound_of_index  (obstacles) -> [m] no obstacle has a smaller signed distance, but for the
+//                        rounding; not positive where one may be inside
+template <class BoundOfIndex>
+void LinkQuery::prove_bound(SnapshotSpan clouds, const BoundOfIndex& bound_of_index) {
+  double bound = kInfinity;
+  const auto take = [&](const auto& obstacles) {
+    enter(obstacles);
+    bound = std::min(bound, bound_of_index(obstacles));
+  };
+  for (std::size_t i = 0; i < clouds.size() && bound > 0.0; ++i) {
+    for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, take);
+  }
+  bound -= link_.search.rounding;
+  // A mesh with holes is bounded by its cover spheres alone: the bound is a cover distance, too.
+  if (bound > 0.0) keep_bound(bound, bound);
+}
+
+// Obstacles that are farther from the cover spheres than the interior gap are outside the link, and
+// so is what is above a supporting plane.
+void LinkQuery::prove_first_bound(SnapshotSpan clouds, bool is_late) {
   LinkSearch& search = link_.search;
   if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
   auto& last = link_.kept.first_bound;
   if (last.scene == search.scene && search.scene != kUnknownScene &&
+      !(is_late && last.was_proven) &&
       link_.context.displacement.between(last.X_FL, search.X_FL) < kFirstBoundAgain) {
     return;
   }
   last.scene = search.scene;
   last.X_FL = search.X_FL;
+  last.by_planes = false;
   const InnerSphereTree& tree = link_.context.tree();
-  const double gap = tree.interior_gap();
-  double bound = kInfinity;
-  bool is_outside = true;
-  const auto bound_index = [&](const auto& obstacles) {
-    enter(obstacles);
+  prove_bound(clouds, [&](const auto& obstacles) {
     const auto by_spheres = [&](bool is_fine) {
-      return static_cast<double>(first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine),
-                                             obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+      const auto bound =
+          static_cast<double>(first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine),
+                                          obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+      const bool is_outside = bound - search.rounding > tree.interior_gap();  // false for NaN
+      return is_outside ? bound : -kInfinity;
     };
-    double of_index = by_spheres(false);
-    if (of_index < kFineSpheresWithin * tree.radius()) of_index = by_spheres(true);
-    is_outside = is_outside && of_index > gap;  // false for NaN
-    bound = std::min(bound, of_index);
-  };
-  for (std::size_t i = 0; i < clouds.size() && is_outside; ++i) {
-    for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL, bound_index);
+    const double bound = by_spheres(false);
+    if (bound >= kFineSpheresWithin * tree.radius()) return bound;
+    if (!link_.context.solid().is_closed()) return by_spheres(true);
+    return bound_by_planes(obstacles, nullptr);
+  });
+  last.was_proven = link_.kept.bound.at(search.scene, search.X_FL) > 0.0;
+}
+
+void LinkQuery::prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline) {
+  LinkSearch& search = link_.search;
+  auto& last = link_.kept.first_bound;
+  if (search.is_answered || last.scene != search.scene || last.by_planes ||
+      !link_.context.solid().is_closed() || !(search.closest.exact.distance > 0.0) ||
+      link_.kept.bound.at(search.scene, search.X_FL) > 0.0) {
+    return;
   }
-  bound -= search.rounding;
-  if (is_outside && bound > gap) keep_bound(bound, bound);
+  last.by_planes = true;
+  prove_bound(clouds, [&](const auto& obstacles) { return bound_by_planes(obstacles, deadline); });
+}
+
+// @param deadline  null: by the plane across the closest obstacle alone, in a few steps
+template <class Obstacles>
+double LinkQuery::bound_by_planes(const Obstacles& obstacles, Deadline* deadline) {
+  const LinkSearch& search = link_.search;
+  const InnerSphereTree& tree = link_.context.tree();
+  const PosedSpheres spheres(tree, obstacles.X_OL, true);
+  SeparatingPlanes planes(*link_.context.model, obstacles.X_OL);
+  const SignedDistance& closest = search.closest.exact;
+  if (closest.distance > 0.0 && closest.distance < kInfinity) {
+    planes.add(obstacles.X_OL.linear() * closest.normal);
+  }
+  SeparationInput<std::decay_t<decltype(*obstacles.bvh)>> input;
+  input.spheres = &spheres;
+  input.gap = round_up(tree.interior_gap() + search.rounding);
+  input.radius = static_cast<float>(tree.radius());
+  input.bvh = obstacles.bvh;
+  if (deadline == nullptr) {
+    input.max_steps = kQuickSteps;
+    input.max_planes = planes.count();
+  }
+  return static_cast<double>(ist::bound_by_planes(input, &planes, deadline));
 }
 
 // The error of a distance by the coordinates of stored points and by poses that are not quite

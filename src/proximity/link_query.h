@@ -33,15 +33,20 @@ class LinkQuery {
              const QueryConfig& config, const OtherLinks& other_links, QueryStatistics* statistics,
              Deadline* deadline);
 
-  /// Proves a first lower bound of the link's distance, where none is kept: it takes some
-  /// microseconds, and is kept for the poses to come. A link that is too near for it is not tried
-  /// again at every step.
-  void prove_first_bound(SnapshotSpan clouds);
-
   /// Measures the last answer's obstacle at the new pose, where it is still in the scene; else a
   /// point that is near to where it was.
   /// @param has_time  false: only the last answer's obstacle, which is one exact distance
   void warm_start(SnapshotSpan clouds, bool has_time = true);
+
+  /// Proves a first lower bound of the link's distance, where none is kept: it takes some
+  /// microseconds, and is kept for the poses to come. A link that is too near for it is not tried
+  /// again at every step, nor is one that a search will prove more of. It is best after
+  /// warm_start(): the plane across the obstacle that was measured may separate the link from all
+  /// others.
+  /// @param is_late  no search follows
+  void prove_first_bound(SnapshotSpan clouds, bool is_late);
+  /// The same with more time, for links that prove_first_bound() has proven nothing of.
+  void prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline);
 
   /// Asks again for what begin() has asked, with other tolerances; what run() has found since is
   /// the upper bound.
@@ -107,6 +112,10 @@ class LinkQuery {
   bool run(const Obstacles& obstacles);
   template <class Obstacles>
   void enter(const Obstacles& obstacles);
+  template <class BoundOfIndex>
+  void prove_bound(SnapshotSpan clouds, const BoundOfIndex& bound_of_index);
+  template <class Obstacles>
+  double bound_by_planes(const Obstacles& obstacles, Deadline* deadline);
   void measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);

@@ -92,9 +92,7 @@ double region_bound(SnapshotSpan clouds, const LinkQueryState& link) {
   double bound = points;
   for (const CloudSnapshot* cloud : clouds) {
     const LinkExtent extent = link_extent(*cloud, link);
-    const double range = extent.farthest_part + std::max(points, 0.0);
-    const double radius =
-        range < extent.points.max_range ? extent.radius(range) : extent.largest_radius();
+    const double radius = extent.largest_radius_beyond(points);
     bound = std::min(bound, points - std::max(radius, cloud->box_extent));
   }
   return bound;
@@ -189,11 +187,13 @@ double LinkQuery::radius_of_closest(SnapshotSpan clouds) const {
 template <class Visit>
 bool LinkQuery::for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentSearch* spheres) {
   bool visited_all = true;
-  // Whether an index is searched: its nearest point may be within the limit with its radius.
-  const auto matters = [&](double largest_radius) {
-    const double bound = spheres->points_bound - largest_radius;
-    if (bound < spheres->prune_bound()) return true;
-    spheres->refined = std::min(spheres->refined, bound);
+  // Whether an index is searched: its nearest point may be within the limit with its radius. The
+  // bound of one that is not is kept for poses with other limits, so that it must hold beyond.
+  const auto matters = [&](double radius_within, double radius_beyond) {
+    const double points = spheres->points_bound;
+    if (points - radius_within < spheres->prune_bound()) return true;
+    const double within = std::min(spheres->limit(), points - radius_within);
+    spheres->refined = std::min(spheres->refined, std::max(within, points - radius_beyond));
     return false;
   };
   for (std::size_t i = 0; i < clouds.size(); ++i) {
@@ -202,11 +202,14 @@ bool LinkQuery::for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentS
     const auto visit_index = [&](const auto& obstacles) {
       if (!visited_all) return;
       if constexpr (is_points<decltype(obstacles)>) {
-        if (!matters(extent.largest_radius_within(spheres->limit()))) return;
+        if (!matters(extent.largest_radius_within(spheres->limit()),
+                     extent.largest_radius_beyond(spheres->points_bound))) {
+          return;
+        }
         PointExtentRefinement refinement(obstacles, extent, &link_, spheres);
         visited_all = visit(obstacles, &refinement);
       } else {
-        if (!matters(cloud.box_extent)) return;
+        if (!matters(cloud.box_extent, cloud.box_extent)) return;
         BoxExtentRefinement refinement(obstacles, cloud.box_extent, &link_, spheres);
         visited_all = visit(obstacles, &refinement);
       }

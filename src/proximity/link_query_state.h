@@ -104,6 +104,8 @@ struct LinkCoherence {
   struct {
     SceneId scene = kUnknownScene;  ///< unknown: nowhere
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    bool was_proven = false;  ///< whether one was found
+    bool by_planes = false;   ///< with as many planes as it takes, too
   } first_bound;
   SupportCache supports;
   Eigen::Vector3d plane_normal_L = Eigen::Vector3d::Zero();  ///< of `supports`; zero: none yet

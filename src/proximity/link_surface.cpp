@@ -110,11 +110,11 @@ std::shared_ptr<const LinkSurface> LinkSurface::of(const LinkModel& link,
   static std::vector<std::weak_ptr<const LinkSurface>> in_use;
   const std::lock_guard<std::mutex> lock(mutex);  // two threads would make the same one
   in_use.erase(std::remove_if(in_use.begin(), in_use.end(),
-                              [](const auto& surface) { return surface.expired(); }),
+                              [](const auto& other) { return other.expired(); }),
                in_use.end());
   for (const auto& kept : in_use) {
-    auto surface = kept.lock();
-    if (surface && is_same_solid(surface->solid, link.solid)) return surface;
+    auto same = kept.lock();
+    if (same && is_same_solid(same->solid, link.solid)) return same;
   }
   auto made = std::make_shared<const LinkSurface>(link, cancelled);
   in_use.push_back(made);

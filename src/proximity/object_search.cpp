@@ -32,10 +32,7 @@ void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
 }
 
 ObjectSearch::ObjectSearch(const RobotSurfaces& robot, std::size_t link)
-    : robot_(robot),
-      link_(link),
-      model_(robot.model->links[link]),
-      surface_(robot.surfaces[link].get()) {
+    : link_(link), model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
   if (surface_ == nullptr) return;
   const Eigen::AlignedBox3d& box = robot.boxes[link];
   center_L_ = box.center();
@@ -186,11 +183,12 @@ void ObjectSearch::activate(const Candidate& candidate) {
   const PosedObject& object = objects_->objects[candidate.object];
   const double margin = margin_of(object);
   // An object that is farther than the nearest one need not be measured.
-  double range = std::max({distance_, question_.influence_distance, kTouch});
-  range = std::min(range, question_.config.max_distance + margin);
+  const double range = std::max({distance_, question_.influence_distance, kTouch});
   QueryConfig config = question_.config;
   config.margin = margin;
-  config.max_distance = current_range_ = range - margin;
+  // The margin is not added to max_distance and taken off again: what rounding leaves of it then
+  // may be less, and an object that is clear would be neither clear nor near.
+  config.max_distance = current_range_ = std::min(range - margin, config.max_distance);
   current_candidate_ = candidate;
   current_ = slot_of(object);
   current_->used = queries_;

@@ -100,7 +100,6 @@ class ObjectSearch {
   void take_distance(const PairProximity& found);
   LinkProximity answer_of(const PairProximity& found) const;
 
-  const RobotSurfaces& robot_;
   const std::size_t link_;
   const LinkModel& model_;
   const LinkSurface* surface_;  // null: the link is not usable

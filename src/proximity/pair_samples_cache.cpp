@@ -105,6 +105,7 @@ std::optional<std::vector<SampledPair>> PairSamplesCache::load(const std::string
   std::error_code error;
   if (!std::filesystem::exists(path(key), error) && !error) return std::nullopt;
   std::vector<SampledPair> sampled;
+  sampled.reserve(pairs.size());
   for (const LinkPair& pair : pairs) sampled.push_back({pair, 0, 0});
   std::string bytes;
   std::string problem = read_regular_file(path(key), serialized(key, sampled).size(), &bytes);

@@ -13,9 +13,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m] A finished lower bound may be this much lower than the tolerance asks for: 0.2 um by rounding
 // for each metre of coordinates, of which there are no more than ten in a robot's work.
 constexpr double kBoundError = 2e-6;
-// [s] Links of which nothing is known yet may exceed the deadline by so much together: an answer
-// that is as late is worth more than none.
-constexpr double kFirstAnswers = 5e-5;
+// [s] Links of which nothing is known yet may exceed the deadline by so much together, until each
+// has an obstacle that was measured, and until each has a bound: an answer that is as late is worth
+// more than none.
+constexpr double kFirstObstacles = 6e-5, kFirstBounds = 7.5e-5;
 
 }  // namespace
 
@@ -64,13 +65,19 @@ struct ProximityQuery::Impl {
     return first;
   }
 
-  // Before any link is refined, every one in `order` gets a first lower bound and an obstacle that
-  // was measured.
+  // Before any link is refined, every one in `order` gets an obstacle that was measured, and a
+  // first lower bound. Links without a bound get more time for one, while there is any.
   void start(SnapshotSpan clouds, Deadline* deadline) {
     for (const std::size_t i : order) {
-      const bool has_time = !deadline->passed_by(kFirstAnswers);
-      if (config.deadline > 0.0 && has_time) links[i].prove_first_bound(clouds);
-      links[i].warm_start(clouds, has_time);
+      links[i].warm_start(clouds, !deadline->passed_by(kFirstObstacles));
+    }
+    if (!(config.deadline > 0.0)) return;
+    for (const std::size_t i : order) {
+      if (deadline->passed_by(kFirstBounds)) break;
+      links[i].prove_first_bound(clouds, deadline->has_passed());
+    }
+    for (const std::size_t i : order) {
+      if (!deadline->passed()) links[i].prove_bound_by_planes(clouds, deadline);
     }
   }
 

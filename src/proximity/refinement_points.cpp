@@ -28,8 +28,8 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   const bool is_late = deadline_passed();
   if (!is_late && !search.visited.insert(id.key())) return search.traversal_prune_bound();
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
-  const double kept = link_.kept.distances.find(obstacles_.bvh->build_id(),
-                                                DistanceCache::Quantity::kUnsigned, id.key(), p_LQ);
+  const double kept = link_.kept.distances.find(DistanceCache::Quantity::kUnsigned,
+                                                coherent_key(obstacles_, id), p_LQ);
   const double bound = std::max(kept, grid_bound({p_LQ}, search.prune_bound()).surface_distance);
   if (bound >= search.prune_bound()) {
     search.prune(bound);
@@ -79,8 +79,8 @@ PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d
   if (bound.is_outside) return Side::kOutside;
   DistanceCache& kept = link_.kept.distances;
   const auto quantity = DistanceCache::Quantity::kOutside;
-  const std::uint64_t build_id = obstacles_.bvh->build_id();
-  if (kept.find(build_id, quantity, id.key(), p_LQ) > 0.0) return Side::kOutside;
+  const std::uint32_t key = coherent_key(obstacles_, id);
+  if (kept.find(quantity, key, p_LQ) > 0.0) return Side::kOutside;
   if (deadline_passed()) return Side::kUnknown;
   link_.search.count_exact();
   const Solid& solid = link_.context.solid();
@@ -89,7 +89,7 @@ PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d
           ? OutsideMargin{solid.is_inside(p_LQ), solid.is_closed() ? bound.surface_distance : 0.0}
           : outside_margin(solid, p_LQ, bound.surface_distance);
   if (found.is_inside) return Side::kInside;
-  if (found.margin > 0.0) kept.store(build_id, quantity, id.key(), p_LQ, found.margin);
+  if (found.margin > 0.0) kept.store(quantity, key, p_LQ, found.margin);
   return Side::kOutside;
 }
 
@@ -132,8 +132,8 @@ double PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_
   const SignedDistance exact = distance_outside(
       link_.context.solid(), p_LQ, limit,
       has_closest ? search.closest.exact.normal : link_.kept.plane_normal_L, 0.0, &lower_bound);
-  link_.kept.distances.store(obstacles_.bvh->build_id(), DistanceCache::Quantity::kUnsigned,
-                             id.key(), p_LQ, lower_bound);
+  link_.kept.distances.store(DistanceCache::Quantity::kUnsigned, coherent_key(obstacles_, id), p_LQ,
+                             lower_bound);
   if (lower_bound < exact.distance) {
     search.refined_bound = std::min(search.refined_bound, lower_bound);
   }

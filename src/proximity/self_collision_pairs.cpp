@@ -137,6 +137,7 @@ std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& m
   constexpr double kTurn = 3.14159265358979323846, kSlide = 0.5;  // [rad, m] without limits
   const auto& joints = kinematics.joints();
   std::vector<SampledPair> sampled;
+  sampled.reserve(pairs.size());
   for (const LinkPair& pair : pairs) sampled.push_back({pair, 0, 0});
   ForwardKinematics forward(*model, {std::shared_ptr<const Kinematics>(), &kinematics});
   QueryConfig config;

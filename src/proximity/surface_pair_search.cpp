@@ -379,15 +379,38 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   return true;
 }
 
+// [m] A lower bound of a pair by the hulls of what is below it; 0: there are none, or they are no
+// farther apart than what is asked for.
+double SurfacePairSearch::bound_by_hulls(const Pair& pair) const {
+  const HullCoreset *hull_a = a_.hull_of(pair.a), *hull_b = b_.hull_of(pair.b);
+  if (hull_a == nullptr || hull_b == nullptr) return 0.0;
+  HullSupport support;
+  support.size = 1;
+  support.a[0] = hull_a->farthest(-n_A_.cast<double>());
+  support.b[0] = hull_b->farthest(n_B_.cast<double>());
+  const double errors = hull_a->error() + hull_b->error() + 2.0 * exact_rounding_;
+  const HullDistance hulls =
+      hull_distance(*hull_a, *hull_b, X_BA_, 0.0, &support, prune_bound_ + errors);
+  return std::max(hulls.lower_bound - exact_rounding_, 0.0);
+}
+
 void SurfacePairSearch::visit(const Entry& entry, int* steps) {
   --*steps;
   ++looked_at_;
   const double known = bound_at(entry.key);
-  const Pair pair{known > 0.0 ? known : -1e30, entry.a, entry.b};
+  Pair pair{known > 0.0 ? known : -1e30, entry.a, entry.b};
   if (is_leaf(pair)) {
     const double bound = measure(pair);
     keep({bound > 0.0 ? bound + path() : kUnproven, pair.a, pair.b, 0});
     return;
+  }
+  const double by_hulls = bound_by_hulls(pair);
+  if (by_hulls > 0.0) {
+    pair.bound = std::max(pair.bound, by_hulls);
+    if (!is_wanted(by_hulls)) {
+      keep({by_hulls + path(), pair.a, pair.b, entry.children});
+      return;
+    }
   }
   const Expansion children = expand(pair, entry.children, prune_bound_);
   if (children.unwanted != 0) {

@@ -26,9 +26,10 @@ namespace ist {
 ///
 /// Before pairs are searched, the convex hulls are asked: their distance is a lower bound, and
 /// where the parts nearest to its ends are as near, it is the answer (convex bodies, and most
-/// others that are apart). The closest parts found last give the first upper bound at a new pose.
-/// Where the memory is full, pairs are searched depth first, which needs none but a bounded stack:
-/// nothing is allocated after construction.
+/// others that are apart). In the search, the hulls of the first levels' nodes bound pairs that
+/// their boxes do not answer. The closest parts found last give the first upper bound at a new
+/// pose. Where the memory is full, pairs are searched depth first, which needs none but a bounded
+/// stack: nothing is allocated after construction.
 class SurfacePairSearch {
  public:
   /// @param a, b      outlive this
@@ -132,6 +133,7 @@ class SurfacePairSearch {
   bool is_leaf(const Pair& pair) const;
   Expansion expand(const Pair& pair, std::uint8_t children, double prune_bound);
   double overlap_order(const Pair& pair) const;
+  double bound_by_hulls(const Pair& pair) const;
   double measure(const Pair& pair);
   void descend();
   void prove_by_plane();

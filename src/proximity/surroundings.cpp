@@ -16,8 +16,9 @@ Surroundings::Surroundings(const LinkModel& link, double skin, double distance) 
   const double half = link.tree.radius() + distance;
   const double step = 2.0 * half / kSteps;
   for (int i = 0; i < kSteps * kSteps * kSteps; ++i) {
-    const Eigen::Array3d cell(i % kSteps, i / kSteps % kSteps, i / kSteps / kSteps);
-    const Eigen::Vector3d p_L = link.tree.center().array() - half + step * (cell + 0.5);
+    const Eigen::Array3i cell(i % kSteps, i / kSteps % kSteps, i / kSteps / kSteps);
+    const Eigen::Vector3d p_L =
+        link.tree.center().array() - half + step * (cell.cast<double>() + 0.5);
     const double apart = link.tree.cover_distance(p_L);
     if (apart > std::max(skin, link.tree.interior_gap()) && apart <= distance) {
       points_.push_back(p_L);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "internal/geometry/limits.h"
@@ -180,6 +181,7 @@ std::size_t triangles_of(const GeometryElement& element) {
 void read_objects(Scanner* in, const std::string& frame, const WorldLimits& limits,
                   std::vector<WorldObject>* objects) {
   in->line();  // the scene's name
+  std::set<std::string> names;
   std::size_t triangles = 0, shapes_read = 0;
   bool is_first = true, has_poses = false;
   while (true) {
@@ -189,6 +191,9 @@ void read_objects(Scanner* in, const std::string& frame, const WorldLimits& limi
     WorldObject object;
     object.frame = frame;
     object.name = in->line();
+    if (!names.insert(object.name).second) {
+      in->fail("it names object '" + printable(object.name) + "' twice; names must be unique");
+    }
     if (is_first) has_poses = in->next_line_has_words();
     is_first = false;
     if (has_poses) object.X_BO = in->pose("the object's pose");

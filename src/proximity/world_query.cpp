@@ -45,11 +45,11 @@ struct WorldQuery::Impl {
     bool operator<(const Waiting& other) const { return bound > other.bound; }  // least on top
   };
 
-  bool take_worlds(Span<const PosedWorld* const> worlds);
-  void list_objects(Span<const PosedWorld* const> worlds);
+  bool take_worlds(Span<const PosedWorld* const> given);
+  void list_objects(Span<const PosedWorld* const> given);
   void prepare_searches();
   void note_allowed(const std::vector<std::string>& names, std::uint64_t* bits) const;
-  void move_objects(Span<const PosedWorld* const> worlds);
+  void move_objects(Span<const PosedWorld* const> given);
   void finish_by(Deadline* deadline);
   void count_unfinished(const LinkProximity& result);
 

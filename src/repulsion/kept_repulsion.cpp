@@ -55,7 +55,7 @@ RepulsiveWrench KeptRepulsion::update(const Repulsion& repulsion, const Eigen::I
     return mean(sums, length);
   }
   is_kept_ = false;
-  const RepulsiveWrench blend =
+  RepulsiveWrench blend =
       repulsion.blend(link_, X_FL, clouds, proximity, config, end, blend_.get());
   is_kept_ = blend.force.allFinite() && !blend_->empty();
   obstacles_ = obstacles;

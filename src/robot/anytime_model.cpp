@@ -96,7 +96,7 @@ class AnytimeModel::Step {
   void choose_links();
   void forget_unused_shapes();
   void add_unknown_shapes(Stage stage);
-  void add_shapes_to_refine(std::size_t link);
+  void add_shapes_to_refine(std::size_t index);
   bool pack(int threads);
   /// @param before   supplies the links that are the same; may be null
   /// @param changed  the link whose geometry may differ from `before`

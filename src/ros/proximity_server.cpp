@@ -170,8 +170,7 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   }
   const auto live = [this] { return live_config(); };
   if (config_.unknown_space != UnknownSpace::kFree) {
-    unknown_space_ =
-        std::make_unique<UnknownSpaceWatch>(memories_, buffer_, config_.query.max_distance);
+    unknown_space_ = std::make_unique<UnknownSpaceWatch>(memories_, config_.query.max_distance);
   }
   query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
                                                   live, unknown_space_.get());

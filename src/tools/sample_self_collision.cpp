@@ -65,14 +65,14 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Options options;
-  CLI::App app("Finds pairs of links that never or always touch");
-  declare(&app, &options);
-  CLI11_PARSE(app, argc, argv);
   try {
+    Options options;
+    CLI::App app("Finds pairs of links that never or always touch");
+    declare(&app, &options);
+    CLI11_PARSE(app, argc, argv);
     return run(options);
   } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
+    std::cerr << "error: " << error.what() << '\n';
     return 1;
   }
 }

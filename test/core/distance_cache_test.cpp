@@ -17,37 +17,59 @@ namespace {
 
 using Quantity = DistanceCache::Quantity;
 
-TEST(DistanceCache, FindsTheSamePointOfTheSameIndex) {
+TEST(DistanceCache, FindsTheSameQuantityUnderTheSameKey) {
   DistanceCache cache;
   const Eigen::Vector3d p(0.1, 0.2, 0.3), q(0.1, 0.2, 0.34);
-  EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, p)));
-  cache.store(1, Quantity::kSigned, 7, p, 0.5);
-  EXPECT_EQ(cache.find(1, Quantity::kSigned, 7, p), 0.5);
-  EXPECT_LE(cache.find(1, Quantity::kSigned, 7, q), 0.46);
-  EXPECT_NEAR(cache.find(1, Quantity::kSigned, 7, q), 0.46, 1e-12);
-  EXPECT_EQ(cache.find(1, Quantity::kSigned, 7, p), 0.5) << "displacements do not add up";
+  EXPECT_TRUE(std::isinf(cache.find(Quantity::kSigned, 7, p)));
+  cache.store(Quantity::kSigned, 7, p, 0.5);
+  EXPECT_EQ(cache.find(Quantity::kSigned, 7, p), 0.5);
+  EXPECT_LE(cache.find(Quantity::kSigned, 7, q), 0.46);
+  EXPECT_NEAR(cache.find(Quantity::kSigned, 7, q), 0.46, 1e-12);
+  EXPECT_EQ(cache.find(Quantity::kSigned, 7, p), 0.5) << "displacements do not add up";
   for (const double other :
-       {cache.find(2, Quantity::kSigned, 7, p), cache.find(1, Quantity::kUnsigned, 7, p),
-        cache.find(1, Quantity::kSigned, 8, p)}) {
+       {cache.find(Quantity::kUnsigned, 7, p), cache.find(Quantity::kSigned, 8, p)}) {
     EXPECT_EQ(other, -std::numeric_limits<double>::infinity());
   }
   const Eigen::Vector3d none(0, std::numeric_limits<double>::quiet_NaN(), 0);
-  EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, none)));
-  cache.store(1, Quantity::kSigned, 7, none, 0.5);
-  EXPECT_TRUE(std::isinf(cache.find(1, Quantity::kSigned, 7, p)));
+  EXPECT_TRUE(std::isinf(cache.find(Quantity::kSigned, 7, none)));
+  cache.store(Quantity::kSigned, 7, none, 0.5);
+  EXPECT_TRUE(std::isinf(cache.find(Quantity::kSigned, 7, p)));
 }
 
 // Points share the entries of the cache; none is given what another has stored.
 TEST(DistanceCache, TellsPointsOfOneEntryApart) {
   DistanceCache cache;
   const Eigen::Vector3d p(0.1, 0.2, 0.3);
-  cache.store(1, Quantity::kSigned, 7, p, 0.5);
+  cache.store(Quantity::kSigned, 7, p, 0.5);
   for (std::uint32_t key = 0; key < 100000; ++key) {
     for (const Quantity quantity : {Quantity::kUnsigned, Quantity::kSigned, Quantity::kOutside}) {
       const bool is_it = key == 7 && quantity == Quantity::kSigned;
-      ASSERT_EQ(std::isfinite(cache.find(1, quantity, key, p)), is_it) << key;
+      ASSERT_EQ(std::isfinite(cache.find(quantity, key, p)), is_it) << key;
     }
   }
+}
+
+// The points of many images under the keys of the first: the bound is that of the place, whatever
+// point is there.
+TEST(DistanceCache, HoldsForOtherPointsUnderTheSameKey) {
+  test::Rng rng(92);
+  const Solid solid({GeometryElement{test::l_shape(0.2, 0.05), Eigen::Isometry3d::Identity(), ""}});
+  DistanceCache cache;
+  int found = 0;
+  for (int image = 0; image < 40; ++image) {
+    const double noise = std::pow(10.0, test::uniform(&rng, -5, -1));
+    for (std::uint32_t key = 0; key < 200; ++key) {
+      const auto at = static_cast<double>(key);
+      const Eigen::Vector3d place(0.3 * std::sin(at), 0.3 * std::cos(2.0 * at), 0.2);
+      const Eigen::Vector3d p = place + test::random_vector(&rng, noise);
+      const double kept = cache.find(Quantity::kSigned, key, p);
+      const PointDepth depth = point_depth(solid, p, -1.0);
+      ASSERT_LE(kept, depth.exact.distance + 1e-12) << "image " << image << ", key " << key;
+      found += kept > 0.0 ? 1 : 0;
+      cache.store(Quantity::kSigned, key, p, depth.floor);
+    }
+  }
+  EXPECT_GT(found, 1000);
 }
 
 // More points than the cache has entries move in and out of a link.
@@ -62,11 +84,11 @@ TEST(DistanceCache, BoundsAreNeverAboveTheTruth) {
     const auto i = static_cast<std::uint32_t>(rng() % points.size());
     Eigen::Vector3d& p = points[i];
     p += test::random_vector(&rng, std::pow(10.0, test::uniform(&rng, -6, -2)));
-    const double floor = cache.find(1, Quantity::kSigned, i, p);
+    const double floor = cache.find(Quantity::kSigned, i, p);
     const PointDepth depth = point_depth(solid, p, -1.0);
     ASSERT_LE(floor, depth.exact.distance + 1e-12);
     found += std::isfinite(floor) ? 1 : 0;
-    if (step % 3 == 0) cache.store(1, Quantity::kSigned, i, p, depth.floor);
+    if (step % 3 == 0) cache.store(Quantity::kSigned, i, p, depth.floor);
   }
   EXPECT_GT(found, 1000);
 }

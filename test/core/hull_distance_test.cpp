@@ -65,13 +65,39 @@ TEST(HullCoreset, SupportIsThatOfTheSurfaceButForTheError) {
   }
 }
 
-TEST(HullCoreset, OnlyTrianglesHaveOne) {
+// Cylinders and spheres, alone and together, in any position: their supports are those of the
+// points but for the error, also where there are fewer points than were made of them.
+TEST(HullCoreset, HoldsRoundPartsToItsError) {
+  test::Rng rng(35);
   EXPECT_TRUE(HullCoreset(std::vector<ConvexPart>{}).empty());
-  ConvexPart sphere;
-  sphere.kind = ConvexPart::Kind::kSphere;
-  sphere.a = sphere.b = sphere.c = Point::Zero();
-  sphere.radius = 0.1;
-  EXPECT_TRUE(HullCoreset({sphere}).empty());
+  for (const std::size_t max_points : {64, 2048}) {
+    for (int trial = 0; trial < test::scaled(20); ++trial) {
+      std::vector<ConvexPart> parts;
+      for (int i = 0; i <= trial % 3; ++i) {
+        ConvexPart part;
+        part.kind = (trial + i) % 2 == 0 ? ConvexPart::Kind::kCylinder : ConvexPart::Kind::kSphere;
+        part.a = part.c = test::random_vector(&rng, 0.3);
+        part.b = test::random_vector(&rng, 0.2);
+        part.radius = test::uniform(&rng, 0.001, 0.1);
+        if (trial == 4) part.radius = 0.0;
+        if (trial == 6) part.b.setZero();
+        parts.push_back(part);
+      }
+      const HullCoreset hull(parts, {}, max_points);
+      ASSERT_LE(hull.size(), max_points);
+      if (max_points == 2048) {
+        ASSERT_LT(hull.error(), 0.003 * 0.1 + 1e-5);
+      }
+      for (int i = 0; i < 200; ++i) {
+        const Point n = test::random_vector(&rng, 1.0).normalized();
+        double truth = -1e9;
+        for (const ConvexPart& part : parts) truth = std::max(truth, support(part, n));
+        const double found = n.dot(hull.point(hull.farthest(n)));
+        ASSERT_LE(found, truth + 1e-12) << trial;
+        ASSERT_GE(found + hull.error(), truth) << trial;
+      }
+    }
+  }
 }
 
 // Never above the distance of any two triangles, from any start; and for convex meshes that

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/geometry/ray_bundle.h"
 #include "support/allocations.h"
 #include "support/meshes.h"
 
@@ -194,6 +195,63 @@ TEST(RayCast, allocatesNothing) {
     nearest_approach(solid, {1.0, 0.0, 0.001 * i}, {-1.0, 0.0, 0.0}, 0.9, 0.1);
   }
   EXPECT_EQ(test::allocations - before, 0);
+}
+
+// The rays of a tile of pixels: what the bundle says of each is what a search for it alone says.
+// Sensors stand inside, near and up to 30 m away; the pixels are up to 0.1 rad apart.
+TEST(RayBundle, agreesWithSingleRays) {
+  Random random(5);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  std::vector<std::vector<GeometryElement>> solids;
+  for (const NamedMesh& m : meshes()) {
+    solids.push_back({element(m.mesh, random_pose(&random))});
+  }
+  // More leaves than a bundle has room for, several elements, and more of these than it can list.
+  solids.push_back({element(test::icosphere(0.15, 6), random_pose(&random))});
+  solids.push_back({element(test::torus(0.15, 0.04, 48, 24), random_pose(&random)),
+                    element(Box{{0.1, 0.2, 0.3}}, random_pose(&random)),
+                    element(Sphere{0.1}, random_pose(&random)),
+                    element(Cylinder{0.05, 0.3}, random_pose(&random))});
+  std::vector<GeometryElement> many;
+  for (int i = 0; i < 20; ++i) many.push_back(element(Sphere{0.03}, random_pose(&random)));
+  solids.push_back(many);
+
+  RayBundle bundle;
+  int hits = 0, misses = 0, empty = 0;
+  for (const std::vector<GeometryElement>& elements : solids) {
+    const Solid solid(elements);
+    for (int i = 0; i < 400; ++i) {
+      const double range = std::pow(10.0, -1.5 + 1.5 * (u(random) + 1.0));
+      const double apart = std::pow(10.0, -4.0 + 1.5 * (u(random) + 1.0));
+      const Eigen::Vector3d origin = range * random_direction(&random);
+      const Eigen::Vector3d aim = 0.25 * random_direction(&random) - origin;
+      const double length = i % 2 == 0 ? 1.0 : aim.norm();
+      std::vector<Eigen::Vector3d> directions;
+      Eigen::AlignedBox3d box;
+      for (int k = 0; k < 16; ++k) {
+        const Eigen::Vector3d d = aim.normalized() + apart * random_direction(&random);
+        directions.push_back(length * d);
+        box.extend(directions.back());
+      }
+      const double max_t = i % 3 == 0 ? kInf : aim.norm() / length;
+      const long before = test::allocations;
+      bundle.begin(solid, origin, box, max_t);
+      empty += bundle.empty() ? 1 : 0;
+      for (const Eigen::Vector3d& d : directions) {
+        const RayHit alone = ray_cast(solid, origin, d, max_t), hit = bundle.cast(d, max_t);
+        ASSERT_EQ(std::isfinite(hit.t), std::isfinite(alone.t));
+        (std::isfinite(hit.t) ? hits : misses) += 1;
+        if (!std::isfinite(hit.t)) continue;
+        ASSERT_FALSE(bundle.empty());
+        EXPECT_EQ(hit.t, alone.t);
+        EXPECT_EQ(hit.normal, alone.normal);
+      }
+      EXPECT_EQ(test::allocations, before);
+    }
+  }
+  EXPECT_GT(hits, 10000);
+  EXPECT_GT(misses, 10000);
+  EXPECT_GT(empty, 300);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cloud/filters/view_calibration.h"
+#include "internal/cloud/memory_scan.h"
 #include "internal/geometry/ray_cast.h"
 #include "internal/packing/packer.h"
 #include "ist_proximity/cloud/ingest.h"
@@ -265,6 +266,36 @@ TEST(ViewFilter, continuesAnObstacleTowardItsContact) {
   }
 }
 
+// A plate lies on a link that stands behind another one: in the image it ends at the front link's
+// outline, 0.4 m behind it. Nothing of the front link is a part of it, though every sixth of its
+// pixels is in front of its surface by a standard deviation. Nor is the rest of a link, behind a
+// board 0.2 m in front of it that touches the link's neighbour there.
+TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
+  std::vector<Body> robot = {Body(Cylinder{0.05, 0.5}, at(0.0, 0.0, 0.9)),
+                             Body(Box{{0.6, 0.6, 0.1}}, at(0.0, 0.0, 1.4)),
+                             Body(Box{{0.1, 0.1, 0.1}}, at(0.0, 0.25, 1.15))};
+  robot[0].X_FL.rotate(Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitX()));
+  const Body plate(Box{{0.3, 0.3, 0.012}}, at(0.0, 0.0, 1.344)),
+      board(Box{{0.1, 0.04, 0.004}}, at(0.0, 0.2, 1.098));
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  Ingest ingest(config_of(SelfFilterMode::kView));
+  CloudSnapshot viewed;
+  Share front, others;
+  for (int i = 0; i < 10; ++i) {
+    const Image image = picture(pointers(robot, {plate, board}), X_FS, kNoise, i);
+    ingest.run(image.raw(), X_FS, posed(robot), 0.1 * i, &viewed);
+    const Share link = share_of(image, kept_of(viewed), 0, 0),
+                plates = share_of(image, kept_of(viewed), 3, 4);
+    front.pixels += link.pixels;
+    front.kept += link.kept;
+    others.pixels += plates.pixels;
+    others.kept += plates.kept;
+  }
+  EXPECT_GT(front.pixels, 30000);
+  EXPECT_EQ(front.kept, 0);
+  EXPECT_GT(others.kept, 0.9 * others.pixels);
+}
+
 // What the padding keeps, the view keeps; of what the padding drops, the view drops the robot.
 TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
   const std::vector<Body> robot = arm();
@@ -328,6 +359,66 @@ TEST(ViewFilter, tellsADriftedSensor) {
   EXPECT_GT(viewed.view.offset, 0.004);
   EXPECT_EQ(viewed.view.X_SC.matrix(), Eigen::Matrix4d::Identity());
   for (const LinkView& link : viewed.view.links) EXPECT_EQ(link.blind_skin, kPadding);
+}
+
+// A rotation about the robot's middle moves none of the points on the robot, but an obstacle a
+// metre away by 70 mm. It is four times the stated error, which no correction is.
+TEST(ViewFilter, tellsASensorThatIsTurnedAboutTheRobot) {
+  const std::vector<Body> robot = arm();
+  Ingest ingest(config_of(SelfFilterMode::kView));
+  const Eigen::Vector3d middle(0.0, 0.05, 1.0);
+  Eigen::Isometry3d X_SE = Eigen::Isometry3d::Identity();
+  X_SE.linear() = Eigen::AngleAxisd(0.075, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  X_SE.translation() = middle - X_SE.linear() * middle;
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  Image image;
+  const CloudSnapshot viewed = run(&ingest, robot, {}, X_FS, X_FS * X_SE, 40, &image);
+  const double applied = Eigen::AngleAxisd(viewed.view.X_SC.linear()).angle();
+  EXPECT_LE(applied, 3.0 * 0.0175);
+  EXPECT_LT(viewed.view.offset, 0.01);
+  EXPECT_GT(viewed.view.angle, 3.0 * 0.0175);
+  EXPECT_TRUE(viewed.view.has_drifted);
+}
+
+// What is remembered of a cloud is where the cloud is: both are placed by the corrected pose, and
+// ranges, by which extents grow, count from the corrected sensor.
+TEST(ViewFilter, memoryAndExtentsAreOfTheCorrectedPose) {
+  const std::vector<Body> robot = arm();
+  const std::vector<Body> others = {Body(Box{{0.2, 0.2, 0.2}}, at(-0.1, -0.35, 1.0))};
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d X_SE = camera_error(0.005, 0.0175);
+  IngestConfig config = config_of(SelfFilterMode::kView);
+  config.extent.noise_constant = 0.001;
+  config.extent.noise_quadratic = 0.002;
+  Ingest ingest(config);
+  Image image;
+  const CloudSnapshot viewed = run(&ingest, robot, others, X_FS, X_FS * X_SE, 10, &image);
+  ASSERT_FALSE(viewed.view.has_drifted);
+  EXPECT_LT((viewed.X_FS.translation() - X_FS.translation()).norm(), 0.004);
+  EXPECT_EQ(viewed.extent.p_FS, viewed.X_FS.translation());
+  std::vector<Eigen::Vector3d> by_id(kWidth * kHeight);
+  std::vector<bool> is_kept(kWidth * kHeight, false);
+  for (const PointTile& tile : test::tiles_of(viewed.index)) {
+    for (int k = 0; k < tile.count; ++k) {
+      by_id[tile.id[k]] = viewed.index.X_FO() * tile.point(k);
+      is_kept[tile.id[k]] = true;
+    }
+  }
+  MemoryScan scan;
+  read_memory_scan(image.raw(), viewed, viewed.X_FS, 0.05, 3.0, &scan);
+  ASSERT_EQ(scan.hits.size(), viewed.counts.used);
+  std::size_t hit = 0;
+  for (std::size_t i = 0; i < by_id.size(); ++i) {
+    if (!is_kept[i]) continue;
+    ASSERT_LT((scan.hits[hit++].cast<double>() - by_id[i]).norm(), 1e-5) << "pixel " << i;
+  }
+  // The next cloud is filtered by padding, and placed as it is told.
+  IngestConfig padding = config;
+  padding.self_filter_mode = SelfFilterMode::kPadding;
+  Ingest other(padding);
+  CloudSnapshot padded = viewed;
+  other.run(image.raw(), X_FS * X_SE, posed(robot), 2.0, &padded);
+  EXPECT_EQ(padded.X_FS.matrix(), (X_FS * X_SE).matrix());
 }
 
 // Pixels between an edge of the robot and the wall behind it, within the skin, are no obstacle.

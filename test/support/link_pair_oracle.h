@@ -254,83 +254,105 @@ class TriangleGroups {
   Eigen::AlignedBox3d box_;
 };
 
+inline void append_triangles(const TriangleMesh& mesh, const Eigen::Isometry3d& X_LE,
+                             std::vector<Corners3<double>>* triangles) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Corners3<double> corners;
+    for (int k = 0; k < 3; ++k) corners.p[k] = X_LE * mesh.corner(t, k);
+    triangles->push_back(corners);
+  }
+}
+
+inline void append_triangles(const Box& box, const Eigen::Isometry3d& X_LE,
+                             std::vector<Corners3<double>>* triangles) {
+  for (int face = 0; face < 6; ++face) {
+    const int axis = face / 2;
+    Eigen::Vector3d corner[4];
+    for (int k = 0; k < 4; ++k) {
+      corner[k][axis] = (face % 2 - 0.5) * box.size[axis];
+      corner[k][(axis + 1) % 3] = (k == 1 || k == 2 ? 0.5 : -0.5) * box.size[(axis + 1) % 3];
+      corner[k][(axis + 2) % 3] = (k >= 2 ? 0.5 : -0.5) * box.size[(axis + 2) % 3];
+      corner[k] = X_LE * corner[k];
+    }
+    triangles->push_back({{corner[0], corner[1], corner[2]}});
+    triangles->push_back({{corner[0], corner[2], corner[3]}});
+  }
+}
+
 /// All triangles of the meshes and boxes of a link, in its frame. Other shapes are left out.
 inline std::vector<Corners3<double>> triangles_of(const LinkGeometry& link) {
   std::vector<Corners3<double>> triangles;
   for (const GeometryElement& element : link) {
     if (const auto* mesh = std::get_if<TriangleMesh>(&element.shape)) {
-      for (std::size_t t = 0; t < mesh->triangles.size(); ++t) {
-        Corners3<double> corners;
-        for (int k = 0; k < 3; ++k) corners.p[k] = element.X_LE * mesh->corner(t, k);
-        triangles.push_back(corners);
-      }
+      append_triangles(*mesh, element.X_LE, &triangles);
     } else if (const auto* box = std::get_if<Box>(&element.shape)) {
-      for (int axis = 0; axis < 3; ++axis) {
-        for (const double side : {-0.5, 0.5}) {
-          Eigen::Vector3d corner[4];
-          for (int k = 0; k < 4; ++k) {
-            corner[k][axis] = side * box->size[axis];
-            corner[k][(axis + 1) % 3] = (k == 1 || k == 2 ? 0.5 : -0.5) * box->size[(axis + 1) % 3];
-            corner[k][(axis + 2) % 3] = (k >= 2 ? 0.5 : -0.5) * box->size[(axis + 2) % 3];
-            corner[k] = element.X_LE * corner[k];
-          }
-          triangles.push_back({{corner[0], corner[1], corner[2]}});
-          triangles.push_back({{corner[0], corner[2], corner[3]}});
-        }
-      }
+      append_triangles(*box, element.X_LE, &triangles);
     }
   }
   return triangles;
+}
+
+/// Round shapes are inscribed by this many sides.
+constexpr int kSidesOfRoundShapes = 160;
+constexpr double kAngleOfSide = 2.0 * 3.14159265358979323846 / kSidesOfRoundShapes;
+
+/// Appends the triangles of a profile (radius, z) that turns about z, from below to above.
+inline void append_turned(const std::vector<Eigen::Vector2d>& profile,
+                          const Eigen::Isometry3d& X_LE, std::vector<Corners3<double>>* triangles) {
+  const auto point = [&](const Eigen::Vector2d& p, int k) {
+    const double angle = kAngleOfSide * (k % kSidesOfRoundShapes);
+    return Eigen::Vector3d(
+        X_LE * Eigen::Vector3d(p.x() * std::cos(angle), p.x() * std::sin(angle), p.y()));
+  };
+  for (std::size_t i = 0; i + 1 < profile.size(); ++i) {
+    for (int k = 0; k < kSidesOfRoundShapes; ++k) {
+      const auto a = point(profile[i], k), b = point(profile[i], k + 1);
+      const auto c = point(profile[i + 1], k), d = point(profile[i + 1], k + 1);
+      if (profile[i].x() > 0.0) triangles->push_back({{a, b, d}});
+      if (profile[i + 1].x() > 0.0) triangles->push_back({{a, d, c}});
+    }
+  }
+}
+
+/// The profile of a cylinder, in pieces, because spheres about slivers are large.
+inline std::vector<Eigen::Vector2d> profile_of(const Cylinder& cylinder) {
+  const double r = cylinder.radius, h = 0.5 * cylinder.length;
+  std::vector<Eigen::Vector2d> profile;
+  const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+    const int pieces = static_cast<int>(std::ceil((to - from).norm() / (0.2 * r)));
+    for (int i = 0; i < pieces; ++i) profile.push_back(from + i * (to - from) / pieces);
+  };
+  add({0.0, -h}, {r, -h});
+  add({r, -h}, {r, h});
+  add({r, h}, {0.0, h});
+  profile.emplace_back(0.0, h);
+  return profile;
+}
+
+inline std::vector<Eigen::Vector2d> profile_of(const Sphere& sphere) {
+  std::vector<Eigen::Vector2d> profile;
+  for (int i = 0; i <= kSidesOfRoundShapes / 2; ++i) {
+    const bool is_pole = i == 0 || i == kSidesOfRoundShapes / 2;
+    profile.emplace_back(is_pole ? 0.0 : sphere.radius * std::sin(kAngleOfSide * i),
+                         -sphere.radius * std::cos(kAngleOfSide * i));
+  }
+  return profile;
 }
 
 /// Appends inscribed triangles of the cylinders and spheres of a link.
 /// @returns [m] no point of those is farther from the triangles
 inline double append_round_shapes(const LinkGeometry& link,
                                   std::vector<Corners3<double>>* triangles) {
-  constexpr int kAround = 160;
-  constexpr double kPi = 3.14159265358979323846;
+  const double sagitta = 1.0 - std::cos(0.5 * kAngleOfSide);  // of radius 1
   double inexactness = 0.0;
-  // Profiles (radius, z) that turn about z, from below to above.
-  const auto turn = [&](const std::vector<Eigen::Vector2d>& profile, const Eigen::Isometry3d& X) {
-    const auto point = [&](const Eigen::Vector2d& p, int k) {
-      const double angle = 2.0 * kPi * (k % kAround) / kAround;
-      return Eigen::Vector3d(
-          X * Eigen::Vector3d(p.x() * std::cos(angle), p.x() * std::sin(angle), p.y()));
-    };
-    for (std::size_t i = 0; i + 1 < profile.size(); ++i) {
-      for (int k = 0; k < kAround; ++k) {
-        const auto a = point(profile[i], k), b = point(profile[i], k + 1);
-        const auto c = point(profile[i + 1], k), d = point(profile[i + 1], k + 1);
-        if (profile[i].x() > 0.0) triangles->push_back({{a, b, d}});
-        if (profile[i + 1].x() > 0.0) triangles->push_back({{a, d, c}});
-      }
-    }
-  };
   for (const GeometryElement& element : link) {
     if (const auto* cylinder = std::get_if<Cylinder>(&element.shape)) {
-      const double r = cylinder->radius, h = 0.5 * cylinder->length;
-      std::vector<Eigen::Vector2d> profile;  // in pieces, because spheres about slivers are large
-      const auto add = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-        const int pieces = static_cast<int>(std::ceil((to - from).norm() / (0.2 * r)));
-        for (int i = 0; i < pieces; ++i) profile.push_back(from + i * (to - from) / pieces);
-      };
-      add({0.0, -h}, {r, -h});
-      add({r, -h}, {r, h});
-      add({r, h}, {0.0, h});
-      profile.emplace_back(0.0, h);
-      turn(profile, element.X_LE);
-      inexactness = std::max(inexactness, r * (1.0 - std::cos(kPi / kAround)));
+      append_turned(profile_of(*cylinder), element.X_LE, triangles);
+      inexactness = std::max(inexactness, cylinder->radius * sagitta);
     } else if (const auto* sphere = std::get_if<Sphere>(&element.shape)) {
-      std::vector<Eigen::Vector2d> profile;
-      for (int i = 0; i <= kAround / 2; ++i) {
-        const double angle = kPi * i / (kAround / 2);
-        const bool is_pole = i == 0 || i == kAround / 2;
-        profile.emplace_back(is_pole ? 0.0 : sphere->radius * std::sin(angle),
-                             -sphere->radius * std::cos(angle));
-      }
-      turn(profile, element.X_LE);
-      // A quadrangle spans an angle of 2 pi / kAround both along and across.
-      inexactness = std::max(inexactness, sphere->radius * 2.0 * (1.0 - std::cos(kPi / kAround)));
+      append_turned(profile_of(*sphere), element.X_LE, triangles);
+      // A quadrangle spans the angle of a side both along and across.
+      inexactness = std::max(inexactness, sphere->radius * 2.0 * sagitta);
     }
   }
   return inexactness;

@@ -98,8 +98,10 @@ struct IngestCounts {
 /// One cloud or map as queries take it, immutable. A cloud consists of points in the fixed frame, a
 /// map of solid boxes in a frame of its own.
 struct CloudSnapshot {
-  PointIndex index;                                        ///< all points used
-  PointExtent extent;                                      ///< of the points
+  PointIndex index;    ///< all points used
+  PointExtent extent;  ///< of the points
+  /// Sensor frame -> fixed frame of a cloud, as a self-filter by view has corrected it.
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
   double thinning = 0.01;                                  ///< [m] edge of a voxel
   RegionOfInterest region;                                 ///< points outside were discarded
   std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none

@@ -23,6 +23,8 @@ struct PointExtent {
   bool is_zero() const { return constant == 0.0 && linear == 0.0 && quadratic == 0.0; }
   /// [m] The radius of a point at this range [m]. It never falls with the range.
   double radius(double range) const { return constant + range * (linear + range * quadratic); }
+  /// The radius grows by so many metres for each metre at this range [m].
+  double growth(double range) const { return linear + 2.0 * quadratic * range; }
   /// Allows for ranges that are off by this [m], because the sensor moved while it measured.
   void allow_for(double movement);
 };

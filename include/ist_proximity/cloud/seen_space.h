@@ -29,8 +29,9 @@ class SeenSpace {
   double time_seen(const Eigen::Vector3d& p_M) const;
 
   /// The unknown space within a sphere, as boxes of whole voxels that lie in blocks of 8 x 8 x 8
-  /// voxels which the sphere touches. Nothing is known as long as no memory is added; there are no
-  /// boxes then.
+  /// voxels which the sphere touches. Space that no voxel has a key for (32768 voxels from the
+  /// origin, along any axis) is unknown. Nothing is known as long as no memory is added; there are
+  /// no boxes then.
   /// @param max_boxes  no more are made
   /// @param boxes      [m] in M, overwritten
   /// @returns whether all are there

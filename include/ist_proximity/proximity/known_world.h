@@ -95,6 +95,8 @@ class WorldBuilder {
   bool remove(const std::string& name);
   void clear();                                         ///< removes all objects
   std::size_t size() const { return entries_.size(); }  ///< objects
+  /// Whether there is an object of this name.
+  bool contains(const std::string& name) const { return entries_.count(name) > 0; }
 
   /// The world of the objects of now.
   std::shared_ptr<const KnownWorld> world() const;
@@ -107,7 +109,7 @@ class WorldBuilder {
   };
   std::string exceeded_limit(const std::vector<WorldObject>& objects) const;
 
-  const WorldLimits limits_;
+  WorldLimits limits_;
   std::map<std::string, Entry> entries_;  ///< by name
   std::size_t triangles_ = 0, shapes_ = 0;
 };

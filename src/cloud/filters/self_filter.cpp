@@ -101,8 +101,8 @@ SelfFilter::Verdict SelfFilter::test(const PaddedBox& box, std::uint32_t first,
     const bool is_for_all = first >= link->first_point && last <= link->last_point;
     const Verdict verdict = test_spheres(Effort::kDecide, *link, link->X_LO * center.cast<double>(),
                                          static_cast<double>(radius));
-    if (verdict == Verdict::kOnRobot && is_for_all) return verdict;
     if (verdict != Verdict::kClear) undecided_.push_back(link);
+    if (verdict == Verdict::kOnRobot && is_for_all) return verdict;
   }
   return undecided_.empty() ? Verdict::kClear : Verdict::kUndecided;
 }

@@ -59,6 +59,9 @@ class SelfFilter {
   enum class Verdict { kClear, kOnRobot, kUndecided };
   /// Whether none or all points of a box in the group are the robot's, as far as spheres prove it.
   Verdict test(const PaddedBox& box);
+  /// The links that points of the box tested last may be on. After kOnRobot: the last of them is
+  /// the one that all points are on, and others may be missing.
+  const std::vector<const Link*>& near_links() const { return undecided_; }
 
   /// Bit k: the point in slot k is the robot's.
   /// @param box  of the tile's points, in the group

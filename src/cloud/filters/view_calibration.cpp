@@ -93,7 +93,8 @@ void ViewCalibration::set_correction() {
   const double moved = displacement(now_, middle_);
   const double reach = middle_.norm();
   const double allowed = std::hypot(config_.position_error, config_.angle_error * reach);
-  has_drifted_ = moved > kDrift * allowed;
+  // A rotation about the robot moves none of its points, but all that is farther away.
+  has_drifted_ = moved > kDrift * allowed || now_.head<3>().norm() > kDrift * config_.angle_error;
   applied_ = has_drifted_ ? Vector6(Vector6::Zero()) : now_;
   X_SC_.setIdentity();
   const double angle = applied_.head<3>().norm();

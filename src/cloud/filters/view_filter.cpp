@@ -19,9 +19,6 @@ constexpr std::uint32_t kWhole = (1U << kPixels) - 1U;
 
 // Noise never pulls a mean back by more: a mixed pixel or a shadow is no evidence of free space.
 constexpr double kClipped = 3.0;
-// A pixel outside the skin belongs to an obstacle in the skin if it is in front of the robot by no
-// more than this many standard deviations beyond the padding.
-constexpr double kFront = 3.0;
 // Standard deviations of the sensor's corrected pose.
 constexpr double kPose = 3.0;
 
@@ -89,6 +86,7 @@ void ViewFilter::begin_cloud(Span<const PosedSolid> solids, double stamp) {
   last_stamp_ = stamp_;
   stamp_ = stamp;
   links_.assign(solids.size(), {});
+  view_.reserve(solids.size());
   const double step = stamp_ - last_stamp_;
   for (std::size_t i = 0; i < solids.size(); ++i) {
     LinkState& link = links_[i];
@@ -136,23 +134,6 @@ void ViewFilter::begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS
   }
 }
 
-ViewFilter::Sight ViewFilter::look(const Eigen::Vector3d& p_S, const SelfFilter& filter) const {
-  Sight sight;
-  const double range = p_S.norm();
-  sight.direction = p_S / range;
-  sight.t = kInf;
-  sight.link = nullptr;
-  for (const SelfFilter::Link* link : filter.group()) {
-    const Eigen::Isometry3d& X_LS = links_[link->number].X_LS;
-    const RayHit hit = ray_cast(*link->solid, X_LS.translation(), X_LS.linear() * sight.direction);
-    if (!(std::abs(hit.t - range) < std::abs(sight.t - range))) continue;
-    sight.t = hit.t;
-    sight.normal = X_LS.linear().transpose() * hit.normal;
-    sight.link = link;
-  }
-  return sight;
-}
-
 void ViewFilter::add_height(std::size_t k, double height, double noise, Tile* tile) const {
   const auto bit = static_cast<std::uint16_t>(1U << k);
   tile->height[k] = static_cast<float>(height);
@@ -166,23 +147,22 @@ void ViewFilter::add_height(std::size_t k, double height, double noise, Tile* ti
 }
 
 // A tile on a smooth part of one link, as most are: four rays say where its plane is.
-bool ViewFilter::add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const SelfFilter& filter,
-                           Tile* tile) {
+bool ViewFilter::add_patch(Tile* tile) {
   constexpr std::array<std::size_t, 4> kCorners = {0, kTileSide - 1, kPixels - kTileSide,
                                                    kPixels - 1};
-  std::array<Sight, 4> sights;
+  std::array<TileView::Sight, 4> sights;
   std::array<Eigen::Vector3d, 4> hits;
   for (std::size_t i = 0; i < 4; ++i) {
-    sights[i] = look(p_S[kCorners[i]], filter);
+    sights[i] = view_.look(kCorners[i]);
     if (sights[i].link == nullptr || sights[i].link != sights[0].link) return false;
-    hits[i] = sights[i].t * sights[i].direction;
+    hits[i] = sights[i].t * view_.direction(kCorners[i]);
   }
   const Eigen::Vector3d across = hits[3] - hits[0], down = hits[2] - hits[1];
   Eigen::Vector3d normal = across.cross(down);
   const double size = normal.norm();
   if (!(size > 0.0)) return false;
-  normal /= normal.dot(sights[0].direction) < 0.0 ? size : -size;
   const Eigen::Vector3d middle = 0.25 * (hits[0] + hits[1] + hits[2] + hits[3]);
+  normal /= normal.dot(middle) < 0.0 ? size : -size;
   const double length = std::max(across.norm(), down.norm());
   const double bend = std::max(angle_between(sights[0].normal, sights[3].normal),
                                angle_between(sights[1].normal, sights[2].normal));
@@ -194,7 +174,7 @@ bool ViewFilter::add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const Sel
   if (cosine < kGrazing) return false;
   std::array<double, kPixels> heights;
   for (std::size_t k = 0; k < kPixels; ++k) {
-    heights[k] = normal.dot(p_S[k] - middle);
+    heights[k] = normal.dot(view_.p_S(k) - middle);
     // A point that is farther from the surface along its ray may be outside the skin.
     if (std::abs(heights[k]) > (padding_ - 2.0 * kFlat) * cosine) return false;
   }
@@ -211,16 +191,15 @@ bool ViewFilter::add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const Sel
 // Judges a point whose ray passes the links, or meets them far behind it: an obstacle is nowhere
 // near a surface, within what noise, the sensor's pose and blurred edges leave open. Behind the
 // nearest point of a surface it is a mixed pixel or a shadow.
-ViewFilter::Passing ViewFilter::pass(const Eigen::Vector3d& p_S, const Sight& sight,
-                                     const SelfFilter& filter) const {
-  const double range = p_S.norm();
+ViewFilter::Passing ViewFilter::pass(std::size_t k, const SelfFilter& filter) const {
+  const double range = view_.range(k);
   const double last = range + kCertain * config_.noise.sigma(range);
   const double blur = config_.mixed_pixels * pixel_ * range;
   Passing passing = Passing::kObstacle;
   for (const SelfFilter::Link* link : filter.group()) {
     const LinkState& state = links_[link->number];
     const Eigen::Vector3d o_L = state.X_LS.translation(),
-                          d_L = state.X_LS.linear() * sight.direction;
+                          d_L = state.X_LS.linear() * view_.direction(k);
     const double limit = state.tolerance + blur;
     const RayApproach near = nearest_approach(*link->solid, o_L, d_L, range, padding_ + kFlat);
     double distance = distance_outside(*link->solid, o_L + last * d_L, limit).distance;
@@ -231,19 +210,28 @@ ViewFilter::Passing ViewFilter::pass(const Eigen::Vector3d& p_S, const Sight& si
   return passing;
 }
 
+// A link that a point is in the skin of; null: none.
+const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight& sight,
+                                            const Skin& skin) const {
+  // The surface is no farther than it is along the ray.
+  if (std::abs(sight.t - view_.range(k)) <= padding_) return sight.link;
+  const std::vector<const SelfFilter::Link*>& links = skin.filter.near_links();
+  if (skin.verdict == SelfFilter::Verdict::kOnRobot) return links.back();
+  const Eigen::Vector3d p_O = skin.X_OS * view_.p_S(k);
+  const auto on = std::find_if(links.begin(), links.end(), [&](const SelfFilter::Link* link) {
+    return skin.filter.is_on_link(*link, p_O);
+  });
+  return on == links.end() ? nullptr : *on;
+}
+
 // A tile at an edge of the robot, or with obstacles: each pixel has its own ray.
-void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uint32_t kept,
-                            const SelfFilter& filter, const Eigen::Isometry3d& X_OS,
-                            Tile* tile) const {
+void ViewFilter::add_pixels(const Skin& skin, Tile* tile) const {
   for (std::size_t k = 0; k < kPixels; ++k) {
-    if ((kept >> k & 1U) == 0) continue;
-    const SelfFilter::Link* in_skin = nullptr;
-    for (const SelfFilter::Link* link : filter.group()) {
-      if (filter.is_on_link(*link, X_OS * p_S[k])) in_skin = link;
-    }
+    if (!view_.is_kept(k)) continue;
     const auto bit = static_cast<std::uint16_t>(1U << k);
-    const double range = p_S[k].norm();
-    const Sight sight = look(p_S[k], filter);
+    const double range = view_.range(k);
+    const TileView::Sight sight = view_.look(k);
+    const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
     if (in_skin == nullptr) {
       // Close in front of the robot there is nothing but an obstacle.
       const double limit = padding_ + kFront * config_.noise.sigma(range);
@@ -254,13 +242,13 @@ void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uin
     if (tile->link == nullptr) {
       tile->link = sight.link != nullptr ? sight.link : in_skin;
       tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
-      tile->p_S = p_S[k].cast<float>();
+      tile->p_S = view_.p_S(k).cast<float>();
     }
     const bool misses = sight.link == nullptr;
-    const double cosine = misses ? 1.0 : -sight.normal.dot(sight.direction);
+    const double cosine = misses ? 1.0 : -sight.normal.dot(view_.direction(k));
     const double height = (sight.t - range) * cosine, noise = config_.noise.sigma(range) * cosine;
     if (misses || height > kCertain * noise + static_cast<double>(tile->tolerance)) {
-      const Passing passing = pass(p_S[k], sight, filter);
+      const Passing passing = pass(k, skin.filter);
       if (misses || passing != Passing::kObstacle) {
         // At an edge the ray may meet what is behind it: nothing is known of the height.
         tile->skin |= bit;
@@ -275,25 +263,25 @@ void ViewFilter::add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uin
 }
 
 void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kept,
-                          const SelfFilter& filter, const Eigen::Isometry3d& X_OS) {
-  std::array<Eigen::Vector3d, kPixels> p_S;
-  for (std::size_t k = 0; k < kPixels; ++k) {
-    if ((kept >> k & 1U) == 0) continue;
-    p_S[k] = point_at(*cloud_, row + k / kTileSide, column + k % kTileSide);
+                          const SelfFilter& filter, SelfFilter::Verdict verdict,
+                          const Eigen::Isometry3d& X_OS) {
+  view_.read(*cloud_, row, column, kept);
+  if ((kept & 3U) == 3U) pixel_ = view_.direction(0).cross(view_.direction(1)).norm();
+  view_.begin(padding_ + kCertain * config_.noise.sigma(view_.farthest()));
+  for (const SelfFilter::Link* link : filter.group()) {
+    view_.add_link(*link, links_[link->number].X_LS);
   }
-  if ((kept & 3U) == 3U) pixel_ = p_S[0].cross(p_S[1]).norm() / (p_S[0].norm() * p_S[1].norm());
   Tile tile;
   tile.kept = static_cast<std::uint16_t>(kept);
   tile.row = static_cast<std::uint32_t>(row);
   tile.column = static_cast<std::uint32_t>(column);
   tile.height.fill(std::numeric_limits<float>::quiet_NaN());
-  if (kept != kWhole || !add_patch(p_S, filter, &tile)) {
-    add_pixels(p_S, kept, filter, X_OS, &tile);
-  }
+  for (std::size_t k = 0; k < kPixels; ++k) tile.range[k] = static_cast<float>(view_.range(k));
+  if (kept != kWhole || !add_patch(&tile)) add_pixels({filter, verdict, X_OS}, &tile);
   if (tile.skin != kept) {
     for (std::size_t k = 0; k < kPixels; ++k) {
       if (((kept & ~static_cast<std::uint32_t>(tile.skin)) >> k & 1U) == 0) continue;
-      add_outside(X_FS_ * p_S[k]);
+      add_outside(X_FS_ * view_.p_S(k));
       break;  // one place a tile is enough
     }
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cloud/filters/self_filter.h"
+#include "cloud/filters/tile_view.h"
 #include "cloud/filters/view_calibration.h"
 #include "internal/cloud/point_tile.h"
 #include "ist_proximity/cloud/ingest.h"
@@ -44,10 +45,11 @@ class ViewFilter {
   /// Adds a tile that may hold points of the robot.
   /// @param row, column  of its first pixel
   /// @param kept         bit 4 r + c: the pixel in row r and column c is in range
-  /// @param filter       its group holds the tile
+  /// @param filter       its group holds the tile, which it has tested last
+  /// @param verdict      of that test
   /// @param X_OS         sensor frame -> the frame of `filter`
   void add_tile(std::size_t row, std::size_t column, std::uint32_t kept, const SelfFilter& filter,
-                const Eigen::Isometry3d& X_OS);
+                SelfFilter::Verdict verdict, const Eigen::Isometry3d& X_OS);
   /// Tells of points near the robot, but outside its skin: what was there a cloud ago and is in the
   /// skin now is an obstacle that came in.
   void add_outside(const Eigen::Vector3d& p_F);
@@ -66,6 +68,10 @@ class ViewFilter {
   // second: a mean that is five off by chance comes once in ten seconds, one of three next to an
   // obstacle only where there is one.
   static constexpr double kCertain = 5.0;
+  // A pixel outside the skin belongs to an obstacle in the skin if it is in front of the robot by
+  // no more than this many standard deviations beyond the padding. A surface has no larger step
+  // from one pixel to the next, either.
+  static constexpr double kFront = 3.0;
 
   struct LinkState {
     const InnerSphereTree* tree = nullptr;
@@ -75,15 +81,10 @@ class ViewFilter {
     double blind_skin = 0.0;  // [m]
     std::uint32_t in_skin = 0, unexplained = 0;
   };
-  // A ray, and where it meets the robot.
-  struct Sight {
-    Eigen::Vector3d direction, normal;  // unit, sensor frame
-    double t;                           // [m] inf: it misses
-    const SelfFilter::Link* link;
-  };
   struct Tile {
     std::uint32_t row, column;
     const SelfFilter::Link* link = nullptr;  // whose surface is expected here
+    std::array<float, 16> range;             // [m] of the points, by pixel, where kept
     std::array<float, 16> height;            // [m] in front of the surface, by pixel; NaN: not used
     std::uint16_t kept = 0;                  // pixels in range
     std::uint16_t robot = 0;                 // pixels that are the robot's unless they are in front
@@ -102,23 +103,33 @@ class ViewFilter {
     Eigen::Vector3f p_S, n_S;  // middle and normal, where there is a height
   };
 
-  Sight look(const Eigen::Vector3d& p_S, const SelfFilter& filter) const;
-  bool add_patch(const std::array<Eigen::Vector3d, 16>& p_S, const SelfFilter& filter, Tile* tile);
-  void add_pixels(const std::array<Eigen::Vector3d, 16>& p_S, std::uint32_t kept,
-                  const SelfFilter& filter, const Eigen::Isometry3d& X_OS, Tile* tile) const;
+  // What says which points of a tile are in the skin.
+  struct Skin {
+    const SelfFilter& filter;
+    SelfFilter::Verdict verdict;
+    const Eigen::Isometry3d& X_OS;
+  };
+  const SelfFilter::Link* skin_of(std::size_t k, const TileView::Sight& sight,
+                                  const Skin& skin) const;
+  bool add_patch(Tile* tile);
+  void add_pixels(const Skin& skin, Tile* tile) const;
   void add_height(std::size_t k, double height, double noise, Tile* tile) const;
   enum class Passing { kObstacle, kBlurred, kRobot };
-  Passing pass(const Eigen::Vector3d& p_S, const Sight& sight, const SelfFilter& filter) const;
+  Passing pass(std::size_t k, const SelfFilter& filter) const;
 
   Tile* tile_at(std::int64_t row, std::int64_t column);
   const Tile* tile_at(std::int64_t row, std::int64_t column) const;
   bool is_in_front(double sum, double variance, int count, double tolerance, double sigmas) const;
+  float largest_step(float range) const;
+  bool is_same_surface(const Tile& a, const Tile& b) const;
+  bool is_surface_in_front(const Tile& tile, std::size_t k) const;
   void find_obstacles();
   void find_windows(std::size_t index);
   void grow();
   bool came_in(const Tile& tile) const;
   void drop_speckles();
-  void grow_pixels();
+  bool continues(std::int64_t row, std::int64_t column, float range, float step) const;
+  void grow_pixels(float sigmas);
   enum class Outside { kInFront, kAll };
   int count_obstacles(std::int64_t row, std::int64_t column, Outside outside) const;
   void finish(Tile* tile);
@@ -134,6 +145,7 @@ class ViewFilter {
   double pixel_ = 0.0;  // [rad] between neighbours
   std::size_t tiles_wide_ = 0, tiles_high_ = 0;
   std::vector<std::int32_t> tile_index_;  // by place in the image; -1: none
+  TileView view_;                         // of the tile that is added
   std::vector<Tile> tiles_;
   std::vector<std::size_t> front_;                       // tiles to grow from
   std::vector<std::uint64_t> outside_, outside_before_;  // sorted voxels with obstacles

@@ -45,6 +45,33 @@ bool ViewFilter::is_in_front(double sum, double variance, int count, double tole
   return count > 0 && sum > sigmas * std::sqrt(variance) + count * tolerance;
 }
 
+// [m] A surface has no larger step from one pixel to the next.
+float ViewFilter::largest_step(float range) const {
+  return static_cast<float>(padding_ + kFront * config_.noise.sigma(static_cast<double>(range)));
+}
+
+// Whether neighbouring tiles may show one surface, or an obstacle on it.
+bool ViewFilter::is_same_surface(const Tile& a, const Tile& b) const {
+  if (a.link == nullptr || b.link == nullptr) return true;
+  const float range = a.p_S.norm();
+  return std::abs(b.p_S.norm() - range) <= largest_step(range);
+}
+
+// Whether the pixels of a tile that show the same surface as pixel k are in front, by their mean.
+bool ViewFilter::is_surface_in_front(const Tile& tile, std::size_t k) const {
+  const float step = largest_step(tile.range[k]);
+  const float variance = tile.variance / static_cast<float>(tile.count);
+  double sum = 0.0;
+  int count = 0;
+  for (std::size_t j = 0; j < kPixels; ++j) {
+    if (!(std::abs(tile.range[j] - tile.range[k]) <= step) || std::isnan(tile.height[j])) continue;
+    sum += static_cast<double>(tile.height[j]);
+    ++count;
+  }
+  return is_in_front(sum, static_cast<double>(variance) * count, count,
+                     static_cast<double>(tile.tolerance), 0.5 * kBesideObstacle);
+}
+
 // A tile, or a window of two by two tiles, that is in front of the robot for certain.
 void ViewFilter::find_windows(std::size_t index) {
   std::array<Tile*, 4> window = {};
@@ -55,6 +82,10 @@ void ViewFilter::find_windows(std::size_t index) {
     window[i] =
         tile_at(row + static_cast<std::int64_t>(i / 2), column + static_cast<std::int64_t>(i % 2));
     if (window[i] == nullptr) continue;
+    if (!is_same_surface(tiles_[index], *window[i])) {
+      window[i] = nullptr;
+      continue;
+    }
     const Tile& t = *window[i];
     sum += static_cast<double>(t.sum);
     variance += static_cast<double>(t.variance);
@@ -92,7 +123,7 @@ void ViewFilter::grow() {
     const std::int64_t row = from.row / kTileSide, column = from.column / kTileSide;
     for (std::int64_t i = 0; i < 9; ++i) {
       Tile* tile = tile_at(row + i / 3 - 1, column + i % 3 - 1);
-      if (tile == nullptr || !is_weak(*tile)) continue;
+      if (tile == nullptr || !is_weak(*tile) || !is_same_surface(from, *tile)) continue;
       tile->is_obstacle = true;
       front_.push_back(static_cast<std::size_t>(tile - tiles_.data()));
     }
@@ -131,32 +162,39 @@ void ViewFilter::drop_speckles() {
   }
 }
 
-// A pixel that may be blurred, or that is one standard deviation in front, is an obstacle next to a
-// pixel that is one.
-void ViewFilter::grow_pixels() {
-  const auto is_obstacle = [this](std::int64_t row, std::int64_t column) {
-    if (row < 0 || column < 0) return false;
-    const Tile* tile = tile_at(row / static_cast<std::int64_t>(kTileSide),
-                               column / static_cast<std::int64_t>(kTileSide));
-    if (tile == nullptr) return false;
-    const auto k = static_cast<unsigned>(row % static_cast<std::int64_t>(kTileSide) *
-                                             static_cast<std::int64_t>(kTileSide) +
-                                         column % static_cast<std::int64_t>(kTileSide));
-    return (static_cast<unsigned>(tile->obstacle | tile->front) >> k & 1U) != 0;
-  };
+// Whether a pixel is an obstacle whose surface may go on at this range [m]: what ends far behind or
+// in front of it is another surface.
+bool ViewFilter::continues(std::int64_t row, std::int64_t column, float range, float step) const {
+  if (row < 0 || column < 0) return false;
+  const Tile* tile = tile_at(row / static_cast<std::int64_t>(kTileSide),
+                             column / static_cast<std::int64_t>(kTileSide));
+  if (tile == nullptr) return false;
+  const auto k = static_cast<std::size_t>(row % static_cast<std::int64_t>(kTileSide) *
+                                              static_cast<std::int64_t>(kTileSide) +
+                                          column % static_cast<std::int64_t>(kTileSide));
+  return (static_cast<unsigned>(tile->obstacle | tile->front) >> k & 1U) != 0 &&
+         std::abs(tile->range[k] - range) <= step;
+}
+
+// A pixel that may be blurred, or that is in front of the robot, is an obstacle next to a pixel of
+// an obstacle that goes on there.
+// @param sigmas  standard deviations by which it must be in front
+void ViewFilter::grow_pixels(float sigmas) {
   for (Tile& tile : tiles_) {
     if (count_obstacles(tile.row / kTileSide, tile.column / kTileSide, Outside::kAll) == 0) {
       continue;
     }
     const float noise =
         tile.count > 0 ? std::sqrt(tile.variance / static_cast<float>(tile.count)) : 0.0F;
+    const float least = sigmas * noise;
     for (std::size_t k = 0; k < kPixels; ++k) {
       const auto bit = static_cast<std::uint16_t>(1U << k);
-      if ((tile.blurred & bit) == 0 && !(tile.height[k] > noise)) continue;
+      if ((tile.blurred & bit) == 0 && !(tile.height[k] > least)) continue;
       const auto row = static_cast<std::int64_t>(tile.row + k / kTileSide),
                  column = static_cast<std::int64_t>(tile.column + k % kTileSide);
+      const float step = largest_step(tile.range[k]);
       for (std::int64_t i = 0; i < 9; ++i) {
-        if (is_obstacle(row + i / 3 - 1, column + i % 3 - 1)) tile.near |= bit;
+        if (continues(row + i / 3 - 1, column + i % 3 - 1, tile.range[k], step)) tile.near |= bit;
       }
     }
   }
@@ -168,12 +206,15 @@ void ViewFilter::find_obstacles() {
   grow();
   for (Tile& tile : tiles_) {
     for (std::size_t k = 0; tile.is_obstacle && k < kPixels; ++k) {
-      if (tile.height[k] > 0.0F) tile.obstacle |= static_cast<std::uint16_t>(1U << k);
+      if (!(tile.height[k] > 0.0F)) continue;
+      if (!tile.is_patch && !is_surface_in_front(tile, k)) continue;
+      tile.obstacle |= static_cast<std::uint16_t>(1U << k);
     }
   }
   drop_speckles();
   for (Tile& tile : tiles_) tile.certain = tile.obstacle;
-  for (int ring = 0; ring < kRings; ++ring) grow_pixels();
+  grow_pixels(0.0F);
+  for (int ring = 1; ring < kRings; ++ring) grow_pixels(1.0F);
 }
 
 }  // namespace ist

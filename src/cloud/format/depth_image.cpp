@@ -47,27 +47,27 @@ struct Projection {
   }
 };
 
+// @returns what must hold of a number and does not; null where all holds
+const char* element_fault(double value, int row, int column) {
+  if (!std::isfinite(value)) return "it must be finite";
+  if (row == column && row < 2) {
+    return value > 0.0 ? nullptr : "a focal length must be more than 0 pixels";
+  }
+  const bool is_center = row < 2 && column == 2;
+  if (is_center) return nullptr;
+  if (row == 2 && column == 2) return value == 1.0 ? nullptr : "it must be 1";
+  if (value == 0.0) return nullptr;
+  return column == 3 ? "it must be 0: the image of a second stereo camera (a baseline) is not "
+                       "supported"
+                     : "it must be 0";
+}
+
 std::string check_projection(const Projection& projection) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < projection.columns; ++column) {
       const double value = projection.at(row, column);
-      const std::string element = projection.element(row, column);
-      if (!std::isfinite(value)) return fault(element, value, "it must be finite");
-      const bool is_focal_length = row == column && row < 2;
-      if (is_focal_length && !(value > 0.0)) {
-        return fault(element, value, "a focal length must be more than 0 pixels");
-      }
-      const bool is_center = row < 2 && column == 2;
-      if (is_focal_length || is_center) continue;
-      if (column == 3) {
-        if (value == 0.0) continue;
-        return fault(element, value,
-                     "it must be 0: the image of a second stereo camera (a baseline) is not "
-                     "supported");
-      }
-      const double expected = row == 2 && column == 2 ? 1.0 : 0.0;
-      if (value != expected) {
-        return fault(element, value, expected == 0.0 ? "it must be 0" : "it must be 1");
+      if (const char* what = element_fault(value, row, column)) {
+        return fault(projection.element(row, column), value, what);
       }
     }
   }

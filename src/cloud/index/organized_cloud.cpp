@@ -139,12 +139,13 @@ class OrganizedReader {
       const std::uint32_t kept = block_.kept[slot];
       if (kept == 0) continue;
       const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
-      if (on_robot_->test(box) == SelfFilter::Verdict::kClear) {
+      const SelfFilter::Verdict verdict = on_robot_->test(box);
+      if (verdict == SelfFilter::Verdict::kClear) {
         const Eigen::Vector3f middle = 0.5F * (box.min + box.max).head<3>();
         view_->add_outside(crop_.X_FO * middle.cast<double>());
         continue;
       }
-      view_->add_tile(row_ + tile_row(slot), column_ + tile_column(slot), kept, *on_robot_,
+      view_->add_tile(row_ + tile_row(slot), column_ + tile_column(slot), kept, *on_robot_, verdict,
                       crop_.X_OS);
     }
   }

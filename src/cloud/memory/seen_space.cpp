@@ -65,6 +65,20 @@ struct SeenSpace::Impl {
     }
     end_run();
   }
+
+  // What lies in the cube about a sphere, and outside of all keys: nothing can be known there.
+  void append_outside(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                      VoxelBoxes* boxes) const {
+    const double first = scale.border(0), end = scale.border(kKeyEnd);
+    for (int axis = 0; axis < 3; ++axis) {
+      Eigen::AlignedBox3d below(low, high), above(low, high);
+      below.max()[axis] = std::min(high[axis], first);
+      above.min()[axis] = std::max(low[axis], end);
+      for (const Eigen::AlignedBox3d& box : {below, above}) {
+        if (box.min()[axis] < box.max()[axis]) boxes->push_back(box);
+      }
+    }
+  }
 };
 
 SeenSpace::SeenSpace() : impl_(std::make_unique<Impl>()) {}
@@ -107,6 +121,7 @@ bool SeenSpace::unknown_boxes(const Eigen::Vector3d& center_M, double radius, st
     return result & kFirstOfBlock;
   };
   const Eigen::Vector3d low = center_M.array() - radius, high = center_M.array() + radius;
+  impl_->append_outside(low, high, boxes);
   for (std::int32_t z = key(low.z()); z <= key(high.z()); z += kBlockSide) {
     for (std::int32_t y = key(low.y()); y <= key(high.y()); y += kBlockSide) {
       impl_->append_row({key(low.x()), y, z}, key(high.x()), center_M, radius, boxes);

@@ -95,14 +95,19 @@ void VoxelMap::insert(const MemoryScan& scan) {
   }
   set_now(scan.stamp);
   forget_old();
-  make_place();
   ++frame_;
-  skipped_ = 0;
   touched_.clear();
   reset_cursor();
-  add_rays(scan.origin, scan.hits, true);
-  add_rays(scan.origin, scan.free_ends, false);
+  if (skipped_ > 0 || blocks_.size() + added_ > blocks_.max_size()) make_place(added_, false);
+  const std::size_t size_before = blocks_.size();
+  find_ends(scan.origin, scan.hits);
+  mark_hits();
+  add_rays(scan.origin);
+  find_ends(scan.origin, scan.free_ends);
+  for (RayEnd& end : ray_ends_) end.is_hit = false;
+  add_rays(scan.origin);
   apply();
+  added_ = blocks_.size() - std::min(size_before, blocks_.size());
 }
 
 void VoxelMap::clear() {
@@ -112,7 +117,8 @@ void VoxelMap::clear() {
 }
 
 std::uint32_t VoxelMap::tick(double time) const {
-  return static_cast<std::uint32_t>(std::clamp((time - epoch_) / kTick, 0.0, kMaxTicks));
+  const double ticks = (time - epoch_) / kTick;
+  return ticks >= 0.0 ? static_cast<std::uint32_t>(std::min(ticks, kMaxTicks)) : 0;  // NaN: 0
 }
 
 double VoxelMap::time(std::uint32_t tick) const { return epoch_ + kTick * tick; }
@@ -205,34 +211,55 @@ void VoxelMap::mark_shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& 
   }
 }
 
-/// Takes one ray.
-/// @param is_hit  whether space is occupied at its end
-void VoxelMap::add_ray(const Eigen::Vector3f& origin, Eigen::Vector3f end, bool is_hit) {
-  const Eigen::Vector3f ray = end - origin;
-  const double length = octomap_norm(ray);
-  if (length > config_.max_range) {
-    const Eigen::Vector3f direction = ray / static_cast<float>(length);
-    end = origin + direction * static_cast<float>(config_.max_range);
-    is_hit = false;
-  }
-  mark_ray(origin, end);
-  VoxelKey key;
-  if (!is_hit || !scale_.key(end, &key) || !is_inside(key)) return;
-  mark(key, &VoxelBlock::hit);
-  mark_shade(origin, end);
-}
-
-void VoxelMap::add_rays(const Eigen::Vector3f& origin, const std::vector<Eigen::Vector3f>& ends,
-                        bool is_hit) {
+/// Finds where the rays of a cloud end: cut off at the largest range, and with `discretize` one for
+/// each voxel.
+void VoxelMap::find_ends(const Eigen::Vector3f& origin, const std::vector<Eigen::Vector3f>& ends) {
+  ends_seen_.clear();
   ray_ends_.clear();
-  for (const Eigen::Vector3f& end : ends) {
+  for (Eigen::Vector3f end : ends) {
     VoxelKey key;
     if (!scale_.key(end, &key)) continue;
-    if (!config_.discretize) {
-      add_ray(origin, end, is_hit);
-    } else if (ray_ends_.insert(key)) {
-      add_ray(origin, scale_.middle(key).cast<float>(), is_hit);
+    if (config_.discretize) {
+      if (!ends_seen_.insert(key)) continue;
+      end = scale_.middle(key).cast<float>();
     }
+    const Eigen::Vector3f ray = end - origin;
+    const double length = octomap_norm(ray);
+    const bool is_cut = length > config_.max_range;
+    if (is_cut) {
+      const Eigen::Vector3f direction = ray / static_cast<float>(length);
+      end = origin + direction * static_cast<float>(config_.max_range);
+    }
+    ray_ends_.push_back({end, !is_cut && scale_.key(end, &key) && is_inside(key)});
+  }
+}
+
+/// Marks the ends of rays as hit, before any ray takes memory. Where there is none for an obstacle,
+/// what is older makes place at once.
+void VoxelMap::mark_hits() {
+  std::vector<std::uint64_t> missing;  // blocks; empty unless memory is short
+  const auto mark_all = [&] {
+    skipped_ = 0;
+    for (const RayEnd& end : ray_ends_) {
+      VoxelKey key;
+      if (!end.is_hit || !scale_.key(end.p, &key)) continue;
+      const std::size_t skipped_before = skipped_;
+      mark(key, &VoxelBlock::hit);
+      if (skipped_ > skipped_before) missing.push_back(block_id(key));
+    }
+  };
+  mark_all();
+  if (missing.empty()) return;
+  std::sort(missing.begin(), missing.end());
+  const auto end = std::unique(missing.begin(), missing.end());
+  make_place(static_cast<std::size_t>(end - missing.begin()), true);
+  mark_all();
+}
+
+void VoxelMap::add_rays(const Eigen::Vector3f& origin) {
+  for (const RayEnd& end : ray_ends_) {
+    mark_ray(origin, end.p);
+    if (end.is_hit) mark_shade(origin, end.p);
   }
 }
 
@@ -285,32 +312,34 @@ void VoxelMap::forget_old() {
   reset_cursor();
 }
 
-/// Forgets blocks where the last cloud lacked memory, or the next one would if it needs as much
-/// more as the last one: those that were measured longest ago, those without anything occupied
-/// first.
-void VoxelMap::make_place() {
-  const std::size_t used_before = std::exchange(blocks_before_, blocks_.size());
-  const std::size_t added = blocks_.size() - std::min(used_before, blocks_.size());
-  const bool is_short = skipped_ > 0 || blocks_.size() + added > blocks_.max_size();
-  if (!is_short || blocks_.size() == 0) return;
+/// Forgets blocks: those that were measured longest ago, those without anything occupied first,
+/// those of the cloud that is being inserted never.
+/// @param wanted     blocks; an eighth of all at least, and half of them at most
+/// @param obstacles  whether blocks with something occupied may be forgotten
+void VoxelMap::make_place(std::size_t wanted, bool obstacles) {
   using Age = std::pair<bool, std::uint32_t>;
   const auto age = [](const VoxelBlock& block) {
     return Age(block.occupied != BlockBits{}, block.newest);
   };
+  const auto may_go = [&](const VoxelBlock& block) {
+    return !is_touched(block) && (obstacles || !age(block).first);
+  };
   std::vector<Age> ages;
-  for (std::size_t i = 0; i < blocks_.size(); ++i) ages.push_back(age(blocks_[i]));
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (may_go(blocks_[i])) ages.push_back(age(blocks_[i]));
+  }
+  if (ages.empty()) return;
   const std::size_t share = ages.size() / kForgottenShare;
-  std::size_t allowed = std::min(ages.size() / 2, std::max(share, added)) + 1;
+  std::size_t allowed = std::min(ages.size() / 2, std::max(share, wanted)) + 1;
   const auto last = ages.begin() + static_cast<std::ptrdiff_t>(allowed - 1);
   std::nth_element(ages.begin(), last, ages.end());
   const Age limit = *last;
   blocks_.remove_if([&](const VoxelBlock& block) {
-    if (allowed == 0 || age(block) > limit) return false;
+    if (allowed == 0 || !may_go(block) || age(block) > limit) return false;
     --allowed;
     forgotten_ += count_bits(block.known);
     return true;
   });
-  blocks_before_ = blocks_.size();
   reset_cursor();
 }
 

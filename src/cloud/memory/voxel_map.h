@@ -43,20 +43,29 @@ class VoxelMap {
   BlockBits hidden(const VoxelBlock& block) const;
 
  private:
+  struct RayEnd {
+    Eigen::Vector3f p;  ///< [m]
+    bool is_hit;        ///< space is occupied there, and it is in the region
+  };
+
   std::uint32_t tick(double time) const;
   bool is_inside(const VoxelKey& key) const;
   VoxelBlock* block_for(const VoxelKey& key);
   void mark(const VoxelKey& key, BlockBits VoxelBlock::*bits);
   void mark_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& end);
   void mark_shade(const Eigen::Vector3f& origin, const Eigen::Vector3f& end);
-  void add_ray(const Eigen::Vector3f& origin, Eigen::Vector3f end, bool is_hit);
-  void add_rays(const Eigen::Vector3f& origin, const std::vector<Eigen::Vector3f>& ends,
-                bool is_hit);
+  void find_ends(const Eigen::Vector3f& origin, const std::vector<Eigen::Vector3f>& ends);
+  void mark_hits();
+  void add_rays(const Eigen::Vector3f& origin);
   void update(VoxelBlock* block, unsigned place, float change, std::uint32_t time);
   static void note(VoxelBlock* block, unsigned place, std::uint32_t time, bool is_hit);
   void apply();
-  void make_place();
+  void make_place(std::size_t wanted, bool obstacles);
   void reset_cursor();
+  /// Whether the cloud that is inserted has marked anything in a block.
+  bool is_touched(const VoxelBlock& block) const {
+    return !touched_.empty() && block.frame == frame_;
+  }
 
   MemoryConfig config_;
   VoxelScale scale_;
@@ -67,11 +76,12 @@ class VoxelMap {
   double epoch_ = 0.0;  ///< [s] at which ticks begin
   std::uint32_t frame_ = 1;
   std::size_t forgotten_ = 0, skipped_ = 0;
-  std::size_t blocks_before_ = 0;  ///< blocks in use before the last cloud
+  std::size_t added_ = 0;  ///< blocks that the last cloud added
 
   // Of the cloud that is inserted.
-  std::vector<VoxelBlock*> touched_;
-  KeySet ray_ends_;
+  std::vector<VoxelBlock*> touched_;  ///< blocks whose bits are of this cloud
+  KeySet ends_seen_;
+  std::vector<RayEnd> ray_ends_;
   std::uint64_t last_id_ = kNoBlock;
   VoxelBlock* last_block_ = nullptr;
 };

@@ -13,7 +13,7 @@ namespace ist {
 /// `max_range` where a point is farther or, in a depth image, nothing is in range. A pixel or point
 /// of which nothing is known (NaN), or nearer than `min_range`, says nothing.
 /// @param cloud      that the snapshot was made of
-/// @param X_MS       sensor frame -> memory's frame
+/// @param X_MS       sensor frame -> memory's frame, of the sensor where the snapshot has it (X_FS)
 /// @param min_range  [m] of the snapshot's Ingest
 /// @param max_range  [m] finite
 /// @param scan       overwritten, its memory used again

@@ -52,7 +52,9 @@ struct HullDistance {
 /// @param X_BA       A's frame -> B's, rigid
 /// @param precision  [m] the search may end where it is this near to the distance
 /// @param support    of the last search, or none; replaced by that of this one
+/// @param enough     [m] the search may end where the lower bound is this, or cannot become it
 HullDistance hull_distance(const HullCoreset& a, const HullCoreset& b,
-                           const Eigen::Isometry3d& X_BA, double precision, HullSupport* support);
+                           const Eigen::Isometry3d& X_BA, double precision, HullSupport* support,
+                           double enough = 0.0);
 
 }  // namespace ist

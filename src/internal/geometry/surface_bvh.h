@@ -54,8 +54,14 @@ class SurfaceBvh {
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< of all parts, in L
   /// [m] The support function: the largest n.x of all points, in double. @param n_L  unit
   double support(const Eigen::Vector3d& n_L) const;
-  /// The hull of the surface of a solid; empty where a part is no triangle, or parts were given.
+  /// The hull of the surface of a solid; empty where parts were given.
   const HullCoreset& hull() const { return hull_; }
+  /// The hull of what is below a slot, for the first levels of a solid's nodes; null elsewhere.
+  const HullCoreset* hull_of(Slot slot) const {
+    return slot < hull_of_.size() && hull_of_[slot] >= 0
+               ? &hulls_[static_cast<std::size_t>(hull_of_[slot])]
+               : nullptr;
+  }
   /// A part that is near a point: the nearest one, or the first that is no farther than `enough`
   /// [m]. There must be any. @param p_L  [m] in L
   Slot nearest_part(const Eigen::Vector3d& p_L, double enough) const;
@@ -66,12 +72,16 @@ class SurfaceBvh {
  private:
   using Range = std::pair<std::uint32_t, std::uint32_t>;
   void build(const CancelRequest& cancelled);
-  std::int32_t add_node(const Range& range, const CancelRequest& cancelled);
+  std::int32_t add_node(const Range& range, int depth, const CancelRequest& cancelled);
+  void add_hull(const Range& range, Slot slot, const CancelRequest& cancelled);
   void set_box(const Range& range, Node* node, int slot) const;
 
   std::vector<Node> nodes_;
   std::vector<ConvexPart> parts_;
   HullCoreset hull_;
+  bool has_hulls_ = false;             // of the first levels
+  std::vector<HullCoreset> hulls_;     // of these
+  std::vector<std::int32_t> hull_of_;  // by slot, as far as there are hulls; below 0: none
   Eigen::AlignedBox3d bounds_;
   double extent_ = 0.0;
 };

@@ -143,6 +143,9 @@ class TriangleBvh {
   struct Triangle {
     Eigen::Vector3d a, b, c;
     std::uint32_t index;  ///< in the mesh
+
+    /// Unit, by the order of the corners; zero for a triangle without area.
+    Eigen::Vector3d normal() const { return (b - a).cross(c - a).normalized(); }
   };
 
   /// The same as it is stored: neighbours share their corners.
@@ -150,6 +153,21 @@ class TriangleBvh {
     std::uint32_t a, b, c;  ///< vertices
     std::uint32_t index;    ///< in the mesh
   };
+
+  /// Finds the leaves that a ray origin + t direction with t in [0, max_t] may cross, whichever of
+  /// the directions it has; roughly the one that is entered first comes first.
+  /// @param directions_M  holds them; corners of it that are no direction of a ray do no harm
+  /// @param leaves        receives them, kWidth in each but the last
+  /// @returns how many leaves there are; more than kWidth times `capacity`: they do not fit, and
+  /// the
+  ///          search ended
+  std::size_t leaves_on_rays(const Eigen::Vector3d& origin_M,
+                             const Eigen::AlignedBox3d& directions_M, double max_t, Boxes* leaves,
+                             std::size_t capacity) const;
+  /// first_crossing() of one of these rays. @param count  of `leaves`
+  RayCrossing first_crossing(const Boxes* leaves, std::size_t count,
+                             const Eigen::Vector3d& origin_M, const Eigen::Vector3d& direction_M,
+                             double max_t) const;
 
   /// [bytes] of the hierarchy and its triangles.
   std::size_t memory() const {

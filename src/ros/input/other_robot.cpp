@@ -24,8 +24,8 @@ std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed
 }  // namespace
 
 OtherRobot::OtherRobot(const OtherRobotConfig& config, const std::string& base_frame,
-                       ros::NodeHandle nh)
-    : config_(config), base_frame_(without_slash(base_frame)), nh_(std::move(nh)) {
+                       const ros::NodeHandle& nh)
+    : config_(config), base_frame_(without_slash(base_frame)), nh_(nh) {
   if (config.joint_states.empty()) return;
   own_buffer_ = std::make_shared<TransformBuffer>(ros::Duration(10.0));
   const ros::NodeHandle remapped(

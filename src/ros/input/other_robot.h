@@ -20,7 +20,8 @@ namespace ist {
 class OtherRobot {
  public:
   /// @param base_frame  frame of its root link in tf; empty: the prefix and the root link's name
-  OtherRobot(const OtherRobotConfig& config, const std::string& base_frame, ros::NodeHandle nh);
+  OtherRobot(const OtherRobotConfig& config, const std::string& base_frame,
+             const ros::NodeHandle& nh);
 
   /// Reads its description from the parameter server.
   /// @param faults  one sentence for each link whose geometry cannot be read

@@ -43,7 +43,8 @@ std::string Placer::missing_transform(const Measurement& measurement,
   for (const ros::Time& time : {instants.front(), instants.back()}) {
     if (is_known(buffer_, target.fixed_frame, sensor, time, &problem)) continue;
     const std::string cause = buffer_.why_refused(target.fixed_frame, sensor);
-    return cause.empty() ? problem : problem + ": " + cause;
+    if (!cause.empty()) problem += ": " + cause;
+    return problem;
   }
   if (!self_filter_) return "";
   for (const ros::Time& time : {instants.front(), instants.back()}) {

@@ -110,7 +110,7 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   RegionOfInterest region_M = target.region;
   region_M.center_F = X_MF_ * target.region.center_F;
   map_.set_region(region_M);
-  read_memory_scan(*measurement.raw_cloud(), cloud.cloud, X_MF_ * placement.X_FS,
+  read_memory_scan(*measurement.raw_cloud(), cloud.cloud, X_MF_ * cloud.cloud.X_FS,
                    config_.ingest.min_range, map_.config().max_range, &scan_);
   map_.insert(scan_);
   stamp_ = cloud.cloud.stamp;

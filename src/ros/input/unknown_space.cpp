@@ -23,9 +23,8 @@ constexpr double kSmaller = 0.8;
 
 }  // namespace
 
-UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, const TransformBuffer& buffer,
-                                     double range)
-    : memories_(std::move(memories)), buffer_(buffer), range_(range) {
+UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range)
+    : memories_(std::move(memories)), range_(range) {
   for (const auto& memory : memories_) skin_ = std::max(skin_, memory->skin());
   thread_ = std::thread(&UnknownSpaceWatch::run, this);
 }

@@ -25,9 +25,8 @@ struct UnknownSnapshot {
 class UnknownSpaceWatch {
  public:
   /// @param memories  with the same resolution and frame
-  /// @param buffer    outlives this
   /// @param range     [m] farther from the robot nothing is asked
-  UnknownSpaceWatch(SourceMemories memories, const TransformBuffer& buffer, double range);
+  UnknownSpaceWatch(SourceMemories memories, double range);
   ~UnknownSpaceWatch();
   UnknownSpaceWatch(const UnknownSpaceWatch&) = delete;
   UnknownSpaceWatch& operator=(const UnknownSpaceWatch&) = delete;
@@ -46,7 +45,6 @@ class UnknownSpaceWatch {
   std::shared_ptr<const UnknownSnapshot> look() const;
 
   const SourceMemories memories_;
-  const TransformBuffer& buffer_;
   const double range_;
   double skin_ = 0.0;
   SnapshotChannel<std::shared_ptr<const UnknownSnapshot>> channel_;

@@ -107,14 +107,13 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
     Eigen::Isometry3d& X_FB = snapshot->world.X_FB[i];
     if (frames[i] == kFixedFrame) continue;  // it is the identity for good
     bool is_own = false;
-    const std::string unplaced =
-        robot_ ? robot_->look_up_frame(buffer_, snapshot->fixed_frame, frames[i], time, max_age,
-                                       &X_FB, &is_own)
-               : "";
+    std::string unplaced = robot_ ? robot_->look_up_frame(buffer_, snapshot->fixed_frame, frames[i],
+                                                          time, max_age, &X_FB, &is_own)
+                                  : "";
     if (!unplaced.empty()) return unplaced;
     if (is_own) continue;
     std::string ignored;
-    const std::string problem =
+    std::string problem =
         is_known(buffer_, snapshot->fixed_frame, frames[i], time, &ignored)
             ? look_up(buffer_, snapshot->fixed_frame, frames[i], time, &X_FB)
             : look_up_newest(buffer_, snapshot->fixed_frame, frames[i], time, max_age, &X_FB);
@@ -321,11 +320,12 @@ void WorldSource::read_configured() {
       objects.push_back(std::move(object));
     }
   }
-  for (const auto& [link, name] : world.allowed_contacts) {
-    const bool is_known = std::any_of(objects.begin(), objects.end(),
-                                      [&](const auto& object) { return object.name == name; });
-    if (!is_known && !world.has_topic) {
-      ROS_WARN_STREAM("source '" << config_.name << "': allowed_contacts names '" << name
+  for (const auto& contact : world.allowed_contacts) {
+    const std::string& allowed = contact.second;
+    const bool is_object = std::any_of(objects.begin(), objects.end(),
+                                       [&](const auto& object) { return object.name == allowed; });
+    if (!is_object && !world.has_topic) {
+      ROS_WARN_STREAM("source '" << config_.name << "': allowed_contacts names '" << allowed
                                  << "', which is no object");
     }
   }

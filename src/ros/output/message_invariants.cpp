@@ -170,7 +170,7 @@ std::string broken_invariant(const ProximityArray& message, const InvariantInput
              message.computation_time);
   if (!check.broken().empty()) return check.broken();
   for (const LinkMessage& link : message.links) {
-    const std::string broken = check_link(link, input);
+    std::string broken = check_link(link, input);
     if (!broken.empty()) return broken;
   }
   return "";

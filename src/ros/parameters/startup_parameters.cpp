@@ -27,12 +27,18 @@ void collect(const XmlRpcValue& value, const std::string& name, const std::set<s
              Values* values) {
   if (value.getType() == XmlRpcValue::TypeStruct) {
     XmlRpcValue members = value;  // its iterators are not const
-    for (auto& [key, member] : members) {
-      collect(member, name.empty() ? key : name + "/" + key, live, values);
-    }
+    const std::string prefix = name.empty() ? "" : name + "/";
+    for (auto& [key, member] : members) collect(member, prefix + key, live, values);
   } else if (!name.empty() && value.valid() && live.count(name) == 0) {
     (*values)[name] = text_of(value);
   }
+}
+
+// @param before  the value in use; null: it was not set
+std::string change_text(const std::string& name, const std::string& value,
+                        const std::string* before) {
+  if (before == nullptr) return "~" + name + " has been set to " + value;
+  return "~" + name + " is " + value + ", in use is " + *before;
 }
 
 }  // namespace
@@ -50,11 +56,9 @@ std::string StartupParameters::changes(const XmlRpcValue& tree, const std::vecto
   std::vector<std::string> changes;
   for (const auto& [name, value] : now) {
     const auto before = in_use_.find(name);
-    if (before == in_use_.end()) {
-      changes.push_back("~" + name + " has been set to " + value);
-    } else if (before->second != value) {
-      changes.push_back("~" + name + " is " + value + ", in use is " + before->second);
-    }
+    const bool is_new = before == in_use_.end();
+    if (!is_new && before->second == value) continue;
+    changes.push_back(change_text(name, value, is_new ? nullptr : &before->second));
   }
   if (changes.empty()) return "";
   return "read at the start only, so that the node has to be restarted: " + join(changes, "; ");

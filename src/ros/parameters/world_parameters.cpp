@@ -106,8 +106,9 @@ void read_objects(ParameterReader* reader, const std::string& prefix, WorldConfi
                       " (max_objects)");
     return;
   }
+  const std::string folder = prefix + "objects/";
   for (const std::string& name : names) {
-    const std::string at = prefix + "objects/" + name;
+    const std::string at = folder + name;
     reader->children(at);  // adds an error unless it is a dictionary
     world->objects.emplace_back();
     read_object(reader, name, at + "/", *world, &world->objects.back());
@@ -136,9 +137,10 @@ void read_world(ParameterReader* reader, const std::string& prefix, SourceConfig
   reader->read(prefix + "max_objects", Range{"", 1.0, 1e6}, &world.limits.max_objects);
   reader->read(prefix + "max_triangles", Range{"", 1.0, 1e8}, &world.limits.max_triangles);
   reader->read(prefix + "margin", kMargin, &world.margin);
+  const std::string margins = prefix + "link_margins/";
   for (const std::string& link : reader->children(prefix + "link_margins")) {
     double margin = 0.0;
-    reader->read(prefix + "link_margins/" + link, kMargin, &margin);
+    reader->read(margins + link, kMargin, &margin);
     world.link_margins[link] = margin;
   }
   reader->read(prefix + "allowed_contacts", &world.allowed_contacts);

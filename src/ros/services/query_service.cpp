@@ -196,6 +196,36 @@ std::string QueryService::run(const Service::Request& request, Service::Response
   return find_impact_times(request, positions, live.query, response);
 }
 
+namespace {
+
+/// @returns empty, or which joint is stated at one end of the motion only
+std::string half_stated_joint(const std::vector<Kinematics::Joint>& joints,
+                              const JointMotion& motion, std::size_t state) {
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!joints[j].is_free() || std::isnan(motion.from[j]) == std::isnan(motion.to[j])) continue;
+    return "joint '" + joints[j].name + "' is stated in one of states[" + std::to_string(state) +
+           "] and states[" + std::to_string(state + 1) + "] only: a motion has to state it in all";
+  }
+  return "";
+}
+
+/// Keeps the first contact of each link, or NaN where it is not known.
+/// @param begin  [s] of the part of the motion that the impacts are found in
+void note_impacts(const std::vector<ImpactTime>& impacts, double begin, std::vector<double>* first,
+                  std::vector<bool>* wanted) {
+  for (std::size_t i = 0; i < wanted->size(); ++i) {
+    if (std::isfinite(impacts[i].time)) {
+      (*first)[i] = begin + impacts[i].time;
+      (*wanted)[i] = false;  // the request asks for the first contact only
+    } else if (std::isnan(impacts[i].time) && (*first)[i] == kInf) {
+      (*first)[i] = impacts[i].time;
+      (*wanted)[i] = false;
+    }
+  }
+}
+
+}  // namespace
+
 /// Finds the times of impact with the obstacles of the last result, straight from state to state.
 /// @returns empty, or why the motion cannot be answered
 std::string QueryService::find_impact_times(const Service::Request& request,
@@ -223,22 +253,11 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
     const JointMotion motion{positions[k], positions[k + 1],
                              request.times[k + 1] - request.times[k]};
-    for (std::size_t j = 0; j < joints.size(); ++j) {
-      if (!joints[j].is_free() || std::isnan(motion.from[j]) == std::isnan(motion.to[j])) continue;
-      return "joint '" + joints[j].name + "' is stated in one of states[" + std::to_string(k) +
-             "] and states[" + std::to_string(k + 1) + "] only: a motion has to state it in all";
-    }
+    const std::string half_stated = half_stated_joint(joints, motion, k);
+    if (!half_stated.empty()) return half_stated;
     impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(), &impacts);
     if (request.self_proximity != 0) self_.advance(motion, request.times[k], still, query);
-    for (std::size_t i = 0; i < wanted.size(); ++i) {
-      if (std::isfinite(impacts[i].time)) {
-        first[i] = request.times[k] + impacts[i].time;
-        wanted[i] = false;  // the request asks for the first contact only
-      } else if (std::isnan(impacts[i].time) && first[i] == kInf) {
-        first[i] = impacts[i].time;
-        wanted[i] = false;
-      }
-    }
+    note_impacts(impacts, request.times[k], &first, &wanted);
     if (!thread_.is_running()) return "the node ends";
   }
   for (std::size_t i = 0; i < chosen_.size(); ++i) {

@@ -19,8 +19,8 @@ namespace ist {
 /// first asked. One thread.
 class SelfQueryAnswer {
  public:
-  SelfQueryAnswer(ros::NodeHandle nh, ServerConfig config)
-      : config_(std::move(config)), nh_(std::move(nh)) {}
+  SelfQueryAnswer(const ros::NodeHandle& nh, ServerConfig config)
+      : config_(std::move(config)), nh_(nh) {}
 
   /// Takes a model that is ready and has kinematics.
   void set_model(const std::shared_ptr<const ModelState>& model);

@@ -1,0 +1,321 @@
+// Known worlds under attack: margins of every size, objects that come, go and change their shape,
+// frames that move, ranges that change, deadlines, and meshes that no one should send.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "internal/proximity/deadline.h"
+#include "ist_proximity/proximity/known_world.h"
+#include "ist_proximity/proximity/world_file.h"
+#include "ist_proximity/proximity/world_query.h"
+#include "support/random_links.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
+#include "support/world_oracle.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// A world that changes from step to step, and its truth.
+class ChangingWorld {
+ public:
+  explicit ChangingWorld(std::uint64_t seed) : rng(seed), links(test::random_links(&rng)) {
+    for (const LinkGeometry& shape : test::random_links(&rng)) {
+      shapes_.push_back(shape);
+      oracles_.emplace_back(shape);
+    }
+    for (const LinkGeometry& link : links) link_oracles_.emplace_back(link);
+  }
+
+  double uniform(double low, double high) { return test::uniform(&rng, low, high); }
+
+  // Adds or replaces one of a few names.
+  void add() {
+    WorldObject object;
+    object.name = "object " + std::to_string(static_cast<int>(uniform(0, 12)));
+    object.frame = "frame " + std::to_string(static_cast<int>(uniform(0, 4)));
+    const auto shape = static_cast<std::size_t>(uniform(0, 0.999) * shapes_.size());
+    object.geometry = shapes_[shape];
+    object.X_BO = test::random_pose(&rng, 1.0);
+    object.margin = uniform(0, 1) < 0.5 ? 0.0 : std::pow(uniform(0, 1), 3);
+    ASSERT_TRUE(builder_.add({object}).empty());
+    Known& known = known_[object.name];
+    known = {shape, object.frame, object.X_BO, object.margin};
+    is_changed_ = true;
+  }
+  void remove() {
+    if (known_.empty()) return;
+    const auto one = std::next(
+        known_.begin(), static_cast<long>(uniform(0, 0.999) * static_cast<double>(known_.size())));
+    EXPECT_TRUE(builder_.remove(one->first));
+    known_.erase(one);
+    is_changed_ = true;
+  }
+  void move() {
+    if (known_.empty()) return;
+    auto& [name, known] = *known_.begin();
+    known.X_BO = known.X_BO * test::random_pose(&rng, uniform(0, 0.3));
+    EXPECT_EQ(builder_.move(name, known.frame, known.X_BO), "");
+    is_changed_ = true;
+  }
+  void move_frames(double size) {
+    for (auto& X : X_FB_) X = X * test::random_pose(&rng, size);
+  }
+
+  const PosedWorld& posed() {
+    if (is_changed_) posed_.world = builder_.world();
+    is_changed_ = false;
+    posed_.X_FB.clear();
+    for (const std::string& frame : posed_.world->frames()) {
+      posed_.X_FB.push_back(X_FB_[static_cast<std::size_t>(frame.back() - '0')]);
+    }
+    return posed_;
+  }
+
+  /// [m] The least distance less its margin; contact counts as 0.
+  double truth(std::size_t link, const Eigen::Isometry3d& X_FL) const {
+    double best = kInf;
+    for (const auto& entry : known_) {
+      const Known& known = entry.second;
+      const Eigen::Isometry3d X_FO =
+          X_FB_[static_cast<std::size_t>(known.frame.back() - '0')] * known.X_BO;
+      const double distance =
+          link_oracles_[link].distance(oracles_[known.shape], X_FL.inverse() * X_FO, 1e9);
+      best = std::min(best, std::max(distance, 0.0) - known.margin);
+    }
+    return best;
+  }
+  bool empty() const { return known_.empty(); }
+
+  test::Rng rng;
+  std::vector<LinkGeometry> links;
+
+ private:
+  struct Known {
+    std::size_t shape;
+    std::string frame;
+    Eigen::Isometry3d X_BO;
+    double margin;
+  };
+  std::vector<LinkGeometry> shapes_;
+  std::vector<test::OracleSolid> oracles_, link_oracles_;
+  WorldBuilder builder_;
+  std::map<std::string, Known> known_;
+  std::vector<Eigen::Isometry3d> X_FB_ =
+      std::vector<Eigen::Isometry3d>(4, Eigen::Isometry3d::Identity());
+  PosedWorld posed_;
+  bool is_changed_ = true;
+};
+
+TEST(HostileWorld, NoBoundIsAboveTheTruthWhateverComesAndGoes) {
+  int cases = 0, clear = 0, near = 0, unfinished = 0;
+  for (const std::uint64_t seed : {7U, 8U}) {
+    ChangingWorld world(seed);
+    const auto robot = make_robot_surfaces(test::model_of(world.links, 0.02));
+    WorldQuery query(robot, {});
+    std::vector<Eigen::Isometry3d> X_FL(world.links.size());
+    for (auto& X : X_FL) X = test::random_pose(&world.rng, 1.0);
+    std::vector<bool> known(world.links.size(), true);
+    std::vector<LinkProximity> results;
+    for (int step = 0; step < test::scaled(100); ++step) {
+      if (step % 3 == 0) world.add();
+      if (step % 5 == 4) world.remove();
+      if (step % 7 == 6) world.move();
+      world.move_frames(step % 4 == 0 ? world.uniform(0, 0.5) : 1e-3);
+      for (auto& X : X_FL) {
+        X = X * test::random_pose(&world.rng, std::pow(10.0, world.uniform(-5, -0.7)));
+      }
+      QueryConfig config;
+      config.max_distance = std::pow(10.0, world.uniform(-2.0, 0.3));
+      config.tolerance = world.uniform(0, 1) < 0.3 ? 0.0 : 0.002;
+      config.relative_tolerance = world.uniform(0, 1) < 0.7 ? 0.0 : 0.2;
+      config.margin = world.uniform(0, 1) < 0.7 ? 0.0 : world.uniform(0.0, 0.2);
+      query.set_config(config);
+      std::vector<double> margins;
+      for (std::size_t i = 0; i < X_FL.size(); ++i) {
+        margins.push_back(world.uniform(0, 1) < 0.7 ? 0.0 : world.uniform(0, 0.3));
+      }
+      query.set_link_margins(margins);
+      query.set_influence_distance(world.uniform(0, 1) < 0.5 ? 0.0 : world.uniform(0, 0.5));
+      const bool has_deadline = step % 6 == 5;
+      const PosedWorld& posed = world.posed();
+      if (has_deadline) Deadline::asks_left_for_test = static_cast<int>(world.uniform(0, 30));
+      const TimePoint end = has_deadline ? std::chrono::steady_clock::now() + std::chrono::hours(1)
+                                         : TimePoint::max();
+      const bool complete = query.run(X_FL, known, {&posed}, end, &results);
+      Deadline::asks_left_for_test = -1;
+      ASSERT_TRUE(complete || has_deadline);
+      unfinished += complete ? 0 : 1;
+      for (std::size_t i = 0; i < X_FL.size(); ++i) {
+        const LinkProximity& r = results[i];
+        const double truth = world.truth(i, X_FL[i]) - config.margin - margins[i];
+        SCOPED_TRACE(::testing::Message() << "seed " << seed << ", step " << step << ", link " << i
+                                          << ", deadline " << has_deadline << ", truth " << truth
+                                          << ", state " << static_cast<int>(r.state));
+        ASSERT_LE(r.lower_bound, truth + 1e-9);
+        if (!has_deadline) ASSERT_NE(r.state, LinkState::kUnknown);
+        if (r.state == LinkState::kClear) ASSERT_GE(truth, config.max_distance - 1e-9);
+        ++cases;
+        clear += r.state == LinkState::kClear ? 1 : 0;
+        near += r.state == LinkState::kNear ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(clear, cases / 20);
+  EXPECT_GT(near, cases / 5);
+  EXPECT_GT(unfinished, 0);
+}
+
+// Whatever is sent is in the world, or there is a fault that names it: nothing is lost in silence.
+TEST(HostileWorld, EveryObjectIsThereOrNamed) {
+  const auto mesh = [](std::vector<Eigen::Vector3d> vertices,
+                       std::vector<TriangleMesh::Triangle> triangles) {
+    TriangleMesh m;
+    m.vertices = std::move(vertices);
+    m.triangles = std::move(triangles);
+    return Shape(m);
+  };
+  const TriangleMesh good = test::icosphere(0.1, 1);
+  TriangleMesh flat = good, tiny = good, huge = good, mirrored = good, doubled = good, far = good;
+  for (auto& v : flat.vertices) v.z() = 0.0;
+  for (auto& v : tiny.vertices) v *= 1e-12;
+  for (auto& v : huge.vertices) v *= 1e9;
+  for (auto& v : far.vertices) v.array() += 1e8;
+  for (auto& t : mirrored.triangles) std::swap(t[0], t[1]);
+  doubled.triangles.insert(doubled.triangles.end(), good.triangles.begin(), good.triangles.end());
+  const std::vector<Shape> shapes = {mesh({}, {}),
+                                     mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}),
+                                     mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 7}}),
+                                     mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 0xFFFFFFFF}}),
+                                     mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 0}}),
+                                     mesh({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}),
+                                     mesh({{0, 0, 0}, {kNaN, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}),
+                                     mesh({{0, 0, 0}, {kInf, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}),
+                                     mesh({{0, 0, 0}, {1e-200, 0, 0}, {0, 1e-200, 0}}, {{0, 1, 2}}),
+                                     mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}),
+                                     flat,
+                                     tiny,
+                                     huge,
+                                     far,
+                                     mirrored,
+                                     doubled,
+                                     Box{{0, 0, 0}},
+                                     Box{{1, 1, 0}},
+                                     Box{{-1, 1, 1}},
+                                     Box{{kNaN, 1, 1}},
+                                     Box{{1e300, 1, 1}},
+                                     Box{{1e-300, 1e-300, 1e-300}},
+                                     Sphere{0},
+                                     Sphere{-1},
+                                     Sphere{kInf},
+                                     Sphere{1e-310},
+                                     Cylinder{0, 1},
+                                     Cylinder{1, 0},
+                                     Cylinder{kNaN, 1},
+                                     Cylinder{1e-9, 1e4},
+                                     Cylinder{1e4, 1e-9}};
+  WorldBuilder builder;
+  std::set<std::string> named;
+  std::vector<WorldObject> objects;
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    WorldObject object;
+    object.name = "object " + std::to_string(i);
+    object.frame = "world";
+    GeometryElement element;
+    element.shape = shapes[i];
+    object.geometry = {element};
+    objects.push_back(object);
+  }
+  for (const WorldFault& fault : builder.add(objects)) {
+    EXPECT_TRUE(named.insert(fault.object).second) << fault.object;
+    EXPECT_NE(fault.text.find(fault.object), std::string::npos) << fault.text;
+  }
+  PosedWorld posed;
+  posed.world = builder.world();
+  posed.X_FB.assign(posed.world->frames().size(), Eigen::Isometry3d::Identity());
+  std::set<std::string> there;
+  for (const auto& object : posed.world->objects()) there.insert(object.name);
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    EXPECT_NE(there.count(objects[i].name), named.count(objects[i].name)) << objects[i].name;
+  }
+  EXPECT_GE(there.size(), 4U);
+  EXPECT_GE(named.size(), 15U);
+  // What is there has distances.
+  const auto robot = make_robot_surfaces(test::make_model({Sphere{0.05}}, 0.005));
+  std::vector<LinkProximity> results;
+  for (const auto& object : posed.world->objects()) {
+    WorldBuilder one;
+    for (const WorldObject& o : objects) {
+      if (o.name == object.name) ASSERT_TRUE(one.add({o}).empty());
+    }
+    PosedWorld alone;
+    alone.world = one.world();
+    alone.X_FB = {Eigen::Isometry3d::Identity()};
+    QueryConfig config;
+    config.max_distance = 2.0;
+    WorldQuery query(robot, config);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    X_FL.translation() = Eigen::Vector3d(0.03, 0.02, 0.6);
+    ASSERT_TRUE(query.run(std::vector<Eigen::Isometry3d>{X_FL}, {true}, {&alone}, TimePoint::max(),
+                          &results));
+    EXPECT_NE(results[0].state, LinkState::kUnknown) << object.name;
+    EXPECT_FALSE(std::isnan(results[0].lower_bound)) << object.name;
+    EXPECT_LT(results[0].lower_bound, 0.7) << object.name << ": " << results[0].lower_bound;
+  }
+}
+
+// 0.4 + 0.3 - 0.3 is less than 0.4: an object whose margin of 0.3 m ends outside of max_distance
+// was neither clear nor near, and its link UNKNOWN.
+TEST(HostileWorld, AMarginThatRoundsMaxDistanceDownLeavesTheLinkClear) {
+  const auto robot = make_robot_surfaces(test::make_model({Sphere{0.05}}, 0.005));
+  int cut = 0;
+  for (int i = 1; i < 60; ++i) {
+    WorldObject object;
+    object.name = "box";
+    object.frame = "world";
+    GeometryElement element;
+    element.shape = Box{{0.1, 0.1, 0.1}};
+    object.geometry = {element};
+    object.margin = 0.01 * i;
+    QueryConfig config;
+    config.max_distance = 0.4;
+    cut += config.max_distance + object.margin - object.margin < config.max_distance ? 1 : 0;
+    WorldBuilder builder;
+    ASSERT_TRUE(builder.add({object}).empty());
+    PosedWorld world;
+    world.world = builder.world();
+    world.X_FB = {Eigen::Isometry3d::Identity()};
+    WorldQuery query(robot, config);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    X_FL.translation().x() = 0.1 + config.max_distance + object.margin + 0.005;
+    X_FL.translation().y() = 0.1;
+    std::vector<LinkProximity> results;
+    ASSERT_TRUE(query.run(std::vector<Eigen::Isometry3d>{X_FL}, {true}, {&world}, TimePoint::max(),
+                          &results));
+    EXPECT_EQ(results[0].state, LinkState::kClear) << "margin " << object.margin;
+    EXPECT_EQ(results[0].lower_bound, config.max_distance);
+  }
+  EXPECT_GT(cut, 0);
+}
+
+// Two objects of one name in a file: the second would take the place of the first, in silence.
+TEST(HostileWorld, AFileThatNamesAnObjectTwiceIsRefused) {
+  const std::string box = "1\nbox\n1 1 1\n0 0 0\n0 0 0 1\n0 0 0 0\n";
+  const SceneFile scene =
+      parse_scene("scene\n* wall\n" + box + "* table\n" + box + "* wall\n" + box + ".\n", "world");
+  EXPECT_TRUE(scene.objects.empty());
+  EXPECT_NE(scene.fault.find("'wall'"), std::string::npos) << scene.fault;
+  EXPECT_NE(scene.fault.find("line "), std::string::npos) << scene.fault;
+}
+
+}  // namespace
+}  // namespace ist
