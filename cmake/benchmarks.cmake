@@ -129,6 +129,7 @@ target_sources(benchmark_kept_repulsion PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp)
 target_sources(benchmark_self_pasted PRIVATE benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
+target_sources(benchmark_link_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_ingest PRIVATE
   benchmark/peers/kinect.cpp

@@ -1,7 +1,8 @@
 // Anytime models over their first minute: the first answer after the URDF, then spheres, memory and
 // the time of a query while packing goes on in a thread of low priority. The same motion is then
-// run again with the last model and without packing, because the times of queries follow the motion
-// more than anything else.
+// run twice more without packing, because the times of queries follow the motion more than anything
+// else: with the same models at the same times, which shows what packing beside it costs, and with
+// the last model, which shows what coarse packings cost.
 
 #include <sys/resource.h>
 
@@ -22,9 +23,11 @@
 #include "internal/robot/anytime_model.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/repulsion/repulsion.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "packing/options.h"
 #include "peers/scene.h"
+#include "ros/model/link_usage.h"
 #include "support.h"
 #include "support/long_chain.h"
 #include "support/whole_cloud.h"
@@ -68,9 +71,11 @@ double resident() {
   return 0.0;
 }
 
-// The newest model, handed from the packing thread to the queries.
+// The newest model, handed from the packing thread to the queries, and what these need.
 class NewestModel {
  public:
+  explicit NewestModel(AnytimeModel::Ptr first)
+      : model_(std::move(first)), usage(model_->robot()->links.size()) {}
   void set(AnytimeModel::Ptr model) {
     const std::lock_guard<std::mutex> lock(mutex_);
     model_ = std::move(model);
@@ -83,21 +88,37 @@ class NewestModel {
  private:
   mutable std::mutex mutex_;
   AnytimeModel::Ptr model_;
+
+ public:
+  LinkUsage usage;
 };
 
-// Refines the links in turn until all are final.
+// The link that is not final and whose queries measured most points exactly since the last call,
+// those before the others that something is near; -1: all are final.
+int link_to_refine(NewestModel* newest) {
+  const AnytimeModel::Ptr model = newest->get();
+  int chosen = -1;
+  std::pair<bool, double> most(false, -1.0);
+  for (std::size_t i = 0; i < newest->usage.size(); ++i) {
+    const LinkUsage::Need need = newest->usage.take(i);
+    if (model->robot()->links[i].is_final || std::pair(need.is_near, need.exact) <= most) continue;
+    most = {need.is_near, need.exact};
+    chosen = static_cast<int>(i);
+  }
+  return chosen;
+}
+
+// Refines the links in the node's order until all are final.
 void refine(NewestModel* newest, const std::atomic<bool>& stop) {
   (void)setpriority(PRIO_PROCESS, 0, 10);  // of this thread
   RobotModelCallbacks callbacks;
   callbacks.cancelled = [&] { return stop.load(); };
-  for (bool is_final = false; !is_final && !stop;) {
-    is_final = true;
-    for (std::size_t i = 0; i < newest->get()->robot()->links.size() && !stop; ++i) {
-      const AnytimeModel::Ptr model = newest->get();
-      if (model->robot()->links[i].is_final) continue;
-      is_final = false;
-      if (AnytimeModel::Ptr next = model->refined(i, callbacks)) newest->set(std::move(next));
-    }
+  while (!stop) {
+    const int link = link_to_refine(newest);
+    if (link < 0) return;
+    const AnytimeModel::Ptr next =
+        newest->get()->refined(static_cast<std::size_t>(link), callbacks);
+    if (next) newest->set(next);
   }
 }
 
@@ -128,11 +149,20 @@ struct Stage {
   std::vector<double> us;  // of the queries since the stage before
 };
 
-// Queries at 1 kHz along the motion, with the newest model.
+// A model, and the first cycle that had it.
+struct ModelOfCycle {
+  std::size_t first_cycle = 0;
+  std::shared_ptr<const RobotModel> model;
+};
+
+// Queries at 1 kHz along the motion.
+// @param model_at  the model of a cycle
+// @param usage     notes what queries need; may be null
+template <typename ModelAt>
 std::vector<Stage> run_stages(const MovingRobot& robot, const CloudSnapshot& cloud,
-                              const NewestModel& newest) {
+                              const ModelAt& model_at, LinkUsage* usage) {
   std::vector<Stage> stages;
-  std::shared_ptr<const RobotModel> model = newest.get()->robot();
+  std::shared_ptr<const RobotModel> model = model_at(0);
   ProximityQuery query(model, {});
   const std::vector<bool> known(model->links.size(), true);
   std::vector<LinkProximity> results;
@@ -142,12 +172,17 @@ std::vector<Stage> run_stages(const MovingRobot& robot, const CloudSnapshot& clo
     std::this_thread::sleep_until(begin + cycle * kPeriod);
     const double time = 1e-3 * static_cast<double>(cycle), second = kSeconds[stages.size()];
     const auto poses = robot.poses(*model, time);
-    const auto newer = newest.get()->robot();
+    const std::shared_ptr<const RobotModel> newer = model_at(cycle);
     ThreadTimer timer;
     if (newer != model) query.set_model(newer);
     query.run(poses, known, {&cloud}, &results);
     us.push_back(timer.lap());
     model = newer;
+    for (std::size_t i = 0; usage != nullptr && i < results.size(); ++i) {
+      const bool is_near = results[i].state >= LinkState::kNear &&
+                           results[i].distance < RepulsionConfig().influence_distance;
+      usage->note_query(i, query.link_statistics()[i], is_near);
+    }
     constexpr double kFirst = 0.2;  // [s] of queries that the first row is about
     if (time < second + (stages.empty() ? kFirst : 0.0)) continue;
     stages.push_back({second, model, resident(), us});
@@ -156,8 +191,8 @@ std::vector<Stage> run_stages(const MovingRobot& robot, const CloudSnapshot& clo
   return stages;
 }
 
-void add_row(const std::string& robot, const Stage& stage, const Stage& later, double first_wall,
-             double first_processor, Table* table) {
+void add_row(const std::string& robot, const Stage& stage, const Stage& replayed,
+             const Stage& later, double first_wall, double first_processor, Table* table) {
   const RobotModel& model = *stage.model;
   const double second = stage.second;
   std::size_t spheres = 0, final = 0;
@@ -172,8 +207,10 @@ void add_row(const std::string& robot, const Stage& stage, const Stage& later, d
               std::to_string(final) + " of " + std::to_string(model.links.size()),
               std::to_string(spheres), text("%.1f", 1e3 * gap), text("%.0f", stage.resident),
               text("%.0f", quantile(stage.us, 0.5)), text("%.0f", quantile(stage.us, 0.99)),
-              text("%.0f", quantile(later.us, 0.5)), text("%.0f", quantile(later.us, 0.99)),
-              text("%.2f", quantile(stage.us, 0.99) / quantile(later.us, 0.99))});
+              text("%.0f", quantile(replayed.us, 0.99)), text("%.0f", quantile(later.us, 0.5)),
+              text("%.0f", quantile(later.us, 0.99)),
+              text("%.2f", quantile(stage.us, 0.99) / quantile(replayed.us, 0.99)),
+              text("%.2f", quantile(replayed.us, 0.99) / quantile(later.us, 0.99))});
 }
 
 void measure_robot(const std::string& name, const std::string& urdf, const Options& options,
@@ -192,8 +229,7 @@ void measure_robot(const std::string& name, const std::string& urdf, const Optio
   RobotModelConfig config;
   config.packing.max_error = kMaxError;
   config.threads = kThreads;
-  NewestModel newest;
-  newest.set(AnytimeModel::build(robot.description, config, AnytimeModel::Stage::kFirst));
+  NewestModel newest(AnytimeModel::build(robot.description, config, AnytimeModel::Stage::kFirst));
   const double first_wall = 1e-6 * microseconds_since(start);
   const double first_processor = processor_seconds() - processor;
   robot.kinematics = std::make_unique<Kinematics>(*robot.description);
@@ -203,12 +239,26 @@ void measure_robot(const std::string& name, const std::string& urdf, const Optio
   Ingest(test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &cloud);
   std::atomic<bool> stop{false};
   std::thread packing(refine, &newest, std::cref(stop));
-  const std::vector<Stage> packing_stages = run_stages(robot, cloud, newest);
+  std::vector<ModelOfCycle> models;
+  const auto newest_model = [&](std::size_t cycle) {
+    const auto model = newest.get()->robot();
+    if (models.empty() || models.back().model != model) models.push_back({cycle, model});
+    return model;
+  };
+  const std::vector<Stage> stages = run_stages(robot, cloud, newest_model, &newest.usage);
   stop = true;
   packing.join();
-  const std::vector<Stage> later = run_stages(robot, cloud, newest);
+  std::size_t place = 0;
+  const auto same_model = [&](std::size_t cycle) {
+    if (cycle == 0) place = 0;
+    while (place + 1 < models.size() && models[place + 1].first_cycle <= cycle) ++place;
+    return models[place].model;
+  };
+  const std::vector<Stage> replayed = run_stages(robot, cloud, same_model, nullptr);
+  const auto last_model = [&](std::size_t /*cycle*/) { return newest.get()->robot(); };
+  const std::vector<Stage> later = run_stages(robot, cloud, last_model, nullptr);
   for (std::size_t i = 0; i < later.size(); ++i) {
-    add_row(name, packing_stages[i], later[i], first_wall, first_processor, table);
+    add_row(name, stages[i], replayed[i], later[i], first_wall, first_processor, table);
   }
 }
 
@@ -219,7 +269,8 @@ Table anytime_table() {
       "anytime",
       {"robot", "after [s]", "first model, clock / processor [s]", "links final", "spheres",
        "largest gap [mm]", "resident memory [MB]", "query, median [us]", "99th percentile [us]",
-       "the same motion afterwards, median [us]", "99th percentile [us]", "ratio of these"},
+       "the same models without packing, 99th percentile [us]", "the last model, median [us]",
+       "99th percentile [us]", "with packing / without, 99th", "these models / the last, 99th"},
       2);
   for (const char* robot : kRobots) {
     for (const double second : kSeconds) table.place({robot, text("%g", second)});

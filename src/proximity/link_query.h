@@ -88,6 +88,13 @@ class LinkQuery {
   /// Forgets what was kept: the clouds of later queries may be others.
   void forget() { link_.kept.forget(); }
 
+  /// [bytes] With its buffers, without the model.
+  std::size_t memory() const {
+    const LinkCoherence& kept = link_.kept;
+    return sizeof *this + link_.context.grid.memory() + kept.nodes.memory() + kept.fronts.memory() +
+           kept.distances.memory() + kept.supports.memory();
+  }
+
  private:
   bool search_points(SnapshotSpan clouds, Deadline* deadline);
   double proven(double bound) const;

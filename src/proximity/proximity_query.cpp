@@ -247,6 +247,11 @@ const std::vector<QueryStatistics>& ProximityQuery::link_statistics() const {
   return impl_->link_statistics;
 }
 const RobotModel& ProximityQuery::model() const { return *impl_->model; }
+std::size_t ProximityQuery::memory() const {
+  std::size_t bytes = sizeof(Impl);
+  for (const LinkQuery& link : impl_->links) bytes += link.memory();
+  return bytes;
+}
 
 bool is_rigid(const Eigen::Isometry3d& X, double tolerance) {
   const Eigen::Matrix3d error = X.linear().transpose() * X.linear() - Eigen::Matrix3d::Identity();

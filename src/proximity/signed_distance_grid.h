@@ -37,6 +37,8 @@ class SignedDistanceGrid {
   /// Takes another copy of the same solid; what was measured stays.
   void set_solid(const Solid& solid) { solid_ = &solid; }
 
+  std::size_t memory() const { return cells_.capacity() * sizeof(Cell); }  ///< [bytes]
+
   /// A part of space: a place, a sphere, or a box and the points that are in it.
   struct Part {
     Eigen::Vector3d center_L;                        ///< [m]

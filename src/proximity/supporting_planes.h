@@ -27,6 +27,10 @@ struct SupportCache {
     ++direction_id;
   }
 
+  std::size_t memory() const {  ///< [bytes]
+    return support.capacity() * sizeof(float) + computed_for.capacity() * sizeof(std::uint64_t);
+  }
+
   std::vector<float> support;               ///< [m] kSphereWidth for each node
   std::vector<std::uint64_t> computed_for;  ///< by node: a direction_id; 0: none
   std::uint64_t direction_id = 0;

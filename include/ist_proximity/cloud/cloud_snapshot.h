@@ -44,6 +44,7 @@ class PointIndex {
   std::size_t size() const;               ///< points
   const Eigen::Isometry3d& X_FO() const;  ///< index's -> fixed frame
   Eigen::AlignedBox3f bounds() const;     ///< [m] in O; holds all points
+  std::size_t memory() const;  ///< [bytes] reserved; the message it may refer to not counted
   /// Identifies one build: another number after every build of any index; 0 before the first.
   std::uint64_t build_id() const;
 

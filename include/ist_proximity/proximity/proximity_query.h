@@ -142,6 +142,7 @@ class ProximityQuery {
   /// The same by link: what each of them cost.
   const std::vector<QueryStatistics>& link_statistics() const;
   const RobotModel& model() const;  ///< the one given to the constructor
+  std::size_t memory() const;       ///< [bytes] of its working memory, without the model
 
  private:
   struct Impl;

@@ -35,6 +35,8 @@ class LazyTileFlags {
     }
   }
 
+  std::size_t memory() const { return size_ * sizeof words_[0]; }  ///< [bytes]
+
   bool is_loaded(std::size_t tile) const {
     return (words_[tile / kTilesPerWord].load(std::memory_order_acquire) & bit(tile)) != 0;
   }

@@ -45,7 +45,12 @@ class PointBvh {
     return flags_.is_loaded(i) ? tiles_[i] : load(i, scratch);
   }
   Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
-  std::uint64_t build_id() const { return build_id_; }    ///< 0 before the first build
+  /// [bytes] Reserved; pages of tiles that no query has looked at are not in use.
+  std::size_t memory() const {
+    return nodes_.capacity() * sizeof(BoxNode) + tiles_.capacity() * sizeof(PointTile) +
+           first_pixel_.capacity() * sizeof(std::uint32_t) + flags_.memory() + thinned_.memory();
+  }
+  std::uint64_t build_id() const { return build_id_; }  ///< 0 before the first build
 
   /// Gives it a thinned cloud until it is built again. Not to be called while others read.
   /// @param voxel_size  [m] > 0, edge of a voxel

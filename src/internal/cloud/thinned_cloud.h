@@ -66,6 +66,10 @@ class ThinnedStorage {
   /// @param tiles  of the index; as many thinned tiles fit
   void reset(std::size_t nodes, std::size_t tiles);
 
+  std::size_t memory() const {  ///< [bytes] reserved
+    return word_capacity_ * sizeof words_[0] + tile_capacity_ * sizeof tiles_[0];
+  }
+
   /// The tiles of a node where they are stored. @returns whether they are
   bool find(std::size_t node, Span<const ThinnedTile>* tiles) const;
 

@@ -72,6 +72,10 @@ class BvttFront {
   /// The pair is expanded once more: nothing is pruned below it for now.
   void reopen(std::int32_t i) { bounds_[static_cast<std::size_t>(i)] = kFarAway; }
 
+  std::size_t memory() const {  ///< [bytes]
+    return pairs_.capacity() * sizeof(Pair) + bounds_.capacity() * sizeof(float);
+  }
+
  private:
   void clear();
 
@@ -91,6 +95,11 @@ class BvttFronts {
   /// lately: with more indices in use than fronts, it is best that some keep theirs.
   BvttFront* find(std::uint64_t build_id);
   void forget();
+  std::size_t memory() const {  ///< [bytes]
+    std::size_t bytes = 0;
+    for (const Slot& slot : slots_) bytes += slot.front.memory();
+    return bytes;
+  }
 
  private:
   struct Slot {

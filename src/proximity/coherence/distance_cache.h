@@ -31,6 +31,8 @@ class DistanceCache {
   double find(Quantity quantity, std::uint32_t key, const Eigen::Vector3d& p_LQ) const;
   void store(Quantity quantity, std::uint32_t key, const Eigen::Vector3d& p_LQ, double lower_bound);
 
+  std::size_t memory() const { return entries_.capacity() * sizeof(Entry); }  ///< [bytes]
+
  private:
   struct Entry {
     std::uint32_t key = 0;

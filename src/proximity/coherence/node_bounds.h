@@ -51,6 +51,10 @@ class NodeBounds {
   bool load(std::int32_t child, ChildBounds* bounds) const;
   void store(std::int32_t child, const ChildBounds& bounds);
   void forget();
+  std::size_t memory() const {  ///< [bytes]
+    return keys_.capacity() * sizeof(Key) +
+           (floors_.capacity() + outsides_.capacity()) * sizeof(Row);
+  }
 
  private:
   static constexpr std::size_t kNodes = 2048, kTiles = 256, kIndices = 4;
