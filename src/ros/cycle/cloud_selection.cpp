@@ -27,6 +27,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       report.stamp = snapshot->stamp;
       report.counts_from = snapshot->counts_from;
       report.counts = snapshot->cloud.counts;
+      report.snapshot_memory = snapshot->cloud.index.memory();
       report.ingest_time = snapshot->cloud.ingest_time;
     }
     status->source_statuses[i] = source_status(report, now.toSec());

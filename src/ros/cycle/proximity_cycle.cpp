@@ -107,6 +107,7 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
   report->links_known = poses_.count_known();
   report->pose_age = seconds_between(poses_.stamp, now_);
   report->deadline = deadline_;
+  report->query_memory = query_.memory();
   report->add_times(message);
   if (status_input_.deadline.any()) ++report->deadlines_missed;
   report->worst_deadline.add(status_input_.deadline);

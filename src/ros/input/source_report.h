@@ -55,6 +55,7 @@ struct SourceReport {
   ros::Time counts_from;     ///< the age counts from then
   double ingest_time = 0.0;  ///< [s]
   IngestCounts counts;
+  std::size_t snapshot_memory = 0;                     ///< [bytes] of its index of points
   std::size_t memory_voxels = 0, memory_occupied = 0;  ///< of a memory
   ViewReport view;                                     ///< of a self-filter by view
   std::vector<std::string> view_links;                 ///< names of view.links

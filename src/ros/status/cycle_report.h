@@ -61,6 +61,7 @@ struct CycleReport {
   std::string speed_scale;           ///< the scale, the rule and the link; empty: not enabled
   std::string counted_links;         ///< which links do not count in both, and why
   std::string counted_problem;       ///< what is wrong with names of links that are configured
+  std::size_t query_memory = 0;      ///< [bytes] of the cycle's query
   std::size_t markers_drawn = 0;     ///< messages on ~markers, drawn while it has subscribers
 
   /// Takes the sources, the problems of poses and the status.

@@ -76,6 +76,8 @@ void add_source_counts(const SourceReport& source, double rate, double now,
     add_value("points NaN", source.counts.not_a_number, status);
     add_value("points infinite", source.counts.infinite, status);
     add_value("time to ingest", milliseconds(source.ingest_time), status);
+    add_value("memory of the cloud's index",
+              format_text("%.1f MB", 1e-6 * static_cast<double>(source.snapshot_memory)), status);
   }
 }
 
@@ -217,6 +219,8 @@ DiagnosticStatus query_diagnostics(const std::string& node, const CycleReport& r
   add_value(wanted, format_text("%.1f Hz", wanted_rate), &status);
   add_deadline(report, &status);
   add_value("markers drawn", report.markers_drawn, &status);
+  add_value("memory of the query",
+            format_text("%.1f MB", 1e-6 * static_cast<double>(report.query_memory)), &status);
   add_value("computation time, median", milliseconds(report.times.quantile(0.5)), &status);
   add_value("computation time, 99th percentile", milliseconds(report.times.quantile(0.99)),
             &status);
