@@ -192,6 +192,42 @@ std::vector<double> position(const ist::Kinematics& kinematics, double time, dou
   return q;
 }
 
+// The shapes of the links that are monitored.
+std::vector<LinkGeometry> shapes_of(const Case& c, const ist::RobotModel& model) {
+  std::vector<LinkGeometry> links;
+  for (const ist::LinkModel& link : model.links) {
+    for (const auto& described : c.robot.links) {
+      if (described.name == link.name) links.push_back(described.geometry);
+    }
+  }
+  return links;
+}
+
+// The objects of a case, and the links of the other robot if it has one.
+std::vector<WorldObject> objects_of(const Case& c, const ist::RobotModel& model,
+                                    const std::vector<LinkGeometry>& links) {
+  std::vector<WorldObject> objects = c.objects;
+  for (std::size_t i = 0; c.other && i < links.size(); ++i) {
+    WorldObject one = object("other " + model.links[i].name, ist::Sphere{1.0},
+                             Eigen::Vector3d::Zero(), "other " + model.links[i].name);
+    one.geometry = links[i];
+    objects.push_back(one);
+  }
+  return objects;
+}
+
+// Places the links of the other robot.
+void place_other(const ist::RobotModel& model, const ist::LinkPoses& other,
+                 ist::PosedWorld* world) {
+  for (std::size_t f = 0; f < world->X_FB.size(); ++f) {
+    for (std::size_t i = 0; i < model.links.size(); ++i) {
+      if (world->world->frames()[f] == "other " + model.links[i].name) {
+        world->X_FB[f] = other.X_FL[i];
+      }
+    }
+  }
+}
+
 // The rows of a case, at tolerances of 1 mm and 0.
 std::string measure(const Case& c, int steps) {
   ist::RobotModelConfig packing;
@@ -199,21 +235,8 @@ std::string measure(const Case& c, int steps) {
   const auto model = ist::build_robot_model(c.robot, packing);
   const auto kinematics = std::make_shared<const ist::Kinematics>(c.robot);
   ist::ForwardKinematics forward(*model, kinematics), forward_other(*model, kinematics);
-  std::vector<LinkGeometry> links;
-  for (const ist::LinkModel& link : model->links) {
-    for (const auto& described : c.robot.links) {
-      if (described.name == link.name) links.push_back(described.geometry);
-    }
-  }
-  std::vector<WorldObject> objects = c.objects;
-  if (c.other) {
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      WorldObject one = object("other " + model->links[i].name, ist::Sphere{1.0},
-                               Eigen::Vector3d::Zero(), "other " + model->links[i].name);
-      one.geometry = links[i];
-      objects.push_back(one);
-    }
-  }
+  const std::vector<LinkGeometry> links = shapes_of(c, *model);
+  const std::vector<WorldObject> objects = objects_of(c, *model, links);
   ist::WorldBuilder builder;
   builder.add(objects);
   ist::PosedWorld world{builder.world(), {}};
@@ -245,15 +268,7 @@ std::string measure(const Case& c, int steps) {
   for (int step = 0; step < steps; ++step) {
     const ist::LinkPoses& poses = forward.run(position(*kinematics, 1e-3 * step, 0.0));
     if (c.other) {
-      const ist::LinkPoses& other =
-          forward_other.run(position(*kinematics, 1e-3 * step, 2.0), X_FR);
-      for (std::size_t f = 0; f < world.X_FB.size(); ++f) {
-        for (std::size_t i = 0; i < links.size(); ++i) {
-          if (world.world->frames()[f] == "other " + model->links[i].name) {
-            world.X_FB[f] = other.X_FL[i];
-          }
-        }
-      }
+      place_other(*model, forward_other.run(position(*kinematics, 1e-3 * step, 2.0), X_FR), &world);
     }
     for (std::size_t k = 0; k < 2; ++k) {
       timer.lap();

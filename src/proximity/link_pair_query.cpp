@@ -246,24 +246,30 @@ void LinkPairQuery::search_from_touch() {
 
 // Some corners of a triangle that passes through the other link lead inward.
 void LinkPairQuery::search_along_parts() {
-  constexpr double kLast = 1e-7;  // share of the way to a corner
-  const Eigen::Vector3d touch_B = surfaces_.closest().on_q;
-  const Eigen::Isometry3d X_AB = X_BA_.inverse();
   const ConvexPart parts[] = {surfaces_.part_a(), surfaces_.part_b()};
   for (int i = 0; i < 2; ++i) {
     if (parts[i].kind != ConvexPart::Kind::kTriangle) continue;
     for (const Eigen::Vector3d& corner : {parts[i].a, parts[i].b, parts[i].c}) {
-      for (double share = 1.0; share > kLast; share *= 0.25) {
-        const Eigen::Vector3d q_B = touch_B + share * (corner - touch_B);
-        const SignedDistance found =
-            i == 0 ? b_.solid.signed_distance(q_B) : a_.solid.signed_distance(X_AB * q_B);
-        if (!(found.distance < depth_distance_)) continue;
-        depth_distance_ = found.distance;
-        on_a_ = i == 0 ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
-        on_b_ = i == 0 ? found.witness : q_B;
-        direction_ = i == 0 ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
-      }
+      search_toward(corner, i == 0);
     }
+  }
+}
+
+// Measures points of one link, from a corner of a touching triangle to where it touches, against
+// the other link.
+void LinkPairQuery::search_toward(const Eigen::Vector3d& corner_B, bool is_of_a) {
+  constexpr double kLast = 1e-7;  // share of the way to the corner
+  const Eigen::Vector3d touch_B = surfaces_.closest().on_q;
+  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  for (double share = 1.0; share > kLast; share *= 0.25) {
+    const Eigen::Vector3d q_B = touch_B + share * (corner_B - touch_B);
+    const SignedDistance found =
+        is_of_a ? b_.solid.signed_distance(q_B) : a_.solid.signed_distance(X_AB * q_B);
+    if (!(found.distance < depth_distance_)) continue;
+    depth_distance_ = found.distance;
+    on_a_ = is_of_a ? q_B : Eigen::Vector3d(X_BA_ * found.witness);
+    on_b_ = is_of_a ? found.witness : q_B;
+    direction_ = is_of_a ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
   }
 }
 

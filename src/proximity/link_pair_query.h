@@ -54,6 +54,7 @@ class LinkPairQuery {
   void keep_deepest(const LinkPairSearch& search, bool of_a);
   void search_from_touch();
   void search_along_parts();
+  void search_toward(const Eigen::Vector3d& corner_B, bool is_of_a);
   double pose_uncertainty(double distance) const;
   double depth_limit() const;
 

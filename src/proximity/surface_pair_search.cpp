@@ -349,18 +349,24 @@ bool SurfacePairSearch::prove_by_hulls() {
   return !is_wanted(plane_bound());
 }
 
+SurfacePairSearch::Start SurfacePairSearch::start(int* steps) {
+  if (closest_.distance <= 0.0 || !is_wanted(lower_bound())) return Start::kAnswered;
+  if (!is_at_reference_) {
+    if (*steps <= 0) return Start::kNoSteps;
+    --*steps;
+    set_reference();
+    if (prove_by_hulls() || closest_.distance <= 0.0) return Start::kAnswered;
+  }
+  begin_search();
+  return Start::kSearches;
+}
+
 bool SurfacePairSearch::run(const Goal& goal, int* steps) {
   goal_ = goal;
   update_prune_bound();
   if (!is_searching_) {
-    if (closest_.distance <= 0.0 || !is_wanted(lower_bound())) return true;
-    if (!is_at_reference_) {
-      if (*steps <= 0) return false;
-      --*steps;
-      set_reference();
-      if (prove_by_hulls() || closest_.distance <= 0.0) return true;
-    }
-    begin_search();
+    const Start started = start(steps);
+    if (started != Start::kSearches) return started == Start::kAnswered;
   }
   while (!queue_.empty() && closest_.distance > 0.0) {
     const Entry entry = queue_.front();

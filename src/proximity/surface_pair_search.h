@@ -103,6 +103,7 @@ class SurfacePairSearch {
     std::uint8_t children;  ///< by bit, those that it is about; 0: the pair itself
     bool operator<(const Entry& other) const { return key > other.key; }  ///< least on top
   };
+  enum class Start { kAnswered, kSearches, kNoSteps };
   /// A pair and its bound at this pose.
   struct Pair {
     double bound;
@@ -145,6 +146,8 @@ class SurfacePairSearch {
   double measure(const Pair& pair);
   void descend();
   void prove_by_plane();
+  /// Looks whether what is known answers, and begins the search otherwise.
+  Start start(int* steps);
   bool prove_by_hulls();
   void keep_plane(double bound);
   void visit(const Entry& entry, int* steps);

@@ -277,6 +277,22 @@ TEST(ClosingSpeedInScenes, ABallAtOneMetrePerSecond) {
   EXPECT_EQ(wrong, 0);
 }
 
+// The frame with noise and the steps of a Kinect's disparity.
+void add_kinect_noise(const std::vector<Eigen::Vector3f>& frame, test::Rng* rng,
+                      std::vector<Eigen::Vector3f>* noisy) {
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const double z = frame[i].z();
+    if (!(z > 0.0)) continue;
+    const double sigma = 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4);
+    // Disparity comes in steps of 1/8 pixel: 2.85 mm at 1 m, growing with the square.
+    const double inverse_step = 0.00285;
+    const double measured =
+        1.0 / (inverse_step * std::round(1.0 / (z + sigma * normal(*rng)) / inverse_step));
+    (*noisy)[i] = frame[i] * static_cast<float>(measured / z);
+  }
+}
+
 // Spheres that stand 0.1 to 0.6 m from what a real Kinect saw, whose noise is drawn anew for each
 // frame: axial noise of 1.2 mm + 1.9 mm/m^2 (z - 0.4 m)^2, and the steps of its disparity.
 TEST(ClosingSpeedInScenes, StaticLinksBesideAKinect) {
@@ -302,20 +318,10 @@ TEST(ClosingSpeedInScenes, StaticLinksBesideAKinect) {
   std::vector<ClosingSpeed> speeds(X_FL.size());
   std::vector<LinkProximity> answers;
   std::vector<Eigen::Vector3f> noisy = frame;
-  std::normal_distribution<double> normal;
   int messages = 0, finite = 0, unknown = 0;
   const int frames = test::scaled(300);
   for (int k = 0; k < frames; ++k) {
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      const double z = frame[i].z();
-      if (!(z > 0.0)) continue;
-      const double sigma = 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4);
-      // Disparity comes in steps of 1/8 pixel: 2.85 mm at 1 m, growing with the square.
-      const double inverse_step = 0.00285;
-      const double measured =
-          1.0 / (inverse_step * std::round(1.0 / (z + sigma * normal(rng)) / inverse_step));
-      noisy[i] = frame[i] * static_cast<float>(measured / z);
-    }
+    add_kinect_noise(frame, &rng, &noisy);
     RawCloud raw;
     raw.data = reinterpret_cast<const std::uint8_t*>(noisy.data());
     raw.width = 640;

@@ -191,6 +191,26 @@ std::vector<LinkGeometry> mesh_links(test::Rng* rng) {
   return links;
 }
 
+// What holds of links that are apart by the truth and told to be.
+void expect_near(const PairProximity& r, double truth, double tolerance, const std::string& what) {
+  EXPECT_EQ(r.state, LinkState::kNear) << what;
+  EXPECT_LE(r.lower_bound, truth + 1e-14) << what;
+  EXPECT_GE(r.distance, truth - 1e-14) << what;
+  EXPECT_LE(r.distance, truth + tolerance + 1e-12) << what;
+  if (r.lower_bound > 0.0) {
+    EXPECT_LE(r.distance - r.lower_bound, tolerance + 1e-11) << what;
+  }
+}
+
+// What holds of links whose surfaces touch, or of which one is inside the other.
+void expect_contact(const PairProximity& r, double truth, bool are_closed,
+                    const std::string& what) {
+  EXPECT_LE(r.lower_bound, 0.0) << what;
+  if (truth == 0.0 || are_closed) {
+    EXPECT_LE(r.distance, 0.0) << what;
+  }
+}
+
 TEST(LinkPairExact, RandomMeshesAgainstBruteForce) {
   test::Rng rng(21);
   const Robot robot(mesh_links(&rng));
@@ -221,10 +241,7 @@ TEST(LinkPairExact, RandomMeshesAgainstBruteForce) {
                                  std::to_string(pairs[i].second) + " trial " +
                                  std::to_string(trial) + " truth " + std::to_string(truth);
         if (inside || truth == 0.0) {
-          EXPECT_LE(r.lower_bound, 0.0) << what;
-          if (truth == 0.0 || are_closed(pairs[i])) {
-            EXPECT_LE(r.distance, 0.0) << what;
-          }
+          expect_contact(r, truth, are_closed(pairs[i]), what);
           contacts += r.state == LinkState::kContact ? 1 : 0;
           through_holes += truth > 0.0 ? 1 : 0;
           continue;
@@ -234,19 +251,27 @@ TEST(LinkPairExact, RandomMeshesAgainstBruteForce) {
           continue;
         }
         ++near;
-        EXPECT_EQ(r.state, LinkState::kNear) << what;
-        EXPECT_LE(r.lower_bound, truth + 1e-14) << what;
-        EXPECT_GE(r.distance, truth - 1e-14) << what;
-        EXPECT_LE(r.distance, truth + tolerance + 1e-12) << what;
-        if (r.lower_bound > 0.0) {
-          EXPECT_LE(r.distance - r.lower_bound, tolerance + 1e-11) << what;
-        }
+        expect_near(r, truth, tolerance, what);
       }
     }
   }
   EXPECT_GT(near, test::scaled(500));
   EXPECT_GT(contacts, test::scaled(200));
   EXPECT_GT(through_holes, test::kSanitized ? 0 : 5);
+}
+
+// What holds of a kept answer beside a fresh one. @param compares_touch  touching ones, too
+void expect_same(const PairProximity& kept, const PairProximity& anew, double tolerance,
+                 bool compares_touch, const std::string& what) {
+  if (kept.distance <= 0.0 && anew.distance <= 0.0 && !compares_touch) return;
+  ASSERT_EQ(kept.state, anew.state) << what << " " << kept.distance << " " << anew.distance;
+  if (kept.state != LinkState::kNear) return;
+  ASSERT_NEAR(kept.distance, anew.distance, tolerance + 1e-12) << what;
+  ASSERT_LE(kept.lower_bound, anew.distance + 1e-13) << what;
+  ASSERT_LE(anew.lower_bound, kept.distance + 1e-13) << what;
+  if (kept.lower_bound > 0.0) {
+    ASSERT_LE(kept.distance - kept.lower_bound, tolerance + 1e-11) << what;
+  }
 }
 
 // The answers along a motion are those of a fresh query at each step.
@@ -293,17 +318,10 @@ TEST(LinkPairExact, AMotionGivesTheAnswersOfFreshQueries) {
         steps += query.statistics().steps;
         fresh_steps += fresh.statistics().steps;
         for (std::size_t i = 0; i < pairs.size(); ++i) {
-          const bool is_touch = kept[i].distance <= 0.0 && anew[i].distance <= 0.0;
-          if (is_touch && !(has_inside(pairs[i].first) && has_inside(pairs[i].second))) continue;
-          ASSERT_EQ(kept[i].state, anew[i].state)
-              << i << " step " << step << " " << kept[i].distance << " " << anew[i].distance;
-          if (kept[i].state != LinkState::kNear) continue;
-          ASSERT_NEAR(kept[i].distance, anew[i].distance, tolerance + 1e-12) << i;
-          ASSERT_LE(kept[i].lower_bound, anew[i].distance + 1e-13) << i << " step " << step;
-          ASSERT_LE(anew[i].lower_bound, kept[i].distance + 1e-13) << i << " step " << step;
-          if (kept[i].lower_bound > 0.0) {
-            ASSERT_LE(kept[i].distance - kept[i].lower_bound, tolerance + 1e-11) << i;
-          }
+          const bool has_insides = has_inside(pairs[i].first) && has_inside(pairs[i].second);
+          expect_same(kept[i], anew[i], tolerance, has_insides,
+                      "pair " + std::to_string(i) + " step " + std::to_string(step));
+          ASSERT_FALSE(HasFatalFailure());
         }
       }
     }

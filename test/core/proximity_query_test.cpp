@@ -317,6 +317,21 @@ TEST(ProximityQuery, BoundsHoldWheneverTheDeadlinePasses) {
 
 // The same at every single step, in place of where the clock happens to stop a query: two clouds,
 // and points inside. Where the answer has a point, its distance is that point's, with its side.
+// What holds of a query's answers wherever it stopped. @param what  of the query
+void expect_bounds(const std::vector<LinkProximity>& results, const std::vector<Solid>& solids,
+                   const std::vector<Eigen::Isometry3d>& X_FL, const std::vector<double>& truth,
+                   const std::string& what) {
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    const LinkProximity& result = results[k];
+    ASSERT_LE(result.lower_bound, truth[k] + 1e-9) << what << ", link " << k;
+    if (result.state < LinkState::kNear) continue;
+    expect_consistent(result, X_FL[k]);
+    ASSERT_GE(result.distance, truth[k] - 1e-7) << what << ", link " << k;
+    const double exact = solids[k].signed_distance(X_FL[k].inverse() * result.p_FCo).distance;
+    ASSERT_NEAR(result.distance, exact, 1e-7) << what << ", link " << k;
+  }
+}
+
 TEST(ProximityQuery, BoundsHoldWhereverAQueryStops) {
   test::Rng rng(143);
   std::vector<TriangleMesh> meshes = link_meshes();
@@ -351,15 +366,10 @@ TEST(ProximityQuery, BoundsHoldWhereverAQueryStops) {
       complete = query.run(X_FL, known, {&first, &second}, &results);
       Deadline::asks_left_for_test = -1;
       stopped += complete ? 0 : 1;
-      for (std::size_t k = 0; k < meshes.size(); ++k) {
-        const LinkProximity& result = results[k];
-        ASSERT_LE(result.lower_bound, truth[k] + 1e-9) << "step " << step << ", link " << k;
-        if (result.state < LinkState::kNear) continue;
-        expect_consistent(result, X_FL[k]);
-        ASSERT_GE(result.distance, truth[k] - 1e-7) << "step " << step << ", link " << k;
-        const double exact = solids[k].signed_distance(X_FL[k].inverse() * result.p_FCo).distance;
-        ASSERT_NEAR(result.distance, exact, 1e-7) << "step " << step << ", link " << k;
-        ++answered;
+      expect_bounds(results, solids, X_FL, truth, "step " + std::to_string(step));
+      ASSERT_FALSE(HasFatalFailure());
+      for (const LinkProximity& result : results) {
+        answered += result.state < LinkState::kNear ? 0 : 1;
         contacts += result.state == LinkState::kContact ? 1 : 0;
       }
     }
