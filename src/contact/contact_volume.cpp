@@ -188,11 +188,15 @@ FieldSphere field_sphere(const ContactLeaf& leaf, int k, const Eigen::Isometry3d
 
 // Lens by lens: exact where the spheres fill both links.
 ContactVolume lens_volumes(const ContactSpheres& spheres_a, const ContactSpheres& spheres_b,
-                           const Eigen::Isometry3d& X_AB) {
+                           const Eigen::Isometry3d& X_AB, Deadline* deadline) {
   ContactVolume sum;
   TraversalStack<std::int32_t, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
   stack.push(0);
   while (!stack.empty()) {
+    if (deadline->passed()) {
+      sum.known = 0.0;
+      break;
+    }
     const std::int32_t child = stack.pop();
     if (child < 0) {
       const ContactLeaf& leaf = spheres_b.leaves[static_cast<std::size_t>(~child)];
@@ -250,13 +254,15 @@ ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geome
 
 // The mean of what either link's elements have inside the other one.
 ContactVolume contact_volume(const ContactGeometry& a, const ContactGeometry& b,
-                             const Eigen::Isometry3d& X_AB) {
+                             const Eigen::Isometry3d& X_AB, TimePoint end) {
+  Deadline deadline(end);
   ContactVolume sum;
   if (!a.has_volume() || !b.has_volume()) return sum;
   const ContactSpheres &in_a = *a.spheres, &in_b = *b.spheres;
-  if (is_filled(a) && is_filled(b)) return lens_volumes(in_a, in_b, X_AB);
-  const ContactVolume of_a = in_a.elements.inside(in_b.solid, in_b.elements.box(), X_AB.inverse());
-  const ContactVolume of_b = in_b.elements.inside(in_a.solid, in_a.elements.box(), X_AB);
+  if (is_filled(a) && is_filled(b)) return lens_volumes(in_a, in_b, X_AB, &deadline);
+  const ContactVolume of_a =
+      in_a.elements.inside(in_b.solid, in_b.elements.box(), X_AB.inverse(), &deadline);
+  const ContactVolume of_b = in_b.elements.inside(in_a.solid, in_a.elements.box(), X_AB, &deadline);
   const Eigen::Vector3d force_b = X_AB.linear() * of_b.weighted_normal;
   const Eigen::Vector3d moment_b =
       X_AB.linear() * of_b.weighted_moment + X_AB.translation().cross(force_b);
@@ -264,6 +270,7 @@ ContactVolume contact_volume(const ContactGeometry& a, const ContactGeometry& b,
   sum.weighted_normal = 0.5 * (force_b - of_a.weighted_normal);
   sum.weighted_moment = 0.5 * (moment_b - of_a.weighted_moment);
   sum.spheres = of_b.spheres;
+  sum.known = 0.5 * (of_a.known + of_b.known);
   return sum;
 }
 

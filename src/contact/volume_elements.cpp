@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "internal/geometry/solid_queries.h"
 
@@ -16,6 +17,8 @@ constexpr int kParts = 3;
 constexpr int kBlock = 4;
 // An outward field shorter than this has no direction any more: it shortens to 0 and does not turn.
 constexpr double kUndecided = 0.2;
+// Exact distances that are measured between two looks at the clock.
+constexpr std::uint32_t kDistancesBetweenLooks = 4;
 
 Eigen::AlignedBox3d box_of(const Solid& solid) {
   Eigen::AlignedBox3d box;
@@ -52,8 +55,9 @@ Mass mass_of(const Solid& solid, const Eigen::Vector3d& center, const Eigen::Vec
   }
   const Eigen::Vector3d part = size / kParts;
   for (int i = 0; i < kParts * kParts * kParts; ++i) {
-    const Eigen::Array3d at(i % kParts, i / kParts % kParts, i / kParts / kParts);
-    const Eigen::Vector3d p = center + ((at + 0.5 - 0.5 * kParts) * part.array()).matrix();
+    const Eigen::Array3i at(i % kParts, i / kParts % kParts, i / kParts / kParts);
+    const Eigen::Array3d from_middle = at.cast<double>() + 0.5 - 0.5 * kParts;
+    const Eigen::Vector3d p = center + (from_middle * part.array()).matrix();
     const SignedDistance found = solid.signed_distance(p);
     const double width = found.normal.cwiseAbs().dot(part);
     const double share = width > 0.0 ? std::clamp(0.5 - found.distance / width, 0.0, 1.0) : 0.0;
@@ -111,9 +115,12 @@ VolumeElements::VolumeElements(const Solid& solid, const OutwardField& field) {
 }
 
 ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,
-                                     const Eigen::Isometry3d& X_SL) const {
+                                     const Eigen::Isometry3d& X_SL, Deadline* deadline) const {
   ContactVolume sum;
+  std::size_t done = 0;
   for (const Block& block : blocks_) {
+    if (deadline->passed_now_and_then(kDistancesBetweenLooks)) break;
+    ++done;
     const Eigen::Vector3d center = X_SL * block.center;
     if (solid_box.exteriorDistance(center) >= block.radius) continue;
     // In a mesh with holes the signed distance jumps where its inside ends without a surface.
@@ -121,9 +128,14 @@ ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox
     if (-depth >= block.radius) continue;
     const bool is_inside = depth >= block.radius;
     for (std::size_t i = block.first; i < block.last; ++i) {
+      if (deadline->passed_now_and_then(kDistancesBetweenLooks)) break;
       add(elements_[i], is_inside ? nullptr : &solid, X_SL, &sum);
     }
   }
+  if (!deadline->has_passed()) return sum;
+  // The block in which the time ended is not known.
+  const double blocks = static_cast<double>(std::max<std::size_t>(blocks_.size(), 1));
+  sum.known = done > 0 ? static_cast<double>(done - 1) / blocks : 0.0;
   return sum;
 }
 

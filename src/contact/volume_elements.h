@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "contact/outward_field.h"
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/geometry/solid.h"
 
@@ -33,9 +34,10 @@ class VolumeElements {
   /// between their mean by the share, so that it is continuous.
   /// @param solid_box  about the solid, its frame S
   /// @param X_SL       this link's frame -> the solid's
+  /// @param deadline   ends the sum; ContactVolume::known is the share of blocks looked at by then
   /// @returns in this link's frame, about its origin
   ContactVolume inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,
-                       const Eigen::Isometry3d& X_SL) const;
+                       const Eigen::Isometry3d& X_SL, Deadline* deadline) const;
 
   const Eigen::AlignedBox3d& box() const { return box_; }  ///< about the link, its frame
   const std::vector<VolumeElement>& elements() const { return elements_; }

@@ -110,6 +110,28 @@ TEST(Deadline, EndsAContactVolume) {
   EXPECT_LT(quantile(overruns, 0.9), kStep);
 }
 
+// The volume of two links measures hundreds of exact distances; without an end it took 2 ms.
+TEST(Deadline, EndsTheVolumeOfTwoLinks) {
+  const ContactLink box(one(Box{{0.4, 0.4, 0.4}})), mesh(one(test::icosphere(0.2, 5)));
+  const Eigen::Isometry3d X(Eigen::Translation3d(0.2, 0.1, 0.05));
+  const ContactVolume whole = contact_volume(*box.body, *mesh.body, X);
+  ASSERT_EQ(whole.known, 1.0);
+  ASSERT_GT(whole.volume, 0.0);
+  std::vector<double> overruns;
+  int partly = 0;
+  for (int i = 0; i < test::scaled(100); ++i) {
+    const double limit = 2e-5 * (1 + i % 5);
+    const double begin = thread_time();
+    const ContactVolume part = contact_volume(*box.body, *mesh.body, X, from_now(limit));
+    overruns.push_back(thread_time() - begin - limit);
+    ASSERT_LT(part.known, 1.0);
+    ASSERT_LE(part.volume, whole.volume);
+    partly += part.known > 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(partly, 0);
+  EXPECT_LT(quantile(overruns, 0.9), kStep);
+}
+
 // One leaf of a map may be divided into thousands of cells; the clock is asked meanwhile.
 TEST(Deadline, EndsTheDivisionOfALeaf) {
   const ContactLink link(one(Box{{0.4, 0.4, 0.4}}));

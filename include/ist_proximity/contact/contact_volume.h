@@ -19,9 +19,9 @@ struct ContactVolume {
   Eigen::Vector3d weighted_normal = Eigen::Vector3d::Zero();  ///< [m^3] sum of V n
   Eigen::Vector3d weighted_moment = Eigen::Vector3d::Zero();  ///< [m^4] sum of p x V n
   std::size_t spheres = 0;  ///< spheres of the obstacle that share volume with the link
-  /// Share of the obstacles near the link that is summed, as the traversal divides them; 1: all,
-  /// and below 1 where time ended the sum. `volume` is a lower bound then, and the rest says
-  /// nothing.
+  /// Share of the obstacles near the link that is summed, as the traversal divides them, and of two
+  /// links the share of their elements; 1: all, and below 1 where time ended the sum. `volume` is a
+  /// lower bound then, and the rest says nothing.
   double known = 1.0;
 
   /// Adds `weight` times the other's volume, normal and moment, and its number of spheres.
@@ -86,9 +86,10 @@ ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geome
 /// there is a contact. Allocates nothing, locks nothing. Thread safe. Measures some hundred exact
 /// distances.
 /// @param X_AB  frame of the second -> frame of the first, rigid
+/// @param end   when the sum has to end; what is known by then says ContactVolume::known
 /// @returns of the first link, in its frame, about its origin
 ContactVolume contact_volume(const ContactGeometry& a, const ContactGeometry& b,
-                             const Eigen::Isometry3d& X_AB);
+                             const Eigen::Isometry3d& X_AB, TimePoint end = TimePoint::max());
 
 /// How strongly contact volumes push.
 struct PenetrationConfig {

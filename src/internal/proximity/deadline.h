@@ -8,6 +8,14 @@
 
 namespace ist {
 
+/// When a share of a deadline has passed.
+/// @param deadline  [s] from `begin`; 0: there is none
+inline TimePoint end_of(double deadline, double share, TimePoint begin) {
+  if (!(deadline > 0.0)) return TimePoint::max();
+  return begin + std::chrono::duration_cast<TimePoint::duration>(
+                     std::chrono::duration<double>(share * deadline));
+}
+
 /// When a computation has to end.
 class Deadline {
  public:

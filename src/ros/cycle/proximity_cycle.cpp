@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/repulsion/object_repulsion.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/stopwatch.h"
@@ -21,13 +22,6 @@ namespace {
 // Of a cycle's deadline: unknown space needs coarse bounds only.
 constexpr double kUnknownShare = 0.2;
 constexpr double kLeastDeadline = 1e-9;  // [s] 0 would be none
-
-/// When a share of a deadline [s] has passed.
-TimePoint end_of(double deadline, double share, TimePoint begin) {
-  if (!(deadline > 0.0)) return TimePoint::max();
-  return begin + std::chrono::duration_cast<TimePoint::duration>(
-                     std::chrono::duration<double>(share * deadline));
-}
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/repulsion/self_repulsion.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
@@ -15,7 +16,6 @@
 #include "ros/output/message_invariants.h"
 #include "ros/poses/make_pose_source.h"
 #include "ros/services/pair_choice.h"
-#include "ros/status/status.h"
 
 namespace ist {
 
@@ -154,7 +154,8 @@ bool SelfProximity::is_finished(std::size_t link) const {
   return true;
 }
 
-void SelfProximity::compute_wrenches(const LiveConfig& live) {
+/// A wrench is unknown where the time ends before all of the volume is summed.
+void SelfProximity::compute_wrenches(const LiveConfig& live, TimePoint end, DeadlineCost* cost) {
   const RobotModel& robot = *model_->robot;
   wrenches_.assign(results_.size(), Wrench::zero());
   for (std::size_t i = 0; i < results_.size(); ++i) {
@@ -164,11 +165,16 @@ void SelfProximity::compute_wrenches(const LiveConfig& live) {
     const ContactGeometry* first = find_contact_geometry(live.contacts.get(), robot, pair.first);
     const ContactGeometry* second = find_contact_geometry(live.contacts.get(), robot, pair.second);
     const Eigen::Isometry3d& X_FA = poses_.X_FL[pair.first];
-    wrenches_[i] = first == nullptr || second == nullptr
-                       ? Wrench::unknown()
-                       : contact_wrench(contact_volume(*first, *second,
-                                                       X_FA.inverse() * poses_.X_FL[pair.second]),
-                                        X_FA, live.penetration);
+    wrenches_[i] = Wrench::unknown();
+    if (first == nullptr || second == nullptr) continue;
+    const ContactVolume volume =
+        contact_volume(*first, *second, X_FA.inverse() * poses_.X_FL[pair.second], end);
+    cost->least_known = std::min(cost->least_known, volume.known);
+    if (volume.known < 1.0) {
+      ++cost->no_penetration;
+    } else {
+      wrenches_[i] = contact_wrench(volume, X_FA, live.penetration);
+    }
   }
 }
 
@@ -213,7 +219,7 @@ void SelfProximity::publish_once() {
     for (const std::size_t i : model_->monitored)
       input.deadline.unfinished += is_finished(i) ? 0 : 1;
     message->unfinished = static_cast<std::uint32_t>(input.deadline.unfinished);
-    compute_wrenches(live);
+    compute_wrenches(live, end_of(live.query.deadline, 1.0, begin), &input.deadline);
     message->header.stamp = poses_.stamp;
     for (const std::size_t i : model_->monitored) {
       const LinkModel& link = model_->robot->links[i];

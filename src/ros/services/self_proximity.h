@@ -19,6 +19,7 @@
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/pose_source.h"
 #include "ros/poses/transform_buffer.h"
+#include "ros/status/status.h"
 
 namespace ist {
 
@@ -56,7 +57,7 @@ class SelfProximity {
   void add_link(std::size_t link, const RepulsionConfig& repulsion,
                 ist_proximity::ProximityArray* message);
   bool is_finished(std::size_t link) const;
-  void compute_wrenches(const LiveConfig& live);
+  void compute_wrenches(const LiveConfig& live, TimePoint end, DeadlineCost* cost);
   Wrench penetration(std::size_t link, const LinkProximity& answer) const;
 
   const ServerConfig config_;
