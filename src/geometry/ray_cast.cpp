@@ -100,22 +100,41 @@ RayHit cast_element(const SolidElement& element, const Eigen::Vector3d& o, const
   return {};
 }
 
+namespace {
+
+// A ray whose origin is its nearest point to the middle of a mesh, where float is exact enough
+// however far the sensor is.
+struct CenteredRay {
+  Eigen::Vector3d o_M;
+  double shift = 0.0;               // from the given origin, in lengths of the direction
+  double first = 0.0, last = -1.0;  // what is looked at; first > last: the ray misses the mesh
+};
+
+CenteredRay centered_ray(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3d& origin_M,
+                         const Eigen::Vector3d& direction_M, double max_t) {
+  const Eigen::Vector3d middle = bounds.center();
+  const double radius = 0.5 * bounds.sizes().norm();
+  CenteredRay ray;
+  ray.shift = (middle - origin_M).dot(direction_M) / direction_M.squaredNorm();
+  ray.o_M = origin_M + ray.shift * direction_M;
+  if ((ray.o_M - middle).norm() > radius * (1.0 + 1e-6)) return ray;
+  const double span = 1.001 * radius / direction_M.norm();
+  ray.first = std::max(-ray.shift, -span);
+  ray.last = std::min(max_t - ray.shift, span);
+  return ray;
+}
+
+}  // namespace
+
 TriangleBvh::RayCrossing TriangleBvh::first_crossing(const Eigen::Vector3d& origin_M,
                                                      const Eigen::Vector3d& direction_M,
                                                      double max_t) const {
   RayCrossing best;
   if (triangles_.empty()) return best;
-  // The ray's origin is moved to its nearest point to the middle of the mesh, where float is exact
-  // enough however far the sensor is.
-  const Eigen::Vector3d middle = bounds_.center();
-  const double radius = 0.5 * bounds_.sizes().norm();
-  const double shift = (middle - origin_M).dot(direction_M) / direction_M.squaredNorm();
-  const Eigen::Vector3d o_M = origin_M + shift * direction_M;
-  if ((o_M - middle).norm() > radius * (1.0 + 1e-6)) return best;
-  const double span = 1.001 * radius / direction_M.norm();
-  const double first = std::max(-shift, -span), last = std::min(max_t - shift, span);
+  const auto [o_M, shift, first, last] = centered_ray(bounds_, origin_M, direction_M, max_t);
   if (first > last) return best;
-  mesh_ray::FloatRay ray = mesh_ray::float_ray(o_M - middle, direction_M, radius, first, last);
+  mesh_ray::FloatRay ray = mesh_ray::float_ray(o_M - bounds_.center(), direction_M,
+                                               0.5 * bounds_.sizes().norm(), first, last);
   double limit = last;
 
   struct Entry {

@@ -63,12 +63,14 @@ class Search {
       if (nearest.size <= kFineEnough * nearest.bound ||
           (deadline != nullptr && deadline->passed())) {
         break;
-      } else if (MayMakePlane(nearest)) {
+      }
+      if (MayMakePlane(nearest)) {
         planes_.add(DirectionTo(nearest));
         queue_[0].has_own_plane = true;
-      } else if (nearest.is_open) {
-        break;
-      } else if (nearest.child < 0) {
+        continue;
+      }
+      if (nearest.is_open) break;
+      if (nearest.child < 0) {
         OpenTile();
       } else {
         Divide(Pop().child);

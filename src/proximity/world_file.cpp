@@ -178,6 +178,14 @@ std::size_t triangles_of(const GeometryElement& element) {
   return mesh != nullptr ? mesh->triangles.size() : 0;
 }
 
+void skip_subframes(Scanner* in) {
+  const std::size_t subframes = in->count("the number of subframes", kMaxElements);
+  for (std::size_t i = 0; i < subframes; ++i) {
+    in->word("a subframe's name");
+    in->pose("a subframe's pose");
+  }
+}
+
 void read_objects(Scanner* in, const std::string& frame, const WorldLimits& limits,
                   std::vector<WorldObject>* objects) {
   in->line();  // the scene's name
@@ -208,13 +216,7 @@ void read_objects(Scanner* in, const std::string& frame, const WorldLimits& limi
       }
       for (int k = 0; k < 4; ++k) in->number("a colour");
     }
-    if (has_poses) {
-      const std::size_t subframes = in->count("the number of subframes", kMaxElements);
-      for (std::size_t i = 0; i < subframes; ++i) {
-        in->word("a subframe's name");
-        in->pose("a subframe's pose");
-      }
-    }
+    if (has_poses) skip_subframes(in);
     objects->push_back(std::move(object));
     if (objects->size() > limits.max_objects) {
       in->fail("it holds more than " + std::to_string(limits.max_objects) +

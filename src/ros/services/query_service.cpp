@@ -253,7 +253,7 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
     const JointMotion motion{positions[k], positions[k + 1],
                              request.times[k + 1] - request.times[k]};
-    const std::string half_stated = half_stated_joint(joints, motion, k);
+    std::string half_stated = half_stated_joint(joints, motion, k);
     if (!half_stated.empty()) return half_stated;
     impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(), &impacts);
     if (request.self_proximity != 0) self_.advance(motion, request.times[k], still, query);
