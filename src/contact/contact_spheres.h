@@ -20,8 +20,8 @@ struct alignas(32) ContactLeaf {
   float gradient[9][kSphereWidth];  ///< [1/m] of the outward field, row-major
 };
 
-/// What a link's contact volumes are summed over: spheres against clouds and maps, elements
-/// against other links.
+/// The pieces that a link's contact volumes are summed over: spheres against clouds and maps,
+/// elements against other links.
 struct ContactSpheres {
   InnerSphereTree tree;             ///< over the spheres that have a volume
   std::vector<ContactLeaf> leaves;  ///< the same leaves as the tree's

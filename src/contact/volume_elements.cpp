@@ -62,7 +62,7 @@ Mass mass_of(const Solid& solid, const Eigen::Vector3d& center, const Eigen::Vec
     const double width = found.normal.cwiseAbs().dot(part);
     const double share = width > 0.0 ? std::clamp(0.5 - found.distance / width, 0.0, 1.0) : 0.0;
     if (!(share > 0.0)) continue;
-    // What is cut off lies outward.
+    // The part that is cut off lies outward.
     const Eigen::Vector3d inner = p - 0.5 * (1.0 - share) * width * found.normal;
     mass.add(inner, part * std::cbrt(share), share * part.prod());
   }

@@ -54,7 +54,7 @@ TriangleBvh::RayCrossing TriangleBvh::first_crossing(const Boxes* leaves, std::s
                                                      const Eigen::Vector3d& origin_M,
                                                      const Eigen::Vector3d& direction_M,
                                                      double max_t) const {
-  // As in the search for one ray, its origin is moved near the mesh, where float is exact enough.
+  // The origin is moved near the mesh, where float is exact enough, as in the search for one ray.
   const Eigen::Vector3d middle = bounds_.center();
   const double radius = 0.5 * bounds_.sizes().norm();
   const double shift = (middle - origin_M).dot(direction_M) / direction_M.squaredNorm();

@@ -85,7 +85,7 @@ class Search {
            (entry.child < 0 || entry.size <= in_.radius);
   }
 
-  // From the centre of the sphere that is nearest to a box, to the box.
+  // The direction from the centre of the sphere that is nearest to a box, to the box.
   Eigen::Vector3d DirectionTo(const Entry& entry) const {
     const BoxNode& node = nodes_[entry.node];
     const Eigen::AlignedBox3f box(

@@ -394,7 +394,7 @@ bool SurfacePairSearch::run(const Goal& goal, int* steps) {
 double SurfacePairSearch::bound_by_hulls(const Pair& pair) {
   const HullCoreset *hull_a = a_.hull_of(pair.a), *hull_b = b_.hull_of(pair.b);
   if (hull_a == nullptr || hull_b == nullptr) return 0.0;
-  // Where hulls of this size do not answer, they are asked no longer.
+  // Hulls of a size that does not answer are asked no longer.
   const double share = (a_.radius(pair.a) + b_.radius(pair.b)) / (a_.extent() + b_.extent());
   HullAnswers& answers =
       hull_answers_[static_cast<std::size_t>(std::clamp(-std::ilogb(share), 0, kHullSizes - 1))];

@@ -103,7 +103,7 @@ class ViewFilter {
     Eigen::Vector3f p_S, n_S;  // middle and normal, where there is a height
   };
 
-  // What says which points of a tile are in the skin.
+  // The tests that say which points of a tile are in the skin.
   struct Skin {
     const SelfFilter& filter;
     SelfFilter::Verdict verdict;

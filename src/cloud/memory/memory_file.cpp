@@ -69,7 +69,7 @@ std::string write_memory_file(const std::string& path, double resolution, std::s
 std::string read_memory_file(const std::string& path, const MemoryConfig& config, Octree* octree) {
   OctreeLimits limits;
   limits.keep_free = true;
-  // What a memory has written can be read: each voxel a leaf, as far out as there are keys.
+  // A file that a memory has written can be read: each voxel a leaf, as far out as there are keys.
   limits.max_leaves = std::max(limits.max_leaves, config.max_nodes);
   limits.max_position = std::max(limits.max_position, (kKeyOrigin + 1) * config.resolution);
   double resolution = 0.0;

@@ -66,7 +66,8 @@ struct SeenSpace::Impl {
     end_run();
   }
 
-  // What lies in the cube about a sphere, and outside of all keys: nothing can be known there.
+  // Appends the parts of the cube about a sphere that lie outside of all keys: nothing can be known
+  // there.
   void append_outside(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
                       VoxelBoxes* boxes) const {
     const double first = scale.border(0), end = scale.border(kKeyEnd);

@@ -61,7 +61,7 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
   if (problem_.empty()) {
     newest_ = make_snapshot(cloud, &MemoryMap::hidden_boxes);
   } else if (newest_) {
-    // What the last remembered cloud answered for may be out of this one's view.
+    // Space that the last remembered cloud answered for may be out of this one's view.
     map_.forget(cloud.cloud.stamp);
     newest_ = make_snapshot(cloud, &MemoryMap::occupied_boxes);
   }

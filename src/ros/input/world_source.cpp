@@ -268,7 +268,7 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
                          std::vector<WorldObject>* added) {
   using Message = ist_proximity::WorldObject;
   if (message.operation == Message::ADD) {
-    // Of names that were never built there are no more than of their faults.
+    // Names of objects that were never built are limited, too.
     const std::size_t most = 2 * config_.world.limits.max_objects;
     if (from_topic_.size() < most) from_topic_.insert(message.id);
     added->push_back(to_world_object(message, config_.world, [this] { return !running_.load(); }));
