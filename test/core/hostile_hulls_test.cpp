@@ -1,0 +1,148 @@
+// Surfaces of many triangles, whose hierarchies have hulls of nodes, in poses that make hulls fail:
+// stretched to needles and plates, far from their frame's origin, one in a hollow of the other, a
+// hair apart. Bounds hold at every answer, against brute force in double.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "internal/geometry/surface_bvh.h"
+#include "ist_proximity/geometry/solid.h"
+#include "proximity/surface_pair_search.h"
+#include "support/link_pair_oracle.h"
+#include "support/random_links.h"
+#include "support/random_numbers.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+TriangleMesh random_body(test::Rng* rng) {
+  TriangleMesh mesh;
+  switch (test::below(rng, 5)) {
+    case 0:
+      mesh = test::torus(0.1, test::uniform(rng, 0.01, 0.06), 24, 12);
+      break;
+    case 1:
+      mesh = test::icosphere(0.1, 3);
+      for (Eigen::Vector3d& v : mesh.vertices) v *= test::uniform(rng, 0.6, 1.1);
+      break;
+    case 2:
+      mesh = test::random_soup(rng, 400);
+      break;
+    case 3:
+      mesh = test::joined(test::icosphere(0.05, 2),
+                          test::moved(test::icosphere(0.04, 2),
+                                      Eigen::Isometry3d(Eigen::Translation3d(0.2, 0.0, 0.0))));
+      break;
+    default:  // a bowl: the other one may be in its hollow
+      mesh = test::icosphere(0.12, 3);
+      mesh.triangles.resize(mesh.triangles.size() / 2);
+  }
+  Eigen::Vector3d stretch(1.0, 1.0, 1.0);
+  for (int k = 0; k < 3; ++k) {
+    if (test::chance(rng, 0.3)) stretch[k] = test::power_of_ten(rng, -5.0, 0.5);
+  }
+  Eigen::Vector3d away = Eigen::Vector3d::Zero();
+  if (test::chance(rng, 0.3)) {
+    away = test::random_vector(rng, test::power_of_ten(rng, -1.0, 3.0));
+  }
+  const Eigen::Matrix3d turn = test::random_pose(rng, 0.0).linear();
+  for (Eigen::Vector3d& v : mesh.vertices) v = turn * stretch.cwiseProduct(v) + away;
+  return mesh;
+}
+
+struct Body {
+  explicit Body(const TriangleMesh& mesh)
+      : solid(test::one(mesh)), bvh(solid), triangles(test::triangles_of(test::one(mesh))) {
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
+    middle = box.center();
+  }
+  Solid solid;
+  SurfaceBvh bvh;
+  test::TriangleGroups triangles;
+  Eigen::Vector3d middle;
+};
+
+// Middles near one another, or a hair between the surfaces along the closest points.
+Eigen::Isometry3d next_pose(test::Rng* rng, const Body& a, const Body& b,
+                            const SurfacePairSearch& search, const Eigen::Isometry3d& X_BA) {
+  if (test::chance(rng, 0.2) || !(search.distance() > 1e-9)) {
+    Eigen::Isometry3d X = test::random_pose(rng, 0.0);
+    X.translation() = b.middle - X.linear() * a.middle +
+                      test::random_vector(rng, test::power_of_ten(rng, -2.5, -0.3));
+    return X;
+  }
+  Eigen::Isometry3d X = X_BA;
+  const Eigen::Vector3d gap = search.closest().on_p - search.closest().on_q;
+  if (test::chance(rng, 0.5) && gap.allFinite() && gap.norm() > 1e-9) {
+    const double wanted = test::power_of_ten(rng, -9.0, -2.0);
+    X.translation() += gap.normalized() * (wanted - gap.norm());
+    return X;
+  }
+  const Eigen::Isometry3d turn = test::small_motion(rng, -1.5);
+  const Eigen::Vector3d middle = X * a.middle;
+  X.linear() = turn.linear() * X.linear();
+  X.translation() = middle - X.linear() * a.middle + turn.translation();
+  return X;
+}
+
+TEST(HostileHulls, BoundsHold) {
+  test::Rng rng(2321);
+  int apart = 0, touching = 0, near = 0;
+  const int pairs = test::scaled(120);
+  for (int i = 0; i < pairs && !testing::Test::HasFailure(); ++i) {
+    const Body a(random_body(&rng)), b(random_body(&rng));
+    SurfacePairSearch search(a.bvh, b.bvh, 512);
+    Eigen::Isometry3d X_BA = Eigen::Isometry3d::Identity();
+    for (int step = 0; step < 20; ++step) {
+      const double old = search.lower_bound();
+      X_BA = next_pose(&rng, a, b, search, X_BA);
+      const double scale = 1.0 + a.bvh.extent() + b.bvh.extent() + X_BA.translation().norm();
+      // What moves is not bounded here: every second pose is searched anew.
+      double moved = std::numeric_limits<double>::infinity();
+      if (step % 2 == 1) {
+        moved = 0.0;
+        for (const ConvexPart& part : a.bvh.parts()) {
+          for (const Eigen::Vector3d& p : {part.a, part.b, part.c}) {
+            moved = std::max(moved, (X_BA * p - search.reference_pose() * p).norm());
+          }
+        }
+        moved += 1e-12 * scale;
+      }
+      search.move_to(X_BA, moved);
+      constexpr double kTolerances[] = {0.0, 1e-6, 1e-3, 0.02};
+      const double tolerance = kTolerances[test::below(&rng, 4)];
+      int steps = test::chance(&rng, 0.2) ? static_cast<int>(test::below(&rng, 30)) : 100000000;
+      const bool is_complete = search.run({1e5, tolerance, 0.0}, &steps);
+      const double truth = b.triangles.distance(a.triangles, X_BA);
+      const double rounding = 1e-13 * scale;
+      const std::string where = "pair " + std::to_string(i) + ", step " + std::to_string(step) +
+                                ", scale " + std::to_string(scale) + ", before " +
+                                std::to_string(old);
+      ASSERT_LE(search.lower_bound(), truth + rounding) << where;
+      ASSERT_LE(search.separation(), truth + rounding) << where;
+      ASSERT_GE(search.distance(), truth - rounding) << where;
+      if (is_complete && truth > rounding) {
+        ASSERT_LE(search.distance() - search.lower_bound(),
+                  tolerance + 2e-5 * scale + 2.0 * search.rounding())
+            << where << ", distance " << search.distance() << ", truth " << truth << ", bound "
+            << search.lower_bound() << ", tolerance " << tolerance << ", steps " << steps;
+      }
+      apart += truth > rounding ? 1 : 0;
+      touching += truth <= rounding ? 1 : 0;
+      near += truth > rounding && truth < 1e-4 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(apart, 20 * pairs / 2);
+  EXPECT_GT(touching, 20 * pairs / 50);
+  EXPECT_GT(near, 20 * pairs / 20);
+}
+
+}  // namespace
+}  // namespace ist
