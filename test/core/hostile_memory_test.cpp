@@ -235,7 +235,8 @@ TEST(HostileMemory, RaysClearUpToTheirEndsAndNoFarther) {
       const Eigen::Vector3d end = origin + test::random_vector(&rng, 2.0);
       MemoryScan scan;
       scan.origin = origin.cast<float>();
-      (is_robot ? scan.free_ends : scan.hits) = {end.cast<float>()};
+      auto& ends = is_robot ? scan.free_ends : scan.hits;
+      ends.assign(1, end.cast<float>());
       map.insert(scan);
       const double length = (end - origin).norm();
       const Eigen::Vector3d along = (end - origin) / length;

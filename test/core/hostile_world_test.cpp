@@ -170,6 +170,7 @@ TEST(HostileWorld, NoBoundIsAboveTheTruthWhateverComesAndGoes) {
       }
     }
   }
+  if (test::kSanitized) return;  // too few cases to count
   EXPECT_GT(clear, cases / 20);
   EXPECT_GT(near, cases / 5);
   EXPECT_GT(unfinished, 0);

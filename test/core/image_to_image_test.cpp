@@ -36,7 +36,7 @@ struct Image {
 // A wall 1 m in front of the camera, with a step, and noise along the rays.
 Image wall(std::size_t width, std::size_t height, double noise, test::Rng* rng) {
   Image image{width, height, std::vector<float>(4 * width * height)};
-  std::normal_distribution<double> normal(0.0, noise);
+  std::normal_distribution<double> normal(0.0, noise > 0.0 ? noise : 1.0);
   for (std::size_t i = 0; i < width * height; ++i) {
     const double u = static_cast<double>(i % width) / static_cast<double>(width) - 0.5;
     const double v = static_cast<double>(i / width) / static_cast<double>(width) - 0.5;

@@ -124,6 +124,7 @@ TEST_F(SeparatingPlanesTest, SheetsAreSeparated) {
     by_planes += found > kError ? 1 : 0;
     by_spheres += bound(link, cloud, X_FL, &never, 0) > kError ? 1 : 0;
   }
+  if (test::kSanitized) return;  // too few cases to count
   EXPECT_GT(by_planes, 0.5 * cases);
   EXPECT_GT(by_planes, 1.5 * by_spheres) << by_planes << " and " << by_spheres;
 }
