@@ -153,8 +153,9 @@ bool ViewFilter::add_patch(Tile* tile) {
                                                    kPixels - 1};
   std::array<TileView::Sight, 4> sights;
   std::array<Eigen::Vector3d, 4> hits;
+  view_.look_at(1U << kCorners[0] | 1U << kCorners[1] | 1U << kCorners[2] | 1U << kCorners[3]);
   for (std::size_t i = 0; i < 4; ++i) {
-    sights[i] = view_.look(kCorners[i]);
+    sights[i] = view_.sight(kCorners[i]);
     if (sights[i].link == nullptr || sights[i].link != sights[0].link) return false;
     hits[i] = sights[i].t * view_.direction(kCorners[i]);
   }
@@ -253,7 +254,7 @@ const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight
 void ViewFilter::add_pixel(std::size_t k, const Skin& skin, Tile* tile) {
   const auto bit = static_cast<std::uint16_t>(1U << k);
   const double range = view_.range(k);
-  const TileView::Sight& sight = view_.look(k);
+  const TileView::Sight& sight = view_.sight(k);
   const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
   if (in_skin == nullptr) {
     // Close in front of the robot there is nothing but an obstacle.
@@ -300,6 +301,7 @@ void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kep
   tile.height.fill(std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < kPixels; ++k) tile.range[k] = static_cast<float>(view_.range(k));
   const bool is_patch = kept == kWhole && add_patch(&tile);
+  if (!is_patch) view_.look_at(kept);
   for (std::size_t k = 0; !is_patch && k < kPixels; ++k) {
     if (view_.is_kept(k)) add_pixel(k, {filter, verdict, X_OS}, &tile);
   }
