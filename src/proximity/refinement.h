@@ -88,7 +88,8 @@ class BoxRefinement {
   bool deadline_passed() { return link_.search.deadline->passed(); }
 
   /// Measures a box that may be inside.
-  void measure(ObstacleId id);
+  /// @param max_distance  [m] a distance to the surface that it is known not to exceed
+  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
   /// Takes the distance of a box that is outside, or does not touch the surface.
   void take_outside(const BoxDistance& found, ObstacleId id);
   /// Takes the signed distance of one point of a box.

@@ -44,10 +44,11 @@ void BoxRefinement::measure_outside(ObstacleId id) {
   }
 }
 
-void BoxRefinement::measure(ObstacleId id) {
+void BoxRefinement::measure(ObstacleId id, double max_distance) {
   ++link_.search.statistics->exact_evaluations;
   const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
-  const BoxDistance found = distance_to_box(link_.context.solid(), box, obstacles_.X_OL, kInfinity);
+  const BoxDistance found =
+      distance_to_box(link_.context.solid(), box, obstacles_.X_OL, max_distance);
   if (!(found.distance > 0.0)) return take_overlap(found, id);
   const InnerSphereTree& tree = link_.context.tree();
   const Eigen::Vector3d center_O = box.center();  // as a whole it may be inside
