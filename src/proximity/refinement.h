@@ -102,7 +102,7 @@ class BoxRefinement {
   void take_deepest_in_spheres(std::int32_t leaf, ObstacleId id);
 
  private:
-  void measure_outside(ObstacleId id);
+  void measure_outside(ObstacleId id, std::uint32_t key, const PlacedBox& placed);
   /// Looks for a point of a box that is inside the link, from one that both have in common, while
   /// none is known.
   void descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ, ObstacleId id);
