@@ -29,7 +29,7 @@ class BvttFront {
   };
   static constexpr std::int32_t kRoot = -1;
   static constexpr std::size_t kMaxPairs = 2048;  ///< a traversal that expands more keeps no front
-  static constexpr std::int32_t kFull = -1;      ///< instead of a pair's index: there is no place
+  static constexpr std::int32_t kFull = -1;       ///< instead of a pair's index: there is no place
 
   BvttFront();
 
