@@ -115,6 +115,7 @@ struct Ingest::Impl {
   PointBvhBuilder builder;
   SelfFilter self_filter;
   std::unique_ptr<ViewFilter> view;  // null: the self-filter drops all that is within its padding
+  LookedBlocks looked;               // of the cloud that `view` has seen last
 
   CropParameters crop_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS) const {
     CropParameters crop = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
@@ -136,7 +137,7 @@ struct Ingest::Impl {
       *crop = crop_of(cloud, X_FC);
       set_axes(scene_axes(cloud, X_FC.linear(), true), crop);
       self_filter.set_poses(robot, crop->X_FO, config.self_filter_padding);
-      again = ist::look_at_robot(cloud, *crop, &self_filter, view.get(), &builder);
+      again = ist::look_at_robot(cloud, *crop, &self_filter, view.get(), &builder, &looked);
     }
     return X_FC;
   }
@@ -193,8 +194,8 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
   IngestCounts counts;
   std::size_t kept = 0;
   if (organized) {
-    kept = index_organized(cloud, crop, on_robot, view, &impl_->builder, &snapshot->index.bvh(),
-                           &counts);
+    kept = index_organized(cloud, crop, on_robot, view, view != nullptr ? &impl_->looked : nullptr,
+                           &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
     kept =
         index_unorganized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);

@@ -61,12 +61,14 @@ bool solve(Simplex* face) {
   }
 }
 
-// The face of the simplex that holds its point nearest to the origin. All fifteen faces are tried:
+// The face of the simplex that holds its point nearest to the origin. The point is nearer than any
+// of the others without the last vertex, so the face has that one. All eight such faces are tried:
 // that is robust where vertices nearly coincide, unlike a selection by Voronoi regions.
 Simplex nearest_face(const Simplex& simplex) {
   Simplex best;
   double best_sq = std::numeric_limits<double>::infinity();
-  for (unsigned set = 1; set < 1U << simplex.size; ++set) {
+  const unsigned last = 1U << (simplex.size - 1);
+  for (unsigned set = last; set < 2U * last; ++set) {
     Simplex face;
     for (std::size_t i = 0; i < simplex.size; ++i) {
       if ((set >> i & 1U) != 0) face.vertex[face.size++] = simplex.vertex[i];
@@ -93,7 +95,7 @@ Eigen::Vector3d support_point(const Cylinder& cylinder, const Eigen::Isometry3d&
 }  // namespace
 
 BoxDistance cylinder_to_box(const Cylinder& cylinder, const Eigen::Isometry3d& X_OE,
-                            const Eigen::AlignedBox3d& box) {
+                            const Eigen::AlignedBox3d& box, double max_distance) {
   constexpr int kMaxSteps = 100;
   constexpr double kTouch = 1e-12;     // [m]
   constexpr double kResolved = 1e-13;  // of the squared distance
@@ -109,6 +111,7 @@ BoxDistance cylinder_to_box(const Cylinder& cylinder, const Eigen::Isometry3d& X
     const Eigen::Vector3d on_box = (v.array() > 0.0).select(box.max(), box.min());
     const Eigen::Vector3d w = on_cylinder - on_box;
     lower_bound = std::max(lower_bound, v.dot(w) / v.norm());
+    if (lower_bound > max_distance) break;
     if (v.squaredNorm() - v.dot(w) <= kResolved * v.squaredNorm()) break;
     Simplex larger = simplex;
     larger.vertex[larger.size++] = {w, on_cylinder, on_box};

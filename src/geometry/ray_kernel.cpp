@@ -2,6 +2,7 @@
 // is chosen at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "geometry/ray_kernel.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -18,6 +19,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr std::size_t kWidth = TriangleBvh::kWidth;
 using FloatTag = hn::CappedTag<float, kWidth>;
+using PacketTag = hn::CappedTag<float, RayPacket::kRays>;
 using V = hn::Vec<FloatTag>;
 
 // Writes where an interval of parameters begins, infinity where it is empty.
@@ -57,78 +59,106 @@ HWY_INLINE void EnterBoxes(const TriangleBvh::Boxes& boxes, const Beam& beam, fl
   }
 }
 
-// The same for a ray.
-HWY_INLINE void EnterBoxes(const TriangleBvh::Boxes& boxes, const mesh_ray::FloatRay& ray,
-                           float* enter) {
-  const FloatTag d;
-  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
-    V first = hn::Set(d, ray.first), last = hn::Set(d, ray.last);
+// Bit k: ray k of the packet may meet a leaf's box.
+HWY_INLINE std::uint32_t EnterLeaf(const TriangleBvh::RayLeaf& leaf, const RayPacket& packet) {
+  const PacketTag d;
+  std::uint32_t bits = 0;
+  for (std::size_t k = 0; k < RayPacket::kRays; k += hn::Lanes(d)) {
+    auto first = hn::Zero(d), last = hn::Load(d, packet.last + k);
     for (std::size_t i = 0; i < 3; ++i) {
-      const V reciprocal = hn::Set(d, ray.reciprocal[i]);
-      const V low = hn::Set(d, ray.origin[i] + ray.margin),
-              high = hn::Set(d, ray.origin[i] - ray.margin);
-      const V a = hn::Mul(hn::Sub(hn::Load(d, boxes.min[i] + k), low), reciprocal);
-      const V b = hn::Mul(hn::Sub(hn::Load(d, boxes.max[i] + k), high), reciprocal);
+      const auto reciprocal = hn::Load(d, packet.reciprocal[i] + k);
+      const auto a =
+          hn::Mul(hn::Set(d, leaf.min[i] - packet.margin - packet.origin[i]), reciprocal);
+      const auto b =
+          hn::Mul(hn::Set(d, leaf.max[i] + packet.margin - packet.origin[i]), reciprocal);
       first = hn::Max(first, hn::Min(a, b));
       last = hn::Min(last, hn::Max(a, b));
     }
-    StoreEnter(first, last, enter + k);
+    const auto slack = hn::Mul(hn::Set(d, 1e-6F), hn::Add(hn::Abs(first), hn::Abs(last)));
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, hn::Le(first, hn::Add(last, slack)), bytes);
+    bits |= (static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8U)
+            << k;
   }
+  return bits & packet.rays;
 }
 
 struct Vec3 {
   V x, y, z;
 };
 
-// d.(a x b)
-HWY_INLINE V EdgeFunction(const Vec3& d, const Vec3& a, const Vec3& b) {
-  const V x = hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), y = hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
-          z = hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x));
-  return hn::MulAdd(d.x, x, hn::MulAdd(d.y, y, hn::Mul(d.z, z)));
+HWY_INLINE Vec3 Cross(const Vec3& a, const Vec3& b) {
+  return {hn::MulSub(a.y, b.z, hn::Mul(a.z, b.y)), hn::MulSub(a.z, b.x, hn::Mul(a.x, b.z)),
+          hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
+}
+HWY_INLINE Vec3 Sub(const Vec3& a, const Vec3& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+HWY_INLINE V Dot(const Vec3& a, const Vec3& b) {
+  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
-// Bit k: the line of the ray may cross triangle k. The edge functions of a triangle that is crossed
-// have one sign.
-HWY_INLINE std::uint32_t Crossed(const TriangleBvh::Leaf& leaf, const mesh_ray::FloatRay& ray) {
+// The line through two corners of each triangle of a leaf, by its Pluecker coordinates.
+struct Edge {
+  Vec3 along, moment;
+};
+HWY_INLINE Edge EdgeOf(const Vec3& a, const Vec3& b) { return {Sub(b, a), Cross(a, b)}; }
+
+// The triangles of a leaf as seen by a packet of rays.
+struct Edges {
+  Edge ab, bc, ca;
+};
+HWY_INLINE Edges EdgesOf(const TriangleBvh::Leaf& leaf, const RayPacket& packet, std::size_t k) {
   const FloatTag t;
-  const Vec3 d = {hn::Set(t, ray.direction[0]), hn::Set(t, ray.direction[1]),
-                  hn::Set(t, ray.direction[2])};
-  const Vec3 o = {hn::Set(t, ray.origin[0]), hn::Set(t, ray.origin[1]), hn::Set(t, ray.origin[2])};
-  std::uint32_t bits = 0;
-  for (std::size_t k = 0; k < kWidth; k += hn::Lanes(t)) {
-    const auto corner = [&](std::size_t c) {
-      return Vec3{hn::Sub(hn::Load(t, leaf.corner[3 * c] + k), o.x),
-                  hn::Sub(hn::Load(t, leaf.corner[3 * c + 1] + k), o.y),
-                  hn::Sub(hn::Load(t, leaf.corner[3 * c + 2] + k), o.z)};
-    };
-    const Vec3 a = corner(0), b = corner(1), c = corner(2);
-    const V ab = EdgeFunction(d, a, b), bc = EdgeFunction(d, b, c), ca = EdgeFunction(d, c, a);
-    const V least = hn::Min(ab, hn::Min(bc, ca)), most = hn::Max(ab, hn::Max(bc, ca));
-    const auto hit = hn::Ge(hn::Max(least, hn::Neg(most)), hn::Set(t, -ray.edge_margin));
-    std::uint8_t bytes[8] = {};
-    hn::StoreMaskBits(t, hit, bytes);
-    bits |= static_cast<std::uint32_t>(bytes[0]) << k;
-  }
-  return bits & ((1U << leaf.count) - 1U);
+  const auto corner = [&](std::size_t c) {
+    return Vec3{hn::Sub(hn::Load(t, leaf.corner[3 * c] + k), hn::Set(t, packet.reference[0])),
+                hn::Sub(hn::Load(t, leaf.corner[3 * c + 1] + k), hn::Set(t, packet.reference[1])),
+                hn::Sub(hn::Load(t, leaf.corner[3 * c + 2] + k), hn::Set(t, packet.reference[2]))};
+  };
+  const Vec3 a = corner(0), b = corner(1), c = corner(2);
+  return {EdgeOf(a, b), EdgeOf(b, c), EdgeOf(c, a)};
 }
 
-// Copies a leaf and its box to a slot; those before it are used, those behind it are far away.
-void CopyChild(const TriangleBvh::Boxes& from, std::size_t k, TriangleBvh::Boxes* to,
-               std::size_t slot) {
-  constexpr float kFar = 1e18F;  // [m]
-  for (std::size_t i = 0; i < 3; ++i) {
-    to->min[i][slot] = from.min[i][k];
-    to->max[i][slot] = from.max[i][k];
-  }
-  to->child[slot] = from.child[k];
-  to->count = static_cast<std::int32_t>(slot + 1);
-  if (slot != 0) return;
-  for (std::size_t rest = 1; rest < kWidth; ++rest) {
-    for (std::size_t i = 0; i < 3; ++i) to->min[i][rest] = to->max[i][rest] = kFar;
-  }
+// Bit k: the line of a ray may cross triangle k. The edge functions of a triangle that is crossed,
+// which say on which side of the edges the ray passes, have one sign.
+HWY_INLINE std::uint32_t Crossed(const Edges& edges, const RayPacket& packet, std::size_t ray) {
+  const FloatTag t;
+  const auto of_ray = [&](const float(&v)[3][RayPacket::kRays]) {
+    return Vec3{hn::Set(t, v[0][ray]), hn::Set(t, v[1][ray]), hn::Set(t, v[2][ray])};
+  };
+  const Vec3 d = of_ray(packet.direction), m = of_ray(packet.moment);
+  const auto side = [&](const Edge& edge) {
+    return hn::Add(Dot(d, edge.moment), Dot(m, edge.along));
+  };
+  const V ab = side(edges.ab), bc = side(edges.bc), ca = side(edges.ca);
+  const V least = hn::Min(ab, hn::Min(bc, ca)), most = hn::Max(ab, hn::Max(bc, ca));
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(t, hn::Ge(hn::Max(least, hn::Neg(most)), hn::Set(t, -packet.edge_margin)),
+                    bytes);
+  return bytes[0];
 }
 
-std::size_t FindLeaves(const TriangleBvh::View& bvh, const Beam& beam, TriangleBvh::Boxes* leaves,
+// Adds the triangles of a leaf that the given rays may cross. @returns how many they are
+HWY_INLINE std::size_t AddCandidates(const TriangleBvh::View& bvh, const TriangleBvh::Leaf& leaf,
+                                     const RayPacket& packet, std::uint32_t rays,
+                                     RayCandidate* candidates) {
+  std::size_t count = 0;
+  for (std::size_t first = 0; first < kWidth; first += hn::Lanes(FloatTag())) {
+    const Edges edges = EdgesOf(leaf, packet, first);
+    for (std::uint32_t ray = 0; rays >> ray != 0; ++ray) {
+      if ((rays >> ray & 1U) == 0) continue;
+      const std::uint32_t bits = Crossed(edges, packet, ray) << first & ((1U << leaf.count) - 1U);
+      for (std::uint32_t j = 0; bits >> j != 0; ++j) {
+        if ((bits >> j & 1U) == 0) continue;
+        hwy::Prefetch(bvh.triangles + leaf.first + j);
+        candidates[count++] = {ray, leaf.first + j};
+      }
+    }
+  }
+  return count;
+}
+
+std::size_t FindLeaves(const TriangleBvh::View& bvh, const Beam& beam, TriangleBvh::RayLeaf* leaves,
                        std::size_t capacity) {
   struct Entry {
     std::int32_t node;
@@ -148,52 +178,56 @@ std::size_t FindLeaves(const TriangleBvh::View& bvh, const Beam& beam, TriangleB
         stack.push_least_on_top<&Entry::enter>(siblings, {boxes.child[k], enter[k]});
         continue;
       }
-      if (count == kWidth * capacity) return count + 1;
-      CopyChild(boxes, k, leaves + count / kWidth, count % kWidth);
-      ++count;
+      if (count == capacity) return count + 1;
+      TriangleBvh::RayLeaf& leaf = leaves[count++];
+      for (std::size_t i = 0; i < 3; ++i) {
+        leaf.min[i] = boxes.min[i][k];
+        leaf.max[i] = boxes.max[i][k];
+      }
+      leaf.leaf = static_cast<std::uint32_t>(~boxes.child[k]);
     }
   }
   return count;
 }
 
-TriangleBvh::RayCrossing FindCrossing(const TriangleBvh::View& bvh,
-                                      const TriangleBvh::Boxes* leaves, std::size_t count,
-                                      const mesh_ray::FloatRay& from, const Eigen::Vector3d& o_M,
-                                      const Eigen::Vector3d& d_M, double first, double limit) {
-  TriangleBvh::RayCrossing best;
-  mesh_ray::FloatRay ray = from;
-  for (std::size_t i = 0; i < count; ++i) {
-    alignas(32) float enter[kWidth];
-    EnterBoxes(leaves[i], ray, enter);
-    for (std::size_t k = 0; k < static_cast<std::size_t>(leaves[i].count); ++k) {
-      if (!(enter[k] <= ray.last) || !std::isfinite(enter[k])) continue;
-      const TriangleBvh::Leaf& leaf = bvh.leaves[~leaves[i].child[k]];
-      const std::uint32_t bits = Crossed(leaf, ray);
-      for (std::uint32_t j = 0; bits >> j != 0; ++j) {
-        if ((bits >> j & 1U) == 0) continue;
-        const double t = mesh_ray::cross_triangle(bvh.triangles[leaf.first + j], o_M, d_M);
-        if (!(t >= first && t <= limit)) continue;
-        limit = t;
-        best = {t, leaf.first + j};
-        ray.last = mesh_ray::last_of(t);
-      }
+std::size_t FindCandidates(const TriangleBvh::View& bvh, const TriangleBvh::RayLeaf* leaves,
+                           std::size_t count, const RayPacket& packet, std::size_t* leaf,
+                           RayCandidate* candidates) {
+  // The leaves of a few steps are fetched while the one before is worked on.
+  struct Entered {
+    const TriangleBvh::Leaf* leaf;
+    std::uint32_t rays;
+  };
+  Entered entered[kLeavesAhead];
+  std::size_t found = 0;
+  while (*leaf < count && found == 0) {
+    std::size_t size = 0;
+    for (; *leaf < count && size < kLeavesAhead; ++*leaf) {
+      const std::uint32_t rays = EnterLeaf(leaves[*leaf], packet);
+      if (rays == 0) continue;
+      entered[size] = {bvh.leaves + leaves[*leaf].leaf, rays};
+      const auto* bytes = reinterpret_cast<const std::uint8_t*>(entered[size].leaf);
+      for (std::size_t i = 0; i < sizeof(TriangleBvh::Leaf); i += 64) hwy::Prefetch(bytes + i);
+      ++size;
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      found += AddCandidates(bvh, *entered[i].leaf, packet, entered[i].rays, candidates + found);
     }
   }
-  return best;
+  return found;
 }
 
 }  // namespace ray_bundle
 
 std::size_t FindRayLeaves(const TriangleBvh::View& bvh, const Beam& beam,
-                          TriangleBvh::Boxes* leaves, std::size_t capacity) {
+                          TriangleBvh::RayLeaf* leaves, std::size_t capacity) {
   return ray_bundle::FindLeaves(bvh, beam, leaves, capacity);
 }
 
-TriangleBvh::RayCrossing FindRayCrossing(const TriangleBvh::View& bvh,
-                                         const TriangleBvh::Boxes* leaves, std::size_t count,
-                                         const mesh_ray::FloatRay& ray, const Eigen::Vector3d& o_M,
-                                         const Eigen::Vector3d& d_M, double first, double limit) {
-  return ray_bundle::FindCrossing(bvh, leaves, count, ray, o_M, d_M, first, limit);
+std::size_t FindRayCandidates(const TriangleBvh::View& bvh, const TriangleBvh::RayLeaf* leaves,
+                              std::size_t count, const RayPacket& packet, std::size_t* leaf,
+                              RayCandidate* candidates) {
+  return ray_bundle::FindCandidates(bvh, leaves, count, packet, leaf, candidates);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -204,18 +238,17 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(FindRayLeaves);
-HWY_EXPORT(FindRayCrossing);
+HWY_EXPORT(FindRayCandidates);
 
-std::size_t find_leaves(const TriangleBvh::View& bvh, const Beam& beam, TriangleBvh::Boxes* leaves,
-                        std::size_t capacity) {
+std::size_t find_leaves(const TriangleBvh::View& bvh, const Beam& beam,
+                        TriangleBvh::RayLeaf* leaves, std::size_t capacity) {
   return HWY_DYNAMIC_DISPATCH(FindRayLeaves)(bvh, beam, leaves, capacity);
 }
 
-TriangleBvh::RayCrossing find_crossing(const TriangleBvh::View& bvh,
-                                       const TriangleBvh::Boxes* leaves, std::size_t count,
-                                       const mesh_ray::FloatRay& ray, const Eigen::Vector3d& o_M,
-                                       const Eigen::Vector3d& d_M, double first, double limit) {
-  return HWY_DYNAMIC_DISPATCH(FindRayCrossing)(bvh, leaves, count, ray, o_M, d_M, first, limit);
+std::size_t find_candidates(const TriangleBvh::View& bvh, const TriangleBvh::RayLeaf* leaves,
+                            std::size_t count, const RayPacket& packet, std::size_t* leaf,
+                            RayCandidate* candidates) {
+  return HWY_DYNAMIC_DISPATCH(FindRayCandidates)(bvh, leaves, count, packet, leaf, candidates);
 }
 
 }  // namespace ist

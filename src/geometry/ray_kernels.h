@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "geometry/mesh_ray.h"
 #include "internal/geometry/triangle_bvh.h"
@@ -25,17 +26,38 @@ struct Beam {
 };
 
 /// The kernel of TriangleBvh::leaves_on_rays.
-std::size_t find_leaves(const TriangleBvh::View& bvh, const Beam& beam, TriangleBvh::Boxes* leaves,
-                        std::size_t capacity);
+std::size_t find_leaves(const TriangleBvh::View& bvh, const Beam& beam,
+                        TriangleBvh::RayLeaf* leaves, std::size_t capacity);
 
-/// The kernel of TriangleBvh::first_crossing with leaves.
-/// @param o_M    [m] the ray's origin, near the mesh
-/// @param first  parameters from here on count
-/// @param limit  and up to here
-/// @returns the crossing with its parameter from o_M
-TriangleBvh::RayCrossing find_crossing(const TriangleBvh::View& bvh,
-                                       const TriangleBvh::Boxes* leaves, std::size_t count,
-                                       const mesh_ray::FloatRay& ray, const Eigen::Vector3d& o_M,
-                                       const Eigen::Vector3d& d_M, double first, double limit);
+/// Sixteen rays from one origin, in float about the middle of the mesh. A line is given by Pluecker
+/// coordinates about a reference point near the mesh, where float is exact enough.
+struct alignas(64) RayPacket {
+  static constexpr std::size_t kRays = 16;
+  float direction[3][kRays], reciprocal[3][kRays];
+  float moment[3][kRays];          ///< [m] of the line about the reference point: c x direction
+  float last[kRays];               ///< parameters up to here count
+  std::array<float, 3> origin;     ///< [m]
+  std::array<float, 3> reference;  ///< [m]
+  float margin;                    ///< [m] more than what float rounds off of a coordinate
+  float edge_margin;               ///< [m^2] the same of an edge function
+  std::uint32_t rays;              ///< bits of those that are used
+};
+
+/// A triangle that a ray may cross.
+struct RayCandidate {
+  std::uint32_t ray, slot;  ///< of the packet; for TriangleBvh::triangle()
+};
+
+/// Leaves whose triangles are looked at together, and their candidates, at most.
+constexpr std::size_t kLeavesAhead = 4;
+constexpr std::size_t kCandidates = kLeavesAhead * RayPacket::kRays * TriangleBvh::kWidth;
+
+/// Finds the triangles that rays of a packet may cross in the next leaves that are entered at all.
+/// @param leaf        in, out: number of the next one of `leaves`
+/// @param candidates  receives up to kCandidates
+/// @returns how many candidates there are; 0: there are none in all the leaves that were left
+std::size_t find_candidates(const TriangleBvh::View& bvh, const TriangleBvh::RayLeaf* leaves,
+                            std::size_t count, const RayPacket& packet, std::size_t* leaf,
+                            RayCandidate* candidates);
 
 }  // namespace ist

@@ -62,7 +62,7 @@ BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O
     } else if (const auto* sphere = std::get_if<Sphere>(&element.primitive)) {
       candidate = sphere_to_box(*sphere, X_OE.translation(), box_O);
     } else if (const auto* cylinder = std::get_if<Cylinder>(&element.primitive)) {
-      candidate = cylinder_to_box(*cylinder, X_OE, box_O);
+      candidate = cylinder_to_box(*cylinder, X_OE, box_O, limit);
     } else {
       candidate = element.box_sides.closest_to_box(box_O, X_OE, limit);
     }

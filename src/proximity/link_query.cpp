@@ -294,7 +294,10 @@ void LinkQuery::measure_again(const PointObstacles& obstacles) {
 }
 
 void LinkQuery::measure_again(const BoxObstacles& obstacles) {
-  BoxRefinement(obstacles, &link_).measure(link_.kept.last.id);
+  const auto& last = link_.kept.last;
+  const Eigen::Vector3d p_OCl = obstacles.X_OL * last.p_LCl;
+  const double distance = (p_OCl - clamp_to(box_O(*obstacles.bvh, last.id), p_OCl)).norm();
+  BoxRefinement(obstacles, &link_).measure(last.id, (1.0 + 1e-9) * distance + kRounding);
 }
 
 // A point that the stopped search has measured as outside may be inside: it had yet to meet the

@@ -11,6 +11,7 @@
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/box_bounds.h"
+#include "proximity/coherence/box_distance_cache.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/extent_bound.h"
@@ -77,6 +78,7 @@ struct LinkCoherence {
   NodeBounds nodes;
   BvttFronts fronts;
   DistanceCache distances;
+  BoxDistanceCache box_distances;
   /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
   struct {
     std::uint64_t build_id = 0;  ///< of its index; 0: there was no answer

@@ -88,7 +88,8 @@ class BoxRefinement {
   bool deadline_passed() { return link_.search.deadline->passed(); }
 
   /// Measures a box that may be inside.
-  void measure(ObstacleId id);
+  /// @param max_distance  [m] a distance to the surface that it is known not to exceed
+  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
   /// Takes the distance of a box that is outside, or does not touch the surface.
   void take_outside(const BoxDistance& found, ObstacleId id);
   /// Takes the signed distance of one point of a box.
@@ -101,7 +102,7 @@ class BoxRefinement {
   void take_deepest_in_spheres(std::int32_t leaf, ObstacleId id);
 
  private:
-  void measure_outside(ObstacleId id);
+  void measure_outside(ObstacleId id, std::uint32_t key, const PlacedBox& placed);
   /// Looks for a point of a box that is inside the link, from one that both have in common, while
   /// none is known.
   void descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ, ObstacleId id);

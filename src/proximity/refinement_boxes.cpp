@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 
 #include "proximity/overlap_descent.h"
 #include "proximity/refinement.h"
@@ -14,6 +16,21 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m] Where box and surface meet, steps of these lengths inward decide whether they overlap.
 constexpr std::array<double, 3> kSteps = {1e-6, 1e-4, 1e-3};
 
+// [m] A box is measured up to this far behind what matters now: so it need not be measured again
+// until the link has moved about as far.
+constexpr double kBehind = 0.005;
+
+// The key under which the bound of a box is kept: the voxels of the next snapshot are in the same
+// places.
+std::uint32_t coherent_key(const BoxBvh& bvh, const Eigen::AlignedBox3d& box_O) {
+  constexpr double kCell = 0.001;  // [m]
+  const Eigen::Vector3d p = (bvh.origin() + box_O.center()) / kCell;
+  const auto cell = [&p](int axis) {
+    return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::floor(p[axis])));
+  };
+  return cell(0) * 73856093U ^ cell(1) * 19349663U ^ cell(2) * 83492791U;
+}
+
 }  // namespace
 
 float BoxRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
@@ -21,7 +38,16 @@ float BoxRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   search.cover_bound =
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
   const ObstacleId id{tile, lane};
-  if (search.visited.insert(id.key())) measure_outside(id);
+  if (!search.visited.insert(id.key())) return search.traversal_prune_bound();
+  const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
+  const std::uint32_t key = coherent_key(*obstacles_.bvh, box);
+  const PlacedBox placed(box, obstacles_.X_LO);
+  const double kept = link_.kept.box_distances.find(key, placed);
+  if (kept >= search.prune_bound()) {
+    search.prune(kept);
+  } else {
+    measure_outside(id, key, placed);
+  }
   return search.traversal_prune_bound();
 }
 
@@ -31,12 +57,14 @@ bool BoxRefinement::update_planes(SupportingPlanes* planes) {
 
 // A box whose cover distance is above the interior gap: if it overlaps the link all the same,
 // points of it are measured.
-void BoxRefinement::measure_outside(ObstacleId id) {
+void BoxRefinement::measure_outside(ObstacleId id, std::uint32_t key, const PlacedBox& placed) {
   const LinkSearch& search = link_.search;
   ++search.statistics->exact_evaluations;
-  const double limit = std::min(search.closest.exact.distance, search.range() + search.rounding);
+  const double limit =
+      std::min(search.closest.exact.distance, search.range() + search.rounding) + kBehind;
   const BoxDistance found =
       distance_to_box(link_.context.solid(), box_O(*obstacles_.bvh, id), obstacles_.X_OL, limit);
+  link_.kept.box_distances.store(key, placed, std::min(found.lower_bound, found.distance));
   if (found.distance > 0.0) {
     take_outside(found, id);
   } else {
@@ -44,10 +72,11 @@ void BoxRefinement::measure_outside(ObstacleId id) {
   }
 }
 
-void BoxRefinement::measure(ObstacleId id) {
+void BoxRefinement::measure(ObstacleId id, double max_distance) {
   ++link_.search.statistics->exact_evaluations;
   const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
-  const BoxDistance found = distance_to_box(link_.context.solid(), box, obstacles_.X_OL, kInfinity);
+  const BoxDistance found =
+      distance_to_box(link_.context.solid(), box, obstacles_.X_OL, max_distance);
   if (!(found.distance > 0.0)) return take_overlap(found, id);
   const InnerSphereTree& tree = link_.context.tree();
   const Eigen::Vector3d center_O = box.center();  // as a whole it may be inside

@@ -579,5 +579,77 @@ TEST(Boxes, BoundsHoldWheneverTheDeadlinePasses) {
   EXPECT_GT(unfinished, test::scaled(20));
 }
 
+struct Work {
+  std::uint64_t kept_evaluations = 0, evaluations = 0, kept_pairs = 0, pairs = 0;
+};
+
+// Links move in small steps among thousands of boxes, as memory remembers them; every tenth step
+// the index is built again, with some boxes gone. The answers agree with those of fresh queries.
+// @returns the work of both
+Work move_among_boxes(double max_error) {
+  test::Rng rng(35);
+  std::vector<Eigen::AlignedBox3d> all;
+  while (all.size() < 2500) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 1.0);
+    if (p.norm() < 0.5 || p.norm() > 0.6) continue;
+    const Eigen::Vector3d low = (50.0 * p).array().floor() / 50.0;
+    all.emplace_back(low, low + Eigen::Vector3d::Constant(0.02));
+  }
+  const std::vector<TriangleMesh> meshes = {test::torus(0.2, 0.03, 24, 12),
+                                            test::icosphere(0.2, 3)};
+  const auto model = test::make_model({meshes.begin(), meshes.end()}, max_error);
+  const QueryConfig config;
+  ProximityQuery query(model, config);
+  const std::vector<bool> known(meshes.size(), true);
+  std::vector<LinkProximity> results, anew;
+  CloudSnapshot map;
+  Work work;
+  for (int step = 0; step < 120; ++step) {
+    if (step % 10 == 0) {
+      std::vector<Eigen::AlignedBox3d> boxes;
+      for (const Eigen::AlignedBox3d& box : all) {
+        if (test::uniform(&rng, 0.0, 1.0) < 0.95) boxes.push_back(box);
+      }
+      auto index = std::make_shared<BoxIndex>();
+      index->build(boxes);
+      map.boxes = index;
+    }
+    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+    const double angle = 0.002 * step;
+    X.translation() = 0.05 * Eigen::Vector3d(std::sin(angle), std::cos(angle), angle);
+    X.rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()));
+    const std::vector<Eigen::Isometry3d> X_FL(meshes.size(), X);
+    query.run(X_FL, known, {&map}, &results);
+    ProximityQuery fresh(model, config);
+    fresh.run(X_FL, known, {&map}, &anew);
+    work.kept_evaluations += query.statistics().exact_evaluations;
+    work.kept_pairs += query.statistics().node_pairs;
+    work.evaluations += fresh.statistics().exact_evaluations;
+    work.pairs += fresh.statistics().node_pairs;
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+      // The fresh query's bounds are those of the oracle's tests.
+      EXPECT_LE(results[i].lower_bound, anew[i].distance + 1e-9) << step;
+      EXPECT_GE(results[i].distance, anew[i].lower_bound - 1e-9) << step;
+      EXPECT_LE(results[i].distance - results[i].lower_bound, config.tolerance + 2e-6) << step;
+      if (step != 119) continue;
+      expect_truth(results[i], truth_of(meshes[i], map, X), meshes[i], map, X, config);
+    }
+  }
+  return work;
+}
+
+// Coarse spheres: boxes that only exact distances tell apart are measured once for several steps.
+// Without bounds that are kept of each box, more than 98 % as many as afresh are measured.
+TEST(BoxesKept, AreMeasuredOnceForSeveralSteps) {
+  const Work work = move_among_boxes(0.005);
+  EXPECT_LT(20 * work.kept_evaluations, 19 * work.evaluations);
+}
+
+// Fine spheres: a traversal expands more pairs than a front held (512), and was made afresh then.
+TEST(BoxesKept, AFrontHoldsThousandsOfPairs) {
+  const Work work = move_among_boxes(0.002);
+  EXPECT_LT(4 * work.kept_pairs, work.pairs);
+}
+
 }  // namespace
 }  // namespace ist

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "internal/geometry/solid_queries.h"
+#include "proximity/coherence/box_distance_cache.h"
 #include "support/meshes.h"
 #include "support/scene.h"
 
@@ -91,6 +92,42 @@ TEST(DistanceCache, BoundsAreNeverAboveTheTruth) {
     if (step % 3 == 0) cache.store(Quantity::kSigned, i, p, depth.floor);
   }
   EXPECT_GT(found, 1000);
+}
+
+// Boxes move past a link, turn, and are replaced by others of other sizes under the same keys.
+TEST(BoxDistanceCache, BoundsAreNeverAboveTheTruth) {
+  test::Rng rng(93);
+  const std::vector<Solid> solids = {
+      Solid({GeometryElement{test::l_shape(0.2, 0.05), Eigen::Isometry3d::Identity(), ""}}),
+      Solid({GeometryElement{Cylinder{0.06, 0.3}, Eigen::Isometry3d::Identity(), ""}}),
+      Solid({GeometryElement{Box{{0.1, 0.2, 0.3}}, Eigen::Isometry3d::Identity(), ""}})};
+  int found = 0, tight = 0;
+  for (const Solid& solid : solids) {
+    BoxDistanceCache cache;
+    Eigen::Isometry3d X_LO = Eigen::Isometry3d::Identity();
+    for (int step = 0; step < 200; ++step) {
+      const double size = std::pow(10.0, test::uniform(&rng, -5, -1));
+      X_LO.translation() += test::random_vector(&rng, size);
+      X_LO.rotate(Eigen::AngleAxisd(size, test::random_vector(&rng, 1.0).normalized()));
+      for (std::uint32_t key = 0; key < 40; ++key) {
+        const auto at = static_cast<double>(key);
+        const Eigen::Vector3d center(0.3 * std::sin(at), 0.3 * std::cos(2.0 * at), 0.2);
+        const double grown = key % 4 == 0 ? test::uniform(&rng, 0.0, 0.01) : 0.0;
+        const Eigen::Vector3d half = Eigen::Vector3d(0.01, 0.02, 0.04).array() + grown;
+        const Eigen::AlignedBox3d box(center - half, center + half);
+        const PlacedBox placed(box, X_LO);
+        const double kept = cache.find(key, placed);
+        const BoxDistance truth =
+            distance_to_box(solid, box, X_LO.inverse(), std::numeric_limits<double>::infinity());
+        ASSERT_LE(kept, truth.distance + 1e-12) << "step " << step << ", key " << key;
+        found += kept > 0.0 ? 1 : 0;
+        tight += kept > truth.distance - 0.002 ? 1 : 0;
+        if (step % 3 == 0) cache.store(key, placed, truth.lower_bound);
+      }
+    }
+  }
+  EXPECT_GT(found, 5000);
+  EXPECT_GT(tight, 5000);
 }
 
 }  // namespace

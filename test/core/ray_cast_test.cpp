@@ -220,25 +220,36 @@ TEST(RayBundle, agreesWithSingleRays) {
   int hits = 0, misses = 0, empty = 0;
   for (const std::vector<GeometryElement>& elements : solids) {
     const Solid solid(elements);
-    for (int i = 0; i < 400; ++i) {
+    for (int i = 0; i < 1600; ++i) {
       const double range = std::pow(10.0, -1.5 + 1.5 * (u(random) + 1.0));
       const double apart = std::pow(10.0, -4.0 + 1.5 * (u(random) + 1.0));
       const Eigen::Vector3d origin = range * random_direction(&random);
       const Eigen::Vector3d aim = 0.25 * random_direction(&random) - origin;
       const double length = i % 2 == 0 ? 1.0 : aim.norm();
-      std::vector<Eigen::Vector3d> directions;
-      Eigen::AlignedBox3d box;
+      RayBundle::Directions directions;
       for (int k = 0; k < 16; ++k) {
-        const Eigen::Vector3d d = aim.normalized() + apart * random_direction(&random);
-        directions.push_back(length * d);
-        box.extend(directions.back());
+        directions.col(k) = length * (aim.normalized() + apart * random_direction(&random));
+      }
+      // Some pixels may be no numbers, and rays may be cast in two parts.
+      const std::uint32_t rays = i % 5 == 0 ? 0xFFFFU : random() & 0xFFFFU,
+                          early = i % 7 == 0 ? 0U : random() & rays;
+      for (std::uint32_t k = 0; k < 16; ++k) {
+        if ((rays >> k & 1U) == 0) directions.col(k).setConstant(std::nan(""));
       }
       const double max_t = i % 3 == 0 ? kInf : aim.norm() / length;
       const long before = test::allocations;
-      bundle.begin(solid, origin, box, max_t);
+      bundle.begin(solid, origin, directions, rays, max_t);
       empty += bundle.empty() ? 1 : 0;
-      for (const Eigen::Vector3d& d : directions) {
-        const RayHit alone = ray_cast(solid, origin, d, max_t), hit = bundle.cast(d, max_t);
+      std::array<double, RayBundle::kRays> limits;
+      for (double& limit : limits)
+        limit = std::isfinite(max_t) ? 0.5 * (u(random) + 1.0) * max_t : max_t;
+      std::array<RayHit, RayBundle::kRays> found;
+      bundle.cast(early, limits, &found);
+      bundle.cast(rays & ~early, limits, &found);
+      for (std::uint32_t k = 0; k < 16; ++k) {
+        if ((rays >> k & 1U) == 0) continue;
+        const RayHit alone = ray_cast(solid, origin, directions.col(k), limits[k]);
+        const RayHit& hit = found[k];
         ASSERT_EQ(std::isfinite(hit.t), std::isfinite(alone.t));
         (std::isfinite(hit.t) ? hits : misses) += 1;
         if (!std::isfinite(hit.t)) continue;

@@ -1,6 +1,7 @@
 #include "cloud/filters/tile_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "cloud/format/point_reader.h"
@@ -27,31 +28,39 @@ void TileView::begin(double behind) {
 }
 
 void TileView::add_link(const SelfFilter::Link& link, const Eigen::Isometry3d& X_LS) {
-  Eigen::AlignedBox3d directions_L;
-  for (std::size_t k = 0; k < kPixels; ++k) {
-    if (is_kept(k)) directions_L.extend(X_LS.linear() * direction_[k]);
-  }
   bundles_.emplace_back();
   Bundle& bundle = bundles_.back();
   bundle.link = &link;
   bundle.R_LS = X_LS.linear();
-  bundle.rays.begin(*link.solid, X_LS.translation(), directions_L, farthest_ + behind_);
+  RayBundle::Directions directions_L;
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    if (!is_kept(k)) continue;
+    directions_L.col(static_cast<Eigen::Index>(k)) = X_LS.linear() * direction_[k];
+  }
+  bundle.rays.begin(*link.solid, X_LS.translation(), directions_L, kept_, farthest_ + behind_);
   if (bundle.rays.empty()) bundles_.pop_back();
 }
 
-const TileView::Sight& TileView::look(std::size_t k) {
-  Sight& sight = sights_[k];
-  if ((looked_ >> k & 1U) != 0) return sight;
-  looked_ |= 1U << k;
-  sight = {};
-  for (const Bundle& bundle : bundles_) {
-    const RayHit hit = bundle.rays.cast(bundle.R_LS * direction_[k], range_[k] + behind_);
-    if (!(std::abs(hit.t - range_[k]) < std::abs(sight.t - range_[k]))) continue;
-    sight.t = hit.t;
-    sight.normal = bundle.R_LS.transpose() * hit.normal;
-    sight.link = bundle.link;
+void TileView::look_at(std::uint32_t pixels) {
+  const std::uint32_t rays = pixels & ~looked_;
+  if (rays == 0) return;
+  looked_ |= rays;
+  std::array<double, kPixels> max_t;
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    if ((rays >> k & 1U) == 0) continue;
+    sights_[k] = {};
+    max_t[k] = range_[k] + behind_;
   }
-  return sight;
+  std::array<RayHit, kPixels> hits;
+  for (const Bundle& bundle : bundles_) {
+    bundle.rays.cast(rays, max_t, &hits);
+    for (std::size_t k = 0; k < kPixels; ++k) {
+      if ((rays >> k & 1U) == 0) continue;
+      Sight& sight = sights_[k];
+      if (!(std::abs(hits[k].t - range_[k]) < std::abs(sight.t - range_[k]))) continue;
+      sight = {hits[k].t, bundle.R_LS.transpose() * hits[k].normal, bundle.link};
+    }
+  }
 }
 
 }  // namespace ist

@@ -42,8 +42,11 @@ class TileView {
   /// @param X_LS  sensor frame -> link frame
   void add_link(const SelfFilter::Link& link, const Eigen::Isometry3d& X_LS);
 
-  /// The ray of pixel k: where it first meets the link whose surface is nearest to the point.
-  const Sight& look(std::size_t k);
+  /// Casts the rays of some pixels, each once. @param pixels  bits of pixels that are kept
+  void look_at(std::uint32_t pixels);
+  /// The ray of pixel k, which has been cast: where it first meets the link whose surface is
+  /// nearest to the point.
+  const Sight& sight(std::size_t k) const { return sights_[k]; }
 
   std::uint32_t kept() const { return kept_; }
   bool is_kept(std::size_t k) const { return (kept_ >> k & 1U) != 0; }

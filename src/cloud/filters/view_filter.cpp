@@ -36,8 +36,9 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 // The median of the angles [rad] between neighbours, of some samples; inf: too few were measured.
 class NeighbourAngles {
  public:
+  bool is_full() const { return count_ == values_.size(); }
   void add(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
-    if (count_ == values_.size() || !p.allFinite() || !q.allFinite()) return;
+    if (is_full() || !p.allFinite() || !q.allFinite()) return;
     const double norms = p.norm() * q.norm();
     if (norms > 0.0) values_[count_++] = p.cross(q).norm() / norms;
   }
@@ -64,7 +65,7 @@ bool is_view(const RawCloud& cloud) {
   // An odd stride: the samples are to be spread over the columns.
   const std::size_t stride = cloud.size() / kSamples | 1U;
   NeighbourAngles across, down;
-  for (std::size_t i = 0; i < cloud.size(); i += stride) {
+  for (std::size_t i = 0; i < cloud.size() && !(across.is_full() && down.is_full()); i += stride) {
     const std::size_t row = i / cloud.width, column = i % cloud.width;
     if (row + 1 == cloud.height || column + 1 == cloud.width) continue;
     const Eigen::Vector3d p = point_at(cloud, row, column);
@@ -152,8 +153,9 @@ bool ViewFilter::add_patch(Tile* tile) {
                                                    kPixels - 1};
   std::array<TileView::Sight, 4> sights;
   std::array<Eigen::Vector3d, 4> hits;
+  view_.look_at(1U << kCorners[0] | 1U << kCorners[1] | 1U << kCorners[2] | 1U << kCorners[3]);
   for (std::size_t i = 0; i < 4; ++i) {
-    sights[i] = view_.look(kCorners[i]);
+    sights[i] = view_.sight(kCorners[i]);
     if (sights[i].link == nullptr || sights[i].link != sights[0].link) return false;
     hits[i] = sights[i].t * view_.direction(kCorners[i]);
   }
@@ -188,6 +190,29 @@ bool ViewFilter::add_patch(Tile* tile) {
   return true;
 }
 
+namespace {
+
+// Whether the spheres of a link prove that its surface is farther from a point than `limit` [m].
+bool is_farther(const SelfFilter::Link& link, const Eigen::Vector3d& p_L, double limit) {
+  return link.tree->cover_distance_exceeds(p_L, std::max(limit, link.tree->interior_gap()));
+}
+
+// [m] The distance of a point to the surface of a link; inf where it is more than `limit`.
+double distance_within(const SelfFilter::Link& link, const Eigen::Vector3d& p_L, double limit) {
+  return is_farther(link, p_L, limit) ? kInf : distance_outside(*link.solid, p_L, limit).distance;
+}
+
+// [m] The nearest approach of a ray to the surface of a link near its point at t, where that is
+// within `limit` [m] and the ray comes nearest before `last`; else inf.
+double approach_within(const SelfFilter::Link& link, const Eigen::Vector3d& o_L,
+                       const Eigen::Vector3d& d_L, double t, double last, double limit) {
+  if (is_farther(link, o_L + t * d_L, limit)) return kInf;
+  const RayApproach near = nearest_approach(*link.solid, o_L, d_L, t, limit);
+  return near.t <= last ? near.distance : kInf;
+}
+
+}  // namespace
+
 // Judges a point whose ray passes the links, or meets them far behind it: an obstacle is nowhere
 // near a surface, within what noise, the sensor's pose and blurred edges leave open. Behind the
 // nearest point of a surface it is a mixed pixel or a shadow.
@@ -201,9 +226,10 @@ ViewFilter::Passing ViewFilter::pass(std::size_t k, const SelfFilter& filter) co
     const Eigen::Vector3d o_L = state.X_LS.translation(),
                           d_L = state.X_LS.linear() * view_.direction(k);
     const double limit = state.tolerance + blur;
-    const RayApproach near = nearest_approach(*link->solid, o_L, d_L, range, padding_ + kFlat);
-    double distance = distance_outside(*link->solid, o_L + last * d_L, limit).distance;
-    if (near.t <= last) distance = std::min(distance, near.distance);
+    const double behind = distance_within(*link, o_L + last * d_L, limit);
+    if (behind <= state.tolerance) return Passing::kRobot;
+    const double distance =
+        std::min(behind, approach_within(*link, o_L, d_L, range, last, padding_ + kFlat));
     if (distance <= state.tolerance) return Passing::kRobot;
     if (distance <= limit) passing = Passing::kBlurred;
   }
@@ -228,7 +254,7 @@ const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight
 void ViewFilter::add_pixel(std::size_t k, const Skin& skin, Tile* tile) {
   const auto bit = static_cast<std::uint16_t>(1U << k);
   const double range = view_.range(k);
-  const TileView::Sight& sight = view_.look(k);
+  const TileView::Sight& sight = view_.sight(k);
   const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
   if (in_skin == nullptr) {
     // Close in front of the robot there is nothing but an obstacle.
@@ -275,6 +301,7 @@ void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kep
   tile.height.fill(std::numeric_limits<float>::quiet_NaN());
   for (std::size_t k = 0; k < kPixels; ++k) tile.range[k] = static_cast<float>(view_.range(k));
   const bool is_patch = kept == kWhole && add_patch(&tile);
+  if (!is_patch) view_.look_at(kept);
   for (std::size_t k = 0; !is_patch && k < kPixels; ++k) {
     if (view_.is_kept(k)) add_pixel(k, {filter, verdict, X_OS}, &tile);
   }

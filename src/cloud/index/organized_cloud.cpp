@@ -94,57 +94,91 @@ class OrganizedReader {
   }
 
   // Looks at the blocks near the robot, without adding anything. @returns ViewFilter::end_pass()
-  bool look_at_robot() {
+  bool look_at_robot(LookedBlocks* looked) {
     view_->begin_pass(cloud_, crop_.X_FO * crop_.X_OS);
-    is_looking_ = true;
-    run();
-    is_looking_ = false;
-    kept_ = 0;
+    looked->blocks.resize(blocks_in(cloud_.height) * blocks_in(cloud_.width));
+    LookedBlocks::Block* block = looked->blocks.data();
+    for (row_ = 0; row_ < cloud_.height; row_ += kBlockSide) {
+      for (column_ = 0; column_ < cloud_.width; column_ += kBlockSide) look_at_block(block++);
+    }
+    looked->kept = kept_;
     return view_->end_pass();
+  }
+
+  // run() for a cloud that look_at_robot() has looked at.
+  std::size_t run_looked(const LookedBlocks& looked) {
+    counts_ = looked.counts;
+    const LookedBlocks::Block* block = looked.blocks.data();
+    for (row_ = 0; row_ < cloud_.height; row_ += kBlockSide) {
+      for (column_ = 0; column_ < cloud_.width; column_ += kBlockSide, ++block) {
+        if (block->kept != 0) add_block(block->bounds, block->is_whole, block->is_on_robot);
+      }
+    }
+    return looked.kept;
   }
 
  private:
   static constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
   static constexpr std::uint32_t kWhole = 0xFFFFU;  // all pixels of a tile are kept
 
+  static std::size_t blocks_in(std::size_t pixels) {
+    return (pixels + kBlockSide - 1) / kBlockSide;
+  }
+
   void read_block() {
-    BlockState state = bound_block(transform_, pixels(), &block_);
+    bool is_whole = false;
+    if (bound(&bounds_, &is_whole) == 0) return;
+    add_block(bounds_, is_whole, on_robot_ != nullptr && on_robot_->begin_group(box_of(bounds_)));
+  }
+
+  // Bounds the current block and counts its pixels.
+  // @param is_whole  receives whether all pixels are kept, none of them near a limit
+  // @returns how many are kept
+  std::size_t bound(BlockBounds* block, bool* is_whole) {
+    BlockState state = bound_block(transform_, pixels(), block);
     if (state == BlockState::kNone) {
       counts_.not_a_number += static_cast<std::uint32_t>(received());
-      return;
+      return 0;
     }
     if (state != BlockState::kUnclear) {
-      const RegionSide side = region_.side_of(block_);
+      const RegionSide side = region_.side_of(*block);
       if (side == RegionSide::kCrossing) state = BlockState::kUnclear;
       if (side == RegionSide::kOutside) {
-        counts_.outside_region += static_cast<std::uint32_t>(count_kept(state));
-        return;
+        counts_.outside_region += static_cast<std::uint32_t>(count_kept(state, *block));
+        return 0;
       }
     }
-    if (state == BlockState::kAll) std::fill_n(block_.kept, kSlots, kWhole);
-    const std::size_t kept = state == BlockState::kUnclear ? crop_in_double() : count_kept(state);
-    if (kept == 0) return;
+    if (state == BlockState::kAll) std::fill_n(block->kept, kSlots, kWhole);
+    const std::size_t kept =
+        state == BlockState::kUnclear ? crop_in_double(block) : count_kept(state, *block);
     kept_ += kept;
-    if (is_looking_) return look_at_block();
-    const std::uint32_t candidates = split_candidates();
-    const bool is_near_robot = on_robot_ != nullptr && on_robot_->begin_group(block_box());
-    if (state == BlockState::kAll && candidates == 0 && !is_near_robot && add_as_node()) return;
-    add_tiles(candidates, is_near_robot);
+    *is_whole = state == BlockState::kAll;
+    return kept;
+  }
+
+  void add_block(const BlockBounds& block, bool is_whole, bool is_near_robot) {
+    const std::uint32_t candidates = split_candidates(block);
+    if (is_whole && candidates == 0 && !is_near_robot && add_as_node(block)) return;
+    add_tiles(block, candidates, is_near_robot);
   }
 
   // Shows the view filter the tiles that the self-filter cannot prove to be clear of the robot.
-  void look_at_block() {
-    if (!on_robot_->begin_group(block_box())) return;
+  void look_at_block(LookedBlocks::Block* looked) {
+    const BlockBounds& block = looked->bounds;
+    looked->kept = static_cast<std::uint32_t>(bound(&looked->bounds, &looked->is_whole));
+    looked->is_on_robot = false;
+    if (looked->kept == 0 || !on_robot_->begin_group(box_of(block))) return;
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
-      const std::uint32_t kept = block_.kept[slot];
+      const std::uint32_t kept = block.kept[slot];
       if (kept == 0) continue;
-      const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
+      const PaddedBox box = box_in(block.boxes, static_cast<int>(slot));
       const SelfFilter::Verdict verdict = on_robot_->test(box);
       if (verdict == SelfFilter::Verdict::kClear) {
         const Eigen::Vector3f middle = 0.5F * (box.min + box.max).head<3>();
         view_->add_outside(crop_.X_FO * middle.cast<double>());
         continue;
       }
+      looked->is_on_robot = true;
       view_->add_tile(row_ + tile_row(slot), column_ + tile_column(slot), kept, *on_robot_, verdict,
                       crop_.X_OS);
     }
@@ -163,13 +197,13 @@ class OrganizedReader {
   }
 
   // The treatment of a tile of a block near the robot.
-  SelfFilter::Verdict judge(std::size_t slot, const PaddedBox& box) {
+  SelfFilter::Verdict judge(std::size_t slot, std::uint32_t kept, const PaddedBox& box) {
     using Verdict = SelfFilter::Verdict;
     if (view_ == nullptr) return on_robot_->test(box);
     const std::uint16_t* robot =
         view_->robot_mask(row_ + tile_row(slot), column_ + tile_column(slot));
     if (robot == nullptr || *robot == 0) return Verdict::kClear;
-    return *robot == block_.kept[slot] ? Verdict::kOnRobot : Verdict::kUndecided;
+    return *robot == kept ? Verdict::kOnRobot : Verdict::kUndecided;
   }
 
   std::size_t rows() const { return std::min(kBlockSide, cloud_.height - row_); }
@@ -218,17 +252,17 @@ class OrganizedReader {
   }
 
   // The pixels kept, after bound_block(); counts those that are NaN.
-  std::size_t count_kept(BlockState state) {
+  std::size_t count_kept(BlockState state, const BlockBounds& block) {
     if (state == BlockState::kAll) return kBlockSide * kBlockSide;
     counts_.not_a_number +=
-        block_.not_a_number - static_cast<std::uint32_t>(kBlockSide * kBlockSide - received());
+        block.not_a_number - static_cast<std::uint32_t>(kBlockSide * kBlockSide - received());
     std::size_t count = 0;
-    for (const std::uint32_t kept : block_.kept) count += std::bitset<kSlots>(kept).count();
+    for (const std::uint32_t kept : block.kept) count += std::bitset<kSlots>(kept).count();
     return count;
   }
 
   // Decides in double, pixel by pixel, which are kept. @returns how many are
-  std::size_t crop_in_double() {
+  std::size_t crop_in_double(BlockBounds* bounds) {
     CropBatch block;
     std::size_t kept = 0;
     copied();
@@ -242,40 +276,39 @@ class OrganizedReader {
             std::numeric_limits<float>::quiet_NaN();
       }
     }
-    if (bound_block(without_limits_, {copy_, 4, 4 * kBlockSide}, &block_) == BlockState::kAll) {
-      std::fill_n(block_.kept, kSlots, kWhole);
+    if (bound_block(without_limits_, {copy_, 4, 4 * kBlockSide}, bounds) == BlockState::kAll) {
+      std::fill_n(bounds->kept, kSlots, kWhole);
     }
     return kept;
   }
 
   // Adds all sixteen tiles as a node, not loaded: the usual case where a camera sees well. @returns
   // false, and adds nothing, where the tiles have to be looked at one by one.
-  bool add_as_node() {
-    const PaddedBox bounds = block_box();
-    if (!are_close_together(bounds.diagonal(), block_.diagonals, kPointWidth)) return false;
+  bool add_as_node(const BlockBounds& block) {
+    if (!are_close_together(box_of(block).diagonal(), block.diagonals, kPointWidth)) return false;
     std::array<std::uint32_t, kSlots> first;
     for (std::size_t slot = 0; slot < kSlots; ++slot) first[slot] = first_pixel(slot);
-    builder_.add_lazy_node(block_.boxes, first.data());
+    builder_.add_lazy_node(block.boxes, first.data());
     return true;
   }
 
-  PaddedBox block_box() const {
-    return {{block_.min[0], block_.min[1], block_.min[2], 0.0F},
-            {block_.max[0], block_.max[1], block_.max[2], 0.0F}};
+  static PaddedBox box_of(const BlockBounds& block) {
+    return {{block.min[0], block.min[1], block.min[2], 0.0F},
+            {block.max[0], block.max[1], block.max[2], 0.0F}};
   }
 
   // Adds the tiles one by one. Only those that have to be split, have holes, or are at the
   // self-filter's border are read.
   // @param candidates  bit k: the tile in slot k may have to be split
-  void add_tiles(std::uint32_t candidates, bool is_near_robot) {
+  void add_tiles(const BlockBounds& block, std::uint32_t candidates, bool is_near_robot) {
     using Verdict = SelfFilter::Verdict;
     static const PointFilter kDropNone;
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
-      const std::uint32_t kept = block_.kept[slot];
+      const std::uint32_t kept = block.kept[slot];
       if (kept == 0) continue;
-      const PaddedBox box = box_in(block_.boxes, static_cast<int>(slot));
+      const PaddedBox box = box_in(block.boxes, static_cast<int>(slot));
       const bool may_split = (candidates >> slot & 1U) != 0;
-      const Verdict robot = is_near_robot ? judge(slot, box) : Verdict::kClear;
+      const Verdict robot = is_near_robot ? judge(slot, kept, box) : Verdict::kClear;
       if (robot == Verdict::kOnRobot) continue;
       if (kept == kWhole && !may_split && robot == Verdict::kClear) {
         builder_.add_lazy_tile(box, first_pixel(slot));
@@ -283,51 +316,51 @@ class OrganizedReader {
       }
       if (may_split) {
         PointTile tile;
-        read_kept(slot, &tile);
+        read_kept(slot, kept, &tile);
         add_parts(tile, (1U << static_cast<std::uint32_t>(tile.count)) - 1U, box,
                   robot == Verdict::kClear ? kDropNone : drop_);
       } else {
-        read_kept(slot, builder_.next_tiles(1));
+        read_kept(slot, kept, builder_.next_tiles(1));
         builder_.add_tile(box, robot == Verdict::kClear ? kDropNone : drop_undecided_);
       }
     }
     builder_.end_group();
   }
 
-  void read_kept(std::size_t slot, PointTile* tile) const {
-    if (block_.kept[slot] == kWhole) {
+  void read_kept(std::size_t slot, std::uint32_t kept, PointTile* tile) const {
+    if (kept == kWhole) {
       return read_tile(cloud_, crop_.X_OS, first_pixel(slot), tile);
     }
-    CropBatch block;
+    CropBatch batch;
     IngestCounts counted_before;
-    crop_tile(cloud_, row_ + tile_row(slot), column_ + tile_column(slot), crop_, &block,
+    crop_tile(cloud_, row_ + tile_row(slot), column_ + tile_column(slot), crop_, &batch,
               &counted_before);
-    copy_kept(block, cloud_.width, first_pixel(slot), tile);
+    copy_kept(batch, cloud_.width, first_pixel(slot), tile);
   }
 
   // Bit k: the tile in slot k may have to be split. Whole tiles without a depth discontinuity need
   // no split; nor do others that are about as long as those.
-  std::uint32_t split_candidates() const {
-    if (block_.may_have_edge == 0 && std::all_of(block_.kept, block_.kept + kSlots,
-                                                 [](std::uint32_t k) { return k == kWhole; })) {
+  static std::uint32_t split_candidates(const BlockBounds& block) {
+    if (block.may_have_edge == 0 &&
+        std::all_of(block.kept, block.kept + kSlots, [](std::uint32_t k) { return k == kWhole; })) {
       return 0;
     }
     std::uint32_t undecided = 0;
     float sum = 0.0F, count = 0.0F;
     for (std::size_t slot = 0; slot < kSlots; ++slot) {
       const std::uint32_t bit = 1U << slot;
-      if (block_.kept[slot] == 0) continue;
-      if (block_.kept[slot] != kWhole || (block_.may_have_edge & bit) != 0) {
+      if (block.kept[slot] == 0) continue;
+      if (block.kept[slot] != kWhole || (block.may_have_edge & bit) != 0) {
         undecided |= bit;
       } else {
-        sum += block_.diagonal_sq[slot];
+        sum += block.diagonal_sq[slot];
         count += 1.0F;
       }
     }
     std::uint32_t candidates = 0;
     for (std::size_t slot = 0; undecided >> slot != 0; ++slot) {
       if ((undecided >> slot & 1U) == 0) continue;
-      if (!is_as_long_as(block_.diagonal_sq[slot], sum, count)) candidates |= 1U << slot;
+      if (!is_as_long_as(block.diagonal_sq[slot], sum, count)) candidates |= 1U << slot;
     }
     return candidates;
   }
@@ -355,13 +388,12 @@ class OrganizedReader {
   const bool holds_floats_;
   SelfFilter* on_robot_;
   ViewFilter* view_;
-  bool is_looking_ = false;
   PointFilter drop_, drop_undecided_;
   PointBvhBuilder& builder_;
   IngestCounts& counts_;
   std::array<std::uint32_t, kSlots> offset_;  // [pixels] by slot
   std::size_t row_ = 0, column_ = 0;          // of the current block
-  BlockBounds block_;
+  BlockBounds bounds_;                        // of read_block()
   alignas(64) float copy_[4 * kBlockSide * kBlockSide];
   std::size_t kept_ = 0;
 };
@@ -369,16 +401,18 @@ class OrganizedReader {
 }  // namespace
 
 bool look_at_robot(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                   ViewFilter* view, PointBvhBuilder* builder) {
-  IngestCounts counted_later;
-  return OrganizedReader(cloud, crop, on_robot, view, builder, &counted_later).look_at_robot();
+                   ViewFilter* view, PointBvhBuilder* builder, LookedBlocks* looked) {
+  looked->counts = {};
+  return OrganizedReader(cloud, crop, on_robot, view, builder, &looked->counts)
+      .look_at_robot(looked);
 }
 
 std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                            ViewFilter* view, PointBvhBuilder* builder, PointBvh* bvh,
-                            IngestCounts* counts) {
+                            ViewFilter* view, const LookedBlocks* looked, PointBvhBuilder* builder,
+                            PointBvh* bvh, IngestCounts* counts) {
   builder->start_organized(crop.X_FO, cloud, crop.X_OS, bvh);
-  const std::size_t kept = OrganizedReader(cloud, crop, on_robot, view, builder, counts).run();
+  OrganizedReader reader(cloud, crop, on_robot, view, builder, counts);
+  const std::size_t kept = looked != nullptr ? reader.run_looked(*looked) : reader.run();
   builder->finish();
   return kept;
 }

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "cloud/filters/crop.h"
 #include "cloud/filters/self_filter.h"
 #include "cloud/filters/view_filter.h"
+#include "cloud/index/block_bounds.h"
 #include "cloud/index/point_bvh_builder.h"
+#include "ist_proximity/cloud/ingest.h"
 
 namespace ist {
 
@@ -14,6 +18,20 @@ namespace ist {
 /// what is found.
 bool is_organized(const RawCloud& cloud, const CropParameters& crop);
 
+/// The blocks of a cloud that the view filter has looked at: their bounds are computed once, and
+/// used by index_organized(). Keeps its memory.
+struct LookedBlocks {
+  struct Block {
+    BlockBounds bounds;
+    std::uint32_t kept;  ///< pixels; 0: the bounds are not set
+    bool is_whole;       ///< all pixels are kept, none of them near a limit
+    bool is_on_robot;    ///< the view filter has a tile of it
+  };
+  std::vector<Block> blocks;  ///< row by row
+  IngestCounts counts;        ///< of the whole cloud
+  std::size_t kept = 0;       ///< points of the whole cloud
+};
+
 /// Reads an organized cloud once and builds its index without sorting points: squares of 4 x 4
 /// pixels become tiles, squares of 4 x 4 tiles become nodes. At depth discontinuities a tile is
 /// split, and tiles that no longer fill a node are grouped by where they are. Counts
@@ -21,15 +39,17 @@ bool is_organized(const RawCloud& cloud, const CropParameters& crop);
 /// @param on_robot  null: no self-filter
 /// @param view      null: the self-filter drops all that is within its padding; else only what the
 ///                  view filter, which look_at_robot() has shown the cloud, takes for the robot
+/// @param looked    what look_at_robot() has found with the same crop; null without `view`
 /// @param bvh  overwritten, its buffers reused
 /// @returns how many points are kept, before `on_robot` drops some
 std::size_t index_organized(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                            ViewFilter* view, PointBvhBuilder* builder, PointBvh* bvh,
-                            IngestCounts* counts);
+                            ViewFilter* view, const LookedBlocks* looked, PointBvhBuilder* builder,
+                            PointBvh* bvh, IngestCounts* counts);
 
 /// Shows the view filter the part of a cloud that is near the robot; nothing is indexed.
+/// @param looked  overwritten
 /// @returns ViewFilter::end_pass()
 bool look_at_robot(const RawCloud& cloud, const CropParameters& crop, SelfFilter* on_robot,
-                   ViewFilter* view, PointBvhBuilder* builder);
+                   ViewFilter* view, PointBvhBuilder* builder, LookedBlocks* looked);
 
 }  // namespace ist

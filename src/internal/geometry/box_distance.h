@@ -38,8 +38,11 @@ BoxDistance sphere_to_box(const Sphere& sphere, const Eigen::Vector3d& center_O,
 
 /// Solid cylinder and a box, by GJK (Gilbert, Johnson, Keerthi 1988) in double: `distance` is that
 /// of two points, `lower_bound` follows from the last separating plane and is usually within 1e-9.
-/// @param X_OE  cylinder's frame -> O, rigid
+/// @param X_OE          cylinder's frame -> O, rigid
+/// @param max_distance  [m] the search ends where a separating plane proves that the distance is
+///                      more: `lower_bound` is more, too, and `distance` may be too large
 BoxDistance cylinder_to_box(const Cylinder& cylinder, const Eigen::Isometry3d& X_OE,
-                            const Eigen::AlignedBox3d& box);
+                            const Eigen::AlignedBox3d& box,
+                            double max_distance = std::numeric_limits<double>::infinity());
 
 }  // namespace ist

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -148,20 +149,32 @@ class TriangleBvh {
     Eigen::Vector3d normal() const { return (b - a).cross(c - a).normalized(); }
   };
 
+  /// A leaf and its box [m] from the centre of the mesh's bounding box.
+  struct RayLeaf {
+    float min[3], max[3];
+    std::uint32_t leaf;
+  };
   /// Finds the leaves that a ray origin + t direction with t in [0, max_t] may cross, whichever of
   /// the directions it has; roughly the one that is entered first comes first.
   /// @param directions_M  holds them; corners of it that are no direction of a ray do no harm
-  /// @param leaves        receives them, kWidth in each but the last
-  /// @returns how many leaves there are; more than kWidth times `capacity`: they do not fit, and
-  /// the
-  ///          search ended
+  /// @param leaves        receives them
+  /// @returns how many leaves there are; more than `capacity`: they do not fit, and the search
+  ///          ended
   std::size_t leaves_on_rays(const Eigen::Vector3d& origin_M,
-                             const Eigen::AlignedBox3d& directions_M, double max_t, Boxes* leaves,
+                             const Eigen::AlignedBox3d& directions_M, double max_t, RayLeaf* leaves,
                              std::size_t capacity) const;
-  /// first_crossing() of one of these rays. @param count  of `leaves`
-  RayCrossing first_crossing(const Boxes* leaves, std::size_t count,
-                             const Eigen::Vector3d& origin_M, const Eigen::Vector3d& direction_M,
-                             double max_t) const;
+
+  /// The directions of sixteen rays, as columns.
+  using Directions = Eigen::Matrix<double, 3, 16>;
+  /// first_crossing() of some of these rays, all of which begin at one point.
+  /// @param leaves     of leaves_on_rays()
+  /// @param rays       bit k: ray k is asked about. The others' numbers below are not used
+  /// @param max_t      by ray
+  /// @param crossings  receives them, by ray
+  void first_crossings(const RayLeaf* leaves, std::size_t count, const Eigen::Vector3d& origin_M,
+                       const Directions& directions_M, std::uint32_t rays,
+                       const std::array<double, 16>& max_t,
+                       std::array<RayCrossing, 16>* crossings) const;
 
   /// [bytes] of the hierarchy and its triangles.
   std::size_t memory() const {

@@ -28,8 +28,8 @@ class BvttFront {
     std::uint32_t expanded;  ///< bit k: child k of the pair is a pair of the front, too
   };
   static constexpr std::int32_t kRoot = -1;
-  static constexpr std::size_t kMaxPairs = 512;  ///< a traversal that expands more keeps no front
-  static constexpr std::int32_t kFull = -1;      ///< instead of a pair's index: there is no place
+  static constexpr std::size_t kMaxPairs = 2048;  ///< a traversal that expands more keeps no front
+  static constexpr std::int32_t kFull = -1;       ///< instead of a pair's index: there is no place
 
   BvttFront();
 
