@@ -38,6 +38,23 @@ SignedDistance distance_outside(const Solid& solid, const Eigen::Vector3d& p_L, 
   return best;
 }
 
+bool is_within_distance(const Solid& solid, const Eigen::Vector3d& p_L, double distance) {
+  // Squares and roots are rounded: more is searched, and the search ends early at less.
+  constexpr double kRounding = 1e-9, kLeast = 1e-9;  // a share, [m]
+  const double limit = distance * (1.0 + kRounding) + kLeast, sure = distance * (1.0 - kRounding);
+  for (const SolidElement& element : elements_of(solid)) {
+    const Eigen::Vector3d p_E = element.X_EL * p_L;
+    if (!element.is_mesh()) {
+      if (primitive_distance(element.primitive, p_E).distance <= distance) return true;
+      continue;
+    }
+    const ClosestPoint closest =
+        element.bvh.closest(p_E, limit * limit, Eigen::Vector3d::Zero(), sure * sure);
+    if (std::sqrt(closest.distance_sq) <= distance) return true;
+  }
+  return false;
+}
+
 double support(const Solid& solid, const Eigen::Vector3d& n_L, double tolerance, double at_least) {
   double largest = at_least;
   for (const SolidElement& element : elements_of(solid)) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "internal/geometry/solid_queries.h"
 #include "support/meshes.h"
@@ -127,6 +128,31 @@ TEST(Solid, MeshEqualsBruteForceInsideAndOut) {
       }
     }
   }
+}
+
+// The first part of a surface that is near enough ends the search; the answer is that of the whole.
+TEST(Solid, WithinDistanceAsTheNearestElementSays) {
+  test::Rng rng(6);
+  const auto pose = [&rng] { return test::random_pose(&rng, 0.2); };
+  std::size_t within = 0, farther = 0;
+  for (int trial = 0; trial < test::scaled(40); ++trial) {
+    const LinkGeometry geometry = {{test::torus(0.2, 0.06, 30, 16), pose(), "torus"},
+                                   {Box{{0.1, 0.2, 0.1}}, pose(), "box"},
+                                   {test::l_shape(0.3, 0.06), pose(), "l"}};
+    const Solid solid(geometry);
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector3d p = test::random_vector(&rng, 0.4);
+      const double infinity = std::numeric_limits<double>::infinity();
+      const double distance = distance_outside(solid, p, infinity).distance;
+      for (const double share : {0.5, 1.0 - 1e-7, 1.0 + 1e-7, 2.0}) {
+        const double limit = share * std::abs(distance);
+        EXPECT_EQ(is_within_distance(solid, p, limit), distance <= limit) << share;
+        ++(distance <= limit ? within : farther);
+      }
+    }
+  }
+  EXPECT_GT(within, 1000U);
+  EXPECT_GT(farther, 1000U);
 }
 
 }  // namespace

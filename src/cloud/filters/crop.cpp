@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -176,6 +177,28 @@ std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column
   const std::size_t used = (window.rows - 1) * kTileSide + window.columns;
   std::fill(batch->x + used, batch->x + kSlots, std::numeric_limits<float>::quiet_NaN());
   return kept;
+}
+
+void move_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
+               const Eigen::Isometry3d& X_OS, float* x, float* y, float* z) {
+  if (is_four_floats(cloud)) {
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = X_OS.linear();
+    move_xyzw_tile(R.data(), X_OS.translation().data(), floats(bytes_of(cloud, row, column)),
+                   cloud.row_step / sizeof(float), x, y, z);
+    return;
+  }
+  constexpr std::size_t kSlots = kTileSide * kTileSide;
+  CropParameters crop;
+  crop.X_OS = X_OS;
+  crop.max_range_sq = std::numeric_limits<double>::max();
+  CropBatch batch;
+  IngestCounts unused;
+  const std::size_t kept = crop_tile(cloud, row, column, crop, &batch, &unused);
+  assert(kept == kSlots);
+  static_cast<void>(kept);
+  std::copy_n(batch.x, kSlots, x);
+  std::copy_n(batch.y, kSlots, y);
+  std::copy_n(batch.z, kSlots, z);
 }
 
 }  // namespace ist

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 
@@ -35,5 +36,11 @@ constexpr std::size_t kTileSide = 4;
 /// @param row, column  of the first pixel
 std::size_t crop_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
                       const CropParameters& crop, CropBatch* batch, IngestCounts* counts);
+
+/// Moves the pixels of a whole tile to O, of which crop_tile() keeps all: the same bits.
+/// @param row, column  of the first pixel
+/// @param x,y,z        [m] by slot, aligned to 64 bytes; overwritten
+void move_tile(const RawCloud& cloud, std::size_t row, std::size_t column,
+               const Eigen::Isometry3d& X_OS, float* x, float* y, float* z);
 
 }  // namespace ist

@@ -24,6 +24,15 @@ HWY_INLINE hn::Vec<DoubleTag> LoadAsDouble(DoubleTag d, const float* from) {
   return hn::PromoteTo(d, hn::Load(FloatTag(), from));
 }
 
+// A coordinate in O: a row of the rotation times the point, plus the translation.
+template <class V>
+HWY_INLINE V Moved(const double* r, double t, V x, V y, V z) {
+  const DoubleTag d;
+  const auto sum = hn::Add(hn::Add(hn::Mul(hn::Set(d, r[0]), x), hn::Mul(hn::Set(d, r[1]), y)),
+                           hn::Mul(hn::Set(d, r[2]), z));
+  return hn::Add(sum, hn::Set(d, t));
+}
+
 // Crops vector by vector; the parameters stay in registers.
 template <bool kHasRegion>
 class Cropper {
@@ -49,9 +58,9 @@ class Cropper {
     const std::size_t kept = hn::CountTrue(d, keep);
     auto to_x = nan;
     if (kept > 0) {
-      to_x = hn::IfThenElse(keep, Moved(0, x, y, z), nan);
-      hn::Store(hn::DemoteTo(f, Moved(1, x, y, z)), f, batch_.y + k);
-      hn::Store(hn::DemoteTo(f, Moved(2, x, y, z)), f, batch_.z + k);
+      to_x = hn::IfThenElse(keep, MovedAlong(0, x, y, z), nan);
+      hn::Store(hn::DemoteTo(f, MovedAlong(1, x, y, z)), f, batch_.y + k);
+      hn::Store(hn::DemoteTo(f, MovedAlong(2, x, y, z)), f, batch_.z + k);
       tally.kept += kept;
     }
     hn::Store(hn::DemoteTo(f, to_x), f, batch_.x + k);
@@ -75,12 +84,8 @@ class Cropper {
   }
 
   template <class V>
-  HWY_INLINE V Moved(int row, V x, V y, V z) const {
-    const DoubleTag d;
-    const double* r = parameters_.R + 3 * row;
-    const auto sum = hn::Add(hn::Add(hn::Mul(hn::Set(d, r[0]), x), hn::Mul(hn::Set(d, r[1]), y)),
-                             hn::Mul(hn::Set(d, r[2]), z));
-    return hn::Add(sum, hn::Set(d, parameters_.t[row]));
+  HWY_INLINE V MovedAlong(int row, V x, V y, V z) const {
+    return Moved(parameters_.R + 3 * row, parameters_.t[row], x, y, z);
   }
 
   const CropKernelParameters parameters_;
@@ -138,10 +143,9 @@ CropTally CropXyzw(const CropKernelParameters& parameters, const float* points, 
                                : CropXyzwAs<false>(parameters, points, count, batch);
 }
 
-CropTally CropXyzwTile(const CropKernelParameters& parameters, const float* points,
-                       std::size_t stride, CropBatch* batch) {
+HWY_INLINE void LoadXyzwTile(const float* points, std::size_t stride, float* x, float* y,
+                             float* z) {
   const hn::CappedTag<float, kTileSide> d;
-  alignas(64) float x[kTileSide * kTileSide], y[kTileSide * kTileSide], z[kTileSide * kTileSide];
   for (std::size_t row = 0; row < kTileSide; ++row, points += stride) {
     for (std::size_t k = 0; k < kTileSide; k += hn::Lanes(d)) {
       hn::Vec<decltype(d)> vx, vy, vz, unused;
@@ -151,7 +155,27 @@ CropTally CropXyzwTile(const CropKernelParameters& parameters, const float* poin
       hn::Store(vz, d, z + kTileSide * row + k);
     }
   }
+}
+
+CropTally CropXyzwTile(const CropKernelParameters& parameters, const float* points,
+                       std::size_t stride, CropBatch* batch) {
+  alignas(64) float x[kTileSide * kTileSide], y[kTileSide * kTileSide], z[kTileSide * kTileSide];
+  LoadXyzwTile(points, stride, x, y, z);
   return CropFloats(parameters, x, y, z, kTileSide * kTileSide, batch);
+}
+
+void MoveXyzwTile(const double* R, const double* t, const float* points, std::size_t stride,
+                  float* x, float* y, float* z) {
+  const DoubleTag d;
+  const FloatTag f;
+  LoadXyzwTile(points, stride, x, y, z);
+  for (std::size_t k = 0; k < kTileSide * kTileSide; k += hn::Lanes(d)) {
+    const auto from_x = LoadAsDouble(d, x + k), from_y = LoadAsDouble(d, y + k),
+               from_z = LoadAsDouble(d, z + k);
+    hn::Store(hn::DemoteTo(f, Moved(R, t[0], from_x, from_y, from_z)), f, x + k);
+    hn::Store(hn::DemoteTo(f, Moved(R + 3, t[1], from_x, from_y, from_z)), f, y + k);
+    hn::Store(hn::DemoteTo(f, Moved(R + 6, t[2], from_x, from_y, from_z)), f, z + k);
+  }
 }
 
 }  // namespace crop
@@ -160,6 +184,7 @@ using crop::CropDoubles;
 using crop::CropFloats;
 using crop::CropXyzw;
 using crop::CropXyzwTile;
+using crop::MoveXyzwTile;
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
@@ -172,6 +197,7 @@ HWY_EXPORT(CropFloats);
 HWY_EXPORT(CropDoubles);
 HWY_EXPORT(CropXyzw);
 HWY_EXPORT(CropXyzwTile);
+HWY_EXPORT(MoveXyzwTile);
 
 CropTally crop_floats(const CropKernelParameters& parameters, const float* x_S, const float* y_S,
                       const float* z_S, std::size_t count, CropBatch* batch) {
@@ -191,6 +217,11 @@ CropTally crop_xyzw(const CropKernelParameters& parameters, const float* points,
 CropTally crop_xyzw_tile(const CropKernelParameters& parameters, const float* points,
                          std::size_t stride, CropBatch* batch) {
   return HWY_DYNAMIC_DISPATCH(CropXyzwTile)(parameters, points, stride, batch);
+}
+
+void move_xyzw_tile(const double R[9], const double t[3], const float* points, std::size_t stride,
+                    float* x, float* y, float* z) {
+  HWY_DYNAMIC_DISPATCH(MoveXyzwTile)(R, t, points, stride, x, y, z);
 }
 
 }  // namespace ist

@@ -45,4 +45,13 @@ CropTally crop_xyzw(const CropKernelParameters& parameters, const float* points,
 CropTally crop_xyzw_tile(const CropKernelParameters& parameters, const float* points,
                          std::size_t stride, CropBatch* batch);
 
+/// Moves the points of a tile of kTileSide x kTileSide such points to O, in double: the same bits
+/// as crop_xyzw_tile(), which also decides about ranges.
+/// @param R       row-major
+/// @param t       [m]
+/// @param stride  [floats] from row to row
+/// @param x,y,z   [m] by slot, aligned to vectors; overwritten
+void move_xyzw_tile(const double R[9], const double t[3], const float* points, std::size_t stride,
+                    float* x, float* y, float* z);
+
 }  // namespace ist

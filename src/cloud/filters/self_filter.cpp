@@ -204,8 +204,7 @@ SelfFilter::Verdict SelfFilter::test_spheres(Effort effort, const Link& link,
 }
 
 bool SelfFilter::test_geometry(const Link& link, const Eigen::Vector3d& p_L) const {
-  const double max_distance = padding_ + kRounding;
-  if (distance_outside(*link.solid, p_L, max_distance).distance <= padding_) return true;
+  if (is_within_distance(*link.solid, p_L, padding_)) return true;
   // The point is farther from the surface than the padding: outside, which the tree may prove, or
   // deep inside.
   const double gap = link.tree->interior_gap();

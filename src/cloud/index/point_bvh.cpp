@@ -30,13 +30,14 @@ void PointBvh::set_thinning(double voxel_size) {
   thinned_.reset(nodes_.size(), tiles_.size());
 }
 
+// The one reader that claims the tile reads it in its place, where nobody looks before it is
+// published.
 const PointTile& PointBvh::load(std::size_t i, PointTile* scratch) const {
-  read_tile(cloud_, X_OS_, first_pixel_[i], scratch);
-  if (flags_.claim(i)) {
-    tiles_[i] = *scratch;
-    flags_.publish(i);
-  }
-  return *scratch;
+  const bool is_first = flags_.claim(i);
+  PointTile* const tile = is_first ? &tiles_[i] : scratch;
+  read_tile(cloud_, X_OS_, first_pixel_[i], tile);
+  if (is_first) flags_.publish(i);
+  return *tile;
 }
 
 }  // namespace ist

@@ -1,8 +1,6 @@
 #include "cloud/index/tile_reader.h"
 
 #include <algorithm>
-#include <cassert>
-#include <limits>
 
 #include "cloud/index/tile_split_kernel.h"
 
@@ -12,11 +10,7 @@ namespace {
 constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
 static_assert(kTileSide * kTileSide == kSlots, "a square of pixels fills a tile");
 
-void copy_all(const CropBatch& batch, std::size_t width, std::uint32_t first_pixel,
-              PointTile* tile) {
-  std::copy_n(batch.x, kSlots, tile->x);
-  std::copy_n(batch.y, kSlots, tile->y);
-  std::copy_n(batch.z, kSlots, tile->z);
+void number_pixels(std::size_t width, std::uint32_t first_pixel, PointTile* tile) {
   for (std::size_t k = 0; k < kSlots; ++k) {
     tile->id[k] = first_pixel + static_cast<std::uint32_t>(k / kTileSide * width + k % kTileSide);
   }
@@ -27,22 +21,18 @@ void copy_all(const CropBatch& batch, std::size_t width, std::uint32_t first_pix
 
 void read_tile(const RawCloud& cloud, const Eigen::Isometry3d& X_OS, std::uint32_t first_pixel,
                PointTile* tile) {
-  CropParameters crop;
-  crop.X_OS = X_OS;
-  crop.max_range_sq = std::numeric_limits<double>::max();
-  CropBatch batch;
-  IngestCounts unused;
-  const std::size_t kept =
-      crop_tile(cloud, first_pixel / cloud.width, first_pixel % cloud.width, crop, &batch, &unused);
-  assert(kept == kSlots);
-  static_cast<void>(kept);
-  copy_all(batch, cloud.width, first_pixel, tile);
+  move_tile(cloud, first_pixel / cloud.width, first_pixel % cloud.width, X_OS, tile->x, tile->y,
+            tile->z);
+  number_pixels(cloud.width, first_pixel, tile);
 }
 
 void copy_kept(const CropBatch& batch, std::size_t width, std::uint32_t first_pixel,
                PointTile* tile) {
   PointTile all;
-  copy_all(batch, width, first_pixel, &all);
+  std::copy_n(batch.x, kSlots, all.x);
+  std::copy_n(batch.y, kSlots, all.y);
+  std::copy_n(batch.z, kSlots, all.z);
+  number_pixels(width, first_pixel, &all);
   std::uint32_t kept = 0;
   for (std::size_t k = 0; k < kSlots; ++k) {
     kept |= static_cast<std::uint32_t>(batch.x[k] == batch.x[k]) << k;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "cloud/thinning/rival_kernel.h"
+#include "cloud/thinning/voxel_kernel.h"
 #include "internal/cloud/point_bvh.h"
 #include "internal/cloud/thinned_cloud.h"
 #include "internal/cloud/voxel_grid.h"
@@ -28,35 +29,27 @@ class NodeThinning {
   void run(std::int32_t node, ThinnedNode* thinned);
 
  private:
-  static constexpr std::size_t kMost = RivalSpheres::kMost;
-  static constexpr std::size_t kTableSize = 2 * kMost;
   static constexpr std::uint16_t kEmpty = 0xFFFF;
+  static_assert(VoxelCandidates::kMost < kEmpty && VoxelCandidates::kMost < kVoxelTableSize,
+                "a table that is never full holds the numbers of candidates");
 
-  struct Candidate {
-    std::int32_t voxel[3];  // numbers along each axis, from the origin, each as an integer
-    float number[3];        // the same as they are
-    float offset_sq;        // squared distance to the voxel's centre, in voxels
-    float x, y, z;          // [m] in O
-    std::uint32_t id;
-
-    bool is_better_than(const Candidate& other) const;
-  };
-
-  template <typename Visit>
-  void for_each_candidate(const PointTile& tile, const Visit& visit) const;
-  std::uint16_t* find(const Candidate& candidate);
+  std::uint16_t* find(const TileVoxels& voxels, std::size_t slot);
+  bool is_better(const PointTile& tile, const TileVoxels& voxels, std::size_t slot,
+                 std::size_t candidate) const;
+  void set(std::size_t candidate, const PointTile& tile, const TileVoxels& voxels,
+           std::size_t slot);
   void collect(const BoxNode& node);
-  void add(const Candidate& candidate);
+  void add(const PointTile& tile);
   void find_rivals(std::int32_t own_node);
-  void set_spheres();
-  void challenge(const Candidate& rival);
+  void challenge(const BoxNode& node, std::size_t child);
+  void challenge(const PointTile& tile);
   void write(ThinnedNode* thinned) const;
 
   const PointBvh& all_;
   const VoxelGrid& grid_;
-  std::array<std::uint16_t, kTableSize> table_;  // open addressing: number of a candidate
-  std::array<Candidate, kMost> candidates_;
-  std::size_t count_ = 0, undefeated_ = 0;
+  std::array<std::uint16_t, kVoxelTableSize> table_;  // open addressing: number of a candidate
+  VoxelCandidates candidates_;
+  std::size_t undefeated_ = 0;
   RivalSpheres spheres_;  // by candidate; those of the defeated are far away, of radius_sq -1
 };
 

@@ -6,8 +6,6 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include <limits>
-
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
@@ -46,30 +44,61 @@ HWY_INLINE hn::Vec<VoxelTag> VoxelsAlong(const VoxelGrid& grid, int axis, const 
   return hn::Mul(off, off);
 }
 
-// The points of one voxel.
-struct VoxelSlots {
-  std::uint32_t all, nearest;  // bit k: slot k; the nearest to the centre
+using Bits = hn::RebindToUnsigned<VoxelTag>;
+
+// The whole numbers of voxels k, k + 1, ... as integers. Equal numbers have equal ones.
+HWY_INLINE hn::Vec<Bits> Whole(const float* number) {
+  const auto whole = hn::ConvertTo(hn::RebindToSigned<VoxelTag>(), hn::Load(VoxelTag(), number));
+  return hn::BitCast(Bits(), whole);
+}
+
+// Finds the entries of voxels in a table.
+HWY_INLINE void HashVoxels(TileVoxels* voxels, std::size_t first) {
+  const Bits d;
+  // Odd numbers near 2^32 over the golden ratio, the plastic number and its square.
+  const auto x = hn::Mul(Whole(voxels->x + first), hn::Set(d, 0x9E3779B1U));
+  const auto y = hn::Mul(Whole(voxels->y + first), hn::Set(d, 0xC13FA9A9U));
+  const auto z = hn::Mul(Whole(voxels->z + first), hn::Set(d, 0x91E10DA5U));
+  const auto h = hn::Xor(hn::Xor(x, y), z);
+  const auto entry = hn::And(hn::Xor(h, hn::ShiftRight<15>(h)), hn::Set(d, kVoxelTableSize - 1));
+  hn::Store(entry, d, voxels->entry + first);
+}
+
+// Numbers of a tile's slots twice, so that each lane meets all others at some shift.
+struct alignas(64) Twice {
+  float lane[2 * kSlots];
+
+  HWY_INLINE void Set(std::size_t first, hn::Vec<VoxelTag> v) {
+    hn::Store(v, VoxelTag(), lane + first);
+    hn::Store(v, VoxelTag(), lane + kSlots + first);
+  }
+  HWY_INLINE hn::Vec<VoxelTag> At(std::size_t first) const {
+    return hn::LoadU(VoxelTag(), lane + first);
+  }
 };
 
-HWY_INLINE VoxelSlots VoxelOf(const TileVoxels& voxels, std::size_t k) {
+// Bit k: another point of the same voxel is nearer to its centre than that in slot k.
+HWY_INLINE std::uint32_t Beaten(const TileVoxels& voxels) {
   const VoxelTag d;
-  const auto x = hn::Set(d, voxels.x[k]), y = hn::Set(d, voxels.y[k]), z = hn::Set(d, voxels.z[k]);
-  const auto far = hn::Set(d, std::numeric_limits<float>::infinity());
-  auto least = far;
-  VoxelSlots voxel = {0, 0};
+  Twice x, y, z, offset_sq;
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
-    const auto same = hn::And(hn::And(hn::Eq(hn::Load(d, voxels.x + i), x),  //
-                                      hn::Eq(hn::Load(d, voxels.y + i), y)),
-                              hn::Eq(hn::Load(d, voxels.z + i), z));
-    voxel.all |= MaskBits(same) << i;
-    least = hn::Min(least, hn::IfThenElse(same, hn::Load(d, voxels.offset_sq + i), far));
+    x.Set(i, hn::Load(d, voxels.x + i));
+    y.Set(i, hn::Load(d, voxels.y + i));
+    z.Set(i, hn::Load(d, voxels.z + i));
+    offset_sq.Set(i, hn::Load(d, voxels.offset_sq + i));
   }
-  least = hn::MinOfLanes(d, least);
+  std::uint32_t all = 0;
   for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
-    voxel.nearest |= MaskBits(hn::Eq(hn::Load(d, voxels.offset_sq + i), least)) << i;
+    const auto own_x = x.At(i), own_y = y.At(i), own_z = z.At(i), own = offset_sq.At(i);
+    auto beaten = hn::Lt(own, own);
+    for (std::size_t k = i + 1; k < i + kSlots; ++k) {
+      const auto same =
+          hn::And(hn::And(hn::Eq(x.At(k), own_x), hn::Eq(y.At(k), own_y)), hn::Eq(z.At(k), own_z));
+      beaten = hn::Or(beaten, hn::And(same, hn::Lt(offset_sq.At(k), own)));
+    }
+    all |= MaskBits(beaten) << i;
   }
-  voxel.nearest &= voxel.all;
-  return voxel;
+  return all;
 }
 
 std::size_t FindVoxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels* voxels) {
@@ -79,16 +108,13 @@ std::size_t FindVoxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels*
     const auto y = VoxelsAlong(grid, 1, tile, i, voxels->y + i);
     const auto z = VoxelsAlong(grid, 2, tile, i, voxels->z + i);
     hn::Store(hn::Add(hn::Add(x, y), z), d, voxels->offset_sq + i);
+    HashVoxels(voxels, i);
   }
+  // Unused slots beat none: no offset is larger than theirs, that of a corner.
+  const std::uint32_t used = (1U << static_cast<std::uint32_t>(tile.count)) - 1U;
   std::size_t count = 0;
-  for (std::uint32_t remaining = (1U << static_cast<std::uint32_t>(tile.count)) - 1U;
-       remaining != 0;) {
-    const VoxelSlots voxel = VoxelOf(*voxels, hwy::Num0BitsBelowLS1Bit_Nonzero32(remaining));
-    for (std::uint32_t best = voxel.nearest; best != 0; best &= best - 1) {
-      const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(best);
-      voxels->nearest[count++] = static_cast<std::uint8_t>(k);
-    }
-    remaining &= ~voxel.all;
+  for (std::uint32_t best = used & ~Beaten(*voxels); best != 0; best &= best - 1) {
+    voxels->nearest[count++] = static_cast<std::uint8_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(best));
   }
   return count;
 }

@@ -44,7 +44,8 @@ class PointBvh {
   const PointTile& tile(std::size_t i, PointTile* scratch) const {
     return flags_.is_loaded(i) ? tiles_[i] : load(i, scratch);
   }
-  Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
+  bool is_loaded(std::size_t i) const { return flags_.is_loaded(i); }  ///< tile i holds its points
+  Eigen::AlignedBox3f bounds() const { return bounds_; }               ///< [m] in O
   /// [bytes] Reserved; pages of tiles that no query has looked at are not in use.
   std::size_t memory() const {
     return nodes_.capacity() * sizeof(BoxNode) + tiles_.capacity() * sizeof(PointTile) +

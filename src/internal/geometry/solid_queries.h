@@ -26,6 +26,11 @@ SignedDistance distance_outside(const Solid& solid, const Eigen::Vector3d& p_L, 
                                 const Eigen::Vector3d& outward_hint_L = Eigen::Vector3d::Zero(),
                                 double tolerance = 0.0, double* lower_bound = nullptr);
 
+/// Whether a point is no farther than `distance` [m] from an element's surface, or is in an element
+/// that is a primitive. As distance_outside() decides it, and found sooner: the first part of the
+/// surface that is as near ends the search.
+bool is_within_distance(const Solid& solid, const Eigen::Vector3d& p_L, double distance);
+
 /// Known bounds of where the surface is about a point, for solids that are one mesh.
 struct NearSurface {
   double within = std::numeric_limits<double>::infinity();  ///< [m] upper bound of the distance

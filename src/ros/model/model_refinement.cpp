@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ros/common/exceptions.h"
+#include "ros/common/memory.h"
 #include "ros/common/thread_name.h"
 #include "ros/common/thread_priority.h"
 #include "ros/model/model_loader.h"
@@ -53,9 +54,9 @@ void ModelLoader::run_refinement() {
   name_thread("ist packing");
   lower_thread_priority();
   while (!stop_) {
-    const std::string fault = exception_of([this] {
-      while (!stop_ && refine_once()) {
-      }
+    bool is_finer = false;
+    const std::string fault = exception_of([this, &is_finer] {
+      while (!stop_ && refine_once()) is_finer = true;
     });
     if (!fault.empty()) {
       ROS_ERROR_STREAM_THROTTLE(5.0, "a link is not packed more finely: " << fault);
@@ -63,6 +64,7 @@ void ModelLoader::run_refinement() {
     retired_.erase(std::remove_if(retired_.begin(), retired_.end(),
                                   [](const auto& state) { return state.use_count() == 1; }),
                    retired_.end());
+    if (is_finer) return_free_memory();  // packing needs some megabytes
     std::unique_lock<std::mutex> lock(mutex_);
     wake_.wait_for(lock, kPollNeed, [this] { return stop_.load(); });
   }
