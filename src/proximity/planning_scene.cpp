@@ -256,6 +256,7 @@ void read_attached(WireReader* in, SceneLayout layout, const WorldLimits& limits
 
 void read_matrix(WireReader* in, PlanningScene* scene) {
   const std::size_t names = in->count(4, "names of the allowed collision matrix");
+  scene->has_matrix = names > 0;
   std::string fault;
   if (names > kMaxMatrixNames) {
     fault = "it has " + std::to_string(names) + " names, and at most " +

@@ -55,6 +55,7 @@ struct AllowedCollisions {
 struct PlanningScene {
   bool is_diff = false;              ///< whether objects that it does not name stay
   std::vector<SceneObject> objects;  ///< in the order of the message
+  bool has_matrix = false;           ///< whether a matrix is stated, even if it is not used
   AllowedCollisions allowed;
   /// What the scene holds and nobody measures: an octomap, attached objects, a matrix that is too
   /// large or not square. Sentences.
