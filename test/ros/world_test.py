@@ -80,6 +80,7 @@ class WorldTest(unittest.TestCase):
                     "parts": {
                         "type": "world",
                         "topic": "parts",
+                        "objects": {"stop": {"shape": "sphere", "radius": 0.1, "position": [0, 0, -3]}},
                         "max_objects": 500,
                         "max_triangles": 3000,
                     },
@@ -165,6 +166,10 @@ class WorldTest(unittest.TestCase):
         self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
         self.send(box("wall", 0.0, operation=WorldObject.REMOVE))
         self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part, without the wall")
+        # The older description of one message ended the fault of the newer one.
+        self.send(box("wall", 1.0), broken)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "wall.stl")
+        self.send(box("wall", 0.0, operation=WorldObject.REMOVE))
         huge = box("huge", 1.0, edge=2e4)
         self.send(huge)
         self.node.wait_for_status(ProximityArray.NO_CLOUD, "'huge'")
@@ -199,7 +204,23 @@ class WorldTest(unittest.TestCase):
         distances = [pt.link(result, "ball_link").distance for result in answer.results]
         # Links on floating joints are placed by tf, as in the cycles.
         self.assertTrue(all(abs(d - 0.3) < 1e-6 for d in distances), distances)
-        self.assertTrue(math.isnan(answer.impact_times[0]), "objects count in no time of impact")
+        # The ball stands still, so that it never touches the table.
+        self.assertEqual(answer.impact_times[0], math.inf)
+        self.send(box("part", 0.0, 0.0))
+        self.ball(lambda l: l.state == LinkProximity.CONTACT, "contact")
+        answer = service(states=[JointState(), JointState()], times=[0.0, 1.0])
+        self.assertEqual(answer.impact_times[0], 0.0)
+        self.send(replace_all=True)
+        self.is_at_table()
+
+    def test_7_replacing_all_leaves_configured_objects(self):
+        """One that the topic had sent anew vanished, and nobody would have sent it again."""
+        self.send(box("stop", 0.0, 0.3), box("part", 0.0, 0.25))
+        self.ball(lambda l: abs(l.distance - 0.05) < 1e-6, "the part")
+        self.send(replace_all=True)
+        self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the stop")
+        self.send(box("stop", 3.0, operation=WorldObject.MOVE))
+        self.is_at_table()
 
 
 class OtherRobotTest(unittest.TestCase):

@@ -10,7 +10,7 @@ SourceState::SourceState(const SourceConfig& config, const std::string& topic)
   report_.is_file =
       config.type == SourceType::kWorld ? !config.world.has_topic : !config.file.empty();
   report_.topic = topic;
-  report_.type = message_type(config.type);
+  report_.type = message_type(config);
   report_.noun = noun(config.type);
   report_.timeout = config.timeout;
   report_.timeout_parameter = config.timeout_parameter;

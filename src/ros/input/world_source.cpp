@@ -21,19 +21,12 @@
 namespace ist {
 namespace {
 
+using Kind = WorldFaultKind;
+
 const ros::WallDuration kPoll(0.02);
 // Messages change the world, so none may be lost.
 constexpr std::uint32_t kQueueSize = 1000;
 constexpr std::chrono::milliseconds kRobotPeriod(500);
-// Keys of faults that are not one object's. That of the last message lasts until the next one;
-// those of the configured objects and of the other robot stay, because what is missing is never
-// sent again.
-constexpr const char* kConfigured = "(configured)";
-constexpr const char* kMessage = "(message)";
-constexpr const char* kRobot = "(other robot)";
-constexpr const char* kWork = "(work)";  // of the thread, until it succeeds
-constexpr const char* kMany = "(many)";  // more faults than are kept, until all are replaced
-
 std::string frame_or_fixed(const std::string& frame) {
   const std::string name = without_slash(frame);
   return name.empty() ? kFixedFrame : name;
@@ -52,7 +45,8 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
       buffer_(buffer),
       state_(config, place_of(config, nh)),
       builder_(config.world.limits),
-      topic_advice_(nh.resolveName(config.topic), message_type(config.type), "") {
+      has_full_scene_(config.world.starts_empty),
+      topic_advice_(nh.resolveName(config.topic), message_type(config), "") {
   if (!config.world.robot.description.empty()) {
     robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
     is_robot_read_ = false;
@@ -61,10 +55,7 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
   }
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
   nh.setCallbackQueue(&queue_);
-  if (config.world.has_topic) {
-    subscriber_ = nh.subscribe(config.topic, kQueueSize, &WorldSource::receive, this,
-                               ros::TransportHints().tcpNoDelay());
-  }
+  if (config.world.has_topic) subscribe(&nh);
   thread_ = std::thread(&WorldSource::run, this);
 }
 
@@ -72,6 +63,21 @@ WorldSource::~WorldSource() {
   running_ = false;
   thread_.join();
   subscriber_.shutdown();
+}
+
+void WorldSource::subscribe(ros::NodeHandle* nh) {
+  const ros::TransportHints hints = ros::TransportHints().tcpNoDelay();
+  if (!config_.world.is_planning_scene) {
+    subscriber_ = nh->subscribe(config_.topic, kQueueSize, &WorldSource::receive, this, hints);
+    return;
+  }
+  ros::SubscribeOptions options;
+  options.init<topic_tools::ShapeShifter>(
+      config_.topic, kQueueSize,
+      [this](const topic_tools::ShapeShifter::ConstPtr& message) { receive_scene(message); });
+  options.datatype = kPlanningSceneType;  // of any md5sum
+  options.transport_hints = hints;
+  subscriber_ = nh->subscribe(options);
 }
 
 void WorldSource::set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
@@ -125,38 +131,39 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
 
 void WorldSource::run() {
   name_thread("ist " + config_.name);
-  guard(kConfigured, [this] { read_configured(); });
+  guard(Kind::kConfigured, [this] { read_configured(); });
   is_changed_ = true;
   while (running_) {
-    guard(kMessage, [this] { queue_.callAvailable(kPoll); });
-    guard(kWork, [this] {
+    guard(Kind::kMessage, [this] { queue_.callAvailable(kPoll); });
+    guard(Kind::kWork, [this] {
       if (!is_robot_read_) read_robot();
       count_publishers();
       take_target();
       if (is_changed_ && target_.model) publish();
-      if (faults_.erase(kWork) > 0) show_faults();
+      if (faults_.erase(fault_of(Kind::kWork)) > 0) show_faults();
     });
   }
 }
 
-void WorldSource::guard(const char* what, const std::function<void()>& function) {
+void WorldSource::guard(WorldFaultKind what, const std::function<void()>& function) {
   const std::string fault = exception_of(function);
   if (fault.empty()) return;
-  if (faults_.count(what) == 0) note_fault(what, "its objects could not be used: " + fault);
+  if (faults_.count(fault_of(what)) == 0)
+    note_fault(fault_of(what), "its objects could not be used: " + fault);
   show_faults();
 }
 
-void WorldSource::note_fault(const std::string& object, const std::string& fault) {
+void WorldSource::note_fault(const WorldFaultKey& key, const std::string& fault) {
   ROS_ERROR_STREAM("source '" << config_.name << "': " << fault);
   // Names that are never sent again would fill the memory.
-  if (faults_.size() >= config_.world.limits.max_objects && faults_.count(object) == 0 &&
-      object != kMessage) {
-    faults_[kMany] = "more objects than max_objects, which is " +
-                     std::to_string(config_.world.limits.max_objects) +
-                     ", could not be used; replace all of them";
+  const bool is_named = key.first == Kind::kObject || key.first == Kind::kClash;
+  if (is_named && faults_.size() >= config_.world.limits.max_objects && faults_.count(key) == 0) {
+    faults_[fault_of(Kind::kMany)] = "more objects than max_objects, which is " +
+                                     std::to_string(config_.world.limits.max_objects) +
+                                     ", could not be used; replace all of them";
     return;
   }
-  faults_[object] = fault;
+  faults_[key] = fault;
 }
 
 /// The source is not OK while an object is missing.
@@ -180,13 +187,19 @@ void WorldSource::read_robot() {
   std::vector<WorldFault> faults;
   const std::string problem = robot_->read(&links, &faults);
   if (!problem.empty()) {
-    if (faults_[kRobot] != problem) note_fault(kRobot, problem);
+    if (faults_[fault_of(Kind::kRobot)] != problem) note_fault(fault_of(Kind::kRobot), problem);
     return show_faults();
   }
-  faults_.erase(kRobot);
-  for (WorldObject& link : links) link.margin = config_.world.margin;
-  add(kRobot, links);
-  for (const WorldFault& fault : faults) note_fault(fault.object, fault.text);
+  faults_.erase(fault_of(Kind::kRobot));
+  for (WorldObject& link : links) {
+    link.margin = config_.world.margin;
+    configured_.insert(link.name);
+  }
+  add(Kind::kRobot, links);
+  for (const WorldFault& fault : faults) {
+    note_fault(object_fault(fault.object), fault.text);
+    configured_.insert(fault.object);
+  }
   show_faults();
   is_robot_read_ = true;
   ROS_INFO_STREAM("source '" << config_.name << "': another robot of " << links.size()
@@ -208,10 +221,15 @@ void WorldSource::count_publishers() {
 void WorldSource::receive(const ist_proximity::WorldObjects& message) {
   has_received_ = true;
   state_.begin_work();
-  guard(kMessage, [&] { apply(message); });
+  guard(Kind::kMessage, [&] { apply(message); });
   state_.end_work();
+  note_receipt(message.header.stamp);
+}
+
+/// @param stamp  of the message; zero: it states none
+void WorldSource::note_receipt(const ros::Time& stamp) {
   const ros::Time now = ros::Time::now();
-  stamp_ = message.header.stamp.isZero() ? now : std::min(message.header.stamp, now);
+  stamp_ = stamp.isZero() ? now : std::min(stamp, now);
   state_.update([&](SourceReport* report) {
     ++report->messages;
     report->newest = stamp_.toSec();
@@ -221,28 +239,35 @@ void WorldSource::receive(const ist_proximity::WorldObjects& message) {
 void WorldSource::apply(const ist_proximity::WorldObjects& message) {
   const std::size_t limit = config_.world.limits.max_objects;
   if (message.objects.size() > limit) {
-    note_fault(kMessage, "a message holds " + std::to_string(message.objects.size()) +
-                             " objects; allowed are " + std::to_string(limit) + " (~sources/" +
-                             config_.name + "/max_objects): it is not used");
+    note_fault(fault_of(Kind::kMessage),
+               "a message holds " + std::to_string(message.objects.size()) +
+                   " objects; allowed are " + std::to_string(limit) + " (~sources/" + config_.name +
+                   "/max_objects): it is not used");
     return show_faults();
   }
-  faults_.erase(kMessage);
+  faults_.erase(fault_of(Kind::kMessage));
   if (!message.replace_all) return change_all(message);
+  replace_from_topic([&] { change_all(message); });
+}
+
+/// Removes the objects of the topic and adds others. Where these exceed a limit, all stays as it
+/// was.
+void WorldSource::replace_from_topic(const std::function<void()>& change) {
   WorldBuilder builder = builder_;
   std::set<std::string> from_topic = from_topic_;
-  std::map<std::string, std::string> faults = faults_;
+  WorldFaults faults = faults_;
   for (const std::string& name : from_topic_) {
     builder_.remove(name);
-    faults_.erase(name);
+    faults_.erase(object_fault(name));
   }
   from_topic_.clear();
-  faults_.erase(kMany);
+  faults_.erase(fault_of(Kind::kMany));
   is_changed_ = true;
-  change_all(message);
-  const auto refused = faults_.find(kMessage);
+  change();
+  const auto refused = faults_.find(fault_of(Kind::kMessage));
   if (refused == faults_.end()) return;
   // A limit is exceeded: the objects of before stay.
-  faults[kMessage] = refused->second;
+  faults[fault_of(Kind::kMessage)] = refused->second;
   builder_ = std::move(builder);
   from_topic_ = std::move(from_topic);
   faults_ = std::move(faults);
@@ -256,10 +281,12 @@ void WorldSource::change_all(const ist_proximity::WorldObjects& message) {
     try {
       change(object, &added);
     } catch (const ModelError& error) {
-      note_fault(object.id, "object '" + name + "': " + error.what());
+      // An older description that the message holds must not end the fault of this one.
+      add(Kind::kMessage, std::exchange(added, {}));
+      note_fault(object_fault(object.id), "object '" + name + "': " + error.what());
     }
   }
-  add(kMessage, added);
+  add(Kind::kMessage, added);
 }
 
 /// Applies what a message says of one object; objects to add are collected, because many are built
@@ -268,62 +295,76 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
                          std::vector<WorldObject>* added) {
   using Message = ist_proximity::WorldObject;
   if (message.operation == Message::ADD) {
-    // Names of objects that were never built are limited, too.
-    const std::size_t most = 2 * config_.world.limits.max_objects;
-    if (from_topic_.size() < most) from_topic_.insert(message.id);
+    remember_from_topic(message.id);
     added->push_back(to_world_object(message, config_.world, [this] { return !running_.load(); }));
     return;
   }
   if (!added->empty()) {  // in the order of the message
-    add(kMessage, *added);
+    add(Kind::kMessage, *added);
     added->clear();
   }
   is_changed_ = true;
   if (message.operation == Message::REMOVE) {
     builder_.remove(message.id);
     from_topic_.erase(message.id);
-    faults_.erase(message.id);
+    faults_.erase(object_fault(message.id));
   } else if (message.operation == Message::MOVE) {
-    const std::string& frame =
-        message.header.frame_id.empty() ? config_.world.frame_id : message.header.frame_id;
     const std::string fault =
-        builder_.move(message.id, frame_or_fixed(frame), to_object_pose(message.pose));
+        builder_.move(message.id, frame_of(message.header.frame_id), to_object_pose(message.pose));
     if (!fault.empty()) throw ModelError(fault);
-    faults_.erase(message.id);
+    faults_.erase(object_fault(message.id));
   } else {
     throw ModelError("operation is " + std::to_string(message.operation) +
                      "; allowed is 0 (ADD), 1 (REMOVE), 2 (MOVE)");
   }
 }
 
-/// Adds the links that ~allowed_contacts names.
-void WorldSource::allow_contacts(WorldObject* object) const {
+/// Notes that an object is removed when those of the topic are replaced. One that parameters, the
+/// file or the other robot state as well stays, because nobody would send it again.
+void WorldSource::remember_from_topic(const std::string& name) {
+  // Names of objects that were never built are limited, too.
+  const std::size_t most = 2 * config_.world.limits.max_objects;
+  if (configured_.count(name) == 0 && from_topic_.size() < most) from_topic_.insert(name);
+}
+
+/// @param stated  by a message; may be empty
+std::string WorldSource::frame_of(const std::string& stated) const {
+  return frame_or_fixed(stated.empty() ? config_.world.frame_id : stated);
+}
+
+/// The links that ~allowed_contacts names for an object.
+std::vector<std::string> WorldSource::configured_contacts(const std::string& object) const {
+  std::vector<std::string> links;
   for (const auto& [link, name] : config_.world.allowed_contacts) {
-    if (name == object->name) object->allowed_links.push_back(link);
+    if (name == object) links.push_back(link);
   }
+  return links;
 }
 
 /// @param what  the key of a fault of all of them
-void WorldSource::add(const char* what, const std::vector<WorldObject>& objects) {
+void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objects) {
   std::vector<WorldObject> complete;
   std::set<std::string> names;
   for (const WorldObject& object : objects) {
     const bool is_twice = builder_.contains(object.name) || !names.insert(object.name).second;
-    if (what != kMessage && is_twice) {
-      note_fault(object.name, "object '" + printable(object.name) +
-                                  "' is stated twice, by parameters, the file or the other robot; "
-                                  "names must be unique in a source");
+    if (what != Kind::kMessage && is_twice) {
+      note_fault(object_fault(object.name),
+                 "object '" + printable(object.name) +
+                     "' is stated twice, by parameters, the file or the other robot; "
+                     "names must be unique in a source");
       continue;
     }
     complete.push_back(object);
     complete.back().frame = frame_or_fixed(object.frame);
-    faults_.erase(object.name);
-    allow_contacts(&complete.back());
+    faults_.erase(object_fault(object.name));
+    const std::vector<std::string> links = configured_contacts(object.name);
+    std::vector<std::string>& allowed = complete.back().allowed_links;
+    allowed.insert(allowed.end(), links.begin(), links.end());
   }
   const std::vector<WorldFault> faults =
       builder_.add(complete, [this] { return !running_.load(); });
   for (const WorldFault& fault : faults) {
-    note_fault(fault.object.empty() ? what : fault.object, fault.text);
+    note_fault(fault.object.empty() ? fault_of(what) : object_fault(fault.object), fault.text);
   }
   is_changed_ = true;
   show_faults();
@@ -345,12 +386,12 @@ void WorldSource::read_configured() {
       }
       objects.push_back(std::move(object));
     } catch (const ModelError& error) {
-      note_fault(object.name, "object '" + object.name + "': " + error.what());
+      note_fault(object_fault(object.name), "object '" + object.name + "': " + error.what());
     }
   }
   if (!config_.file.empty()) {
     SceneFile scene = read_scene_file(config_.file, frame_or_fixed(world.frame_id), world.limits);
-    if (!scene.fault.empty()) note_fault(kConfigured, scene.fault);
+    if (!scene.fault.empty()) note_fault(fault_of(Kind::kConfigured), scene.fault);
     for (WorldObject& object : scene.objects) {
       object.margin = world.margin;
       objects.push_back(std::move(object));
@@ -365,8 +406,10 @@ void WorldSource::read_configured() {
                                  << "', which is no object");
     }
   }
+  for (const WorldObjectConfig& config : world.objects) configured_.insert(config.object.name);
+  for (const WorldObject& object : objects) configured_.insert(object.name);
   stamp_ = ros::Time::now();
-  add(kConfigured, objects);
+  add(Kind::kConfigured, objects);
   ROS_INFO_STREAM("source '" << config_.name << "': a known world of " << builder_.size()
                              << " objects");
 }

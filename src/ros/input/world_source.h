@@ -5,17 +5,18 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/subscriber.h>
+#include <topic_tools/shape_shifter.h>
 
 #include <atomic>
 #include <chrono>
 #include <functional>
-#include <map>
 #include <memory>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "internal/proximity/planning_scene.h"
 #include "ist_proximity/proximity/known_world.h"
 #include "ros/common/publisher_count.h"
 #include "ros/input/obstacle_source.h"
@@ -23,6 +24,7 @@
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
 #include "ros/input/topic_advice.h"
+#include "ros/input/world_faults.h"
 #include "ros/parameters/source_config.h"
 #include "ros/poses/transform_buffer.h"
 
@@ -31,9 +33,9 @@ namespace ist {
 /// The frame of objects that stand still in the fixed frame, whatever that is.
 constexpr const char* kFixedFrame = "(fixed frame)";
 
-/// A known world: objects from parameters, from a MoveIt scene file and from a topic, and the links
-/// of another robot. A thread of its own reads meshes and builds hierarchies, so that no query
-/// waits for them.
+/// A known world: objects from parameters, from a MoveIt scene file and from a topic (WorldObjects
+/// or moveit_msgs/PlanningScene), and the links of another robot. A thread of its own reads meshes
+/// and builds hierarchies, so that no query waits for them.
 ///
 /// Objects are placed when a query asks for them, at the poses of their frames at that time. Where
 /// one of these is not known, or an object cannot be used, the source is not OK and says so.
@@ -58,18 +60,31 @@ class WorldSource : public ObstacleSource {
 
  private:
   void run();
-  void guard(const char* what, const std::function<void()>& function);
+  void guard(WorldFaultKind what, const std::function<void()>& function);
   void read_configured();
   void read_robot();
+  void subscribe(ros::NodeHandle* nh);
+  void note_receipt(const ros::Time& stamp);
+  void replace_from_topic(const std::function<void()>& change);
   void receive(const ist_proximity::WorldObjects& message);
   void apply(const ist_proximity::WorldObjects& message);
   void change_all(const ist_proximity::WorldObjects& message);
   void change(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
+  void receive_scene(const topic_tools::ShapeShifter::ConstPtr& message);
+  void apply_scene(const topic_tools::ShapeShifter& message);
+  void change_all(const PlanningScene& scene);
+  void change(const SceneObject& object, std::vector<WorldObject>* added);
+  void append(const SceneObject& object, std::vector<WorldObject>* added);
+  void move(const SceneObject& object);
+  void remove_from_scene(const std::string& name);
+  void allow_collisions(const PlanningScene& scene);
+  void remember_from_topic(const std::string& name);
+  std::string frame_of(const std::string& stated) const;
   void count_publishers();
-  void add(const char* what, const std::vector<WorldObject>& objects);
-  void note_fault(const std::string& object, const std::string& fault);
+  void add(WorldFaultKind what, const std::vector<WorldObject>& objects);
+  void note_fault(const WorldFaultKey& key, const std::string& fault);
   void show_faults();
-  void allow_contacts(WorldObject* object) const;
+  std::vector<std::string> configured_contacts(const std::string& object) const;
   void take_target();
   void publish();
   void publish_markers();
@@ -90,12 +105,15 @@ class WorldSource : public ObstacleSource {
 
   // Used by the source's thread alone.
   WorldBuilder builder_;
-  std::map<std::string, std::string> faults_;  ///< by object
+  WorldFaults faults_;
   SourceTarget target_;
   std::shared_ptr<const RobotSurfaces> surfaces_;  ///< of target_.model
   bool is_robot_read_ = true, is_changed_ = false, has_received_ = false;
   std::chrono::steady_clock::time_point next_reading_;  ///< of the other robot's description
   std::set<std::string> from_topic_;                    ///< names of objects
+  std::set<std::string> configured_;  ///< names of parameters, the file and the other robot
+  AllowedCollisions allowed_;         ///< of planning scenes
+  bool has_full_scene_ = false;       ///< whether differences have something that they change
   PublisherCount publisher_count_;
   TopicAdvice topic_advice_;
   ros::Time stamp_;

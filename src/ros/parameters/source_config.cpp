@@ -20,6 +20,10 @@ const char* message_type(SourceType type) {
   return "sensor_msgs/PointCloud2";
 }
 
+const char* message_type(const SourceConfig& config) {
+  return config.world.is_planning_scene ? kPlanningSceneType : message_type(config.type);
+}
+
 const char* noun(SourceType type) {
   switch (type) {
     case SourceType::kDepthImage:

@@ -16,6 +16,9 @@ enum class SourceType { kCloud, kDepthImage, kScan, kMap, kWorld };
 /// The ROS message type of a source, as rostopic writes it; of a known world its type in ~sources
 /// is kWorldType.
 const char* message_type(SourceType type);
+/// The same for what comes on the topic of a source.
+struct SourceConfig;
+const char* message_type(const SourceConfig& config);
 /// The word for one message of a source: "cloud", "image", "scan", "map" or "world".
 const char* noun(SourceType type);
 

@@ -14,6 +14,9 @@ namespace ist {
 /// The value of ~sources/NAME/type for a known world.
 constexpr const char* kWorldType = "world";
 
+/// The other message type that a known world may have.
+constexpr const char* kPlanningSceneType = "moveit_msgs/PlanningScene";
+
 /// An object of ~sources/NAME/objects.
 struct WorldObjectConfig {
   WorldObject object;  ///< without geometry where `mesh` is set
@@ -33,7 +36,12 @@ struct WorldConfig {
   std::string frame_id;  ///< of objects that state none; empty: the fixed frame
   std::vector<WorldObjectConfig> objects;
   OtherRobotConfig robot;
-  bool has_topic = false;  ///< whether its topic is subscribed to
+  bool has_topic = false;          ///< whether its topic is subscribed to
+  bool is_planning_scene = false;  ///< whether that is a moveit_msgs/PlanningScene
+  /// Whether planning scenes that are differences begin with an empty world.
+  bool starts_empty = false;
+  /// Whether pairs of the allowed collision matrix of planning scenes may touch.
+  bool use_allowed_collisions = true;
   WorldLimits limits;
   double margin = 0.0;                         ///< [m] of objects that state none
   std::map<std::string, double> link_margins;  ///< [m] by name of a link

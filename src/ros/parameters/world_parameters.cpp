@@ -128,6 +128,33 @@ void read_robot(ParameterReader* reader, const std::string& prefix, OtherRobotCo
   }
 }
 
+// Changes of the world come on one topic, of the one type or of the other.
+void read_topic(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+  WorldConfig& world = source->world;
+  world.has_topic = reader->has(prefix + "topic");
+  world.is_planning_scene = reader->has(prefix + "planning_scene");
+  source->timeout = kInf;  // objects are sent when they change
+  if (world.is_planning_scene) {
+    if (world.has_topic) {
+      reader->add_error("~" + prefix + "topic and ~" + prefix +
+                        "planning_scene are both set: a source has one of them; give the other one "
+                        "a source of its own");
+    }
+    world.has_topic = true;
+    reader->read(prefix + "planning_scene", &source->topic);
+    if (source->topic.empty()) {
+      reader->add_error("~" + prefix +
+                        "planning_scene is empty: the name of a topic is needed, for example "
+                        "/move_group/monitored_planning_scene");
+    }
+    reader->read(prefix + "starts_empty", &world.starts_empty);
+    reader->read(prefix + "use_allowed_collisions", &world.use_allowed_collisions);
+  }
+  if (world.has_topic) {
+    reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
+  }
+}
+
 }  // namespace
 
 void read_world(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
@@ -153,14 +180,12 @@ void read_world(ParameterReader* reader, const std::string& prefix, SourceConfig
                         "\": an absolute path is needed, for example /home/robot/cell.scene");
     }
   }
-  world.has_topic = reader->has(prefix + "topic");
-  source->timeout = kInf;  // objects are sent when they change
-  if (world.has_topic)
-    reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
+  read_topic(reader, prefix, source);
   if (!world.has_topic && source->file.empty() && !reader->has(prefix + "objects") &&
       world.robot.description.empty()) {
-    reader->add_error("~" + prefix +
-                      "type is world: at least one of objects, file, topic or robot is needed");
+    reader->add_error(
+        "~" + prefix +
+        "type is world: at least one of objects, file, topic, planning_scene or robot is needed");
   }
 }
 

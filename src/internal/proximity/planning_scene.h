@@ -1,0 +1,89 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/geometry/shapes.h"
+#include "ist_proximity/geometry/span.h"
+#include "ist_proximity/proximity/known_world.h"
+
+/// moveit_msgs/PlanningScene, read from its bytes, so that the package of that message is not
+/// needed.
+namespace ist {
+
+/// The layouts of moveit_msgs/CollisionObject that publishers have.
+enum class SceneLayout {
+  kShapePoses,  ///< to moveit_msgs 0.10 (Indigo to Melodic): shapes have poses, objects have none
+  kObjectPose   ///< from moveit_msgs 0.11 (Noetic): shapes stand in an object's pose; subframes
+};
+
+/// The layout of a message whose definition has this md5sum; none: it is not known.
+std::optional<SceneLayout> scene_layout(const std::string& md5sum);
+
+/// A moveit_msgs/CollisionObject.
+struct SceneObject {
+  /// What is to be done with the object of this name, with the message's numbers.
+  enum class Operation : std::uint8_t { kAdd, kRemove, kAppend, kMove };
+
+  SceneLayout layout = SceneLayout::kObjectPose;
+  std::string id;
+  std::string frame;  ///< of the header; may be empty
+  Operation operation = Operation::kAdd;
+  bool has_pose = false;  ///< whether the pose is stated: not the identity, and not 0
+  Eigen::Isometry3d X_BP = Eigen::Isometry3d::Identity();  ///< the object's pose P -> frame B
+  LinkGeometry geometry;                                   ///< its shapes, in P
+  std::vector<Eigen::Isometry3d> X_PS;  ///< poses of shapes; of kMove there may be poses alone
+  std::string fault;                    ///< why it cannot be used; empty: it can
+};
+
+/// A moveit_msgs/AllowedCollisionMatrix.
+struct AllowedCollisions {
+  std::vector<std::string> names;             ///< of links and objects; empty: not stated
+  std::vector<std::vector<bool>> is_allowed;  ///< by two indices of names
+
+  /// Names that may touch `name`, other than those of which `is_left_out` is true.
+  std::vector<std::string> allowed_with(
+      const std::string& name, const std::function<bool(const std::string&)>& is_left_out) const;
+};
+
+/// What is read of a moveit_msgs/PlanningScene.
+struct PlanningScene {
+  bool is_diff = false;              ///< whether objects that it does not name stay
+  std::vector<SceneObject> objects;  ///< in the order of the message
+  bool has_matrix = false;           ///< whether a matrix is stated, even if it is not used
+  AllowedCollisions allowed;
+  /// What the scene holds and nobody measures: an octomap, attached objects, a matrix that is too
+  /// large or not square. Sentences.
+  std::vector<std::string> notes;
+  std::string fault;  ///< why nothing of it can be used; empty: it can
+};
+
+/// Reads a message.
+/// @param limits  more objects, shapes or triangles are a fault, found before memory is taken for
+///                them. What is kept takes at most 200 bytes for each byte of the message
+PlanningScene read_planning_scene(Span<const std::uint8_t> bytes, SceneLayout layout,
+                                  const WorldLimits& limits = {});
+
+/// The object that kAdd, or kAppend to none, adds. Where one shape alone has a pose, it becomes the
+/// object's, as MoveIt does it, so that the object can be moved.
+/// @param default_frame  where the message names none
+WorldObject to_world_object(const SceneObject& object, const std::string& default_frame);
+
+/// Adds the shapes of kAppend to an object, if they stand in the same frame at the same pose.
+/// @returns empty, or why they cannot be added
+std::string append_shapes(const SceneObject& object, const std::string& default_frame,
+                          WorldObject* known);
+
+/// Finds the pose that kMove gives to an object. Where it states poses of shapes, these must be
+/// those of the object moved as a whole.
+/// @param X_BO  set unless there is a fault
+/// @returns empty, or why it cannot be moved
+std::string moved_pose(const SceneObject& object, const WorldObject& known,
+                       Eigen::Isometry3d* X_BO);
+
+}  // namespace ist

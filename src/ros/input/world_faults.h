@@ -1,0 +1,33 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+
+namespace ist {
+
+/// What a fault of a known world is about. The first ones are shown first.
+enum class WorldFaultKind {
+  kScene,       ///< no full planning scene has come: until one comes
+  kConfigured,  ///< parameters and the file: for good, because they are never sent again
+  kMessage,     ///< the last message: until the next one
+  kRobot,       ///< the other robot: until it is read
+  kWork,        ///< the source's thread: until it succeeds
+  kMany,        ///< more faults than are kept: until all objects are replaced
+  kClash,       ///< a scene's object with the name of a configured one
+  kObject       ///< an object
+};
+
+/// A kind of fault and, of kClash and kObject, the object's name. Names come from outside, so they
+/// are no keys by themselves.
+using WorldFaultKey = std::pair<WorldFaultKind, std::string>;
+
+/// What cannot be used of a known world. It is not OK until there is none.
+using WorldFaults = std::map<WorldFaultKey, std::string>;
+
+inline WorldFaultKey object_fault(const std::string& name) {
+  return {WorldFaultKind::kObject, name};
+}
+inline WorldFaultKey fault_of(WorldFaultKind kind) { return {kind, ""}; }
+
+}  // namespace ist

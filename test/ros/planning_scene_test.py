@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+"""moveit_msgs/PlanningScene as a known world: of Noetic and of Melodic, as genpy writes them."""
+
+import math
+import sys
+import unittest
+
+import proximity_testing as pt
+import rospy
+from geometry_msgs.msg import Pose
+from planning_scene_messages import planning_scene_types
+from proximity_testing import LinkProximity, ProximityArray
+
+ADD, REMOVE, APPEND, MOVE = range(4)
+
+
+def pose(x=0.0, y=0.0, z=0.0):
+    result = Pose()
+    result.position.x, result.position.y, result.position.z = x, y, z
+    result.orientation.w = 1.0
+    return result
+
+
+class Publisher:
+    """Planning scenes of one layout."""
+
+    def __init__(self, topic, is_noetic):
+        types = planning_scene_types(is_noetic)
+        self.Scene = types["moveit_msgs/PlanningScene"]
+        self.Object = types["moveit_msgs/CollisionObject"]
+        self.Primitive = types["shape_msgs/SolidPrimitive"]
+        self.Entry = types["moveit_msgs/AllowedCollisionEntry"]
+        self.Attached = types["moveit_msgs/AttachedCollisionObject"]
+        self.publisher = rospy.Publisher(topic, self.Scene, queue_size=10, latch=True)
+
+    def box(self, name, at=None, operation=ADD, edge=0.2, frame="base"):
+        """A box whose pose is that of its shape."""
+        one = self.Object(id=name, operation=operation)
+        one.header.frame_id = frame
+        if at is not None and operation != REMOVE:
+            one.primitive_poses = [pose(*at)]
+            if operation != MOVE:
+                one.primitives = [self.Primitive(type=1, dimensions=[edge] * 3)]
+        return one
+
+    def send(self, *objects, is_diff=True, allowed=None, octomap=b"", attached=()):
+        scene = self.Scene(is_diff=is_diff, name="scene")
+        scene.world.collision_objects = list(objects)
+        scene.world.octomap.octomap.data = list(octomap)
+        scene.robot_state.attached_collision_objects = [
+            self.Attached(link_name="hand", object=self.box(name, (0, 0, 0))) for name in attached
+        ]
+        if allowed is not None:
+            matrix = scene.allowed_collision_matrix
+            matrix.entry_names = list(allowed)
+            count = len(matrix.entry_names)
+            matrix.entry_values = [self.Entry(enabled=[True] * count) for _ in range(count)]
+        self.publisher.publish(scene)
+
+
+class PlanningSceneTest(unittest.TestCase):
+    """One node with a source of each layout; the ball of radius 0.1 m is at the origin."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.world = pt.World("/scenes").stand(box=pt.transform((0, 0, 2)))
+        cls.world.start_tf()
+        cls.noetic = Publisher("/scenes/monitored_planning_scene", True)
+        cls.melodic = Publisher("/scenes/old_planning_scene", False)
+        cls.noetic.send(is_diff=False)
+        cls.melodic.send()
+        post = {"shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.5, 0, 0]}
+        cls.node = pt.ProximityNode(
+            "/scenes",
+            {
+                "sources": {
+                    "noetic": {
+                        "type": "world",
+                        "planning_scene": "monitored_planning_scene",
+                        "objects": {"post": post},
+                        "max_objects": 100,
+                    },
+                    "melodic": {
+                        "type": "world",
+                        "planning_scene": "old_planning_scene",
+                        "starts_empty": True,
+                    },
+                },
+                "links": ["ball_link"],
+            },
+            pt.urdf(),
+        )
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.node.stop()
+        cls.world.stop()
+
+    def distance(self, expected, what, source=None):
+        message = self.node.wait_for(
+            lambda m: m.status == ProximityArray.OK
+            and abs(pt.link(m, "ball_link").distance - expected) < 1e-6,
+            what,
+        )
+        ball = pt.link(message, "ball_link")
+        self.assertLessEqual(ball.lower_bound, ball.distance)
+        if source:
+            self.assertEqual(ball.source, source)
+
+    def at_post(self):
+        """Nothing but the configured post is near."""
+        self.distance(0.3, "the post", "noetic")
+
+    def test_1_objects_come_move_and_go(self):
+        self.at_post()
+        for publisher, source in ((self.noetic, "noetic"), (self.melodic, "melodic")):
+            box = publisher.box
+            publisher.send(box("part", (0, 0.35, 0)), box("other", (0, 0, 0.9)))
+            self.distance(0.15, "the part", source)
+            publisher.send(box("part", (0, 0.4, 0), MOVE))
+            self.distance(0.2, "the part that was moved", source)
+            publisher.send(box("other", (0, 0, 0.3), MOVE), box("part", None, REMOVE))
+            self.distance(0.1, "the other", source)
+            # Of a full scene only its own objects remain.
+            publisher.send(box("third", (0, -0.45, 0)), is_diff=False)
+            self.distance(0.25, "the third", source)
+            publisher.send(box("", None, REMOVE))
+            self.at_post()
+
+    def test_2_poses_of_objects_in_noetic(self):
+        box = self.noetic.box("pair", (0, 0.05, 0))
+        box.pose = pose(0, 0.4, 0)
+        self.noetic.send(box)
+        self.distance(0.25, "a shape in the pose of its object")
+        more = self.noetic.box("pair", (0, -0.05, 0), APPEND)
+        more.pose = pose(0, 0.4, 0)
+        self.noetic.send(more)
+        self.distance(0.15, "the shape that was appended")
+        moved = self.noetic.box("pair", None, MOVE)
+        moved.pose = pose(0, 0.45, 0)
+        self.noetic.send(moved)
+        self.distance(0.2, "the pair that was moved")
+        more.pose = pose(0, 0.2, 0)
+        self.noetic.send(more)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "'pair'")
+        self.noetic.send(box)
+        self.distance(0.25, "the object that was sent anew")
+        self.noetic.send(is_diff=False)
+        self.at_post()
+
+    def test_3_allowed_collisions(self):
+        self.noetic.send(self.noetic.box("table", (0, 0.25, 0)))
+        self.distance(0.05, "the table", "noetic")
+        self.noetic.send(allowed=["ball_link", "box_link", "table"])
+        self.at_post()
+        # The object may be touched as well when it is sent anew, and after the matrix has changed
+        # it may not.
+        self.noetic.send(self.noetic.box("table", (0, 0.3, 0)), self.noetic.box("wall", (0, -0.4, 0)))
+        self.distance(0.2, "the wall", "noetic")
+        self.noetic.send(allowed=["box_link", "table"])
+        self.distance(0.1, "the table, which may not be touched any more", "noetic")
+        self.noetic.send(is_diff=False)
+        self.at_post()
+
+    def test_4_what_cannot_be_used_is_named(self):
+        bad = self.noetic.box("bad", (0, 0.5, 0), edge=math.nan)
+        self.noetic.send(self.noetic.box("good", (0, 0.35, 0)), bad)
+        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "'bad'")
+        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.noetic.send(self.noetic.box("bad", None, REMOVE))
+        self.distance(0.15, "the good one, without the bad one")
+        # A description that cannot be used after one of the same name that can.
+        self.noetic.send(self.noetic.box("bad", (0, 0.9, 0)), bad)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "'bad'")
+        # A name of a configured object: neither vanishes in silence.
+        self.noetic.send(self.noetic.box("post", (0, 0.5, 0)), is_diff=False)
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "'post'")
+        self.noetic.send(self.noetic.box("post", None, REMOVE))
+        self.at_post()
+        # Names are no keys of other faults.
+        self.noetic.send(bad, self.noetic.box("nowhere", (0, 3, 0), frame="no_such_frame"))
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "'bad'")
+        self.noetic.send(is_diff=False)
+        self.at_post()
+
+    def test_5_a_difference_that_is_lost_needs_a_full_scene(self):
+        self.noetic.send(*[self.noetic.box("object %d" % i, (0, 3, 0)) for i in range(101)])
+        self.node.wait_for_status(ProximityArray.NO_CLOUD, "101 objects; allowed are 100")
+        self.noetic.send(self.noetic.box("(full scene)", (0, 3, 0)))
+        told = self.node.wait_for_status(ProximityArray.NO_CLOUD, "a full scene")
+        self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+        self.noetic.send(self.noetic.box("part", (0, 0.35, 0)), is_diff=False)
+        self.distance(0.15, "the part of the full scene")
+        self.noetic.send(is_diff=False)
+        self.at_post()
+
+    def test_6_what_nobody_measures_and_other_types(self):
+        self.noetic.send(octomap=b"12", attached=["drill"])
+        self.at_post()
+        self.node.wait_until(
+            lambda: "'drill'" in self.node.log() and "octomap" in self.node.log(), "a warning"
+        )
+        # Only differences: a source of its own would do the same after a restart of the node.
+        late = Publisher("/scenes/late", True)
+        world = pt.World("/late").stand()
+        world.start_tf()
+        node = pt.ProximityNode(
+            "/late",
+            {"sources": {"late": {"type": "world", "planning_scene": "/scenes/late"}}, "links": ["ball_link"]},
+            pt.urdf(),
+        )
+        try:
+            node.wait_for_status(ProximityArray.NO_CLOUD)
+            late.send(late.box("part", (0, 0.35, 0)))
+            node.wait_for_status(ProximityArray.NO_CLOUD, "only differences (is_diff) have come")
+            late.send(late.box("part", (0, 0.4, 0)), is_diff=False)
+            node.wait_for(lambda m: abs(pt.link(m, "ball_link").distance - 0.2) < 1e-6, "the part")
+        finally:
+            node.stop()
+            world.stop()
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("planning_scene_test")
+    rostest.rosrun("ist_proximity", "world_scenes", PlanningSceneTest, sys.argv)
