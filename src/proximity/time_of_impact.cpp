@@ -6,6 +6,7 @@
 #include "ist_proximity/robot/link_poses.h"
 #include "proximity/motion_bound.h"
 #include "proximity/moved_joints.h"
+#include "proximity/robot_surfaces.h"
 
 namespace ist {
 namespace {
@@ -14,6 +15,11 @@ constexpr double kTouch = 1e-6;  // [m] a bound below it is contact
 constexpr int kMaxSteps = 4000;
 // Tolerance of the next distance: as a ratio to the last bound, and in [m] at the first step.
 constexpr double kRelativeTolerance = 0.1, kFirstTolerance = 0.01;
+
+struct Obstacles {
+  SnapshotSpan clouds;
+  Span<const PosedWorld* const> worlds;
+};
 
 }  // namespace
 
@@ -35,36 +41,63 @@ struct TimeOfImpact::Impl {
     forward.run(moved, X_FR);
   }
 
-  const LinkProximity& measure(std::size_t link, SnapshotSpan clouds, double tolerance) {
+  /// A proven lower bound of the distance [m]; NaN where nothing is known.
+  double measure(std::size_t link, const Obstacles& obstacles, double tolerance) {
     config.tolerance = tolerance;
-    query.set_config(config);
-    query.run(forward.links().X_FL, moving, clouds, &answers);
-    return answers[link];
+    double bound = std::numeric_limits<double>::infinity();
+    const auto take = [&] {
+      const bool is_known = answers[link].state != LinkState::kUnknown;
+      bound = is_known && !std::isnan(bound) ? std::min(bound, answers[link].lower_bound)
+                                             : std::numeric_limits<double>::quiet_NaN();
+    };
+    if (!obstacles.clouds.empty() || obstacles.worlds.empty()) {
+      query.set_config(config);
+      query.run(forward.links().X_FL, moving, obstacles.clouds, &answers);
+      take();
+    }
+    if (!obstacles.worlds.empty()) {
+      worlds->set_config(config);
+      worlds->run(forward.links().X_FL, moving, obstacles.worlds, TimePoint::max(), &answers);
+      take();
+    }
+    return bound;
+  }
+
+  /// [m] The radius of a sphere about the centre of a link's tree, which encloses all of the link
+  /// that is measured.
+  double radius(std::size_t link, const Obstacles& obstacles) const {
+    const InnerSphereTree& tree = model->links[link].tree;
+    if (obstacles.worlds.empty()) return tree.radius();
+    const Eigen::AlignedBox3d& box = worlds->robot()->boxes[link];
+    if (box.isEmpty()) return tree.radius();
+    const Eigen::Vector3d c = tree.center();
+    return std::max(tree.radius(),
+                    (box.min() - c).cwiseAbs().cwiseMax((box.max() - c).cwiseAbs()).norm());
   }
 
   // Conservative advancement of one link.
   ImpactTime find(std::size_t link, const JointMotion& motion, const JointPoses& still,
-                  const Eigen::Isometry3d& X_FR, SnapshotSpan clouds) {
+                  const Eigen::Isometry3d& X_FR, const Obstacles& obstacles) {
     ImpactTime impact;
     place(motion, still, X_FR, 0.0);
     if (!forward.links().known[link]) return impact;
     const InnerSphereTree& tree = model->links[link].tree;
     const MotionBound bound(forward.kinematics(), motion, still, *forward.body(link), tree.center(),
-                            tree.radius());
+                            radius(link, obstacles));
     double time = 0.0, tolerance = kFirstTolerance;
     for (; impact.steps < kMaxSteps; ++impact.steps) {
       if (impact.steps > 0) place(motion, still, X_FR, time);
-      const LinkProximity* answer = &measure(link, clouds, tolerance);
-      if (answer->lower_bound <= kTouch && tolerance > 0.0) answer = &measure(link, clouds, 0.0);
-      if (answer->state == LinkState::kUnknown) return impact;
+      double distance = measure(link, obstacles, tolerance);
+      if (distance <= kTouch && tolerance > 0.0) distance = measure(link, obstacles, 0.0);
+      if (std::isnan(distance)) return impact;
       impact.time = time;
-      if (answer->lower_bound <= kTouch) return impact;
-      time += bound.time_for(answer->lower_bound, forward.bodies().X_FB);
+      if (distance <= kTouch) return impact;
+      time += bound.time_for(distance, forward.bodies().X_FB);
       if (time >= motion.duration) {
         impact.time = std::numeric_limits<double>::infinity();
         return impact;
       }
-      tolerance = std::min(kFirstTolerance, kRelativeTolerance * answer->lower_bound);
+      tolerance = std::min(kFirstTolerance, kRelativeTolerance * distance);
     }
     impact.converged = false;
     return impact;
@@ -74,6 +107,7 @@ struct TimeOfImpact::Impl {
   ForwardKinematics forward;
   QueryConfig config;
   ProximityQuery query;
+  std::unique_ptr<WorldQuery> worlds;  ///< null: no surfaces are set
 
   // Buffers of one call.
   std::vector<bool> moving;  // by link: the one that is being advanced
@@ -96,17 +130,33 @@ void TimeOfImpact::set_config(const QueryConfig& config) {
 void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
                        const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted,
                        SnapshotSpan clouds, std::vector<ImpactTime>* results) {
+  run(motion, still, X_FR, wanted, clouds, {}, results);
+}
+
+void TimeOfImpact::set_surfaces(std::shared_ptr<const RobotSurfaces> surfaces,
+                                std::vector<double> margins) {
+  if (!impl_->worlds || impl_->worlds->robot() != surfaces) {
+    impl_->worlds = std::make_unique<WorldQuery>(std::move(surfaces), impl_->config);
+  }
+  impl_->worlds->set_link_margins(std::move(margins));
+}
+
+void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
+                       const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted,
+                       SnapshotSpan clouds, Span<const PosedWorld* const> worlds,
+                       std::vector<ImpactTime>* results) {
   const std::size_t count = impl_->model->links.size();
   const std::size_t joints = impl_->forward.kinematics().joints().size();
   results->assign(count, ImpactTime());
   const bool fits = wanted.size() == count && motion.from.size() == joints &&
                     motion.to.size() == joints && still.X_PC.size() == joints &&
                     still.known.size() == joints;
+  if (!worlds.empty() && !impl_->worlds) return;
   if (!fits || !(motion.duration > 0.0) || !std::isfinite(motion.duration)) return;
   for (std::size_t i = 0; i < count; ++i) {
     if (!wanted[i] || !impl_->forward.body(i) || !impl_->model->links[i].usable()) continue;
     impl_->moving[i] = true;
-    (*results)[i] = impl_->find(i, motion, still, X_FR, clouds);
+    (*results)[i] = impl_->find(i, motion, still, X_FR, {clouds, worlds});
     impl_->moving[i] = false;
   }
 }

@@ -76,6 +76,92 @@ TEST(TimeOfImpact, randomMotionsAgainstDenseSampling) {
   EXPECT_GT(counts.motions - counts.contacts, counts.motions / 10);
 }
 
+// Balls at points, in a frame of their own.
+PosedWorld world_of_balls(const std::vector<Eigen::Vector3d>& points, double radius, double margin,
+                          const Eigen::Isometry3d& X_FB) {
+  WorldBuilder builder;
+  std::vector<WorldObject> balls;
+  for (const Eigen::Vector3d& point : points) {
+    WorldObject ball;
+    ball.name = "ball " + std::to_string(balls.size());
+    ball.frame = "cell";
+    ball.geometry = {GeometryElement{Sphere{radius}, Eigen::Isometry3d::Identity(), "ball"}};
+    ball.X_BO.translation() = X_FB.inverse() * point;
+    ball.margin = margin;
+    balls.push_back(ball);
+  }
+  EXPECT_TRUE(builder.add(balls).empty());
+  PosedWorld world;
+  world.world = builder.world();
+  world.X_FB.assign(world.world->frames().size(), X_FB);
+  return world;
+}
+
+// No ball of a known world and no point of a cloud is touched before the time that is returned, and
+// one of them is touched then.
+TEST(TimeOfImpact, KnownWorldsBesideClouds) {
+  constexpr double kRadius = 0.005, kMargin = 0.002;
+  test::Rng rng(67);
+  int contacts = 0, free = 0, by_ball = 0;
+  for (int i = 0; i < test::scaled(80); ++i) {
+    const test::Arm arm = test::random_arm(&rng);
+    QueryConfig config;
+    config.max_distance = 0.5;
+    TimeOfImpact impacts(arm.model, arm.kinematics, config);
+    test::ArmMotion motion = test::random_motion(&rng, arm);
+    test::ArmMotion balls = motion;
+    if (i % 3 != 0) {  // else both
+      motion.points.resize(motion.points.size() / 2);
+      balls.points.erase(balls.points.begin(),
+                         balls.points.begin() + static_cast<long>(motion.points.size()));
+    }
+    const bool has_cloud = i % 4 != 1 && !motion.points.empty();
+    const CloudSnapshot cloud = test::make_snapshot(motion.points);
+    const PosedWorld world =
+        world_of_balls(balls.points, kRadius, kMargin, test::random_pose(&rng, 1.0));
+    std::vector<const CloudSnapshot*> clouds;
+    if (has_cloud) clouds = {&cloud};
+    std::vector<ImpactTime> found;
+    const std::vector<bool> wanted(arm.size(), true);
+    impacts.run(motion.joints, motion.still, motion.X_FR, wanted, clouds, {&world}, &found);
+    for (const ImpactTime& one : found) EXPECT_TRUE(std::isnan(one.time)) << "no surfaces are set";
+    impacts.set_surfaces(make_robot_surfaces(arm.model), {});
+    impacts.run(motion.joints, motion.still, motion.X_FR, wanted, clouds, {&world}, &found);
+    double first = kInf;
+    bool converged = true;
+    for (const ImpactTime& one : found) {
+      ASSERT_FALSE(std::isnan(one.time));
+      converged &= one.converged;
+      first = std::min(first, one.time);
+    }
+    const auto of_balls = [&](double time) {
+      return test::sampled_distance(arm, balls, time) - kRadius - kMargin;
+    };
+    const auto distance = [&](double time) {
+      const double ball = of_balls(time);
+      return has_cloud ? std::min(ball, test::sampled_distance(arm, motion, time)) : ball;
+    };
+    if (distance(0.0) <= 0.0) {
+      EXPECT_EQ(first, 0.0);
+      continue;
+    }
+    const double end = std::min(first, motion.joints.duration);
+    for (int k = 0; k < 60; ++k) {
+      ASSERT_GT(distance(end * k / 60), -1e-9) << "motion " << i << ", " << first << " s";
+    }
+    if (first == kInf) {
+      ++free;
+    } else if (converged) {
+      EXPECT_LT(distance(first), 3e-6) << "motion " << i;
+      ++contacts;
+      by_ball += of_balls(first) < 3e-6 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(contacts, test::scaled(80) / 8);
+  EXPECT_GT(by_ball, contacts / 4);
+  EXPECT_GT(free, 0);
+}
+
 // The largest displacement [m] of a point of a sphere on a body between two instants.
 double displacement(const test::Arm& arm, const test::ArmMotion& motion, std::size_t body,
                     const Eigen::Vector3d& center, double radius, double from, double to) {

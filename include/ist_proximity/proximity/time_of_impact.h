@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/robot/kinematics.h"
 #include "ist_proximity/robot/robot_model.h"
 
@@ -60,6 +61,20 @@ class TimeOfImpact {
   ///                 arguments differ or the duration is not finite and more than 0
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
            const std::vector<bool>& wanted, SnapshotSpan clouds, std::vector<ImpactTime>* results);
+
+  /// The same beside known worlds, whose objects stand where they are: the first contact with a
+  /// cloud or an object counts. Needs set_surfaces().
+  /// @param clouds  where there are none, the worlds alone decide
+  /// @param worlds  as for WorldQuery::run. Where there are some and surfaces are not set, every
+  ///                time is NaN
+  void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
+           const std::vector<bool>& wanted, SnapshotSpan clouds,
+           Span<const PosedWorld* const> worlds, std::vector<ImpactTime>* results);
+
+  /// Sets the robot's surfaces, which worlds are measured with.
+  /// @param surfaces  of the model that this was made with, or of one of the same geometry
+  /// @param margins   [m] by link, see WorldQuery::set_link_margins
+  void set_surfaces(std::shared_ptr<const RobotSurfaces> surfaces, std::vector<double> margins);
 
   /// Takes effect at the next run().
   void set_config(const QueryConfig& config);

@@ -72,6 +72,9 @@ class ProximityCycle {
   SnapshotSpan clouds() const { return selection_.clouds(); }
   /// Whether known worlds were among the obstacles of the last run().
   bool has_worlds() const { return worlds_.any(); }
+  /// The known worlds of the last run(), likewise, and what they are measured with.
+  Span<const PosedWorld* const> worlds() const { return selection_.worlds(); }
+  const WorldAnswers& world_answers() const { return worlds_; }
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 

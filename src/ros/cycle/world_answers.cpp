@@ -17,7 +17,7 @@ bool is_near(const LinkProximity& answer) {
 WorldAnswers::WorldAnswers(const ServerConfig& config) : config_(config) {}
 
 /// The largest margin of all sources counts.
-void WorldAnswers::set_margins(const RobotModel& model) {
+std::vector<double> WorldAnswers::link_margins(const RobotModel& model) const {
   std::vector<double> margins(model.links.size(), 0.0);
   for (const SourceConfig& source : config_.sources) {
     for (std::size_t i = 0; i < margins.size(); ++i) {
@@ -27,7 +27,7 @@ void WorldAnswers::set_margins(const RobotModel& model) {
       }
     }
   }
-  query_->set_link_margins(std::move(margins));
+  return margins;
 }
 
 void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
@@ -62,7 +62,7 @@ void WorldAnswers::run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_
   if (!any_) return;
   if (!query_ || query_->robot() != selection.surfaces()) {
     query_ = std::make_unique<WorldQuery>(selection.surfaces(), query);
-    set_margins(robot);
+    query_->set_link_margins(link_margins(robot));
   }
   note_motion(selection, time);
   query_->set_config(query);

@@ -31,6 +31,14 @@ class WorldAnswers {
   /// @param results  by link: the answers of the clouds, overwritten
   void combine(SnapshotSpan clouds, std::vector<LinkProximity>* results);
 
+  /// The surfaces of the robot's links that the last run() measured with; null before the first
+  /// world.
+  std::shared_ptr<const RobotSurfaces> surfaces() const {
+    return query_ ? query_->robot() : nullptr;
+  }
+  /// [m] By link: see WorldQuery::set_link_margins().
+  std::vector<double> link_margins(const RobotModel& model) const;
+
   /// Whether the nearest point of a link is an object's.
   bool is_nearest(std::size_t link) const { return is_nearest_[link]; }
   /// Whether there is a world.
@@ -59,7 +67,6 @@ class WorldAnswers {
     std::vector<Eigen::Isometry3d> X_FB;
   };
   void note_motion(const CloudSelection& selection, double time);
-  void set_margins(const RobotModel& model);
 
   const ServerConfig config_;
   std::unique_ptr<WorldQuery> query_;  ///< null before the first world

@@ -109,9 +109,6 @@ bool QueryService::answer(Service::Request& request, Service::Response& response
   if (bad != response.results.end()) {
     response.message =
         "results[" + std::to_string(bad - response.results.begin()) + "]: " + bad->status_text;
-  } else if (!response.impact_times.empty() && cycle_->has_worlds()) {
-    response.message =
-        "impact_times are NaN: they are found against clouds alone, and there are known worlds";
   }
   return true;
 }
@@ -244,10 +241,9 @@ std::string QueryService::find_impact_times(const Service::Request& request,
   if (request.self_proximity != 0) self_.begin_motion();
   JointPoses still;  // nothing is known of the motion while the root link has no pose
   if (poses_->is_root_known()) still = poses_->joints();
-  // Times are found against clouds alone: beside a known world, "never" would not be known.
   if (cycle_->has_worlds()) {
-    std::fill(first.begin(), first.end(), std::nan(""));
-    std::fill(wanted.begin(), wanted.end(), false);
+    const WorldAnswers& answers = cycle_->world_answers();
+    impacts_->set_surfaces(answers.surfaces(), answers.link_margins(*model_->robot));
   }
   std::vector<ImpactTime> impacts;
   for (std::size_t k = 0; k + 1 < positions.size(); ++k) {
@@ -255,7 +251,8 @@ std::string QueryService::find_impact_times(const Service::Request& request,
                              request.times[k + 1] - request.times[k]};
     std::string half_stated = half_stated_joint(joints, motion, k);
     if (!half_stated.empty()) return half_stated;
-    impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(), &impacts);
+    impacts_->run(motion, poses_->joints(), poses_->X_FR(), wanted, cycle_->clouds(),
+                  cycle_->worlds(), &impacts);
     if (request.self_proximity != 0) self_.advance(motion, request.times[k], still, query);
     note_impacts(impacts, request.times[k], &first, &wanted);
     if (!thread_.is_running()) return "the node ends";
