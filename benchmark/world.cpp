@@ -1,6 +1,6 @@
-// Links against a known world, beside FCL in the same run: two arms in one cell, and a cell of
-// meshes with a thousand objects that are far. Motions at 1 kHz. With a document, writes its table
-// there.
+// Links against a known world, beside FCL and Bullet in the same run: two arms in one cell, and a
+// cell of meshes with a thousand objects that are far. Motions at 1 kHz. With a document, writes
+// its table there.
 //
 // Usage: world [DOCUMENT] [steps]
 
@@ -22,6 +22,9 @@
 #include "support/demo_arm.h"
 #include "support/meshes.h"
 #include "support/scene.h"
+#ifdef IST_PROXIMITY_HAS_BULLET
+#include "world/bullet.h"
+#endif
 #ifdef IST_PROXIMITY_HAS_FCL
 #include <fcl/fcl.h>
 #endif
@@ -31,6 +34,9 @@ namespace {
 using ist::LinkGeometry;
 using ist::WorldObject;
 using ist::benchmark::quantile;
+// Peers are measured in every so many steps. They begin with what they found then.
+constexpr int kPeerStep = 20;
+
 using Poses = std::vector<Eigen::Isometry3d>;
 
 WorldObject object(const std::string& name, const ist::Shape& shape, const Eigen::Vector3d& p,
@@ -252,17 +258,20 @@ std::string measure(const Case& c, int steps) {
     config.tolerance = tolerance;
     queries.push_back(std::make_unique<ist::WorldQuery>(robot, config));
   }
-#ifdef IST_PROXIMITY_HAS_FCL
   std::vector<std::size_t> frames;
   for (const WorldObject& one : objects) {
     const auto& names = world.world->frames();
     frames.push_back(
         static_cast<std::size_t>(std::find(names.begin(), names.end(), one.frame) - names.begin()));
   }
+#ifdef IST_PROXIMITY_HAS_FCL
   Peer peer(links, objects, frames);
 #endif
-  std::vector<double> ours[2], peers;
-  double searched = 0.0, differs = 0.0;
+#ifdef IST_PROXIMITY_HAS_BULLET
+  const auto bullet = ist::benchmark::bullet_world(links, objects, frames);
+#endif
+  std::vector<double> ours[2], peers, bullets;
+  double searched = 0.0, differs = 0.0, bullet_differs = 0.0;
   std::vector<ist::LinkProximity> results;
   ist::benchmark::ThreadTimer timer;
   for (int step = 0; step < steps; ++step) {
@@ -277,7 +286,7 @@ std::string measure(const Case& c, int steps) {
     }
     searched += static_cast<double>(queries[1]->statistics().pairs_searched);
 #ifdef IST_PROXIMITY_HAS_FCL
-    if (step % 20 == 0) {
+    if (step % kPeerStep == 0) {
       timer.lap();
       const std::vector<double>& found = peer.run(poses.X_FL, world.X_FB, c.other != nullptr);
       peers.push_back(timer.lap());
@@ -287,20 +296,35 @@ std::string measure(const Case& c, int steps) {
       }
     }
 #endif
+#ifdef IST_PROXIMITY_HAS_BULLET
+    if (step % kPeerStep == 0) {
+      timer.lap();
+      const std::vector<double>& found = bullet->run(poses.X_FL, world.X_FB);
+      bullets.push_back(timer.lap());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        if (results[i].state != ist::LinkState::kNear || !(found[i] > 0.0)) continue;
+        bullet_differs = std::max(bullet_differs, std::abs(found[i] - results[i].distance));
+      }
+    }
+#endif
   }
-  const double of_peer = quantile(peers, 0.5);
-  const auto ratio = [&](double of_ours) {
+  const double of_peer = quantile(peers, 0.5), of_bullet = quantile(bullets, 0.5);
+  const auto ratio = [](double theirs, double of_ours) {
     char text[32] = "-";
-    if (of_peer > 0.0) std::snprintf(text, sizeof text, "%.0f", of_peer / of_ours);
+    if (theirs > 0.0) std::snprintf(text, sizeof text, "%.0f", theirs / of_ours);
     return std::string(text);
   };
   char row[512];
-  std::snprintf(
-      row, sizeof row,
-      "| %s: %zu links, %zu objects | %.0f | %.0f | %.0f | %.0f | %s | %s | %.0f | %.2g |\n",
-      c.name.c_str(), links.size(), objects.size(), quantile(ours[0], 0.5), quantile(ours[0], 0.99),
-      quantile(ours[1], 0.5), of_peer, ratio(quantile(ours[0], 0.5)).c_str(),
-      ratio(quantile(ours[1], 0.5)).c_str(), searched / steps, 1e3 * differs);
+  std::snprintf(row, sizeof row,
+                "| %s: %zu links, %zu objects | %.0f | %.0f | %.0f | %.0f | %.0f | %s | %s | %s | "
+                "%.0f | %.2g "
+                "| %.2g |\n",
+                c.name.c_str(), links.size(), objects.size(), quantile(ours[0], 0.5),
+                quantile(ours[0], 0.99), quantile(ours[1], 0.5), of_peer, of_bullet,
+                ratio(of_peer, quantile(ours[0], 0.5)).c_str(),
+                ratio(of_peer, quantile(ours[1], 0.5)).c_str(),
+                ratio(of_bullet, quantile(ours[0], 0.5)).c_str(), searched / steps, 1e3 * differs,
+                1e3 * bullet_differs);
   std::printf("%s", row);
   std::fflush(stdout);
   return row;
@@ -326,8 +350,9 @@ int main(int argc, char** argv) {
   cases.push_back(far);
   std::string rows =
       "| scene | ours to 1 mm, median [us] | p99 [us] | ours exact, median [us] | FCL [us] "
-      "| FCL / ours | FCL / exact | objects measured | largest difference [mm] |\n"
-      "|---|---|---|---|---|---|---|---|---|\n";
+      "| Bullet to 1 mm [us] | FCL / ours | FCL / exact | Bullet / ours | objects measured "
+      "| largest difference of FCL [mm] | of Bullet [mm] |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const Case& c : cases) rows += measure(c, steps);
   if (document.empty()) return 0;
   return ist::benchmark::write_table(document, "known world", rows) ? 0 : 1;

@@ -74,8 +74,13 @@ if(BULLET_INCLUDE_DIR AND BULLET_COLLISION_LIBRARY AND BULLET_MATH_LIBRARY)
   target_include_directories(benchmark_link_pairs SYSTEM PRIVATE ${BULLET_INCLUDE_DIR})
   target_link_libraries(benchmark_link_pairs PRIVATE
     ${BULLET_COLLISION_LIBRARY} ${BULLET_MATH_LIBRARY})
+  target_sources(benchmark_world PRIVATE benchmark/world/bullet.cpp)
+  target_compile_definitions(benchmark_world PRIVATE IST_PROXIMITY_HAS_BULLET)
+  target_include_directories(benchmark_world SYSTEM PRIVATE ${BULLET_INCLUDE_DIR})
+  target_link_libraries(benchmark_world PRIVATE
+    ${BULLET_COLLISION_LIBRARY} ${BULLET_MATH_LIBRARY})
 else()
-  message(STATUS "ist_proximity: benchmark/link_pairs without Bullet (apt install libbullet-dev)")
+  message(STATUS "ist_proximity: benchmark/link_pairs and world without Bullet (apt install libbullet-dev)")
 endif()
 
 target_sources(benchmark_repulsion PRIVATE

@@ -13,6 +13,7 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/coherence/displacement.h"
+#include "proximity/shape_cache.h"
 #include "proximity/world_shape.h"
 
 namespace ist {
@@ -63,7 +64,68 @@ std::string sentence(const std::string& name, const std::string& fault) {
   return "object '" + printable(name) + "': " + fault;
 }
 
+// An object to add, and its shape.
+struct Taken {
+  const WorldObject* object;
+  ShapeCache::Entry shape;  // without members: not known, or it cannot be built
+  std::string fault = {};   // why it cannot
+  bool is_new = false;
+};
+
+// Builds the shapes that are not known, each geometry once.
+// @returns false when it was cancelled
+bool build_missing(std::vector<Taken>* taken, const std::function<bool()>& cancelled) {
+  std::vector<Taken*> missing;
+  std::vector<const LinkGeometry*> geometries;
+  for (Taken& one : *taken) {
+    if (one.shape.shape) continue;
+    missing.push_back(&one);
+    geometries.push_back(&one.object->geometry);
+  }
+  if (missing.empty()) return true;
+  const std::vector<std::size_t> first = first_of_same(geometries);
+  auto description = std::make_shared<RobotDescription>();
+  std::vector<std::size_t> link_of(missing.size());
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    if (first[i] != i) continue;
+    link_of[i] = description->links.size();
+    LinkDescription link;
+    link.name = "object " + std::to_string(link_of[i]);
+    link.geometry = *geometries[i];
+    description->links.push_back(std::move(link));
+  }
+  RobotModelConfig config;
+  config.packing.max_error = kPackingError;
+  config.packing.max_spheres = kMaxSpheres;
+  config.threads = 1;
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = cancelled;
+  const auto built =
+      AnytimeModel::build(description, config, AnytimeModel::Stage::kFirst, callbacks);
+  if (!built) return false;
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    Taken& one = *missing[i];
+    if (first[i] != i) {
+      one.shape = missing[first[i]]->shape;
+      one.fault = missing[first[i]]->fault;
+      continue;
+    }
+    LinkModel link = built->robot()->links[link_of[i]];
+    if (!link.usable() || link.tree.empty()) {
+      one.fault = link.usable() ? "it has neither surface nor volume" : link.error;
+      continue;
+    }
+    one.shape.geometry = std::make_shared<const LinkGeometry>(*geometries[i]);
+    one.shape.shape = std::make_shared<const WorldShape>(std::move(link));
+    one.is_new = true;
+  }
+  return true;
+}
+
 }  // namespace
+
+WorldBuilder::WorldBuilder(const WorldLimits& limits)
+    : limits_(limits), shapes_by_geometry_(std::make_shared<ShapeCache>()) {}
 
 Eigen::AlignedBox3d whole_box(const LinkModel& link, const LinkSurface& surface) {
   Eigen::AlignedBox3d box = bounding_box(link);
@@ -107,56 +169,44 @@ std::vector<WorldFault> WorldBuilder::add(const std::vector<WorldObject>& object
   const std::string limit = exceeded_limit(objects);
   if (!limit.empty()) return {{"", limit}};
   std::vector<WorldFault> faults;
-  auto description = std::make_shared<RobotDescription>();
-  std::vector<const WorldObject*> taken;
+  std::vector<Taken> taken;
   for (const WorldObject& object : objects) {
     const std::string fault = object_fault(object);
-    if (!fault.empty()) {
+    if (fault.empty()) {
+      taken.push_back({&object, shapes_by_geometry_->find(object.geometry)});
+    } else {
       faults.push_back({object.name, sentence(object.name, fault)});
-      continue;
     }
-    LinkDescription link;
-    link.name = "object " + std::to_string(taken.size());  // names may be repeated
-    link.geometry = object.geometry;
-    description->links.push_back(std::move(link));
-    taken.push_back(&object);
   }
-  if (taken.empty()) return faults;
-  RobotModelConfig config;
-  config.packing.max_error = kPackingError;
-  config.packing.max_spheres = kMaxSpheres;
-  config.threads = 1;
-  RobotModelCallbacks callbacks;
-  callbacks.cancelled = cancelled;
-  const auto built =
-      AnytimeModel::build(description, config, AnytimeModel::Stage::kFirst, callbacks);
-  if (!built) return faults;
-  for (std::size_t i = 0; i < taken.size(); ++i) {
-    const WorldObject& object = *taken[i];
-    LinkModel link = built->robot()->links[i];
-    if (!link.usable() || link.tree.empty()) {
-      faults.push_back(
-          {object.name, sentence(object.name, link.usable() ? "it has neither surface nor volume"
-                                                            : link.error)});
-      continue;
+  if (!build_missing(&taken, cancelled)) return faults;
+  for (const Taken& one : taken) {
+    if (one.shape.shape) {
+      insert(*one.object, one.shape.geometry, one.shape.shape);
+      if (one.is_new) shapes_by_geometry_->add(one.shape);
+    } else {
+      faults.push_back({one.object->name, sentence(one.object->name, one.fault)});
     }
-    link.name = object.name;
-    Entry entry;
-    entry.object.name = object.name;
-    entry.object.X_BO = object.X_BO;
-    entry.object.margin = object.margin;
-    entry.object.allowed_links = object.allowed_links;
-    entry.object.geometry = std::make_shared<const LinkGeometry>(object.geometry);
-    entry.object.shape = std::make_shared<const WorldShape>(std::move(link));
-    entry.object.id = next_build_id();
-    entry.frame = object.frame;
-    entry.triangles = triangles_of(object.geometry);
-    remove(object.name);
-    triangles_ += entry.triangles;
-    shapes_ += object.geometry.size();
-    entries_[object.name] = std::move(entry);
   }
   return faults;
+}
+
+void WorldBuilder::insert(const WorldObject& object,
+                          const std::shared_ptr<const LinkGeometry>& geometry,
+                          const std::shared_ptr<const WorldShape>& shape) {
+  Entry entry;
+  entry.object.name = object.name;
+  entry.object.X_BO = object.X_BO;
+  entry.object.margin = object.margin;
+  entry.object.allowed_links = object.allowed_links;
+  entry.object.geometry = geometry;
+  entry.object.shape = shape;
+  entry.object.id = next_build_id();
+  entry.frame = object.frame;
+  entry.triangles = triangles_of(object.geometry);
+  remove(object.name);
+  triangles_ += entry.triangles;
+  shapes_ += object.geometry.size();
+  entries_[object.name] = std::move(entry);
 }
 
 std::string WorldBuilder::move(const std::string& name, const std::string& frame,

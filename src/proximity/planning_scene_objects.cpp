@@ -42,9 +42,6 @@ WorldObject to_world_object(const SceneObject& object, const std::string& defaul
   result.frame = frame_of(object, default_frame);
   result.X_BO = object.X_BP;
   result.geometry = object.geometry;
-  for (GeometryElement& element : result.geometry) {
-    element.source += " of object '" + printable(object.id) + "'";
-  }
   if (object.has_pose || object.geometry.size() != 1) return result;
   // The shape's frame becomes the object's.
   result.X_BO = object.X_PS[0];
@@ -89,8 +86,7 @@ std::string moved_pose(const SceneObject& object, const WorldObject& known,
   const Eigen::Isometry3d X = object.X_BP * object.X_PS[0] * geometry[0].X_LE.inverse();
   for (std::size_t i = 0; i < geometry.size(); ++i) {
     // The pose of a plane's box is not that of the plane.
-    if (geometry[i].source.compare(0, 5, "plane") == 0)
-      return "it has a plane and is to be moved" + advice;
+    if (geometry[i].source == "plane") return "it has a plane and is to be moved" + advice;
     if (!is_same(X * geometry[i].X_LE, object.X_BP * object.X_PS[i])) {
       return "its shapes are to be moved against one another" + advice;
     }

@@ -1,5 +1,6 @@
 #include "proximity/shape_cache.h"
 
+#include <algorithm>
 #include <cstring>
 #include <type_traits>
 #include <variant>
@@ -86,8 +87,7 @@ bool is_same(const LinkGeometry& a, const LinkGeometry& b) {
   return true;
 }
 
-}  // namespace
-
+// Never different for geometries that are the same.
 std::uint64_t geometry_hash(const LinkGeometry& geometry) {
   Hash hash;
   for (const GeometryElement& element : geometry) {
@@ -95,6 +95,23 @@ std::uint64_t geometry_hash(const LinkGeometry& geometry) {
     add_shape(element.shape, &hash);
   }
   return hash.value();
+}
+
+}  // namespace
+
+std::vector<std::size_t> first_of_same(const std::vector<const LinkGeometry*>& geometries) {
+  std::vector<std::size_t> first;
+  std::multimap<std::uint64_t, std::size_t> known;
+  for (std::size_t i = 0; i < geometries.size(); ++i) {
+    const std::uint64_t hash = geometry_hash(*geometries[i]);
+    const auto [begin, end] = known.equal_range(hash);
+    const auto same = std::find_if(begin, end, [&](const auto& one) {
+      return is_same(*geometries[one.second], *geometries[i]);
+    });
+    first.push_back(same == end ? i : same->second);
+    if (same == end) known.insert({hash, i});
+  }
+  return first;
 }
 
 ShapeCache::Entry ShapeCache::find(const LinkGeometry& geometry) const {

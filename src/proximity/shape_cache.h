@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <vector>
 
 #include "ist_proximity/geometry/shapes.h"
 #include "proximity/world_shape.h"
@@ -34,7 +35,8 @@ class ShapeCache {
   std::size_t next_cleaning_ = 64;              // size
 };
 
-/// The same for geometries with equal ones: never different for equal geometries.
-std::uint64_t geometry_hash(const LinkGeometry& geometry);
+/// Finds the geometries of a batch that are the same to the last bit.
+/// @returns by geometry: the index of the first one that is the same
+std::vector<std::size_t> first_of_same(const std::vector<const LinkGeometry*>& geometries);
 
 }  // namespace ist

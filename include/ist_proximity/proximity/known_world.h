@@ -32,6 +32,7 @@ struct WorldLimits {
 
 /// The shape of an object, ready for queries.
 struct WorldShape;
+class ShapeCache;
 
 /// The objects of one source, ready for queries. Immutable, thread safe, shared by pointer.
 class KnownWorld {
@@ -74,14 +75,16 @@ struct WorldFault {
 };
 
 /// Makes known worlds, object by object. Objects that do not change are shared by all worlds that
-/// are made. One thread.
+/// are made. One thread, also for a builder and its copies.
 class WorldBuilder {
  public:
   /// @param limits  of the worlds that it makes
-  explicit WorldBuilder(const WorldLimits& limits = {}) : limits_(limits) {}
+  explicit WorldBuilder(const WorldLimits& limits = {});
 
   /// Adds objects; one takes the place of another of the same name. It builds their hierarchies and
-  /// packs them coarsely: milliseconds for primitives, up to a second for 10^5 triangles.
+  /// packs them coarsely: up to a millisecond for a box or a cylinder, some ten for a sphere, up to
+  /// a second for 10^5 triangles. Objects of equal geometry share it, and what is known is not
+  /// built again.
   /// @param cancelled  asked now and then; true ends the work, and nothing is added. May be empty
   /// @returns one fault for each object that cannot be used; an older one of that name stays. Where
   ///          a limit is exceeded, the only fault says so and nothing is added
@@ -114,9 +117,12 @@ class WorldBuilder {
     std::size_t triangles = 0;
   };
   std::string exceeded_limit(const std::vector<WorldObject>& objects) const;
+  void insert(const WorldObject& object, const std::shared_ptr<const LinkGeometry>& geometry,
+              const std::shared_ptr<const WorldShape>& shape);
 
   WorldLimits limits_;
-  std::map<std::string, Entry> entries_;  ///< by name
+  std::shared_ptr<ShapeCache> shapes_by_geometry_;  ///< copies of this share it
+  std::map<std::string, Entry> entries_;            ///< by name
   std::size_t triangles_ = 0, shapes_ = 0;
 };
 

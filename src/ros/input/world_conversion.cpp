@@ -94,7 +94,7 @@ GeometryElement to_element(const Message& message, const CancelRequest& cancelle
     default:
       throw ModelError("shape is " + std::to_string(message.shape) + "; allowed is 0 to 5");
   }
-  element.source = "object '" + printable(message.id) + "'";
+  element.source = message.mesh.empty() ? "its shape" : printable(message.mesh);
   return element;
 }
 
