@@ -1,0 +1,39 @@
+// Planning scenes: what is read keeps to the limits, and each object of it is in the world or there
+// is a fault that names it. Covers: src/proximity/planning_scene.cpp
+// src/proximity/planning_scene_objects.cpp
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "internal/proximity/planning_scene.h"
+#include "ist_proximity/proximity/known_world.h"
+#include "support/check.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  ist::WorldLimits limits;
+  limits.max_objects = 20;
+  limits.max_triangles = 600;  // a cone has 256
+  const auto layout =
+      data[0] % 2 == 0 ? ist::SceneLayout::kShapePoses : ist::SceneLayout::kObjectPose;
+  const ist::PlanningScene scene = ist::read_planning_scene({data + 1, size - 1}, layout, limits);
+  FUZZ_CHECK(scene.fault.empty() || scene.objects.empty(), "a fault, and objects: %s",
+             scene.fault.c_str());
+  FUZZ_CHECK(scene.objects.size() <= limits.max_objects, "%zu objects", scene.objects.size());
+  for (const ist::SceneObject& object : scene.objects) {
+    if (!object.fault.empty()) continue;
+    const ist::WorldObject added = ist::to_world_object(object, "world");
+    ist::WorldBuilder builder(limits);
+    const std::vector<ist::WorldFault> faults = builder.add({added});
+    FUZZ_CHECK(faults.size() + builder.size() == 1, "%zu faults, %zu objects", faults.size(),
+               builder.size());
+    if (builder.size() == 0) continue;
+    Eigen::Isometry3d X;
+    ist::moved_pose(object, added, &X);
+    ist::WorldObject more = added;
+    ist::append_shapes(object, "world", &more);
+  }
+  return 0;
+}
