@@ -84,7 +84,7 @@ class WorldSource : public ObstacleSource {
   void add(WorldFaultKind what, const std::vector<WorldObject>& objects);
   void note_fault(const WorldFaultKey& key, const std::string& fault);
   void show_faults();
-  std::vector<std::string> configured_contacts(const std::string& name) const;
+  std::vector<std::string> configured_contacts(const std::string& object) const;
   void take_target();
   void publish();
   void publish_markers();
