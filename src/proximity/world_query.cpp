@@ -49,6 +49,7 @@ struct WorldQuery::Impl {
   void list_objects(Span<const PosedWorld* const> given);
   void prepare_searches();
   void note_allowed(const std::vector<std::string>& names, std::uint64_t* bits) const;
+  void list_members();
   void move_objects(Span<const PosedWorld* const> given);
   void finish_by(Deadline* deadline);
   void count_unfinished(const LinkProximity& result);
@@ -60,6 +61,10 @@ struct WorldQuery::Impl {
   WorldQueryStatistics statistics;
   std::vector<PosedWorld> worlds;  // of the last run
   PosedObjects objects;
+  // The objects of each frame, so that those of frames that stand still cost nothing: objects
+  // members[first_member[f]] to members[first_member[f + 1]], frames of all worlds counted through.
+  std::vector<std::size_t> first_member;
+  std::vector<std::uint32_t> members;
   std::vector<ObjectSearch> searches;  // by link
   std::vector<Waiting> queue;          // a heap
   std::vector<LinkPairSearch::Entry> depth_queue;
@@ -120,9 +125,32 @@ void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
       objects.objects.push_back(object);
     }
   }
+  statistics.objects_placed += objects.objects.size();
+  list_members();
   objects.allowed.assign(objects.words * objects.objects.size(), 0);
   for (std::size_t i = 0; i < objects.objects.size(); ++i) {
     note_allowed(objects.objects[i].object->allowed_links, &objects.allowed[i * objects.words]);
+  }
+}
+
+// Sorts the objects by their frames.
+void WorldQuery::Impl::list_members() {
+  std::vector<std::size_t> first_frame;  // by world
+  std::size_t frames = 0;
+  for (const PosedWorld& world : worlds) {
+    first_frame.push_back(frames);
+    frames += world.X_FB.size();
+  }
+  first_member.assign(frames + 1, 0);
+  const auto frame_of = [&](const PosedObject& object) {
+    return first_frame[object.world] + object.object->frame;
+  };
+  for (const PosedObject& object : objects.objects) ++first_member[frame_of(object) + 1];
+  for (std::size_t f = 0; f < frames; ++f) first_member[f + 1] += first_member[f];
+  std::vector<std::size_t> next(first_member.begin(), first_member.end() - 1);
+  members.resize(objects.objects.size());
+  for (std::size_t i = 0; i < members.size(); ++i) {
+    members[next[frame_of(objects.objects[i])]++] = static_cast<std::uint32_t>(i);
   }
 }
 
@@ -145,17 +173,25 @@ void WorldQuery::Impl::prepare_searches() {
 // Places the objects of frames that have moved.
 void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
   double farthest = 0.0;
-  for (PosedObject& object : objects.objects) {
-    const std::size_t frame = object.object->frame;
-    const Eigen::Isometry3d& X_FB = given[object.world]->X_FB[frame];
-    if (X_FB.matrix() == worlds[object.world].X_FB[frame].matrix()) continue;
-    const Eigen::Isometry3d before = object.X_FO.X;
-    object.place(X_FB * object.object->X_BO);
-    farthest = std::max(farthest,
-                        object.object->shape->surface.displacement.between(before, object.X_FO.X));
-  }
+  std::size_t counted = 0;  // frames of the worlds before
   for (std::size_t w = 0; w < given.size(); ++w) {
-    std::copy(given[w]->X_FB.begin(), given[w]->X_FB.end(), worlds[w].X_FB.begin());
+    if (!worlds[w].world) {  // its poses are anything
+      counted += worlds[w].X_FB.size();
+      continue;
+    }
+    for (std::size_t frame = 0; frame < worlds[w].X_FB.size(); ++frame, ++counted) {
+      const Eigen::Isometry3d& X_FB = given[w]->X_FB[frame];
+      if (X_FB.matrix() == worlds[w].X_FB[frame].matrix()) continue;
+      for (std::size_t m = first_member[counted]; m < first_member[counted + 1]; ++m) {
+        PosedObject& object = objects.objects[members[m]];
+        const Eigen::Isometry3d before = object.X_FO.X;
+        object.place(X_FB * object.object->X_BO);
+        ++statistics.objects_placed;
+        const auto& displacement = object.object->shape->surface.displacement;
+        farthest = std::max(farthest, displacement.between(before, object.X_FO.X));
+      }
+      worlds[w].X_FB[frame] = X_FB;
+    }
   }
   objects.path += farthest;
   if (!(objects.path < kLongestPath)) {  // the lists are made anew

@@ -27,6 +27,7 @@ struct NearObject {
 
 /// Counts of a query's work, for tuning and tests.
 struct WorldQueryStatistics {
+  std::uint64_t objects_placed = 0;   ///< objects that were placed: all of a new world, or moved
   std::uint64_t objects_bounded = 0;  ///< pairs of a link and an object whose boxes were compared
   std::uint64_t pairs_searched = 0;   ///< pairs of a link and an object that were measured
   std::uint64_t steps = 0;            ///< pairs of boxes and of parts that were looked at
