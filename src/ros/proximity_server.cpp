@@ -60,6 +60,8 @@ constexpr double kLongestPeriod = 0.1;  // [s] the same
 
 // Whether the robot's root stands still is asked this often where the URDF does not say it.
 constexpr std::chrono::seconds kRootPeriod(1);
+// [m] Unknown space is drawn as far from the links as this.
+constexpr double kDrawnUnseen = 0.15;
 
 }  // namespace
 
@@ -170,7 +172,9 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   }
   const auto live = [this] { return live_config(); };
   if (config_.unknown_space != UnknownSpace::kFree) {
-    unknown_space_ = std::make_unique<UnknownSpaceWatch>(memories_, config_.query.max_distance);
+    unknown_space_ = std::make_unique<UnknownSpaceWatch>(
+        memories_, config_.query.max_distance,
+        private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen);
   }
   query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
                                                   live, unknown_space_.get());
@@ -256,7 +260,7 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   ++report_.cycles;
   results_.publish(
       message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
-      [] { return Eigen::AlignedBox3d(); });
+      [] { return MarkerScene(); });
 }
 
 void ProximityServer::Impl::run_cycle() {
@@ -294,9 +298,8 @@ void ProximityServer::Impl::run_cycle() {
     if (!cycle_) return;
     cycle_->fill_joint_repulsion(*message, results_.summary().self_problem(), self.get(), efforts);
   };
-  const auto robot_box = [&] { return cycle_ ? cycle_->robot_box() : Eigen::AlignedBox3d(); };
-  const bool drawn =
-      results_.publish(message, self, live.speed_scale, fill_joint_repulsion, robot_box);
+  const auto scene = [&] { return cycle_ ? cycle_->marker_scene() : MarkerScene(); };
+  const bool drawn = results_.publish(message, self, live.speed_scale, fill_joint_repulsion, scene);
   const std::lock_guard<std::mutex> lock(report_mutex_);
   if (drawn) ++report_.markers_drawn;
   if (cycle_) report_.parts[kPartPublish].add(watch.lap());

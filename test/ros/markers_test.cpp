@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "ros/input/unseen_markers.h"
 #include "ros/output/nearest_summary.h"
 #include "ros/output/nearness_color.h"
 
@@ -100,11 +101,12 @@ TEST(ProximityMarkers, LabelsAreAListAboveTheRobot) {
     for (int i = 0; i < 12; ++i) links.push_back(link("l" + std::to_string(i), uniform(random)));
     const Eigen::Vector3d corner(uniform(random), uniform(random), uniform(random));
     const Eigen::AlignedBox3d robot(corner, corner + Eigen::Vector3d(0.4, 0.4, 1.0));
-    auto drawn = by_key(drawer.draw(array(links), robot));
+    auto drawn = by_key(drawer.draw(array(links), {robot, {}}));
     if (round == 0) {
       EXPECT_GT((drawn[{"nearest", 0}].pose.position.z), robot.max().z());
     }
-    for (int i = 0; i < 200; ++i) drawn = by_key(drawer.draw(array(links), robot));  // it follows
+    for (int i = 0; i < 200; ++i)
+      drawn = by_key(drawer.draw(array(links), {robot, {}}));  // it follows
 
     const Marker& number = drawn[{"nearest", 0}];
     std::vector<std::pair<double, double>> rows;  // distance, top of the row
@@ -135,7 +137,7 @@ TEST(ProximityMarkers, NamespacesAndIds) {
   const Eigen::AlignedBox3d robot(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones());
   auto drawn = by_key(drawer.draw(
       array({link("far", 0.5), link("near", 0.2, 0.1), link("unknown", kNaN), link("c", kInf)}),
-      robot));
+      {robot, {}}));
   for (const char* ns : {"distance", "point_on_link", "point_on_obstacle", "repulsion"}) {
     EXPECT_EQ(drawn.count({ns, 0}), 1U) << ns;
     EXPECT_EQ(drawn.count({ns, 1}), 1U) << ns;
@@ -153,13 +155,73 @@ TEST(ProximityMarkers, NamespacesAndIds) {
   // Arrows of repulsion are of no colour of the scale: those have little blue.
   EXPECT_GT((drawn[{"repulsion", 0}].color.b), 0.5F);
 
-  drawn = by_key(drawer.draw(array({link("far", kInf), link("near", kInf)}), robot));
+  drawn = by_key(drawer.draw(array({link("far", kInf), link("near", kInf)}), {robot, {}}));
   for (const auto& [key, one] : drawn) {
     const bool stays = key == std::pair<std::string, int>("nearest", 0);
     EXPECT_EQ(one.action, stays ? Marker::ADD : Marker::DELETE) << key.first << key.second;
   }
   EXPECT_EQ((drawn[{"nearest", 0}].text), "> 1.00 m");
   EXPECT_EQ(drawn.size(), 12U);
+}
+
+// Unknown space is drawn for the links that it is near, whatever their state is.
+TEST(ProximityMarkers, LinesToUnknownSpace) {
+  ProximityMarkers drawer(1.0, 1.0);
+  const ProximityArray message = array({link("clear", kInf), link("near", 0.2)});
+  const MarkerScene::UnseenLine line{0, {0.1, 0.2, 0.3}, {0.1, 0.2, 0.7}};
+  auto drawn = by_key(drawer.draw(message, {{}, {line}}));
+  ASSERT_EQ(drawn.count({"unseen", 0}), 1U);
+  EXPECT_EQ(drawn.count({"unseen", 1}), 0U);
+  const Marker& one = drawn[{"unseen", 0}];
+  EXPECT_EQ(one.points[0].z, 0.7);
+  EXPECT_EQ(one.points[1].z, 0.3);
+  EXPECT_EQ(one.color.r, one.color.b);  // grey: not known
+  EXPECT_EQ((drawn[{"unseen_end", 0}].pose.position.z), 0.7);
+
+  drawn = by_key(drawer.draw(message, {}));
+  EXPECT_EQ((drawn[{"unseen", 0}].action), Marker::DELETE);
+  EXPECT_EQ((drawn[{"unseen_end", 0}].action), Marker::DELETE);
+}
+
+TEST(UnseenMarkers, CubesNearTheRobot) {
+  const VoxelBoxes robot = {{Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(0, 0, 0)},
+                            {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 1, 1)}};
+  const auto box = [](double x, double size) {
+    const Eigen::Vector3d low(x, 0.5, 0.5);
+    return Eigen::AlignedBox3d(low, low + Eigen::Vector3d(size, 0.02, 0.02));
+  };
+  std_msgs::Header header;
+  header.frame_id = "odom";
+  // Two voxels, a row that is drawn to 0.3 m, and a voxel that is too far.
+  const auto drawn =
+      unseen_markers({box(1.1, 0.02), box(1.2, 0.02), box(1.25, 0.16), box(1.5, 0.02)}, robot, 0.3,
+                     header)
+          .markers;
+  ASSERT_EQ(drawn.size(), 3U);
+  EXPECT_EQ(drawn[0].action, Marker::DELETEALL);
+  ASSERT_EQ(drawn[1].points.size(), 2U);
+  EXPECT_NEAR(drawn[1].points[0].x, 1.11, 1e-9);
+  EXPECT_NEAR(drawn[1].scale.x, 0.25 * 0.02, 1e-9);
+  ASSERT_EQ(drawn[1].colors.size(), 2U);
+  EXPECT_GT(drawn[1].colors[0].a, drawn[1].colors[1].a);  // nearer
+  EXPECT_GT(drawn[1].colors[1].a, 0.0F);
+  ASSERT_EQ(drawn[2].points.size(), 2U);
+  EXPECT_NEAR(drawn[2].scale.x, 0.25 * 0.04, 1e-9);
+  EXPECT_NEAR(drawn[2].points[1].x, 1.31, 1e-9);
+  EXPECT_EQ(drawn[2].header.frame_id, "odom");
+
+  // Too many: the nearest ones are drawn.
+  VoxelBoxes many;
+  for (int i = 0; i < 30000; ++i) many.push_back(box(1.28 - 1e-5 * i, 0.01));
+  const auto nearest = unseen_markers(many, {robot[1]}, 0.3, header).markers;
+  std::size_t count = 0;
+  double farthest = 0.0;
+  for (const Marker& list : nearest) {
+    count += list.points.size();
+    for (const auto& point : list.points) farthest = std::max(farthest, point.x);
+  }
+  EXPECT_EQ(count, 20000U);
+  EXPECT_NEAR(farthest, 1.28 - 1e-5 * 10000 + 0.005, 1e-3);
 }
 
 }  // namespace

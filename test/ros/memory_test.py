@@ -16,6 +16,7 @@ import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
 
 VOXEL = 0.02
 DECAY = 4.0
@@ -229,6 +230,31 @@ class MemoryTest(unittest.TestCase):
         for ball in self.move_in_cone("obstacle"):
             self.assertEqual(ball.state, LinkProximity.NEAR)
             self.assertAlmostEqual(ball.lower_bound, ball.unseen_distance, places=9)
+
+    # The grey dots and lines in rviz are where unknown space is.
+    def test_unknown_space_is_drawn(self):
+        dots, lines = [], []
+        name = self.namespace + "/proximity"
+        subscribers = [
+            rospy.Subscriber(name + "/unseen_space", MarkerArray, dots.append, queue_size=1),
+            rospy.Subscriber(name + "/markers", MarkerArray, lines.append, queue_size=1),
+        ]
+        before, after = self.move_in_cone("report")
+        self.assertLess(after.unseen_distance, before.unseen_distance)
+        last = len(dots)
+        self.node.wait_until(lambda: len(dots) > last + 1, "the unknown space drawn")
+        for subscriber in subscribers:
+            subscriber.unregister()
+        drawn = [m for m in dots[-1].markers if m.type == Marker.CUBE_LIST]
+        centers = np.array([[p.x, p.y, p.z] for m in drawn for p in m.points])
+        self.assertEqual({m.header.frame_id for m in drawn}, {"base"})
+        self.assertGreater(len(centers), 100)
+        # The cone of the view, out of which a voxel may reach by its diagonal.
+        self.assertTrue((np.abs(centers[:, 1:]).max(axis=1) > 0.3 * centers[:, 0] - 2 * VOXEL).all())
+        ends = [m for m in lines[-1].markers if m.ns == "unseen" and m.action == Marker.ADD]
+        self.assertEqual([m.id for m in ends], [0])
+        start, end = pt.vector(ends[0].points[1]), pt.vector(ends[0].points[0])
+        self.assertAlmostEqual(np.linalg.norm(start - end), after.unseen_distance, delta=0.02)
 
     def test_unknown_space_is_reported(self):
         for ball in self.move_in_cone("report"):

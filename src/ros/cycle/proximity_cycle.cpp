@@ -288,17 +288,22 @@ void ProximityCycle::forget() {
   poses_.stamp = ros::Time();
 }
 
-Eigen::AlignedBox3d ProximityCycle::robot_box() const {
-  Eigen::AlignedBox3d box;
+MarkerScene ProximityCycle::marker_scene() const {
+  MarkerScene scene;
   for (std::size_t i = 0; i < packed_->links.size(); ++i) {
     if (i >= poses_.known.size() || !poses_.known[i]) continue;
     for (const InnerSphere& sphere : packed_->links[i].packing.spheres) {
       const Eigen::Vector3d p_FS = poses_.X_FL[i] * sphere.center;
-      box.extend(p_FS - Eigen::Vector3d::Constant(sphere.radius));
-      box.extend(p_FS + Eigen::Vector3d::Constant(sphere.radius));
+      scene.robot.extend(p_FS - Eigen::Vector3d::Constant(sphere.radius));
+      scene.robot.extend(p_FS + Eigen::Vector3d::Constant(sphere.radius));
     }
   }
-  return box;
+  for (std::size_t k = 0; unknown_space_ && k < model_->monitored.size(); ++k) {
+    const UnknownSpaceAnswer& answer = unknown_space_->answer(model_->monitored[k]);
+    if (!known_[model_->monitored[k]] || !answer.p_FCl.allFinite()) continue;
+    scene.unseen.push_back({k, answer.p_FCl, answer.p_FCo});
+  }
+  return scene;
 }
 
 void ProximityCycle::fill_joint_repulsion(const ProximityArray& proximity,

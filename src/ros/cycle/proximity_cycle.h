@@ -19,6 +19,7 @@
 #include "ros/input/obstacle_source.h"
 #include "ros/model/model_state.h"
 #include "ros/output/joint_repulsion.h"
+#include "ros/output/markers.h"
 #include "ros/parameters/parameters.h"
 #include "ros/poses/pose_source.h"
 #include "ros/status/cycle_report.h"
@@ -75,9 +76,10 @@ class ProximityCycle {
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 
-  /// Encloses the inner spheres of all links whose pose the last run() knew, in the fixed frame.
-  /// Looks at each sphere: for pictures, not for every cycle.
-  Eigen::AlignedBox3d robot_box() const;
+  /// What is drawn beside the message of the last run(), in the fixed frame. The box encloses the
+  /// inner spheres of all links whose pose was known; each sphere is looked at, which is for
+  /// pictures and not for every cycle.
+  MarkerScene marker_scene() const;
 
   /// Gives the repulsion of the last run() as joint efforts.
   /// @param proximity     the message of that run()

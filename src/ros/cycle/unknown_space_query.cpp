@@ -47,6 +47,8 @@ void UnknownSpaceQuery::run(const std::vector<Eigen::Isometry3d>& X_FL,
   for (std::size_t i = 0; i < answers_.size(); ++i) {
     answers_[i].lower_bound = std::max(results_[i].lower_bound, deepest(i));  // -inf: out of time
     answers_[i].direction = -results_[i].direction;  // NaN where nothing is near
+    answers_[i].p_FCl = results_[i].p_FCl;
+    answers_[i].p_FCo = results_[i].p_FCo;
   }
   if (influence_distance != surroundings_distance_) {
     surroundings_.assign(surroundings_.size(), std::nullopt);

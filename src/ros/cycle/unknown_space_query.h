@@ -18,6 +18,8 @@ struct UnknownSpaceAnswer {
   SeenShare seen;
   double lower_bound = std::numeric_limits<double>::quiet_NaN();  ///< [m] NaN: not asked
   Eigen::Vector3d direction = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  /// [m] The closest points of the link and of unknown space, in the fixed frame; NaN as direction.
+  Eigen::Vector3d p_FCl = direction, p_FCo = direction;
 };
 
 /// Measures links against unknown space, beside the query of what has been seen. One thread.

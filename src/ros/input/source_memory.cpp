@@ -85,7 +85,7 @@ void SourceMemory::begin_target(const SourceTarget& target) {
   map_.clear();
   body_.clear();
   body_noted_ = 0.0;
-  robot_.setEmpty();
+  links_.clear();
   const std::string& file = config_.memory.file;
   if (file.empty() || !is_there(file)) return;  // it is written later
   file_problem_ = map_.read_file(file, ros::Time::now().toSec());
@@ -131,7 +131,10 @@ void SourceMemory::note_body(const Placement& placement, const Eigen::Isometry3d
                              double stamp) {
   if (!wants_body_ || stamp - body_noted_ < kBodyPeriod) return;
   body_noted_ = stamp;
-  robot_ = ist::note_body(placement.robot, X_MF, skin(), stamp, &body_);
+  links_.clear();
+  for (const PosedSolid& link : placement.robot) {
+    links_.push_back(ist::note_body({&link, 1}, X_MF, skin(), stamp, &body_));
+  }
 }
 
 /// @param find_boxes  of MemoryMap: the boxes that queries get beside the cloud
@@ -161,8 +164,13 @@ void SourceMemory::publish_when_due(const ros::Time& stamp) {
   next_publication_ = now + kPublicationPeriod;
   std_msgs::Header header;
   header.stamp = stamp;
-  header.frame_id = config_.memory.frame_id.empty() ? fixed_frame_ : config_.memory.frame_id;
+  header.frame_id = frame();
   publish_map(publisher_, header, map_.config().resolution, map_.octree_bytes());
+}
+
+/// tf's name of the memory's frame. Under the mutex, or in the source's thread.
+std::string SourceMemory::frame() const {
+  return config_.memory.frame_id.empty() ? fixed_frame_ : without_slash(config_.memory.frame_id);
 }
 
 std::string SourceMemory::shortage() const {
@@ -194,15 +202,16 @@ std::string SourceMemory::save(bool* is_saved) const {
 
 bool SourceMemory::add_to(SeenSpace* seen, KnownSpace* known) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (std::isnan(map_.now()) || robot_.isEmpty()) return false;
+  if (std::isnan(map_.now()) || links_.empty()) return false;
   const double now = ros::Time::now().toSec();
   map_.forget(now);
   body_.forget(now);
   seen->add(map_);
   seen->add(body_);
-  known->robot = robot_;
+  known->links = links_;
   known->X_FM = X_MF_.inverse();
   known->stamp = stamp_;
+  known->frame = frame();  // the thread of the source writes it under the same mutex
   return true;
 }
 

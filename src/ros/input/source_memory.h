@@ -19,9 +19,10 @@ namespace ist {
 
 /// What a memory knows beside its voxels.
 struct KnownSpace {
-  Eigen::AlignedBox3d robot;  ///< [m] holds the robot as it was last noted, in the memory's frame M
+  VoxelBoxes links;  ///< [m] each holds a link as it was last noted, in the memory's frame M
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< M -> fixed frame, at the last cloud
   double stamp = 0.0;                                      ///< [s] of the last cloud
+  std::string frame;                                       ///< tf's name of M
 };
 
 /// What one source remembers (~memory): its clouds go into a MemoryMap in the source's thread,
@@ -66,6 +67,7 @@ class SourceMemory {
                                                           const) const;
   void publish_when_due(const ros::Time& stamp);
   std::string shortage() const;
+  std::string frame() const;
 
   const SourceConfig config_;
   const TransformBuffer& buffer_;
@@ -83,8 +85,8 @@ class SourceMemory {
   mutable std::mutex mutex_;  ///< guards the members below
   MemoryMap map_, body_;
   Eigen::Isometry3d X_MF_ = Eigen::Isometry3d::Identity();
-  Eigen::AlignedBox3d robot_;  ///< [m] in M
-  double stamp_ = 0.0;         ///< [s] of the last cloud
+  VoxelBoxes links_;    ///< [m] each holds a link, in M
+  double stamp_ = 0.0;  ///< [s] of the last cloud
   MemoryCounts counts_;
   std::string problem_, file_problem_;
   double took_ = 0.0;  ///< [s] of the last cloud

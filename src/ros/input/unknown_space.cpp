@@ -6,8 +6,10 @@
 #include <chrono>
 
 #include "ros/common/exceptions.h"
+#include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
 #include "ros/common/thread_name.h"
+#include "ros/input/unseen_markers.h"
 
 namespace ist {
 namespace {
@@ -20,11 +22,16 @@ constexpr double kWorkingShare = 0.25;
 // One million boxes take 0.5 s and 150 MB. Where there are more, the region becomes smaller.
 constexpr std::size_t kMaxBoxes = 1000000;
 constexpr double kSmaller = 0.8;
+constexpr std::chrono::milliseconds kPublicationPeriod(500);
 
 }  // namespace
 
-UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range)
-    : memories_(std::move(memories)), range_(range) {
+UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range,
+                                     const ros::Publisher& publisher, double drawn_range)
+    : memories_(std::move(memories)),
+      range_(range),
+      publisher_(publisher),
+      drawn_range_(drawn_range) {
   for (const auto& memory : memories_) skin_ = std::max(skin_, memory->skin());
   thread_ = std::thread(&UnknownSpaceWatch::run, this);
 }
@@ -65,17 +72,20 @@ void UnknownSpaceWatch::run() {
   }
 }
 
-std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() const {
+std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
   auto snapshot = std::make_shared<UnknownSnapshot>();
+  KnownSpace all;
   Eigen::AlignedBox3d robot;
   bool any = false;
   for (const auto& memory : memories_) {
     KnownSpace known;
     if (!memory->add_to(&snapshot->seen, &known)) continue;
     any = true;
-    robot.extend(known.robot);
+    for (const Eigen::AlignedBox3d& link : known.links) robot.extend(link);
+    all.links.insert(all.links.end(), known.links.begin(), known.links.end());
     snapshot->cloud.X_FM = known.X_FM;
     snapshot->cloud.stamp = std::max(snapshot->cloud.stamp, known.stamp);
+    all.frame = known.frame;
   }
   if (!any || robot.isEmpty()) return nullptr;
   double radius = 0.5 * robot.diagonal().norm() + range_ + kMotion;
@@ -88,7 +98,17 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() const {
   snapshot->cloud.boxes = index;
   snapshot->cloud.region.center_F = snapshot->cloud.X_FM * robot.center();
   snapshot->cloud.region.radius = radius;
+  publish_when_due(boxes, all);
   return snapshot;
+}
+
+void UnknownSpaceWatch::publish_when_due(const VoxelBoxes& boxes, const KnownSpace& known) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_publication_ || publisher_.getNumSubscribers() == 0) return;
+  next_publication_ = now + kPublicationPeriod;
+  std_msgs::Header header;  // its stamp is 0, so rviz takes the newest transform
+  header.frame_id = known.frame;
+  publish_message(publisher_, unseen_markers(boxes, known.links, drawn_range_, header));
 }
 
 }  // namespace ist

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <ros/publisher.h>
+
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -26,7 +29,10 @@ class UnknownSpaceWatch {
  public:
   /// @param memories  with the same resolution and frame
   /// @param range     [m] farther from the robot nothing is asked
-  UnknownSpaceWatch(SourceMemories memories, double range);
+  /// @param publisher  of a MarkerArray that shows the boxes, while somebody listens
+  /// @param drawn_range  [m] farther from the robot no boxes are drawn
+  UnknownSpaceWatch(SourceMemories memories, double range, const ros::Publisher& publisher,
+                    double drawn_range);
   ~UnknownSpaceWatch();
   UnknownSpaceWatch(const UnknownSpaceWatch&) = delete;
   UnknownSpaceWatch& operator=(const UnknownSpaceWatch&) = delete;
@@ -42,10 +48,14 @@ class UnknownSpaceWatch {
 
  private:
   void run();
-  std::shared_ptr<const UnknownSnapshot> look() const;
+  std::shared_ptr<const UnknownSnapshot> look();
+  void publish_when_due(const VoxelBoxes& boxes, const KnownSpace& known);
 
   const SourceMemories memories_;
   const double range_;
+  const ros::Publisher publisher_;
+  const double drawn_range_;
+  std::chrono::steady_clock::time_point next_publication_;  ///< used by the thread alone
   double skin_ = 0.0;
   SnapshotChannel<std::shared_ptr<const UnknownSnapshot>> channel_;
   mutable std::mutex mutex_;

@@ -91,6 +91,24 @@ void ProximityMarkers::draw_link(const LinkMessage& link, int id,
   }
 }
 
+/// The line ends in a cube, as unknown space is made of voxels.
+void ProximityMarkers::draw_unseen(const MarkerScene::UnseenLine& unseen,
+                                   std::vector<Marker>* markers) const {
+  const std_msgs::ColorRGBA grey = nearness_color(std::nan(""), max_distance_);
+  Marker line = marker("unseen", static_cast<int>(unseen.link), Marker::LINE_LIST);
+  scale(kLineWidth, 0, 0, &line);
+  line.color = grey;
+  line.points.resize(2);
+  assign(unseen.p_FCo, &line.points[0]);
+  assign(unseen.p_FCl, &line.points[1]);
+  markers->push_back(line);
+  Marker end = marker("unseen_end", static_cast<int>(unseen.link), Marker::CUBE);
+  scale(kPointSize, kPointSize, kPointSize, &end);
+  end.color = grey;
+  assign(unseen.p_FCo, &end.pose.position);
+  markers->push_back(end);
+}
+
 void ProximityMarkers::draw_labels(const std::vector<LinkMessage>& links,
                                    std::vector<Marker>* markers) const {
   std::vector<std::size_t> order;
@@ -151,15 +169,16 @@ void ProximityMarkers::place_list(const Eigen::AlignedBox3d& robot) {
 }
 
 MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximity,
-                                   const Eigen::AlignedBox3d& robot) {
+                                   const MarkerScene& scene) {
   header_ = proximity.header;
-  place_list(robot);
+  place_list(scene.robot);
   MarkerArray result;
   for (std::size_t i = 0; i < proximity.links.size(); ++i) {
     if (proximity.links[i].state >= LinkMessage::NEAR) {
       draw_link(proximity.links[i], static_cast<int>(i), &result.markers);
     }
   }
+  for (const MarkerScene::UnseenLine& unseen : scene.unseen) draw_unseen(unseen, &result.markers);
   draw_labels(proximity.links, &result.markers);
   draw_nearest(proximity, &result.markers);
 

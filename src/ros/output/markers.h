@@ -15,9 +15,21 @@
 
 namespace ist {
 
+/// What is drawn beside a ProximityArray, in its frame.
+struct MarkerScene {
+  /// The closest points of a link and of unknown space.
+  struct UnseenLine {
+    std::size_t link;  ///< place in the array
+    Eigen::Vector3d p_FCl, p_FCo;
+  };
+  Eigen::AlignedBox3d robot;  ///< [m] encloses the robot; empty where it is not known
+  std::vector<UnseenLine> unseen;
+};
+
 /// Draws a ProximityArray for rviz, in its own frame. Namespaces: "distance" (line from obstacle to
 /// link), "point_on_link", "point_on_obstacle", "repulsion" (violet arrow) and "text" (name and
-/// distance of the nearest links within 0.3 m); the id is the link's place in the array.
+/// distance of the nearest links within 0.3 m), "unseen" (grey line from a link to the nearest
+/// unknown space); the id is the link's place in the array.
 /// "nearest" has the ids 0 (the nearest link's distance as a large number, or why it is not known),
 /// 1 and 2 (its line and its point, highlighted). The number and below it the labels, the nearest
 /// first, are a list above the robot: none lies over another or over the robot in a view from the
@@ -34,9 +46,8 @@ class ProximityMarkers {
   void set_counts(const std::vector<bool>& counts) { counts_ = counts; }
 
   /// Draws every link that is NEAR or CONTACT, and deletes the other markers of the last call.
-  /// @param robot  [m] encloses the robot in the message's frame; empty where it is not known
   visualization_msgs::MarkerArray draw(const ist_proximity::ProximityArray& proximity,
-                                       const Eigen::AlignedBox3d& robot);
+                                       const MarkerScene& scene);
 
  private:
   using Key = std::pair<std::string, int>;  // namespace and id
@@ -44,6 +55,8 @@ class ProximityMarkers {
   visualization_msgs::Marker marker(const std::string& ns, int id, int type) const;
   void draw_link(const ist_proximity::LinkProximity& link, int id,
                  std::vector<visualization_msgs::Marker>* markers) const;
+  void draw_unseen(const MarkerScene::UnseenLine& unseen,
+                   std::vector<visualization_msgs::Marker>* markers) const;
   void draw_labels(const std::vector<ist_proximity::LinkProximity>& links,
                    std::vector<visualization_msgs::Marker>* markers) const;
   void draw_nearest(const ist_proximity::ProximityArray& proximity,

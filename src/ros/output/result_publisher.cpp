@@ -23,7 +23,7 @@ bool ResultPublisher::publish(
     const ist_proximity::ProximityArrayConstPtr& result,
     const ist_proximity::ProximityArrayConstPtr& self, const SpeedScaleConfig& speed_scale,
     const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion,
-    const std::function<Eigen::AlignedBox3d()>& robot_box) {
+    const std::function<MarkerScene()>& scene) {
   summary_.publish(*result, self.get(), speed_scale, ros::Time::now());
   publish_message(proximity_, result);
   if (joint_repulsion_.getNumSubscribers() > 0) {
@@ -38,7 +38,7 @@ bool ResultPublisher::publish(
   const auto now = std::chrono::steady_clock::now();
   if (markers_.getNumSubscribers() == 0 || now < next_markers_) return false;
   next_markers_ = now + kMarkerPeriod;
-  publish_message(markers_, marker_drawer_.draw(*result, robot_box()));
+  publish_message(markers_, marker_drawer_.draw(*result, scene()));
   return true;
 }
 

@@ -5,7 +5,6 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 
-#include <Eigen/Geometry>
 #include <chrono>
 #include <functional>
 
@@ -34,14 +33,13 @@ class ResultPublisher {
   /// @param fill_joint_repulsion  fills the message for the same result; called only while the
   /// topic
   ///                              has subscribers, because Jacobians cost time
-  /// @param robot_box             encloses the robot in the fixed frame, empty where it is not
-  ///                              known; called only while markers are drawn
+  /// @param scene                 in the fixed frame; called only while markers are drawn
   /// @returns whether markers were drawn
   bool publish(const ist_proximity::ProximityArrayConstPtr& result,
                const ist_proximity::ProximityArrayConstPtr& self,
                const SpeedScaleConfig& speed_scale,
                const std::function<void(ist_proximity::JointRepulsion*)>& fill_joint_repulsion,
-               const std::function<Eigen::AlignedBox3d()>& robot_box);
+               const std::function<MarkerScene()>& scene);
 
  private:
   ros::Publisher proximity_, joint_repulsion_, markers_;
