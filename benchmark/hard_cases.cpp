@@ -117,13 +117,16 @@ void print(std::FILE* csv, const HardScene& scene, const Setting& setting, doubl
   const char* asked = name_of(s.is_cold ? Asked::kCold : Asked::kWarm);
   const double width = 1e3 * quantile(s.width, 0.5), width_p90 = 1e3 * quantile(s.width, 0.9);
   const double late = quantile(s.overrun_us, 0.999), latest = quantile(s.overrun_us, 1.0);
+  std::string free = "all in contact";
+  if (s.free_links > 0) {
+    const std::size_t percent = 100 * s.proven_free / s.free_links;
+    free = std::to_string(percent) + " % of " + std::to_string(s.free_links);
+  }
   std::printf(
-      "| %s | %s | %zu | %g | %g | %s | %g %% | %.0f | %.1f %% | %zu of %zu | %.2f / %.2f | "
+      "| %s | %s | %zu | %g | %g | %s | %g %% | %.0f | %s | %zu of %zu | %.2f / %.2f | "
       "%.1f / %.1f | %zu |\n",
       scene.name.c_str(), scene.link.c_str(), setting.points, 1e3 * setting.noise,
-      1e3 * setting.tolerance, asked, 1e2 * s.share, quantile(s.full_us, 0.5),
-      100.0 * static_cast<double>(s.proven_free) /
-          static_cast<double>(std::max<std::size_t>(1, s.free_links)),
+      1e3 * setting.tolerance, asked, 1e2 * s.share, quantile(s.full_us, 0.5), free.c_str(),
       s.unknown, s.links, width, width_p90, late, latest, s.wrong);
   std::fflush(stdout);
   if (csv == nullptr) return;

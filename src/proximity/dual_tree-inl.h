@@ -7,6 +7,7 @@
 #define IST_PROXIMITY_DUAL_TREE_INL_H
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -41,13 +42,19 @@ struct LeafPair {
   const PlaneFrame& planes;
 };
 
+// Lower bounds of a tile's points.
+struct TileBound {
+  float least;  // [m]
+  float cover;  // [m] of cover distances, where `least` may be more and the link has holes
+};
+
 // A visitor has
 //   float Limit() const;                      pairs whose bound is not below it are pruned
 //   bool IsSettled() const;                   nothing that is left can matter
 //   bool Stops(node_pairs, PlaneFrame*);      called before each expansion: the search ends
 //   float BoundOfBox(const Pair&, radius);    a bound that prunes the pair, or -inf
 //   kHasExtent, float LargestRadius(const Pair&)   where obstacles have a radius, see Radius()
-//   float Visit(const LeafPair<Tile>&);       returns the least lower bound of the tile's points
+//   TileBound Visit(const LeafPair<Tile>&);   returns the least lower bound of the tile's points
 //   float pruned_bound                        [m] least bound of what it pruned itself
 template <class Visitor, class Bvh>
 class DualTree {
@@ -73,6 +80,7 @@ class DualTree {
   }
 
   float pruned_bound() const { return pruned_bound_; }
+  float cover_bound() const { return cover_bound_; }
   bool stopped() const { return stopped_; }
   std::uint64_t node_pairs() const { return node_pairs_; }
   std::uint64_t leaf_pairs() const { return leaf_pairs_; }
@@ -150,32 +158,40 @@ class DualTree {
               [stored](std::int32_t a, std::int32_t b) { return stored[a] < stored[b]; });
     for (std::size_t i = 0; i < count; ++i) {
       const float bound = stored[pairs[i]] - front_->offset();
-      if (stopped_ || !(bound < visitor_.Limit())) {
-        Prune(bound);
+      const float cover = front_->stored_cover_bounds()[pairs[i]] - front_->offset();
+      const bool is_outside = cover > in_.inside_bound;
+      if (stopped_ || (is_outside && !(bound < visitor_.Limit()))) {
+        Prune(is_outside ? bound : std::min(bound, cover));
+        cover_bound_ = std::min(cover_bound_, cover);
         continue;
       }
-      Reopen(pairs[i], bound);
+      Reopen(pairs[i], std::min(bound, cover));
       Traverse();
       if (is_cut_short_ && !stopped_) return;
     }
   }
 
-  // The pairs whose stored bound is below the limit; the least bound of the others is pruned.
+  // The pairs whose stored bound is below the limit, and those whose points may have come inside
+  // through a hole; the least bound of the others is pruned.
   std::size_t FindOpenPairs(std::int32_t* pairs) {
     const BoxTag d;
     const float offset = front_->offset();
     const auto limit = hn::Set(d, std::min(visitor_.Limit() + offset, kFarAway));
-    auto pruned = hn::Set(d, kFarAway);
+    const auto inside_limit = hn::Set(d, in_.inside_bound + offset);
+    auto pruned = hn::Set(d, kFarAway), covers = pruned;
     std::size_t count = 0;
     for (std::size_t i = 0; i < front_->size(); i += hn::Lanes(d)) {
       const auto stored = hn::LoadU(d, front_->stored_bounds() + i);
-      const auto is_open = hn::Lt(stored, limit);
+      const auto cover = hn::LoadU(d, front_->stored_cover_bounds() + i);
+      const auto is_open = hn::Or(hn::Lt(stored, limit), hn::Le(cover, inside_limit));
       pruned = hn::Min(pruned, hn::IfThenElse(is_open, pruned, stored));
+      covers = hn::Min(covers, hn::IfThenElse(is_open, covers, cover));
       for (std::uint32_t bits = MaskBits(d, is_open); bits != 0; bits &= bits - 1) {
         pairs[count++] = static_cast<std::int32_t>(i + hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
       }
     }
     Prune(hn::GetLane(hn::MinOfLanes(d, pruned)) - offset);
+    cover_bound_ = hn::GetLane(hn::MinOfLanes(d, covers)) - offset;
     return count;
   }
 
@@ -328,8 +344,24 @@ class DualTree {
         BoundBoxChildren(pair, box_nodes_[pair.box], SupportOfSlot(pair.sphere_slot), planes_,
                          in_.rounding, Limit(radius), expanded, bound);
     PruneChildren(front_index, Less(children.pruned_bound, radius));
-    PushChildren(pair, front_index, children.bits, bound,
-                 [&](int k, Pair* child) { SetBox(pair.box * kBoxWidth + k, child); });
+    PushChildren(pair, front_index, children.bits, bound, [&](int k, Pair* child) {
+      SetBox(pair.box * kBoxWidth + k, child);
+      Prefetch(child->box);
+    });
+  }
+
+  // Fetches what a child's expansion will look at: indices are larger than the fastest caches.
+  HWY_INLINE void Prefetch(std::int32_t box) const {
+    if (box < 0) {
+      PrefetchLines(in_.bvh->place_of_tile(static_cast<std::size_t>(~box)),
+                    sizeof(typename Bvh::Tile));
+    } else {
+      PrefetchLines(&box_nodes_[box], sizeof(BoxNode));
+    }
+  }
+  static HWY_INLINE void PrefetchLines(const void* begin, std::size_t size) {
+    const auto* bytes = static_cast<const char*>(begin);
+    for (std::size_t i = 0; i < size; i += 64) hwy::Prefetch(bytes + i);
   }
 
   HWY_INLINE void VisitLeaves(const Pair& pair, float radius) {
@@ -341,9 +373,11 @@ class DualTree {
     typename Bvh::Tile scratch;
     const typename Bvh::Tile& tile = in_.bvh->tile(static_cast<std::size_t>(~pair.box), &scratch);
     const float plane_offset = planes_.offset() + SupportOfSlot(pair.sphere_slot);
-    const float least = visitor_.Visit(LeafPair<typename Bvh::Tile>{
+    const TileBound bound = visitor_.Visit(LeafPair<typename Bvh::Tile>{
         leaf, tile, ~pair.sphere, ~pair.box, centers, plane_offset, radius, planes_});
-    if (front_index >= 0) front_->prune(front_index, Less(least, radius));
+    if (front_index < 0) return;
+    front_->prune(front_index, Less(bound.least, radius));
+    if (bound.cover < kFarAway) front_->keep_cover_bound(front_index, bound.cover);
   }
 
   const DualTreeInput<Bvh>& in_;
@@ -354,6 +388,7 @@ class DualTree {
   BvttFront* front_;
   PlaneFrame planes_;
   float pruned_bound_ = std::numeric_limits<float>::infinity();
+  float cover_bound_ = std::numeric_limits<float>::infinity();  // see DualTreeResult
   std::uint64_t node_pairs_ = 0, leaf_pairs_ = 0;
   bool front_is_full_ = false;
   bool is_cut_short_ = false;  // the stack was not emptied

@@ -74,7 +74,7 @@ class RefiningVisitor {
   }
 
   template <class Tile>
-  HWY_INLINE float Visit(const LeafPair<Tile>& pair) {
+  HWY_INLINE TileBound Visit(const LeafPair<Tile>& pair) {
     const BoxTag d;
     alignas(64) float bound[kBoxWidth];
     float visit_limit = Limit();
@@ -87,17 +87,18 @@ class RefiningVisitor {
       hn::Store(least, d, bound + k);
     }
     if (is_near) ClipSpheres(pair, bound);
-    auto least = hn::Load(d, bound);
-    for (std::size_t k = hn::Lanes(d); k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
-      least = hn::Min(least, hn::Load(d, bound + k));
+    const float least = Least(bound);
+    if (!is_near) {
+      Prune(least, pair.radius);
+      return {least, kFarAway};
     }
-    const float least_bound = hn::GetLane(hn::MinOfLanes(d, least));
-    if (is_near) {
-      RefineTile(pair.tile_index, pair.tile.count, bound, pair.radius);
-    } else {
-      Prune(least_bound, pair.radius);
+    RefineTile(pair.tile_index, pair.tile.count, bound, pair.radius);
+    if constexpr (Policy::kBoundsPoints) {
+      const float refined = Least(bound);
+      if (!policy_.has_holes()) return {refined, kFarAway};
+      if (least > in_.inside_bound && refined > least) return {refined, least};
     }
-    return least_bound;
+    return {least, kFarAway};
   }
 
   float pruned_bound() const { return pruned_bound_; }
@@ -111,6 +112,15 @@ class RefiningVisitor {
   HWY_INLINE void Prune(float bound, float radius) {
     if constexpr (kHasExtent) bound -= radius;
     pruned_bound_ = std::min(pruned_bound_, bound);
+  }
+
+  static HWY_INLINE float Least(const float* bound) {
+    const BoxTag d;
+    auto least = hn::Load(d, bound);
+    for (std::size_t k = hn::Lanes(d); k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
+      least = hn::Min(least, hn::Load(d, bound + k));
+    }
+    return hn::GetLane(hn::MinOfLanes(d, least));
   }
 
   // Raises the bounds to those of the clipped spheres.
@@ -146,22 +156,25 @@ class RefiningVisitor {
     }
   }
 
-  // The most promising point first: it may spare the others.
-  void RefineTile(std::int32_t tile, int count, const float* bound, float radius) {
+  // The most promising point first: it may spare the others. Bounds are raised to what is known of
+  // the points then.
+  void RefineTile(std::int32_t tile, int count, float* bound, float radius) {
     int first = 0;
     for (int k = 1; k < count; ++k) first = bound[k] < bound[first] ? k : first;
-    RefinePoint(tile, first, bound[first], radius);
+    RefinePoint(tile, first, &bound[first], radius);
     for (int k = 0; k < count; ++k) {
-      if (k != first) RefinePoint(tile, k, bound[k], radius);
+      if (k != first) RefinePoint(tile, k, &bound[k], radius);
     }
   }
 
-  HWY_INLINE void RefinePoint(std::int32_t tile, int k, float bound, float radius) {
+  HWY_INLINE void RefinePoint(std::int32_t tile, int k, float* known, float radius) {
+    const float bound = *known;
     const bool is_near = bound <= in_.inside_bound;
     if (is_near && !policy_.is_outside(tile, k)) {
       may_be_inside_ = true;
     } else if (is_near || bound < PruneBound(radius)) {
       const float prune_bound = policy_.refine(tile, k, bound);
+      if constexpr (Policy::kBoundsPoints) *known = std::max(bound, policy_.refined_bound());
       if (prune_bound < prune_bound_) {
         prune_bound_ = prune_bound;
         next_planes_ = node_pairs_ + kPairsBeforePlanes;
@@ -194,7 +207,7 @@ class InnerVisitor {
   }
 
   template <class Tile>
-  HWY_INLINE float Visit(const LeafPair<Tile>& pair) {
+  HWY_INLINE TileBound Visit(const LeafPair<Tile>& pair) {
     const BoxTag d;
     alignas(64) float distance[kBoxWidth];
     for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
@@ -207,7 +220,7 @@ class InnerVisitor {
       nearest_.lane = k;
       nearest_.leaf = pair.leaf_index;
     }
-    return nearest_.distance;
+    return {nearest_.distance, kFarAway};
   }
 
   const NearestToInnerSpheres& nearest() const { return nearest_; }
@@ -223,8 +236,12 @@ DualTreeResult Search(const DualTreeInput<Bvh>& input, Policy* policy) {
   Visitor visitor(input, policy);
   DualTree<Visitor, Bvh> traversal(input, &visitor);
   traversal.Run();
-  return {std::min(traversal.pruned_bound(), visitor.pruned_bound()), visitor.may_be_inside(),
-          traversal.stopped(), traversal.node_pairs(), traversal.leaf_pairs()};
+  return {std::min(traversal.pruned_bound(), visitor.pruned_bound()),
+          traversal.cover_bound(),
+          visitor.may_be_inside(),
+          traversal.stopped(),
+          traversal.node_pairs(),
+          traversal.leaf_pairs()};
 }
 
 }  // namespace dual_tree

@@ -37,6 +37,8 @@ struct DualTreeInput {
 
 struct DualTreeResult {
   float pruned_bound = std::numeric_limits<float>::infinity();  ///< [m] least of all pruned pairs
+  /// [m] Least cover distance of points that were pruned by more than their cover distances.
+  float cover_bound = std::numeric_limits<float>::infinity();
   bool may_be_inside = false;  ///< some point's lower bound is at most `inside_bound`
   bool stopped = false;        ///< by the policy; `pruned_bound` bounds what was left
   std::uint64_t node_pairs = 0, leaf_pairs = 0;  ///< expanded
@@ -55,6 +57,10 @@ struct DualTreeResult {
 ///   changed bool deadline_passed();
 ///   bool is_crowded(std::uint64_t node_pairs);  // too many points had to be measured: the
 ///   traversal is stopped
+///   kBoundsPoints  // whether there is refined_bound(): [m] a lower bound of the distance to the
+///                  // whole link of the point that refine() got last, which is outside; -inf:
+///                  none.
+///                  // Then also bool has_holes()
 ///   kHasExtent   // whether obstacles are spheres about points, or boxes that are larger on all
 ///   sides, for which
 ///   float largest_radius(std::int32_t slot, const float* min, const float* max);

@@ -74,7 +74,7 @@ struct ExtentSearch {
 /// traversal with extents. Functions neither allocate nor throw.
 class PointExtentRefinement {
  public:
-  static constexpr bool kHasExtent = true;
+  static constexpr bool kHasExtent = true, kBoundsPoints = false;
 
   PointExtentRefinement(const PointObstacles& obstacles, const LinkExtent& extent,
                         LinkQueryState* link, ExtentSearch* search);
@@ -121,7 +121,7 @@ class PointExtentRefinement {
 /// The same for boxes, which have one extent in common.
 class BoxExtentRefinement {
  public:
-  static constexpr bool kHasExtent = true;
+  static constexpr bool kHasExtent = true, kBoundsPoints = false;
 
   BoxExtentRefinement(const BoxObstacles& obstacles, double extent, LinkQueryState* link,
                       ExtentSearch* search);

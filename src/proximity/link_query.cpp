@@ -350,6 +350,8 @@ DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   search.statistics->leaf_pairs += found.leaf_pairs;
   if (is_crowded(found)) return found;  // another search follows
   search.prune(static_cast<double>(found.pruned_bound) - search.rounding);
+  search.cover_bound =
+      std::min(search.cover_bound, static_cast<double>(found.cover_bound) - search.rounding);
   if (found.may_be_inside) search.cover_bound = -kInfinity;
   return found;
 }

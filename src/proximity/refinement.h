@@ -15,7 +15,7 @@ namespace ist {
 /// allocate nor throw.
 class PointRefinement {
  public:
-  static constexpr bool kHasExtent = false;
+  static constexpr bool kHasExtent = false, kBoundsPoints = true;
 
   PointRefinement(const PointObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
@@ -42,6 +42,9 @@ class PointRefinement {
   /// @param lower_bound  [m] by the clipped cover spheres
   /// @returns [m] the new prune bound
   float refine(std::int32_t tile, int lane, float lower_bound);
+  /// [m] A lower bound of the distance of the point that refine() got last; -inf: none is known.
+  float refined_bound() const { return refined_bound_; }
+  bool has_holes() const { return !link_.context.solid().is_closed(); }
   /// Calls update_supporting_planes().
   bool update_planes(SupportingPlanes* planes);
   bool deadline_passed() { return link_.search.deadline->passed(); }
@@ -63,6 +66,7 @@ class PointRefinement {
  private:
   const PointObstacles& obstacles_;
   LinkQueryState& link_;
+  float refined_bound_ = -std::numeric_limits<float>::infinity();
 };
 
 /// The same for solid boxes. While a box is outside the link, its distance is exact: triangle
@@ -70,7 +74,7 @@ class PointRefinement {
 /// outside as a whole; if the mesh has holes, the winding number at the box's centre decides.
 class BoxRefinement {
  public:
-  static constexpr bool kHasExtent = false;
+  static constexpr bool kHasExtent = false, kBoundsPoints = false;
 
   BoxRefinement(const BoxObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}

@@ -26,18 +26,21 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
   const ObstacleId id{tile, lane};
   const bool is_late = deadline_passed();
-  if (!is_late && !search.visited.insert(id.key())) return search.traversal_prune_bound();
+  const bool was_visited = !is_late && !search.visited.insert(id.key());
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
   const double kept = link_.kept.distances.find(DistanceCache::Quantity::kUnsigned,
                                                 coherent_key(obstacles_, id), p_LQ);
+  refined_bound_ = round_down(kept);
+  if (was_visited) return search.traversal_prune_bound();
   const double bound = std::max(kept, grid_bound({p_LQ}, search.prune_bound()).surface_distance);
   if (bound >= search.prune_bound()) {
     search.prune(bound);
+    refined_bound_ = round_down(bound);
   } else if (is_late) {
     // The bound is that of one part of the link; the others are in pairs of their own.
     search.prune(static_cast<double>(lower_bound) - search.rounding);
   } else {
-    measure_outside(id, p_OQ, p_LQ);
+    refined_bound_ = round_down(measure_outside(id, p_OQ, p_LQ));
   }
   return search.traversal_prune_bound();
 }

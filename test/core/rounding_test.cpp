@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/geometry/float_rounding.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/trial.h"
@@ -41,6 +42,26 @@ std::vector<Point> two_sides(const Point& center, double radius, double spread, 
     points.push_back(center + (distance + test::uniform(rng, 0, spread)) * direction);
   }
   return points;
+}
+
+// The nearest float on the right side of a number, as std::nextafter() says it.
+TEST(FloatRounding, IsThatOfNextAfter) {
+  test::Rng rng(91);
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  constexpr float kMax = std::numeric_limits<float>::max();
+  std::vector<double> values = {0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-45, -1e-45, kInf, -kInf};
+  for (int i = 0; i < 20000; ++i) {
+    values.push_back(test::uniform(&rng, -1.0, 1.0) * std::pow(10.0, test::uniform(&rng, -44, 37)));
+    values.push_back(static_cast<float>(values.back()));
+  }
+  for (const double value : values) {
+    const auto nearest = static_cast<float>(value);
+    const float up = nearest >= value ? nearest : std::nextafter(nearest, kMax);
+    const float down = nearest <= value ? nearest : std::nextafter(nearest, -kMax);
+    ASSERT_EQ(round_up(value), up) << value;
+    ASSERT_EQ(round_down(value), down) << value;
+  }
+  EXPECT_TRUE(std::isnan(round_up(std::numeric_limits<double>::quiet_NaN())));
 }
 
 TEST(Rounding, NoLowerBoundIsAboveTheTruthFarFromTheOrigin) {

@@ -98,7 +98,7 @@ struct QueryStatistics {
 ///
 /// Working memory is about 670 kB a link: 320 kB of signed distances about the link, 220 kB of
 /// bounds of boxes and points (150 kB more for a mesh with holes), 96 kB of distances of points,
-/// 32 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node of its tree.
+/// 40 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node of its tree.
 class ProximityQuery {
  public:
   /// @param model  shared with the caller; not null

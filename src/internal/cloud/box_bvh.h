@@ -39,6 +39,7 @@ class BoxBvh {
   const std::vector<BoxTile>& tiles() const { return tiles_; }
   using Tile = BoxTile;
   const BoxTile& tile(std::size_t i, BoxTile* /*scratch*/) const { return tiles_[i]; }
+  const BoxTile* place_of_tile(std::size_t i) const { return &tiles_[i]; }
   std::uint64_t build_id() const { return build_id_; }  ///< 0 before the first build
 
  private:

@@ -17,10 +17,13 @@ constexpr std::uint64_t kInUse = 32;
 
 }  // namespace
 
-BvttFront::BvttFront() : pairs_(kMaxPairs), bounds_(kMaxPairs, kFarAway) {}
+BvttFront::BvttFront()
+    : pairs_(kMaxPairs), bounds_(kMaxPairs, kFarAway), cover_bounds_(kMaxPairs, kFarAway) {}
 
 void BvttFront::clear() {
-  std::fill(bounds_.begin(), bounds_.begin() + static_cast<std::ptrdiff_t>(size_), kFarAway);
+  for (std::vector<float>* bounds : {&bounds_, &cover_bounds_}) {
+    std::fill(bounds->begin(), bounds->begin() + static_cast<std::ptrdiff_t>(size_), kFarAway);
+  }
   size_ = first_size_ = 0;
   displacement_ = 0.0;
 }

@@ -20,6 +20,11 @@ namespace ist {
 /// Stored bounds are relative to the front's first pose: the displacement since then is added when
 /// one is stored and subtracted when it is read. So one number updates all of them. It is a sum of
 /// displacements between successive poses, which is never below the displacement of any point.
+///
+/// Below a pair of leaves nothing is expanded, but its points may be known to be farther from the
+/// whole link than their cover distances say: exact distances are stored as its bound. If the link
+/// is a mesh with holes, such points must also stay outside, and the pair keeps their least cover
+/// distance beside it (see stays_outside()).
 class BvttFront {
  public:
   struct Pair {
@@ -52,6 +57,9 @@ class BvttFront {
 
   /// [m] By pair, as stored: kFarAway where nothing was pruned, and beyond size().
   const float* stored_bounds() const { return bounds_.data(); }
+  /// [m] The least cover distance of points whose stored bound says more than that; kFarAway where
+  /// there are none.
+  const float* stored_cover_bounds() const { return cover_bounds_.data(); }
   /// [m] What is added to a bound of this traversal when it is stored.
   float offset() const { return offset_; }
 
@@ -69,18 +77,27 @@ class BvttFront {
     float& stored = bounds_[static_cast<std::size_t>(i)];
     stored = bound + offset_ < stored ? bound + offset_ : stored;
   }
+  /// What was pruned below the pair are points outside a mesh with holes, whose cover distance is
+  /// at least this [m].
+  void keep_cover_bound(std::int32_t i, float bound) {
+    float& stored = cover_bounds_[static_cast<std::size_t>(i)];
+    stored = bound + offset_ < stored ? bound + offset_ : stored;
+  }
   /// The pair is expanded once more: nothing is pruned below it for now.
-  void reopen(std::int32_t i) { bounds_[static_cast<std::size_t>(i)] = kFarAway; }
+  void reopen(std::int32_t i) {
+    bounds_[static_cast<std::size_t>(i)] = cover_bounds_[static_cast<std::size_t>(i)] = kFarAway;
+  }
 
   std::size_t memory() const {  ///< [bytes]
-    return pairs_.capacity() * sizeof(Pair) + bounds_.capacity() * sizeof(float);
+    return pairs_.capacity() * sizeof(Pair) +
+           (bounds_.capacity() + cover_bounds_.capacity()) * sizeof(float);
   }
 
  private:
   void clear();
 
   std::vector<Pair> pairs_;
-  std::vector<float> bounds_;
+  std::vector<float> bounds_, cover_bounds_;
   std::size_t size_ = 0, first_size_ = 0;
   std::uint64_t build_id_ = 0;
   Eigen::Isometry3d X_OL_ = Eigen::Isometry3d::Identity();
