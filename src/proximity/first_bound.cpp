@@ -37,11 +37,12 @@ class Search {
  public:
   explicit Search(const PosedSpheres& spheres) : spheres_(spheres) {}
 
-  float Run(const BoxNode* nodes, std::int32_t root) {
+  float Run(const BoxNode* nodes, std::int32_t root, Deadline* deadline, double late) {
     Divide(nodes[root]);
     for (int step = 1; step < kMaxSteps && size_ > 0; ++step) {
       const Entry& nearest = queue_[0];
       if (nearest.child < 0 || nearest.size <= kFineEnough * nearest.bound) break;
+      if (deadline != nullptr && deadline->passed_by(late)) break;
       Divide(nodes[Pop().child]);
     }
     return size_ > 0 ? std::min(queue_[0].bound, farthest_) : farthest_;
@@ -89,8 +90,9 @@ class Search {
 
 }  // namespace first_bound
 
-float FirstBound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root) {
-  return first_bound::Search(spheres).Run(nodes, root);
+float FirstBound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root,
+                 Deadline* deadline, double late) {
+  return first_bound::Search(spheres).Run(nodes, root, deadline, late);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -129,8 +131,9 @@ void PosedSpheres::add(const Spheres& spheres, const float* radii, int k,
   radius[count++] = radii[k];
 }
 
-float first_bound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root) {
-  return HWY_DYNAMIC_DISPATCH(FirstBound)(spheres, nodes, root);
+float first_bound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root,
+                  Deadline* deadline, double late) {
+  return HWY_DYNAMIC_DISPATCH(FirstBound)(spheres, nodes, root, deadline, late);
 }
 
 }  // namespace ist

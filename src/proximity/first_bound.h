@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "internal/bvh/box_node.h"
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 
 namespace ist {
@@ -29,7 +30,11 @@ struct PosedSpheres {
 /// any.
 /// @param nodes  of the hierarchy
 /// @param root   index of the node
+/// @param deadline  asked before each division; null: there is none. A search that it stops has a
+///                  bound, though a lower one
+/// @param late      [s] the search may exceed the deadline by so much
 /// @returns [m] rounding is not taken off
-float first_bound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root);
+float first_bound(const PosedSpheres& spheres, const BoxNode* nodes, std::int32_t root,
+                  Deadline* deadline = nullptr, double late = 0.0);
 
 }  // namespace ist

@@ -489,10 +489,11 @@ void LinkQuery::prove_bound(SnapshotSpan clouds, const BoundOfIndex& bound_of_in
 
 // Obstacles that are farther from the cover spheres than the interior gap are outside the link, and
 // so is what is above a supporting plane.
-void LinkQuery::prove_first_bound(SnapshotSpan clouds, bool is_late) {
+void LinkQuery::prove_first_bound(SnapshotSpan clouds, Deadline* deadline, double late) {
   LinkSearch& search = link_.search;
   if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
   auto& last = link_.kept.first_bound;
+  const bool is_late = deadline->has_passed();
   if (last.scene == search.scene && search.scene != kUnknownScene &&
       !(is_late && last.was_proven) &&
       link_.context.displacement.between(last.X_FL, search.X_FL) < kFirstBoundAgain) {
@@ -504,18 +505,20 @@ void LinkQuery::prove_first_bound(SnapshotSpan clouds, bool is_late) {
   const InnerSphereTree& tree = link_.context.tree();
   prove_bound(clouds, [&](const auto& obstacles) {
     const auto by_spheres = [&](bool is_fine) {
-      const auto bound =
-          static_cast<double>(first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine),
-                                          obstacles.bvh->nodes().data(), obstacles.bvh->root()));
+      const auto bound = static_cast<double>(
+          first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine), obstacles.bvh->nodes().data(),
+                      obstacles.bvh->root(), deadline, late));
       const bool is_outside = bound - search.rounding > tree.interior_gap();  // false for NaN
       return is_outside ? bound : -kInfinity;
     };
     const double bound = by_spheres(false);
-    if (bound >= kFineSpheresWithin * tree.radius()) return bound;
+    if (bound >= kFineSpheresWithin * tree.radius() || deadline->passed_by(late)) return bound;
     if (!link_.context.solid().is_closed()) return by_spheres(true);
-    return bound_by_planes(obstacles, nullptr);
+    return bound_by_planes(obstacles, deadline, late);
   });
   last.was_proven = link_.kept.bound.at(search.scene, search.X_FL) > 0.0;
+  // What was cut short is tried again by the next query.
+  if (!last.was_proven && deadline->passed_by(late)) last.scene = kUnknownScene;
 }
 
 void LinkQuery::prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline) {
@@ -527,12 +530,16 @@ void LinkQuery::prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline) {
     return;
   }
   last.by_planes = true;
-  prove_bound(clouds, [&](const auto& obstacles) { return bound_by_planes(obstacles, deadline); });
+  prove_bound(clouds,
+              [&](const auto& obstacles) { return bound_by_planes(obstacles, deadline, {}); });
 }
 
-// @param deadline  null: by the plane across the closest obstacle alone, in a few steps
+// @param late  [s] the search may exceed the deadline by so much, and it is quick: by the plane
+// across
+//              the closest obstacle alone, in a few steps
 template <class Obstacles>
-double LinkQuery::bound_by_planes(const Obstacles& obstacles, Deadline* deadline) {
+double LinkQuery::bound_by_planes(const Obstacles& obstacles, Deadline* deadline,
+                                  std::optional<double> late) {
   const LinkSearch& search = link_.search;
   const InnerSphereTree& tree = link_.context.tree();
   const PosedSpheres spheres(tree, obstacles.X_OL, true);
@@ -546,7 +553,8 @@ double LinkQuery::bound_by_planes(const Obstacles& obstacles, Deadline* deadline
   input.gap = round_up(tree.interior_gap() + search.rounding);
   input.radius = static_cast<float>(tree.radius());
   input.bvh = obstacles.bvh;
-  if (deadline == nullptr) {
+  if (late) {
+    input.late = *late;
     input.max_steps = kQuickSteps;
     input.max_planes = planes.count();
   }

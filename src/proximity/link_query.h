@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "proximity/dual_tree.h"
 #include "proximity/extent_refinement.h"
@@ -43,8 +44,9 @@ class LinkQuery {
   /// again at every step, nor is one that a search will prove more of. It is best after
   /// warm_start(): the plane across the obstacle that was measured may separate the link from all
   /// others.
-  /// @param is_late  no search follows
-  void prove_first_bound(SnapshotSpan clouds, bool is_late);
+  /// @param deadline  if it has passed, no search follows. It is asked at every step
+  /// @param late      [s] it may be exceeded by so much
+  void prove_first_bound(SnapshotSpan clouds, Deadline* deadline, double late);
   /// The same with more time, for links that prove_first_bound() has proven nothing of.
   void prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline);
 
@@ -115,7 +117,8 @@ class LinkQuery {
   template <class BoundOfIndex>
   void prove_bound(SnapshotSpan clouds, const BoundOfIndex& bound_of_index);
   template <class Obstacles>
-  double bound_by_planes(const Obstacles& obstacles, Deadline* deadline);
+  double bound_by_planes(const Obstacles& obstacles, Deadline* deadline,
+                         std::optional<double> late);
   void measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);

@@ -74,7 +74,7 @@ struct ProximityQuery::Impl {
     if (!(config.deadline > 0.0)) return;
     for (const std::size_t i : order) {
       if (deadline->passed_by(kFirstBounds)) break;
-      links[i].prove_first_bound(clouds, deadline->has_passed());
+      links[i].prove_first_bound(clouds, deadline, kFirstBounds);
     }
     for (const std::size_t i : order) {
       if (!deadline->passed()) links[i].prove_bound_by_planes(clouds, deadline);

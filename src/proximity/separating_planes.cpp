@@ -61,7 +61,7 @@ class Search {
       }
       ++steps;
       if (nearest.size <= kFineEnough * nearest.bound ||
-          (deadline != nullptr && deadline->passed())) {
+          (deadline != nullptr && deadline->passed_by(in_.late))) {
         break;
       }
       if (MayMakePlane(nearest)) {

@@ -51,6 +51,7 @@ struct SeparationInput {
   float radius;  ///< [m] of the link: planes are made for boxes that are no larger
   const Bvh* bvh;
   int max_steps = kMaxSeparationSteps, max_planes = SeparatingPlanes::kMax;
+  double late = 0.0;  ///< [s] the deadline may be exceeded by so much
 };
 
 /// A lower bound of the signed distance between a link and all obstacles of an index, by

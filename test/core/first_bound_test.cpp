@@ -155,6 +155,41 @@ TEST_F(NoTime, EveryLinkHasAnObstacleAndABound) {
   EXPECT_GE(proven, 0.9 * free);
 }
 
+// The clock is asked before each division, so that no more than one is made between two looks; a
+// search that is stopped at any of them has a bound that holds, and more time never lowers it.
+TEST(FirstBound, LooksAtTheClockBeforeEachDivision) {
+  constexpr std::int64_t kAsks = 1000;
+  const auto model =
+      test::make_model({Box{{0.2, 0.1, 0.6}}, test::torus(0.2, 0.04, 24, 12)}, 0.005);
+  test::Rng rng(162);
+  std::int64_t most = 0;
+  for (int i = 0; i < test::scaled(300); ++i) {
+    const CloudSnapshot cloud = test::make_snapshot(random_points(&rng, i));
+    const PointBvh& bvh = cloud.index.bvh();
+    const Eigen::Isometry3d X_OL = bvh.X_FO().inverse() * test::random_pose(&rng, 0.4);
+    const PosedSpheres spheres(model->links[static_cast<std::size_t>(i % 2)].tree, X_OL, true);
+    const auto stopped = [&](std::int64_t asks) {
+      Deadline deadline(1e3);
+      Deadline::asks_left_for_test = asks;
+      return first_bound(spheres, bvh.nodes().data(), bvh.root(), &deadline);
+    };
+    const float whole = first_bound(spheres, bvh.nodes().data(), bvh.root());
+    ASSERT_EQ(stopped(kAsks), whole) << "case " << i;
+    const std::int64_t asked = kAsks - Deadline::asks_left_for_test;
+    most = std::max(most, asked);
+    float last = -std::numeric_limits<float>::infinity();
+    for (std::int64_t asks = 0; asks <= asked; ++asks) {
+      const float bound = stopped(asks);
+      ASSERT_GE(bound, last) << "case " << i << ", stopped at question " << asks;
+      ASSERT_LE(bound, whole);
+      last = bound;
+    }
+    ASSERT_EQ(last, whole);
+    Deadline::asks_left_for_test = -1;
+  }
+  EXPECT_GT(most, 1);  // else no search was stopped half-way
+}
+
 // A link in range of nothing is CLEAR, though there is no time to measure anything.
 TEST_F(NoTime, ClearLinksAreClear) {
   QueryConfig config;
