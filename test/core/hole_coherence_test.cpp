@@ -100,5 +100,53 @@ TEST(HoleCoherence, ASecondPointGoesInUnnoticedByTheWarmStart) {
   EXPECT_GT(contacts, 100);
 }
 
+// Asked within 1 m, the front learns that a point above the opening is 0.12 m from every surface.
+// Asked within 0.1 m, with another second source, the search resumes that front and does not visit
+// the point. The link's bound that it proves, 0.1 m, must end where the point may be inside, after
+// some 0.02 m: it would answer for 0.095 m when 5 mm are asked for.
+TEST(HoleCoherence, APointThatOnlyTheFrontHoldsGoesInThroughTheOpening) {
+  test::Rng rng(83);
+  const TriangleMesh mesh = test::open_box({0.2, 0.2, 0.2});
+  const Point out = opening(mesh);
+  const auto model = test::make_model({mesh}, 0.005);
+  const Point side = out.unitOrthogonal();
+  std::vector<LinkProximity> results;
+  int contacts = 0;
+  for (int run = 0; run < test::scaled(100); ++run) {
+    QueryConfig config;
+    config.max_distance = 1.0;
+    config.tolerance = run % 2 == 0 ? 0.0 : 0.001;
+    ProximityQuery query(model, config);
+    const double height = test::uniform(&rng, 0.07, 0.08);  // [m] above the opening
+    std::vector<Point> points(32);
+    for (Point& p : points) p = 0.21 * side + test::random_vector(&rng, 0.002);
+    points.emplace_back((0.1 + height) * out);
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    const CloudSnapshot far = test::make_snapshot({-0.5 * side});
+    const CloudSnapshot far_again = test::make_snapshot({-0.51 * side});
+    const std::vector<Point> stored = test::stored_points(cloud.index);
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud, &far}, &results));
+    config.max_distance = 0.1;
+    query.set_config(config);
+    ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud, &far_again}, &results));
+    config.max_distance = 0.005;
+    query.set_config(config);
+    const double step = std::pow(10.0, test::uniform(&rng, -4, -2));
+    for (double moved = 0.0; moved < height + 0.01; moved += step) {
+      X_FL.translation() = moved * out;
+      ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud, &far_again}, &results));
+      double truth = 1.0;
+      for (const Point& p : stored) {
+        truth = std::min(truth, test::oracle_signed_distance(mesh, p - X_FL.translation()));
+      }
+      ASSERT_LE(results[0].lower_bound, truth) << run << ": after " << moved << " m";
+      ASSERT_EQ(results[0].state == LinkState::kContact, truth < 0.0) << run;
+      contacts += truth < 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(contacts, test::scaled(50));
+}
+
 }  // namespace
 }  // namespace ist
