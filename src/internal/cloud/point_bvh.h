@@ -45,7 +45,7 @@ class PointBvh {
     return flags_.is_loaded(i) ? tiles_[i] : load(i, scratch);
   }
   bool is_loaded(std::size_t i) const { return flags_.is_loaded(i); }  ///< tile i holds its points
-  /// Where a tile is or will be, to be fetched from memory before it is looked at.
+  /// The place of a tile, loaded or not, for prefetching.
   const PointTile* place_of_tile(std::size_t i) const { return &tiles_[i]; }
   Eigen::AlignedBox3f bounds() const { return bounds_; }  ///< [m] in O
   /// [bytes] Reserved; pages of tiles that no query has looked at are not in use.

@@ -27,7 +27,7 @@ std::optional<SceneLayout> scene_layout(const std::string& md5sum);
 
 /// A moveit_msgs/CollisionObject.
 struct SceneObject {
-  /// What is to be done with the object of this name, with the message's numbers.
+  /// The operation on the object of this name, with the message's numbers.
   enum class Operation : std::uint8_t { kAdd, kRemove, kAppend, kMove };
 
   SceneLayout layout = SceneLayout::kObjectPose;
@@ -51,14 +51,14 @@ struct AllowedCollisions {
       const std::string& name, const std::function<bool(const std::string&)>& is_left_out) const;
 };
 
-/// What is read of a moveit_msgs/PlanningScene.
+/// The part of a moveit_msgs/PlanningScene that is read.
 struct PlanningScene {
   bool is_diff = false;              ///< whether objects that it does not name stay
   std::vector<SceneObject> objects;  ///< in the order of the message
   bool has_matrix = false;           ///< whether a matrix is stated, even if it is not used
   AllowedCollisions allowed;
-  /// What the scene holds and nobody measures: an octomap, attached objects, a matrix that is too
-  /// large or not square. Sentences.
+  /// The parts of the scene that nobody measures: an octomap, attached objects, a matrix that is
+  /// too large or not square. Sentences.
   std::vector<std::string> notes;
   std::string fault;  ///< why nothing of it can be used; empty: it can
 };

@@ -21,7 +21,7 @@ namespace ist {
 /// one is stored and subtracted when it is read. So one number updates all of them. It is a sum of
 /// displacements between successive poses, which is never below the displacement of any point.
 ///
-/// Below a pair of leaves nothing is expanded, but its points may be known to be farther from the
+/// A pair of leaves is not expanded, but its points may be known to be farther from the
 /// whole link than their cover distances say: exact distances are stored as its bound. If the link
 /// is a mesh with holes, such points must also stay outside, and the pair keeps their least cover
 /// distance beside it (see stays_outside()).
