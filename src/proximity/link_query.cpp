@@ -517,7 +517,7 @@ void LinkQuery::prove_first_bound(SnapshotSpan clouds, Deadline* deadline, doubl
     return bound_by_planes(obstacles, deadline, late);
   });
   last.was_proven = link_.kept.bound.at(search.scene, search.X_FL) > 0.0;
-  // What was cut short is tried again by the next query.
+  // The next query tries again a bound that was cut short.
   if (!last.was_proven && deadline->passed_by(late)) last.scene = kUnknownScene;
 }
 

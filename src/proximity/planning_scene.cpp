@@ -19,7 +19,7 @@ constexpr std::size_t kNameBuffer = kMaxNameSize + 1;
 constexpr std::size_t kMostNamed = 3;      // names in one sentence
 constexpr double kLengthTolerance = 1e-2;  // of quaternions, as in files of scenes
 
-// What of the limits is not used up.
+// The part of the limits that is not used up.
 struct Budget {
   std::size_t shapes, triangles;
 };

@@ -29,7 +29,7 @@ std::vector<std::string> AllowedCollisions::allowed_with(
   if (at == names.end()) return found;
   const auto row = static_cast<std::size_t>(at - names.begin());
   for (std::size_t i = 0; i < names.size(); ++i) {
-    // Where the matrix is not symmetric, the pair is measured.
+    // The pair is measured if the matrix is not symmetric.
     if (i == row || !is_allowed[row][i] || !is_allowed[i][row]) continue;
     if (!is_left_out(names[i])) found.push_back(names[i]);
   }

@@ -77,8 +77,8 @@ class BvttFront {
     float& stored = bounds_[static_cast<std::size_t>(i)];
     stored = bound + offset_ < stored ? bound + offset_ : stored;
   }
-  /// What was pruned below the pair are points outside a mesh with holes, whose cover distance is
-  /// at least this [m].
+  /// The points that were pruned below the pair are outside a mesh with holes, and their cover
+  /// distance is at least this [m].
   void keep_cover_bound(std::int32_t i, float bound) {
     float& stored = cover_bounds_[static_cast<std::size_t>(i)];
     stored = bound + offset_ < stored ? bound + offset_ : stored;

@@ -79,9 +79,9 @@ class ProximityCycle {
   /// By link of the robot: whether the last run() could measure it if it had a pose.
   const std::vector<bool>& measurable() const { return measurable_; }
 
-  /// What is drawn beside the message of the last run(), in the fixed frame. The box encloses the
-  /// inner spheres of all links whose pose was known; each sphere is looked at, which is for
-  /// pictures and not for every cycle.
+  /// The scene that is drawn beside the message of the last run(), in the fixed frame. The box
+  /// encloses the inner spheres of all links whose pose was known; each sphere is looked at, which
+  /// is for pictures and not for every cycle.
   MarkerScene marker_scene() const;
 
   /// Gives the repulsion of the last run() as joint efforts.

@@ -15,7 +15,7 @@
 
 namespace ist {
 
-/// What is drawn beside a ProximityArray, in its frame.
+/// The scene that is drawn beside a ProximityArray, in its frame.
 struct MarkerScene {
   /// The closest points of a link and of unknown space.
   struct UnseenLine {
