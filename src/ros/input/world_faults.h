@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// What a fault of a known world is about. The first ones are shown first.
+/// The subject of a fault of a known world. The first ones are shown first.
 enum class WorldFaultKind {
   kScene,       ///< no full planning scene has come: until one comes
   kConfigured,  ///< parameters and the file: for good, because they are never sent again
@@ -22,7 +22,7 @@ enum class WorldFaultKind {
 /// are no keys by themselves.
 using WorldFaultKey = std::pair<WorldFaultKind, std::string>;
 
-/// What cannot be used of a known world. It is not OK until there is none.
+/// The faults of a known world, by subject. The world is not OK until there is none.
 using WorldFaults = std::map<WorldFaultKey, std::string>;
 
 inline WorldFaultKey object_fault(const std::string& name) {

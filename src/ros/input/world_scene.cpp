@@ -55,7 +55,7 @@ void WorldSource::receive_scene(const topic_tools::ShapeShifter::ConstPtr& messa
   has_received_ = true;
   state_.begin_work();
   guard(Kind::kMessage, [&] { apply_scene(*message); });
-  // What a message that is not used would have changed is not known.
+  // A message that is not used may have changed anything: the scene is not known any more.
   const auto lost = faults_.find(fault_of(Kind::kMessage));
   if (lost != faults_.end()) {
     has_full_scene_ = false;
