@@ -11,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -39,9 +40,15 @@ ist::QueryConfig query_config(double tolerance) {
   return config;
 }
 
-ist::CloudSnapshot ingested(const Frame& frame) {
+// The snapshot keeps the frame: queries read its points when they need them.
+ist::CloudSnapshot ingested(Frame frame) {
+  const auto owner = std::make_shared<const Frame>(std::move(frame));
+  ist::RawCloud raw = owner->raw();
+  raw.owner = owner;
+  ist::IngestConfig config = ist::test::whole_cloud();
+  config.max_points = raw.size();  // the largest cloud has more points than the default allows
   ist::CloudSnapshot snapshot;
-  ist::Ingest(ist::test::whole_cloud()).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
+  ist::Ingest(config).run(raw, owner->X_FS, {}, 0.0, &snapshot);
   return snapshot;
 }
 

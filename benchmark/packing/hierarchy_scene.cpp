@@ -1,7 +1,9 @@
 #include "packing/hierarchy_scene.h"
 
 #include <algorithm>
+#include <memory>
 #include <random>
+#include <utility>
 
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/robot/link_poses.h"
@@ -14,9 +16,13 @@ namespace {
 
 using Poses = std::vector<Eigen::Isometry3d>;
 
-CloudSnapshot ingested(const Frame& frame) {
+// The snapshot keeps the frame: queries read its points when they need them.
+CloudSnapshot ingested(Frame frame) {
+  const auto owner = std::make_shared<const Frame>(std::move(frame));
+  RawCloud raw = owner->raw();
+  raw.owner = owner;
   CloudSnapshot snapshot;
-  Ingest(test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &snapshot);
+  Ingest(test::whole_cloud(false)).run(raw, owner->X_FS, {}, 0.0, &snapshot);
   return snapshot;
 }
 
