@@ -1,6 +1,6 @@
 // Planning scenes: what is read keeps to the limits, and each object of it is in the world or there
-// is a fault that names it. Covers: src/proximity/planning_scene.cpp
-// src/proximity/planning_scene_objects.cpp
+// is a fault that names it.
+// Covers: src/proximity/planning_scene.cpp src/proximity/planning_scene_objects.cpp
 
 #include <algorithm>
 #include <cstddef>

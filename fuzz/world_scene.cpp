@@ -1,5 +1,6 @@
 // MoveIt scenes: what is read keeps to the limits, and each object of it is in the world or there
-// is a fault that names it. Covers: src/proximity/world_file.cpp src/proximity/known_world.cpp
+// is a fault that names it.
+// Covers: src/proximity/world_file.cpp src/proximity/known_world.cpp
 
 #include <algorithm>
 #include <cmath>

@@ -100,6 +100,12 @@ double distance_to_triangle(const Solid& solid, std::uint32_t triangle,
   return (closest_point_on_triangle(p_E, t.a, t.b, t.c) - p_E).norm();
 }
 
+bool is_behind_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L) {
+  const SolidElement& element = elements_of(solid).front();
+  const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);
+  return (t.b - t.a).cross(t.c - t.a).dot(element.X_EL * p_L - t.a) < 0.0;
+}
+
 double surface_support_in_sphere(const Solid& solid, const Eigen::Vector3d& center_L, double radius,
                                  const Eigen::Vector3d& n_L, double tolerance, double at_least) {
   double largest = at_least;

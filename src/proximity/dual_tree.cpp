@@ -169,9 +169,11 @@ class RefiningVisitor {
 
   HWY_INLINE void RefinePoint(std::int32_t tile, int k, float* known, float radius) {
     const float bound = *known;
+    if (IsSettled()) return Prune(std::max(bound, in_.inside_bound), radius);
     const bool is_near = bound <= in_.inside_bound;
     if (is_near && !policy_.is_outside(tile, k)) {
       may_be_inside_ = true;
+      prune_bound_ = std::min(prune_bound_, policy_.traversal_prune_bound());
     } else if (is_near || bound < PruneBound(radius)) {
       const float prune_bound = policy_.refine(tile, k, bound);
       if constexpr (Policy::kBoundsPoints) *known = std::max(bound, policy_.refined_bound());

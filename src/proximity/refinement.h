@@ -32,8 +32,12 @@ class PointRefinement {
                   double enough);
   bool is_outside(std::int32_t tile, int lane) {
     const ObstacleId id{tile, lane};
-    return side(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id)) == Side::kOutside;
+    const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
+    const Side found = side(id, p_LQ);
+    if (found == Side::kInside) measure_inside(id, p_OQ, p_LQ);
+    return found == Side::kOutside;
   }
+  float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }
   using Side = NearSurface::Side;
   /// On which side of the link's surface a point is; unknown after the deadline.
   Side side(ObstacleId id, const Eigen::Vector3d& p_LQ);
@@ -59,6 +63,9 @@ class PointRefinement {
   /// @returns [m] a lower bound of its distance
   double measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
                          double max_distance = std::numeric_limits<double>::infinity());
+
+  /// Measures a point that is known to be inside, if it may be the deepest.
+  void measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ);
 
   /// By the link's grid; `enough` as above.
   SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
@@ -86,6 +93,7 @@ class BoxRefinement {
   static bool is_crowded(std::uint64_t /*node_pairs*/) { return false; }
   /// The depth search decides which boxes are outside.
   static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return false; }
+  float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }
   /// Does for a box what PointRefinement::refine() does for a point.
   float refine(std::int32_t tile, int lane, float lower_bound);
   bool update_planes(SupportingPlanes* planes);

@@ -85,6 +85,9 @@ PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d
   const std::uint32_t key = coherent_key(obstacles_, id);
   if (kept.find(quantity, key, p_LQ) > 0.0) return Side::kOutside;
   if (deadline_passed()) return Side::kUnknown;
+  SignedDistanceGrid& grid = link_.context.grid;
+  SignedDistanceGrid::Cell* cell = grid.find(p_LQ);
+  if (cell != nullptr && grid.outside_margin(cell, p_LQ) > 0.0) return Side::kOutside;
   link_.search.count_exact();
   const Solid& solid = link_.context.solid();
   const OutsideMargin found =
@@ -122,6 +125,16 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
   }
   link_.search.count_exact();
   link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
+}
+
+void PointRefinement::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
+                                     const Eigen::Vector3d& p_LQ) {
+  link_.search.count_exact();
+  NearSurface near;
+  if (is_one_mesh(link_.context.solid())) near.side = Side::kInside;
+  const double deepest = std::max(-link_.search.prune_bound(), 0.0);
+  link_.search.offer(point_depth(link_.context.solid(), p_LQ, deepest, near).exact, p_OQ,
+                     obstacles_, id);
 }
 
 double PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,

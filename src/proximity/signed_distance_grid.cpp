@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "internal/geometry/float_rounding.h"
+#include "internal/geometry/outside_margin.h"
 #include "proximity/coherence/displacement.h"
 
 namespace ist {
@@ -89,12 +90,47 @@ SignedDistanceGrid::Cell* SignedDistanceGrid::measure(const Eigen::Vector3d& p_L
   return &cell;
 }
 
+// The cells that share a face with a cell. Those that have been measured bound it.
+template <class Visit>
+void SignedDistanceGrid::for_each_neighbor(std::uint64_t key, const Visit& visit) const {
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const std::uint64_t step = std::uint64_t{1} << (axis * kIndexBits);
+    for (const std::uint64_t neighbor : {key - step, key + step}) {
+      const Cell& cell = cells_[slot(neighbor)];
+      if (cell.key == neighbor) visit(cell);
+    }
+  }
+}
+
+NearSurface SignedDistanceGrid::known_by_neighbors(const Cell& cell,
+                                                   const Eigen::Vector3d& center) const {
+  NearSurface known;
+  if (!is_one_mesh_) return known;
+  for_each_neighbor(cell.key, [&](const Cell& neighbor) {
+    known.within = std::min(known.within, -depth_bound(neighbor, center, 0.0));
+    const auto floor = static_cast<double>(neighbor.floor);
+    const double distance = (center - this->center(neighbor)).norm() + kRounding;
+    if (is_closed_ && distance < (1.0 - kStored) * std::abs(floor)) {
+      known.side = floor < 0.0 ? NearSurface::Side::kInside : NearSurface::Side::kOutside;
+    }
+  });
+  return known;
+}
+
 void SignedDistanceGrid::fill(Cell* cell) const {
   const Eigen::Vector3d center = this->center(*cell);
-  const PointDepth depth = point_depth(*solid_, center, -1.0);
+  NearSurface known = known_by_neighbors(*cell, center);
+  // A mesh with holes has no side that a bound could use.
+  const bool has_holes = is_one_mesh_ && !is_closed_;
+  if (has_holes) known.side = NearSurface::Side::kOutside;
+  const PointDepth depth = point_depth(*solid_, center, -1.0, known);
   cell->floor = round_down(depth.floor);
   cell->triangle = depth.triangle;
   cell->normal = depth.exact.normal.cast<float>();
+  if (has_holes && depth.triangle != kNoTriangle &&
+      is_behind_triangle(*solid_, depth.triangle, center)) {
+    cell->normal = -cell->normal;
+  }
   cell->witness =
       round_down(cell->normal.cast<double>().dot(depth.exact.witness - center) - kRounding);
   // Far from the link, or without a surface, a plane bounds no better than the distance.
@@ -163,6 +199,21 @@ SignedDistanceGrid::Bound SignedDistanceGrid::bound(Cell* cell, const Part& part
     bound.signed_distance = std::max(bound.signed_distance, above);
   }
   return bound;
+}
+
+// The closest point is against the outward normal of a place outside.
+double SignedDistanceGrid::outside_margin(Cell* cell, const Eigen::Vector3d& p_LQ) const {
+  if (is_closed_ || !is_one_mesh_) return 0.0;
+  const Eigen::Vector3d center = this->center(*cell);
+  const double distance = (p_LQ - center).norm() + kRounding;
+  if (!cell->has_margin) {
+    const double surface_distance = (1.0 - kStored) * std::abs(static_cast<double>(cell->floor));
+    if (!(cell->witness < 0.0F && distance < surface_distance)) return 0.0;
+    cell->has_margin = true;
+    const double margin = ist::outside_margin(*solid_, center, surface_distance).margin;
+    cell->margin = static_cast<std::uint8_t>(std::min(margin / kMarginUnit, 255.0));
+  }
+  return cell->margin * kMarginUnit * (1.0 - kStored) - distance;
 }
 
 double SignedDistanceGrid::depth_bound(const Cell& cell, const Eigen::Vector3d& center_L,

@@ -79,6 +79,9 @@ class SignedDistanceGrid {
   double floor_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
   /// [m] No place in the sphere is deeper than minus this, by the cell's triangle; -inf: unknown.
   double depth_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
+  /// [m] Every place nearer than this to a place is outside a mesh with holes; not positive:
+  /// unknown.
+  double outside_margin(Cell* cell, const Eigen::Vector3d& p_LQ) const;
   /// [m] Larger parts are bounded by no plane.
   double plane_radius() const { return plane_radius(level_); }
   /// Bounds of where the surface is about a place.
@@ -93,12 +96,15 @@ class SignedDistanceGrid {
     std::uint32_t triangle = kNoTriangle;              ///< of a solid that is one mesh
     bool has_plane = false;                            ///< whether the plane was looked for
     bool is_outside_above_plane = false;               ///< every place there that the plane bounds
+    bool has_margin = false;                           ///< whether the margin was looked for
+    std::uint8_t margin = 0;  ///< [kMarginUnit] places nearer to C are outside a mesh with holes
   };
 
  private:
   static constexpr std::size_t kCells = 8192;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
   static constexpr int kMaxLevel = 7;
+  static constexpr double kMarginUnit = 4e-5;  // [m] so that one byte holds OutsideMargin's largest
 
   std::uint64_t key(const Eigen::Vector3d& p_LQ) const;
   static std::size_t slot(std::uint64_t key) { return (key * 0x9E3779B97F4A7C15ULL) >> 51U; }
@@ -108,6 +114,9 @@ class SignedDistanceGrid {
     return static_cast<double>(1U << static_cast<unsigned>(level)) * size_;
   }
   double plane_radius(int level) const;
+  template <class Visit>
+  void for_each_neighbor(std::uint64_t key, const Visit& visit) const;
+  NearSurface known_by_neighbors(const Cell& cell, const Eigen::Vector3d& center) const;
   void fill(Cell* cell) const;
   void find_plane(Cell* cell) const;
 

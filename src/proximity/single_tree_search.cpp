@@ -190,10 +190,20 @@ class SingleTreeSearch {
     }
     const Bound by_cover = cover_bound(part.center_L, part.radius);
     if (by_cover.now >= search_.prune_bound()) return by_cover;
+    if (cell != nullptr) {
+      const double margin = grid_.outside_margin(cell, part.center_L) - part.radius;
+      if (margin > 0.0) return bound(kInfinity, margin);
+    }
     if (cell != nullptr || part.radius > kLargestBox * grid_.plane_radius()) return by_cover;
     if (search_.deadline->passed()) return by_cover;
     cell = grid_.measure(part.center_L);
-    return cell == nullptr ? by_cover : bound(grid_bound(cell, part), kInfinity);
+    if (cell == nullptr) return by_cover;
+    const double floor = grid_bound(cell, part);
+    if (floor < search_.prune_bound()) {
+      const double margin = grid_.outside_margin(cell, part.center_L) - part.radius;
+      if (margin > 0.0) return bound(kInfinity, margin);
+    }
+    return bound(floor, kInfinity);
   }
 
   // By the cover spheres: the places of a sphere are outside, or nothing is known.
@@ -268,6 +278,8 @@ class SingleTreeSearch {
     } else {
       const Bound outside = cover_bound(p_LQ, 0.0);
       if (outside.now == kInfinity) return tile_.set(i, outside);
+      const double margin = cell == nullptr ? 0.0 : grid_.outside_margin(cell, p_LQ);
+      if (margin > 0.0) return tile_.set(i, bound(kInfinity, margin));
       if (search_.prune_bound() <= 0.0 && take_outside(i, cell, &near)) return;
     }
     search_.count_exact();

@@ -105,6 +105,50 @@ TEST(SignedDistanceGrid, HoldsNearTheSurface) {
   }
 }
 
+// A mesh with holes: no place within the margin is inside, also in a sphere with an opening, whose
+// winding number changes slowly there.
+TEST(SignedDistanceGrid, PlacesWithinTheMarginAreOutside) {
+  TriangleMesh bowl = test::icosphere(0.1, 3);
+  bowl.triangles.resize(bowl.triangles.size() - bowl.triangles.size() / 8);
+  const test::Trial trial({test::open_box({0.15, 0.1, 0.2}), bowl}, 0.005);
+  test::Rng rng(96);
+  for (const LinkModel& link : trial.model().links) {
+    SCOPED_TRACE(link.name);
+    SignedDistanceGrid grid(link);
+    int margins = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const Eigen::Vector3d p = link.tree.center() + test::random_vector(&rng, link.tree.radius());
+      const double margin = grid.outside_margin(grid.measure(p), p);
+      if (!(margin > 0.0)) continue;
+      ++margins;
+      for (int k = 0; k < 4; ++k) {
+        const Eigen::Vector3d place = p + margin * test::random_vector(&rng, 1.0).normalized();
+        ASSERT_FALSE(link.solid.is_inside(place)) << margin;
+      }
+    }
+    EXPECT_GT(margins, 300);
+  }
+}
+
+// Bounds by measured neighbours do not change what a cell holds.
+TEST(SignedDistanceGrid, NeighborsAffectTheSpeedAlone) {
+  const test::Trial trial(shapes(), 0.005);
+  test::Rng rng(97);
+  for (const LinkModel& link : trial.model().links) {
+    SCOPED_TRACE(link.name);
+    SignedDistanceGrid many(link);
+    for (int i = 0; i < 3000; ++i) {
+      const Eigen::Vector3d p = link.tree.center() + test::random_vector(&rng, link.tree.radius());
+      SignedDistanceGrid alone(link);
+      const SignedDistanceGrid::Cell& one = *alone.measure(p);
+      const SignedDistanceGrid::Cell& other = *many.measure(p);
+      ASSERT_EQ(other.floor, one.floor);
+      // Of several triangles that are equally near, either may be the closest.
+      if (other.triangle == one.triangle) ASSERT_EQ(other.normal, one.normal);
+    }
+  }
+}
+
 // The bound of a sphere, of a box and of the points of a tile holds for each of their places.
 TEST(SignedDistanceGrid, BoundsPartsOfSpace) {
   const test::Trial trial(shapes(), 0.005);

@@ -63,6 +63,9 @@ PointDepth point_depth(const Solid& solid, const Eigen::Vector3d& p_L, double mi
 /// [m] The distance of p_L to a triangle, by PointDepth::triangle: no less than to the surface.
 double distance_to_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L);
 
+/// Whether p_L is on the side of the triangle's plane that its normal points away from.
+bool is_behind_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L);
+
 /// [m] An upper bound of the support of the elements' surfaces within a sphere, measured from the
 /// sphere's centre: no point x of a surface in the sphere has a larger n.(x - center).
 /// @param n_L        unit
