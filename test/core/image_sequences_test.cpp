@@ -223,8 +223,9 @@ class ImageSequences : public ::testing::Test {
   std::vector<Eigen::Isometry3d> X_FL_;
   QueryConfig config_;
   std::vector<SourcePtr> known_, used_;
-  std::array<int, 4> answers_{};  // by state
-  int unfinished_ = 0, with_extent_ = 0;
+  // Of all repetitions: one seed alone may miss a state.
+  static inline std::array<int, 4> answers_{};  // by state
+  static inline int unfinished_ = 0, with_extent_ = 0;
 };
 
 TEST_F(ImageSequences, NoBoundIsAboveTheTruth) {
