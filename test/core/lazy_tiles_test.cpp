@@ -174,5 +174,57 @@ TEST(LazyTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
   EXPECT_TRUE(message.expired());
 }
 
+// One missing pixel in nearly every tile leaves few tiles to be read later: the message, which is
+// as large as all tiles, is not kept for them. Answers are those of brute force, and the bytes may
+// change.
+TEST(LazyTiles, MessageIsNotKeptForFewTiles) {
+  test::Rng rng(76);
+  Scene scene(&rng);
+  for (std::size_t tile = 0; tile < kWidth * kHeight / 16; ++tile) {
+    if (tile % 20 == 0) continue;  // whole
+    const std::size_t row = tile / (kWidth / 4) * 4, column = tile % (kWidth / 4) * 4;
+    (*scene.pixels)[4 * ((row + rng() % 4) * kWidth + column + rng() % 4)] =
+        std::numeric_limits<float>::quiet_NaN();
+  }
+  const std::weak_ptr<std::vector<float>> message = scene.pixels;
+  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+  QueryConfig config;
+  config.max_distance = 5.0;
+  config.tolerance = 0.0;
+  CloudSnapshot cloud;
+  Ingest(test::whole_cloud(false)).run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  std::vector<double> truth;
+  for (std::size_t k = 0; k < scene.meshes.size(); ++k) truth.push_back(scene.truth(k));
+  scene.pixels->assign(scene.pixels->size(), 0.0F);
+  scene.pixels.reset();
+  EXPECT_TRUE(message.expired());
+  ProximityQuery query(model, config);
+  std::vector<LinkProximity> links;
+  ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+  for (std::size_t k = 0; k < links.size(); ++k) EXPECT_NEAR(links[k].distance, truth[k], 2e-6);
+}
+
+TEST(LazyTiles, ClearedIndexLetsGoOfItsMessageAndIsEmpty) {
+  test::Rng rng(77);
+  Scene scene(&rng);
+  const std::weak_ptr<std::vector<float>> message = scene.pixels;
+  CloudSnapshot cloud;
+  Ingest ingest(test::whole_cloud(false));
+  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  const std::size_t memory = cloud.index.memory();
+  scene.pixels.reset();
+  EXPECT_FALSE(message.expired());
+  cloud.index.clear();
+  EXPECT_TRUE(message.expired());
+  EXPECT_TRUE(cloud.index.empty());
+  EXPECT_EQ(cloud.index.size(), 0U);
+  EXPECT_EQ(cloud.index.memory(), memory) << "kept for the next cloud";
+  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+  ProximityQuery query(model, {});
+  std::vector<LinkProximity> links;
+  ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+  for (const LinkProximity& link : links) EXPECT_EQ(link.state, LinkState::kClear);
+}
+
 }  // namespace
 }  // namespace ist
