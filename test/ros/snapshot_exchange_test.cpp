@@ -8,6 +8,7 @@
 
 #include <boost/weak_ptr.hpp>
 
+#include <algorithm>
 #include <memory>
 #include <set>
 #include <vector>
@@ -26,7 +27,7 @@ Message fill(SourceSnapshot* snapshot) {
   auto message = std::make_shared<std::vector<float>>(4 * kSide * kSide, 1.0F);
   for (std::size_t i = 0; i < kSide * kSide; ++i) {
     (*message)[4 * i] = 0.01F * static_cast<float>(i % kSide);
-    (*message)[4 * i + 1] = 0.01F * static_cast<float>(i / kSide);
+    (*message)[4 * i + 1] = 0.01F * static_cast<float>((i - i % kSide) / kSide);
   }
   RawCloud cloud = packed_cloud(message->data(), kSide, kSide, 4);
   cloud.owner = message;
@@ -144,21 +145,26 @@ TEST(ReceivePool, MemoryOfAHugeMessageIsNotKept) {
   EXPECT_LE(pool.take()->data.capacity(), 1000U);
 }
 
-// Messages that have waited for transforms are freed, all but one.
-TEST(ReceivePool, OneFreeMessageIsKept) {
-  ReceivePool<sensor_msgs::PointCloud2> pool;
-  std::vector<boost::shared_ptr<sensor_msgs::PointCloud2>> held;
+// Messages that have waited for transforms are used again as long as that goes on, and freed later.
+TEST(ReceivePool, AsManyMessagesAreKeptAsWereHeldLately) {
+  using Pool = ReceivePool<sensor_msgs::PointCloud2>;
+  Pool pool;
+  std::vector<Pool::Pointer> held;
   std::vector<boost::weak_ptr<sensor_msgs::PointCloud2>> all;
+  const auto alive = [&] {
+    return std::count_if(all.begin(), all.end(), [](const auto& one) { return !one.expired(); });
+  };
   for (int i = 0; i < 10; ++i) {
     held.push_back(pool.take());
     held.back()->data.resize(1000);
     all.emplace_back(held.back());
   }
   held.clear();
-  const auto next = pool.take();
-  std::size_t alive = 0;
-  for (const auto& message : all) alive += message.expired() ? 0 : 1;
-  EXPECT_EQ(alive, 1U);
+  EXPECT_EQ(alive(), 10);
+  for (unsigned i = 0; i < Pool::kWindow; ++i) pool.take()->data.resize(1000);
+  EXPECT_EQ(alive(), 10) << "ten were held in this window";
+  for (unsigned i = 0; i < 2 * Pool::kWindow; ++i) pool.take()->data.resize(1000);
+  EXPECT_EQ(alive(), 1);
 }
 
 }  // namespace
