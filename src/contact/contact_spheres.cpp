@@ -94,6 +94,7 @@ ContactGeometry make_contact_geometry(const LinkGeometry& geometry, const Solid&
   spheres.tree = InnerSphereTree(tight);
   const PowerCells cells(tight.spheres, covered_box(packing), solid);
   const OutwardField field(geometry, solid);
+  spheres.leaves.reserve(spheres.tree.leaves().size());
   for (const SphereLeaf& leaf : spheres.tree.leaves()) {
     spheres.leaves.push_back(make_leaf(leaf, tight.spheres, cells, field));
   }

@@ -112,6 +112,7 @@ VolumeElements::VolumeElements(const Solid& solid, const OutwardField& field) {
     block.radius += size.norm();
     blocks_.push_back(block);
   }
+  elements_.shrink_to_fit();
 }
 
 ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,

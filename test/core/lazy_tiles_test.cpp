@@ -174,5 +174,68 @@ TEST(LazyTiles, SnapshotKeepsItsMessageUntilTheNextOne) {
   EXPECT_TRUE(message.expired());
 }
 
+// One missing pixel in nearly every tile leaves few tiles to be read later: the message, which is
+// as large as all tiles, is not kept for them. Answers are those of brute force, and the bytes may
+// change.
+TEST(LazyTiles, MessageIsNotKeptForFewTiles) {
+  test::Rng rng(76);
+  Scene scene(&rng);
+  for (std::size_t tile = 0; tile < kWidth * kHeight / 16; ++tile) {
+    if (tile % 48 < 2) continue;  // two whole ones side by side
+    const std::size_t row = tile / (kWidth / 4) * 4, column = tile % (kWidth / 4) * 4;
+    (*scene.pixels)[4 * ((row + rng() % 4) * kWidth + column + rng() % 4)] =
+        std::numeric_limits<float>::quiet_NaN();
+  }
+  const std::weak_ptr<std::vector<float>> message = scene.pixels;
+  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+  QueryConfig config;
+  config.max_distance = 5.0;
+  config.tolerance = 0.0;
+  CloudSnapshot cloud, loaded;
+  Ingest ingest(test::whole_cloud(false));
+  RawCloud not_owned = raw(scene.pixels);
+  not_owned.owner = nullptr;
+  ingest.run(not_owned, scene.X_FS, {}, 0.0, &loaded);
+  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  std::vector<double> truth;
+  for (std::size_t k = 0; k < scene.meshes.size(); ++k) truth.push_back(scene.truth(k));
+  scene.pixels->assign(scene.pixels->size(), 0.0F);
+  scene.pixels.reset();
+  EXPECT_TRUE(message.expired());
+  const std::vector<PointTile> expected = test::tiles_of(loaded.index);
+  ASSERT_EQ(cloud.index.bvh().tile_count(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    PointTile scratch;
+    ASSERT_TRUE(cloud.index.bvh().is_loaded(i));
+    ASSERT_TRUE(test::same_points(cloud.index.bvh().tile(i, &scratch), expected[i]));
+  }
+  ProximityQuery query(model, config);
+  std::vector<LinkProximity> links;
+  ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+  for (std::size_t k = 0; k < links.size(); ++k) EXPECT_NEAR(links[k].distance, truth[k], 2e-6);
+}
+
+TEST(LazyTiles, ClearedIndexLetsGoOfItsMessageAndIsEmpty) {
+  test::Rng rng(77);
+  Scene scene(&rng);
+  const std::weak_ptr<std::vector<float>> message = scene.pixels;
+  CloudSnapshot cloud;
+  Ingest ingest(test::whole_cloud(false));
+  ingest.run(raw(scene.pixels), scene.X_FS, {}, 0.0, &cloud);
+  const std::size_t memory = cloud.index.memory();
+  scene.pixels.reset();
+  EXPECT_FALSE(message.expired());
+  cloud.index.clear();
+  EXPECT_TRUE(message.expired());
+  EXPECT_TRUE(cloud.index.empty());
+  EXPECT_EQ(cloud.index.size(), 0U);
+  EXPECT_EQ(cloud.index.memory(), memory) << "kept for the next cloud";
+  const auto model = test::make_model({scene.meshes.begin(), scene.meshes.end()}, 0.005);
+  ProximityQuery query(model, {});
+  std::vector<LinkProximity> links;
+  ASSERT_TRUE(query.run(scene.X_FL, {true, true, true}, {&cloud}, &links));
+  for (const LinkProximity& link : links) EXPECT_EQ(link.state, LinkState::kClear);
+}
+
 }  // namespace
 }  // namespace ist

@@ -58,6 +58,25 @@ TEST(SnapshotChannel, threeSlotsAreReused) {
   EXPECT_EQ(slots.size(), 3U);
 }
 
+TEST(SnapshotChannel, WriterHasTheWaitingSlotOnceItsValueWasTaken) {
+  SnapshotChannel<int> channel;
+  ASSERT_NE(channel.waiting(), nullptr) << "nothing was published";
+  EXPECT_NE(channel.waiting(), &channel.back());
+  EXPECT_NE(channel.waiting(), &channel.front());
+  for (int value = 1; value < 10; ++value) {
+    channel.back() = value;
+    channel.publish();
+    EXPECT_EQ(channel.waiting(), nullptr) << "the reader may take it at any time";
+    ASSERT_TRUE(channel.update());
+    ASSERT_NE(channel.waiting(), nullptr);
+    EXPECT_NE(channel.waiting(), &channel.front());
+    EXPECT_EQ(*channel.waiting(), value - 1) << "what the reader has given up";
+    *channel.waiting() = value;
+    EXPECT_FALSE(channel.update());
+    EXPECT_EQ(channel.front(), value);
+  }
+}
+
 // A torn or stale value would break "all elements equal" or "never older than before". Run under
 // ThreadSanitizer this also proves that the slots are handed over with the right memory order.
 TEST(SnapshotChannel, twoThreads) {
@@ -83,6 +102,7 @@ TEST(SnapshotChannel, twoThreads) {
     }
   });
   for (int i = 1; i <= kValues; ++i) {
+    if (std::vector<int>* waiting = channel.waiting()) waiting->assign(8, -1);  // nobody reads it
     channel.back().assign(static_cast<std::size_t>(1 + i % 64), i);
     channel.publish();
   }

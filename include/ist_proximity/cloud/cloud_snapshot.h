@@ -45,6 +45,9 @@ class PointIndex {
   const Eigen::Isometry3d& X_FO() const;  ///< index's -> fixed frame
   Eigen::AlignedBox3f bounds() const;     ///< [m] in O; holds all points
   std::size_t memory() const;  ///< [bytes] reserved; the message it may refer to not counted
+  /// Makes it empty, so that it lets go of the message, and keeps its memory for the next build.
+  /// Not to be called while others read.
+  void clear();
   /// Identifies one build: another number after every build of any index; 0 before the first.
   std::uint64_t build_id() const;
 
@@ -132,6 +135,14 @@ class SnapshotChannel {
     // given up.
     const std::uint8_t fresh = back_ | kFresh;
     back_ = waiting_.exchange(fresh, std::memory_order_acq_rel) & kIndex;
+  }
+
+  /// Writer: the slot that waits for the reader, where the reader has taken its value before: it is
+  /// the writer's too until the next publish(). Null: it holds the newest value, not taken yet.
+  T* waiting() {
+    // Acquires the slot, which the reader has given up.
+    const std::uint8_t waiting = waiting_.load(std::memory_order_acquire);
+    return (waiting & kFresh) == 0 ? &slots_[waiting & kIndex] : nullptr;
   }
 
   /// Reader: takes the newest value. @returns false when none was published since the last call

@@ -24,6 +24,18 @@ PointBvh& PointBvh::operator=(const PointBvh& other) {
   return *this;
 }
 
+void PointBvh::clear() {
+  bounds_.setEmpty();
+  nodes_.clear();
+  tiles_.clear();
+  first_pixel_.clear();
+  cloud_ = RawCloud();
+  size_ = 0;
+  root_ = -1;
+  build_id_ = 0;
+  is_thinned_ = false;
+}
+
 void PointBvh::set_thinning(double voxel_size) {
   is_thinned_ = true;
   grid_ = VoxelGrid(X_FO_, voxel_size);

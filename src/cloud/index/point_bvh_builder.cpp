@@ -11,6 +11,9 @@ namespace ist {
 namespace {
 
 constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
+// A message is not kept for fewer lazy tiles than one in this many: it is about as large as all
+// tiles.
+constexpr std::size_t kLazyShare = 16;
 
 // Removes the points whose bit is set.
 void remove(std::uint32_t dropped, PointTile* tile) {
@@ -63,7 +66,7 @@ void PointBvhBuilder::start(const Eigen::Isometry3d& X_FO, PointBvh* bvh) {
 }
 
 PointTile* PointBvhBuilder::next_tiles(std::size_t count) {
-  std::vector<PointTile>& tiles = bvh_->tiles_;
+  PageVector<PointTile>& tiles = bvh_->tiles_;
   if (used_ + count > tiles.size()) {
     tiles.resize(used_ + count);
     bvh_->first_pixel_.resize(used_ + count);
@@ -102,6 +105,16 @@ void PointBvhBuilder::start_organized(const Eigen::Isometry3d& X_FO, const RawCl
   start(X_FO, bvh);
   bvh->cloud_ = cloud;
   bvh->X_OS_ = X_OS;
+  // Reserved pages cost nothing; those of tiles that no query looks at are never written to, which
+  // a copy to a larger array would do.
+  const std::size_t squares =
+      ((cloud.width + kTileSide - 1) / kTileSide) * ((cloud.height + kTileSide - 1) / kTileSide);
+  if (bvh->tiles_.capacity() < squares) {
+    bvh->tiles_.clear();
+    bvh->tiles_.reserve(squares + squares / 2);  // tiles with an edge are split
+    bvh->first_pixel_.clear();
+    bvh->first_pixel_.reserve(squares + squares / 2);
+  }
 }
 
 void PointBvhBuilder::append_lazy(const std::uint32_t* first_pixels, std::size_t count) {
@@ -148,7 +161,23 @@ void PointBvhBuilder::end_group() {
   group_begin_ = ungrouped_.size();
 }
 
+// Reads the lazy tiles where they are so few that the message is not worth its memory, as in an
+// image with a missing pixel in nearly every tile.
+void PointBvhBuilder::read_few_lazy_tiles() {
+  std::size_t lazy = 0;
+  for (const TileRun& run : lazy_runs_) lazy += run.count;
+  if (lazy * kLazyShare >= used_) return;
+  for (const TileRun& run : lazy_runs_) {
+    for (std::size_t i = run.first; i < run.first + run.count; ++i) {
+      read_tile(bvh_->cloud_, bvh_->X_OS_, bvh_->first_pixel_[i], &bvh_->tiles_[i]);
+    }
+  }
+  lazy_runs_.clear();
+  bvh_->cloud_.owner = nullptr;
+}
+
 void PointBvhBuilder::finish() {
+  read_few_lazy_tiles();
   bvh_->tiles_.resize(used_);
   bvh_->first_pixel_.resize(used_);
   bvh_->flags_.reset(used_);

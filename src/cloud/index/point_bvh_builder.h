@@ -82,6 +82,7 @@ class PointBvhBuilder {
     std::size_t first, count;
   };
 
+  void read_few_lazy_tiles();
   void append_lazy(const std::uint32_t* first_pixels, std::size_t count);
   void add_points(CloudPoint* points, CloudPoint* spare, std::size_t n, const Filters& filters);
   void slice_into_tiles(CloudPoint* points, CloudPoint* spare, std::size_t n);

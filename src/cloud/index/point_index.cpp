@@ -31,6 +31,9 @@ std::size_t PointIndex::size() const { return bvh().size(); }
 const Eigen::Isometry3d& PointIndex::X_FO() const { return bvh().X_FO(); }
 Eigen::AlignedBox3f PointIndex::bounds() const { return bvh().bounds(); }
 std::size_t PointIndex::memory() const { return bvh().memory(); }
+void PointIndex::clear() {
+  if (bvh_ != nullptr) bvh_->clear();
+}
 std::uint64_t PointIndex::build_id() const { return bvh().build_id(); }
 
 const PointBvh& PointIndex::bvh() const {

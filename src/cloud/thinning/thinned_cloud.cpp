@@ -12,10 +12,9 @@ void ThinnedStorage::reset(std::size_t nodes, std::size_t tiles) {
     word_capacity_ = (nodes + 1) + (nodes + 1) / 2;
     words_ = std::make_unique<std::atomic<std::uint64_t>[]>(word_capacity_);
   }
-  if (tiles > tile_capacity_) {
-    tile_capacity_ = tiles + tiles / 2;
-    tiles_.reset();
-    tiles_.reset(new ThinnedTile[tile_capacity_]);  // make_unique would fill it with zeros
+  if (tiles > tiles_.size()) {
+    tiles_ = PageVector<ThinnedTile>();  // the old ones are not copied
+    tiles_.resize(tiles + tiles / 2);
   }
   nodes_ = nodes;
   for (std::size_t i = 0; i <= nodes; ++i) words_[i].store(0, std::memory_order_relaxed);
@@ -24,7 +23,7 @@ void ThinnedStorage::reset(std::size_t nodes, std::size_t tiles) {
 bool ThinnedStorage::find(std::size_t node, Span<const ThinnedTile>* tiles) const {
   const std::uint64_t word = words_[node].load(std::memory_order_acquire);
   if ((word & kStored) == 0) return false;
-  *tiles = Span<const ThinnedTile>(tiles_.get() + (word >> kFirstShift),
+  *tiles = Span<const ThinnedTile>(tiles_.data() + (word >> kFirstShift),
                                    word >> kCountShift & kCountMask);
   return true;
 }
@@ -34,7 +33,7 @@ void ThinnedStorage::store(std::size_t node, const ThinnedNode& thinned) const {
   std::uint64_t expected = 0;
   if (!words_[node].compare_exchange_strong(expected, kClaimed, std::memory_order_relaxed)) return;
   const std::uint64_t first = words_[nodes_].fetch_add(thinned.count, std::memory_order_relaxed);
-  std::copy_n(thinned.tiles, thinned.count, tiles_.get() + first);
+  std::copy_n(thinned.tiles, thinned.count, tiles_.data() + first);
   words_[node].store(first << kFirstShift | std::uint64_t{thinned.count} << kCountShift | kStored,
                      std::memory_order_release);
 }

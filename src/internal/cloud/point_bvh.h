@@ -8,6 +8,7 @@
 
 #include "internal/bvh/box_node.h"
 #include "internal/cloud/lazy_tile_flags.h"
+#include "internal/cloud/page_vector.h"
 #include "internal/cloud/point_tile.h"
 #include "internal/cloud/thinned_cloud.h"
 #include "internal/cloud/voxel_grid.h"
@@ -55,6 +56,10 @@ class PointBvh {
   }
   std::uint64_t build_id() const { return build_id_; }  ///< 0 before the first build
 
+  /// Makes it empty and lets go of the message, and keeps its memory for the next build. Not to be
+  /// called while others read.
+  void clear();
+
   /// Gives it a thinned cloud until it is built again. Not to be called while others read.
   /// @param voxel_size  [m] > 0, edge of a voxel
   void set_thinning(double voxel_size);
@@ -70,12 +75,12 @@ class PointBvh {
   Eigen::Isometry3d X_FO_ = Eigen::Isometry3d::Identity();
   Eigen::AlignedBox3f bounds_;
   std::vector<BoxNode> nodes_;  ///< level by level, the root last
-  mutable std::vector<PointTile> tiles_;
+  mutable PageVector<PointTile> tiles_;
   LazyTileFlags flags_;
   // The source of the tiles that are not loaded.
   RawCloud cloud_;
   Eigen::Isometry3d X_OS_ = Eigen::Isometry3d::Identity();
-  std::vector<std::uint32_t> first_pixel_;  ///< by tile
+  PageVector<std::uint32_t> first_pixel_;  ///< by tile, of those that are loaded lazily
   std::size_t size_ = 0;
   std::int32_t root_ = -1;
   std::uint64_t build_id_ = 0;

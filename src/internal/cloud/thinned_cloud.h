@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "internal/bvh/box_node.h"
+#include "internal/cloud/page_vector.h"
 #include "internal/cloud/point_tile.h"
 #include "ist_proximity/geometry/span.h"
 
@@ -67,7 +68,7 @@ class ThinnedStorage {
   void reset(std::size_t nodes, std::size_t tiles);
 
   std::size_t memory() const {  ///< [bytes] reserved
-    return word_capacity_ * sizeof words_[0] + tile_capacity_ * sizeof tiles_[0];
+    return word_capacity_ * sizeof words_[0] + tiles_.capacity() * sizeof(ThinnedTile);
   }
 
   /// The tiles of a node where they are stored. @returns whether they are
@@ -83,8 +84,8 @@ class ThinnedStorage {
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free, "nobody may wait");
 
   std::unique_ptr<std::atomic<std::uint64_t>[]> words_;  ///< the last one counts used tiles
-  std::unique_ptr<ThinnedTile[]> tiles_;  ///< not initialized: pages are used when they are filled
-  std::size_t word_capacity_ = 0, tile_capacity_ = 0, nodes_ = 0;
+  mutable PageVector<ThinnedTile> tiles_;                ///< pages are used when they are filled
+  std::size_t word_capacity_ = 0, nodes_ = 0;
 };
 
 /// The thinned cloud of an index: of the points in each voxel of a grid that is aligned to the

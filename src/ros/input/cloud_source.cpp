@@ -24,7 +24,7 @@ namespace {
 constexpr double kMaxDisorder = 1.0;
 // Characters of a frame's name, which every status that mentions it repeats.
 constexpr std::size_t kMaxFrameName = 256;
-const ros::WallDuration kPollIdle(0.05), kPollTf(0.002);
+const ros::WallDuration kPollIdle(0.05), kPollTaken(0.005), kPollTf(0.002);
 
 /// Stamps that are farther ahead of the clock are not believed. [s]
 double future_tolerance(double timeout) { return std::min(timeout, kMaxAhead); }
@@ -102,7 +102,10 @@ void CloudSource::run() {
   name_thread("ist " + config_.name);
   guard([this] { read_file(); });
   while (running_) {
-    guard([this] { queue_.callAvailable(waiting_.empty() ? kPollIdle : kPollTf); });
+    // Before the next message is read, so that the new one can use the memory of an old one.
+    const bool is_taken = exchange_.release_unused();
+    const ros::WallDuration idle = is_taken ? kPollIdle : kPollTaken;
+    guard([&] { queue_.callAvailable(waiting_.empty() ? idle : kPollTf); });
     guard([this] {
       take_target();
       drop_overdue();

@@ -8,6 +8,7 @@
 #include "ros/input/cloud_measurement.h"
 #include "ros/input/image_measurement.h"
 #include "ros/input/map_measurement.h"
+#include "ros/input/receive_pool.h"
 #include "ros/input/scan_measurement.h"
 
 namespace ist {
@@ -24,17 +25,29 @@ constexpr double kFarthestPoint = 4.0 * kMaxPosition;
 // little nearer than max_distance, and links out there say so.
 constexpr double kLargestPixelAngle = 0.0125;
 
+template <typename Message>
+using Factory = boost::function<boost::shared_ptr<Message>()>;
+
+// @param make  makes the messages to receive into
 template <typename Message, typename Read>
 ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
-                             const ReadingBegins& begin, const Receiver& receive,
-                             const Read& read) {
+                             const ReadingBegins& begin, const Receiver& receive, const Read& read,
+                             const Factory<Message>& make = ros::DefaultMessageCreator<Message>()) {
   const boost::function<void(const boost::shared_ptr<const Message>&)> callback =
       [begin, receive, read](const boost::shared_ptr<const Message>& message) {
         begin();
         receive(read(message));
       };
-  return nh->subscribe<Message>(config.topic, kQueueSize, callback, {},
-                                ros::TransportHints().tcpNoDelay());
+  ros::SubscribeOptions options;
+  options.init<Message>(config.topic, kQueueSize, callback, make);
+  options.transport_hints = ros::TransportHints().tcpNoDelay();
+  return nh->subscribe(options);
+}
+
+// The messages of a camera, whose memory is used again.
+template <typename Message>
+Factory<Message> from_pool() {
+  return [pool = std::make_shared<ReceivePool<Message>>()] { return pool->take(); };
 }
 
 }  // namespace
@@ -100,14 +113,16 @@ Subscription subscribe(const SourceConfig& config, ros::NodeHandle* nh, const Re
         config, nh, begin, receive,
         [camera, max_points, noise](const sensor_msgs::ImageConstPtr& message) {
           return read_image(message, *camera, max_points, noise);
-        });
+        },
+        from_pool<sensor_msgs::Image>());
     return subscription;
   }
   subscription.messages = subscribe_as<sensor_msgs::PointCloud2>(
       config, nh, begin, receive,
       [max_points, noise](const sensor_msgs::PointCloud2ConstPtr& message) {
         return read_cloud(message, max_points, noise);
-      });
+      },
+      from_pool<sensor_msgs::PointCloud2>());
   return subscription;
 }
 

@@ -4,12 +4,47 @@
 
 namespace ist {
 
-SourceSnapshot& SnapshotExchange::writable() {
-  std::shared_ptr<SourceSnapshot>& snapshot = channel_.back();
-  if (!snapshot || snapshot.use_count() > 1) snapshot = std::make_shared<SourceSnapshot>();
+namespace {
+
+using SnapshotPtr = std::shared_ptr<SourceSnapshot>;
+
+// Whether there is a snapshot that its slot alone holds.
+bool is_unused(const SnapshotPtr& snapshot) {
+  if (!snapshot || snapshot.use_count() > 1) return false;
   // use_count() alone does not order what the last holder read before what is written now.
   std::atomic_thread_fence(std::memory_order_acquire);
-  return *snapshot;
+  return true;
+}
+
+// Lets go of what a snapshot keeps alive, but not of its own memory.
+void empty(SourceSnapshot* snapshot) {
+  snapshot->cloud.index.clear();
+  snapshot->cloud.boxes.reset();
+  snapshot->memory.reset();
+  snapshot->model.reset();
+  snapshot->generation = 0;
+}
+
+}  // namespace
+
+SourceSnapshot& SnapshotExchange::writable() {
+  SnapshotPtr& back = channel_.back();
+  SnapshotPtr* const waiting = channel_.waiting();
+  if (waiting != nullptr && !is_unused(back) && is_unused(*waiting)) back.swap(*waiting);
+  spare_age_ = waiting != nullptr ? spare_age_ + 1 : 0;
+  if (!is_unused(back)) back = std::make_shared<SourceSnapshot>();
+  return *back;
+}
+
+bool SnapshotExchange::release_unused() {
+  SnapshotPtr* const waiting = channel_.waiting();
+  if (waiting == nullptr) return false;
+  SnapshotPtr& back = channel_.back();
+  if (is_unused(back) && is_unused(*waiting) && spare_age_ >= kSpareAge) waiting->reset();
+  for (SnapshotPtr* slot : {&back, waiting}) {
+    if (is_unused(*slot)) empty(slot->get());
+  }
+  return true;
 }
 
 void SnapshotExchange::publish() {

@@ -11,9 +11,19 @@ namespace ist {
 /// Hands the snapshots of one source from its thread to the threads that query.
 class SnapshotExchange {
  public:
-  /// The snapshot to fill next. It is an old one, whose memory is used again, unless a reader still
-  /// holds that. The source's thread only.
+  /// The snapshot to fill next. It is an old one, whose memory is used again, unless readers hold
+  /// all of these: two snapshots do while the cycle takes each one before the next is filled. The
+  /// source's thread only.
   SourceSnapshot& writable();
+
+  /// Empties old snapshots that nobody reads any more, so that they let go of their messages, and
+  /// frees one that was not needed for the last kSpareAge snapshots. The source's thread only.
+  /// @returns false while the cycle has not taken the newest snapshot, and may hold an older one
+  bool release_unused();
+
+  /// A cycle that is slower than its source needs a third snapshot all the time; one that was late
+  /// needs it once. Ten seconds at 30 Hz.
+  static constexpr int kSpareAge = 300;
 
   /// Makes writable() the newest snapshot. The source's thread only.
   void publish();
@@ -27,6 +37,7 @@ class SnapshotExchange {
 
  private:
   SnapshotChannel<std::shared_ptr<SourceSnapshot>> channel_;
+  int spare_age_ = 0;  ///< snapshots since a third one was needed; the source's thread only
   mutable std::mutex mutex_;
   std::shared_ptr<const SourceSnapshot> shared_;  ///< guarded by mutex_
 };

@@ -11,6 +11,7 @@
 
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/common/exceptions.h"
+#include "ros/common/memory.h"
 #include "ros/common/thread_name.h"
 #include "ros/common/thread_priority.h"
 
@@ -65,17 +66,22 @@ void ContactLoader::run() {
   name_thread("ist contact");
   lower_thread_priority();
   do {
-    const std::string fault = exception_of([this] {
+    bool is_new = false;
+    const std::string fault = exception_of([this, &is_new] {
       auto state = loader_.state();
       if (!state->robot) return;
       const auto contacts = this->contacts();
       if (!contacts || !same_geometry(*contacts->robot, *state->robot)) begin(*state);
-      while (is_current(*state) && add_next(*state)) state = loader_.state();
+      while (is_current(*state) && add_next(*state)) {
+        state = loader_.state();
+        is_new = true;
+      }
     });
     // No memory, for example; the next round tries again.
     if (!fault.empty()) {
       ROS_ERROR_STREAM_THROTTLE(5.0, "contact volumes cannot be computed: " << fault);
     }
+    if (is_new) return_free_memory();  // packing needs some megabytes
   } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
 }
 
