@@ -80,7 +80,7 @@ std::string SceneRequest::ask(SceneLayout layout) {
   if (!link) return "no service " + service_ + " is there";
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (is_ended_) return service_ + ": the request was ended";
+    if (is_ended_) return service_;  // nobody reads it
     link_ = link;
   }
   std_msgs::UInt32 components;
