@@ -251,6 +251,9 @@ TEST(PlanningScene, WhatNobodyMeasuresIsSaidUntilItEnds) {
   EXPECT_EQ(after(with_attached("", 1, true)), 0U);  // all of the link
   EXPECT_EQ(after(octomap), 1U);
   EXPECT_EQ(after(WireScene()), 0U);  // a whole scene
+  // Names that are never detached take no more memory than the limit.
+  for (int i = 0; i < 15; ++i) after(with_attached("tool " + std::to_string(i), 0, true));
+  EXPECT_NE(parts.sentences()[0].find("and 7 more"), std::string::npos) << parts.sentences()[0];
 }
 
 TEST(PlanningScene, AllowedPairsNeedBothEntries) {
@@ -447,6 +450,11 @@ TEST(PlanningScene, ASceneAboveTheLimitsIsRefusedWhole) {
   shapes.objects = {box_object("many", kIdentityPose)};
   shapes.objects[0].primitives.resize(51, shapes.objects[0].primitives[0]);
   triangles.objects = {every_shape(), every_shape(), every_shape()};
+  WireScene attached;
+  attached.attached = objects.objects;
+  EXPECT_NE(
+      read(attached, kLayouts[1], limits).fault.find("it attaches 51 objects; allowed are 50"),
+      std::string::npos);
   const std::string texts[] = {read(objects, kLayouts[1], limits).fault,
                                read(shapes, kLayouts[1], limits).fault,
                                read(triangles, kLayouts[1], limits).fault};
