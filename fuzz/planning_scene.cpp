@@ -22,6 +22,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_CHECK(scene.fault.empty() || scene.objects.empty(), "a fault, and objects: %s",
              scene.fault.c_str());
   FUZZ_CHECK(scene.objects.size() <= limits.max_objects, "%zu objects", scene.objects.size());
+  ist::UnmeasuredParts parts(limits.max_objects);
+  parts.apply(scene);
+  FUZZ_CHECK(!scene.has_octomap || !parts.sentences().empty(),
+             "an octomap that is not said, with %zu objects", scene.objects.size());
   for (const ist::SceneObject& object : scene.objects) {
     if (!object.fault.empty()) continue;
     const ist::WorldObject added = ist::to_world_object(object, "world");

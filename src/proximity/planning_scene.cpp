@@ -16,7 +16,6 @@ constexpr std::size_t kPoseSize = 56, kPointSize = 24, kTriangleSize = 12;  // [
 constexpr std::size_t kMaxMatrixNames = 20000;
 // Longer names are no names, and are cut here.
 constexpr std::size_t kNameBuffer = kMaxNameSize + 1;
-constexpr std::size_t kMostNamed = 3;      // names in one sentence
 constexpr double kLengthTolerance = 1e-2;  // of quaternions, as in files of scenes
 
 // The part of the limits that is not used up.
@@ -206,17 +205,19 @@ SceneObject read_object(WireReader* in, SceneLayout layout, Budget* budget) {
   return object;
 }
 
-void skip_joint_states(WireReader* in) {
+// Returns whether any joint is stated.
+bool skip_joint_states(WireReader* in) {
   in->skip(12, "a header");
   in->skip_string("a header");
-  in->skip_strings("joints");
+  bool has_joints = in->skip_strings("joints") > 0;
   for (int k = 0; k < 3; ++k) in->skip_array(8, "joints");
   in->skip(12, "a header");
   in->skip_string("a header");
-  in->skip_strings("joints");
+  has_joints = in->skip_strings("joints") > 0 || has_joints;
   in->skip_array(56, "transforms of joints");
   in->skip_array(48, "speeds of joints");
   in->skip_array(48, "forces of joints");
+  return has_joints;
 }
 
 void skip_posture(WireReader* in) {
@@ -230,28 +231,24 @@ void skip_posture(WireReader* in) {
   }
 }
 
-std::string quoted(const std::string& name) { return "'" + printable(name) + "'"; }
-
 void read_attached(WireReader* in, SceneLayout layout, const WorldLimits& limits,
-                   std::vector<std::string>* notes) {
+                   std::vector<SceneAttachment>* attachments) {
   // The least attached object has 93 bytes, whatever its layout.
   const std::size_t attached = in->count(93, "attached objects");
-  std::string names;
-  std::size_t kept = 0;
+  if (attached > limits.max_objects) {
+    in->fail("it attaches " + std::to_string(attached) + " objects; allowed are " +
+             std::to_string(limits.max_objects) + " (max_objects)");
+  }
   for (std::size_t i = 0; i < attached; ++i) {
-    in->skip_string("a link's name");
+    std::string link = in->string(kNameBuffer, "a link's name");
     Budget budget{limits.max_objects, limits.max_triangles};
     const SceneObject object = read_object(in, layout, &budget);
     in->skip_strings("touch_links");
     skip_posture(in);
     in->skip(8, "a weight");
-    if (object.operation == SceneObject::Operation::kRemove) continue;
-    if (kept++ < kMostNamed) names += (names.empty() ? "" : ", ") + quoted(object.id);
+    attachments->push_back(
+        {std::move(link), object.id, object.operation == SceneObject::Operation::kRemove});
   }
-  if (kept == 0) return;
-  if (kept > kMostNamed) names += " and " + std::to_string(kept - kMostNamed) + " more";
-  notes->push_back("attached to the robot are " + names +
-                   ", which no source measures: attach them with ~attach_object");
 }
 
 void read_matrix(WireReader* in, PlanningScene* scene) {
@@ -312,28 +309,27 @@ void read_objects(WireReader* in, SceneLayout layout, const WorldLimits& limits,
   for (std::size_t i = 0; i < count; ++i) objects->push_back(read_object(in, layout, &budget));
 }
 
-void read_octomap(WireReader* in, std::vector<std::string>* notes) {
+void read_octomap(WireReader* in, PlanningScene* scene) {
   for (int k = 0; k < 2; ++k) {
     in->skip(12, "a header");
     in->skip_string("a header");
     if (k == 0) in->skip(kPoseSize, "the octomap's origin");
   }
   in->skip(1, "the octomap");
-  in->skip_string("the octomap");
+  const bool has_id = !in->string(1, "the octomap").empty();
   in->skip(8, "the octomap's resolution");
   const std::size_t size = in->count(1, "bytes of the octomap");
   in->skip(size, "bytes of the octomap");
-  if (size == 0) return;
-  notes->emplace_back(
-      "its octomap is not measured: give what it is made of to sources of their own");
+  scene->has_octomap = size > 0;
+  scene->states_octomap = has_id || size > 0;  // MoveIt names one that was cleared, without data
 }
 
 void read_scene(WireReader* in, SceneLayout layout, const WorldLimits& limits,
                 PlanningScene* scene) {
   in->skip_string("the scene's name");
-  skip_joint_states(in);
-  read_attached(in, layout, limits, &scene->notes);
-  in->skip(1, "the state's is_diff");
+  const bool has_joints = skip_joint_states(in);
+  read_attached(in, layout, limits, &scene->attachments);
+  const bool is_state_diff = in->boolean("the state's is_diff");
   in->skip_string("the robot's name");
   const std::size_t transforms = in->count(76, "fixed transforms");
   for (std::size_t i = 0; i < transforms; ++i) {
@@ -344,8 +340,11 @@ void read_scene(WireReader* in, SceneLayout layout, const WorldLimits& limits,
   read_matrix(in, scene);
   skip_paddings_and_colors(in);
   read_objects(in, layout, limits, &scene->objects);
-  read_octomap(in, &scene->notes);
+  read_octomap(in, scene);
   scene->is_diff = in->boolean("is_diff");
+  // A state that says nothing changes nothing, as in MoveIt.
+  const bool has_state = has_joints || !scene->attachments.empty();
+  scene->keeps_attached = scene->is_diff && (is_state_diff || !has_state);
   if (in->left() > 0) in->fail(std::to_string(in->left()) + " bytes follow its end");
 }
 

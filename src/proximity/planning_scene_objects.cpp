@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,6 +9,11 @@
 
 namespace ist {
 namespace {
+
+constexpr std::size_t kMostNamed = 3;  // names in one sentence
+
+// The name of the octomap among MoveIt's objects.
+constexpr const char* kOctomapName = "<octomap>";
 
 // [m, and of a rotation matrix] Poses that differ by less are the same: messages round.
 constexpr double kSamePose = 1e-6;
@@ -34,6 +40,53 @@ std::vector<std::string> AllowedCollisions::allowed_with(
     if (!is_left_out(names[i])) found.push_back(names[i]);
   }
   return found;
+}
+
+void UnmeasuredParts::apply(const SceneAttachment& attachment) {
+  const auto is_meant = [&](const auto& known) {
+    return (attachment.id.empty() || known.first == attachment.id) &&
+           (attachment.link.empty() || known.second == attachment.link);
+  };
+  if (!attachment.is_detached) {
+    if (link_of_.size() < most_ || link_of_.count(attachment.id) > 0)
+      link_of_[attachment.id] = attachment.link;
+    return;
+  }
+  for (auto known = link_of_.begin(); known != link_of_.end();) {
+    known = is_meant(*known) ? link_of_.erase(known) : std::next(known);
+  }
+}
+
+void UnmeasuredParts::apply(const PlanningScene& scene) {
+  if (!scene.fault.empty()) return;
+  if (!scene.keeps_attached) link_of_.clear();
+  for (const SceneAttachment& attachment : scene.attachments) apply(attachment);
+  const bool is_removed =
+      std::any_of(scene.objects.begin(), scene.objects.end(), [](const SceneObject& object) {
+        return object.id == kOctomapName && object.operation == SceneObject::Operation::kRemove;
+      });
+  if (!scene.is_diff || scene.states_octomap || is_removed) has_octomap_ = scene.has_octomap;
+}
+
+std::vector<std::string> UnmeasuredParts::sentences() const {
+  std::vector<std::string> sentences;
+  std::string names;
+  std::size_t named = 0;
+  for (const auto& [id, link] : link_of_) {
+    if (named++ == kMostNamed) break;
+    names += (names.empty() ? "'" : ", '") + printable(id) + "' (to '" + printable(link) + "')";
+  }
+  if (link_of_.size() > kMostNamed)
+    names += " and " + std::to_string(link_of_.size() - kMostNamed) + " more";
+  if (!names.empty()) {
+    sentences.push_back("attached to the robot are " + names +
+                        ", which no source measures: attach them with ~attach_object");
+  }
+  if (has_octomap_) {
+    sentences.emplace_back(
+        "its octomap is not measured: give what it is made of to sources of their own");
+  }
+  return sentences;
 }
 
 WorldObject to_world_object(const SceneObject& object, const std::string& default_frame) {

@@ -59,9 +59,11 @@ class WireReader {
   void skip(std::size_t size, const char* what) { take(size, what); }
   void skip_string(const char* what) { skip(count(1, what), what); }
   void skip_array(std::size_t size, const char* what) { skip(count(size, what) * size, what); }
-  void skip_strings(const char* what) {
+  /// @returns how many strings there were
+  std::size_t skip_strings(const char* what) {
     const std::size_t strings = count(4, what);
     for (std::size_t i = 0; i < strings; ++i) skip_string(what);
+    return strings;
   }
 
   [[noreturn]] void fail(const std::string& what) const {

@@ -203,10 +203,57 @@ TEST(PlanningScene, WhatNobodyMeasuresIsSaid) {
   const PlanningScene scene = read(wire);
   EXPECT_EQ(scene.fault, "");
   EXPECT_TRUE(scene.is_diff);
-  ASSERT_EQ(scene.notes.size(), 2U);
-  EXPECT_NE(scene.notes[0].find("'tool 1', 'tool 2', 'tool 3' and 1 more"), std::string::npos)
-      << scene.notes[0];
-  EXPECT_NE(scene.notes[1].find("octomap"), std::string::npos);
+  EXPECT_TRUE(scene.notes.empty());
+  UnmeasuredParts parts(WorldLimits().max_objects);
+  parts.apply(scene);
+  const std::vector<std::string> said = parts.sentences();
+  ASSERT_EQ(said.size(), 2U);
+  EXPECT_NE(said[0].find("'tool 1' (to 'hand'), 'tool 2' (to 'hand'), 'tool 3' (to 'hand') and 1 "
+                         "more"),
+            std::string::npos)
+      << said[0];
+  EXPECT_NE(said[1].find("octomap"), std::string::npos);
+}
+
+WireScene with_attached(const std::string& name, std::uint8_t operation, bool is_state_diff) {
+  WireScene wire;
+  wire.is_diff = true;
+  wire.is_state_diff = is_state_diff;
+  wire.attached = {box_object(name, kIdentityPose)};
+  wire.attached[0].operation = operation;
+  return wire;
+}
+
+// The next difference names neither the attached object nor the octomap; they are there all the
+// same. They end when they are detached, when a whole state is without them, or a whole scene is.
+TEST(PlanningScene, WhatNobodyMeasuresIsSaidUntilItEnds) {
+  UnmeasuredParts parts(10);
+  WireScene silent;
+  silent.is_diff = true;
+  WireScene octomap = silent;
+  octomap.octomap_bytes = 10;
+  WireScene cleared = silent;
+  cleared.octomap_id = "cleared";
+  const auto after = [&](const WireScene& wire) {
+    parts.apply(read(wire));
+    return parts.sentences().size();
+  };
+  EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
+  EXPECT_EQ(after(silent), 1U);
+  EXPECT_EQ(after(octomap), 2U);
+  EXPECT_EQ(after(silent), 2U);
+  EXPECT_EQ(after(with_attached("other", 1, true)), 2U);
+  EXPECT_EQ(after(with_attached("drill", 1, true)), 1U);
+  EXPECT_EQ(after(cleared), 0U);
+  EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
+  EXPECT_EQ(after(with_attached("saw", 0, false)), 1U);  // a whole state
+  EXPECT_EQ(parts.sentences()[0].find("'drill'"), std::string::npos);
+  EXPECT_EQ(after(with_attached("", 1, true)), 0U);  // all of the link
+  EXPECT_EQ(after(octomap), 1U);
+  EXPECT_EQ(after(WireScene()), 0U);  // a whole scene
+  // Names that are never detached take no more memory than the limit.
+  for (int i = 0; i < 15; ++i) after(with_attached("tool " + std::to_string(i), 0, true));
+  EXPECT_NE(parts.sentences()[0].find("and 7 more"), std::string::npos) << parts.sentences()[0];
 }
 
 TEST(PlanningScene, AllowedPairsNeedBothEntries) {
@@ -403,6 +450,11 @@ TEST(PlanningScene, ASceneAboveTheLimitsIsRefusedWhole) {
   shapes.objects = {box_object("many", kIdentityPose)};
   shapes.objects[0].primitives.resize(51, shapes.objects[0].primitives[0]);
   triangles.objects = {every_shape(), every_shape(), every_shape()};
+  WireScene attached;
+  attached.attached = objects.objects;
+  EXPECT_NE(
+      read(attached, kLayouts[1], limits).fault.find("it attaches 51 objects; allowed are 50"),
+      std::string::npos);
   const std::string texts[] = {read(objects, kLayouts[1], limits).fault,
                                read(shapes, kLayouts[1], limits).fault,
                                read(triangles, kLayouts[1], limits).fault};

@@ -4,6 +4,8 @@ genpy computes the md5sums and writes the bytes, so that the node's own reader i
 itself. Comments of the definitions are left out; they are no part of the md5sum.
 """
 
+import hashlib
+
 import genpy.dynamic
 
 # The fields as of moveit_msgs 0.11 and later (Noetic), by message, and those that others have.
@@ -96,6 +98,46 @@ uint8 CONE_RADIUS=1
     "octomap_msgs/Octomap octomap\n",
     "octomap_msgs/Octomap": "Header header\nbool binary\nstring id\nfloat64 resolution\nint8[] data\n",
 }
+
+
+COMPONENTS = """uint32 SCENE_SETTINGS=1
+uint32 ROBOT_STATE=2
+uint32 ROBOT_STATE_ATTACHED_OBJECTS=4
+uint32 WORLD_OBJECT_NAMES=8
+uint32 WORLD_OBJECT_GEOMETRY=16
+uint32 OCTOMAP=32
+uint32 TRANSFORMS=64
+uint32 ALLOWED_COLLISION_MATRIX=128
+uint32 LINK_PADDING_AND_SCALING=256
+uint32 OBJECT_COLORS=512
+uint32 components
+"""
+
+
+def get_planning_scene_type(types):
+    """The service moveit_msgs/GetPlanningScene, for the classes of planning_scene_types()."""
+    components = genpy.dynamic.generate_dynamic("moveit_msgs/PlanningSceneComponents", COMPONENTS)
+    Components = components["moveit_msgs/PlanningSceneComponents"]
+    Scene = types["moveit_msgs/PlanningScene"]
+
+    class Request(Components):
+        """The request's one field is of that type, so its bytes are the same."""
+
+    class Response(Scene):
+        """The response's one field is the scene."""
+
+    # As genmsg does it: of the text of the request and of the response, types by their md5sums.
+    text = "%s components%s scene" % (Components._md5sum, Scene._md5sum)
+
+    class Service:
+        """What rospy.Service needs."""
+
+        _type = "moveit_msgs/GetPlanningScene"
+        _md5sum = hashlib.md5(text.encode()).hexdigest()
+        _request_class = Request
+        _response_class = Response
+
+    return Service
 
 
 def planning_scene_types(is_noetic):

@@ -8,7 +8,7 @@ import unittest
 import proximity_testing as pt
 import rospy
 from geometry_msgs.msg import Pose
-from planning_scene_messages import planning_scene_types
+from planning_scene_messages import get_planning_scene_type, planning_scene_types
 from proximity_testing import LinkProximity, ProximityArray
 
 ADD, REMOVE, APPEND, MOVE = range(4)
@@ -26,12 +26,33 @@ class Publisher:
 
     def __init__(self, topic, is_noetic):
         types = planning_scene_types(is_noetic)
+        self.types, self.topic = types, topic
         self.Scene = types["moveit_msgs/PlanningScene"]
         self.Object = types["moveit_msgs/CollisionObject"]
         self.Primitive = types["shape_msgs/SolidPrimitive"]
         self.Entry = types["moveit_msgs/AllowedCollisionEntry"]
         self.Attached = types["moveit_msgs/AttachedCollisionObject"]
-        self.publisher = rospy.Publisher(topic, self.Scene, queue_size=10, latch=True)
+        self.publisher = None
+        self.start()
+
+    def start(self):
+        self.publisher = rospy.Publisher(self.topic, self.Scene, queue_size=10, latch=True)
+
+    def stop(self):
+        self.publisher.unregister()
+
+    def serve(self, name, *objects):
+        """A service that gives these objects as the full scene; its requests are counted."""
+        service = get_planning_scene_type(self.types)
+        requests = []
+
+        def answer(request):
+            requests.append(request.components)
+            scene = service._response_class()
+            scene.world.collision_objects = list(objects)
+            return scene
+
+        return rospy.Service(name, service, answer), requests
 
     def box(self, name, at=None, operation=ADD, edge=0.2, frame="base"):
         """A box whose pose is that of its shape."""
@@ -106,6 +127,13 @@ class PlanningSceneTest(unittest.TestCase):
         self.assertLessEqual(ball.lower_bound, ball.distance)
         if source:
             self.assertEqual(ball.source, source)
+
+    def diagnostics_name(self, text):
+        """Whether diagnostics that begin from now on have the text."""
+        for _ in range(2):  # the first may have been on its way
+            self.node.diagnostics.clear()
+            self.node.wait_until(lambda: "input noetic" in self.node.diagnostics, "diagnostics")
+        return text in self.node.diagnostics["input noetic"].message
 
     def at_post(self):
         """Nothing but the configured post is near."""
@@ -200,6 +228,13 @@ class PlanningSceneTest(unittest.TestCase):
         self.node.wait_until(
             lambda: "'drill'" in self.node.log() and "octomap" in self.node.log(), "a warning"
         )
+        # A difference that names neither does not end the warning.
+        self.noetic.send(self.noetic.box("part", (0, 0.35, 0)))
+        self.distance(0.15, "the part")
+        self.assertTrue(self.diagnostics_name("'drill' (to 'hand')"))
+        self.noetic.send(is_diff=False)
+        self.at_post()
+        self.assertFalse(self.diagnostics_name("'drill'"))
         # Only differences: a source of its own would do the same after a restart of the node.
         late = Publisher("/scenes/late", True)
         world = pt.World("/late").stand()
@@ -215,6 +250,34 @@ class PlanningSceneTest(unittest.TestCase):
             node.wait_for_status(ProximityArray.NO_CLOUD, "only differences (is_diff) have come")
             late.send(late.box("part", (0, 0.4, 0)), is_diff=False)
             node.wait_for(lambda m: abs(pt.link(m, "ball_link").distance - 0.2) < 1e-6, "the part")
+            # Another publisher, whose difference changes what nobody knows, until the service tells.
+            late.stop()
+            late.start()
+            late.send(late.box("other", (0, 0, 0.9)))
+            told = node.wait_for_status(ProximityArray.NO_CLOUD, "has another publisher than before")
+            self.assertEqual(pt.link(told, "ball_link").state, LinkProximity.UNKNOWN)
+            service, requests = late.serve("/late/get_planning_scene", late.box("part", (0, 0.35, 0)))
+            node.wait_for(
+                lambda m: m.status == ProximityArray.OK
+                and abs(pt.link(m, "ball_link").distance - 0.15) < 1e-6,
+                "the part of the service's scene",
+            )
+            self.assertEqual(set(requests), {4 | 16 | 32 | 64 | 128})
+            late.send(late.box("part", (0, 0.3, 0), MOVE))
+            node.wait_for(lambda m: abs(pt.link(m, "ball_link").distance - 0.1) < 1e-6, "its move")
+            service.shutdown()
+            # A publisher of the older layout: a service of the one md5sum refuses the other.
+            old = Publisher("/scenes/late", False)
+            late.stop()
+            service, requests = old.serve("/late/get_planning_scene", old.box("part", (0, 0.45, 0)))
+            old.send(old.box("other", (0, 0, 0.9)))
+            node.wait_for(
+                lambda m: m.status == ProximityArray.OK
+                and abs(pt.link(m, "ball_link").distance - 0.25) < 1e-6,
+                "the part of the older layout",
+            )
+            self.assertTrue(requests)
+            service.shutdown()
         finally:
             node.stop()
             world.stop()

@@ -75,6 +75,7 @@ TEST(WorldParameters, APlanningSceneIsATopicOfAnotherType) {
   XmlRpcValue tree = good();
   XmlRpcValue& cell = tree["sources"]["cell"];
   cell["planning_scene"] = "move_group/monitored_planning_scene";
+  cell["planning_scene_service"] = "move_group/get_planning_scene";
   cell["starts_empty"] = true;
   cell["use_allowed_collisions"] = false;
   cell["timeout"] = 2.0;
@@ -84,6 +85,7 @@ TEST(WorldParameters, APlanningSceneIsATopicOfAnotherType) {
   const SourceConfig& source = config.sources.at(0);
   EXPECT_EQ(source.topic, "move_group/monitored_planning_scene");
   EXPECT_TRUE(source.world.has_topic);
+  EXPECT_EQ(source.world.scene_service, "move_group/get_planning_scene");
   EXPECT_TRUE(source.world.starts_empty);
   EXPECT_FALSE(source.world.use_allowed_collisions);
   EXPECT_EQ(source.timeout, 2.0);

@@ -133,6 +133,8 @@ struct WireScene {
   std::vector<std::string> matrix_names = {};
   std::vector<std::vector<int>> matrix = {};
   std::size_t octomap_bytes = 0;
+  std::string octomap_id = {};  ///< of an octomap without bytes
+  bool is_state_diff = true;
   bool is_diff = false;
 
   std::vector<std::uint8_t> bytes(SceneLayout layout) const {
@@ -149,7 +151,7 @@ struct WireScene {
       for (int k = 0; k < 4; ++k) out.u32(1).f64(0.5);
       out.u32(1).u32(0).f64(0.3);
     }
-    out.u8(1).string("robot");
+    out.u8(is_state_diff ? 1 : 0).string("robot");
     out.u32(1).header("world").string("map").pose(kIdentityPose);
     out.strings(matrix_names).u32(matrix.size());
     for (const std::vector<int>& row : matrix) {
@@ -161,7 +163,8 @@ struct WireScene {
     out.u32(1).string("object").u32(0).u32(0).u32(0).u32(0);
     out.u32(objects.size());
     for (const WireObject& object : objects) out.append(object.bytes(layout));
-    out.header("map").pose(kIdentityPose).header("map").u8(1).string("OcTree").f64(0.05);
+    out.header("map").pose(kIdentityPose).header("map").u8(1);
+    out.string(octomap_bytes > 0 ? "OcTree" : octomap_id).f64(0.05);
     out.u32(octomap_bytes);
     out.bytes.resize(out.bytes.size() + octomap_bytes, 0x55);
     out.u8(is_diff ? 1 : 0);

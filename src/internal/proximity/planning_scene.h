@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,16 +52,46 @@ struct AllowedCollisions {
       const std::string& name, const std::function<bool(const std::string&)>& is_left_out) const;
 };
 
+/// An object that a scene attaches to a link of the robot, or detaches from it.
+struct SceneAttachment {
+  std::string link, id;  ///< of a detachment they may be empty: any
+  bool is_detached = false;
+};
+
 /// The part of a moveit_msgs/PlanningScene that is read.
 struct PlanningScene {
   bool is_diff = false;              ///< whether objects that it does not name stay
   std::vector<SceneObject> objects;  ///< in the order of the message
   bool has_matrix = false;           ///< whether a matrix is stated, even if it is not used
   AllowedCollisions allowed;
-  /// The parts of the scene that nobody measures: an octomap, attached objects, a matrix that is
-  /// too large or not square. Sentences.
+  std::vector<SceneAttachment> attachments;  ///< in the order of the message
+  /// Whether objects that earlier scenes have attached stay so.
+  bool keeps_attached = false;
+  bool has_octomap = false;     ///< whether it has an octomap with data
+  bool states_octomap = false;  ///< whether it says anything of an octomap
+  /// Why parts of it are not used: a matrix that is too large or not square. Sentences.
   std::vector<std::string> notes;
   std::string fault;  ///< why nothing of it can be used; empty: it can
+};
+
+/// The parts of all scenes so far that nobody measures: attached objects and the octomap. A
+/// difference that does not name them does not end them.
+class UnmeasuredParts {
+ public:
+  /// @param most  attached objects that are kept
+  explicit UnmeasuredParts(std::size_t most) : most_(most) {}
+
+  void apply(const PlanningScene& scene);
+
+  /// @returns sentences; none: nothing is left unmeasured
+  std::vector<std::string> sentences() const;
+
+ private:
+  void apply(const SceneAttachment& attachment);
+
+  std::size_t most_;
+  std::map<std::string, std::string> link_of_;  ///< by name of an attached object
+  bool has_octomap_ = false;
 };
 
 /// Reads a message.

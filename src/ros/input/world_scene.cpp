@@ -3,6 +3,8 @@
 #include <ros/console.h>
 #include <ros/serialization.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -31,6 +33,17 @@ std::vector<std::uint8_t> bytes_of(const topic_tools::ShapeShifter& message) {
   return bytes;
 }
 
+// Connections that are told apart. After more of them a full scene is asked for without need.
+constexpr std::size_t kMaxConnections = 64;
+// From one request to the next. Messages wait while one is pending, so a pause follows that is
+// twice as long.
+constexpr std::chrono::seconds kBetweenRequests(2);
+
+std::string too_large(std::size_t size) {
+  return "a planning scene has " + std::to_string(size) + " bytes; allowed are " +
+         std::to_string(kMaxSceneSize);
+}
+
 // Reads a message of any type.
 PlanningScene read_message(const topic_tools::ShapeShifter& message, const WorldLimits& limits) {
   PlanningScene scene;
@@ -41,8 +54,7 @@ PlanningScene read_message(const topic_tools::ShapeShifter& message, const World
                   printable(message.getMD5Sum()) + " comes in; read are " + kPlanningSceneType +
                   " of Indigo to Melodic and of Noetic";
   } else if (message.size() > kMaxSceneSize) {
-    scene.fault = "a planning scene has " + std::to_string(message.size()) +
-                  " bytes; allowed are " + std::to_string(kMaxSceneSize);
+    scene.fault = too_large(message.size());
   } else {
     scene = read_planning_scene(bytes_of(message), *layout, limits);
   }
@@ -51,10 +63,31 @@ PlanningScene read_message(const topic_tools::ShapeShifter& message, const World
 
 }  // namespace
 
-void WorldSource::receive_scene(const topic_tools::ShapeShifter::ConstPtr& message) {
+void WorldSource::receive_scene(const ros::MessageEvent<const topic_tools::ShapeShifter>& event) {
+  const bool is_other = is_other_publisher(event);
+  use_scene([&] {
+    PlanningScene scene = read_message(*event.getConstMessage(), config_.world.limits);
+    if (is_other && scene.is_diff) lose_scene();
+    return scene;
+  });
+}
+
+/// Whether a message comes by another connection than those of before. Its publisher may have begun
+/// anew, or messages may have been lost in between.
+bool WorldSource::is_other_publisher(
+    const ros::MessageEvent<const topic_tools::ShapeShifter>& event) {
+  const bool was_gone = std::exchange(is_publisher_gone_, false);
+  const bool is_first = connections_.empty();
+  const bool is_new = connections_.insert(event.getConnectionHeaderPtr()).second;
+  if (connections_.size() > kMaxConnections) connections_.erase(connections_.begin());
+  return (is_new && !is_first) || was_gone;
+}
+
+/// Applies a scene that has come by the topic or from the service.
+void WorldSource::use_scene(const std::function<PlanningScene()>& read) {
   has_received_ = true;
   state_.begin_work();
-  guard(Kind::kMessage, [&] { apply_scene(*message); });
+  guard(Kind::kMessage, [&] { apply_scene(read()); });
   // A message that is not used may have changed anything: the scene is not known any more.
   const auto lost = faults_.find(fault_of(Kind::kMessage));
   if (lost != faults_.end()) {
@@ -71,9 +104,11 @@ void WorldSource::receive_scene(const topic_tools::ShapeShifter::ConstPtr& messa
   note_receipt(ros::Time());
 }
 
-void WorldSource::apply_scene(const topic_tools::ShapeShifter& message) {
-  const PlanningScene scene = read_message(message, config_.world.limits);
-  const std::string doubt = join(scene.notes, "; ");
+void WorldSource::apply_scene(const PlanningScene& scene) {
+  unmeasured_.apply(scene);
+  std::vector<std::string> doubts = unmeasured_.sentences();
+  doubts.insert(doubts.end(), scene.notes.begin(), scene.notes.end());
+  const std::string doubt = join(doubts, "; ");
   if (!doubt.empty()) ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': " << doubt);
   state_.update([&](SourceReport* report) { report->doubt = doubt; });
   if (!scene.fault.empty()) return note_fault(fault_of(Kind::kMessage), scene.fault);
@@ -89,6 +124,69 @@ void WorldSource::apply_scene(const topic_tools::ShapeShifter& message) {
     faults_.erase(fault_of(Kind::kScene));
   }
   allow_collisions(scene);
+}
+
+/// Notes that the publisher of scenes has ended: the next one need not have the same objects.
+void WorldSource::note_publishers(std::uint32_t publishers) {
+  if (publishers == 0 && publishers_ > 0) is_publisher_gone_ = true;
+  publishers_ = publishers;
+  if (publishers > 0 && is_publisher_gone_) {
+    connections_.clear();  // the next one is not another one again
+    lose_scene();
+  }
+  ask_for_scene();
+}
+
+/// Another publisher has begun: the objects of the last one stay until a full scene comes.
+void WorldSource::lose_scene() {
+  is_publisher_gone_ = false;
+  if (config_.world.starts_empty || !has_full_scene_) return;
+  has_full_scene_ = false;
+  next_request_ = {};
+  note_fault(fault_of(Kind::kScene),
+             "the planning scene has another publisher than before, whose objects are not known: "
+             "a full scene (is_diff false) is needed now");
+  show_faults();
+}
+
+/// Asks for a full scene when there is a publisher: what it sends from now on will come as well.
+void WorldSource::ask_for_scene() {
+  if (!scene_request_ || has_full_scene_ || publishers_ == 0 || scene_request_->is_pending()) {
+    return;
+  }
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_request_) return;
+  next_request_ = now + kBetweenRequests;
+  scene_request_->start();
+}
+
+void WorldSource::receive_answer() {
+  SceneRequest::Answer answer;
+  if (!scene_request_->take(&answer)) return;
+  const auto now = std::chrono::steady_clock::now();
+  const auto asked = next_request_ - kBetweenRequests;
+  next_request_ = std::max(next_request_, now + 2 * (now - asked));
+  if (!answer.fault.empty()) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': the full planning scene was "
+                                              << "asked for, but " << answer.fault);
+    return;
+  }
+  use_scene([&] {
+    PlanningScene scene;
+    if (answer.bytes.size() > kMaxSceneSize) {
+      scene.fault = too_large(answer.bytes.size());
+    } else {
+      scene = read_planning_scene(answer.bytes, answer.layout, config_.world.limits);
+    }
+    if (scene.fault.empty() && scene.is_diff)
+      scene.fault = "a difference (is_diff) is no full scene";
+    if (!scene.fault.empty()) scene.fault = scene_request_->service() + " answers: " + scene.fault;
+    return scene;
+  });
+  if (has_full_scene_) {
+    ROS_INFO_STREAM("source '" << config_.name << "': the full planning scene has come from "
+                               << scene_request_->service());
+  }
 }
 
 void WorldSource::change_all(const PlanningScene& scene) {

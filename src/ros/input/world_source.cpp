@@ -46,6 +46,7 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
       state_(config, place_of(config, nh)),
       builder_(config.world.limits),
       has_full_scene_(config.world.starts_empty),
+      unmeasured_(config.world.limits.max_objects),
       topic_advice_(nh.resolveName(config.topic), message_type(config), "") {
   if (!config.world.robot.description.empty()) {
     robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
@@ -54,6 +55,9 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
         [&](SourceReport* report) { report->incomplete = "waiting for the other robot's URDF"; });
   }
   markers_ = private_nh.advertise<visualization_msgs::MarkerArray>("world/" + config.name, 1, true);
+  if (config.world.is_planning_scene && !config.world.scene_service.empty()) {
+    scene_request_ = std::make_unique<SceneRequest>(nh.resolveName(config.world.scene_service));
+  }
   nh.setCallbackQueue(&queue_);
   if (config.world.has_topic) subscribe(&nh);
   thread_ = std::thread(&WorldSource::run, this);
@@ -72,9 +76,9 @@ void WorldSource::subscribe(ros::NodeHandle* nh) {
     return;
   }
   ros::SubscribeOptions options;
-  options.init<topic_tools::ShapeShifter>(
-      config_.topic, kQueueSize,
-      [this](const topic_tools::ShapeShifter::ConstPtr& message) { receive_scene(message); });
+  using Event = ros::MessageEvent<const topic_tools::ShapeShifter>;
+  options.initByFullCallbackType<const Event&>(
+      config_.topic, kQueueSize, [this](const Event& event) { receive_scene(event); });
   options.datatype = kPlanningSceneType;  // of any md5sum
   options.transport_hints = hints;
   subscriber_ = nh->subscribe(options);
@@ -134,7 +138,12 @@ void WorldSource::run() {
   guard(Kind::kConfigured, [this] { read_configured(); });
   is_changed_ = true;
   while (running_) {
-    guard(Kind::kMessage, [this] { queue_.callAvailable(kPoll); });
+    if (scene_request_ && scene_request_->is_pending()) {
+      kPoll.sleep();  // differences change the scene that is asked for, so they wait for it
+    } else {
+      guard(Kind::kMessage, [this] { queue_.callAvailable(kPoll); });
+    }
+    if (scene_request_) guard(Kind::kMessage, [this] { receive_answer(); });
     guard(Kind::kWork, [this] {
       if (!is_robot_read_) read_robot();
       count_publishers();
@@ -212,6 +221,7 @@ void WorldSource::count_publishers() {
   if (!publishers) return;
   std::optional<std::string> advice;
   if (!has_received_) advice = topic_advice_.ask();
+  if (config_.world.is_planning_scene) note_publishers(*publishers);
   state_.update([&](SourceReport* report) {
     report->publishers = *publishers;
     if (advice) report->advice = *advice;

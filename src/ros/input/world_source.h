@@ -2,6 +2,7 @@
 
 #include <ist_proximity/WorldObjects.h>
 #include <ros/callback_queue.h>
+#include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/subscriber.h>
@@ -9,6 +10,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <set>
@@ -21,6 +23,7 @@
 #include "ros/common/publisher_count.h"
 #include "ros/input/obstacle_source.h"
 #include "ros/input/other_robot.h"
+#include "ros/input/scene_request.h"
 #include "ros/input/snapshot_exchange.h"
 #include "ros/input/source_state.h"
 #include "ros/input/topic_advice.h"
@@ -70,8 +73,14 @@ class WorldSource : public ObstacleSource {
   void apply(const ist_proximity::WorldObjects& message);
   void change_all(const ist_proximity::WorldObjects& message);
   void change(const ist_proximity::WorldObject& message, std::vector<WorldObject>* added);
-  void receive_scene(const topic_tools::ShapeShifter::ConstPtr& message);
-  void apply_scene(const topic_tools::ShapeShifter& message);
+  void receive_scene(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
+  bool is_other_publisher(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
+  void use_scene(const std::function<PlanningScene()>& read);
+  void apply_scene(const PlanningScene& scene);
+  void note_publishers(std::uint32_t publishers);
+  void lose_scene();
+  void ask_for_scene();
+  void receive_answer();
   void change_all(const PlanningScene& scene);
   void change(const SceneObject& object, std::vector<WorldObject>* added);
   void append(const SceneObject& object, std::vector<WorldObject>* added);
@@ -114,6 +123,13 @@ class WorldSource : public ObstacleSource {
   std::set<std::string> configured_;  ///< names of parameters, the file and the other robot
   AllowedCollisions allowed_;         ///< of planning scenes
   bool has_full_scene_ = false;       ///< whether differences have something that they change
+  UnmeasuredParts unmeasured_;        ///< of planning scenes
+  std::unique_ptr<SceneRequest> scene_request_;  ///< null: none is to be made
+  std::chrono::steady_clock::time_point next_request_;
+  /// The connections by which scenes have come, by their headers.
+  std::set<boost::shared_ptr<ros::M_string>> connections_;
+  std::uint32_t publishers_ = 0;    ///< at the last count
+  bool is_publisher_gone_ = false;  ///< whether scenes had a publisher, and now have none
   PublisherCount publisher_count_;
   TopicAdvice topic_advice_;
   ros::Time stamp_;

@@ -38,6 +38,8 @@ struct WorldConfig {
   OtherRobotConfig robot;
   bool has_topic = false;          ///< whether its topic is subscribed to
   bool is_planning_scene = false;  ///< whether that is a moveit_msgs/PlanningScene
+  /// Service that is asked for the full scene while none has come; empty: none.
+  std::string scene_service = "get_planning_scene";
   /// Whether planning scenes that are differences begin with an empty world.
   bool starts_empty = false;
   /// Whether pairs of the allowed collision matrix of planning scenes may touch.

@@ -147,6 +147,7 @@ void read_topic(ParameterReader* reader, const std::string& prefix, SourceConfig
                         "planning_scene is empty: the name of a topic is needed, for example "
                         "/move_group/monitored_planning_scene");
     }
+    reader->read(prefix + "planning_scene_service", &world.scene_service);
     reader->read(prefix + "starts_empty", &world.starts_empty);
     reader->read(prefix + "use_allowed_collisions", &world.use_allowed_collisions);
   }
