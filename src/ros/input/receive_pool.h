@@ -22,8 +22,8 @@ class ReceivePool {
  public:
   using Pointer = boost::shared_ptr<Message>;
 
-  /// As many messages are kept as were held at a time while this number was taken: ten seconds of
-  /// 30 Hz.
+  /// The pool keeps as many messages as were held at a time while this number was taken: ten
+  /// seconds of 30 Hz.
   static constexpr unsigned kWindow = 300;
 
   /// A message that nobody else holds, to be filled.

@@ -35,8 +35,8 @@ std::vector<std::uint8_t> bytes_of(const topic_tools::ShapeShifter& message) {
 
 // Connections that are told apart. After more of them a full scene is asked for without need.
 constexpr std::size_t kMaxConnections = 64;
-// From one request to the next. Messages wait while one is pending, so a pause follows that is
-// twice as long.
+// Requests begin no closer than this. Messages wait while a request is pending, so that the pause
+// after it is twice as long as it took.
 constexpr std::chrono::seconds kBetweenRequests(2);
 
 std::string too_large(std::size_t size) {
