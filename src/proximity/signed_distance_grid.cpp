@@ -14,8 +14,9 @@ namespace {
 constexpr double kStored = 1e-6;
 // [m] More than double loses in the distance of two places of a link.
 constexpr double kRounding = 1e-12;
-// Cells along the radius of a link.
-constexpr double kCellsPerRadius = 16.0;
+// Cells along the radius of a link. A mesh with holes has more of them, because what is outside
+// about a cell's centre ends where an open edge is near.
+constexpr double kCellsPerRadius = 16.0, kCellsPerRadiusWithHoles = 24.0;
 constexpr double kMinCell = 1e-3;  // [m]
 // Cells to either side of the origin that a key can tell apart.
 constexpr double kMaxIndex = 262143.0;
@@ -37,7 +38,8 @@ SignedDistanceGrid::SignedDistanceGrid(const LinkModel& link)
       is_one_mesh_(is_one_mesh(link.solid)),
       is_closed_(link.solid.is_closed()),
       origin_(link.tree.center()),
-      size_(std::max(link.tree.radius() / kCellsPerRadius, kMinCell)),
+      size_(std::max(link.tree.radius() / (is_closed_ ? kCellsPerRadius : kCellsPerRadiusWithHoles),
+                     kMinCell)),
       per_size_(1.0 / size_),
       cells_(kCells) {}
 

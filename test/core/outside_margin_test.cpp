@@ -59,49 +59,196 @@ TEST(OutsideMargin, HoldsNoPlaceInside) {
   EXPECT_GT(large, test::scaled(1000));
 }
 
-// Next to an edge of many short pieces the bound is no more than pi / 2 times the gradient: an edge
-// seen from `d` changes the winding number by 1 / (2 pi d) for each metre.
-TEST(OutsideMargin, GradientIsBounded) {
-  TriangleMesh fan;  // a square, its border in short edges
-  constexpr int kPieces = 100;
-  fan.vertices.push_back(Eigen::Vector3d::Zero());
+// A square about the z axis; its border is in `pieces` edges for each side.
+TriangleMesh fan(int pieces, double half) {
+  TriangleMesh mesh;
+  mesh.vertices.push_back(Eigen::Vector3d::Zero());
   for (int side = 0; side < 4; ++side) {
-    for (int i = 0; i < kPieces; ++i) {
-      const double along = 2.0 * i / kPieces - 1.0;
-      const Eigen::Vector3d p(1.0, along, 0.0);
-      fan.vertices.push_back(Eigen::AngleAxisd(0.5 * EIGEN_PI * side, Eigen::Vector3d::UnitZ()) *
-                             p);
+    for (int i = 0; i < pieces; ++i) {
+      const Eigen::Vector3d p(half, half * (2.0 * i / pieces - 1.0), 0.0);
+      mesh.vertices.push_back(Eigen::AngleAxisd(0.5 * EIGEN_PI * side, Eigen::Vector3d::UnitZ()) *
+                              p);
     }
   }
-  for (std::uint32_t i = 0; i < 4 * kPieces; ++i) {
-    fan.triangles.push_back({0, 1 + i, 1 + (i + 1) % (4 * kPieces)});
+  const auto corners = static_cast<std::uint32_t>(4 * pieces);
+  for (std::uint32_t i = 0; i < corners; ++i) {
+    mesh.triangles.push_back({0, 1 + i, 1 + (i + 1) % corners});
   }
-  const OpenEdgeBlocks edges(fan);
-  test::Rng rng(182);
-  double least = 10.0;
+  return mesh;
+}
+
+// The change of the winding number from p to q, if the straight line between them does not cross
+// the mesh: crossing it changes it by one, which is more than these places are apart.
+double change_of_winding(const TriangleMesh& mesh, const Eigen::Vector3d& p,
+                         const Eigen::Vector3d& q) {
+  const double change = test::oracle_winding(mesh, q) - test::oracle_winding(mesh, p);
+  return std::abs(change - std::round(change));
+}
+
+// The largest change from p to a place at `radius` from it, by hill climbing.
+double largest_change(const TriangleMesh& mesh, const Eigen::Vector3d& p, double radius,
+                      test::Rng* rng) {
+  Eigen::Vector3d best = Eigen::Vector3d::UnitX();
+  double change = 0.0;
+  for (int k = 0; k < 40; ++k) {
+    const double step = k < 10 ? 10.0 : std::pow(0.85, k - 10);
+    const Eigen::Vector3d tried = (best + step * test::random_vector(rng, 1.0)).normalized();
+    const double found = change_of_winding(mesh, p, p + radius * tried);
+    if (!(found > change)) continue;
+    change = found;
+    best = tried;
+  }
+  return change;
+}
+
+struct Steadiness {
+  double most_used = 0.0;  // share of the change that was allowed
+  int positive = 0, large = 0;
+};
+
+// Asks at places about the open edges of a mesh, from near to far.
+Steadiness check_steady(const TriangleMesh& mesh, double size, test::Rng* rng) {
+  const OpenEdgeBlocks edges(mesh);
+  Steadiness found;
   for (int i = 0; i < test::scaled(300); ++i) {
-    const double from_edge = test::uniform(&rng, 0.05, 0.4);
-    const double angle = test::uniform(&rng, 0.0, 2.0 * EIGEN_PI);
-    const Eigen::Vector3d p(1.0 + from_edge * std::cos(angle), test::uniform(&rng, -0.7, 0.7),
-                            from_edge * std::sin(angle));
-    Eigen::Vector3d gradient;
-    constexpr double kStep = 1e-4;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(axis);
-      // Past the square itself the winding number jumps by one.
-      const double change =
-          test::oracle_winding(fan, p + step) - test::oracle_winding(fan, p - step);
-      gradient[axis] = (change - std::round(change)) / (2.0 * kStep);
-    }
-    const double bound = edges.gradient_bound(p, 0.0);
-    ASSERT_LE(gradient.norm(), bound * (1.0 + 1e-5)) << p.transpose();
-    least = std::min(least, bound / gradient.norm());
-    // And within a ball, wherever the place is.
-    const double radius = 0.5 * from_edge;
-    ASSERT_LE(edges.gradient_bound(p + radius * test::random_vector(&rng, 0.5), 0.0),
-              edges.gradient_bound(p, radius));
+    const double from = std::pow(10.0, test::uniform(rng, -4.0, 1.0)) * size;
+    const Eigen::Vector3d p =
+        size * test::random_vector(rng, 1.0) * (i % 2) +
+        (mesh.vertices.back() + from * test::random_vector(rng, 1.0)) * (1 - i % 2);
+    const double allowed = std::pow(10.0, test::uniform(rng, -2.0, -0.4));
+    const double radius = edges.steady_radius(p, allowed, size);
+    EXPECT_LE(radius, size);
+    if (!(radius > 0.0)) continue;
+    ++found.positive;
+    found.large += radius > 0.1 * size ? 1 : 0;
+    const double used = largest_change(mesh, p, radius, rng) / allowed;
+    EXPECT_LE(used, 1.0 + 1e-6) << p.transpose() << ", " << radius;
+    if (radius < size) found.most_used = std::max(found.most_used, used);
   }
-  EXPECT_LT(least, 2.0) << "a bound ten times as low would not hold";
+  return found;
+}
+
+TEST(OutsideMargin, WindingNumberIsSteady) {
+  test::Rng rng(182);
+  for (const double size : {1e-3, 1.0, 1e3}) {
+    for (const TriangleMesh& mesh :
+         {fan(1, size), fan(100, size), test::sheet(size), test::open_box({size, size, size})}) {
+      const Steadiness found = check_steady(mesh, size, &rng);
+      EXPECT_GT(found.positive, test::scaled(200));
+      EXPECT_GT(found.large, test::scaled(20));
+      EXPECT_GT(found.most_used, 0.5) << "the radius could be twice as large";
+    }
+  }
+}
+
+// Edges of one block; unused lanes are far away.
+OpenEdgeBlock block_of(const std::vector<Eigen::Vector3d>& from,
+                       const std::vector<Eigen::Vector3d>& along) {
+  OpenEdgeBlock block{};
+  for (std::size_t i = 0; i < OpenEdgeBlock::kEdges; ++i) {
+    const bool is_used = i < from.size();
+    for (int axis = 0; axis < 3; ++axis) {
+      block.from[axis][i] = is_used ? static_cast<float>(from[i][axis]) : 1e6F;
+      block.along[axis][i] = is_used ? static_cast<float>(along[i][axis]) : 0.0F;
+      if (is_used) block.sum_along[axis] += block.along[axis][i];
+    }
+    if (!is_used) continue;
+    const auto length = static_cast<float>(along[i].norm());
+    block.per_length_sq[i] = 1.0F / (length * length);
+    block.length[i] = length;
+    block.count[i] = 1.0F;
+    block.sum_length += length;
+    block.radius = std::max(
+        block.radius, static_cast<float>(std::max(from[i].norm(), (from[i] + along[i]).norm())));
+  }
+  return block;
+}
+
+OpenEdgeSums sums_at(const OpenEdgeBlock& block, const Eigen::Vector3d& p) {
+  const Eigen::Vector3f p_float = p.cast<float>();
+  OpenEdgeSums sums;
+  sum_open_edges({block}, p_float.data(), &sums);
+  return sums;
+}
+
+// The field of a straight edge (Biot and Savart).
+Eigen::Vector3d field_of(const Eigen::Vector3d& from, const Eigen::Vector3d& along,
+                         const Eigen::Vector3d& p) {
+  constexpr int kParts = 1000;
+  Eigen::Vector3d field = Eigen::Vector3d::Zero();
+  for (int i = 0; i < kParts; ++i) {
+    const Eigen::Vector3d r = from + (i + 0.5) / kParts * along - p;
+    field += r.cross(along / kParts) / std::pow(r.norm(), 3);
+  }
+  return field;
+}
+
+// The field of a short edge falls with the cube of the distance, which the bound of its derivative
+// just allows.
+TEST(OutsideMargin, CurvatureOfOneEdge) {
+  constexpr double kLength = 1e-3, kStep = 1e-3;
+  const OpenEdgeBlock block = block_of({{0.0, -0.5 * kLength, 0.0}}, {{0.0, kLength, 0.0}});
+  for (const double distance : {0.003, 0.006, 0.01, 1.0}) {
+    const Eigen::Vector3d p(distance, 0.0, 0.0);
+    const OpenEdgeSums sums = sums_at(block, p);
+    const Eigen::Vector3d step = kStep * p;
+    const Eigen::Vector3d change =
+        field_of({0.0, -0.5 * kLength, 0.0}, {0.0, kLength, 0.0}, p + step) -
+        field_of({0.0, -0.5 * kLength, 0.0}, {0.0, kLength, 0.0}, p - step);
+    const double slope = change.norm() / (2.0 * step.norm());
+    EXPECT_LE(slope, sums.curvature);
+    EXPECT_GT(slope, 0.8 * sums.curvature);
+    EXPECT_LE(sums.nearest, distance);
+    EXPECT_GT(sums.nearest, 0.9 * distance);
+  }
+}
+
+// The field is as wrong as it says, at most: from nearby, where edges are summed up, and from afar,
+// where the block is.
+TEST(OutsideMargin, FieldErrorIsBounded) {
+  test::Rng rng(184);
+  double most_used = 0.0;
+  for (int i = 0; i < test::scaled(200); ++i) {
+    std::vector<Eigen::Vector3d> from, along;
+    for (std::size_t k = 0; k < OpenEdgeBlock::kEdges - static_cast<std::size_t>(i % 3); ++k) {
+      from.push_back(test::random_vector(&rng, 0.5));
+      along.push_back(test::random_vector(&rng, 0.4) + Eigen::Vector3d(0.1, 0.0, 0.0));
+    }
+    const OpenEdgeBlock block = block_of(from, along);
+    const double away = std::pow(10.0, test::uniform(&rng, -0.3, 2.5));
+    const Eigen::Vector3d p = (1.0 + away) * test::random_vector(&rng, 1.0).normalized();
+    const OpenEdgeSums sums = sums_at(block, p);
+    Eigen::Vector3d error(-sums.field[0], -sums.field[1], -sums.field[2]);
+    double quadrature = 0.0;
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      const Eigen::Vector3d field = field_of(from[k], along[k], p);
+      error += field;
+      quadrature += 1e-6 * field.norm();
+    }
+    ASSERT_LE(error.norm(), sums.field_error + quadrature) << p.norm();
+    most_used = std::max(most_used, error.norm() / sums.field_error);
+  }
+  EXPECT_GT(most_used, 0.1) << "the error is never so large";
+}
+
+// Two sheets whose borders meet in opposite directions change it little, though each one alone
+// would: the fields of their edges cancel.
+TEST(OutsideMargin, SeamsCancel) {
+  TriangleMesh two = fan(7, 0.1);
+  TriangleMesh other = fan(9, 0.1 + 1e-5);
+  const auto first = static_cast<std::uint32_t>(two.vertices.size());
+  two.vertices.insert(two.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const TriangleMesh::Triangle& t : other.triangles) {
+    two.triangles.push_back({first + t[0], first + t[2], first + t[1]});
+  }
+  constexpr double kChange = 0.2;
+  const Eigen::Vector3d p(0.11, 0.0, 0.0);
+  const double alone = OpenEdgeBlocks(fan(7, 0.1)).steady_radius(p, kChange, 0.1);
+  const double both = OpenEdgeBlocks(two).steady_radius(p, kChange, 0.1);
+  EXPECT_LT(alone, 0.01);
+  EXPECT_GT(both, 0.7 * alone) << "there are twice as many edges";
+  test::Rng rng(183);
+  check_steady(two, 0.1, &rng);
 }
 
 // The edges of a large mesh take a second to collect, which nothing could end.
@@ -115,8 +262,10 @@ TEST(OutsideMargin, EdgesCanBeCancelled) {
     EXPECT_THROW(OpenEdgeBlocks(mesh, [&] { return ++asked >= last; }), Cancelled);
     EXPECT_EQ(asked, last);
   }
-  const double far = whole.gradient_bound({1.0, 0.0, 0.0}, 0.0);
-  EXPECT_EQ(far, OpenEdgeBlocks(mesh).gradient_bound({1.0, 0.0, 0.0}, 0.0));
+  const Eigen::Vector3d p(0.15, 0.0, 0.0);
+  const double radius = whole.steady_radius(p, 0.1, 1.0);
+  EXPECT_GT(radius, 0.0);
+  EXPECT_EQ(radius, OpenEdgeBlocks(mesh).steady_radius(p, 0.1, 1.0));
 }
 
 }  // namespace
