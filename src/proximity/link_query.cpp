@@ -251,13 +251,15 @@ void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_last);
   }
   if (distance() < kInfinity || !has_time) return;
-  // A new cloud has about the same obstacle about the same place.
-  const Eigen::Vector3d p_FQ =
-      last.has_place ? last.p_FCo : link_.search.X_FL * link_.context.tree().center();
-  const auto measure_near = [&](const auto& obstacles) { measure_near_place(obstacles, p_FQ); };
-  for (std::size_t i = 0; i < clouds.size(); ++i) {
-    for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_near);
-  }
+  // A new cloud has about the same obstacle about the same place, unless the link has left it.
+  const auto measure_near = [&](const Eigen::Vector3d& p_FQ) {
+    for (std::size_t i = 0; i < clouds.size(); ++i) {
+      for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL,
+                     [&](const auto& obstacles) { measure_near_place(obstacles, p_FQ); });
+    }
+  };
+  if (last.has_place) measure_near(last.p_FCo);
+  if (distance() == kInfinity) measure_near(link_.search.X_FL * link_.context.tree().center());
 }
 
 // Measures an obstacle that is near a place, though perhaps not the nearest: of the points of one
@@ -280,7 +282,10 @@ void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen:
       nearest = k;
     }
   }
-  PointRefinement(obstacles, &link_).measure({~child, nearest});
+  // A point of the link's surface is no nearer than the surface.
+  const double distance = last.has_place ? (tile.point(nearest) - p_OC).norm() : kInfinity;
+  PointRefinement(obstacles, &link_)
+      .measure({~child, nearest}, (1.0 + 1e-9) * distance + kRounding);
 }
 
 // Boxes have an upper bound of their own.

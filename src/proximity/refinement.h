@@ -41,6 +41,8 @@ class PointRefinement {
   using Side = NearSurface::Side;
   /// On which side of the link's surface a point is; unknown after the deadline.
   Side side(ObstacleId id, const Eigen::Vector3d& p_LQ);
+  /// The same, by what is kept and by the link's grid: outside or unknown.
+  Side known_side(ObstacleId id, const Eigen::Vector3d& p_LQ);
   /// Measures a point that is outside the link, unless it was measured in this traversal or a kept
   /// bound proves that it does not matter.
   /// @param lower_bound  [m] by the clipped cover spheres

@@ -76,18 +76,28 @@ float PointRefinement::bound_box(std::int32_t slot, std::int32_t child, const fl
                                   bound.is_outside ? round_down(bound.signed_distance) : kNone);
 }
 
+// What needs no winding number. After the deadline there is no time to measure a cell's margin.
+PointRefinement::Side PointRefinement::known_side(ObstacleId id, const Eigen::Vector3d& p_LQ) {
+  if (link_.kept.distances.find(DistanceCache::Quantity::kOutside, coherent_key(obstacles_, id),
+                                p_LQ) > 0.0) {
+    return Side::kOutside;
+  }
+  SignedDistanceGrid& grid = link_.context.grid;
+  SignedDistanceGrid::Cell* cell = grid.find(p_LQ);
+  if (cell == nullptr || deadline_passed()) return Side::kUnknown;
+  const bool is_outside =
+      grid.bound(cell, {p_LQ}, kInfinity).is_outside || grid.outside_margin(cell, p_LQ) > 0.0;
+  return is_outside ? Side::kOutside : Side::kUnknown;
+}
+
 // The winding number is asked last. It is not asked after the deadline.
 PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ) {
   const SignedDistanceGrid::Bound bound = grid_bound({p_LQ}, kInfinity);
-  if (bound.is_outside) return Side::kOutside;
+  if (bound.is_outside || known_side(id, p_LQ) == Side::kOutside) return Side::kOutside;
+  if (deadline_passed()) return Side::kUnknown;
   DistanceCache& kept = link_.kept.distances;
   const auto quantity = DistanceCache::Quantity::kOutside;
   const std::uint32_t key = coherent_key(obstacles_, id);
-  if (kept.find(quantity, key, p_LQ) > 0.0) return Side::kOutside;
-  if (deadline_passed()) return Side::kUnknown;
-  SignedDistanceGrid& grid = link_.context.grid;
-  SignedDistanceGrid::Cell* cell = grid.find(p_LQ);
-  if (cell != nullptr && grid.outside_margin(cell, p_LQ) > 0.0) return Side::kOutside;
   link_.search.count_exact();
   const Solid& solid = link_.context.solid();
   const OutsideMargin found =
@@ -123,8 +133,15 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
     measure_outside(id, p_OQ, p_LQ, max_distance);
     return;
   }
-  link_.search.count_exact();
-  link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
+  switch (known_side(id, p_LQ)) {
+    case Side::kOutside:
+      measure_outside(id, p_OQ, p_LQ, max_distance);
+      return;
+    case Side::kInside:
+    case Side::kUnknown:
+      link_.search.count_exact();
+      link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
+  }
 }
 
 void PointRefinement::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,

@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/contact/contact_volume.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
@@ -211,6 +212,33 @@ TEST(Deadline, HoldsForManyLinksAndANewCloud) {
     }
   }
   EXPECT_LT(quantile(overruns, 0.9), kStep);
+}
+
+// A link that has jumped out of reach of its last obstacle gets another one, even without time: it
+// stayed UNKNOWN as long as there was none.
+TEST(Deadline, FindsAnObstacleAfterAJump) {
+  const auto model = test::make_model({Shape(test::torus(0.1, 0.03, 48, 24))}, 0.01);
+  Points points = shell(300, 0.2);
+  for (const Eigen::Vector3d& p : shell(300, 0.2))
+    points.emplace_back(p + Eigen::Vector3d(4, 0, 0));
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  QueryConfig config;
+  config.deadline = 1.0;
+  ProximityQuery query(model, config);
+  std::vector<LinkProximity> results;
+  query.run({Eigen::Isometry3d::Identity()}, {true}, {&cloud}, &results);
+  for (const double x : {4.0, 0.0}) {
+    const Eigen::Isometry3d X_FL(Eigen::Translation3d(x, 0.01, 0.02));
+    Deadline::asks_left_for_test = 0;
+    query.run({X_FL}, {true}, {&cloud}, &results);
+    Deadline::asks_left_for_test = -1;
+    const LinkProximity& result = results[0];
+    ASSERT_EQ(result.state, LinkState::kNear) << x;
+    const double distance =
+        model->links[0].solid.signed_distance(X_FL.inverse() * result.p_FCo).distance;
+    EXPECT_NEAR(result.distance, distance, 1e-6);
+    EXPECT_LE(result.lower_bound, result.distance);
+  }
 }
 
 // In contact with a fine mesh, with holes or without, a cell of the grid costs more than an exact
