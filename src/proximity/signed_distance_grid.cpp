@@ -28,8 +28,10 @@ constexpr double kPlaneRadius = 1.5;
 constexpr double kPlaneDistance = 64.0;
 // The share of that radius by which a plane may be too high.
 constexpr double kPlaneTolerance = 0.01;
-// A plane that cuts off less of the sphere about C, as a share of its radius, says little.
-constexpr double kHighestPlane = 0.9;
+// A plane that cuts off less of the sphere about C, as a share of its radius, says little. Below
+// this one, a place in the plane's radius, which is half the sphere's at most, gets straight up to
+// the plane without leaving the sphere.
+constexpr double kHighestPlane = 0.86;
 
 }  // namespace
 
@@ -194,10 +196,12 @@ SignedDistanceGrid::Bound SignedDistanceGrid::bound(Cell* cell, const Part& part
   const Eigen::Vector3d normal = cell->normal.cast<double>();
   const double above = normal.dot(from_C) - part.extent_against(normal) -
                        static_cast<double>(cell->plane) - kStored * distance;
-  if (!(above > 0.0)) return bound;
-  bound.surface_distance = std::max(bound.surface_distance, above);
+  if (above > 0.0) {
+    bound.surface_distance = std::max(bound.surface_distance, above);
+    bound.is_outside = bound.is_outside || cell->is_outside_above_plane;
+  }
+  // A place inside and below the plane meets the surface on its way up.
   if (cell->is_outside_above_plane) {
-    bound.is_outside = true;
     bound.signed_distance = std::max(bound.signed_distance, above);
   }
   return bound;

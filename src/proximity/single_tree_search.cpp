@@ -136,22 +136,22 @@ class SingleTreeSearch {
   }
 
   // The supporting plane of the whole link across the direction of the closest obstacle: a flat
-  // scene is above it.
+  // scene is above it, or nowhere far below.
   void set_plane() {
     const SignedDistance& closest = search_.closest.exact;
-    if (!is_closed_ || !(closest.distance > 0.0 && closest.distance < kInfinity)) return;
+    if (!is_closed_ || !(closest.distance < kInfinity)) return;
     plane_normal_L_ = closest.normal;
     plane_height_ = support(link_.context.solid(), closest.normal, kPlaneSlack,
                             closest.normal.dot(closest.witness)) +
                     kPlaneRounding * (1.0 + tree_.center().norm() + tree_.radius());
   }
 
-  // [m] No point of a part has a smaller signed distance, by that plane.
+  // [m] No point of a part has a smaller signed distance, by that plane: a point below it that is
+  // inside the link meets the surface on its way up to the plane.
   double plane_bound(const SignedDistanceGrid::Part& part) const {
     if (plane_height_ == kInfinity) return -kInfinity;
-    const double above =
-        plane_normal_L_.dot(part.center_L) - part.extent_against(plane_normal_L_) - plane_height_;
-    return above > 0.0 ? above : -kInfinity;
+    return plane_normal_L_.dot(part.center_L) - part.extent_against(plane_normal_L_) -
+           plane_height_;
   }
 
   // Begins with the bounds that are kept.

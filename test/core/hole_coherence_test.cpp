@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "support/meshes.h"
@@ -63,6 +65,62 @@ TEST(HoleCoherence, PointsGoInThroughTheOpening) {
   }
   EXPECT_GT(contacts, 0);
   EXPECT_GT(jumps, test::scaled(200));
+}
+
+// An open box with a frame about the opening, which is half as wide as the box.
+TriangleMesh framed_box(const Point& out) {
+  TriangleMesh mesh = test::open_box({0.2, 0.2, 0.2});
+  const Point u = out.unitOrthogonal(), v = out.cross(u);
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  for (const double half : {0.1, 0.05}) {
+    for (const auto& [a, b] :
+         {std::pair(-1, -1), std::pair(1, -1), std::pair(1, 1), std::pair(-1, 1)}) {
+      mesh.vertices.push_back(0.1 * out + half * (a * u + b * v));
+    }
+  }
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const std::uint32_t a = first + k, b = first + (k + 1) % 4, c = b + 4, d = a + 4;
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  }
+  return mesh;
+}
+
+// Points just below the frame are no deeper than it is high above them, but one in the opening is
+// as deep as the frame is far, though it is as high.
+TEST(HoleCoherence, APointInTheOpeningIsDeeperThanThoseBelowTheFrame) {
+  test::Rng rng(82);
+  const Point out = opening(test::open_box({0.2, 0.2, 0.2}));
+  const TriangleMesh mesh = framed_box(out);
+  const auto model = test::make_model({mesh}, 0.005);
+  ASSERT_FALSE(model->links[0].solid.is_closed());
+  std::vector<LinkProximity> results;
+  int jumps = 0;
+  for (int run = 0; run < test::scaled(200); ++run) {
+    std::vector<Point> points;
+    const auto add = [&](double from_middle, double depth) {
+      Point lateral = test::random_vector(&rng, 1.0);
+      lateral -= lateral.dot(out) * out;
+      points.push_back(from_middle * lateral.normalized() + (0.1 - depth) * out);
+    };
+    for (int i = 0; i < 200; ++i) add(test::uniform(&rng, 0.075, 0.095), 0.001);
+    const CloudSnapshot below = test::make_snapshot(points);
+    add(test::uniform(&rng, 0.0, 0.02), test::uniform(&rng, 0.001, 0.01));
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    QueryConfig config;
+    config.tolerance = run % 2 == 0 ? 0.0 : 0.001;
+    ProximityQuery query(model, config);
+    const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    ASSERT_TRUE(query.run({X_FL}, {true}, {&below}, &results));
+    ASSERT_EQ(results[0].state, LinkState::kContact);
+    ASSERT_TRUE(query.run({X_FL}, {true}, {&cloud}, &results));
+    double truth = 1.0;
+    for (const Point& p : points) truth = std::min(truth, test::oracle_signed_distance(mesh, p));
+    ASSERT_LE(results[0].lower_bound, truth) << run;
+    ASSERT_LE(results[0].distance, truth + config.tolerance + 1e-6) << run;
+    jumps += truth < -0.02 ? 1 : 0;
+  }
+  EXPECT_GT(jumps, test::scaled(100));
 }
 
 // The nearest point is above the rim, and a second one goes in through the opening. It was

@@ -25,7 +25,7 @@ std::vector<Shape> shapes() {
 
 // How often the bounds were worth something.
 struct Counts {
-  int outside = 0, sides = 0, close = 0, close_depth = 0;
+  int outside = 0, sides = 0, close = 0, close_depth = 0, close_below_plane = 0;
 };
 
 // All that a cell says of a place, against the truth.
@@ -43,6 +43,8 @@ void expect_bounds(const LinkModel& link, SignedDistanceGrid* grid, const Eigen:
   ASSERT_LE(grid->depth_bound(*cell, p_L, 0.0), signed_distance);
   counts->outside += bound.is_outside ? 1 : 0;
   counts->close += signed_distance > 0.0 && bound.surface_distance > signed_distance - 1e-3 ? 1 : 0;
+  counts->close_below_plane +=
+      signed_distance < 0.0 && bound.signed_distance > 1.5 * signed_distance ? 1 : 0;
   if (!is_one_mesh(link.solid)) return;
   ASSERT_LE(bound.surface_distance, std::abs(signed_distance));
   counts->close_depth +=
@@ -79,6 +81,7 @@ TEST(SignedDistanceGrid, IsNeverAboveTheTruth) {
     }
     EXPECT_GT(counts.close, 300);
     EXPECT_EQ(counts.outside > 300, link.solid.is_closed());
+    if (link.solid.is_closed()) EXPECT_GT(counts.close_below_plane, 10);
     if (is_one_mesh(link.solid)) {
       EXPECT_EQ(counts.sides > 300, link.solid.is_closed());
       EXPECT_GT(counts.close_depth, 30);
