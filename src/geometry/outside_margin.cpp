@@ -10,7 +10,7 @@ namespace ist {
 namespace {
 
 // [m] Larger margins are not looked for: the gradient's bound grows with them.
-constexpr double kLargestMargin = 0.01;
+constexpr double kLargestMargin = 0.05;
 // A place below this winding number is outside in spite of the errors of winding numbers, which are
 // 0.01, and 0.06 for the quick one.
 constexpr double kSurelyOutside = 0.47;

@@ -217,9 +217,10 @@ double SignedDistanceGrid::outside_margin(Cell* cell, const Eigen::Vector3d& p_L
     if (!(cell->witness < 0.0F && distance < surface_distance)) return 0.0;
     cell->has_margin = true;
     const double margin = ist::outside_margin(*solid_, center, surface_distance).margin;
-    cell->margin = static_cast<std::uint8_t>(std::min(margin / kMarginUnit, 255.0));
+    const double parts = kMarginParts * margin / size(level(*cell));
+    cell->margin = static_cast<std::uint8_t>(std::min(parts, 255.0));
   }
-  return cell->margin * kMarginUnit * (1.0 - kStored) - distance;
+  return cell->margin * size(level(*cell)) / kMarginParts * (1.0 - kStored) - distance;
 }
 
 double SignedDistanceGrid::depth_bound(const Cell& cell, const Eigen::Vector3d& center_L,

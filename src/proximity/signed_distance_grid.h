@@ -97,14 +97,16 @@ class SignedDistanceGrid {
     bool has_plane = false;                            ///< whether the plane was looked for
     bool is_outside_above_plane = false;               ///< every place there that the plane bounds
     bool has_margin = false;                           ///< whether the margin was looked for
-    std::uint8_t margin = 0;  ///< [kMarginUnit] places nearer to C are outside a mesh with holes
+    /// Places nearer to C than so many 1 / kMarginParts of the cell's edge are outside a mesh with
+    /// holes.
+    std::uint8_t margin = 0;
   };
 
  private:
   static constexpr std::size_t kCells = 8192;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
   static constexpr int kMaxLevel = 7;
-  static constexpr double kMarginUnit = 4e-5;  // [m] so that one byte holds OutsideMargin's largest
+  static constexpr double kMarginParts = 192.0;  // a byte reaches the corners of the cell
 
   std::uint64_t key(const Eigen::Vector3d& p_LQ) const;
   static std::size_t slot(std::uint64_t key) { return (key * 0x9E3779B97F4A7C15ULL) >> 51U; }
