@@ -351,6 +351,83 @@ TEST(WorldQuery, FarObjectsCostLittle) {
   EXPECT_EQ(searched, 200U);
 }
 
+// A thousand balls in frames that move and turn, in groups that are placed when a link comes near:
+// the answers are those of all balls, in poses that are rigid to 1e-6 alone as well.
+TEST(WorldQuery, GroupsOfObjectsLeaveNoneOut) {
+  test::Rng rng(67);
+  constexpr int kFrames = 4, kBalls = 1000;
+  std::vector<WorldObject> objects;
+  for (int i = 0; i < kBalls; ++i) {
+    const double radius = i % 50 == 0 ? 0.5 : 0.02 + 0.001 * (i % 5);
+    WorldObject one = object_of("ball" + std::to_string(i), {}, at(0.0, 0.0, 0.0));
+    one.geometry = {GeometryElement{Sphere{radius}, Eigen::Isometry3d::Identity(), "sphere"}};
+    one.geometry[0].X_LE.translation() = test::random_vector(&rng, 0.2);
+    one.X_BO.translation() = test::random_vector(&rng, 4.0);
+    const double angle = test::uniform(&rng, 0.0, 3.0);
+    one.X_BO.rotate(Eigen::AngleAxisd(angle, test::random_vector(&rng, 1.0).normalized()));
+    if (i % 7 == 0) one.X_BO.linear() *= 1.0 + 2e-7;
+    one.frame = "frame" + std::to_string(i % kFrames);
+    one.margin = i % 11 == 0 ? 0.15 : 0.0;
+    if (i % 13 == 0) one.allowed_links = {"link1"};
+    objects.push_back(one);
+  }
+  PosedWorld world = posed(objects);
+  const std::vector<std::string> names = world.world->frames();
+  const double radii[] = {0.1, 0.05};
+  const auto model = test::make_model({Sphere{0.1}, Sphere{0.05}}, 0.005);
+  const auto robot = make_robot_surfaces(model);
+  std::vector<bool> may_touch;
+  for (const LinkModel& link : model->links) may_touch.push_back(link.name == "link1");
+  ASSERT_EQ(std::count(may_touch.begin(), may_touch.end(), true), 1);
+  QueryConfig config;
+  config.max_distance = 0.3;
+  WorldQuery query(robot, config);
+  std::vector<Eigen::Isometry3d> X_FL = {at(0.5, 0.0, 0.0), at(-0.5, 0.3, 0.2)};
+  std::uint64_t placed = 0, near = 0;
+  const int steps = test::scaled(400);
+  for (int step = 0; step < steps; ++step) {
+    for (Eigen::Isometry3d& X : X_FL) X.translation() += test::random_vector(&rng, 0.05);
+    for (std::size_t f = 0; f < kFrames; ++f) {
+      if (test::uniform(&rng, 0, 1) < 0.3) continue;
+      const Eigen::AngleAxisd turn(0.01, test::random_vector(&rng, 1.0).normalized());
+      world.X_FB[f] = world.X_FB[f] * turn;
+      world.X_FB[f].translation() += test::random_vector(&rng, 0.01);
+      if (f == 1) world.X_FB[f].linear() = turn.matrix() * (1.0 + (step % 2) * 3e-7);
+    }
+    std::vector<LinkProximity> results;
+    query.run(X_FL, {true, true}, {&world}, TimePoint::max(), &results);
+    placed += query.statistics().objects_placed;
+    for (std::size_t i = 0; i < X_FL.size(); ++i) {
+      double truth = 1e9, proven = 1e9;
+      for (const WorldObject& one : objects) {
+        if (may_touch[i] && !one.allowed_links.empty()) continue;
+        const auto f = static_cast<std::size_t>(std::find(names.begin(), names.end(), one.frame) -
+                                                names.begin());
+        const Eigen::Vector3d p_FO =
+            world.X_FB[f] * (one.X_BO * one.geometry[0].X_LE.translation());
+        const double distance = (p_FO - X_FL[i].translation()).norm() - radii[i] -
+                                std::get<Sphere>(one.geometry[0].shape).radius;
+        truth = std::min(truth, distance);
+        proven = std::min(proven, distance - one.margin);
+      }
+      constexpr double kPoses = 2e-6;  // [m] what such poses leave open
+      const LinkProximity& r = results[i];
+      ASSERT_LE(r.lower_bound, proven + kPoses) << step;
+      if (proven > config.max_distance + kPoses) {
+        ASSERT_EQ(r.state, LinkState::kClear) << step;
+      } else if (proven > 0.0) {
+        ASSERT_GE(r.lower_bound, proven - config.tolerance - kPoses) << step;
+      }
+      if (r.state == LinkState::kNear) {
+        ASSERT_GE(r.distance, truth - kPoses) << step;
+        ++near;
+      }
+    }
+  }
+  EXPECT_GT(near, static_cast<std::uint64_t>(steps) / 4);
+  EXPECT_GT(placed, 0U);
+}
+
 // Objects out of range come near in small steps while the link stands still.
 TEST(WorldQuery, ObjectsThatComeIntoRangeAreFound) {
   std::vector<WorldObject> objects = {object_of("cart", cube(0.2))};
