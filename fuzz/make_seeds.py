@@ -19,8 +19,8 @@ def write(target, name, content):
     (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
-def planning_scene(has_pose, kinds=("primitive", "mesh", "plane"), operation=0):
-    """moveit_msgs/PlanningScene with one object; the first byte is the layout."""
+def planning_scene(has_pose, kinds=("primitive", "mesh", "plane"), operation=0, octomap=b""):
+    """moveit_msgs/PlanningScene with one object; the first byte is the layout. The octomap is a binary tree."""
 
     def u32(value):
         return struct.pack("<I", value)
@@ -49,7 +49,9 @@ def planning_scene(has_pose, kinds=("primitive", "mesh", "plane"), operation=0):
     result = bytes([has_pose]) + text("scene") + joints * 2 + u32(0) + b"\0" + text("robot") + u32(0)
     result += u32(1) + text("object") + u32(1) + u32(1) + b"\1" + u32(0) * 2  # the matrix
     result += u32(0) * 3 + u32(1) + one
-    return result + header("") + pose + header("") + b"\0" + text("") + bytes(8) + u32(0) + b"\0"
+    kind = text("OcTree") + struct.pack("<d", 0.05) if octomap else text("") + bytes(8)
+    result += header("map" if octomap else "") + pose + header("")
+    return result + bytes([len(octomap) > 0]) + kind + u32(len(octomap)) + octomap + b"\0"
 
 
 def pseudo_random(target, lengths, count=4):
@@ -167,6 +169,9 @@ def scenes():
         write("planning_scene", name, planning_scene(has_pose))
         write("planning_scene", name + "_append", planning_scene(has_pose, ("primitive",), 2))
         write("planning_scene", name + "_move", planning_scene(has_pose, (), 3))
+    inner, occupied = struct.pack("<H", 3 << 14), struct.pack("<H", 2)
+    one_leaf = inner + struct.pack("<H", 3) * 14 + occupied
+    write("planning_scene", "octomap", planning_scene(True, ("primitive",), octomap=one_leaf))
     write("world_scene", "every_shape.scene", new + ".\n")
     old = "old\n* wall\n2\n" + "".join(s + pose + colour for s in shapes[:2])
     write("world_scene", "without_poses.scene", old + ".\n")

@@ -1,6 +1,7 @@
 // Planning scenes: what is read keeps to the limits, and each object of it is in the world or there
 // is a fault that names it.
-// Covers: src/proximity/planning_scene.cpp src/proximity/planning_scene_objects.cpp
+// Covers: src/proximity/planning_scene.cpp src/proximity/planning_scene_fields.cpp
+// Covers: src/proximity/planning_scene_objects.cpp
 
 #include <algorithm>
 #include <cstddef>
@@ -18,14 +19,23 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   limits.max_triangles = 600;  // a cone has 256
   const auto layout =
       data[0] % 2 == 0 ? ist::SceneLayout::kShapePoses : ist::SceneLayout::kObjectPose;
-  const ist::PlanningScene scene = ist::read_planning_scene({data + 1, size - 1}, layout, limits);
+  ist::OctreeLimits octomap;
+  octomap.max_leaves = 100;
+  const ist::PlanningScene scene =
+      ist::read_planning_scene({data + 1, size - 1}, layout, limits, octomap);
   FUZZ_CHECK(scene.fault.empty() || scene.objects.empty(), "a fault, and objects: %s",
              scene.fault.c_str());
   FUZZ_CHECK(scene.objects.size() <= limits.max_objects, "%zu objects", scene.objects.size());
   ist::UnmeasuredParts parts(limits.max_objects);
   parts.apply(scene);
-  FUZZ_CHECK(!scene.has_octomap || !parts.sentences().empty(),
-             "an octomap that is not said, with %zu objects", scene.objects.size());
+  FUZZ_CHECK(parts.sentences().size() <= 1, "%zu sentences", parts.sentences().size());
+  const std::vector<Eigen::AlignedBox3d>& leaves = scene.octomap.tree.occupied;
+  FUZZ_CHECK(leaves.size() <= octomap.max_leaves, "%zu leaves", leaves.size());
+  FUZZ_CHECK(leaves.empty() || (scene.fault.empty() && scene.octomap.fault.empty()),
+             "a fault, and %zu leaves", leaves.size());
+  FUZZ_CHECK(leaves.empty() || scene.sets_octomap, "%zu leaves that are not used", leaves.size());
+  FUZZ_CHECK(scene.octomap.X_BM.matrix().allFinite(), "an origin that is not finite, %zu leaves",
+             leaves.size());
   for (const ist::SceneObject& object : scene.objects) {
     if (!object.fault.empty()) continue;
     const ist::WorldObject added = ist::to_world_object(object, "world");

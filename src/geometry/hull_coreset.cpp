@@ -160,10 +160,21 @@ class HullCoreset::Builder {
 
 HullCoreset::HullCoreset(Span<const ConvexPart> parts, const CancelRequest& cancelled,
                          std::size_t max_points) {
+  if (parts.size() == 1 && parts[0].kind == ConvexPart::Kind::kSphere) {
+    take_sphere(parts[0]);
+    return;
+  }
   Corners corners = corners_of(parts);
   if (corners.points.empty()) return;
   Builder(std::move(corners.points), max_points, this).run(cancelled);
   error_ += corners.error;
+}
+
+// Takes the centre of a sphere, which is the same distance from the hull in all directions: slabs
+// are as wide as in closed form.
+void HullCoreset::take_sphere(const ConvexPart& sphere) {
+  add(sphere.a);
+  error_ = sphere.radius * (1.0 + 1e-15) + kLostInLength * (sphere.a.norm() + sphere.radius);
 }
 
 // Finds the point of the coreset's hull that is nearest to p, by GJK from a point of the coreset

@@ -13,6 +13,7 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/coherence/displacement.h"
+#include "proximity/object_groups.h"
 #include "proximity/shape_cache.h"
 #include "proximity/world_shape.h"
 
@@ -268,6 +269,7 @@ std::shared_ptr<const KnownWorld> WorldBuilder::world() const {
     world->objects_.push_back(entry.object);
     world->objects_.back().frame = frame->second;
   }
+  world->groups_ = std::make_shared<const ObjectGroups>(*world);
   return world;
 }
 

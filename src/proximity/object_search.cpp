@@ -31,6 +31,46 @@ void PosedObject::place(const Eigen::Isometry3d& X_FO_given) {
   extent = box.center().norm() + radius;
 }
 
+// A point x of an object is placed at Q x + t, Q the rotation nearest to R_FB R_BO. It is no
+// farther from R_FB R_BO x + t than the drift of that product times |x|; the drift of a product is
+// no more than the sum of the drifts, but for their squares.
+void PosedGroup::place() {
+  constexpr double kMaxDrift = 0.01, kSquares = 1.1;
+  const double frame_drift = nearest_rigid(*X_FB).drift;
+  drift = kSquares * (frame_drift + group->drift);
+  center_F = *X_FB * group->center_B;
+  radius = group->radius * (1.0 + frame_drift) + drift * group->extent;
+  if (!(frame_drift <= kMaxDrift && group->drift <= kMaxDrift)) radius = kInf;
+}
+
+double PosedGroup::moves_at_most(const Eigen::Isometry3d& X_FB_next) const {
+  PosedGroup next = *this;
+  next.X_FB = &X_FB_next;
+  next.place();
+  if (!(radius < kInf && next.radius < kInf)) return kInf;
+  const double turned = (X_FB_next.linear() - X_FB->linear()).norm();
+  const double moved = (next.center_F - center_F).norm() + turned * group->radius;
+  const double scale = center_F.norm() + next.center_F.norm() + radius + group->center_B.norm();
+  return moved + (drift + next.drift) * group->extent + kBoxRounding * scale;
+}
+
+void PosedObjects::place(PosedGroup* posed) {
+  const ObjectGroup& group = *posed->group;
+  const KnownWorld& world = *worlds[posed->world];
+  const bool is_new = posed->first_placed == PosedGroup::kNotPlaced;
+  if (is_new) posed->first_placed = objects.size();
+  for (std::size_t m = group.first; m < group.last; ++m) {
+    const std::size_t at = posed->first_placed + m - group.first;
+    if (is_new) objects.emplace_back();
+    PosedObject& object = objects[at];
+    object.index = world.groups()->members[m];
+    object.world = posed->world;
+    object.object = &world.objects()[object.index];
+    object.place(*posed->X_FB * object.object->X_BO);
+    ++placed;
+  }
+}
+
 ObjectSearch::ObjectSearch(const RobotSurfaces& robot, std::size_t link)
     : link_(link), model_(robot.model->links[link]), surface_(robot.surfaces[link].get()) {
   if (surface_ == nullptr) return;
@@ -79,6 +119,17 @@ double ObjectSearch::box_bound(const PosedObject& object) const {
   return proven > 0.0 ? proven : -kInf;
 }
 
+// [m] No object of the group has a lower bound by boxes, its margin taken off, that is less; -inf
+// where it is not known.
+double ObjectSearch::group_bound(const PosedGroup& posed) const {
+  const double apart = (center_F_ - posed.center_F).norm();
+  const double scale = center_F_.norm() + posed.center_F.norm() + radius_ + posed.radius;
+  const double bound = apart - radius_ - posed.radius - 4.0 * kBoxRounding * scale;
+  const double drift = X_FL_.drift + posed.drift;
+  const double proven = bound - pose_error(drift, extent_ + posed.group->extent, bound);
+  return proven > 0.0 ? proven - posed.group->margin : -kInf;
+}
+
 void ObjectSearch::begin_unknown() {
   is_known_ = false;
   is_finished_ = true;
@@ -87,11 +138,11 @@ void ObjectSearch::begin_unknown() {
   near_.clear();
 }
 
-void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& objects,
+void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, PosedObjects* objects,
                          const ObjectQuestion& question, WorldQueryStatistics* statistics) {
   begin_unknown();
   if (surface_ == nullptr || !X_FL.matrix().allFinite()) return;
-  objects_ = &objects;
+  objects_ = objects;
   question_ = question;
   statistics_ = statistics;
   X_FL_ = nearest_rigid(X_FL);
@@ -108,7 +159,7 @@ void ObjectSearch::begin(const Eigen::Isometry3d& X_FL, const PosedObjects& obje
   }
   // The nearest object of the last time is the first one, as it gives the best upper bound.
   const auto first = std::find_if(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
-    return objects.objects[c.object].object->id == nearest_id_;
+    return objects->objects[c.object].object->id == nearest_id_;
   });
   std::swap(first != candidates_.end() ? *first
                                        : *std::max_element(candidates_.begin(), candidates_.end()),
@@ -130,13 +181,20 @@ void ObjectSearch::list_objects() {
   }
   ++statistics_->scans;
   list_.clear();
-  for (std::uint32_t i = 0; i < objects_->objects.size(); ++i) {
-    if (objects_->is_allowed(i, link_)) continue;
-    const PosedObject& object = objects_->objects[i];
-    const double bound = box_bound(object);
-    if (bound - object.object->margin < range + kListSlack) list_.push_back(i);
+  for (PosedGroup& group : objects_->groups) {
+    ++statistics_->groups_bounded;
+    if (group_bound(group) >= range + kListSlack) continue;
+    if (group.first_placed == PosedGroup::kNotPlaced) objects_->place(&group);
+    const std::size_t end = group.first_placed + group.group->last - group.group->first;
+    statistics_->objects_bounded += end - group.first_placed;
+    for (std::size_t i = group.first_placed; i < end; ++i) {
+      const PosedObject& object = objects_->objects[i];
+      if (objects_->is_allowed(object, link_)) continue;
+      const double bound = box_bound(object);
+      if (bound - object.object->margin < range + kListSlack)
+        list_.push_back(static_cast<std::uint32_t>(i));
+    }
   }
-  statistics_->objects_bounded += objects_->objects.size();
   X_FL_of_list_ = X_FL_.X;
   path_of_list_ = objects_->path;
   range_of_list_ = range;

@@ -6,17 +6,15 @@
 
 #include "internal/geometry/limits.h"
 #include "ist_proximity/proximity/world_file.h"
+#include "proximity/planning_scene_fields.h"
 #include "proximity/wire_reader.h"
 
 namespace ist {
 namespace {
 
-constexpr std::size_t kPoseSize = 56, kPointSize = 24, kTriangleSize = 12;  // [bytes]
+constexpr std::size_t kPointSize = 24, kTriangleSize = 12;  // [bytes]
 // A matrix of this many names takes 50 MB.
 constexpr std::size_t kMaxMatrixNames = 20000;
-// Longer names are no names, and are cut here.
-constexpr std::size_t kNameBuffer = kMaxNameSize + 1;
-constexpr double kLengthTolerance = 1e-2;  // of quaternions, as in files of scenes
 
 // The part of the limits that is not used up.
 struct Budget {
@@ -25,30 +23,6 @@ struct Budget {
 
 // Numbers of shape_msgs/SolidPrimitive.
 enum Primitive : std::uint8_t { kBox = 1, kSphere = 2, kCylinder = 3, kCone = 4 };
-
-// The first fault of an object counts.
-void note(std::string* fault, const std::string& text) {
-  if (fault->empty()) *fault = text;
-}
-
-// A quaternion of zeros is the identity, as in MoveIt.
-Eigen::Isometry3d read_pose(WireReader* in, const char* what, std::string* fault) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  double v[7];
-  for (double& value : v) value = in->f64(what);
-  const Eigen::Vector3d p(v[0], v[1], v[2]);
-  const Eigen::Quaterniond q(v[6], v[3], v[4], v[5]);
-  const double length = q.norm();
-  const bool is_unit = std::abs(length - 1.0) <= kLengthTolerance;
-  if (length != 0.0 && !is_unit) {
-    note(fault, std::string(what) + " has a quaternion of length " + std::to_string(length));
-  } else {
-    note(fault, position_fault(what, p));
-    X.translation() = p;
-    if (is_unit) X.linear() = q.normalized().toRotationMatrix();
-  }
-  return X;
-}
 
 void read_poses(WireReader* in, const char* what, SceneObject* object,
                 std::vector<Eigen::Isometry3d>* X_PS) {
@@ -169,11 +143,6 @@ void read_kind(WireReader* in, const char* what, std::size_t least_size, SceneOb
     element.X_LE = X_PS[i] * element.X_LE;
   }
   object->X_PS.insert(object->X_PS.end(), X_PS.begin(), X_PS.end());
-}
-
-std::string read_header_frame(WireReader* in) {
-  in->skip(12, "a header");
-  return in->string(kNameBuffer, "a frame's name");
 }
 
 SceneObject read_object(WireReader* in, SceneLayout layout, Budget* budget) {
@@ -309,23 +278,8 @@ void read_objects(WireReader* in, SceneLayout layout, const WorldLimits& limits,
   for (std::size_t i = 0; i < count; ++i) objects->push_back(read_object(in, layout, &budget));
 }
 
-void read_octomap(WireReader* in, PlanningScene* scene) {
-  for (int k = 0; k < 2; ++k) {
-    in->skip(12, "a header");
-    in->skip_string("a header");
-    if (k == 0) in->skip(kPoseSize, "the octomap's origin");
-  }
-  in->skip(1, "the octomap");
-  const bool has_id = !in->string(1, "the octomap").empty();
-  in->skip(8, "the octomap's resolution");
-  const std::size_t size = in->count(1, "bytes of the octomap");
-  in->skip(size, "bytes of the octomap");
-  scene->has_octomap = size > 0;
-  scene->states_octomap = has_id || size > 0;  // MoveIt names one that was cleared, without data
-}
-
 void read_scene(WireReader* in, SceneLayout layout, const WorldLimits& limits,
-                PlanningScene* scene) {
+                const OctreeLimits& octomap_limits, PlanningScene* scene) {
   in->skip_string("the scene's name");
   const bool has_joints = skip_joint_states(in);
   read_attached(in, layout, limits, &scene->attachments);
@@ -340,8 +294,9 @@ void read_scene(WireReader* in, SceneLayout layout, const WorldLimits& limits,
   read_matrix(in, scene);
   skip_paddings_and_colors(in);
   read_objects(in, layout, limits, &scene->objects);
-  read_octomap(in, scene);
+  const bool states_octomap = read_scene_octomap(in, octomap_limits, &scene->octomap);
   scene->is_diff = in->boolean("is_diff");
+  scene->sets_octomap = !scene->is_diff || states_octomap || removes_octomap(*scene);
   // A state that says nothing changes nothing, as in MoveIt.
   const bool has_state = has_joints || !scene->attachments.empty();
   scene->keeps_attached = scene->is_diff && (is_state_diff || !has_state);
@@ -357,11 +312,11 @@ std::optional<SceneLayout> scene_layout(const std::string& md5sum) {
 }
 
 PlanningScene read_planning_scene(Span<const std::uint8_t> bytes, SceneLayout layout,
-                                  const WorldLimits& limits) {
+                                  const WorldLimits& limits, const OctreeLimits& octomap) {
   PlanningScene scene;
   WireReader in(bytes);
   try {
-    read_scene(&in, layout, limits, &scene);
+    read_scene(&in, layout, limits, octomap, &scene);
   } catch (const WireError& error) {
     scene = PlanningScene();
     scene.fault = "no planning scene that can be read, " + error.what;

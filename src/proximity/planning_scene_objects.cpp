@@ -42,6 +42,12 @@ std::vector<std::string> AllowedCollisions::allowed_with(
   return found;
 }
 
+bool removes_octomap(const PlanningScene& scene) {
+  return std::any_of(scene.objects.begin(), scene.objects.end(), [](const SceneObject& object) {
+    return object.id == kOctomapName && object.operation == SceneObject::Operation::kRemove;
+  });
+}
+
 void UnmeasuredParts::apply(const SceneAttachment& attachment) {
   const auto is_meant = [&](const auto& known) {
     return (attachment.id.empty() || known.first == attachment.id) &&
@@ -61,11 +67,6 @@ void UnmeasuredParts::apply(const PlanningScene& scene) {
   if (!scene.fault.empty()) return;
   if (!scene.keeps_attached) link_of_.clear();
   for (const SceneAttachment& attachment : scene.attachments) apply(attachment);
-  const bool is_removed =
-      std::any_of(scene.objects.begin(), scene.objects.end(), [](const SceneObject& object) {
-        return object.id == kOctomapName && object.operation == SceneObject::Operation::kRemove;
-      });
-  if (!scene.is_diff || scene.states_octomap || is_removed) has_octomap_ = scene.has_octomap;
 }
 
 std::vector<std::string> UnmeasuredParts::sentences() const {
@@ -81,10 +82,6 @@ std::vector<std::string> UnmeasuredParts::sentences() const {
   if (!names.empty()) {
     sentences.push_back("attached to the robot are " + names +
                         ", which no source measures: attach them with ~attach_object");
-  }
-  if (has_octomap_) {
-    sentences.emplace_back(
-        "its octomap is not measured: give what it is made of to sources of their own");
   }
   return sentences;
 }

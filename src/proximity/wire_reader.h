@@ -56,6 +56,14 @@ class WireReader {
     return {text, size < most ? size : most};
   }
 
+  /// @returns the next `size` bytes, of those that the reader was given
+  const std::uint8_t* take(std::size_t size, const char* what) {
+    if (size > left()) fail(std::string("it ends within ") + what);
+    const std::uint8_t* first = bytes_.data() + at_;
+    at_ += size;
+    return first;
+  }
+
   void skip(std::size_t size, const char* what) { take(size, what); }
   void skip_string(const char* what) { skip(count(1, what), what); }
   void skip_array(std::size_t size, const char* what) { skip(count(size, what) * size, what); }
@@ -72,13 +80,6 @@ class WireReader {
   }
 
  private:
-  const std::uint8_t* take(std::size_t size, const char* what) {
-    if (size > left()) fail(std::string("it ends within ") + what);
-    const std::uint8_t* first = bytes_.data() + at_;
-    at_ += size;
-    return first;
-  }
-
   Span<const std::uint8_t> bytes_;
   std::size_t at_ = 0;
 };

@@ -49,7 +49,8 @@ struct WorldQuery::Impl {
   void list_objects(Span<const PosedWorld* const> given);
   void prepare_searches();
   void note_allowed(const std::vector<std::string>& names, std::uint64_t* bits) const;
-  void list_members();
+  bool has_objects(std::size_t w) const { return worlds[w].world && groups_of(w) != nullptr; }
+  const ObjectGroups* groups_of(std::size_t w) const { return worlds[w].world->groups(); }
   void move_objects(Span<const PosedWorld* const> given);
   void finish_by(Deadline* deadline);
   void count_unfinished(const LinkProximity& result);
@@ -61,10 +62,7 @@ struct WorldQuery::Impl {
   WorldQueryStatistics statistics;
   std::vector<PosedWorld> worlds;  // of the last run
   PosedObjects objects;
-  // The objects of each frame, so that those of frames that stand still cost nothing: objects
-  // members[first_member[f]] to members[first_member[f + 1]], frames of all worlds counted through.
-  std::vector<std::size_t> first_member;
-  std::vector<std::uint32_t> members;
+  std::size_t total = 0;               // objects of all worlds, placed or not
   std::vector<ObjectSearch> searches;  // by link
   std::vector<Waiting> queue;          // a heap
   std::vector<LinkPairSearch::Entry> depth_queue;
@@ -109,48 +107,37 @@ void WorldQuery::Impl::note_allowed(const std::vector<std::string>& names,
 
 void WorldQuery::Impl::list_objects(Span<const PosedWorld* const> given) {
   objects.objects.clear();
+  objects.groups.clear();
+  objects.worlds.clear();
+  objects.first_of_world.clear();
   ++objects.generation;
   objects.path = 0.0;
   worlds.resize(given.size());
+  total = 0;
   for (std::size_t w = 0; w < given.size(); ++w) {
     worlds[w] = *given[w];
-    if (!worlds[w].world) continue;
-    const auto& described = worlds[w].world->objects();
-    for (std::size_t i = 0; i < described.size(); ++i) {
-      PosedObject object;
-      object.object = &described[i];
-      object.world = static_cast<std::uint32_t>(w);
-      object.index = static_cast<std::uint32_t>(i);
-      object.place(worlds[w].X_FB[described[i].frame] * described[i].X_BO);
-      objects.objects.push_back(object);
+    objects.worlds.push_back(worlds[w].world.get());
+    objects.first_of_world.push_back(total);
+    if (!has_objects(w)) continue;
+    total += worlds[w].world->objects().size();
+    for (const ObjectGroup& group : groups_of(w)->groups) {
+      PosedGroup posed;
+      posed.group = &group;
+      posed.X_FB = &worlds[w].X_FB[group.frame];
+      posed.world = static_cast<std::uint32_t>(w);
+      posed.place();
+      objects.groups.push_back(posed);
     }
   }
-  statistics.objects_placed += objects.objects.size();
-  list_members();
-  objects.allowed.assign(objects.words * objects.objects.size(), 0);
-  for (std::size_t i = 0; i < objects.objects.size(); ++i) {
-    note_allowed(objects.objects[i].object->allowed_links, &objects.allowed[i * objects.words]);
-  }
-}
-
-// Sorts the objects by their frames.
-void WorldQuery::Impl::list_members() {
-  std::vector<std::size_t> first_frame;  // by world
-  std::size_t frames = 0;
-  for (const PosedWorld& world : worlds) {
-    first_frame.push_back(frames);
-    frames += world.X_FB.size();
-  }
-  first_member.assign(frames + 1, 0);
-  const auto frame_of = [&](const PosedObject& object) {
-    return first_frame[object.world] + object.object->frame;
-  };
-  for (const PosedObject& object : objects.objects) ++first_member[frame_of(object) + 1];
-  for (std::size_t f = 0; f < frames; ++f) first_member[f + 1] += first_member[f];
-  std::vector<std::size_t> next(first_member.begin(), first_member.end() - 1);
-  members.resize(objects.objects.size());
-  for (std::size_t i = 0; i < members.size(); ++i) {
-    members[next[frame_of(objects.objects[i])]++] = static_cast<std::uint32_t>(i);
+  objects.objects.reserve(total);
+  objects.allowed.assign(objects.words * total, 0);
+  for (std::size_t w = 0; w < worlds.size(); ++w) {
+    if (!has_objects(w)) continue;
+    for (const std::uint32_t i : groups_of(w)->touchable) {
+      const std::size_t number = objects.first_of_world[w] + i;
+      note_allowed(worlds[w].world->objects()[i].allowed_links,
+                   &objects.allowed[number * objects.words]);
+    }
   }
 }
 
@@ -161,36 +148,38 @@ void WorldQuery::Impl::prepare_searches() {
   for (const LinkModel& link : robot->model->links) {
     nodes = std::max(nodes, link.tree.nodes().size());
   }
-  for (const PosedObject& object : objects.objects) {
-    const WorldShape& shape = *object.object->shape;
-    nodes = std::max(nodes, shape.link.tree.nodes().size());
-    if (!shape.surface.opening_cells.empty()) open = &shape;
+  for (std::size_t w = 0; w < worlds.size(); ++w) {
+    if (!has_objects(w)) continue;
+    nodes = std::max(nodes, groups_of(w)->most_nodes);
+    if (groups_of(w)->open != nullptr) open = groups_of(w)->open;
   }
   depth_queue.reserve((nodes + 1) * kSphereWidth);
-  for (ObjectSearch& search : searches) search.prepare(objects.objects.size(), open);
+  for (ObjectSearch& search : searches) search.prepare(total, open);
 }
 
-// Places the objects of frames that have moved.
+// Places the groups of frames that have moved, and their objects where these are placed.
 void WorldQuery::Impl::move_objects(Span<const PosedWorld* const> given) {
   double farthest = 0.0;
-  std::size_t counted = 0;  // frames of the worlds before
+  std::size_t g = 0;
   for (std::size_t w = 0; w < given.size(); ++w) {
-    if (!worlds[w].world) {  // its poses are anything
-      counted += worlds[w].X_FB.size();
-      continue;
-    }
-    for (std::size_t frame = 0; frame < worlds[w].X_FB.size(); ++frame, ++counted) {
+    if (!has_objects(w)) continue;  // its poses are anything
+    const std::vector<std::size_t>& first_group = groups_of(w)->first_group;
+    const std::size_t first = g;
+    g += groups_of(w)->groups.size();
+    for (std::size_t frame = 0; frame < worlds[w].X_FB.size(); ++frame) {
       const Eigen::Isometry3d& X_FB = given[w]->X_FB[frame];
       if (X_FB.matrix() == worlds[w].X_FB[frame].matrix()) continue;
-      for (std::size_t m = first_member[counted]; m < first_member[counted + 1]; ++m) {
-        PosedObject& object = objects.objects[members[m]];
-        const Eigen::Isometry3d before = object.X_FO.X;
-        object.place(X_FB * object.object->X_BO);
-        ++statistics.objects_placed;
-        const auto& displacement = object.object->shape->surface.displacement;
-        farthest = std::max(farthest, displacement.between(before, object.X_FO.X));
+      const std::size_t end = first + first_group[frame + 1];
+      for (std::size_t i = first + first_group[frame]; i < end; ++i) {
+        farthest = std::max(farthest, objects.groups[i].moves_at_most(X_FB));
       }
       worlds[w].X_FB[frame] = X_FB;
+      for (std::size_t i = first + first_group[frame]; i < end; ++i) {
+        objects.groups[i].place();
+        if (objects.groups[i].first_placed != PosedGroup::kNotPlaced) {
+          objects.place(&objects.groups[i]);
+        }
+      }
     }
   }
   objects.path += farthest;
@@ -244,6 +233,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
   Impl& impl = *impl_;
   const std::size_t count = impl.searches.size();
   impl.statistics = {};
+  impl.objects.placed = 0;
   results->resize(count);
   for (LinkProximity& result : *results) result.reset();
   for (ObjectSearch& search : impl.searches) search.begin_unknown();
@@ -257,7 +247,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
                                   i < impl.link_margins.size() ? impl.link_margins[i] : 0.0,
                                   impl.influence_distance};
     ObjectSearch& search = impl.searches[i];
-    search.begin(X_FL[i], impl.objects, question, &impl.statistics);
+    search.begin(X_FL[i], &impl.objects, question, &impl.statistics);
     if (search.is_finished()) continue;
     if (is_limited) {
       impl.queue.push_back({search.lower_bound(), i});
@@ -270,6 +260,7 @@ bool WorldQuery::run(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>
     impl.searches[i].report(&(*results)[i]);
     if (!impl.searches[i].is_finished()) impl.count_unfinished((*results)[i]);
   }
+  impl.statistics.objects_placed = impl.objects.placed;
   return impl.statistics.unfinished == 0;
 }
 

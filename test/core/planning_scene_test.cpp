@@ -19,7 +19,9 @@ namespace {
 using test::box_object;
 using test::kIdentityPose;
 using test::kUnsetPose;
+using test::one_leaf;
 using test::WireObject;
+using test::WireOctomap;
 using test::WirePose;
 using test::WireScene;
 using Operation = SceneObject::Operation;
@@ -195,7 +197,6 @@ TEST(PlanningScene, ShapesAreAppendedWhereBothReadingsAgree) {
 TEST(PlanningScene, WhatNobodyMeasuresIsSaid) {
   WireScene wire;
   wire.is_diff = true;
-  wire.octomap_bytes = 100;
   for (int i = 0; i < 5; ++i) {
     wire.attached.push_back(box_object("tool " + std::to_string(i), kIdentityPose));
   }
@@ -207,12 +208,11 @@ TEST(PlanningScene, WhatNobodyMeasuresIsSaid) {
   UnmeasuredParts parts(WorldLimits().max_objects);
   parts.apply(scene);
   const std::vector<std::string> said = parts.sentences();
-  ASSERT_EQ(said.size(), 2U);
+  ASSERT_EQ(said.size(), 1U);
   EXPECT_NE(said[0].find("'tool 1' (to 'hand'), 'tool 2' (to 'hand'), 'tool 3' (to 'hand') and 1 "
                          "more"),
             std::string::npos)
       << said[0];
-  EXPECT_NE(said[1].find("octomap"), std::string::npos);
 }
 
 WireScene with_attached(const std::string& name, std::uint8_t operation, bool is_state_diff) {
@@ -224,36 +224,159 @@ WireScene with_attached(const std::string& name, std::uint8_t operation, bool is
   return wire;
 }
 
-// The next difference names neither the attached object nor the octomap; they are there all the
-// same. They end when they are detached, when a whole state is without them, or a whole scene is.
+// The next difference does not name the attached object; it is there all the same. It ends when it
+// is detached, when a whole state is without it, or a whole scene is.
 TEST(PlanningScene, WhatNobodyMeasuresIsSaidUntilItEnds) {
   UnmeasuredParts parts(10);
   WireScene silent;
   silent.is_diff = true;
-  WireScene octomap = silent;
-  octomap.octomap_bytes = 10;
-  WireScene cleared = silent;
-  cleared.octomap_id = "cleared";
   const auto after = [&](const WireScene& wire) {
     parts.apply(read(wire));
     return parts.sentences().size();
   };
   EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
   EXPECT_EQ(after(silent), 1U);
-  EXPECT_EQ(after(octomap), 2U);
-  EXPECT_EQ(after(silent), 2U);
-  EXPECT_EQ(after(with_attached("other", 1, true)), 2U);
-  EXPECT_EQ(after(with_attached("drill", 1, true)), 1U);
-  EXPECT_EQ(after(cleared), 0U);
+  EXPECT_EQ(after(with_attached("other", 1, true)), 1U);
+  EXPECT_EQ(after(with_attached("drill", 1, true)), 0U);
   EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
   EXPECT_EQ(after(with_attached("saw", 0, false)), 1U);  // a whole state
   EXPECT_EQ(parts.sentences()[0].find("'drill'"), std::string::npos);
   EXPECT_EQ(after(with_attached("", 1, true)), 0U);  // all of the link
-  EXPECT_EQ(after(octomap), 1U);
+  EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
   EXPECT_EQ(after(WireScene()), 0U);  // a whole scene
   // Names that are never detached take no more memory than the limit.
   for (int i = 0; i < 15; ++i) after(with_attached("tool " + std::to_string(i), 0, true));
   EXPECT_NE(parts.sentences()[0].find("and 7 more"), std::string::npos) << parts.sentences()[0];
+}
+
+TEST(PlanningScene, TheOctomapIsReadWithItsPose) {
+  for (const SceneLayout layout : kLayouts) {
+    WireScene wire;
+    wire.octomap = one_leaf(0.5);
+    wire.octomap.origin = {1, 2, 3, 0, 0, 1, 0};
+    PlanningScene scene = read(wire, layout);
+    ASSERT_EQ(scene.fault, "");
+    ASSERT_EQ(scene.octomap.fault, "");
+    EXPECT_TRUE(scene.sets_octomap);
+    EXPECT_EQ(scene.octomap.frame, "map");
+    ASSERT_EQ(scene.octomap.tree.occupied.size(), 1U);
+    EXPECT_EQ(scene.octomap.tree.occupied[0].min(), Eigen::Vector3d(0, 0, 0));
+    EXPECT_EQ(scene.octomap.tree.occupied[0].max(), Eigen::Vector3d(0.5, 0.5, 0.5));
+    EXPECT_TRUE(
+        (scene.octomap.X_BM * Eigen::Vector3d(0.5, 0, 0)).isApprox(Eigen::Vector3d(0.5, 2, 3)));
+    wire.octomap.is_binary = false;  // its bytes are no tree of log-odds
+    scene = read(wire, layout);
+    EXPECT_EQ(scene.fault, "");
+    EXPECT_NE(scene.octomap.fault, "");
+  }
+}
+
+// A difference changes the octomap where it states one, or says that it is gone; a full scene
+// always does.
+TEST(PlanningScene, TheOctomapIsReplacedAsInMoveIt) {
+  WireScene wire;
+  EXPECT_TRUE(read(wire).sets_octomap);
+  wire.is_diff = true;
+  EXPECT_FALSE(read(wire).sets_octomap);
+  WireScene named = wire;
+  named.octomap.id = "cleared";
+  EXPECT_TRUE(read(named).sets_octomap);
+  EXPECT_EQ(read(named).octomap.fault, "");
+  EXPECT_TRUE(read(named).octomap.tree.occupied.empty());
+  WireScene removed = wire;
+  removed.objects = {box_object("<octomap>", kIdentityPose)};
+  EXPECT_FALSE(read(removed).sets_octomap);
+  removed.objects[0].operation = 1;
+  EXPECT_TRUE(read(removed).sets_octomap);
+  WireScene stated = wire;
+  stated.octomap = one_leaf();
+  EXPECT_TRUE(read(stated).sets_octomap);
+}
+
+// An octomap that cannot be used is a fault of its own: the scene's objects are there.
+TEST(PlanningScene, AnOctomapThatCannotBeUsedIsSaid) {
+  struct Bad {
+    const char* what;
+    void (*spoil)(WireOctomap*);
+    const char* said;
+  };
+  const std::vector<Bad> all = {
+      {"another type", [](WireOctomap* o) { o->id = "ColorOcTree"; }, "ColorOcTree"},
+      {"a long type", [](WireOctomap* o) { o->id.assign(100000, 'x'); }, "type"},
+      {"no resolution", [](WireOctomap* o) { o->resolution = 0.0; }, "resolution"},
+      {"a resolution of NaN", [](WireOctomap* o) { o->resolution = kNaN; }, "resolution"},
+      {"a huge resolution", [](WireOctomap* o) { o->resolution = 1e300; }, "resolution"},
+      {"bytes after the tree", [](WireOctomap* o) { o->data.push_back(0); }, "ends 1 bytes before"},
+      {"NaN in the origin", [](WireOctomap* o) { o->origin[1] = kNaN; }, "its origin"},
+      {"an origin far away", [](WireOctomap* o) { o->origin[1] = 1e9; }, "its origin"},
+      {"a quaternion of length 2", [](WireOctomap* o) { o->origin[6] = 2.0; }, "length 2"},
+      {"an origin without frame",
+       [](WireOctomap* o) {
+         o->frame = "";
+         o->origin[0] = 1.0;
+       },
+       "no frame_id"},
+      {"a long frame", [](WireOctomap* o) { o->frame.assign(100000, 'x'); }, "frame_id"}};
+  WireScene wire;
+  wire.objects = {box_object("box", kIdentityPose)};
+  const auto fault = [&](const WireOctomap& octomap) {
+    wire.octomap = octomap;
+    const PlanningScene scene = read(wire);
+    EXPECT_EQ(scene.fault, "");
+    EXPECT_EQ(scene.objects.size(), 1U);
+    EXPECT_TRUE(scene.sets_octomap);
+    EXPECT_TRUE(scene.octomap.fault.empty() || scene.octomap.tree.occupied.empty());
+    EXPECT_LT(scene.octomap.fault.size(), 400U);
+    return scene.octomap.fault;
+  };
+  ASSERT_EQ(fault(one_leaf()), "");
+  for (const Bad& bad : all) {
+    WireOctomap octomap = one_leaf();
+    bad.spoil(&octomap);
+    EXPECT_NE(fault(octomap).find(bad.said), std::string::npos) << bad.what;
+  }
+  for (std::size_t size = 1; size < one_leaf().data.size(); ++size) {
+    WireOctomap octomap = one_leaf();
+    octomap.data.resize(size);
+    EXPECT_NE(fault(octomap), "") << size;
+  }
+  OctreeLimits limits;
+  limits.max_leaves = 0;
+  wire.octomap = one_leaf();
+  const std::vector<std::uint8_t> bytes = wire.bytes(SceneLayout::kObjectPose);
+  const PlanningScene scene = read_planning_scene(bytes, SceneLayout::kObjectPose, {}, limits);
+  EXPECT_NE(scene.octomap.fault.find("max_leaves"), std::string::npos) << scene.octomap.fault;
+}
+
+// Whatever the data is, it is a tree that keeps to the limits or a fault.
+TEST(PlanningScene, RandomOctomapsKeepToTheLimits) {
+  test::Rng rng(19);
+  OctreeLimits limits;
+  limits.max_leaves = 50;
+  int read_well = 0;
+  for (int i = 0; i < 5000; ++i) {
+    WireScene wire;
+    wire.objects = {box_object("box", kIdentityPose)};
+    wire.octomap = one_leaf();
+    wire.octomap.is_binary = test::uniform(&rng, 0, 1) < 0.5;
+    std::vector<std::uint8_t>& data = wire.octomap.data;
+    for (int k = 0; k < 3; ++k) {
+      const auto at = static_cast<std::size_t>(test::uniform(&rng, 0, 31.99));
+      data[at] = static_cast<std::uint8_t>(test::uniform(&rng, 0, 255.99));
+    }
+    const std::vector<std::uint8_t> bytes = wire.bytes(SceneLayout::kObjectPose);
+    const PlanningScene scene = read_planning_scene(bytes, SceneLayout::kObjectPose, {}, limits);
+    ASSERT_EQ(scene.fault, "");
+    ASSERT_EQ(scene.objects.size(), 1U);
+    ASSERT_LE(scene.octomap.tree.occupied.size(), limits.max_leaves);
+    for (const Eigen::AlignedBox3d& leaf : scene.octomap.tree.occupied) {
+      ASSERT_GT(leaf.sizes().minCoeff(), 0.0);
+      ASSERT_LE(leaf.min().cwiseAbs().cwiseMax(leaf.max().cwiseAbs()).maxCoeff(),
+                limits.max_position);
+    }
+    read_well += scene.octomap.fault.empty() ? 1 : 0;
+  }
+  EXPECT_GT(read_well, 20);
 }
 
 TEST(PlanningScene, AllowedPairsNeedBothEntries) {
@@ -383,7 +506,7 @@ TEST(PlanningScene, TruncatedMessagesAreRefused) {
   wire.attached = {every_shape()};
   wire.matrix_names = {"a", "b"};
   wire.matrix = {{0, 1}, {1, 0}};
-  wire.octomap_bytes = 10;
+  wire.octomap = one_leaf();
   for (const SceneLayout layout : kLayouts) {
     const std::vector<std::uint8_t> whole = wire.bytes(layout);
     EXPECT_EQ(read_planning_scene(whole, layout).fault, "");

@@ -351,6 +351,119 @@ TEST(WorldQuery, FarObjectsCostLittle) {
   EXPECT_EQ(searched, 200U);
 }
 
+// A thousand balls in frames that move and turn, in groups that are placed when a link comes near:
+// the answers are those of all balls, in poses that are rigid to 1e-6 alone as well.
+TEST(WorldQuery, GroupsOfObjectsLeaveNoneOut) {
+  test::Rng rng(67);
+  constexpr int kFrames = 2, kBalls = 1000;
+  constexpr double kMargin = 0.3;  // [m] the largest
+  std::vector<WorldObject> objects;
+  for (int i = 0; i < kBalls; ++i) {
+    const double radius = i % 250 == 0 ? 0.5 : 0.02 + 0.001 * (i % 5);
+    WorldObject one = object_of("ball" + std::to_string(i), {}, at(0.0, 0.0, 0.0));
+    one.geometry = {GeometryElement{Sphere{radius}, Eigen::Isometry3d::Identity(), "sphere"}};
+    one.geometry[0].X_LE.translation() = test::random_vector(&rng, 0.2);
+    one.X_BO.translation() = test::random_vector(&rng, 4.0);
+    const double angle = test::uniform(&rng, 0.0, 3.0);
+    one.X_BO.rotate(Eigen::AngleAxisd(angle, test::random_vector(&rng, 1.0).normalized()));
+    if (i % 7 == 0) one.X_BO.linear() *= 1.0 + 2e-7;
+    one.frame = "frame" + std::to_string(i % kFrames);
+    one.margin = i % 11 == 0 ? 0.15 : 0.0;
+    if (i % 13 == 0) one.allowed_links = {"link1"};
+    if (i % 250 == 0) {  // a large ball alone in its group
+      one.frame = "ball" + std::to_string(i);
+      one.X_BO.translation() = test::random_vector(&rng, 1.5);
+      one.margin = kMargin;
+    }
+    if (i % 50 == 1 || i % 50 == 2) {  // two that turn about the middle of their group
+      one.frame = "pair" + std::to_string(i / 50);
+      one.X_BO.translation() = Eigen::Vector3d(i % 50 == 1 ? 1.0 : -1.0, 0.0, 0.0);
+      one.geometry[0].X_LE.setIdentity();
+    }
+    objects.push_back(one);
+  }
+  PosedWorld world = posed(objects);
+  const std::vector<std::string> names = world.world->frames();
+  for (std::size_t f = 0; f < names.size(); ++f) {
+    if (names[f].rfind("pair", 0) == 0) {
+      world.X_FB[f].translation() = test::random_vector(&rng, 1.0);
+    }
+  }
+  const double radii[] = {0.1, 0.05};
+  const auto model = test::make_model({Sphere{0.1}, Sphere{0.05}}, 0.005);
+  const auto robot = make_robot_surfaces(model);
+  std::vector<bool> may_touch;
+  for (const LinkModel& link : model->links) may_touch.push_back(link.name == "link1");
+  ASSERT_EQ(std::count(may_touch.begin(), may_touch.end(), true), 1);
+  QueryConfig config;
+  config.max_distance = 0.3;
+  WorldQuery query(robot, config);
+  std::vector<Eigen::Isometry3d> X_FL = {at(0.5, 0.0, 0.0), at(-0.5, 0.3, 0.2)};
+  std::uint64_t placed = 0, near = 0;
+  const int steps = test::scaled(1500);
+  for (int step = 0; step < steps; ++step) {
+    for (Eigen::Isometry3d& X : X_FL) X.translation() += test::random_vector(&rng, 0.01);
+    for (std::size_t f = 0; f < world.X_FB.size(); ++f) {
+      if (test::uniform(&rng, 0, 1) < 0.3) continue;
+      const bool is_pair = names[f].rfind("pair", 0) == 0;
+      const Eigen::AngleAxisd turn(is_pair ? 0.1 : 0.002, Eigen::Vector3d(0.0, 0.6, 0.8));
+      world.X_FB[f] = world.X_FB[f] * turn;
+      world.X_FB[f].translation() += test::random_vector(&rng, 0.002);
+      if (f == 1) world.X_FB[f].linear() = turn.matrix() * (1.0 + (step % 2) * 3e-7);
+    }
+    std::vector<LinkProximity> results;
+    query.run(X_FL, {true, true}, {&world}, TimePoint::max(), &results);
+    placed += query.statistics().objects_placed;
+    for (std::size_t i = 0; i < X_FL.size(); ++i) {
+      double truth = 1e9, proven = 1e9;
+      for (const WorldObject& one : objects) {
+        if (may_touch[i] && !one.allowed_links.empty()) continue;
+        const auto f = static_cast<std::size_t>(std::find(names.begin(), names.end(), one.frame) -
+                                                names.begin());
+        const Eigen::Vector3d p_FO =
+            world.X_FB[f] * (one.X_BO * one.geometry[0].X_LE.translation());
+        const double distance = (p_FO - X_FL[i].translation()).norm() - radii[i] -
+                                std::get<Sphere>(one.geometry[0].shape).radius;
+        truth = std::min(truth, distance);
+        proven = std::min(proven, distance - one.margin);
+      }
+      constexpr double kPoses = 2e-6;  // [m] what such poses leave open
+      const LinkProximity& r = results[i];
+      if (truth <= 0.0) {  // the depth of a point in both is another one
+        ASSERT_LE(r.lower_bound, kPoses) << step;
+        continue;
+      }
+      ASSERT_LE(r.lower_bound, proven + kPoses) << step;
+      if (proven > config.max_distance + kPoses) {
+        ASSERT_EQ(r.state, LinkState::kClear) << step;
+      } else if (proven > 0.0) {
+        const double least = std::min(proven, truth - kMargin);
+        ASSERT_GE(r.lower_bound, least - config.tolerance - kPoses) << step;
+      }
+      if (r.state == LinkState::kNear) {
+        ASSERT_GE(r.distance, truth - kPoses) << step;
+        ++near;
+      }
+    }
+  }
+  EXPECT_GT(near, static_cast<std::uint64_t>(steps) / 4);
+  EXPECT_GT(placed, 0U);
+}
+
+// An object that its margin alone brings into range.
+TEST(WorldQuery, AMarginBringsAFarObjectIntoRange) {
+  for (const double x : {1.5, 2.5, 4.0}) {
+    WorldObject far = object_of("far", {}, at(x, 0.0, 0.0));
+    far.geometry = {GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "sphere"}};
+    far.margin = x - 0.5;
+    WorldQuery query(ball());
+    const PosedWorld world = posed({far});
+    const LinkProximity r = answer_at(&query, world);
+    EXPECT_LE(r.lower_bound, 0.3 + 1e-9) << x;
+    EXPECT_GE(r.lower_bound, 0.3 - 0.002) << x;
+  }
+}
+
 // Objects out of range come near in small steps while the link stands still.
 TEST(WorldQuery, ObjectsThatComeIntoRangeAreFound) {
   std::vector<WorldObject> objects = {object_of("cart", cube(0.2))};

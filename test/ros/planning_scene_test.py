@@ -2,6 +2,7 @@
 """moveit_msgs/PlanningScene as a known world: of Noetic and of Melodic, as genpy writes them."""
 
 import math
+import struct
 import sys
 import unittest
 
@@ -12,6 +13,8 @@ from planning_scene_messages import get_planning_scene_type, planning_scene_type
 from proximity_testing import LinkProximity, ProximityArray
 
 ADD, REMOVE, APPEND, MOVE = range(4)
+# A binary OcTree with one occupied leaf, which begins at (0, 0, 0): 16 levels of inner nodes above it.
+ONE_LEAF = struct.pack("<16H", 3 << 14, *[3] * 14, 2)
 
 
 def pose(x=0.0, y=0.0, z=0.0):
@@ -64,10 +67,19 @@ class Publisher:
                 one.primitives = [self.Primitive(type=1, dimensions=[edge] * 3)]
         return one
 
-    def send(self, *objects, is_diff=True, allowed=None, octomap=b"", attached=()):
+    def octomap(self, at, data=ONE_LEAF, frame="base", kind="OcTree"):
+        """An octomap of one leaf of 0.2 m, whose lower corner is at its origin."""
+        one = self.types["octomap_msgs/OctomapWithPose"](origin=pose(*at))
+        one.header.frame_id = frame
+        one.octomap.binary, one.octomap.id, one.octomap.resolution = True, kind, 0.2
+        one.octomap.data = list(struct.unpack("%db" % len(data), data))
+        return one
+
+    def send(self, *objects, is_diff=True, allowed=None, octomap=None, attached=()):
         scene = self.Scene(is_diff=is_diff, name="scene")
         scene.world.collision_objects = list(objects)
-        scene.world.octomap.octomap.data = list(octomap)
+        if octomap is not None:
+            scene.world.octomap = octomap
         scene.robot_state.attached_collision_objects = [
             self.Attached(link_name="hand", object=self.box(name, (0, 0, 0))) for name in attached
         ]
@@ -222,13 +234,51 @@ class PlanningSceneTest(unittest.TestCase):
         self.noetic.send(is_diff=False)
         self.at_post()
 
-    def test_6_what_nobody_measures_and_other_types(self):
-        self.noetic.send(octomap=b"12", attached=["drill"])
+    def test_5b_the_octomap_is_an_obstacle(self):
+        for publisher, source in ((self.noetic, "noetic"), (self.melodic, "melodic")):
+            octomap, cleared = publisher.octomap, publisher.octomap((0, 0, 0), b"", kind="cleared")
+            # Its leaf begins 0.15 m above the ball, in a frame with an origin.
+            publisher.send(octomap=octomap((-0.1, 0.25, -0.1)))
+            self.distance(0.15, "the octomap", source)
+            # A difference that says nothing of it leaves it; one with another replaces it.
+            publisher.send(publisher.box("part", (0, 0, 0.9)))
+            self.distance(0.15, "the octomap that stays", source)
+            publisher.send(octomap=octomap((-0.1, -0.1, 0.3)))
+            self.distance(0.2, "the next octomap", source)
+            # In the frame of a link, which stands at a height of 2 m; objects count beside it.
+            publisher.send(octomap=octomap((-0.1, -0.1, -1.8), frame="box_link"))
+            self.distance(0.1, "the octomap in another frame", source)
+            publisher.send(publisher.box("part", (0, 0.25, 0)))
+            self.distance(0.05, "an object nearer than the octomap", source)
+            publisher.send(publisher.box("part", None, REMOVE), octomap=cleared)
+            self.at_post()
+            publisher.send(octomap=octomap((-0.1, 0.25, -0.1)))
+            self.distance(0.15, "the octomap once more", source)
+            publisher.send(is_diff=False)  # a full scene without one
+            self.at_post()
+
+    def test_5c_an_octomap_that_cannot_be_used(self):
+        octomap = self.noetic.octomap
+        for bad, told in (
+            (octomap((0, 0, 0), ONE_LEAF[:-1]), "ends in the middle of the tree"),
+            (octomap((0, 0, 0), kind="ColorOcTree"), "ColorOcTree"),
+            (octomap((math.nan, 0, 0)), "its origin"),
+            (octomap((1, 0, 0), frame=""), "no frame_id"),
+            (octomap((0, 0, 0), frame="no_such_frame"), "no_such_frame"),
+        ):
+            self.noetic.send(octomap=bad)
+            message = self.node.wait_for_status(ProximityArray.NO_CLOUD, told)
+            self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
+            self.noetic.send(octomap=octomap((-0.1, 0.25, -0.1)))
+            self.distance(0.15, "the octomap that was sent anew", "noetic")
+        self.noetic.send(is_diff=False)
         self.at_post()
-        self.node.wait_until(
-            lambda: "'drill'" in self.node.log() and "octomap" in self.node.log(), "a warning"
-        )
-        # A difference that names neither does not end the warning.
+
+    def test_6_what_nobody_measures_and_other_types(self):
+        self.noetic.send(attached=["drill"])
+        self.at_post()
+        self.node.wait_until(lambda: "'drill'" in self.node.log(), "a warning")
+        # A difference that does not name it does not end the warning.
         self.noetic.send(self.noetic.box("part", (0, 0.35, 0)))
         self.distance(0.15, "the part")
         self.assertTrue(self.diagnostics_name("'drill' (to 'hand')"))

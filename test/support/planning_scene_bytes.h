@@ -126,14 +126,35 @@ inline WireObject box_object(const std::string& id, const WirePose& pose, double
   return object;
 }
 
+/// An octomap_msgs/OctomapWithPose.
+struct WireOctomap {
+  std::string frame = "map";
+  WirePose origin = kIdentityPose;
+  bool is_binary = true;
+  std::string id = {};
+  double resolution = 0.05;
+  std::vector<std::uint8_t> data = {};
+};
+
+/// An octomap of one leaf, from (0, 0, 0) to its resolution in x, y and z.
+inline WireOctomap one_leaf(double resolution = 0.05) {
+  WireOctomap octomap;
+  octomap.id = "OcTree";
+  octomap.resolution = resolution;
+  WireWriter out;
+  out.u8(0).u8(0xC0);  // the root: its last child is an inner node
+  for (int depth = 1; depth < 15; ++depth) out.u8(3).u8(0);  // these: their first child is
+  octomap.data = out.u8(2).u8(0).bytes;  // the last one: its first child is occupied
+  return octomap;
+}
+
 /// A moveit_msgs/PlanningScene with something in every field.
 struct WireScene {
   std::vector<WireObject> objects = {};
   std::vector<WireObject> attached = {};
   std::vector<std::string> matrix_names = {};
   std::vector<std::vector<int>> matrix = {};
-  std::size_t octomap_bytes = 0;
-  std::string octomap_id = {};  ///< of an octomap without bytes
+  WireOctomap octomap = {};
   bool is_state_diff = true;
   bool is_diff = false;
 
@@ -163,10 +184,9 @@ struct WireScene {
     out.u32(1).string("object").u32(0).u32(0).u32(0).u32(0);
     out.u32(objects.size());
     for (const WireObject& object : objects) out.append(object.bytes(layout));
-    out.header("map").pose(kIdentityPose).header("map").u8(1);
-    out.string(octomap_bytes > 0 ? "OcTree" : octomap_id).f64(0.05);
-    out.u32(octomap_bytes);
-    out.bytes.resize(out.bytes.size() + octomap_bytes, 0x55);
+    out.header(octomap.frame).pose(octomap.origin).header("unused").u8(octomap.is_binary ? 1 : 0);
+    out.string(octomap.id).f64(octomap.resolution);
+    out.u32(octomap.data.size()).append(octomap.data);
     out.u8(is_diff ? 1 : 0);
     return out.bytes;
   }

@@ -33,6 +33,7 @@ struct WorldLimits {
 /// The shape of an object, ready for queries.
 struct WorldShape;
 class ShapeCache;
+struct ObjectGroups;
 
 /// The objects of one source, ready for queries. Immutable, thread safe, shared by pointer.
 class KnownWorld {
@@ -54,12 +55,15 @@ class KnownWorld {
   /// Names of the frames that objects stand in, each once.
   const std::vector<std::string>& frames() const { return frames_; }
   std::size_t triangles() const { return triangles_; }  ///< of all objects
+  /// For the library's own use; null for a world without a builder, which is empty.
+  const ObjectGroups* groups() const { return groups_.get(); }
 
  private:
   friend class WorldBuilder;
   std::vector<Object> objects_;
   std::vector<std::string> frames_;
   std::size_t triangles_ = 0;
+  std::shared_ptr<const ObjectGroups> groups_;
 };
 
 /// A known world and where its frames are at one instant.
@@ -82,8 +86,8 @@ class WorldBuilder {
   explicit WorldBuilder(const WorldLimits& limits = {});
 
   /// Adds objects; one takes the place of another of the same name. It builds their hierarchies and
-  /// packs them coarsely: up to a millisecond for a box or a cylinder, some ten for a sphere, up to
-  /// a second for 10^5 triangles. Objects of equal geometry share it, and what is known is not
+  /// packs them coarsely: some milliseconds for a box or a cylinder, none for a sphere, up to a
+  /// second for 10^5 triangles. Objects of equal geometry share it, and what is known is not
   /// built again.
   /// @param cancelled  asked now and then; true ends the work, and nothing is added. May be empty
   /// @returns one fault for each object that cannot be used; an older one of that name stays. Where

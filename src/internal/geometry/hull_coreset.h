@@ -13,13 +13,15 @@ namespace ist {
 
 /// A coreset of the convex hull of a surface (Agarwal, Har-Peled and Varadarajan 2004): some of its
 /// corners, whose hull is proven to come within `error()` of all others. Its support function is
-/// that of the surface, less at most that error, and takes tens of nanoseconds. Immutable; const
-/// members are thread safe and allocate nothing.
+/// that of the surface, less at most that error, and takes tens of nanoseconds. Of a sphere alone
+/// it is the centre, and the error is the radius in every direction. Immutable; const members are
+/// thread safe and allocate nothing.
 class HullCoreset {
  public:
   HullCoreset() = default;
   /// Takes some milliseconds for ten thousand triangles. Of round parts it takes points of their
-  /// surface, so many that error() is about 3e-4 of a cylinder's radius and 3e-3 of a sphere's.
+  /// surface, so many that error() is about 3e-4 of a cylinder's radius and 3e-3 of that of a
+  /// sphere beside other parts.
   /// @param max_points  in the coreset, at least 32
   /// @throws Cancelled  soon after `cancelled` returned true
   explicit HullCoreset(Span<const ConvexPart> parts, const CancelRequest& cancelled = {},
@@ -40,6 +42,7 @@ class HullCoreset {
 
  private:
   class Builder;
+  void take_sphere(const ConvexPart& sphere);
   Eigen::Vector3d offset(const Eigen::Vector3d& p, std::uint32_t* point_index) const;
   void add(const Eigen::Vector3d& point);
 

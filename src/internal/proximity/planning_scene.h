@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/cloud/octree.h"
 #include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/geometry/span.h"
 #include "ist_proximity/proximity/known_world.h"
@@ -58,6 +59,14 @@ struct SceneAttachment {
   bool is_detached = false;
 };
 
+/// The octomap of a scene (octomap_msgs/OctomapWithPose).
+struct SceneOctomap {
+  std::string frame;                                       ///< B, of the outer header; may be empty
+  Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();  ///< the map's frame M -> frame B
+  Octree tree;                                             ///< in M; no leaf: none, or cleared
+  std::string fault;                                       ///< why it cannot be used; empty: it can
+};
+
 /// The part of a moveit_msgs/PlanningScene that is read.
 struct PlanningScene {
   bool is_diff = false;              ///< whether objects that it does not name stay
@@ -67,15 +76,16 @@ struct PlanningScene {
   std::vector<SceneAttachment> attachments;  ///< in the order of the message
   /// Whether objects that earlier scenes have attached stay so.
   bool keeps_attached = false;
-  bool has_octomap = false;     ///< whether it has an octomap with data
-  bool states_octomap = false;  ///< whether it says anything of an octomap
+  /// Whether `octomap` takes the place of that of earlier scenes, also where it is empty.
+  bool sets_octomap = false;
+  SceneOctomap octomap;
   /// Why parts of it are not used: a matrix that is too large or not square. Sentences.
   std::vector<std::string> notes;
   std::string fault;  ///< why nothing of it can be used; empty: it can
 };
 
-/// The parts of all scenes so far that nobody measures: attached objects and the octomap. A
-/// difference that does not name them does not end them.
+/// The parts of all scenes so far that nobody measures: attached objects. A difference that does
+/// not name them does not end them.
 class UnmeasuredParts {
  public:
   /// @param most  attached objects that are kept
@@ -91,14 +101,17 @@ class UnmeasuredParts {
 
   std::size_t most_;
   std::map<std::string, std::string> link_of_;  ///< by name of an attached object
-  bool has_octomap_ = false;
 };
 
 /// Reads a message.
 /// @param limits  more objects, shapes or triangles are a fault, found before memory is taken for
 ///                them. What is kept takes at most 200 bytes for each byte of the message
+/// @param octomap  the same of the scene's octomap; a larger one is a fault of the octomap alone
 PlanningScene read_planning_scene(Span<const std::uint8_t> bytes, SceneLayout layout,
-                                  const WorldLimits& limits = {});
+                                  const WorldLimits& limits = {}, const OctreeLimits& octomap = {});
+
+/// Whether a scene removes the octomap by the name that it has among MoveIt's objects.
+bool removes_octomap(const PlanningScene& scene);
 
 /// The object that kAdd, or kAppend to none, adds. Where one shape alone has a pose, it becomes the
 /// object's, as MoveIt does it, so that the object can be moved.

@@ -51,14 +51,14 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       worlds_.push_back(&selected_[i]->world);
       world_sources_.push_back(static_cast<int>(i));
       surfaces_ = selected_[i]->surfaces;
-      continue;
+      if (!selected_[i]->cloud.boxes) continue;  // it has no octomap
     }
     clouds_.push_back(&selected_[i]->cloud);
     cloud_sources_.push_back(static_cast<int>(i));
     const SourceReport& report = status->sources[i];
     cloud_stands_still_.push_back(report.is_file || report.is_memory || std::isinf(report.timeout));
     const ros::Time& stamp = selected_[i]->stamp;
-    if (report.is_file || report.is_memory) continue;
+    if (report.is_file || report.is_memory || selected_[i]->surfaces) continue;
     if (oldest_stamp_.isZero() || stamp < oldest_stamp_) oldest_stamp_ = stamp;
   }
 }

@@ -24,9 +24,12 @@ struct SourceSnapshot {
   std::vector<bool> filtered;
   std::uint64_t generation = 0;        ///< see SourceTarget; 0: not filled yet
   std::string fixed_frame, map_frame;  ///< the frames between which a map is placed
+  /// The map's boxes -> `map_frame`.
+  Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
   /// What the source remembers and the cloud does not show; null: nothing.
   std::shared_ptr<const SourceSnapshot> memory;
-  /// A known world in place of the cloud, and the surfaces of the model's links; null: a cloud.
+  /// A known world, and the surfaces of the model's links; null: a cloud. The boxes of the cloud
+  /// belong to the world then.
   PosedWorld world;
   std::shared_ptr<const RobotSurfaces> surfaces;
 };

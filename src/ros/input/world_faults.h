@@ -11,6 +11,7 @@ enum class WorldFaultKind {
   kScene,       ///< no full planning scene has come: until one comes
   kConfigured,  ///< parameters and the file: for good, because they are never sent again
   kMessage,     ///< the last message: until the next one
+  kOctomap,     ///< the octomap of a scene: until a scene says anything of it
   kRobot,       ///< the other robot: until it is read
   kWork,        ///< the source's thread: until it succeeds
   kMany,        ///< more faults than are kept: until all objects are replaced

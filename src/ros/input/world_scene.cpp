@@ -45,7 +45,8 @@ std::string too_large(std::size_t size) {
 }
 
 // Reads a message of any type.
-PlanningScene read_message(const topic_tools::ShapeShifter& message, const WorldLimits& limits) {
+PlanningScene read_message(const topic_tools::ShapeShifter& message, const WorldLimits& limits,
+                           const OctreeLimits& octomap) {
   PlanningScene scene;
   const bool is_scene = message.getDataType() == kPlanningSceneType;
   const std::optional<SceneLayout> layout = scene_layout(message.getMD5Sum());
@@ -56,7 +57,7 @@ PlanningScene read_message(const topic_tools::ShapeShifter& message, const World
   } else if (message.size() > kMaxSceneSize) {
     scene.fault = too_large(message.size());
   } else {
-    scene = read_planning_scene(bytes_of(message), *layout, limits);
+    scene = read_planning_scene(bytes_of(message), *layout, limits, octomap);
   }
   return scene;
 }
@@ -66,7 +67,7 @@ PlanningScene read_message(const topic_tools::ShapeShifter& message, const World
 void WorldSource::receive_scene(const ros::MessageEvent<const topic_tools::ShapeShifter>& event) {
   const bool is_other = is_other_publisher(event);
   use_scene([&] {
-    PlanningScene scene = read_message(*event.getConstMessage(), config_.world.limits);
+    PlanningScene scene = read_message(*event.getConstMessage(), config_.world.limits, config_.map);
     if (is_other && scene.is_diff) lose_scene();
     return scene;
   });
@@ -123,7 +124,29 @@ void WorldSource::apply_scene(const PlanningScene& scene) {
     has_full_scene_ = true;
     faults_.erase(fault_of(Kind::kScene));
   }
+  use_octomap(scene);
   allow_collisions(scene);
+}
+
+/// Takes the octomap of a scene in place of the one before. One that cannot be used is told, and
+/// the one before stays until then.
+void WorldSource::use_octomap(const PlanningScene& scene) {
+  if (!scene.sets_octomap) return;
+  const SceneOctomap& octomap = scene.octomap;
+  if (!octomap.fault.empty()) {
+    return note_fault(fault_of(Kind::kOctomap),
+                      "the octomap of its planning scene cannot be used: " + octomap.fault);
+  }
+  std::shared_ptr<BoxIndex> index;
+  if (!octomap.tree.occupied.empty()) {
+    index = std::make_shared<BoxIndex>();
+    index->build(octomap.tree.occupied);
+  }
+  octomap_ = std::move(index);
+  octomap_frame_ = frame_of(octomap.frame);
+  X_BM_ = octomap.X_BM;
+  faults_.erase(fault_of(Kind::kOctomap));
+  is_changed_ = true;
 }
 
 /// Notes that the publisher of scenes has ended: the next one need not have the same objects.
@@ -176,7 +199,7 @@ void WorldSource::receive_answer() {
     if (answer.bytes.size() > kMaxSceneSize) {
       scene.fault = too_large(answer.bytes.size());
     } else {
-      scene = read_planning_scene(answer.bytes, answer.layout, config_.world.limits);
+      scene = read_planning_scene(answer.bytes, answer.layout, config_.world.limits, config_.map);
     }
     if (scene.fault.empty() && scene.is_diff)
       scene.fault = "a difference (is_diff) is no full scene";

@@ -110,27 +110,38 @@ std::shared_ptr<const SourceSnapshot> WorldSource::share(
   return place(time, max_age, placed.get()).empty() ? placed : nullptr;
 }
 
-/// Looks up where the objects' frames are at an instant, or else at the newest one that tf knows.
+/// Looks up where the frames of the objects and of the octomap are.
 std::string WorldSource::place(const ros::Time& time, double max_age,
                                SourceSnapshot* snapshot) const {
+  const std::string& fixed = snapshot->fixed_frame;
   const std::vector<std::string>& frames = snapshot->world.world->frames();
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    Eigen::Isometry3d& X_FB = snapshot->world.X_FB[i];
-    if (frames[i] == kFixedFrame) continue;  // it is the identity for good
-    bool is_own = false;
-    std::string unplaced = robot_ ? robot_->look_up_frame(buffer_, snapshot->fixed_frame, frames[i],
-                                                          time, max_age, &X_FB, &is_own)
-                                  : "";
-    if (!unplaced.empty()) return unplaced;
-    if (is_own) continue;
-    std::string ignored;
-    std::string problem =
-        is_known(buffer_, snapshot->fixed_frame, frames[i], time, &ignored)
-            ? look_up(buffer_, snapshot->fixed_frame, frames[i], time, &X_FB)
-            : look_up_newest(buffer_, snapshot->fixed_frame, frames[i], time, max_age, &X_FB);
+    std::string problem = place_frame(fixed, frames[i], time, max_age, &snapshot->world.X_FB[i]);
     if (!problem.empty()) return problem;
   }
-  return "";
+  if (!snapshot->cloud.boxes) return "";
+  Eigen::Isometry3d X_FB = Eigen::Isometry3d::Identity();
+  std::string problem = place_frame(fixed, snapshot->map_frame, time, max_age, &X_FB);
+  if (problem.empty()) snapshot->cloud.X_FM = X_FB * snapshot->X_BM;
+  return problem;
+}
+
+/// Looks up where a frame is at an instant, or else at the newest one that tf knows.
+/// @param X_FB  the identity at first
+std::string WorldSource::place_frame(const std::string& fixed_frame, const std::string& frame,
+                                     const ros::Time& time, double max_age,
+                                     Eigen::Isometry3d* X_FB) const {
+  if (frame == kFixedFrame) return "";  // it is the identity for good
+  bool is_own = false;
+  std::string unplaced;
+  if (robot_) {
+    unplaced = robot_->look_up_frame(buffer_, fixed_frame, frame, time, max_age, X_FB, &is_own);
+  }
+  if (!unplaced.empty() || is_own) return unplaced;
+  std::string ignored;
+  return is_known(buffer_, fixed_frame, frame, time, &ignored)
+             ? look_up(buffer_, fixed_frame, frame, time, X_FB)
+             : look_up_newest(buffer_, fixed_frame, frame, time, max_age, X_FB);
 }
 
 void WorldSource::run() {
@@ -149,6 +160,7 @@ void WorldSource::run() {
       count_publishers();
       take_target();
       if (is_changed_ && target_.model) publish();
+      free_unused();
       if (faults_.erase(fault_of(Kind::kWork)) > 0) show_faults();
     });
   }
@@ -444,16 +456,28 @@ void WorldSource::publish() {
   SourceSnapshot& snapshot = exchange_.writable();
   snapshot = SourceSnapshot();
   snapshot.world.world = builder_.world();
+  made_.push_back(snapshot.world.world);
   snapshot.world.X_FB.assign(snapshot.world.world->frames().size(), Eigen::Isometry3d::Identity());
   snapshot.surfaces = surfaces_;
   snapshot.model = surfaces_ ? target_.model : nullptr;
   snapshot.fixed_frame = target_.fixed_frame;
   snapshot.generation = target_.generation;
   snapshot.stamp = snapshot.counts_from = stamp_;
+  snapshot.cloud.boxes = octomap_;
+  snapshot.map_frame = octomap_frame_;
+  snapshot.X_BM = X_BM_;
+  snapshot.cloud.stamp = stamp_.toSec();
   snapshot.cloud.counts.received = snapshot.cloud.counts.used =
-      static_cast<std::uint32_t>(builder_.size());
+      static_cast<std::uint32_t>(builder_.size() + (octomap_ ? octomap_->size() : 0));
   exchange_.publish();
   publish_markers();
+}
+
+/// Frees the worlds that nobody else has any more here, so that no query has to.
+void WorldSource::free_unused() {
+  made_.erase(std::remove_if(made_.begin(), made_.end(),
+                             [](const auto& world) { return world.use_count() == 1; }),
+              made_.end());
 }
 
 void WorldSource::publish_markers() {

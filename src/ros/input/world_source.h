@@ -87,6 +87,7 @@ class WorldSource : public ObstacleSource {
   void move(const SceneObject& object);
   void remove_from_scene(const std::string& name);
   void allow_collisions(const PlanningScene& scene);
+  void use_octomap(const PlanningScene& scene);
   void remember_from_topic(const std::string& name);
   std::string frame_of(const std::string& stated) const;
   void count_publishers();
@@ -96,8 +97,11 @@ class WorldSource : public ObstacleSource {
   std::vector<std::string> configured_contacts(const std::string& object) const;
   void take_target();
   void publish();
+  void free_unused();
   void publish_markers();
   std::string place(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
+  std::string place_frame(const std::string& fixed_frame, const std::string& frame,
+                          const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB) const;
 
   const SourceConfig config_;
   const TransformBuffer& buffer_;
@@ -124,7 +128,12 @@ class WorldSource : public ObstacleSource {
   AllowedCollisions allowed_;         ///< of planning scenes
   bool has_full_scene_ = false;       ///< whether differences have something that they change
   UnmeasuredParts unmeasured_;        ///< of planning scenes
-  std::unique_ptr<SceneRequest> scene_request_;  ///< null: none is to be made
+  std::shared_ptr<const BoxIndex> octomap_;  ///< of planning scenes; null: none
+  std::string octomap_frame_;
+  /// Worlds that queries may still have: a large one takes milliseconds to free.
+  std::vector<std::shared_ptr<const KnownWorld>> made_;
+  Eigen::Isometry3d X_BM_ = Eigen::Isometry3d::Identity();  ///< octomap -> octomap_frame_
+  std::unique_ptr<SceneRequest> scene_request_;             ///< null: none is to be made
   std::chrono::steady_clock::time_point next_request_;
   /// The connections by which scenes have come, by their headers.
   std::set<boost::shared_ptr<ros::M_string>> connections_;

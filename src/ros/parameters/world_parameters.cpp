@@ -14,6 +14,7 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 const Range kSize = Range::positive("m", kMaxLength);
 const Range kPosition{"m", -kMaxLength, kMaxLength};
 const Range kAngle{"rad", -100.0, 100.0};
+const Range kLeaves{"", 1.0, 5e7};
 const Range kMargin = Range::non_negative("m", kMaxLength);
 
 void read_pose(ParameterReader* reader, const std::string& prefix, Eigen::Isometry3d* X) {
@@ -150,6 +151,7 @@ void read_topic(ParameterReader* reader, const std::string& prefix, SourceConfig
     reader->read(prefix + "planning_scene_service", &world.scene_service);
     reader->read(prefix + "starts_empty", &world.starts_empty);
     reader->read(prefix + "use_allowed_collisions", &world.use_allowed_collisions);
+    reader->read(prefix + "max_leaves", kLeaves, &source->map.max_leaves);  // of the octomap
   }
   if (world.has_topic) {
     reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
