@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <utility>
 
 #include "contact/outward_field.h"
 #include "contact/power_cells.h"
+#include "internal/bvh/traversal_stack.h"
 
 namespace ist {
 namespace {
@@ -80,7 +82,83 @@ ContactLeaf make_leaf(const SphereLeaf& source, const std::vector<InnerSphere>& 
   return leaf;
 }
 
+// A child of the tree, and the greatest cell ratio below it.
+struct Candidate {
+  std::int32_t child;
+  float ratio;
+};
+
+// Fills the entries of a child and of all below it. @returns its greatest ratio
+float find_greatest_ratios(std::int32_t child, ContactSpheres* spheres) {
+  float greatest = 0.0F;
+  if (child < 0) {
+    const ContactLeaf& leaf = spheres->leaves[static_cast<std::size_t>(~child)];
+    return *std::max_element(leaf.cell_ratio, leaf.cell_ratio + kSphereWidth);
+  }
+  const auto number = static_cast<std::size_t>(child);
+  const SphereNode& node = spheres->tree.nodes()[number];
+  for (int k = 0; k < node.count; ++k) {
+    const float ratio = find_greatest_ratios(node.child[k], spheres);
+    spheres->greatest_ratio[number][static_cast<std::size_t>(k)] = ratio;
+    greatest = std::max(greatest, ratio);
+  }
+  return greatest;
+}
+
+// The most spheres that one of them overlaps, itself included.
+double greatest_overlap(const std::vector<InnerSphere>& spheres) {
+  constexpr double kTouch = 1e-6;
+  std::ptrdiff_t most = 1;
+  for (const InnerSphere& a : spheres) {
+    most = std::max(most, std::count_if(spheres.begin(), spheres.end(), [&](const InnerSphere& b) {
+                      const double reach = (1.0 - kTouch) * (a.radius + b.radius);
+                      return (a.center - b.center).squaredNorm() < reach * reach;
+                    }));
+  }
+  return static_cast<double>(most);
+}
+
 }  // namespace
+
+double greatest_density(const ContactSpheres& spheres, const Eigen::Vector3d& center,
+                        double radius) {
+  constexpr float kRounding = 1.0F + 1e-4F;
+  using Lanes = Eigen::Array<float, kSphereWidth, 1>;
+  using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
+  const Eigen::Vector3f c = center.cast<float>();
+  const float r = kRounding * static_cast<float>(radius);
+  const auto intersects = [&](const auto& node) {
+    const Lanes x = LaneMap(node.x) - c.x(), y = LaneMap(node.y) - c.y(),
+                z = LaneMap(node.z) - c.z();
+    return ((x * x + y * y + z * z).sqrt() < LaneMap(node.radius) + r).eval();
+  };
+  float greatest = 0.0F;
+  TraversalStack<Candidate, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
+  if (!spheres.tree.empty()) stack.push({0, std::numeric_limits<float>::infinity()});
+  while (!stack.empty()) {
+    const Candidate candidate = stack.pop();
+    if (!(candidate.ratio > greatest)) continue;
+    if (candidate.child < 0) {
+      const ContactLeaf& leaf = spheres.leaves[static_cast<std::size_t>(~candidate.child)];
+      greatest = std::max(
+          greatest, intersects(leaf).select(LaneMap(leaf.cell_ratio), Lanes::Zero()).maxCoeff());
+      continue;
+    }
+    const auto number = static_cast<std::size_t>(candidate.child);
+    const SphereNode& node = spheres.tree.nodes()[number];
+    const auto meeting = intersects(node);
+    for (int k = 0; k < node.count; ++k) {
+      const float ratio = spheres.greatest_ratio[number][static_cast<std::size_t>(k)];
+      if (!meeting[k] || !(ratio > greatest)) continue;
+      if (node.radius[k] < r) {
+        greatest = ratio;
+      } else {
+        stack.push({node.child[k], ratio});
+      }
+    }
+  }
+  return spheres.overlap * static_cast<double>(greatest);
+}
 
 ContactGeometry make_contact_geometry(const LinkGeometry& geometry, const Solid& solid,
                                       const Packing& packing) {
@@ -98,8 +176,11 @@ ContactGeometry make_contact_geometry(const LinkGeometry& geometry, const Solid&
   for (const SphereLeaf& leaf : spheres.tree.leaves()) {
     spheres.leaves.push_back(make_leaf(leaf, tight.spheres, cells, field));
   }
+  spheres.greatest_ratio.resize(spheres.tree.nodes().size());
+  find_greatest_ratios(0, &spheres);
   spheres.elements = VolumeElements(solid, field);
   spheres.solid = solid;
+  spheres.overlap = std::min(greatest_overlap(tight.spheres), static_cast<double>(geometry.size()));
   result.spheres = std::make_shared<const ContactSpheres>(std::move(spheres));
   result.sphere_count = tight.spheres.size();
   result.volume = cells.volume;

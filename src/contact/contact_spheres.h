@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "contact/volume_elements.h"
@@ -14,7 +15,7 @@ namespace ist {
 struct alignas(32) ContactLeaf {
   float x[kSphereWidth], y[kSphereWidth], z[kSphereWidth];  ///< [m] centres
   float radius[kSphereWidth];                               ///< [m] negative in unused slots
-  /// Volume of the sphere's power cell over the sphere's own volume; >= 1, 0 in unused slots.
+  /// Volume of the sphere's power cell over the sphere's own volume; 0 in unused slots.
   float cell_ratio[kSphereWidth];
   float outward[3][kSphereWidth];   ///< outward field at the centre, see ContactGeometry
   float gradient[9][kSphereWidth];  ///< [1/m] of the outward field, row-major
@@ -27,7 +28,17 @@ struct ContactSpheres {
   std::vector<ContactLeaf> leaves;  ///< the same leaves as the tree's
   VolumeElements elements;
   Solid solid;  ///< the link's exact geometry
+  /// Spheres of different elements may overlap: no point is in more of them.
+  double overlap = 1.0;
+  /// The greatest cell ratio below each child of the tree's nodes.
+  std::vector<std::array<float, kSphereWidth>> greatest_ratio;
 };
+
+/// No part of space within a sphere [m] counts for more than its volume times this: the greatest
+/// cell ratio of the spheres that intersect it, times how many of them may hold one point; 0 where
+/// none does. Groups of spheres that are smaller than that one may count as a whole.
+double greatest_density(const ContactSpheres& spheres, const Eigen::Vector3d& center,
+                        double radius);
 
 /// Measures the power cells and the outward field of a packing that is there.
 /// @param packing  disjoint within each element

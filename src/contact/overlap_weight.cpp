@@ -17,6 +17,9 @@ namespace {
 using Lanes = Eigen::Array<float, kPointWidth, 1>;
 using LaneMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
 
+// Leaves between two looks at the clock, where their points have been thinned before.
+constexpr std::uint32_t kLeavesBetweenLooks = 16;
+
 Lanes squared_distance(const BoxNode& node, const Eigen::Vector3f& p) {
   const auto gap = [](const float* min, const float* max, float v) {
     return Lanes((LaneMap(min) - v).max(v - LaneMap(max)).max(0.0F));
@@ -36,8 +39,9 @@ float lens_sum(const PointTile& tile, const Eigen::Vector3f& p, float R, float r
   return (lens.thickness.square() * lens.factor).sum();
 }
 
-// Adds those of all points of a thinned cloud to `sum`.
-void add_lenses(const ThinnedCloud& cloud, const Eigen::Vector3f& p, float R, float r, float* sum) {
+// Adds those of all points of a thinned cloud to `sum`, until the deadline.
+void add_lenses(const ThinnedCloud& cloud, const Eigen::Vector3f& p, float R, float r,
+                Deadline* deadline, float* sum) {
   if (cloud.empty()) return;
   const float touch_sq = (R + r) * (R + r);
   ThinnedNode buffer;
@@ -47,6 +51,8 @@ void add_lenses(const ThinnedCloud& cloud, const Eigen::Vector3f& p, float R, fl
     const std::int32_t child = stack.pop();
     const BoxNode& node = cloud.nodes()[static_cast<std::size_t>(child)];
     if (ThinnedCloud::is_leaf(node)) {
+      const bool is_costly = !cloud.is_stored(child);
+      if (deadline->passed_now_and_then(is_costly ? 1 : kLeavesBetweenLooks)) return;
       for (const ThinnedTile& tile : cloud.tiles(child, &buffer)) *sum += lens_sum(tile, p, R, r);
       continue;
     }
@@ -63,7 +69,8 @@ double point_sphere_radius(const CloudSnapshot& cloud) {
   return kPointSphereRadius * cloud.thinning;
 }
 
-double overlap_weight(const Eigen::Vector3d& p_F, double radius, SnapshotSpan clouds) {
+double overlap_weight(const Eigen::Vector3d& p_F, double radius, SnapshotSpan clouds,
+                      Deadline* deadline) {
   const auto r = static_cast<float>(radius);
   float sum = 0.0F;
   for (const CloudSnapshot* cloud : clouds) {
@@ -71,7 +78,8 @@ double overlap_weight(const Eigen::Vector3d& p_F, double radius, SnapshotSpan cl
     const auto R = static_cast<float>(point_sphere_radius(*cloud));
     const Eigen::Vector3f p =
         (thinned.X_FO().linear().transpose() * (p_F - thinned.X_FO().translation())).cast<float>();
-    add_lenses(thinned, p, R, r, &sum);
+    add_lenses(thinned, p, R, r, deadline, &sum);
+    if (deadline->has_passed()) return 0.0;
   }
   const float own = 16.0F * r * r * r;                   // the sphere's own volume, over pi / 12
   return static_cast<double>(own / std::max(sum, own));  // rounding could make its own lens less

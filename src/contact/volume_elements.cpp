@@ -1,6 +1,7 @@
 #include "contact/volume_elements.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -19,6 +20,8 @@ constexpr int kBlock = 4;
 constexpr double kUndecided = 0.2;
 // Exact distances that are measured between two looks at the clock.
 constexpr std::uint32_t kDistancesBetweenLooks = 4;
+// Blocks that are kept for later, at most; a link that is not far longer than wide has fewer.
+constexpr std::size_t kPostponed = 512;
 
 Eigen::AlignedBox3d box_of(const Solid& solid) {
   Eigen::AlignedBox3d box;
@@ -97,6 +100,7 @@ VolumeElements::VolumeElements(const Solid& solid, const OutwardField& field) {
       VolumeElement element;
       element.center = mean.cast<float>();
       element.volume = static_cast<float>(mass.volume);
+      block.volume += static_cast<double>(element.volume);
       element.covariance = (mass.second / mass.volume - mean * mean.transpose()).cast<float>();
       element.outward = (o / std::sqrt(o.squaredNorm() + kUndecided * kUndecided)).cast<float>();
       elements_.push_back(element);
@@ -115,28 +119,53 @@ VolumeElements::VolumeElements(const Solid& solid, const OutwardField& field) {
   elements_.shrink_to_fit();
 }
 
+// Blocks that are wholly inside hold the most and cost the least: they are summed first.
 ContactVolume VolumeElements::inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,
-                                     const Eigen::Isometry3d& X_SL, Deadline* deadline) const {
+                                     const Eigen::Isometry3d& X_SL, Deadline* deadline,
+                                     double* rest) const {
   ContactVolume sum;
-  std::size_t done = 0;
-  for (const Block& block : blocks_) {
-    if (deadline->passed_now_and_then(kDistancesBetweenLooks)) break;
-    ++done;
-    const Eigen::Vector3d center = X_SL * block.center;
-    if (solid_box.exteriorDistance(center) >= block.radius) continue;
-    // In a mesh with holes the signed distance jumps where its inside ends without a surface.
-    const double depth = solid.is_closed() ? -solid.signed_distance(center).distance : 0.0;
-    if (-depth >= block.radius) continue;
-    const bool is_inside = depth >= block.radius;
+  std::array<std::uint32_t, kPostponed> cut;  // blocks that the solid's surface may cut
+  std::size_t cuts = 0, done = 0, done_cuts = 0;
+  double in_block = 0.0;  // of the block that is being summed: the volume not yet looked at
+  const auto add_block = [&](const Block& block, const Solid* cutting) {
+    in_block = block.volume;
     for (std::size_t i = block.first; i < block.last; ++i) {
-      if (deadline->passed_now_and_then(kDistancesBetweenLooks)) break;
-      add(elements_[i], is_inside ? nullptr : &solid, X_SL, &sum);
+      if (deadline->passed_now_and_then(kDistancesBetweenLooks)) return false;
+      add(elements_[i], cutting, X_SL, &sum);
+      in_block -= static_cast<double>(elements_[i].volume);
+    }
+    in_block = 0.0;
+    return true;
+  };
+  for (; done < blocks_.size(); ++done) {
+    if (deadline->passed_now_and_then(kDistancesBetweenLooks)) break;
+    const Block& block = blocks_[done];
+    if (!is_near(block, solid_box, X_SL)) continue;
+    // In a mesh with holes the signed distance jumps where its inside ends without a surface.
+    const double depth =
+        solid.is_closed() ? -solid.signed_distance(X_SL * block.center).distance : 0.0;
+    if (-depth >= block.radius) continue;
+    if (depth >= block.radius) {
+      if (!add_block(block, nullptr)) break;
+    } else if (cuts < cut.size()) {
+      cut[cuts++] = static_cast<std::uint32_t>(done);
+    } else if (!add_block(block, &solid)) {
+      break;
     }
   }
-  if (!deadline->has_passed()) return sum;
-  // The block in which the time ended is not known.
-  const double blocks = static_cast<double>(std::max<std::size_t>(blocks_.size(), 1));
-  sum.known = done > 0 ? static_cast<double>(done - 1) / blocks : 0.0;
+  while (done_cuts < cuts && !deadline->has_passed()) {
+    if (add_block(blocks_[cut[done_cuts]], &solid)) ++done_cuts;
+  }
+  // A block in which time ended is counted by its elements that are left.
+  *rest = in_block;
+  const std::size_t begun = in_block > 0.0 ? 1 : 0;
+  const bool is_cut = done == blocks_.size();
+  for (std::size_t i = done_cuts + (is_cut ? begun : 0); i < cuts; ++i) {
+    *rest += blocks_[cut[i]].volume;
+  }
+  for (std::size_t i = done + (is_cut ? 0 : begun); i < blocks_.size(); ++i) {
+    if (is_near(blocks_[i], solid_box, X_SL)) *rest += blocks_[i].volume;
+  }
   return sum;
 }
 

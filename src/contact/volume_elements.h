@@ -34,10 +34,12 @@ class VolumeElements {
   /// between their mean by the share, so that it is continuous.
   /// @param solid_box  about the solid, its frame S
   /// @param X_SL       this link's frame -> the solid's
-  /// @param deadline   ends the sum; ContactVolume::known is the share of blocks looked at by then
+  /// @param deadline   ends the sum
+  /// @param rest       [m^3] receives what may be inside besides, at most: the volume of the
+  ///                   elements near the solid that time left; about 0 where it left none
   /// @returns in this link's frame, about its origin
   ContactVolume inside(const Solid& solid, const Eigen::AlignedBox3d& solid_box,
-                       const Eigen::Isometry3d& X_SL, Deadline* deadline) const;
+                       const Eigen::Isometry3d& X_SL, Deadline* deadline, double* rest) const;
 
   const Eigen::AlignedBox3d& box() const { return box_; }  ///< about the link, its frame
   const std::vector<VolumeElement>& elements() const { return elements_; }
@@ -50,8 +52,14 @@ class VolumeElements {
   struct Block {
     Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< [m]
     double radius = 0.0;                               ///< [m] about all of its points
+    double volume = 0.0;                               ///< [m^3] of its elements
     std::size_t first = 0, last = 0;
   };
+  static bool is_near(const Block& block, const Eigen::AlignedBox3d& solid_box,
+                      const Eigen::Isometry3d& X_SL) {
+    return solid_box.exteriorDistance(Eigen::Vector3d(X_SL * block.center)) < block.radius;
+  }
+
   Eigen::AlignedBox3d box_;
   std::vector<VolumeElement> elements_;
   std::vector<Block> blocks_;

@@ -19,9 +19,11 @@ struct ContactVolume {
   Eigen::Vector3d weighted_normal = Eigen::Vector3d::Zero();  ///< [m^3] sum of V n
   Eigen::Vector3d weighted_moment = Eigen::Vector3d::Zero();  ///< [m^4] sum of p x V n
   std::size_t spheres = 0;  ///< spheres of the obstacle that share volume with the link
-  /// Share of the obstacles near the link that is summed, as the traversal divides them, and of two
-  /// links the share of their elements; 1: all, and below 1 where time ended the sum. `volume` is a
-  /// lower bound then, and the rest says nothing.
+  /// The share of the whole volume that `volume` is at least; 1: all is summed, and below 1 where
+  /// time ended the sum. `volume` is a lower bound then, `volume / known` an upper one where known
+  /// is above 0, and the rest says nothing. More time never makes it less. What is left is bounded
+  /// by the volume of the spheres about the points in each box of the hierarchy that is not summed
+  /// yet, or of the elements.
   double known = 1.0;
 
   /// Adds `weight` times the other's volume, normal and moment, and its number of spheres.

@@ -43,6 +43,11 @@ const Eigen::Isometry3d& ThinnedCloud::X_FO() const { return all_.X_FO(); }
 const std::vector<BoxNode>& ThinnedCloud::nodes() const { return all_.nodes(); }
 std::int32_t ThinnedCloud::root() const { return all_.root(); }
 
+bool ThinnedCloud::is_stored(std::int32_t leaf) const {
+  Span<const ThinnedTile> tiles;
+  return all_.thinned_.find(static_cast<std::size_t>(leaf), &tiles);
+}
+
 Span<const ThinnedTile> ThinnedCloud::tiles(std::int32_t leaf, ThinnedNode* buffer) const {
   const auto node = static_cast<std::size_t>(leaf);
   Span<const ThinnedTile> tiles;

@@ -103,6 +103,9 @@ class ThinnedCloud {
   /// Whether a node is a leaf: of the lowest level.
   static bool is_leaf(const BoxNode& node) { return node.child[0] < 0; }
 
+  /// Whether tiles() of a leaf need not be found any more, which takes microseconds.
+  bool is_stored(std::int32_t leaf) const;
+
   /// The thinned points of a leaf.
   /// @param buffer  may hold the answer
   Span<const ThinnedTile> tiles(std::int32_t leaf, ThinnedNode* buffer) const;
