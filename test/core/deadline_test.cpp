@@ -107,7 +107,8 @@ TEST(Deadline, EndsAContactVolume) {
     contact.lower_bound = contact.distance = -0.1;
     ASSERT_TRUE(std::isnan(penetration_wrench(contact, {}, &part, X_FL, {}).force.x()));
   }
-  EXPECT_GT(partly, 0);
+  // Instrumented code gets to no part in that time; contact_known_test stops at counted looks.
+  if (!test::kSanitized) EXPECT_GT(partly, 0);
   EXPECT_LT(quantile(overruns, 0.9), kStep);
 }
 
@@ -129,7 +130,7 @@ TEST(Deadline, EndsTheVolumeOfTwoLinks) {
     ASSERT_LE(part.volume, whole.volume);
     partly += part.known > 0.0 ? 1 : 0;
   }
-  EXPECT_GT(partly, 0);
+  if (!test::kSanitized) EXPECT_GT(partly, 0);
   EXPECT_LT(quantile(overruns, 0.9), kStep);
 }
 
