@@ -100,6 +100,13 @@ double distance_to_triangle(const Solid& solid, std::uint32_t triangle,
   return (closest_point_on_triangle(p_E, t.a, t.b, t.c) - p_E).norm();
 }
 
+Eigen::Vector3d closest_on_triangle(const Solid& solid, std::uint32_t triangle,
+                                    const Eigen::Vector3d& p_L) {
+  const SolidElement& element = elements_of(solid).front();
+  const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);
+  return element.X_LE * closest_point_on_triangle(element.X_EL * p_L, t.a, t.b, t.c);
+}
+
 bool is_behind_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L) {
   const SolidElement& element = elements_of(solid).front();
   const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);

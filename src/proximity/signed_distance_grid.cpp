@@ -111,7 +111,7 @@ NearSurface SignedDistanceGrid::known_by_neighbors(const Cell& cell,
   NearSurface known;
   if (!is_one_mesh_) return known;
   for_each_neighbor(cell.key, [&](const Cell& neighbor) {
-    known.within = std::min(known.within, -depth_bound(neighbor, center, 0.0));
+    known.within = std::min(known.within, -depth_bound(neighbor, {center}));
     const auto floor = static_cast<double>(neighbor.floor);
     const double distance = (center - this->center(neighbor)).norm() + kRounding;
     if (is_closed_ && distance < (1.0 - kStored) * std::abs(floor)) {
@@ -174,6 +174,23 @@ double SignedDistanceGrid::Part::extent_against(const Eigen::Vector3d& n_L) cons
   return n_O.dot(center_O) - least;
 }
 
+double SignedDistanceGrid::Part::reach_from(const Eigen::Vector3d& p_LA) const {
+  const Eigen::Vector3d from_A = center_L - p_LA;
+  if (R_LO == nullptr) return from_A.norm() + radius;
+  const Eigen::Vector3d from_A_O = R_LO->transpose() * from_A;
+  if (points == nullptr) return (from_A_O.cwiseAbs() + half).norm();
+  const Eigen::Vector3d p_OA = center_O - from_A_O;
+  double farthest_sq = 0.0;
+  for (int k = 0; k < kPointWidth; ++k) {  // so many, for SIMD
+    const double x = static_cast<double>(points->x[k]) - p_OA.x(),
+                 y = static_cast<double>(points->y[k]) - p_OA.y(),
+                 z = static_cast<double>(points->z[k]) - p_OA.z();
+    const double distance_sq = x * x + y * y + z * z;
+    farthest_sq = k < points->count && distance_sq > farthest_sq ? distance_sq : farthest_sq;
+  }
+  return std::sqrt(farthest_sq);
+}
+
 double SignedDistanceGrid::floor_bound(const Cell& cell, const Eigen::Vector3d& center_L,
                                        double radius) const {
   return static_cast<double>(cell.floor) - (center_L - center(cell)).norm() - radius - kRounding;
@@ -223,11 +240,11 @@ double SignedDistanceGrid::outside_margin(Cell* cell, const Eigen::Vector3d& p_L
   return cell->margin * size(level(*cell)) / kMarginParts * (1.0 - kStored) - distance;
 }
 
-double SignedDistanceGrid::depth_bound(const Cell& cell, const Eigen::Vector3d& center_L,
-                                       double radius) const {
+// The surface is no farther from any place of the part than a point of the triangle is.
+double SignedDistanceGrid::depth_bound(const Cell& cell, const Part& part) const {
   if (cell.triangle == kNoTriangle) return -std::numeric_limits<double>::infinity();
-  return -(1.0 + kStored) * distance_to_triangle(*solid_, cell.triangle, center_L) - radius -
-         kRounding;
+  const Eigen::Vector3d p_LT = closest_on_triangle(*solid_, cell.triangle, part.center_L);
+  return -(1.0 + kStored) * part.reach_from(p_LT) - kRounding;
 }
 
 NearSurface SignedDistanceGrid::near_surface(Cell* cell, const Eigen::Vector3d& p_LQ) const {
@@ -235,8 +252,7 @@ NearSurface SignedDistanceGrid::near_surface(Cell* cell, const Eigen::Vector3d& 
   if (!is_one_mesh_) return near;
   const double distance = (p_LQ - center(*cell)).norm() + kRounding;
   const auto floor = static_cast<double>(cell->floor);
-  near.within =
-      std::min((1.0 + kStored) * std::abs(floor) + distance, -depth_bound(*cell, p_LQ, 0.0));
+  near.within = std::min((1.0 + kStored) * std::abs(floor) + distance, -depth_bound(*cell, {p_LQ}));
   if (bound(cell, {p_LQ}, std::numeric_limits<double>::infinity()).is_outside) {
     near.side = NearSurface::Side::kOutside;
   } else if (is_closed_ && floor < 0.0 && distance < (1.0 - kStored) * -floor) {

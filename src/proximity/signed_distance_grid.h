@@ -1,5 +1,7 @@
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
@@ -50,6 +52,8 @@ class SignedDistanceGrid {
 
     /// [m] How far it extends from the centre against a direction.
     double extent_against(const Eigen::Vector3d& n_L) const;
+    /// [m] No place of it is farther from p_LA.
+    double reach_from(const Eigen::Vector3d& p_LA) const;
   };
 
   /// A bound of all places of a part of space.
@@ -66,6 +70,8 @@ class SignedDistanceGrid {
 
   /// Chooses the size of cells for places that are about as far [m] from the link.
   void set_distance(double distance);
+  /// Brings the cell of a place near for find(), which else waits for memory.
+  void prefetch(const Eigen::Vector3d& p_LQ) const { hwy::Prefetch(&cells_[slot(key(p_LQ))]); }
   /// The cell of a place, if it has been measured; null otherwise, and for a place that is not
   /// finite or too far from the link.
   Cell* find(const Eigen::Vector3d& p_LQ);
@@ -77,8 +83,8 @@ class SignedDistanceGrid {
   Bound bound(Cell* cell, const Part& part, double enough) const;
   /// [m] No place in the sphere has a smaller signed distance. The cell's plane is not used.
   double floor_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
-  /// [m] No place in the sphere is deeper than minus this, by the cell's triangle; -inf: unknown.
-  double depth_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
+  /// [m] No place of a part is deeper than minus this, by the cell's triangle; -inf: unknown.
+  double depth_bound(const Cell& cell, const Part& part) const;
   /// [m] Every place nearer than this to a place is outside a mesh with holes; not positive:
   /// unknown.
   double outside_margin(Cell* cell, const Eigen::Vector3d& p_LQ) const;

@@ -22,6 +22,8 @@ constexpr double kLargestBox = 2.0;
 constexpr double kPlaneSlack = 1e-5;
 // [m] Rounding of a height above it, for each metre that the link is large.
 constexpr double kPlaneRounding = 1e-12;
+// Relative rounding of a distance to a triangle.
+constexpr double kDepthRounding = 1e-9;
 
 // The signed distance falls by no more than the distance between two points (but for holes, see
 // PointDepth), so what the link's grid of signed distances holds near a box's centre bounds the
@@ -129,9 +131,14 @@ class SingleTreeSearch {
     Frame& frame = stack_[size_++];
     const BoxNode& node = obstacles_.bvh->nodes()[static_cast<std::size_t>(child)];
     enter(child, node.count, &frame);
+    const auto is_needed = [&](int k) {
+      return frame.now[static_cast<std::size_t>(k)] < search_.prune_bound();
+    };
     for (int k = 0; k < node.count; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      if (frame.now[i] < search_.prune_bound()) frame.raise(i, bound_box(node, k));
+      if (is_needed(k)) grid_.prefetch(obstacles_.X_LO * bounding_sphere(node, k).center);
+    }
+    for (int k = 0; k < node.count; ++k) {
+      if (is_needed(k)) frame.raise(static_cast<std::size_t>(k), bound_box(node, k));
     }
   }
 
@@ -225,9 +232,7 @@ class SingleTreeSearch {
     // No plane tells inside from outside near holes.
     const double bound = is_closed_ ? grid_.bound(cell, part, search_.prune_bound()).signed_distance
                                     : grid_.floor_bound(*cell, part.center_L, part.radius);
-    return bound >= search_.prune_bound()
-               ? bound
-               : std::max(bound, grid_.depth_bound(*cell, part.center_L, part.radius));
+    return bound >= search_.prune_bound() ? bound : std::max(bound, grid_.depth_bound(*cell, part));
   }
 
   // Each point that is measured bounds its neighbours, so few of the sixteen have to be.
@@ -256,19 +261,29 @@ class SingleTreeSearch {
     return tile_.least();
   }
 
-  // One point's bound bounds its neighbours, too.
-  void take(ObstacleId id, double floor) {
+  // One point's bound bounds its neighbours, too: by how far they are from it, and by how far they
+  // are from the triangle that is closest to it.
+  void take(ObstacleId id, double floor, std::uint32_t triangle = PointDepth::kNoTriangle) {
     const auto i = static_cast<std::size_t>(id.lane);
     tile_.set(i, bound(floor, kInfinity));
-    if (!(floor > search_.prune_bound())) return;
+    const bool is_high = floor > search_.prune_bound();
     for (std::size_t j = 0; j < static_cast<std::size_t>(tile_.count); ++j) {
-      if (j != i) tile_.raise(j, bound(floor - (p_LQ_[j] - p_LQ_[i]).norm(), kInfinity));
+      if (j == i) continue;
+      if (is_high) tile_.raise(j, bound(floor - (p_LQ_[j] - p_LQ_[i]).norm(), kInfinity));
+      if (triangle == PointDepth::kNoTriangle || !tile_.is_open[j]) continue;
+      if (tile_.now[j] >= search_.prune_bound()) continue;
+      const double depth = distance_to_triangle(link_.context.solid(), triangle, p_LQ_[j]);
+      tile_.raise(j, bound(-(1.0 + kDepthRounding) * depth - kPlaneRounding, kInfinity));
     }
   }
 
   void measure(ObstacleId id) {
     const auto i = static_cast<std::size_t>(id.lane);
     const Eigen::Vector3d& p_LQ = p_LQ_[i];
+    if (!is_closed_) {  // cover spheres cost less than a cell
+      const Bound outside = cover_bound(p_LQ, 0.0);
+      if (outside.now == kInfinity) return tile_.set(i, outside);
+    }
     SignedDistanceGrid::Cell* cell = grid_.measure(p_LQ);
     NearSurface near = cell == nullptr ? NearSurface() : grid_.near_surface(cell, p_LQ);
     if (is_closed_) {
@@ -276,8 +291,6 @@ class SingleTreeSearch {
         return take(id, PointRefinement(obstacles_, &link_).measure_outside(id, p_OQ_[i], p_LQ));
       }
     } else {
-      const Bound outside = cover_bound(p_LQ, 0.0);
-      if (outside.now == kInfinity) return tile_.set(i, outside);
       const double margin = cell == nullptr ? 0.0 : grid_.outside_margin(cell, p_LQ);
       if (margin > 0.0) return tile_.set(i, bound(kInfinity, margin));
       if (search_.prune_bound() <= 0.0 && take_outside(i, cell, &near)) return;
@@ -285,7 +298,7 @@ class SingleTreeSearch {
     search_.count_exact();
     const PointDepth depth = point_depth(link_.context.solid(), p_LQ, -search_.prune_bound(), near);
     search_.offer(depth.exact, p_OQ_[i], obstacles_, id);
-    take(id, depth.floor);
+    take(id, depth.floor, depth.triangle);
     const bool is_known = depth.exact.distance < kInfinity;
     tile_.now[i] = is_known ? depth.exact.distance : std::max(depth.floor, search_.prune_bound());
   }

@@ -40,7 +40,7 @@ void expect_bounds(const LinkModel& link, SignedDistanceGrid* grid, const Eigen:
   ASSERT_LE(grid->floor_bound(*cell, p_L, 0.0), truth.floor);
   if (signed_distance > 0.0) ASSERT_LE(bound.surface_distance, signed_distance);
   if (bound.is_outside) ASSERT_GE(signed_distance, 0.0);
-  ASSERT_LE(grid->depth_bound(*cell, p_L, 0.0), signed_distance);
+  ASSERT_LE(grid->depth_bound(*cell, {p_L}), signed_distance);
   counts->outside += bound.is_outside ? 1 : 0;
   counts->close += signed_distance > 0.0 && bound.surface_distance > signed_distance - 1e-3 ? 1 : 0;
   counts->close_below_plane +=
@@ -48,7 +48,7 @@ void expect_bounds(const LinkModel& link, SignedDistanceGrid* grid, const Eigen:
   if (!is_one_mesh(link.solid)) return;
   ASSERT_LE(bound.surface_distance, std::abs(signed_distance));
   counts->close_depth +=
-      signed_distance < 0.0 && grid->depth_bound(*cell, p_L, 0.0) > signed_distance - 1e-3 ? 1 : 0;
+      signed_distance < 0.0 && grid->depth_bound(*cell, {p_L}) > signed_distance - 1e-3 ? 1 : 0;
   const NearSurface near = grid->near_surface(cell, p_L);
   ASSERT_GE(near.within, std::abs(signed_distance));
   if (near.side != NearSurface::Side::kUnknown) {
@@ -156,7 +156,7 @@ TEST(SignedDistanceGrid, NeighborsAffectTheSpeedAlone) {
 TEST(SignedDistanceGrid, BoundsPartsOfSpace) {
   const test::Trial trial(shapes(), 0.005);
   test::Rng rng(95);
-  int outside = 0;
+  int outside = 0, close_depth = 0;
   for (const LinkModel& link : trial.model().links) {
     SCOPED_TRACE(link.name);
     SignedDistanceGrid grid(link);
@@ -181,16 +181,24 @@ TEST(SignedDistanceGrid, BoundsPartsOfSpace) {
       SignedDistanceGrid::Cell* cell = grid.measure(part.center_L);
       const SignedDistanceGrid::Bound bound = grid.bound(cell, part, kInfinity);
       outside += bound.is_outside ? 1 : 0;
+      const double depth = grid.depth_bound(*cell, part);
+      double deepest = 0.0;
       for (int k = 0; k < tile.count; ++k) {
         const double truth = link.solid.signed_distance(X_LO * tile.point(k)).distance;
+        ASSERT_LE(depth, truth + (i % 2 == 0 ? 1e-12 : 1e-7));
+        deepest = std::min(deepest, truth);
         // A float point of the tile may be a little outside its box.
         ASSERT_LE(bound.signed_distance, truth + (i % 2 == 0 ? 1e-12 : 1e-7));
         if (bound.is_outside) ASSERT_GE(truth, 0.0);
         if (truth > 0.0) ASSERT_LE(bound.surface_distance, truth + (i % 2 == 0 ? 1e-12 : 1e-7));
       }
+      // Better than the distance of the centre and the radius of the part.
+      const double by_center = grid.depth_bound(*cell, {part.center_L}) - part.radius;
+      close_depth += deepest < 0.0 && depth > 0.5 * (deepest + by_center) ? 1 : 0;
     }
   }
   EXPECT_GT(outside, 2000);
+  EXPECT_GT(close_depth, 500);
 }
 
 // A cell's plane holds within its radius: a part that is longer may meet a wall that the cell does

@@ -63,6 +63,10 @@ PointDepth point_depth(const Solid& solid, const Eigen::Vector3d& p_L, double mi
 /// [m] The distance of p_L to a triangle, by PointDepth::triangle: no less than to the surface.
 double distance_to_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L);
 
+/// The point of that triangle that is closest to p_L: a point of the surface, in the link frame.
+Eigen::Vector3d closest_on_triangle(const Solid& solid, std::uint32_t triangle,
+                                    const Eigen::Vector3d& p_L);
+
 /// Whether p_L is on the side of the triangle's plane that its normal points away from.
 bool is_behind_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L);
 
