@@ -365,7 +365,7 @@ TEST(PackMesh, AsksWhetherToGoOnWhileALargeMeshIsRead) {
   });
   std::printf("%zu triangles: asked after %.0f ms at most, of %.1f s\n", mesh.triangles.size(),
               1e3 * longest, last - begin);
-  EXPECT_LT(longest, 0.2);
+  EXPECT_LT(longest, test::kSanitized ? 1.0 : 0.2);
 }
 
 // A mesh in millimetres takes minutes. After a request to stop, no later step may start.

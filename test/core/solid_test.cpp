@@ -151,8 +151,8 @@ TEST(Solid, WithinDistanceAsTheNearestElementSays) {
       }
     }
   }
-  EXPECT_GT(within, 1000U);
-  EXPECT_GT(farther, 1000U);
+  EXPECT_GT(within, static_cast<std::size_t>(test::scaled(10000)));
+  EXPECT_GT(farther, static_cast<std::size_t>(test::scaled(10000)));
 }
 
 }  // namespace
