@@ -114,7 +114,7 @@ void print_deadline_header(std::FILE* csv) {
 
 void print(std::FILE* csv, const HardScene& scene, const Setting& setting, double max_error_mm,
            const Stopped& s) {
-  const char* asked = name_of(s.is_cold ? Asked::kCold : Asked::kWarm);
+  const char* asked = name_of(s.asked);
   const double width = 1e3 * quantile(s.width, 0.5), width_p90 = 1e3 * quantile(s.width, 0.9);
   const double late = quantile(s.overrun_us, 0.999), latest = quantile(s.overrun_us, 1.0);
   std::string free = "all in contact";

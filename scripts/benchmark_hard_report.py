@@ -106,7 +106,7 @@ def deadline_table(rows):
     """One row for each scene and kind; settings of one scene are added up, widths are the worst."""
     lines = []
     for (scene, link) in sources(rows):
-        for asked in ("warm", "cold"):
+        for asked in ("warm", "new image", "cold"):
             of = [r for r in rows if (r["scene"], r["link"], r["asked"]) == (scene, link, asked)]
             line = [scene, link, asked]
             for share in SHARES:
@@ -128,7 +128,7 @@ class DeadlinePlot(Drawing):
     """Width of the bounds against the deadline: median and 90th percentile of the links."""
 
     WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM, GAP = 860, 360, 70, 20, 60, 50, 24
-    COLOURS = {"warm": "#2980b9", "cold": "#c0392b"}
+    COLOURS = {"warm": "#2980b9", "new image": "#8e44ad", "cold": "#c0392b"}
     UNKNOWN_MM = 2000.0  # drawn here
 
     def __init__(self, rows, scenes, title):

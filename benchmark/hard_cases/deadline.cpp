@@ -47,6 +47,32 @@ class DeadlineTrial {
     }
   }
 
+  // The first queries after an image. What each knows then it has proven without a deadline.
+  void new_image(std::vector<Stopped>* all) {
+    ProximityQuery full(model_, config_);
+    std::vector<ProximityQuery> queries;
+    for (std::size_t i = 0; i < all->size(); ++i) queries.emplace_back(model_, config_);
+    double spent = 0.0;
+    for (std::size_t i = 1; i <= setting_.images && (i == 1 || spent < setting_.budget); ++i) {
+      const double time = kPeriod * static_cast<double>(i * setting_.steps / setting_.images);
+      const Poses last = scene_.poses(time - kPeriod), X_FL = scene_.poses(time);
+      full.run(last, known_, {&snapshot_}, &truth_);
+      for (ProximityQuery& query : queries) {
+        query.set_config(config_);
+        query.run(last, known_, {&snapshot_}, &results_);
+      }
+      snapshot_ = CloudSnapshot();  // its points may be read from the frame until then
+      frame_ = scene_.image(setting_.points, setting_.noise, &rng_);
+      ingest();
+      const double full_us = run(&full, X_FL, &truth_);
+      spent += 1e-6 * full_us * (1.0 + static_cast<double>(all->size()));
+      for (std::size_t k = 0; k < all->size(); ++k) {
+        ingest();
+        stop(&queries[k], X_FL, full_us, &(*all)[k]);
+      }
+    }
+  }
+
   // Each query reads the cloud anew, because the first query that looks at a tile loads it.
   void cold(std::vector<Stopped>* all) {
     double spent = 0.0;
@@ -126,17 +152,19 @@ std::vector<Stopped> measure_deadlines(const HardScene& scene,
                                        const std::shared_ptr<const RobotModel>& model,
                                        const Setting& setting, const std::vector<double>& shares) {
   DeadlineTrial trial(scene, model, setting);
-  std::vector<Stopped> warm, cold;
-  for (const double share : shares) {
-    warm.emplace_back();
-    warm.back().share = share;
+  std::vector<Stopped> all;
+  for (const Asked asked : {Asked::kWarm, Asked::kNewImage, Asked::kCold}) {
+    std::vector<Stopped> some(shares.size());
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      some[i].share = shares[i];
+      some[i].asked = asked;
+    }
+    if (asked == Asked::kWarm) trial.motion(&some);
+    if (asked == Asked::kNewImage) trial.new_image(&some);
+    if (asked == Asked::kCold) trial.cold(&some);
+    for (Stopped& stopped : some) all.push_back(std::move(stopped));
   }
-  cold = warm;
-  for (Stopped& stopped : cold) stopped.is_cold = true;
-  trial.motion(&warm);
-  trial.cold(&cold);
-  for (Stopped& stopped : cold) warm.push_back(std::move(stopped));
-  return warm;
+  return all;
 }
 
 }  // namespace ist::benchmark

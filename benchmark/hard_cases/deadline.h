@@ -11,8 +11,8 @@ namespace ist::benchmark {
 
 /// Measurements at one deadline, over the links of all queries.
 struct Stopped {
-  double share = 0.0;    ///< the deadline over the time of the full query
-  bool is_cold = false;  ///< a new ProximityQuery and snapshot, else on the motion
+  double share = 0.0;  ///< the deadline over the time of the full query
+  Asked asked = Asked::kWarm;
   std::size_t queries = 0;
   std::size_t stopped = 0;         ///< queries that the deadline stopped
   std::size_t links = 0;           ///< answers
@@ -25,8 +25,8 @@ struct Stopped {
   std::vector<double> overrun_us;  ///< [us] by query: processor time beyond the deadline
 };
 
-/// For each share: queries on the motion, and cold ones, each with the deadline that is this share
-/// of the time that a full query takes in the same state.
+/// For each share: queries on the motion, the first ones after a new image, and cold ones, each
+/// with the deadline that is this share of the time that a full query takes in the same state.
 std::vector<Stopped> measure_deadlines(const HardScene& scene,
                                        const std::shared_ptr<const RobotModel>& model,
                                        const Setting& setting, const std::vector<double>& shares);
