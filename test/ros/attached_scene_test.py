@@ -7,8 +7,12 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
+from joint_states_test import ARM, arm_poses
 from planning_scene_test import APPEND, MOVE, REMOVE, Publisher
 from proximity_testing import LinkProximity, ProximityArray
+from sensor_msgs.msg import JointState
+
+from ist_proximity.srv import QueryProximity
 
 EDGE = 0.2  # [m] of every object
 HOME = pt.transform((0, 0, 0.75))  # of box_link
@@ -229,8 +233,61 @@ class AttachedSceneTest(unittest.TestCase):
         return status.message if status else ""
 
 
+class QueryTest(unittest.TestCase):
+    """In a configuration that ~query states, what a link carries is where the link is then."""
+
+    def setUp(self):
+        self.world = pt.World("/carried", static=False)
+        X = arm_poses(turn=0.3, slide=0.5)
+        column = pt.transform((0, 0, 0.5), angle=0.3)
+        self.world.poses = {"column": ("base", column), "camera": ("base", X["camera"])}
+        for name in ("ball_link", "box_link"):
+            self.world.poses[name] = ("column", pt.inverse(column) @ X[name])
+        self.world.start_tf()
+        self.scenes = Publisher("/carried/scene", True)
+        # Between ball and box, whose gap it leaves is 2.5 slide - 0.05.
+        cup = self.scenes.box("cup", (-0.3, 0, 0), frame="ball_link")
+        self.scenes.send(attached=[self.scenes.attached("ball_link", cup)], is_diff=False)
+        source = {"type": "world", "planning_scene": "scene"}
+        self.node = pt.ProximityNode("/carried", {"sources": {"moveit": source}, "max_distance": 3.0}, ARM)
+        self.node.wait_for_status(ProximityArray.OK)
+        self.ask = rospy.ServiceProxy("/carried/proximity/query", QueryProximity)
+        self.ask.wait_for_service(pt.TIMEOUT)
+
+    def tearDown(self):
+        self.assertEqual(self.node.stop(), 0)
+        self.world.stop()
+
+    def state(self, turn, slide):
+        return JointState(name=["turn", "slide"], position=[turn, slide])
+
+    def test_query(self):
+        rng = np.random.default_rng(8)
+        slides = rng.uniform(0.03, 1.0, 20)
+        answer = self.ask(states=[self.state(rng.uniform(-3, 3), slide) for slide in slides])
+        self.assertTrue(answer.success, answer.message)
+        for slide, result in zip(slides, answer.results):
+            self.assertEqual(result.status, ProximityArray.OK, result.status_text)
+            box, truth = pt.link(result, "box_link"), 2.5 * slide - 0.05
+            self.assertLessEqual(box.lower_bound, truth + 1e-9)
+            self.assertGreaterEqual(box.distance, truth - 1e-9)
+            self.assertLessEqual(box.distance - truth, 1.001e-3)
+            self.assertEqual(pt.link(result, "ball_link").state, LinkProximity.CLEAR)
+        # Of the robot as it is now, the cycles say the same.
+        self.assertLess(abs(pt.link(self.node.messages[-1], "box_link").distance - 1.2), 1.001e-3)
+
+    def test_times_of_impact(self):
+        motion = [self.state(0.3, 0.5), self.state(1.3, 0.0)]
+        answer = self.ask(states=motion, times=[0.0, 1.0])
+        times = dict(zip(answer.impact_links, answer.impact_times))
+        self.assertEqual(times["ball_link"], np.inf)
+        self.assertLessEqual(times["box_link"], 0.96)  # where slide is 0.02
+        self.assertGreater(times["box_link"], 0.955)
+
+
 if __name__ == "__main__":
     import rostest
 
     rospy.init_node("attached_scene_test")
-    rostest.rosrun("ist_proximity", "world_attached", AttachedSceneTest, sys.argv)
+    kinds = {"attached": AttachedSceneTest, "carried": QueryTest}
+    rostest.rosrun("ist_proximity", "world_" + sys.argv[1], kinds[sys.argv[1]], sys.argv)
