@@ -149,8 +149,8 @@ void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
   if (!unknown_space_) return;
   QueryConfig query = config.query;
   query.deadline *= kUnknownShare;
-  unknown_space_->run(poses_.X_FL, known_, poses_.stamp.toSec(), query,
-                      config.repulsion.influence_distance);
+  status_input_.unknown_space_problem = unknown_space_->run(
+      poses_, known_, fixed_frame_, pose_timeout_, query, config.repulsion.influence_distance);
 }
 
 /// The links that matter most are served first, as time may end.
