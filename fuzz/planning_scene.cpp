@@ -26,9 +26,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_CHECK(scene.fault.empty() || scene.objects.empty(), "a fault, and objects: %s",
              scene.fault.c_str());
   FUZZ_CHECK(scene.objects.size() <= limits.max_objects, "%zu objects", scene.objects.size());
-  ist::UnmeasuredParts parts(limits.max_objects);
-  parts.apply(scene);
-  FUZZ_CHECK(parts.sentences().size() <= 1, "%zu sentences", parts.sentences().size());
+  ist::AttachedObjects attached(limits.max_objects / 2);
+  std::vector<ist::SceneObject> objects = scene.objects;
+  for (const ist::SceneAttachment& attachment : scene.attachments) {
+    attached.attach(attachment);
+    objects.push_back(attachment.object);
+  }
+  const std::size_t count = attached.names().size();
+  FUZZ_CHECK(count <= limits.max_objects / 2, "%zu attached", count);
+  FUZZ_CHECK(attached.sentence().empty() == (count == 0), "a sentence of %zu attached", count);
+  for (const ist::SceneAttachment& attachment : scene.attachments) attached.detach(attachment);
+  FUZZ_CHECK(scene.fault.empty() || scene.attachments.empty(), "a fault, and attachments: %s",
+             scene.fault.c_str());
   const std::vector<Eigen::AlignedBox3d>& leaves = scene.octomap.tree.occupied;
   FUZZ_CHECK(leaves.size() <= octomap.max_leaves, "%zu leaves", leaves.size());
   FUZZ_CHECK(leaves.empty() || (scene.fault.empty() && scene.octomap.fault.empty()),
@@ -36,7 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FUZZ_CHECK(leaves.empty() || scene.sets_octomap, "%zu leaves that are not used", leaves.size());
   FUZZ_CHECK(scene.octomap.X_BM.matrix().allFinite(), "an origin that is not finite, %zu leaves",
              leaves.size());
-  for (const ist::SceneObject& object : scene.objects) {
+  for (const ist::SceneObject& object : objects) {
     if (!object.fault.empty()) continue;
     const ist::WorldObject added = ist::to_world_object(object, "world");
     ist::WorldBuilder builder(limits);

@@ -3,89 +3,115 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/posed_box_kernel.h"
 #include "internal/geometry/triangle_bvh.h"
 
 namespace ist {
 namespace {
+
+// Of all lengths involved: bounds in float are too large by less.
+constexpr double kFloatRounding = 4e-6;
+// A triangle may be nearer than the one that is found by this share of the distance. Neighbours
+// of the closest triangle have the same closest point, to rounding.
+constexpr double kSame = 1e-12;
 
 double distance_sq(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& low,
                    const Eigen::Vector3d& high) {
   return (box.min() - high).cwiseMax(low - box.max()).cwiseMax(0.0).squaredNorm();
 }
 
-// A box that is axis-aligned in frame O, and its bounding box in the frame M of a mesh.
-class PosedBox {
+// The search for the triangle that is closest to a box.
+class BoxSearch {
  public:
-  PosedBox(const Eigen::AlignedBox3d& box, const Eigen::Isometry3d& X_OM)
-      : box_O_(box), R_OM_(X_OM.linear()), p_OM_(X_OM.translation()), abs_R_OM_(R_OM_.cwiseAbs()) {
-    const Eigen::Vector3d center = R_OM_.transpose() * (box.center() - p_OM_);
-    const Eigen::Vector3d half = abs_R_OM_.transpose() * (0.5 * box.sizes());
-    box_M_ = Eigen::AlignedBox3d(center - half, center + half);
+  /// @param X_OM    the mesh's frame M -> O
+  /// @param origin  centre of the mesh's bounding box
+  /// @param radius  half its diagonal
+  BoxSearch(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OM, double max_distance,
+            const Eigen::Vector3d& origin, double radius)
+      : box_O_(box_O), X_OM_(X_OM), upper_bound_(max_distance) {
+    const Eigen::Matrix3d R_MO = X_OM.linear().transpose();
+    const Eigen::Vector3d center_M = R_MO * (box_O.center() - X_OM.translation()) - origin;
+    const Eigen::Vector3d half_O = 0.5 * box_O.sizes(), half_M = R_MO.cwiseAbs() * half_O;
+    for (int i = 0; i < 3; ++i) {
+      posed_.center_M[i] = static_cast<float>(center_M[i]);
+      posed_.half_O[i] = static_cast<float>(half_O[i]);
+      posed_.half_M[i] = static_cast<float>(half_M[i]);
+      for (int j = 0; j < 3; ++j) posed_.rotation[i][j] = static_cast<float>(R_MO(j, i));
+    }
+    // The poses of a mesh and of a box are rounded as well.
+    const double far = origin.norm() + X_OM.translation().norm() + box_O.center().norm();
+    posed_.slack = static_cast<float>(kFloatRounding *
+                                      (center_M.norm() + radius + half_O.norm() + 1e-6 * far));
   }
 
-  // A lower bound of the squared distance from the box to the box [low, high] in frame M.
-  double lower_bound_sq(const Eigen::Vector3d& low, const Eigen::Vector3d& high) const {
-    const double in_M = distance_sq(box_M_, low, high);
-    const Eigen::Vector3d center = R_OM_ * (0.5 * (low + high)) + p_OM_;
-    const Eigen::Vector3d half = abs_R_OM_ * (0.5 * (high - low));
-    return std::max(in_M, distance_sq(box_O_, center - half, center + half));
+  const PosedBox& posed() const { return posed_; }
+  double upper_bound() const { return upper_bound_; }
+  const BoxDistance& best() const { return best_; }
+
+  void visit(const TriangleBvh::Triangle& triangle) {
+    const Eigen::Vector3d a = X_OM_ * triangle.a, b = X_OM_ * triangle.b, c = X_OM_ * triangle.c;
+    const Eigen::Vector3d low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+    if (distance_sq(box_O_, low, high) >= upper_bound_ * upper_bound_) return;
+    const double nearest = std::max({normal_O_.dot(a), normal_O_.dot(b), normal_O_.dot(c)});
+    if (offset_O_ - nearest >= (1.0 - kSame) * upper_bound_) return;
+    const BoxDistance found = triangle_to_box(a, b, c, box_O_);
+    if (found.distance >= upper_bound_) return;
+    best_ = found;
+    best_.lower_bound = (1.0 - 2.0 * kSame) * found.distance;
+    upper_bound_ = found.distance;
+    if (upper_bound_ > 0.0) separate();
   }
 
  private:
-  Eigen::AlignedBox3d box_O_, box_M_;
-  Eigen::Matrix3d R_OM_;
-  Eigen::Vector3d p_OM_;
-  Eigen::Matrix3d abs_R_OM_;
-};
+  // The closest point of the box has a plane, across the way to the triangle, behind which the
+  // whole box is.
+  void separate() {
+    normal_O_ = (best_.p_OB - best_.p_OS) / best_.distance;
+    offset_O_ = normal_O_.dot(best_.p_OB);
+    const Eigen::Vector3d normal_M = X_OM_.linear().transpose() * normal_O_;
+    for (int i = 0; i < 3; ++i) posed_.normal_M[i] = static_cast<float>(normal_M[i]);
+    posed_.offset = static_cast<float>(normal_O_.dot(best_.p_OB - box_O_.center()));
+  }
 
-// Keeps the closest pair of a triangle and the box, and its squared distance as an upper bound.
-void visit_triangle(const TriangleBvh::Triangle& triangle, const Eigen::AlignedBox3d& box_O,
-                    const Eigen::Isometry3d& X_OM, double* upper_bound_sq, BoxDistance* best) {
-  const Eigen::Vector3d a = X_OM * triangle.a, b = X_OM * triangle.b, c = X_OM * triangle.c;
-  const Eigen::Vector3d low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-  if (distance_sq(box_O, low, high) >= *upper_bound_sq) return;
-  const BoxDistance found = triangle_to_box(a, b, c, box_O);
-  if (found.distance * found.distance >= *upper_bound_sq) return;
-  *best = found;
-  *upper_bound_sq = best->distance * best->distance;
-}
+  const Eigen::AlignedBox3d& box_O_;
+  const Eigen::Isometry3d& X_OM_;
+  PosedBox posed_;
+  double upper_bound_;
+  BoxDistance best_;
+  Eigen::Vector3d normal_O_ = Eigen::Vector3d::Zero();
+  double offset_O_ = -std::numeric_limits<double>::infinity();
+};
 
 }  // namespace
 
 BoxDistance TriangleBvh::closest_to_box(const Eigen::AlignedBox3d& box_O,
                                         const Eigen::Isometry3d& X_OM, double max_distance) const {
-  BoxDistance best;
-  if (triangles_.empty() || !(max_distance > 0.0)) return best;
-  const PosedBox posed_box(box_O, X_OM);
-  const Eigen::Vector3d origin = bounds_.center();
-  double upper_bound_sq = max_distance * max_distance;
+  if (triangles_.empty() || !(max_distance > 0.0)) return {};
+  BoxSearch search(box_O, X_OM, max_distance, bounds_.center(), 0.5 * bounds_.diagonal().norm());
   struct Entry {
     std::int32_t child;
-    double lower_bound_sq;
+    float lower_bound;
   };
   Stack<Entry> stack;
-  stack.push({0, 0.0});
-  while (!stack.empty() && best.distance > 0.0) {
+  stack.push({0, 0.0F});
+  alignas(32) float bounds[kWidth];
+  while (!stack.empty() && search.best().distance > 0.0) {
     const Entry entry = stack.pop();
-    if (entry.lower_bound_sq >= upper_bound_sq) continue;
+    if (static_cast<double>(entry.lower_bound) >= search.upper_bound()) continue;
     if (entry.child < 0) {
       const Leaf& leaf = leaves_[static_cast<std::size_t>(~entry.child)];
-      for (std::uint32_t k = 0; k < leaf.count; ++k) {
-        visit_triangle(triangles_[leaf.first + k], box_O, X_OM, &upper_bound_sq, &best);
-      }
+      for (std::uint32_t k = 0; k < leaf.count; ++k) search.visit(triangles_[leaf.first + k]);
       continue;
     }
     const Boxes& boxes = boxes_[static_cast<std::size_t>(entry.child)];
+    posed_box_bounds(boxes, search.posed(), bounds);
     const std::size_t first = stack.size();
     for (int k = 0; k < boxes.count; ++k) {
-      const Eigen::Vector3d low(boxes.min[0][k], boxes.min[1][k], boxes.min[2][k]);
-      const Eigen::Vector3d high(boxes.max[0][k], boxes.max[1][k], boxes.max[2][k]);
-      const double lower_bound_sq = posed_box.lower_bound_sq(low + origin, high + origin);
-      if (lower_bound_sq >= upper_bound_sq) continue;
-      stack.push_least_on_top<&Entry::lower_bound_sq>(first, {boxes.child[k], lower_bound_sq});
+      if (static_cast<double>(bounds[k]) >= search.upper_bound()) continue;
+      stack.push_least_on_top<&Entry::lower_bound>(first, {boxes.child[k], bounds[k]});
     }
   }
-  return best;
+  return search.best();
 }
 
 }  // namespace ist

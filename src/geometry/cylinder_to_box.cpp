@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "internal/geometry/box_distance.h"
 
@@ -27,20 +28,59 @@ struct Simplex {
   }
 };
 
+// Solves for the combination of columns nearest to a vector, by orthogonalization with pivoting:
+// columns that the others span, to rounding, get no share.
+template <std::size_t kColumns>
+std::array<double, kColumns> least_squares(std::array<Eigen::Vector3d, kColumns> column,
+                                           Eigen::Vector3d rest) {
+  constexpr double kSpanned = 1e-15;  // of the longest column
+  std::array<std::size_t, kColumns> order{};
+  std::array<std::array<double, kColumns>, kColumns> r{};  // by step and column
+  std::array<double, kColumns> along{}, share{};
+  for (std::size_t i = 0; i < kColumns; ++i) order[i] = i;
+  double longest = 0.0;
+  std::size_t rank = 0;
+  for (; rank < kColumns; ++rank) {
+    std::size_t pivot = rank;
+    for (std::size_t j = rank + 1; j < kColumns; ++j) {
+      if (column[order[j]].squaredNorm() > column[order[pivot]].squaredNorm()) pivot = j;
+    }
+    std::swap(order[rank], order[pivot]);
+    const double length = column[order[rank]].norm();
+    longest = std::max(longest, length);
+    if (!(length > kSpanned * longest)) break;
+    const Eigen::Vector3d q = column[order[rank]] / length;
+    r[rank][order[rank]] = length;
+    for (int pass = 0; pass < 2; ++pass) {  // the second one removes what rounding has left
+      for (std::size_t j = rank + 1; j < kColumns; ++j) {
+        const double part = q.dot(column[order[j]]);
+        column[order[j]] -= part * q;
+        r[rank][order[j]] += part;
+      }
+      const double part = q.dot(rest);
+      rest -= part * q;
+      along[rank] += part;
+    }
+  }
+  for (std::size_t i = rank; i-- > 0;) {
+    double sum = along[i];
+    for (std::size_t j = i + 1; j < rank; ++j) sum -= r[i][order[j]] * share[order[j]];
+    share[order[i]] = sum / r[i][order[i]];
+  }
+  return share;
+}
+
 // Finds the weights of the vertices at the point of their affine hull that is nearest to the
 // origin; false if that point lies outside their convex hull.
-template <int kOthers>
+template <std::size_t kOthers>
 bool solve(const Simplex& face, std::array<double, 4>* weight) {
-  Eigen::Matrix<double, 3, kOthers> edges;
-  for (int j = 0; j < kOthers; ++j) {
-    edges.col(j) = face.vertex[static_cast<std::size_t>(j) + 1].w - face.vertex[0].w;
-  }
-  const Eigen::Matrix<double, kOthers, 1> solution =
-      edges.colPivHouseholderQr().solve(-face.vertex[0].w);
+  std::array<Eigen::Vector3d, kOthers> edges;
+  for (std::size_t j = 0; j < kOthers; ++j) edges[j] = face.vertex[j + 1].w - face.vertex[0].w;
+  const std::array<double, kOthers> solution = least_squares<kOthers>(edges, -face.vertex[0].w);
   double first = 1.0;
-  for (int j = 0; j < kOthers; ++j) {
+  for (std::size_t j = 0; j < kOthers; ++j) {
     if (!(solution[j] >= 0.0)) return false;
-    (*weight)[static_cast<std::size_t>(j) + 1] = solution[j];
+    (*weight)[j + 1] = solution[j];
     first -= solution[j];
   }
   (*weight)[0] = first;

@@ -200,7 +200,7 @@ void skip_posture(WireReader* in) {
   }
 }
 
-void read_attached(WireReader* in, SceneLayout layout, const WorldLimits& limits,
+void read_attached(WireReader* in, SceneLayout layout, const WorldLimits& limits, Budget* budget,
                    std::vector<SceneAttachment>* attachments) {
   // The least attached object has 93 bytes, whatever its layout.
   const std::size_t attached = in->count(93, "attached objects");
@@ -209,14 +209,18 @@ void read_attached(WireReader* in, SceneLayout layout, const WorldLimits& limits
              std::to_string(limits.max_objects) + " (max_objects)");
   }
   for (std::size_t i = 0; i < attached; ++i) {
-    std::string link = in->string(kNameBuffer, "a link's name");
-    Budget budget{limits.max_objects, limits.max_triangles};
-    const SceneObject object = read_object(in, layout, &budget);
-    in->skip_strings("touch_links");
+    SceneAttachment attachment;
+    attachment.link = in->string(kNameBuffer, "a link's name");
+    attachment.object = read_object(in, layout, budget);
+    const std::size_t links = in->count(4, "touch_links");
+    for (std::size_t k = 0; k < links; ++k) {
+      std::string link = in->string(kNameBuffer, "touch_links");
+      // A robot has no more links; and of others nothing is measured.
+      if (k < kMaxLinks) attachment.touch_links.push_back(std::move(link));
+    }
     skip_posture(in);
     in->skip(8, "a weight");
-    attachments->push_back(
-        {std::move(link), object.id, object.operation == SceneObject::Operation::kRemove});
+    attachments->push_back(std::move(attachment));
   }
 }
 
@@ -267,22 +271,22 @@ void skip_paddings_and_colors(WireReader* in) {
   }
 }
 
-void read_objects(WireReader* in, SceneLayout layout, const WorldLimits& limits,
+void read_objects(WireReader* in, SceneLayout layout, const WorldLimits& limits, Budget* budget,
                   std::vector<SceneObject>* objects) {
   const std::size_t count = in->count(53, "objects");
   if (count > limits.max_objects) {
     in->fail("it holds " + std::to_string(count) + " objects; allowed are " +
              std::to_string(limits.max_objects) + " (max_objects)");
   }
-  Budget budget{limits.max_objects, limits.max_triangles};
-  for (std::size_t i = 0; i < count; ++i) objects->push_back(read_object(in, layout, &budget));
+  for (std::size_t i = 0; i < count; ++i) objects->push_back(read_object(in, layout, budget));
 }
 
 void read_scene(WireReader* in, SceneLayout layout, const WorldLimits& limits,
                 const OctreeLimits& octomap_limits, PlanningScene* scene) {
   in->skip_string("the scene's name");
   const bool has_joints = skip_joint_states(in);
-  read_attached(in, layout, limits, &scene->attachments);
+  Budget budget{limits.max_objects, limits.max_triangles};
+  read_attached(in, layout, limits, &budget, &scene->attachments);
   const bool is_state_diff = in->boolean("the state's is_diff");
   in->skip_string("the robot's name");
   const std::size_t transforms = in->count(76, "fixed transforms");
@@ -293,7 +297,7 @@ void read_scene(WireReader* in, SceneLayout layout, const WorldLimits& limits,
   }
   read_matrix(in, scene);
   skip_paddings_and_colors(in);
-  read_objects(in, layout, limits, &scene->objects);
+  read_objects(in, layout, limits, &budget, &scene->objects);
   const bool states_octomap = read_scene_octomap(in, octomap_limits, &scene->octomap);
   scene->is_diff = in->boolean("is_diff");
   scene->sets_octomap = !scene->is_diff || states_octomap || removes_octomap(*scene);

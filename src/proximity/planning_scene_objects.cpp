@@ -48,42 +48,54 @@ bool removes_octomap(const PlanningScene& scene) {
   });
 }
 
-void UnmeasuredParts::apply(const SceneAttachment& attachment) {
-  const auto is_meant = [&](const auto& known) {
-    return (attachment.id.empty() || known.first == attachment.id) &&
-           (attachment.link.empty() || known.second == attachment.link);
-  };
-  if (!attachment.is_detached) {
-    if (link_of_.size() < most_ || link_of_.count(attachment.id) > 0)
-      link_of_[attachment.id] = attachment.link;
-    return;
-  }
-  for (auto known = link_of_.begin(); known != link_of_.end();) {
-    known = is_meant(*known) ? link_of_.erase(known) : std::next(known);
-  }
+bool AttachedObjects::attach(const SceneAttachment& attachment) {
+  const std::string& id = attachment.object.id;
+  if (attached_.size() >= most_ && !contains(id)) return false;
+  attached_[id] = {attachment.link, attachment.touch_links};
+  return true;
 }
 
-void UnmeasuredParts::apply(const PlanningScene& scene) {
-  if (!scene.fault.empty()) return;
-  if (!scene.keeps_attached) link_of_.clear();
-  for (const SceneAttachment& attachment : scene.attachments) apply(attachment);
+std::vector<std::string> AttachedObjects::detach(const SceneAttachment& attachment) {
+  const std::string &id = attachment.object.id, &link = attachment.link;
+  std::vector<std::string> names;
+  for (auto known = attached_.begin(); known != attached_.end();) {
+    const bool is_meant =
+        (id.empty() || known->first == id) && (link.empty() || known->second.link == link);
+    if (is_meant) names.push_back(known->first);
+    known = is_meant ? attached_.erase(known) : std::next(known);
+  }
+  return names;
 }
 
-std::vector<std::string> UnmeasuredParts::sentences() const {
-  std::vector<std::string> sentences;
+std::vector<std::string> AttachedObjects::names() const {
+  std::vector<std::string> names;
+  names.reserve(attached_.size());
+  for (const auto& known : attached_) names.push_back(known.first);
+  return names;
+}
+
+std::vector<std::string> AttachedObjects::touched_by(const std::string& id) const {
+  const auto known = attached_.find(id);
+  if (known == attached_.end()) return {};
+  std::vector<std::string> links = known->second.touch_links;
+  links.push_back(known->second.link);
+  return links;
+}
+
+std::string AttachedObjects::sentence() const {
+  if (attached_.empty()) return "";
   std::string names;
   std::size_t named = 0;
-  for (const auto& [id, link] : link_of_) {
+  for (const auto& [id, attached] : attached_) {
     if (named++ == kMostNamed) break;
-    names += (names.empty() ? "'" : ", '") + printable(id) + "' (to '" + printable(link) + "')";
+    names +=
+        (names.empty() ? "'" : ", '") + printable(id) + "' (to '" + printable(attached.link) + "')";
   }
-  if (link_of_.size() > kMostNamed)
-    names += " and " + std::to_string(link_of_.size() - kMostNamed) + " more";
-  if (!names.empty()) {
-    sentences.push_back("attached to the robot are " + names +
-                        ", which no source measures: attach them with ~attach_object");
-  }
-  return sentences;
+  if (attached_.size() > kMostNamed)
+    names += " and " + std::to_string(attached_.size() - kMostNamed) + " more";
+  return "attached to the robot are " + names +
+         ": measured against the robot's other links alone, not against clouds, the octomap and "
+         "other objects (~attach_object does that)";
 }
 
 WorldObject to_world_object(const SceneObject& object, const std::string& default_frame) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "internal/proximity/carried_worlds.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "proximity/motion_bound.h"
 #include "proximity/moved_joints.h"
@@ -39,6 +40,7 @@ struct TimeOfImpact::Impl {
              double time) {
     place_moved_joints(forward.kinematics(), motion, still, time, &moved);
     forward.run(moved, X_FR);
+    carried.place(forward.bodies());
   }
 
   /// A proven lower bound of the distance [m]; NaN where nothing is known.
@@ -75,6 +77,27 @@ struct TimeOfImpact::Impl {
                     (box.min() - c).cwiseAbs().cwiseMax((box.max() - c).cwiseAbs()).norm());
   }
 
+  // Bounds the motion of the objects that the robot carries, by frame.
+  void bound_carried(const JointMotion& motion, const JointPoses& still) {
+    carried_bounds.clear();
+    for (const CarriedWorlds::Frame& frame : carried.frames()) {
+      carried_bounds.emplace_back(forward.kinematics(), motion, still, frame.body, frame.center_B,
+                                  frame.radius);
+    }
+  }
+
+  // [s] The link and no object come nearer to each other by `distance` [m] within this time.
+  double time_for(const MotionBound& link, double distance) const {
+    const std::vector<Eigen::Isometry3d>& X_FB = forward.bodies().X_FB;
+    if (carried_bounds.empty()) return link.time_for(distance, X_FB);
+    const double half = 0.5 * distance;  // link and object may both move
+    double time = link.time_for(half, X_FB);
+    for (const MotionBound& object : carried_bounds) {
+      time = std::min(time, object.time_for(half, X_FB));
+    }
+    return time;
+  }
+
   // Conservative advancement of one link.
   ImpactTime find(std::size_t link, const JointMotion& motion, const JointPoses& still,
                   const Eigen::Isometry3d& X_FR, const Obstacles& obstacles) {
@@ -92,7 +115,7 @@ struct TimeOfImpact::Impl {
       if (std::isnan(distance)) return impact;
       impact.time = time;
       if (distance <= kTouch) return impact;
-      time += bound.time_for(distance, forward.bodies().X_FB);
+      time += time_for(bound, distance);
       if (time >= motion.duration) {
         impact.time = std::numeric_limits<double>::infinity();
         return impact;
@@ -108,10 +131,12 @@ struct TimeOfImpact::Impl {
   QueryConfig config;
   ProximityQuery query;
   std::unique_ptr<WorldQuery> worlds;  ///< null: no surfaces are set
+  CarriedWorlds carried;
 
   // Buffers of one call.
   std::vector<bool> moving;  // by link: the one that is being advanced
   JointPoses moved;
+  std::vector<MotionBound> carried_bounds;  // by frame of what the robot carries
   std::vector<LinkProximity> answers;
 };
 
@@ -153,10 +178,12 @@ void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
                     still.known.size() == joints;
   if (!worlds.empty() && !impl_->worlds) return;
   if (!fits || !(motion.duration > 0.0) || !std::isfinite(motion.duration)) return;
+  impl_->carried.take(worlds, impl_->forward.kinematics());
+  impl_->bound_carried(motion, still);
   for (std::size_t i = 0; i < count; ++i) {
     if (!wanted[i] || !impl_->forward.body(i) || !impl_->model->links[i].usable()) continue;
     impl_->moving[i] = true;
-    (*results)[i] = impl_->find(i, motion, still, X_FR, {clouds, worlds});
+    (*results)[i] = impl_->find(i, motion, still, X_FR, {clouds, impl_->carried.worlds()});
     impl_->moving[i] = false;
   }
 }

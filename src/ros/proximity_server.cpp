@@ -174,7 +174,8 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   if (config_.unknown_space != UnknownSpace::kFree) {
     unknown_space_ = std::make_unique<UnknownSpaceWatch>(
         memories_, config_.query.max_distance,
-        private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen);
+        private_nh_.advertise<visualization_msgs::MarkerArray>("unseen_space", 1), kDrawnUnseen,
+        buffer_);
   }
   query_service_ = std::make_unique<QueryService>(nh_, private_nh_, config_, sources_, buffer_,
                                                   live, unknown_space_.get());

@@ -194,59 +194,95 @@ TEST(PlanningScene, ShapesAreAppendedWhereBothReadingsAgree) {
   }
 }
 
-TEST(PlanningScene, WhatNobodyMeasuresIsSaid) {
-  WireScene wire;
-  wire.is_diff = true;
-  for (int i = 0; i < 5; ++i) {
-    wire.attached.push_back(box_object("tool " + std::to_string(i), kIdentityPose));
+TEST(PlanningScene, AttachedObjectsAreReadWithTheirLinks) {
+  for (const SceneLayout layout : kLayouts) {
+    WireScene wire;
+    wire.is_diff = true;
+    wire.attached = {box_object("tool", {1, 2, 3, 0, 0, 0, 1}), every_shape(), every_shape()};
+    wire.attached[0].frame = "hand";
+    wire.attached[2].operation = 1;
+    wire.objects = {box_object("box", kIdentityPose)};
+    const PlanningScene scene = read(wire, layout);
+    ASSERT_EQ(scene.fault, "");
+    EXPECT_TRUE(scene.notes.empty());
+    ASSERT_EQ(scene.attachments.size(), 3U);
+    for (const SceneAttachment& one : scene.attachments) {
+      EXPECT_EQ(one.link, "hand");
+      EXPECT_EQ(one.touch_links, std::vector<std::string>{"finger"});
+      EXPECT_EQ(one.object.fault, "");
+    }
+    const WorldObject tool = to_world_object(scene.attachments[0].object, "other");
+    EXPECT_EQ(tool.name, "tool");
+    EXPECT_EQ(tool.frame, "hand");
+    EXPECT_EQ(tool.X_BO.translation(), Eigen::Vector3d(1, 2, 3));
+    EXPECT_EQ(scene.attachments[1].object.geometry.size(), 6U);
+    EXPECT_EQ(scene.attachments[1].object.operation, Operation::kAdd);
+    EXPECT_EQ(scene.attachments[2].object.operation, Operation::kRemove);
+    ASSERT_EQ(scene.objects.size(), 1U);
+    EXPECT_EQ(scene.objects[0].id, "box");
   }
-  wire.attached[0].operation = 1;
-  const PlanningScene scene = read(wire);
-  EXPECT_EQ(scene.fault, "");
-  EXPECT_TRUE(scene.is_diff);
-  EXPECT_TRUE(scene.notes.empty());
-  UnmeasuredParts parts(WorldLimits().max_objects);
-  parts.apply(scene);
-  const std::vector<std::string> said = parts.sentences();
-  ASSERT_EQ(said.size(), 1U);
-  EXPECT_NE(said[0].find("'tool 1' (to 'hand'), 'tool 2' (to 'hand'), 'tool 3' (to 'hand') and 1 "
-                         "more"),
-            std::string::npos)
-      << said[0];
 }
 
-WireScene with_attached(const std::string& name, std::uint8_t operation, bool is_state_diff) {
+// Attached objects take memory, as those of the world do.
+TEST(PlanningScene, ShapesOfAttachedObjectsCount) {
   WireScene wire;
-  wire.is_diff = true;
-  wire.is_state_diff = is_state_diff;
-  wire.attached = {box_object(name, kIdentityPose)};
-  wire.attached[0].operation = operation;
-  return wire;
+  wire.attached = {every_shape()};
+  wire.objects = {every_shape()};
+  WorldLimits limits;
+  limits.max_objects = 12;
+  EXPECT_EQ(read(wire, kLayouts[1], limits).fault, "");
+  limits.max_objects = 11;
+  EXPECT_NE(read(wire, kLayouts[1], limits).fault.find("more shapes"), std::string::npos);
+  limits = {};
+  limits.max_triangles = 7;  // each has a mesh of 4
+  EXPECT_NE(read(wire, kLayouts[1], limits).fault.find("more triangles"), std::string::npos);
 }
 
-// The next difference does not name the attached object; it is there all the same. It ends when it
-// is detached, when a whole state is without it, or a whole scene is.
-TEST(PlanningScene, WhatNobodyMeasuresIsSaidUntilItEnds) {
-  UnmeasuredParts parts(10);
-  WireScene silent;
-  silent.is_diff = true;
-  const auto after = [&](const WireScene& wire) {
-    parts.apply(read(wire));
-    return parts.sentences().size();
-  };
-  EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
-  EXPECT_EQ(after(silent), 1U);
-  EXPECT_EQ(after(with_attached("other", 1, true)), 1U);
-  EXPECT_EQ(after(with_attached("drill", 1, true)), 0U);
-  EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
-  EXPECT_EQ(after(with_attached("saw", 0, false)), 1U);  // a whole state
-  EXPECT_EQ(parts.sentences()[0].find("'drill'"), std::string::npos);
-  EXPECT_EQ(after(with_attached("", 1, true)), 0U);  // all of the link
-  EXPECT_EQ(after(with_attached("drill", 0, true)), 1U);
-  EXPECT_EQ(after(WireScene()), 0U);  // a whole scene
-  // Names that are never detached take no more memory than the limit.
-  for (int i = 0; i < 15; ++i) after(with_attached("tool " + std::to_string(i), 0, true));
-  EXPECT_NE(parts.sentences()[0].find("and 7 more"), std::string::npos) << parts.sentences()[0];
+SceneAttachment attachment(const std::string& id, const std::string& link) {
+  SceneAttachment one;
+  one.link = link;
+  one.touch_links = {"finger"};
+  one.object.id = id;
+  return one;
+}
+
+TEST(AttachedObjects, StayUntilTheyAreDetached) {
+  AttachedObjects attached(4);
+  EXPECT_EQ(attached.sentence(), "");
+  for (const char* id : {"cup", "drill", "saw"}) {
+    EXPECT_TRUE(attached.attach(attachment(id, "hand")));
+  }
+  EXPECT_TRUE(attached.attach(attachment("hat", "head")));
+  EXPECT_FALSE(attached.attach(attachment("bag", "hand")));
+  EXPECT_TRUE(attached.attach(attachment("saw", "foot")));  // in place of that in the hand
+  EXPECT_EQ(attached.names(), (std::vector<std::string>{"cup", "drill", "hat", "saw"}));
+  EXPECT_EQ(attached.touched_by("saw"), (std::vector<std::string>{"finger", "foot"}));
+  EXPECT_TRUE(attached.touched_by("bag").empty());
+  const std::string said = attached.sentence();
+  EXPECT_NE(said.find("'cup' (to 'hand'), 'drill' (to 'hand'), 'hat' (to 'head') and 1 more: "),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("not against clouds"), std::string::npos) << said;
+  EXPECT_TRUE(attached.detach(attachment("cup", "head")).empty());  // MoveIt refuses it
+  EXPECT_TRUE(attached.detach(attachment("bag", "")).empty());
+  EXPECT_EQ(attached.detach(attachment("cup", "hand")), std::vector<std::string>{"cup"});
+  EXPECT_EQ(attached.detach(attachment("", "head")), std::vector<std::string>{"hat"});
+  EXPECT_TRUE(attached.contains("saw"));
+  EXPECT_EQ(attached.detach(attachment("", "")), (std::vector<std::string>{"drill", "saw"}));
+  EXPECT_EQ(attached.sentence(), "");
+}
+
+// A difference that does not name attached objects keeps them. A whole state ends them, as a whole
+// scene does.
+TEST(PlanningScene, OnlyWholeStatesEndAttachments) {
+  WireScene wire;
+  EXPECT_FALSE(read(wire).keeps_attached);
+  wire.is_diff = true;
+  EXPECT_TRUE(read(wire).keeps_attached);
+  wire.attached = {box_object("drill", kIdentityPose)};
+  EXPECT_TRUE(read(wire).keeps_attached);
+  wire.is_state_diff = false;
+  EXPECT_FALSE(read(wire).keeps_attached);
 }
 
 TEST(PlanningScene, TheOctomapIsReadWithItsPose) {

@@ -163,6 +163,146 @@ TEST(TimeOfImpact, KnownWorldsBesideClouds) {
   EXPECT_GT(free, 0);
 }
 
+// Two balls that one link carries, and which the others may run into.
+struct CarriedBalls {
+  std::size_t link;                  // of the model: it may touch them
+  std::vector<Eigen::Vector3d> p_B;  // [m] their centres, in that link's frame
+};
+
+// Where another link is at some time of the motion, so that they meet now and then.
+CarriedBalls random_carried_balls(test::Rng* rng, const test::Arm& arm,
+                                  const test::ArmMotion& motion) {
+  const auto random_link = [&] {
+    return static_cast<std::size_t>(test::uniform(rng, 0, 0.999) * static_cast<double>(arm.size()));
+  };
+  CarriedBalls balls;
+  balls.link = random_link();
+  for (int i = 0; i < 2; ++i) {
+    const double time = test::uniform(rng, 0.3, 1.2) * motion.joints.duration;
+    const std::vector<Eigen::Isometry3d> X_FB = test::sampled_poses(arm, motion, time);
+    const Eigen::Vector3d p_F = X_FB[arm.bodies[random_link()]] * test::random_vector(rng, 0.1);
+    balls.p_B.push_back(X_FB[arm.bodies[balls.link]].inverse() * p_F);
+  }
+  return balls;
+}
+
+// [m] The exact distance of the centres of balls from all links but the one that carries them.
+double distance_to_carried(const test::Arm& arm, const test::ArmMotion& motion,
+                           const CarriedBalls& balls, double time) {
+  const std::vector<Eigen::Isometry3d> X_FB = test::sampled_poses(arm, motion, time);
+  std::vector<Eigen::Vector3d> centers;
+  for (const Eigen::Vector3d& p_B : balls.p_B) {
+    centers.push_back(X_FB[arm.bodies[balls.link]] * p_B);
+  }
+  double smallest = kInf;
+  for (std::size_t i = 0; i < arm.size(); ++i) {
+    if (i == balls.link) continue;
+    const double d = test::oracle_minimum(arm.links[i], X_FB[arm.bodies[i]], centers);
+    smallest = std::min(smallest, d);
+  }
+  return smallest;
+}
+
+bool may_move(const Kinematics& kinematics, std::size_t body) {
+  for (; body > 0; body = kinematics.joints()[body - 1].parent) {
+    if (kinematics.joints()[body - 1].type != JointType::kFixed) return true;
+  }
+  return false;
+}
+
+// What the robot carries moves with it: no link touches it before the time that is returned, and
+// one touches it then.
+TEST(TimeOfImpact, CarriedObjectsMoveWithTheirBodies) {
+  constexpr double kRadius = 0.005;
+  test::Rng rng(69);
+  int contacts = 0, free = 0;
+  for (int i = 0; i < test::scaled(300); ++i) {
+    const test::Arm arm = test::random_arm(&rng);
+    const test::ArmMotion motion = test::random_motion(&rng, arm);
+    const CarriedBalls balls = random_carried_balls(&rng, arm, motion);
+    const std::size_t body = arm.bodies[balls.link];
+    WorldBuilder builder;
+    for (const Eigen::Vector3d& p_B : balls.p_B) {
+      WorldObject object;
+      object.name = "ball " + std::to_string(builder.size());
+      object.frame = arm.kinematics->bodies()[body];
+      object.geometry = {GeometryElement{Sphere{kRadius}, Eigen::Isometry3d::Identity(), "ball"}};
+      object.X_BO.translation() = p_B;
+      object.allowed_links = {object.frame};
+      ASSERT_TRUE(builder.add({object}).empty());
+    }
+    PosedWorld world;
+    world.world = builder.world();
+    // Where the robot is now does not matter, but for bodies that cannot move.
+    world.X_FB = {may_move(*arm.kinematics, body) ? test::random_pose(&rng, 1.0)
+                                                  : test::sampled_poses(arm, motion, 0.0)[body]};
+    QueryConfig config;
+    config.max_distance = 0.5;
+    TimeOfImpact impacts(arm.model, arm.kinematics, config);
+    impacts.set_surfaces(make_robot_surfaces(arm.model), {});
+    std::vector<ImpactTime> found;
+    impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true), {},
+                {&world}, &found);
+    double first = kInf;
+    bool converged = true;
+    for (const ImpactTime& one : found) {
+      ASSERT_FALSE(std::isnan(one.time));
+      converged &= one.converged;
+      first = std::min(first, one.time);
+    }
+    const auto distance = [&](double time) {
+      return distance_to_carried(arm, motion, balls, time) - kRadius;
+    };
+    if (distance(0.0) <= 0.0) {
+      EXPECT_EQ(first, 0.0);
+      continue;
+    }
+    const double end = std::min(first, motion.joints.duration);
+    for (int k = 0; k <= 60; ++k) {
+      ASSERT_GT(distance(end * k / 60), -1e-9) << "motion " << i << ", " << first << " s";
+    }
+    free += first == kInf ? 1 : 0;
+    if (first == kInf || !converged) continue;
+    EXPECT_LT(distance(first), 3e-6) << "motion " << i;
+    ++contacts;
+  }
+  EXPECT_GT(contacts, test::scaled(300) / 15);
+  EXPECT_GT(free, test::scaled(300) / 15);
+}
+
+// A ball in the frame of a body whose pose is not known may be anywhere.
+TEST(TimeOfImpact, CarriedByABodyThatIsNotKnown) {
+  test::Rng rng(70);
+  int unknown = 0;
+  for (int i = 0; i < 50; ++i) {
+    const test::Arm arm = test::random_arm(&rng);
+    test::ArmMotion motion = test::random_motion(&rng, arm);
+    const std::size_t body = arm.bodies.back();
+    std::size_t joint = body - 1;
+    if (arm.kinematics->joints()[joint].type == JointType::kFixed) continue;
+    WorldObject object;
+    object.name = "carried";
+    object.frame = arm.kinematics->bodies()[body];
+    object.geometry = {GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "ball"}};
+    WorldBuilder builder;
+    ASSERT_TRUE(builder.add({object}).empty());
+    PosedWorld world;
+    world.world = builder.world();
+    world.X_FB = {Eigen::Isometry3d::Identity()};
+    TimeOfImpact impacts(arm.model, arm.kinematics, QueryConfig());
+    impacts.set_surfaces(make_robot_surfaces(arm.model), {});
+    joint = arm.kinematics->joints()[joint].source;
+    motion.joints.from[joint] = motion.joints.to[joint] = std::nan("");
+    motion.still.known[body - 1] = false;
+    std::vector<ImpactTime> found;
+    impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true), {},
+                {&world}, &found);
+    for (const ImpactTime& one : found) EXPECT_TRUE(std::isnan(one.time)) << "arm " << i;
+    ++unknown;
+  }
+  EXPECT_GT(unknown, 20);
+}
+
 // The largest displacement [m] of a point of a sphere on a body between two instants.
 double displacement(const test::Arm& arm, const test::ArmMotion& motion, std::size_t body,
                     const Eigen::Vector3d& center, double radius, double from, double to) {

@@ -231,6 +231,49 @@ class MemoryTest(unittest.TestCase):
             self.assertEqual(ball.state, LinkProximity.NEAR)
             self.assertAlmostEqual(ball.lower_bound, ball.unseen_distance, places=9)
 
+    # The memory is in a frame in which the robot drives. No cloud comes while it does, so that unknown
+    # space moves by tf alone.
+    def test_unknown_space_stands_still_while_the_robot_drives(self):
+        self.world.points = patch(2.4, 0.72, 0.015)
+        links = {"ball_link": ("base", pt.transform((1.0, 0.0, 0.0))), "box_link": ("base", pt.transform((0, 0, 5)))}
+
+        def drive(y):
+            self.world.poses = dict(links, base=("odom", pt.transform((3.0, y, 0.0), angle=0.0)))
+
+        drive(-1.0)
+        memory = {"enabled": True, "decay": 1000.0, "resolution": VOXEL, "frame_id": "odom"}
+        self.start(memory=memory, unknown_space="obstacle", max_distance=2.0, cloud_timeout=float("inf"))
+
+        def unseen(y):
+            """Waits for the distance to the side of the cone that was seen at first."""
+            to_side = (0.3 - abs(y)) / np.hypot(1.0, 0.3) - pt.BALL_RADIUS
+            low, high = to_side - 3 * VOXEL, to_side + 2 * VOXEL
+            message = self.node.wait_for(
+                lambda m: self.is_from("cloud")(m) and low < self.ball(m).unseen_distance < high,
+                "unknown space %g m away" % to_side,
+            )
+            self.assertAlmostEqual(self.ball(message).lower_bound, self.ball(message).unseen_distance, places=9)
+            return self.ball(message)
+
+        unseen(0.0)
+        self.clouds.paused = True
+        rospy.sleep(1.0)  # until the last cloud is in unknown space
+        for y in (0.13, 0.0, -0.13):
+            drive(y - 1.0)
+            ball = unseen(y)
+            if y != 0.0:
+                self.assertGreater(pt.vector(ball.unseen_direction)[1] * np.sign(y), 0.8)
+        drive(-1.0)
+        unseen(0.0)
+        self.world.poses = links  # odom is lost
+        lost = self.node.wait_for_status(ProximityArray.DEGRADED, "all space counts as unknown")
+        self.assertIn("odom", lost.status_text)
+        self.assertLess(self.ball(lost).lower_bound, 0.0)
+        self.assertTrue(np.isnan(self.ball(lost).seen_share))
+        self.assertAlmostEqual(self.ball(lost).distance, 2.4 - 1.0 - pt.BALL_RADIUS, delta=0.01)
+        drive(-1.0)
+        unseen(0.0)
+
     # The grey dots and lines in rviz are where unknown space is.
     def test_unknown_space_is_drawn(self):
         dots, lines = [], []

@@ -33,7 +33,8 @@ struct ImpactTime {
   int steps = 0;  ///< distance queries
 };
 
-/// Conservative time of impact of a robot's links with standing obstacles along a joint motion.
+/// Conservative time of impact of a robot's links along a joint motion, with obstacles that stand
+/// or that the robot carries.
 ///
 /// Conservative advancement (Mirtich 1996): a link whose distance is proven to be d or more cannot
 /// touch anything before one of its points has moved by d. Each step bounds the speed of its points
@@ -62,8 +63,9 @@ class TimeOfImpact {
   void run(const JointMotion& motion, const JointPoses& still, const Eigen::Isometry3d& X_FR,
            const std::vector<bool>& wanted, SnapshotSpan clouds, std::vector<ImpactTime>* results);
 
-  /// The same beside known worlds, whose objects stand where they are: the first contact with a
-  /// cloud or an object counts. Needs set_surfaces().
+  /// The same beside known worlds: the first contact with a cloud or an object counts. Objects in
+  /// the frame of a body of the kinematics, which has its name, move with it where joints move the
+  /// body; all others stand where they are. Needs set_surfaces().
   /// @param clouds  where there are none, the worlds alone decide
   /// @param worlds  as for WorldQuery::run. Where there are some and surfaces are not set, every
   ///                time is NaN

@@ -53,10 +53,14 @@ struct AllowedCollisions {
       const std::string& name, const std::function<bool(const std::string&)>& is_left_out) const;
 };
 
-/// An object that a scene attaches to a link of the robot, or detaches from it.
+/// A moveit_msgs/AttachedCollisionObject: an object that a scene attaches to a link of the robot,
+/// or detaches from it.
 struct SceneAttachment {
-  std::string link, id;  ///< of a detachment they may be empty: any
-  bool is_detached = false;
+  std::string link;                      ///< of a detachment (kRemove) it may be empty: any
+  std::vector<std::string> touch_links;  ///< links that it may touch, besides `link`
+  /// The object. Of a detachment its name may be empty: any. Without shapes it is the object of
+  /// this name in the scene's world.
+  SceneObject object;
 };
 
 /// The octomap of a scene (octomap_msgs/OctomapWithPose).
@@ -84,23 +88,39 @@ struct PlanningScene {
   std::string fault;  ///< why nothing of it can be used; empty: it can
 };
 
-/// The parts of all scenes so far that nobody measures: attached objects. A difference that does
-/// not name them does not end them.
-class UnmeasuredParts {
+/// The objects that scenes have attached to links of the robot. A difference that does not name
+/// them does not end them.
+class AttachedObjects {
  public:
+  /// An object of a scene is one of the world by its own name, and attached by this one, so that
+  /// both may be there.
+  static std::string name_in_world(const std::string& id) { return id + " (attached)"; }
+
   /// @param most  attached objects that are kept
-  explicit UnmeasuredParts(std::size_t most) : most_(most) {}
+  explicit AttachedObjects(std::size_t most) : most_(most) {}
 
-  void apply(const PlanningScene& scene);
+  /// Notes that an object is attached, in place of one of the same name.
+  /// @returns false where there are too many
+  bool attach(const SceneAttachment& attachment);
+  /// Ends the attachments that a detachment means.
+  /// @returns the names of their objects
+  std::vector<std::string> detach(const SceneAttachment& attachment);
+  void clear() { attached_.clear(); }  ///< detaches all of them
 
-  /// @returns sentences; none: nothing is left unmeasured
-  std::vector<std::string> sentences() const;
+  bool contains(const std::string& id) const { return attached_.count(id) > 0; }
+  std::vector<std::string> names() const;  ///< of all of them
+  /// The links that an attached object may touch: its own, and those that were named.
+  std::vector<std::string> touched_by(const std::string& id) const;
+  /// @returns what is not measured of them, a sentence; empty: none is attached
+  std::string sentence() const;
 
  private:
-  void apply(const SceneAttachment& attachment);
-
+  struct Attached {
+    std::string link;
+    std::vector<std::string> touch_links;
+  };
   std::size_t most_;
-  std::map<std::string, std::string> link_of_;  ///< by name of an attached object
+  std::map<std::string, Attached> attached_;  ///< by name of the object
 };
 
 /// Reads a message.

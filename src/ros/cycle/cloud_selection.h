@@ -32,6 +32,12 @@ class CloudSelection {
               const std::shared_ptr<const RobotModel>& model, const ros::Time& poses_stamp,
               double pose_timeout, StatusInput* status);
 
+  /// Takes other poses of the same worlds.
+  /// @param worlds  valid until the next update()
+  void set_worlds(Span<const PosedWorld* const> worlds) {
+    worlds_.assign(worlds.begin(), worlds.end());
+  }
+
   // Results of the last update(), valid until the next one.
 
   /// The clouds that queries may use; empty while a required source is not usable.

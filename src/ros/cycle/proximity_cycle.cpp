@@ -113,6 +113,7 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   selection_.exclude_unfiltered(&measurable_);
   known_ = measurable_;
   for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
+  place_carried_objects();
   // The world is known exactly and costs little: it may take half of the time.
   worlds_.set_influence_distance(config.repulsion.influence_distance);
   worlds_.run(robot_, poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
@@ -133,12 +134,23 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   note_usage(config);
 }
 
+/// In a configuration that the robot is not in, the objects that it carries are elsewhere, too.
+void ProximityCycle::place_carried_objects() {
+  if (!pose_source_ || !pose_source_->is_stated() || selection_.worlds().empty()) return;
+  carried_.take(selection_.worlds(), *model_->kinematics);
+  if (carried_.frames().empty()) return;
+  BodyPoses bodies;
+  pose_source_->look_up_all(*model_->kinematics, poses_.stamp, &bodies);
+  carried_.place(bodies);
+  selection_.set_worlds(carried_.worlds());
+}
+
 void ProximityCycle::ask_unknown_space(const LiveConfig& config) {
   if (!unknown_space_) return;
   QueryConfig query = config.query;
   query.deadline *= kUnknownShare;
-  unknown_space_->run(poses_.X_FL, known_, poses_.stamp.toSec(), query,
-                      config.repulsion.influence_distance);
+  status_input_.unknown_space_problem = unknown_space_->run(
+      poses_, known_, fixed_frame_, pose_timeout_, query, config.repulsion.influence_distance);
 }
 
 /// The links that matter most are served first, as time may end.

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/proximity/carried_worlds.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/kept_repulsion.h"
@@ -99,6 +100,7 @@ class ProximityCycle {
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
   void run_query(const LiveConfig& config, TimePoint begin);
+  void place_carried_objects();
   void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
@@ -118,6 +120,7 @@ class ProximityCycle {
   const bool self_counts_;     ///< ~self_collision/in_minimum
   CloudSelection selection_;
   WorldAnswers worlds_;
+  CarriedWorlds carried_;
   ProximityQuery query_;
   std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
   const bool unknown_is_obstacle_;

@@ -32,18 +32,24 @@ void UnknownSpaceQuery::set_model(std::shared_ptr<const RobotModel> model) {
   query_.set_model(model_);
 }
 
-void UnknownSpaceQuery::run(const std::vector<Eigen::Isometry3d>& X_FL,
-                            const std::vector<bool>& known, double now, const QueryConfig& config,
-                            double influence_distance) {
+std::string UnknownSpaceQuery::run(const StampedLinkPoses& poses, const std::vector<bool>& known,
+                                   const std::string& fixed_frame, double pose_timeout,
+                                   const QueryConfig& config, double influence_distance) {
+  const std::vector<Eigen::Isometry3d>& X_FL = poses.X_FL;
   if (!is_only_reader_) held_ = watch_.share();
   const UnknownSnapshot* unknown = is_only_reader_ ? watch_.newest() : held_.get();
-  for (std::size_t i = 0; unknown == nullptr && i < answers_.size(); ++i) {
-    answers_[i] = UnknownSpaceAnswer();
-    answers_[i].lower_bound = deepest(i);
+  std::string problem;
+  Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();
+  if (unknown != nullptr) {
+    problem = watch_.place(*unknown, fixed_frame, poses.stamp, pose_timeout, &X_FM);
   }
-  if (unknown == nullptr) return;
+  if (unknown == nullptr || !problem.empty()) {
+    know_nothing();
+    return problem;
+  }
+  place(*unknown, X_FM);
   query_.set_config(coarse(config));
-  query_.run(X_FL, known, {&unknown->cloud}, &results_);
+  query_.run(X_FL, known, {&placed_}, &results_);
   for (std::size_t i = 0; i < answers_.size(); ++i) {
     answers_[i].lower_bound = std::max(results_[i].lower_bound, deepest(i));  // -inf: out of time
     answers_[i].direction = -results_[i].direction;  // NaN where nothing is near
@@ -58,8 +64,26 @@ void UnknownSpaceQuery::run(const std::vector<Eigen::Isometry3d>& X_FL,
     const std::size_t link = (next_ + i) % answers_.size();
     if (!known[link]) continue;
     next_ = link;
-    return look_about(link, X_FL[link], now, influence_distance, *unknown);
+    look_about(link, X_FL[link], poses.stamp.toSec(), influence_distance, *unknown);
+    break;
   }
+  return "";
+}
+
+/// The links may be inside something everywhere.
+void UnknownSpaceQuery::know_nothing() {
+  for (std::size_t i = 0; i < answers_.size(); ++i) {
+    answers_[i] = UnknownSpaceAnswer();
+    answers_[i].lower_bound = deepest(i);
+  }
+}
+
+void UnknownSpaceQuery::place(const UnknownSnapshot& unknown, const Eigen::Isometry3d& X_FM) {
+  placed_.boxes = unknown.boxes;
+  placed_.stamp = unknown.stamp;
+  placed_.X_FM = X_FM;
+  placed_.region.center_F = X_FM * unknown.center_M;
+  placed_.region.radius = unknown.radius;
 }
 
 /// [m] A lower bound of any signed distance: nothing is deeper inside anything than a link is
@@ -76,7 +100,7 @@ void UnknownSpaceQuery::look_about(std::size_t link, const Eigen::Isometry3d& X_
     surroundings.emplace(model_->links[link], watch_.skin(),
                          std::max(influence_distance, 2.0 * watch_.skin()));
   }
-  answers_[link].seen = surroundings->look(unknown.seen, unknown.cloud.X_FM.inverse() * X_FL, now);
+  answers_[link].seen = surroundings->look(unknown.seen, placed_.X_FM.inverse() * X_FL, now);
 }
 
 }  // namespace ist

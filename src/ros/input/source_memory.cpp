@@ -209,7 +209,6 @@ bool SourceMemory::add_to(SeenSpace* seen, KnownSpace* known) {
   seen->add(map_);
   seen->add(body_);
   known->links = links_;
-  known->X_FM = X_MF_.inverse();
   known->stamp = stamp_;
   known->frame = frame();  // the thread of the source writes it under the same mutex
   return true;

@@ -19,10 +19,9 @@ namespace ist {
 
 /// What a memory knows beside its voxels.
 struct KnownSpace {
-  VoxelBoxes links;  ///< [m] each holds a link as it was last noted, in the memory's frame M
-  Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< M -> fixed frame, at the last cloud
-  double stamp = 0.0;                                      ///< [s] of the last cloud
-  std::string frame;                                       ///< tf's name of M
+  VoxelBoxes links;    ///< [m] each holds a link as it was last noted, in the memory's frame M
+  double stamp = 0.0;  ///< [s] of the last cloud
+  std::string frame;   ///< tf's name of M
 };
 
 /// What one source remembers (~memory): its clouds go into a MemoryMap in the source's thread,

@@ -10,6 +10,7 @@
 #include "ros/common/stopwatch.h"
 #include "ros/common/thread_name.h"
 #include "ros/input/unseen_markers.h"
+#include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
@@ -27,11 +28,13 @@ constexpr std::chrono::milliseconds kPublicationPeriod(500);
 }  // namespace
 
 UnknownSpaceWatch::UnknownSpaceWatch(SourceMemories memories, double range,
-                                     const ros::Publisher& publisher, double drawn_range)
+                                     const ros::Publisher& publisher, double drawn_range,
+                                     const TransformBuffer& buffer)
     : memories_(std::move(memories)),
       range_(range),
       publisher_(publisher),
-      drawn_range_(drawn_range) {
+      drawn_range_(drawn_range),
+      buffer_(buffer) {
   for (const auto& memory : memories_) skin_ = std::max(skin_, memory->skin());
   thread_ = std::thread(&UnknownSpaceWatch::run, this);
 }
@@ -49,6 +52,17 @@ const UnknownSnapshot* UnknownSpaceWatch::newest() {
 std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::share() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return shared_;
+}
+
+std::string UnknownSpaceWatch::place(const UnknownSnapshot& unknown, const std::string& fixed_frame,
+                                     const ros::Time& time, double max_age,
+                                     Eigen::Isometry3d* X_FM) const {
+  std::string problem;
+  // An exception in every cycle would cost more than is_known().
+  problem = is_known(buffer_, fixed_frame, unknown.frame, time, &problem)
+                ? look_up(buffer_, fixed_frame, unknown.frame, time, X_FM)
+                : look_up_newest(buffer_, fixed_frame, unknown.frame, time, max_age, X_FM);
+  return problem.empty() ? "" : "all space counts as unknown (memory/frame_id): " + problem;
 }
 
 void UnknownSpaceWatch::run() {
@@ -83,8 +97,7 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
     any = true;
     for (const Eigen::AlignedBox3d& link : known.links) robot.extend(link);
     all.links.insert(all.links.end(), known.links.begin(), known.links.end());
-    snapshot->cloud.X_FM = known.X_FM;
-    snapshot->cloud.stamp = std::max(snapshot->cloud.stamp, known.stamp);
+    snapshot->stamp = std::max(snapshot->stamp, known.stamp);
     all.frame = known.frame;
   }
   if (!any || robot.isEmpty()) return nullptr;
@@ -95,9 +108,10 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::look() {
   }
   auto index = std::make_shared<BoxIndex>();
   index->build(boxes);
-  snapshot->cloud.boxes = index;
-  snapshot->cloud.region.center_F = snapshot->cloud.X_FM * robot.center();
-  snapshot->cloud.region.radius = radius;
+  snapshot->frame = all.frame;
+  snapshot->boxes = index;
+  snapshot->center_M = robot.center();
+  snapshot->radius = radius;
   publish_when_due(boxes, all);
   return snapshot;
 }

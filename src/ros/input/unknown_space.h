@@ -1,7 +1,9 @@
 #pragma once
 
 #include <ros/publisher.h>
+#include <ros/time.h>
 
+#include <Eigen/Geometry>
 #include <chrono>
 #include <memory>
 #include <mutex>
@@ -19,7 +21,11 @@ namespace ist {
 
 /// The space about the robot that no memory knows, at one instant. Immutable.
 struct UnknownSnapshot {
-  CloudSnapshot cloud;  ///< boxes of unknown space, and the region about the robot that they fill
+  std::string frame;                                   ///< tf's name of the memories' frame M
+  std::shared_ptr<const BoxIndex> boxes;               ///< of unknown space, in M
+  Eigen::Vector3d center_M = Eigen::Vector3d::Zero();  ///< [m] they fill a sphere about the robot
+  double radius = 0.0;                                 ///< [m] of that sphere
+  double stamp = 0.0;                                  ///< [s] of the newest cloud in it
   SeenSpace seen;
 };
 
@@ -31,8 +37,9 @@ class UnknownSpaceWatch {
   /// @param range     [m] farther from the robot nothing is asked
   /// @param publisher  of a MarkerArray that shows the boxes, while somebody listens
   /// @param drawn_range  [m] farther from the robot no boxes are drawn
+  /// @param buffer  outlives this
   UnknownSpaceWatch(SourceMemories memories, double range, const ros::Publisher& publisher,
-                    double drawn_range);
+                    double drawn_range, const TransformBuffer& buffer);
   ~UnknownSpaceWatch();
   UnknownSpaceWatch(const UnknownSpaceWatch&) = delete;
   UnknownSpaceWatch& operator=(const UnknownSpaceWatch&) = delete;
@@ -42,6 +49,13 @@ class UnknownSpaceWatch {
   const UnknownSnapshot* newest();
   /// The same for any other thread; valid as long as it is held.
   std::shared_ptr<const UnknownSnapshot> share() const;
+
+  /// Looks up where the memories' frame is at an instant, or else at the newest one. Thread safe.
+  /// @param max_age  [s] allowed age of that instant
+  /// @param X_FM     set on success
+  /// @returns empty on success, else a sentence
+  std::string place(const UnknownSnapshot& unknown, const std::string& fixed_frame,
+                    const ros::Time& time, double max_age, Eigen::Isometry3d* X_FM) const;
 
   /// [m] Space nearer to a link than this may be the robot's own, and counts as known.
   double skin() const { return skin_; }
@@ -55,6 +69,7 @@ class UnknownSpaceWatch {
   const double range_;
   const ros::Publisher publisher_;
   const double drawn_range_;
+  const TransformBuffer& buffer_;
   std::chrono::steady_clock::time_point next_publication_;  ///< used by the thread alone
   double skin_ = 0.0;
   SnapshotChannel<std::shared_ptr<const UnknownSnapshot>> channel_;

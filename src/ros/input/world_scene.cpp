@@ -106,26 +106,34 @@ void WorldSource::use_scene(const std::function<PlanningScene()>& read) {
 }
 
 void WorldSource::apply_scene(const PlanningScene& scene) {
-  unmeasured_.apply(scene);
-  std::vector<std::string> doubts = unmeasured_.sentences();
-  doubts.insert(doubts.end(), scene.notes.begin(), scene.notes.end());
-  const std::string doubt = join(doubts, "; ");
-  if (!doubt.empty()) ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': " << doubt);
-  state_.update([&](SourceReport* report) { report->doubt = doubt; });
   if (!scene.fault.empty()) return note_fault(fault_of(Kind::kMessage), scene.fault);
   if (scene.is_diff) {
+    attach_all(scene);
     change_all(scene);
   } else {
     replace_from_topic([&] {
       remove_from_scene("");
+      attach_all(scene);
       change_all(scene);
     });
-    if (faults_.count(fault_of(Kind::kMessage)) > 0) return;
+  }
+  show_doubts(scene.notes);
+  if (faults_.count(fault_of(Kind::kMessage)) > 0 && !scene.is_diff) return;
+  if (!scene.is_diff) {
     has_full_scene_ = true;
     faults_.erase(fault_of(Kind::kScene));
   }
   use_octomap(scene);
   allow_collisions(scene);
+}
+
+/// Says what of the scene is not measured, or not used.
+void WorldSource::show_doubts(std::vector<std::string> doubts) {
+  const std::string unmeasured = attached_.sentence();
+  if (!unmeasured.empty()) doubts.insert(doubts.begin(), unmeasured);
+  const std::string doubt = join(doubts, "; ");
+  if (!doubt.empty()) ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': " << doubt);
+  state_.update([&](SourceReport* report) { report->doubt = doubt; });
 }
 
 /// Takes the octomap of a scene in place of the one before. One that cannot be used is told, and
@@ -285,6 +293,7 @@ void WorldSource::move(const SceneObject& object) {
   }
   const std::string fault = builder_.move(object.id, frame_of(object.frame), X_BO);
   if (!fault.empty()) throw ModelError(fault);
+  to_restate_.erase(object.id);
   faults_.erase(object_fault(object.id));
 }
 
@@ -295,10 +304,7 @@ void WorldSource::remove_from_scene(const std::string& name) {
       name.empty() ? std::exchange(from_topic_, {}) : std::set<std::string>{name};
   for (const std::string& one : names) {
     faults_.erase({Kind::kClash, one});
-    if (configured_.count(one) > 0) continue;  // it is not the scene's
-    builder_.remove(one);
-    from_topic_.erase(one);
-    faults_.erase(object_fault(one));
+    if (configured_.count(one) == 0) remove_object(one);  // else it is not the scene's
   }
   if (!name.empty()) return;
   faults_.erase(fault_of(Kind::kMany));
@@ -311,13 +317,19 @@ void WorldSource::allow_collisions(const PlanningScene& scene) {
   if (!config_.world.use_allowed_collisions) return;
   if (!scene.is_diff || scene.has_matrix) allowed_ = scene.allowed;
   std::size_t pairs = 0;
-  for (const std::string& name : from_topic_) {
-    std::vector<std::string> links = configured_contacts(name);
-    const std::vector<std::string> more = allowed_.allowed_with(
-        name, [this](const std::string& other) { return builder_.contains(other); });
+  const auto allow = [&](const std::string& id, const std::string& name,
+                         std::vector<std::string> links) {
+    const std::vector<std::string> more =
+        allowed_.allowed_with(id, [this](const std::string& other) {
+          return builder_.contains(other) || attached_.contains(other);
+        });
     pairs += more.size();
     if (pairs <= kMaxAllowedPairs) links.insert(links.end(), more.begin(), more.end());
     builder_.set_allowed_links(name, std::move(links));
+  };
+  for (const std::string& name : from_topic_) allow(name, name, configured_contacts(name));
+  for (const std::string& id : attached_.names()) {
+    allow(id, AttachedObjects::name_in_world(id), links_of_attached(id));
   }
   is_changed_ = true;
   if (pairs <= kMaxAllowedPairs) return;

@@ -46,7 +46,7 @@ WorldSource::WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::No
       state_(config, place_of(config, nh)),
       builder_(config.world.limits),
       has_full_scene_(config.world.starts_empty),
-      unmeasured_(config.world.limits.max_objects),
+      attached_(config.world.limits.max_objects),
       topic_advice_(nh.resolveName(config.topic), message_type(config), "") {
   if (!config.world.robot.description.empty()) {
     robot_ = std::make_unique<OtherRobot>(config.world.robot, config.world.frame_id, nh);
@@ -159,6 +159,7 @@ void WorldSource::run() {
       if (!is_robot_read_) read_robot();
       count_publishers();
       take_target();
+      restate_waiting();
       if (is_changed_ && target_.model) publish();
       free_unused();
       if (faults_.erase(fault_of(Kind::kWork)) > 0) show_faults();
@@ -277,9 +278,12 @@ void WorldSource::apply(const ist_proximity::WorldObjects& message) {
 void WorldSource::replace_from_topic(const std::function<void()>& change) {
   WorldBuilder builder = builder_;
   std::set<std::string> from_topic = from_topic_;
+  AttachedObjects attached = attached_;
+  std::map<std::string, std::string> to_restate = to_restate_;
   WorldFaults faults = faults_;
   for (const std::string& name : from_topic_) {
     builder_.remove(name);
+    to_restate_.erase(name);
     faults_.erase(object_fault(name));
   }
   from_topic_.clear();
@@ -292,6 +296,8 @@ void WorldSource::replace_from_topic(const std::function<void()>& change) {
   faults[fault_of(Kind::kMessage)] = refused->second;
   builder_ = std::move(builder);
   from_topic_ = std::move(from_topic);
+  attached_ = std::move(attached);
+  to_restate_ = std::move(to_restate);
   faults_ = std::move(faults);
   show_faults();
 }
@@ -378,6 +384,7 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
     }
     complete.push_back(object);
     complete.back().frame = frame_or_fixed(object.frame);
+    to_restate_.erase(object.name);
     faults_.erase(object_fault(object.name));
     const std::vector<std::string> links = configured_contacts(object.name);
     std::vector<std::string>& allowed = complete.back().allowed_links;

@@ -12,7 +12,9 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -77,6 +79,7 @@ class WorldSource : public ObstacleSource {
   bool is_other_publisher(const ros::MessageEvent<const topic_tools::ShapeShifter>& event);
   void use_scene(const std::function<PlanningScene()>& read);
   void apply_scene(const PlanningScene& scene);
+  void show_doubts(std::vector<std::string> doubts);
   void note_publishers(std::uint32_t publishers);
   void lose_scene();
   void ask_for_scene();
@@ -88,6 +91,15 @@ class WorldSource : public ObstacleSource {
   void remove_from_scene(const std::string& name);
   void allow_collisions(const PlanningScene& scene);
   void use_octomap(const PlanningScene& scene);
+  void attach_all(const PlanningScene& scene);
+  void attach(const SceneAttachment& attachment);
+  void detach(const SceneAttachment& attachment);
+  WorldObject describe_attached(const SceneAttachment& attachment,
+                                const std::optional<WorldObject>& in_world) const;
+  std::vector<std::string> links_of_attached(const std::string& id) const;
+  void remove_object(const std::string& name);
+  void restate(const std::string& name, const std::string& frame);
+  void restate_waiting();
   void remember_from_topic(const std::string& name);
   std::string frame_of(const std::string& stated) const;
   void count_publishers();
@@ -127,7 +139,9 @@ class WorldSource : public ObstacleSource {
   std::set<std::string> configured_;  ///< names of parameters, the file and the other robot
   AllowedCollisions allowed_;         ///< of planning scenes
   bool has_full_scene_ = false;       ///< whether differences have something that they change
-  UnmeasuredParts unmeasured_;        ///< of planning scenes
+  AttachedObjects attached_;          ///< of planning scenes
+  /// Objects by name, and the frames that they are to stand in as soon as tf knows where.
+  std::map<std::string, std::string> to_restate_;
   std::shared_ptr<const BoxIndex> octomap_;  ///< of planning scenes; null: none
   std::string octomap_frame_;
   /// Worlds that queries may still have: a large one takes milliseconds to free.

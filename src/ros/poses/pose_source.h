@@ -51,6 +51,9 @@ class PoseSource {
   virtual void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                            BodyPoses* bodies) = 0;
 
+  /// Whether the poses are of a configuration that the robot need not be in.
+  virtual bool is_stated() const { return false; }
+
   /// Names a likely cause for the user whose links have no pose.
   virtual std::string hint() const = 0;
 };

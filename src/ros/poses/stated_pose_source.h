@@ -43,6 +43,7 @@ class StatedPoseSource : public PoseSource {
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
                    BodyPoses* bodies) override;
+  bool is_stated() const override { return true; }
   std::string hint() const override;
 
  private:

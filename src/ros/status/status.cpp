@@ -141,7 +141,8 @@ bool clouds_usable(const StatusInput& input) {
 
 bool StatusInput::is_fine() const {
   return model_problem.empty() && link_errors.empty() && pose_problems.empty() &&
-         pose_doubts.empty() && !deadline.any() && !outside_region &&
+         pose_doubts.empty() && unknown_space_problem.empty() && !deadline.any() &&
+         !outside_region &&
          std::all_of(source_statuses.begin(), source_statuses.end(),
                      [](const Status& status) { return status.ok(); });
 }
@@ -162,6 +163,9 @@ Status overall_status(const StatusInput& input, double now) {
                   "there are not known; state the true limits in the URDF");
   }
   sentences.add(ProximityArray::DEGRADED, input.pose_doubts);
+  if (!input.unknown_space_problem.empty()) {
+    sentences.add(ProximityArray::DEGRADED, input.unknown_space_problem);
+  }
   if (sentences.empty()) return {ProximityArray::OK, ""};
   Status status = sentences.status();
   if (!input.clock_runs) {

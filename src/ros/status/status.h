@@ -43,6 +43,7 @@ struct StatusInput {
   std::vector<Status> source_statuses;     ///< by source
   std::vector<std::string> pose_problems;  ///< one sentence each
   std::vector<std::string> pose_doubts;    ///< poses that are known, and hardly true
+  std::string unknown_space_problem;       ///< why nothing of space is known; empty: it is
   DeadlineCost deadline;
   bool outside_region = false;  ///< a link is farther out than the joint limits allow
   bool clock_runs = true;       ///< false: simulated time, and nothing on /clock yet
@@ -57,8 +58,8 @@ bool clouds_usable(const StatusInput& input);
 
 /// Decides the status of a ProximityArray. The first that applies: a model or link error; a
 /// required source without any message; a stale required source; a missing pose; a required source
-/// whose messages cannot be used; a passed deadline; OK. The text begins with the deciding sentence
-/// and continues with the others.
+/// whose messages cannot be used; a passed deadline and other doubts; OK. The text begins with the
+/// deciding sentence and continues with the others.
 /// @param now  [s] ROS clock
 Status overall_status(const StatusInput& input, double now);
 
