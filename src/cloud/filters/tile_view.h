@@ -30,7 +30,10 @@ class TileView {
   };
 
   /// Prepares for robots of so many links.
-  void reserve(std::size_t links) { bundles_.reserve(links); }
+  void reserve(std::size_t links) {
+    others_.reserve(links);
+    bundles_.reserve(links);
+  }
 
   /// Reads a tile's points.
   /// @param row, column  of its first pixel
@@ -39,7 +42,9 @@ class TileView {
   /// Begins to look at links.
   /// @param behind  [m] surfaces that are farther behind a point than this are not seen
   void begin(double behind);
-  /// @param X_LS  sensor frame -> link frame
+  /// Adds a link. The one that most of the points are likely to be of should come first: it saves
+  /// the search of links that are farther from the points. The sights do not depend on the order.
+  /// @param X_LS  sensor frame -> link frame; viewed until the next begin()
   void add_link(const SelfFilter::Link& link, const Eigen::Isometry3d& X_LS);
 
   /// Casts the rays of some pixels, each once. @param pixels  bits of pixels that are kept
@@ -56,11 +61,19 @@ class TileView {
   double farthest() const { return farthest_; }                                    ///< [m] range
 
  private:
+  struct Other {
+    const SelfFilter::Link* link;
+    const Eigen::Isometry3d* X_LS;
+  };
   struct Bundle {
     const SelfFilter::Link* link;
     Eigen::Matrix3d R_LS;
     RayBundle rays;
   };
+
+  bool may_be_nearer(const Other& other, std::uint32_t rays) const;
+  void open(const Other& other);
+  void cast(const Bundle& bundle, std::uint32_t rays);
 
   std::uint32_t kept_ = 0;
   std::array<Eigen::Vector3d, kPixels> p_S_, direction_;
@@ -68,6 +81,7 @@ class TileView {
   std::array<Sight, kPixels> sights_;
   std::uint32_t looked_ = 0;              // bits of the pixels whose sights are known
   double behind_ = 0.0, farthest_ = 0.0;  // [m]
+  std::vector<Other> others_;             // links whose bundles have not been needed so far
   std::vector<Bundle> bundles_;           // of links that a ray of the tile may meet
 };
 

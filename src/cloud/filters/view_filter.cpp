@@ -291,8 +291,11 @@ void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kep
   view_.read(*cloud_, row, column, kept);
   if ((kept & 3U) == 3U) pixel_ = view_.direction(0).cross(view_.direction(1)).norm();
   view_.begin(padding_ + kCertain * config_.noise.sigma(view_.farthest()));
+  const std::vector<const SelfFilter::Link*>& near_links = filter.near_links();
+  const SelfFilter::Link* const likely = near_links.empty() ? nullptr : near_links.back();
+  if (likely != nullptr) view_.add_link(*likely, links_[likely->number].X_LS);
   for (const SelfFilter::Link* link : filter.group()) {
-    view_.add_link(*link, links_[link->number].X_LS);
+    if (link != likely) view_.add_link(*link, links_[link->number].X_LS);
   }
   Tile tile;
   tile.kept = static_cast<std::uint16_t>(kept);
