@@ -29,7 +29,7 @@ class ObstacleContact {
 
  private:
   using Entry = ContactFrontier::Entry;
-  /// What parts of a leaf of a map share with the link, at most.
+  /// An upper bound of what parts of a leaf of a map share with the link.
   struct CellBound {
     Eigen::AlignedBox3d reach;  ///< holds all of every cell that counts
     double density;             ///< see greatest_density()

@@ -9,7 +9,7 @@
 namespace ist {
 namespace {
 
-// Of all lengths involved: bounds in float are too large by less.
+// Bounds in float are too large by less than this share of all lengths involved.
 constexpr double kFloatRounding = 4e-6;
 // A triangle may be nearer than the one that is found by this share of the distance. Neighbours
 // of the closest triangle have the same closest point, to rounding.

@@ -24,8 +24,8 @@ struct OpenEdgeBlock {
   float sum_length;                                     ///< [m] of all edges, times count
 };
 
-/// What the open edges say of the winding number about a place: sums over all of them, as in the
-/// law of Biot and Savart.
+/// Sums over the open edges say how the winding number changes about a place, as in the law of Biot
+/// and Savart.
 struct OpenEdgeSums {
   double field[3] = {};      ///< [1/m] the winding number's gradient, times 4 pi
   double field_error = 0.0;  ///< [1/m] by how much the field may be wrong
