@@ -1,6 +1,7 @@
 // The cost of a cycle of the node by its parts, in one process and without a ROS master: the link
-// poses are given, the clouds are ingested as the node does it, and everything is on that is on by
-// default. Printed as a Markdown table; run it on an idle machine.
+// poses are given, the clouds are ingested as the node does it, the first answer with each is made
+// beside the cycles, and everything is on that is on by default. Printed as a Markdown table; run
+// it on an idle machine.
 //
 // Needs the test data for the Panda: IST_PROXIMITY_DATA, or ../shared/data.
 // Usage: cycle CACHE_FOLDER [--quick] [DOCUMENT]
@@ -101,6 +102,7 @@ class CycleBenchmark {
     auto source = std::make_unique<test::StatedSource>("camera");
     source_ = source.get();
     sources_.push_back(std::move(source));
+    cycle_->set_warm_up(&warm_up_);
     live_.query.deadline = 0.0;
     live_.contacts = contacts_of(trial, cache);
   }
@@ -115,6 +117,7 @@ class CycleBenchmark {
         const Frame& frame = trial_.frames[k / kCyclesPerCloud % trial_.frames.size()];
         solids = posed_solids(*trial_.robot, X_FL, known);
         ingest.run(frame.raw(), frame.X_FS, solids, now_.toSec(), source_->cloud(now_));
+        warm_up_.run(*source_, *source_->newest(trial_.robot, now_, 0.0));
       }
       now_ += ros::Duration(0.001);
       poses_->set(X_FL);
@@ -152,6 +155,7 @@ class CycleBenchmark {
   test::StatedPoses* poses_ = nullptr;
   test::StatedSource* source_ = nullptr;
   CloudSources sources_;
+  SceneWarmUp warm_up_{sources_};
   std::unique_ptr<ProximityCycle> cycle_;
   LiveConfig live_;
   MessagePool<ist_proximity::ProximityArray> messages_;

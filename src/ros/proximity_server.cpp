@@ -21,6 +21,7 @@
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/cycle/proximity_cycle.h"
+#include "ros/cycle/scene_warm_up.h"
 #include "ros/input/cloud_source.h"
 #include "ros/input/map_message.h"
 #include "ros/input/measurement.h"
@@ -57,6 +58,10 @@ using Clock = std::chrono::steady_clock;
 // A cycle runs at least this often with pose_source joint_states.
 constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
 constexpr double kLongestPeriod = 0.1;  // [s] the same
+
+// [s] Where a cycle is rarer than this, the first answer with a new cloud has all the time it
+// needs.
+constexpr double kLongestWarmPeriod = 0.01;
 
 // Whether the robot's root stands still is asked this often where the URDF does not say it.
 constexpr std::chrono::seconds kRootPeriod(1);
@@ -105,6 +110,7 @@ class ProximityServer::Impl {
   TransformBuffer buffer_;
   TransformListener listener_;
   SourceMemories memories_;
+  SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
   CloudSources sources_;
   std::unique_ptr<MemoryService> memory_service_;
   std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
@@ -193,6 +199,7 @@ ProximityServer::Impl::~Impl() {
   diagnostics_signal_.stop();
   cycle_thread_.join();
   diagnostics_thread_.join();
+  warm_up_.end();
   query_service_.reset();
   self_proximity_.reset();
   link_pairs_.reset();
@@ -210,7 +217,11 @@ void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Pu
                                             config_.unknown_space != UnknownSpace::kFree, map);
     memories_.push_back(memory);
   }
-  sources_.push_back(std::make_unique<CloudSource>(config, nh_, buffer_, filtered, memory));
+  sources_.push_back(std::make_unique<CloudSource>(
+      config, nh_, buffer_, filtered, memory,
+      [this](const ObstacleSource& source, const SourceSnapshot& fresh) {
+        return warm_up_.run(source, fresh);
+      }));
   if (!memory) return;
   const ObstacleSource& parent = *sources_.back();
   sources_.push_back(std::make_unique<MemorySource>(parent, memory, map.getTopic()));
@@ -275,7 +286,10 @@ void ProximityServer::Impl::run_cycle() {
   LiveConfig live = live_config();
   live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
-  if (cycle_) cycle_->run(now, sources_, live, transform_problem, message.get());
+  if (cycle_) {
+    cycle_->set_warms_up(period() <= kLongestWarmPeriod);
+    cycle_->run(now, sources_, live, transform_problem, message.get());
+  }
   {
     const std::lock_guard<std::mutex> lock(report_mutex_);
     report_.transform_problem = transform_problem;
@@ -334,7 +348,9 @@ void ProximityServer::Impl::take_model() {
                          JointPoseSource::Which::kTaken),
         CloudSelection::Reader::kOnly, unknown_space_.get());
     cycle_->continue_from(last_stamp_);
+    cycle_->set_warm_up(&warm_up_);
   } else {
+    warm_up_.begin(nullptr);
     cycle_.reset();
   }
   if (joint_states_) {

@@ -27,7 +27,7 @@ TEST(CycleDeadline, IsAShareOfThePeriodByDefault) {
   const ServerConfig config = parse_parameters(XmlRpc::XmlRpcValue(), &warnings);
   EXPECT_EQ(config.query.deadline, kDefaultDeadline);
   EXPECT_EQ(LiveConfig().query.deadline, kDefaultDeadline);
-  EXPECT_DOUBLE_EQ(deadline_of(config.query.deadline, 0.01), 0.005);
+  EXPECT_DOUBLE_EQ(deadline_of(config.query.deadline, 0.01), 0.0075);
   EXPECT_DOUBLE_EQ(deadline_of(-1.0, 0.01), 0.01);
   EXPECT_DOUBLE_EQ(deadline_of(0.002, 0.01), 0.002);
   EXPECT_EQ(deadline_of(0.0, 0.01), 0.0);

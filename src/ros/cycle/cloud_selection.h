@@ -52,6 +52,8 @@ class CloudSelection {
   const std::vector<const SourceSnapshot*>& selected() const { return selected_; }
   /// The stamp of the oldest selected cloud, map files aside; zero when there is none.
   ros::Time oldest_stamp() const { return oldest_stamp_; }
+  /// By cloud: the number of its source.
+  const std::vector<int>& cloud_sources() const { return cloud_sources_; }
   /// The selected cloud that holds the nearest point of an answer.
   ClosingSpeed::Nearest nearest(const LinkProximity& answer) const;
   /// The number of that cloud's source; -1: no point is near.
@@ -70,7 +72,7 @@ class CloudSelection {
   std::vector<const SourceSnapshot*> selected_;
   std::vector<std::shared_ptr<const SourceSnapshot>> held_;  ///< used with Reader::kOther
   std::vector<const CloudSnapshot*> clouds_;
-  std::vector<int> cloud_sources_;        ///< by cloud: the number of its source
+  std::vector<int> cloud_sources_;
   std::vector<bool> cloud_stands_still_;  ///< by cloud: its source never goes stale
   std::vector<const PosedWorld*> worlds_;
   std::vector<int> world_sources_;  ///< by world: the number of its source

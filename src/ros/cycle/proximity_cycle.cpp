@@ -37,13 +37,12 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       self_counts_(config.self_collision.enabled && config.self_collision.in_minimum),
       selection_(reader),
       worlds_(config),
-      query_(model_->robot, config.query),
+      queries_(std::make_unique<CoherentQueries>(model_->robot, config.query)),
       unknown_space_(watch == nullptr
                          ? nullptr
                          : std::make_unique<UnknownSpaceQuery>(
                                model_->robot, watch, reader == CloudSelection::Reader::kOnly)),
       unknown_is_obstacle_(config.unknown_space == UnknownSpace::kObstacle),
-      repulsion_(model_->robot),
       filters_(robot_.links.size()),
       speeds_(robot_.links.size()),
       joint_repulsion_(*model_),
@@ -53,7 +52,6 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
   status_input_.model_problem = model_->problem;
-  for (std::size_t i = 0; i < robot_.links.size(); ++i) blends_.emplace_back(i);
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
     if (!link.usable()) status_input_.link_errors.push_back(link.error);
@@ -71,10 +69,12 @@ void ProximityCycle::run(const ros::Time& now, const CloudSources& sources,
   const TimePoint begin = Stopwatch::Clock::now();
   status_input_.deadline = DeadlineCost();
   selection_.update(now, sources, model_->robot, poses_.stamp, pose_timeout_, &status_input_);
+  take_warm_queries();
   describe_pose_problems(transform_problem);
   const double preparation = watch.lap();
 
   run_query(config, begin);
+  note_asked(config);
   ask_unknown_space(config);
   message->query_time = watch.lap();
   find_urgent_links();
@@ -101,10 +101,40 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
   report->links_known = poses_.count_known();
   report->pose_age = seconds_between(poses_.stamp, now_);
   report->deadline = deadline_;
-  report->query_memory = query_.memory();
+  // The spare queries of a warm-up take as much.
+  report->query_memory = queries_->query().memory() * (warm_up_ == nullptr ? 1 : 2);
   report->add_times(message);
   if (status_input_.deadline.any()) ++report->deadlines_missed;
   report->worst_deadline.add(status_input_.deadline);
+}
+
+void ProximityCycle::set_warm_up(SceneWarmUp* warm_up) {
+  warm_up_ = warm_up;
+  warm_up_->begin(std::make_unique<CoherentQueries>(packed_, queries_->query().config(),
+                                                    queries_->repulsion()));
+}
+
+/// Goes on from the first answer that another thread made with the clouds that are new.
+void ProximityCycle::take_warm_queries() {
+  if (warm_up_ == nullptr) return;
+  const std::uint64_t obstacles = obstacles_key(selection_.clouds());
+  if (std::exchange(last_obstacles_, obstacles) == obstacles) return;
+  const Repulsion repulsion = queries_->repulsion();
+  if (!warm_up_->exchange(obstacles, &queries_)) return;
+  if (queries_->model() != packed_) queries_->set_model(packed_, repulsion);
+}
+
+void ProximityCycle::note_asked(const LiveConfig& config) {
+  if (warm_up_ == nullptr) return;
+  asked_.model = model_->robot;
+  asked_.sources = warms_up_ ? selection_.cloud_sources() : std::vector<int>();
+  asked_.stamp = poses_.stamp;
+  asked_.pose_timeout = pose_timeout_;
+  asked_.X_FL = poses_.X_FL;
+  asked_.known = known_;
+  asked_.query = config.query;
+  asked_.repulsion = config.repulsion;
+  warm_up_->note(asked_);
 }
 
 void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
@@ -123,9 +153,10 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
         end_of(query.deadline, kQueryShare, begin) - Stopwatch::Clock::now();
     query.deadline = std::max(left.count(), kLeastDeadline);
   }
-  query_.set_config(query);
-  query_.run(poses_.X_FL, known_, selection_.clouds(), &results_);
-  const QueryStatistics& statistics = query_.statistics();
+  ProximityQuery& clouds = queries_->query();
+  clouds.set_config(query);
+  clouds.run(poses_.X_FL, known_, selection_.clouds(), &results_);
+  const QueryStatistics& statistics = clouds.statistics();
   status_input_.outside_region = statistics.outside_region > 0;
   status_input_.deadline.unfinished += statistics.unfinished;
   status_input_.deadline.widest = std::max(status_input_.deadline.widest, statistics.widest);
@@ -188,7 +219,7 @@ RepulsiveWrench ProximityCycle::push_of_clouds(std::size_t link, const LinkProxi
                                                std::uint64_t* key) {
   const Eigen::Isometry3d& X_FL = poses_.X_FL[link];
   RepulsiveWrench raw =
-      blends_[link].update(repulsion_, X_FL, selection_.clouds(), result, config.repulsion, end);
+      queries_->repel(link, X_FL, selection_.clouds(), result, config.repulsion, end);
   if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
     raw = nearest_repulsion(X_FL, result, config.repulsion);
     *key = ~*key;  // the filter spreads the change as if the obstacles were others
@@ -276,7 +307,7 @@ void ProximityCycle::note_usage(const LiveConfig& config) {
   for (const std::size_t i : model_->monitored) {
     const bool is_near = results_[i].state >= LinkState::kNear &&
                          results_[i].lower_bound < config.repulsion.influence_distance;
-    model_->usage->note_query(i, query_.link_statistics()[i], is_near);
+    model_->usage->note_query(i, queries_->query().link_statistics()[i], is_near);
   }
 }
 
@@ -284,19 +315,17 @@ void ProximityCycle::refine(const std::shared_ptr<const ModelState>& model) {
   for (std::size_t i = 0; i < filters_.size(); ++i) {
     if (model->robot->links[i].packing_id != packed_->links[i].packing_id) {
       filters_[i].expect_jump();
-      blends_[i] = KeptRepulsion(i);
     }
   }
   packed_ = model->robot;
-  query_.set_model(packed_);
+  queries_->set_model(packed_, model->repulsion ? *model->repulsion : Repulsion(packed_));
   if (unknown_space_) unknown_space_->set_model(packed_);
-  repulsion_ = model->repulsion ? *model->repulsion : Repulsion(packed_);
 }
 
 void ProximityCycle::forget() {
   speeds_.assign(speeds_.size(), ClosingSpeed());
   filters_.assign(filters_.size(), RepulsionFilter());
-  for (KeptRepulsion& blend : blends_) blend.forget();
+  queries_->forget_repulsion();
   poses_.stamp = ros::Time();
 }
 

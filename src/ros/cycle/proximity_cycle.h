@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "internal/proximity/carried_worlds.h"
+#include "internal/repulsion/coherent_queries.h"
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "ist_proximity/repulsion/kept_repulsion.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
+#include "ros/cycle/scene_warm_up.h"
 #include "ros/cycle/unknown_space_query.h"
 #include "ros/cycle/world_answers.h"
 #include "ros/input/obstacle_source.h"
@@ -29,7 +30,7 @@
 namespace ist {
 
 /// The shares of a cycle's deadline at which distances and repulsion have to be there.
-constexpr double kQueryShare = 0.6, kRepulsionShare = 0.8;
+constexpr double kQueryShare = 0.7, kRepulsionShare = 0.9;
 
 /// Turns link poses and clouds into one ProximityArray per cycle, for one robot model. It uses the
 /// newest data and never waits. One thread.
@@ -46,10 +47,9 @@ class ProximityCycle {
   /// @param message  overwritten; its memory is kept, so that a message that was used by a cycle
   ///                 before costs no allocation
   /// @param config   query.deadline is in seconds here, from known poses on: distances take
-  /// kQueryShare
-  ///                 of it at most, repulsion ends at kRepulsionShare, and contact volumes at the
-  ///                 deadline. Repulsion that is late is that of the link's nearest point, volumes
-  ///                 that are late are NaN, and the status says so
+  ///                 kQueryShare of it at most, repulsion ends at kRepulsionShare, and contact
+  ///                 volumes at the deadline. Repulsion that is late is that of the link's nearest
+  ///                 point, volumes that are late are NaN, and the status says so
   /// @param transform_problem  what tf's listener has to say; empty: nothing
   void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
            const std::string& transform_problem, ist_proximity::ProximityArray* message);
@@ -69,6 +69,12 @@ class ProximityCycle {
 
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
+
+  /// From now on, the first answers with new clouds are made by the threads of their sources.
+  /// @param warm_up  outlives this; that of no other cycle
+  void set_warm_up(SceneWarmUp* warm_up);
+  /// Whether it is worth it: where cycles are rare, it is not.
+  void set_warms_up(bool warms_up) { warms_up_ = warms_up; }
 
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }
@@ -99,6 +105,8 @@ class ProximityCycle {
   void note_usage(const LiveConfig& config);
   void look_up_poses(const ros::Time& now);
   void describe_pose_problems(const std::string& transform_problem);
+  void take_warm_queries();
+  void note_asked(const LiveConfig& config);
   void run_query(const LiveConfig& config, TimePoint begin);
   void place_carried_objects();
   void ask_unknown_space(const LiveConfig& config);
@@ -121,11 +129,13 @@ class ProximityCycle {
   CloudSelection selection_;
   WorldAnswers worlds_;
   CarriedWorlds carried_;
-  ProximityQuery query_;
+  std::unique_ptr<CoherentQueries> queries_;
+  SceneWarmUp* warm_up_ = nullptr;  ///< null: no other thread helps
+  bool warms_up_ = true;
+  std::uint64_t last_obstacles_ = 0;  ///< key of the clouds of the last cycle
+  AskedScene asked_;
   std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
   const bool unknown_is_obstacle_;
-  Repulsion repulsion_;
-  std::vector<KeptRepulsion> blends_;     ///< by link of the robot
   std::vector<RepulsionFilter> filters_;  ///< by link of the robot
   std::vector<ClosingSpeed> speeds_;      ///< by link of the robot
   JointRepulsion joint_repulsion_;

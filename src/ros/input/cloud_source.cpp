@@ -40,12 +40,13 @@ std::string clock_difference(const Measurement& measurement) {
 
 CloudSource::CloudSource(const SourceConfig& config, ros::NodeHandle nh,
                          const TransformBuffer& buffer, const ros::Publisher& filtered,
-                         std::shared_ptr<SourceMemory> memory)
+                         std::shared_ptr<SourceMemory> memory, WarmUp warm_up)
     : config_(config),
       is_map_(config.type == SourceType::kMap),
       buffer_(buffer),
       filtered_(filtered),
       memory_(std::move(memory)),
+      warm_up_(std::move(warm_up)),
       state_(config, config.file.empty() ? nh.resolveName(config.topic) : config.file),
       placer_(config, buffer),
       ingest_(ingest_config(config)),
@@ -340,8 +341,19 @@ std::string CloudSource::ingest(const Measurement& measurement) {
     publish_message(filtered_, to_message(snapshot.cloud, snapshot.stamp, target_.fixed_frame));
     state_.update([](SourceReport* report) { ++report->shown; });
   }
+  if (!is_map_) warm_up(snapshot);  // a map is placed when a query asks for it
   exchange_.publish();
   return "";
+}
+
+/// A warm-up that fails makes the next answer slower, and no cloud is lost for it.
+void CloudSource::warm_up(const SourceSnapshot& snapshot) {
+  double took = 0.0;
+  const std::string fault = exception_of([&] { took = warm_up_(*this, snapshot); });
+  if (!fault.empty()) {
+    ROS_WARN_STREAM_THROTTLE(60.0, "source '" << config_.name << "': warm-up failed: " << fault);
+  }
+  state_.update([took](SourceReport* report) { report->warm_up_time = took; });
 }
 
 /// Notes what a self-filter by view found, and warns where it could not do its work.

@@ -44,12 +44,16 @@ namespace ist {
 /// because it may never be sent again. A map file is read once, in this thread.
 class CloudSource : public ObstacleSource {
  public:
+  /// @returns [s] what it took
+  using WarmUp = std::function<double(const ObstacleSource& source, const SourceSnapshot& fresh)>;
+
   /// @param nh        in the namespace that the topic is relative to
   /// @param buffer    outlives this
   /// @param filtered  publisher of what queries see, used while it has subscribers
   /// @param memory    what the source remembers; null: nothing
+  /// @param warm_up   called by the source's thread with each cloud before queries get it
   CloudSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
-              const ros::Publisher& filtered, std::shared_ptr<SourceMemory> memory);
+              const ros::Publisher& filtered, std::shared_ptr<SourceMemory> memory, WarmUp warm_up);
   ~CloudSource() override;
   CloudSource(const CloudSource&) = delete;
   CloudSource& operator=(const CloudSource&) = delete;
@@ -81,6 +85,7 @@ class CloudSource : public ObstacleSource {
   std::string ingest(const Measurement& measurement);
   void complete(const Measurement& measurement, const Placement& placement,
                 SourceSnapshot* snapshot) const;
+  void warm_up(const SourceSnapshot& snapshot);
   void note_view(const Placement& placement, const ViewReport& view);
   void count_publishers();
 
@@ -89,6 +94,7 @@ class CloudSource : public ObstacleSource {
   const TransformBuffer& buffer_;
   ros::Publisher filtered_;
   const std::shared_ptr<SourceMemory> memory_;  ///< null: nothing is remembered
+  const WarmUp warm_up_;
   ros::CallbackQueue queue_;
   Subscription subscription_;
   SnapshotExchange exchange_;

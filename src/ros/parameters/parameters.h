@@ -52,8 +52,8 @@ enum class ContactsWanted {
 enum class UnknownSpace { kFree, kObstacle, kReport };
 
 /// ~query/deadline below 0 is this share of the period, with the sign changed: by default a cycle
-/// may take half of the time until the next one, so that no scene makes answers late.
-constexpr double kDefaultDeadline = -0.5;
+/// may take three quarters of the time until the next one, so that no scene makes answers late.
+constexpr double kDefaultDeadline = -0.75;
 
 /// How the node's queries answer by default: as the core's, but with a deadline.
 QueryConfig default_query();

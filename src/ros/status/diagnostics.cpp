@@ -76,6 +76,7 @@ void add_source_counts(const SourceReport& source, double rate, double now,
     add_value("points NaN", source.counts.not_a_number, status);
     add_value("points infinite", source.counts.infinite, status);
     add_value("time to ingest", milliseconds(source.ingest_time), status);
+    add_value("time of the first answer with it", milliseconds(source.warm_up_time), status);
     add_value("memory of the cloud's index",
               format_text("%.1f MB", 1e-6 * static_cast<double>(source.snapshot_memory)), status);
   }

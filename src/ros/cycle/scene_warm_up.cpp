@@ -1,0 +1,114 @@
+#include "ros/cycle/scene_warm_up.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "ist_proximity/repulsion/repulsion.h"
+#include "ros/common/stopwatch.h"
+
+namespace ist {
+namespace {
+
+// [s] A snapshot is handed on after so much time at the latest.
+constexpr double kLongest = 0.005;
+
+}  // namespace
+
+void SceneWarmUp::begin(std::unique_ptr<CoherentQueries> spare) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  spare_ = {std::move(spare), 0};
+  has_scene_ = false;
+  ++generation_;
+}
+
+void SceneWarmUp::note(const AskedScene& scene) {
+  const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+  if (!lock.owns_lock()) return;
+  newest_ = scene;
+  has_scene_ = true;
+}
+
+bool SceneWarmUp::exchange(std::uint64_t obstacles, std::unique_ptr<CoherentQueries>* own) {
+  const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+  if (!lock.owns_lock() || !spare_.queries || spare_.obstacles != obstacles) return false;
+  own->swap(spare_.queries);
+  spare_.obstacles = 0;
+  return true;
+}
+
+double SceneWarmUp::run(const ObstacleSource& source, const SourceSnapshot& fresh) {
+  const std::unique_lock<std::mutex> running(run_mutex_, std::try_to_lock);
+  if (!running.owns_lock()) return 0.0;
+  Stopwatch watch;
+  held_.clear();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (has_ended_ || !has_scene_) return 0.0;
+    scene_ = newest_;
+  }
+  if (!select_clouds(source, fresh)) return 0.0;
+  std::uint64_t generation = 0;
+  std::unique_ptr<CoherentQueries> queries = take_spare(&generation);
+  if (!queries) return 0.0;
+  queries->warm_up(scene_.X_FL, scene_.known, clouds_, scene_.query, scene_.repulsion, kLongest);
+  held_.clear();
+  give_back(std::move(queries), generation);
+  return watch.lap();
+}
+
+std::unique_ptr<CoherentQueries> SceneWarmUp::take_spare(std::uint64_t* generation) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  *generation = generation_;
+  spare_.obstacles = 0;
+  return has_scene_ ? std::move(spare_.queries) : nullptr;
+}
+
+void SceneWarmUp::give_back(std::unique_ptr<CoherentQueries> queries, std::uint64_t generation) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (generation == generation_) spare_ = {std::move(queries), obstacles_key(clouds_)};
+}
+
+void SceneWarmUp::end() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    has_ended_ = true;
+  }
+  const std::lock_guard<std::mutex> wait(run_mutex_);
+}
+
+/// Finds the clouds of the scene with the fresh one in place of its source's last one.
+/// @returns false where that source has no part in the scene, or another one has none to share
+bool SceneWarmUp::select_clouds(const ObstacleSource& source, const SourceSnapshot& fresh) {
+  clouds_.clear();
+  bool is_part = false;
+  for (const int i : scene_.sources) {
+    const ObstacleSource& one = *sources_[static_cast<std::size_t>(i)];
+    const SourceSnapshot* snapshot = nullptr;
+    if (&one == &source) {
+      snapshot = &fresh;
+      is_part = true;
+    } else if (one.parent() == &source) {
+      snapshot = fresh.memory.get();
+    } else {
+      snapshot = share(one);
+    }
+    if (snapshot == nullptr) return false;
+    clouds_.push_back(&snapshot->cloud);
+  }
+  return is_part;
+}
+
+/// The newest snapshot of another source, held until the warm-up ends.
+const SourceSnapshot* SceneWarmUp::share(const ObstacleSource& source) {
+  const ObstacleSource* const shared = source.parent() != nullptr ? source.parent() : &source;
+  const auto found = std::find_if(
+      sources_.begin(), sources_.end(),
+      [shared](const std::unique_ptr<ObstacleSource>& s) { return s.get() == shared; });
+  if (found == sources_.end()) return nullptr;
+  held_.push_back((*found)->share(scene_.model, scene_.stamp, scene_.pose_timeout));
+  const SourceSnapshot* const snapshot = held_.back().get();
+  if (snapshot == nullptr || shared == &source) return snapshot;
+  return snapshot->memory.get();
+}
+
+}  // namespace ist
