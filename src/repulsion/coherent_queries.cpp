@@ -48,7 +48,8 @@ void CoherentQueries::warm_up(Span<const Eigen::Isometry3d> X_FL, const std::vec
 void CoherentQueries::set_model(std::shared_ptr<const RobotModel> model,
                                 const Repulsion& repulsion) {
   for (std::size_t i = 0; i < blends_.size(); ++i) {
-    if (model->links[i].packing_id != model_->links[i].packing_id) blends_[i] = KeptRepulsion(i);
+    const std::uint64_t id = model->links[i].packing_id;  // 0: not known
+    if (id == 0 || id != model_->links[i].packing_id) blends_[i] = KeptRepulsion(i);
   }
   model_ = std::move(model);
   query_.set_model(model_);

@@ -109,6 +109,9 @@ TEST_F(CoherentQueriesTest, RepelFromTheNewCloud) {
     move();
     run(&queries);
     for (std::size_t link = 0; link < results_.size(); ++link) {
+      // What is kept is there at once.
+      EXPECT_TRUE(queries.repel(link, X_FL_[link], {&cloud_}, results_[link], {}, TimePoint::min())
+                      .force.allFinite());
       const RepulsiveWrench truth =
           queries.repulsion().wrench(link, X_FL_[link], {&cloud_}, results_[link], {});
       const RepulsiveWrench kept = queries.repel(link, X_FL_[link], {&cloud_}, results_[link], {});
@@ -146,6 +149,13 @@ TEST_F(CoherentQueriesTest, TakeAnotherPackingOfTheSameLinks) {
     const std::shared_ptr<const RobotModel> next = image % 2 == 0 ? finer : model_;
     queries.set_model(next, Repulsion(next));
     EXPECT_EQ(queries.model(), next);
+    EXPECT_EQ(&queries.query().model(), next.get());
+    run(&queries);
+    for (std::size_t link = 0; link < results_.size(); ++link) {
+      const RepulsiveWrench truth =
+          Repulsion(next).wrench(link, X_FL_[link], {&cloud_}, results_[link], {});
+      EXPECT_EQ(queries.repel(link, X_FL_[link], {&cloud_}, results_[link], {}).force, truth.force);
+    }
     move();
     run(&queries);
     expect_true_answers();
