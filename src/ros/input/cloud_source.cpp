@@ -24,7 +24,7 @@ namespace {
 constexpr double kMaxDisorder = 1.0;
 // Characters of a frame's name, which every status that mentions it repeats.
 constexpr std::size_t kMaxFrameName = 256;
-const ros::WallDuration kPollIdle(0.05), kPollTaken(0.005), kPollTf(0.002);
+const ros::WallDuration kPollIdle(0.05), kPollTaken(0.005), kPollTf(0.0005);
 
 /// Stamps that are farther ahead of the clock are not believed. [s]
 double future_tolerance(double timeout) { return std::min(timeout, kMaxAhead); }
