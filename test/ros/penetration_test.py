@@ -119,6 +119,36 @@ class PenetrationTest(unittest.TestCase):
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
         self.assertTrue(np.isfinite(wrench(self.move(0.03))).all())
 
+    def test_another_robot_while_volumes_are_packed(self):
+        """Volumes are those of the newest model: of its links, as large as they are there."""
+
+        def boxes(count, edge):
+            return "".join(
+                """<link name="part%d"><collision><geometry><box size="%g %g %g"/></geometry>
+                </collision></link><joint name="to_part%d" type="fixed"><parent link="base"/>
+                <child link="part%d"/></joint>"""
+                % (i, edge, edge, edge, i, i)
+                for i in range(count)
+            )
+
+        node = self.start(**{"penetration/enabled": True})
+        for count, edge in ((4, 0.2), (12, 0.3), (12, 0.2), (8, 0.4), (12, 0.5)):
+            rospy.set_param(self.namespace + "/robot_description", pt.urdf(boxes(count, edge)))
+            self.assertTrue(node.reload().success)
+            # Some volumes are there, and others are not.
+            node.wait_until(
+                lambda: node.diagnostic("model", "links with a volume").endswith(
+                    "of %d" % (count + 2)
+                ),
+                "the new links",
+            )
+        node.wait_until(
+            lambda: node.diagnostic("model", "links with a volume") == "14 of 14", "all volumes"
+        )
+        for i in range(12):
+            said = node.diagnostic("model", "volume of part%d" % i)
+            self.assertGreater(float(said.split(", ")[1].split()[0]), 60.0, said)  # of 125 litres
+
     def test_switched_off(self):
         node = self.start(**{"penetration/enabled": False})
         self.assertFalse(wrench(self.move(-0.05)).any())

@@ -68,14 +68,7 @@ void ContactLoader::run() {
   do {
     bool is_new = false;
     const std::string fault = exception_of([this, &is_new] {
-      auto state = loader_.state();
-      if (!state->robot) return;
-      const auto contacts = this->contacts();
-      if (!contacts || !same_geometry(*contacts->robot, *state->robot)) begin(*state);
-      while (is_current(*state) && add_next(*state)) {
-        state = loader_.state();
-        is_new = true;
-      }
+      while (follow()) is_new = true;
     });
     // No memory, for example; the next round tries again.
     if (!fault.empty()) {
@@ -83,6 +76,16 @@ void ContactLoader::run() {
     }
     if (is_new) return_free_memory();  // packing needs some megabytes
   } while (stop_signal_.sleep_until(StopSignal::Clock::now() + kPoll));
+}
+
+/// Makes one body of the newest model, which may be another one than for the last body.
+/// @returns false where there is nothing to do
+bool ContactLoader::follow() {
+  const auto state = loader_.state();
+  if (!state->robot || stop_signal_.stopped()) return false;
+  const auto contacts = this->contacts();
+  if (!contacts || !same_geometry(*contacts->robot, *state->robot)) begin(*state);
+  return add_next(*state);
 }
 
 /// Begins a model with the bodies that are known from the last one.

@@ -44,6 +44,7 @@ class ContactLoader {
  private:
   using Clock = std::chrono::steady_clock;
 
+  bool follow();
   void begin(const ModelState& state);
   bool is_needed(const ModelState& state, std::size_t link);
   bool add_next(const ModelState& state);
