@@ -61,7 +61,7 @@ constexpr double kLongestPeriod = 0.1;  // [s] the same
 
 // [s] Where a cycle is rarer than this, the first answer with a new cloud has all the time it
 // needs.
-constexpr double kLongestWarmPeriod = 0.01;
+constexpr double kLongestWarmPeriod = 0.005;
 
 // Whether the robot's root stands still is asked this often where the URDF does not say it.
 constexpr std::chrono::seconds kRootPeriod(1);
@@ -287,7 +287,7 @@ void ProximityServer::Impl::run_cycle() {
   live.query.deadline = deadline_of(live.query.deadline, period());
   if (live.query.margin != margin_) set_source_targets(live.query);
   if (cycle_) {
-    cycle_->set_warms_up(period() <= kLongestWarmPeriod);
+    cycle_->set_warm_up(period() <= kLongestWarmPeriod ? &warm_up_ : nullptr);
     cycle_->run(now, sources_, live, transform_problem, message.get());
   }
   {
@@ -339,6 +339,7 @@ void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
   if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
+  warm_up_.begin(nullptr);  // of the last model
   model_ = std::move(model);
   region_radius_ = 0.0;
   if (model_->phase == ModelState::Phase::kReady) {
@@ -348,9 +349,7 @@ void ProximityServer::Impl::take_model() {
                          JointPoseSource::Which::kTaken),
         CloudSelection::Reader::kOnly, unknown_space_.get());
     cycle_->continue_from(last_stamp_);
-    cycle_->set_warm_up(&warm_up_);
   } else {
-    warm_up_.begin(nullptr);
     cycle_.reset();
   }
   if (joint_states_) {

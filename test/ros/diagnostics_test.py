@@ -79,9 +79,9 @@ class DiagnosticsTest(unittest.TestCase):
         self.node.wait_until(
             lambda: self.node.diagnostic("input cloud", "rate", "0").split()[0] > "0", "a rate"
         )
-        # Two links, of about 670 kB each, and as much for first answers; two points.
+        # Two links, of about 670 kB each; two points.
         number, unit = self.node.diagnostic("query", "memory of the query").split()
-        self.assertTrue(2.0 < float(number) < 4.0 and unit == "MB", number)
+        self.assertTrue(1.0 < float(number) < 2.0 and unit == "MB", number)
         number, unit = self.node.diagnostic("input cloud", "memory of the cloud's index").split()
         self.assertTrue(0.0 <= float(number) < 1.0 and unit == "MB", number)
 

@@ -102,16 +102,22 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
   report->pose_age = seconds_between(poses_.stamp, now_);
   report->deadline = deadline_;
   // The spare queries of a warm-up take as much.
-  report->query_memory = queries_->query().memory() * (warm_up_ == nullptr ? 1 : 2);
+  report->query_memory = queries_->query().memory() * (has_spare_ ? 2 : 1);
   report->add_times(message);
   if (status_input_.deadline.any()) ++report->deadlines_missed;
   report->worst_deadline.add(status_input_.deadline);
 }
 
 void ProximityCycle::set_warm_up(SceneWarmUp* warm_up) {
+  if (warm_up == nullptr && warm_up_ != nullptr) {
+    asked_.sources.clear();  // no source has a part
+    warm_up_->note(asked_);
+  }
   warm_up_ = warm_up;
-  warm_up_->begin(std::make_unique<CoherentQueries>(packed_, queries_->query().config(),
-                                                    queries_->repulsion()));
+  if (warm_up == nullptr || has_spare_) return;
+  warm_up->begin(std::make_unique<CoherentQueries>(packed_, queries_->query().config(),
+                                                   queries_->repulsion()));
+  has_spare_ = true;
 }
 
 /// Goes on from the first answer that another thread made with the clouds that are new.
@@ -127,7 +133,7 @@ void ProximityCycle::take_warm_queries() {
 void ProximityCycle::note_asked(const LiveConfig& config) {
   if (warm_up_ == nullptr) return;
   asked_.model = model_->robot;
-  asked_.sources = warms_up_ ? selection_.cloud_sources() : std::vector<int>();
+  asked_.sources = selection_.cloud_sources();
   asked_.stamp = poses_.stamp;
   asked_.pose_timeout = pose_timeout_;
   asked_.X_FL = poses_.X_FL;

@@ -70,11 +70,10 @@ class ProximityCycle {
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }
 
-  /// From now on, the first answers with new clouds are made by the threads of their sources.
-  /// @param warm_up  outlives this; that of no other cycle
+  /// Whether the first answers with new clouds are made by the threads of their sources. The first
+  /// time that they are, allocates the memory of a query.
+  /// @param warm_up  outlives this; that of no other cycle. Null: they are not
   void set_warm_up(SceneWarmUp* warm_up);
-  /// Whether it is worth it: where cycles are rare, it is not.
-  void set_warms_up(bool warms_up) { warms_up_ = warms_up; }
 
   /// The clouds of the last run(); valid until the next one.
   SnapshotSpan clouds() const { return selection_.clouds(); }
@@ -130,8 +129,8 @@ class ProximityCycle {
   WorldAnswers worlds_;
   CarriedWorlds carried_;
   std::unique_ptr<CoherentQueries> queries_;
-  SceneWarmUp* warm_up_ = nullptr;  ///< null: no other thread helps
-  bool warms_up_ = true;
+  SceneWarmUp* warm_up_ = nullptr;    ///< null: no other thread helps
+  bool has_spare_ = false;            ///< whether there are spare queries
   std::uint64_t last_obstacles_ = 0;  ///< key of the clouds of the last cycle
   AskedScene asked_;
   std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
