@@ -309,7 +309,7 @@ void LinkQuery::measure_again(const BoxObstacles& obstacles) {
   }
   const Eigen::Vector3d p_OCl = obstacles.X_OL * last.p_LCl;
   const double distance = (p_OCl - clamp_to(box, p_OCl)).norm();
-  refinement.measure(last.id, (1.0 + 1e-9) * distance + kRounding);
+  refinement.measure(last.id, (1.0 + 1e-9) * distance + kRounding, p_OCl);
 }
 
 // A point that the stopped search has measured as outside may be inside: it had yet to meet the

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "internal/geometry/solid_queries.h"
 #include "proximity/dual_tree.h"
@@ -112,7 +113,9 @@ class BoxRefinement {
 
   /// Measures a box that may be inside.
   /// @param max_distance  [m] a distance to the surface that it is known not to exceed
-  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
+  /// @param near_O        [m] a place that the closest point of the link may be near
+  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity(),
+               const std::optional<Eigen::Vector3d>& near_O = std::nullopt);
   /// Takes the distance of a box that is outside, or does not touch the surface.
   void take_outside(const BoxDistance& found, ObstacleId id);
   /// Takes the signed distance of one point of a box.
@@ -134,7 +137,8 @@ class BoxRefinement {
     PlacedBox placed;
   };
   /// Measures a box and keeps its distance to the surface, as far as it matters.
-  BoxDistance measure_distance(const Visit& visit, double limit, BoxDistanceCache::Kept* kept);
+  BoxDistance measure_distance(const Visit& visit, double limit, BoxDistanceCache::Kept* kept,
+                               const std::optional<Eigen::Vector3d>& near_O = std::nullopt);
   /// Whether a box that the surface of a closed link does not meet is outside, by its centre.
   bool is_center_outside(const Visit& visit) const;
   bool is_far_from_cover(const Visit& visit) const;

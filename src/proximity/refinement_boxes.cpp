@@ -102,10 +102,11 @@ double BoxRefinement::useful_distance() const {
 }
 
 BoxDistance BoxRefinement::measure_distance(const Visit& visit, double limit,
-                                            BoxDistanceCache::Kept* kept) {
+                                            BoxDistanceCache::Kept* kept,
+                                            const std::optional<Eigen::Vector3d>& near_O) {
   ++link_.search.statistics->exact_evaluations;
   const BoxDistance found =
-      distance_to_box(link_.context.solid(), visit.box, obstacles_.X_OL, limit);
+      distance_to_box(link_.context.solid(), visit.box, obstacles_.X_OL, limit, near_O);
   kept->lower_bound = std::min(found.lower_bound, found.distance);
   kept->is_outside = kept->is_outside && kept->lower_bound > 0.0;
   link_.kept.box_distances.store(visit.key, visit.placed, *kept);
@@ -139,10 +140,11 @@ void BoxRefinement::keep_outside(const Visit& visit, BoxDistanceCache::Kept* kep
   link_.kept.box_distances.store(visit.key, visit.placed, *kept);
 }
 
-void BoxRefinement::measure(ObstacleId id, double max_distance) {
+void BoxRefinement::measure(ObstacleId id, double max_distance,
+                            const std::optional<Eigen::Vector3d>& near_O) {
   const Visit visit(obstacles_, id);
   BoxDistanceCache::Kept kept = link_.kept.box_distances.find(visit.key, visit.placed);
-  const BoxDistance found = measure_distance(visit, max_distance, &kept);
+  const BoxDistance found = measure_distance(visit, max_distance, &kept, near_O);
   if (!(found.distance > 0.0)) return take_overlap(found, id);
   if (is_far_from_cover(visit)) {
     keep_outside(visit, &kept);
