@@ -41,7 +41,7 @@ constexpr double kMaxRange = 3.0;     // [m]
 constexpr int kPeerEvery = 10;        // liboctomap takes one cloud of so many
 constexpr std::size_t kKept = 30;     // clouds for memory over time
 constexpr int kSteps = 5000;          // [ms] of the query among hidden boxes
-constexpr double kClearance = 0.05;   // [m] of these from the arm's motion
+constexpr double kClearance = 0.05;   // [m] of these from the arm, at every tenth of a second
 
 struct Times {
   std::vector<double> ingest, scan, insert, insert_each, boxes;  // [us] of a cloud
@@ -168,7 +168,7 @@ Eigen::VectorXd joints_at(const ist::sim::Arm& arm, int step) {
   return q;
 }
 
-// [m] The distance of a point from where the arm comes in query_hidden().
+// [m] The distance of a point from where the arm is at every tenth of a second in query_hidden().
 double distance_from_motion(const ist::RobotModel& model, const ist::sim::Arm& arm,
                             const Eigen::Vector3d& p) {
   double least = std::numeric_limits<double>::infinity();
@@ -183,7 +183,8 @@ double distance_from_motion(const ist::RobotModel& model, const ist::sim::Arm& a
   return least;
 }
 
-// Points about the arm, outside its motion, and then a board close to the camera that hides them.
+// Points about the arm, apart from most of its motion, and then a board close to the camera that
+// hides them.
 std::shared_ptr<ist::BoxIndex> hidden_clutter(std::size_t points, const ist::RobotModel& model,
                                               const ist::sim::Arm& arm,
                                               const Eigen::Vector3d& eye) {

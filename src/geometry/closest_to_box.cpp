@@ -14,6 +14,8 @@ constexpr double kFloatRounding = 4e-6;
 // A triangle may be nearer than the one that is found by this share of the distance. Neighbours
 // of the closest triangle have the same closest point, to rounding.
 constexpr double kSame = 1e-12;
+// [m] A way that is shorter has no direction.
+constexpr double kLeastWay = 1e-9;
 
 double distance_sq(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& low,
                    const Eigen::Vector3d& high) {
@@ -48,29 +50,37 @@ class BoxSearch {
   double upper_bound() const { return upper_bound_; }
   const BoxDistance& best() const { return best_; }
 
+  // A point of which the closest point is thought to be near: the box is behind the plane across
+  // the way from there, wherever that is.
+  void expect_near(const Eigen::Vector3d& p_O) {
+    const Eigen::Vector3d p_OB = clamp_to(box_O_, p_O);
+    const double distance = (p_OB - p_O).norm();
+    if (distance > kLeastWay) separate((p_OB - p_O) / distance, p_OB);
+  }
+
   void visit(const TriangleBvh::Triangle& triangle) {
+    const double nearest =
+        std::max({normal_M_.dot(triangle.a), normal_M_.dot(triangle.b), normal_M_.dot(triangle.c)});
+    if (offset_M_ - nearest >= (1.0 - kSame) * upper_bound_) return;
     const Eigen::Vector3d a = X_OM_ * triangle.a, b = X_OM_ * triangle.b, c = X_OM_ * triangle.c;
     const Eigen::Vector3d low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
     if (distance_sq(box_O_, low, high) >= upper_bound_ * upper_bound_) return;
-    const double nearest = std::max({normal_O_.dot(a), normal_O_.dot(b), normal_O_.dot(c)});
-    if (offset_O_ - nearest >= (1.0 - kSame) * upper_bound_) return;
     const BoxDistance found = triangle_to_box(a, b, c, box_O_);
     if (found.distance >= upper_bound_) return;
     best_ = found;
     best_.lower_bound = (1.0 - 2.0 * kSame) * found.distance;
     upper_bound_ = found.distance;
-    if (upper_bound_ > 0.0) separate();
+    if (upper_bound_ > 0.0) separate((best_.p_OB - best_.p_OS) / best_.distance, best_.p_OB);
   }
 
  private:
-  // The closest point of the box has a plane, across the way to the triangle, behind which the
-  // whole box is.
-  void separate() {
-    normal_O_ = (best_.p_OB - best_.p_OS) / best_.distance;
-    offset_O_ = normal_O_.dot(best_.p_OB);
-    const Eigen::Vector3d normal_M = X_OM_.linear().transpose() * normal_O_;
-    for (int i = 0; i < 3; ++i) posed_.normal_M[i] = static_cast<float>(normal_M[i]);
-    posed_.offset = static_cast<float>(normal_O_.dot(best_.p_OB - box_O_.center()));
+  // The closest point of the box to another one has a plane, across the way from there, behind
+  // which the whole box is.
+  void separate(const Eigen::Vector3d& normal_O, const Eigen::Vector3d& p_OB) {
+    normal_M_ = X_OM_.linear().transpose() * normal_O;
+    offset_M_ = normal_O.dot(p_OB - X_OM_.translation());
+    for (int i = 0; i < 3; ++i) posed_.normal_M[i] = static_cast<float>(normal_M_[i]);
+    posed_.offset = static_cast<float>(normal_O.dot(p_OB - box_O_.center()));
   }
 
   const Eigen::AlignedBox3d& box_O_;
@@ -78,16 +88,18 @@ class BoxSearch {
   PosedBox posed_;
   double upper_bound_;
   BoxDistance best_;
-  Eigen::Vector3d normal_O_ = Eigen::Vector3d::Zero();
-  double offset_O_ = -std::numeric_limits<double>::infinity();
+  Eigen::Vector3d normal_M_ = Eigen::Vector3d::Zero();
+  double offset_M_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace
 
 BoxDistance TriangleBvh::closest_to_box(const Eigen::AlignedBox3d& box_O,
-                                        const Eigen::Isometry3d& X_OM, double max_distance) const {
+                                        const Eigen::Isometry3d& X_OM, double max_distance,
+                                        const std::optional<Eigen::Vector3d>& near_O) const {
   if (triangles_.empty() || !(max_distance > 0.0)) return {};
   BoxSearch search(box_O, X_OM, max_distance, bounds_.center(), 0.5 * bounds_.diagonal().norm());
+  if (near_O) search.expect_near(*near_O);
   struct Entry {
     std::int32_t child;
     float lower_bound;

@@ -68,20 +68,21 @@ double support(const Solid& solid, const Eigen::Vector3d& n_L, double tolerance,
 }
 
 BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O,
-                            const Eigen::Isometry3d& X_OL, double max_distance) {
+                            const Eigen::Isometry3d& X_OL, double max_distance,
+                            const std::optional<Eigen::Vector3d>& near_O) {
   BoxDistance best;
   double limit = max_distance, lower_bound = max_distance;
   for (const SolidElement& element : elements_of(solid)) {
     const Eigen::Isometry3d X_OE = X_OL * element.X_LE;
     BoxDistance candidate;
     if (element.is_mesh()) {
-      candidate = element.bvh.closest_to_box(box_O, X_OE, limit);
+      candidate = element.bvh.closest_to_box(box_O, X_OE, limit, near_O);
     } else if (const auto* sphere = std::get_if<Sphere>(&element.primitive)) {
       candidate = sphere_to_box(*sphere, X_OE.translation(), box_O);
     } else if (const auto* cylinder = std::get_if<Cylinder>(&element.primitive)) {
       candidate = cylinder_to_box(*cylinder, X_OE, box_O, limit);
     } else {
-      candidate = element.box_sides.closest_to_box(box_O, X_OE, limit);
+      candidate = element.box_sides.closest_to_box(box_O, X_OE, limit, near_O);
     }
     lower_bound = std::min(lower_bound, candidate.lower_bound);
     if (candidate.distance >= limit) continue;

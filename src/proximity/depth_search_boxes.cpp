@@ -26,6 +26,14 @@ class BoxDepthSearch {
   BoxDepthSearch(const BoxObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link), search_(link->search), refinement_(obstacles, link) {}
 
+  // Visits the boxes that the traversal has left.
+  void run(const BoxesInside& boxes) {
+    for (const BoxesInside::Entry& entry : boxes) {
+      if (search_.deadline->passed()) return give_up();
+      search_box(entry.id, entry.found, false);
+    }
+  }
+
   // Visits every box that may hold points inside the link.
   void run() {
     stack_.push({-kInfinity, obstacles_.bvh->root()});
@@ -64,10 +72,10 @@ class BoxDepthSearch {
     for (int k = 0; k < node.count; ++k) {
       const BoundingSphere sphere = bounding_sphere(node, k);
       const double near = outside_distance() + sphere.radius;
-      const double distance =
-          link_.context.tree().cover_distance(obstacles_.X_LO * sphere.center, near);
+      const Eigen::Vector3d center_L = obstacles_.X_LO * sphere.center;
       // The traversal has refined what farther boxes hold; it is outside.
-      if (distance > near) continue;
+      if (link_.context.tree().cover_distance_exceeds(center_L, near)) continue;
+      const double distance = link_.context.tree().cover_distance(center_L, near);
       stack_.push_least_on_top<&Entry::cover_distance>(first, {distance - near, node.child[k]});
     }
   }
@@ -86,10 +94,16 @@ class BoxDepthSearch {
     const double cover = link_.context.tree().cover_distance(center_L, outside_distance());
     if (cover > outside_distance() + radius_of(box)) return;
     ++search_.statistics->exact_evaluations;
-    const Solid& solid = link_.context.solid();
-    const BoxDistance found = distance_to_box(solid, box, obstacles_.X_OL,
+    const BoxDistance found = distance_to_box(link_.context.solid(), box, obstacles_.X_OL,
                                               std::max(search_.closest.exact.distance, kContact));
-    if (found.distance > 0.0 && (cover > outside_distance() || !solid.is_inside(center_L))) {
+    search_box(id, found, cover > outside_distance());
+  }
+
+  // @param is_center_outside  what is known of it
+  void search_box(ObstacleId id, const BoxDistance& found, bool is_center_outside) {
+    const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
+    if (found.distance > 0.0 &&
+        (is_center_outside || !link_.context.solid().is_inside(obstacles_.X_LO * box.center()))) {
       return refinement_.take_outside(found, id);
     }
     const Cell whole = make_cell(box, id);
@@ -153,7 +167,13 @@ class BoxDepthSearch {
 }  // namespace
 
 void search_depth(const BoxObstacles& obstacles, LinkQueryState* link) {
-  BoxDepthSearch(obstacles, link).run();
+  BoxDepthSearch search(obstacles, link);
+  const BoxesInside& boxes = link->search.boxes_inside;
+  if (link->context.solid().is_closed() && boxes.is_complete()) {
+    search.run(boxes);
+  } else {
+    search.run();
+  }
 }
 
 }  // namespace ist

@@ -48,7 +48,9 @@ class RefiningVisitor {
       : in_(input), policy_(*policy), prune_bound_(input.prune_bound) {}
 
   float Limit() const { return std::max(prune_bound_, in_.inside_bound); }
-  bool IsSettled() const { return may_be_inside_ && prune_bound_ <= in_.inside_bound; }
+  bool IsSettled() const {
+    return may_be_inside_ && prune_bound_ <= in_.inside_bound && policy_.leaves_inside();
+  }
 
   bool Stops(std::uint64_t node_pairs, PlaneFrame* planes) {
     node_pairs_ = node_pairs;

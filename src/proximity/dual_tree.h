@@ -51,10 +51,11 @@ struct DualTreeResult {
 /// A refinement policy has
 ///   float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max);
 ///                  // lower bound of all obstacles in a box of the BVH; -inf: may be inside
-///   bool is_outside(std::int32_t tile, int lane);                   // proven, where it may be
-///   inside float refine(std::int32_t tile, int lane, float lower_bound);   // returns the prune
-///   bound bool update_planes(SupportingPlanes* planes);                   // true: they have
-///   changed bool deadline_passed();
+///   bool is_outside(std::int32_t tile, int lane);  // proven, where it may be inside
+///   bool leaves_inside();  // another search finds what is inside, as soon as anything may be
+///   float refine(std::int32_t tile, int lane, float lower_bound);  // returns the prune bound
+///   bool update_planes(SupportingPlanes* planes);                  // true: they have changed
+///   bool deadline_passed();
 ///   bool is_crowded(std::uint64_t node_pairs);  // too many points had to be measured: the
 ///   traversal is stopped
 ///   kBoundsPoints  // whether there is refined_bound(): [m] a lower bound of the distance to the

@@ -92,6 +92,7 @@ class PointExtentRefinement {
   }
   float bound_box(std::int32_t slot, std::int32_t child, const float* min, const float* max);
   static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return true; }
+  static bool leaves_inside() { return true; }
   float refine(std::int32_t tile, int lane, float lower_bound);
   bool update_planes(SupportingPlanes* planes) { return points_.update_planes(planes); }
   bool deadline_passed() { return link_.search.deadline->passed(); }
@@ -134,6 +135,7 @@ class BoxExtentRefinement {
     return -std::numeric_limits<float>::infinity();
   }
   static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return true; }
+  static bool leaves_inside() { return true; }
   float refine(std::int32_t tile, int lane, float lower_bound);
   bool update_planes(SupportingPlanes* planes) {
     return update_supporting_planes(obstacles_.X_OL, &link_, planes);

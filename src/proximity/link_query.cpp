@@ -300,9 +300,16 @@ void LinkQuery::measure_again(const PointObstacles& obstacles) {
 
 void LinkQuery::measure_again(const BoxObstacles& obstacles) {
   const auto& last = link_.kept.last;
+  const Eigen::AlignedBox3d box = box_O(*obstacles.bvh, last.id);
+  BoxRefinement refinement(obstacles, &link_);
+  if (last.was_inside && link_.context.solid().is_closed()) {
+    // The deepest point of a box hardly changes. With holes, the centre of a box may decide.
+    refinement.take_point(clamp_to(box, obstacles.X_FO.inverse() * last.p_FCo), last.id);
+    if (distance() < 0.0) return;
+  }
   const Eigen::Vector3d p_OCl = obstacles.X_OL * last.p_LCl;
-  const double distance = (p_OCl - clamp_to(box_O(*obstacles.bvh, last.id), p_OCl)).norm();
-  BoxRefinement(obstacles, &link_).measure(last.id, (1.0 + 1e-9) * distance + kRounding);
+  const double distance = (p_OCl - clamp_to(box, p_OCl)).norm();
+  refinement.measure(last.id, (1.0 + 1e-9) * distance + kRounding, p_OCl);
 }
 
 // A point that the stopped search has measured as outside may be inside: it had yet to meet the
@@ -341,6 +348,8 @@ template <class Obstacles>
 DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
   search.visited.clear();
+  search.outside.clear();
+  search.boxes_inside.clear();
   search.refined = 0;
   search.box_bounds.clear();
   auto input = dual_tree_input(obstacles);
@@ -600,6 +609,7 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   last.id = closest.id;
   last.p_LCl = closest.exact.witness;
   last.p_FCo = closest.p_FCo;
+  last.was_inside = distance < 0.0;
   last.has_place = true;
   result->state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = distance;

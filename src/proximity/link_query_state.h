@@ -11,6 +11,7 @@
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "proximity/box_bounds.h"
+#include "proximity/boxes_inside.h"
 #include "proximity/coherence/box_distance_cache.h"
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
@@ -86,6 +87,7 @@ struct LinkCoherence {
     Eigen::Vector3d p_LCl = Eigen::Vector3d::Zero();  ///< [m] closest point of the link
     bool has_place = false;                           ///< whether p_FCo is that of some answer
     Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
+    bool was_inside = false;                          ///< whether p_FCo was inside the link
   } last;
   /// The obstacle whose sphere was found nearest; build_id 0: none was.
   struct {
@@ -148,6 +150,8 @@ struct LinkSearch : SearchResult {
   double first_extent_bound = 0.0;  ///< [m] the same for spheres
   BoxBounds box_bounds;
   VisitedSet visited;          ///< obstacles of the index at work that were refined
+  VisitedSet outside;          ///< boxes of the index at work that are outside the link
+  BoxesInside boxes_inside;    ///< of the index at work
   int measured = 0;            ///< points
   int refined = 0;             ///< points, in the dual-tree traversal at work
   int box_cells_left = 0;      ///< into which overlapping boxes may still be divided

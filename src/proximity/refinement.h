@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "internal/geometry/solid_queries.h"
 #include "proximity/dual_tree.h"
@@ -37,6 +38,8 @@ class PointRefinement {
     if (found == Side::kInside) measure_inside(id, p_OQ, p_LQ);
     return found == Side::kOutside;
   }
+  /// Points that are outside are told from others at once, or the rest is the depth search's.
+  static bool leaves_inside() { return true; }
   float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }
   using Side = NearSurface::Side;
   /// On which side of the link's surface a point is; unknown after the deadline.
@@ -83,7 +86,7 @@ class PointRefinement {
 /// outside as a whole; if the mesh has holes, the winding number at the box's centre decides.
 class BoxRefinement {
  public:
-  static constexpr bool kHasExtent = false, kBoundsPoints = false;
+  static constexpr bool kHasExtent = false, kBoundsPoints = true;
 
   BoxRefinement(const BoxObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
@@ -93,8 +96,15 @@ class BoxRefinement {
     return -std::numeric_limits<float>::infinity();
   }
   static bool is_crowded(std::uint64_t /*node_pairs*/) { return false; }
-  /// The depth search decides which boxes are outside.
-  static bool is_outside(std::int32_t /*tile*/, int /*lane*/) { return false; }
+  /// Whether a box, of which the cover distances say nothing, is wholly outside. Of a link with
+  /// holes, the depth search decides; of a closed one, what may be inside is in boxes_inside.
+  bool is_outside(std::int32_t tile, int lane);
+  /// Whether the depth search looks at all boxes itself.
+  bool leaves_inside() const { return has_holes() || !link_.search.boxes_inside.is_complete(); }
+  bool has_holes() const { return !link_.context.solid().is_closed(); }
+  /// [m] A lower bound of the distance of the box that refine() got last, if it is known to be
+  /// outside a closed link; else -inf.
+  float refined_bound() const { return refined_bound_; }
   float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }
   /// Does for a box what PointRefinement::refine() does for a point.
   float refine(std::int32_t tile, int lane, float lower_bound);
@@ -103,7 +113,9 @@ class BoxRefinement {
 
   /// Measures a box that may be inside.
   /// @param max_distance  [m] a distance to the surface that it is known not to exceed
-  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity());
+  /// @param near_O        [m] a place that the closest point of the link may be near
+  void measure(ObstacleId id, double max_distance = std::numeric_limits<double>::infinity(),
+               const std::optional<Eigen::Vector3d>& near_O = std::nullopt);
   /// Takes the distance of a box that is outside, or does not touch the surface.
   void take_outside(const BoxDistance& found, ObstacleId id);
   /// Takes the signed distance of one point of a box.
@@ -116,13 +128,30 @@ class BoxRefinement {
   void take_deepest_in_spheres(std::int32_t leaf, ObstacleId id);
 
  private:
-  void measure_outside(ObstacleId id, std::uint32_t key, const PlacedBox& placed);
+  /// A box and what is kept of it.
+  struct Visit {
+    Visit(const BoxObstacles& obstacles, ObstacleId obstacle);
+    ObstacleId id;
+    Eigen::AlignedBox3d box;  // frame O
+    std::uint32_t key;
+    PlacedBox placed;
+  };
+  /// Measures a box and keeps its distance to the surface, as far as it matters.
+  BoxDistance measure_distance(const Visit& visit, double limit, BoxDistanceCache::Kept* kept,
+                               const std::optional<Eigen::Vector3d>& near_O = std::nullopt);
+  /// Whether a box that the surface of a closed link does not meet is outside, by its centre.
+  bool is_center_outside(const Visit& visit) const;
+  bool is_far_from_cover(const Visit& visit) const;
+  double useful_distance() const;
+  void measure_outside(const Visit& visit, BoxDistanceCache::Kept* kept);
+  void keep_outside(const Visit& visit, BoxDistanceCache::Kept* kept);
   /// Looks for a point of a box that is inside the link, from one that both have in common, while
   /// none is known.
   void descend(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& p_OQ, ObstacleId id);
 
   const BoxObstacles& obstacles_;
   LinkQueryState& link_;
+  float refined_bound_ = -std::numeric_limits<float>::infinity();
 };
 
 template <class Obstacles>

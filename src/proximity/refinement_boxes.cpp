@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
+#include "internal/geometry/float_rounding.h"
 #include "proximity/overlap_descent.h"
 #include "proximity/refinement.h"
 
@@ -14,7 +16,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // [m] Where box and surface meet, steps of these lengths inward decide whether they overlap.
-constexpr std::array<double, 3> kSteps = {1e-6, 1e-4, 1e-3};
+constexpr std::array<double, 3> kSteps = {1e-3, 1e-4, 1e-6};
 
 // [m] A box is measured up to this far behind what matters now: so it need not be measured again
 // until the link has moved about as far.
@@ -33,55 +35,121 @@ std::uint32_t coherent_key(const BoxBvh& bvh, const Eigen::AlignedBox3d& box_O) 
 
 }  // namespace
 
+BoxRefinement::Visit::Visit(const BoxObstacles& obstacles, ObstacleId obstacle)
+    : id(obstacle),
+      box(box_O(*obstacles.bvh, obstacle)),
+      key(coherent_key(*obstacles.bvh, box)),
+      placed(box, obstacles.X_LO) {}
+
 float BoxRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   LinkSearch& search = link_.search;
   search.cover_bound =
       std::min(search.cover_bound, static_cast<double>(lower_bound) - search.rounding);
+  refined_bound_ = -std::numeric_limits<float>::infinity();
   const ObstacleId id{tile, lane};
-  if (!search.visited.insert(id.key())) return search.traversal_prune_bound();
-  const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
-  const std::uint32_t key = coherent_key(*obstacles_.bvh, box);
-  const PlacedBox placed(box, obstacles_.X_LO);
-  const double kept = link_.kept.box_distances.find(key, placed);
-  if (kept >= search.prune_bound()) {
-    search.prune(kept);
-  } else {
-    measure_outside(id, key, placed);
+  const bool is_new = search.visited.insert(id.key());
+  if (!is_new && !search.outside.contains(id.key())) return search.traversal_prune_bound();
+  const Visit visit(obstacles_, id);
+  BoxDistanceCache::Kept kept = link_.kept.box_distances.find(visit.key, visit.placed);
+  if (is_new && kept.lower_bound >= search.prune_bound()) {
+    search.prune(kept.lower_bound);
+  } else if (is_new) {
+    measure_outside(visit, &kept);
   }
+  if (kept.is_outside) refined_bound_ = round_down(kept.lower_bound);
   return search.traversal_prune_bound();
+}
+
+// A box that the surface does not meet is inside or outside as a whole.
+bool BoxRefinement::is_outside(std::int32_t tile, int lane) {
+  if (has_holes()) return false;
+  LinkSearch& search = link_.search;
+  const ObstacleId id{tile, lane};
+  if (search.outside.contains(id.key())) return true;
+  if (search.boxes_inside.contains(id)) return false;
+  if (deadline_passed()) {
+    search.boxes_inside.give_up();
+    return false;
+  }
+  const Visit visit(obstacles_, id);
+  BoxDistanceCache::Kept kept = link_.kept.box_distances.find(visit.key, visit.placed);
+  if (!kept.is_outside) {
+    BoxDistance found;
+    const bool is_known = kept.lower_bound > 0.0;
+    if (!is_known) {
+      search.visited.insert(id.key());
+      found = measure_distance(visit, std::max(useful_distance(), kBehind), &kept);
+    }
+    if (kept.lower_bound > 0.0 && is_center_outside(visit)) keep_outside(visit, &kept);
+    if (!kept.is_outside) {
+      search.boxes_inside.add(id, found);
+      return false;
+    }
+    if (!is_known) take_outside(found, id);
+  }
+  search.outside.insert(id.key());
+  return true;
 }
 
 bool BoxRefinement::update_planes(SupportingPlanes* planes) {
   return update_supporting_planes(obstacles_.X_OL, &link_, planes);
 }
 
-// A box whose cover distance is above the interior gap: if it overlaps the link all the same,
-// points of it are measured.
-void BoxRefinement::measure_outside(ObstacleId id, std::uint32_t key, const PlacedBox& placed) {
+// [m] What is farther does not matter, nor will it at the next poses.
+double BoxRefinement::useful_distance() const {
   const LinkSearch& search = link_.search;
-  ++search.statistics->exact_evaluations;
-  const double limit =
-      std::min(search.closest.exact.distance, search.range() + search.rounding) + kBehind;
-  const BoxDistance found =
-      distance_to_box(link_.context.solid(), box_O(*obstacles_.bvh, id), obstacles_.X_OL, limit);
-  link_.kept.box_distances.store(key, placed, std::min(found.lower_bound, found.distance));
-  if (found.distance > 0.0) {
-    take_outside(found, id);
-  } else {
-    take_overlap(found, id);
-  }
+  return std::min(search.closest.exact.distance, search.range() + search.rounding) + kBehind;
 }
 
-void BoxRefinement::measure(ObstacleId id, double max_distance) {
+BoxDistance BoxRefinement::measure_distance(const Visit& visit, double limit,
+                                            BoxDistanceCache::Kept* kept,
+                                            const std::optional<Eigen::Vector3d>& near_O) {
   ++link_.search.statistics->exact_evaluations;
-  const Eigen::AlignedBox3d box = box_O(*obstacles_.bvh, id);
   const BoxDistance found =
-      distance_to_box(link_.context.solid(), box, obstacles_.X_OL, max_distance);
-  if (!(found.distance > 0.0)) return take_overlap(found, id);
+      distance_to_box(link_.context.solid(), visit.box, obstacles_.X_OL, limit, near_O);
+  kept->lower_bound = std::min(found.lower_bound, found.distance);
+  kept->is_outside = kept->is_outside && kept->lower_bound > 0.0;
+  link_.kept.box_distances.store(visit.key, visit.placed, *kept);
+  return found;
+}
+
+bool BoxRefinement::is_center_outside(const Visit& visit) const {
+  return is_far_from_cover(visit) || !link_.context.solid().is_inside(visit.placed.p_LC);
+}
+
+// Whether the centre of a box is outside by its cover distance.
+bool BoxRefinement::is_far_from_cover(const Visit& visit) const {
   const InnerSphereTree& tree = link_.context.tree();
-  const Eigen::Vector3d center_O = box.center();  // as a whole it may be inside
-  if (tree.cover_distance(obstacles_.X_LO * center_O, 0.0) <= tree.interior_gap()) {
-    take_point(center_O, id);
+  return tree.cover_distance_exceeds(visit.placed.p_LC,
+                                     tree.interior_gap() + 3.0 * link_.search.rounding);
+}
+
+// A box whose cover distance is above the interior gap: if it overlaps the link all the same,
+// points of it are measured.
+void BoxRefinement::measure_outside(const Visit& visit, BoxDistanceCache::Kept* kept) {
+  const BoxDistance found = measure_distance(visit, useful_distance(), kept);
+  if (!(found.distance > 0.0)) return take_overlap(found, visit.id);
+  take_outside(found, visit.id);
+  if (is_far_from_cover(visit)) keep_outside(visit, kept);
+}
+
+// A box whose centre is outside a closed link, and which the surface does not meet, is outside.
+void BoxRefinement::keep_outside(const Visit& visit, BoxDistanceCache::Kept* kept) {
+  if (kept->is_outside || has_holes() || !(kept->lower_bound > 0.0)) return;
+  kept->is_outside = true;
+  link_.kept.box_distances.store(visit.key, visit.placed, *kept);
+}
+
+void BoxRefinement::measure(ObstacleId id, double max_distance,
+                            const std::optional<Eigen::Vector3d>& near_O) {
+  const Visit visit(obstacles_, id);
+  BoxDistanceCache::Kept kept = link_.kept.box_distances.find(visit.key, visit.placed);
+  const BoxDistance found = measure_distance(visit, max_distance, &kept, near_O);
+  if (!(found.distance > 0.0)) return take_overlap(found, id);
+  if (is_far_from_cover(visit)) {
+    keep_outside(visit, &kept);
+  } else if (!kept.is_outside) {
+    take_point(visit.box.center(), id);  // as a whole it may be inside
   }
   take_outside(found, id);
 }
@@ -114,8 +182,11 @@ void BoxRefinement::take_overlap(const BoxDistance& found, ObstacleId id) {
   const Eigen::Vector3d into_link = obstacles_.X_OL.linear() * -touch.normal;
   const Eigen::Vector3d into_box = (box.center() - found.p_OB).stableNormalized();
   for (const double step : kSteps) {
-    take_point(clamp_to(box, found.p_OB + step * into_link), id);
-    take_point(clamp_to(box, found.p_OB + step * (into_link + into_box)), id);
+    for (const Eigen::Vector3d& way : {into_link, Eigen::Vector3d(into_link + into_box)}) {
+      // A point is no deeper than the one that the step leaves, but for the step's length.
+      if (link_.search.closest.exact.distance <= touch.distance - step * way.norm()) continue;
+      take_point(clamp_to(box, found.p_OB + step * way), id);
+    }
   }
   descend(box, found.p_OB, id);
 }

@@ -16,11 +16,14 @@ class VisitedSet {
     epoch_ = 1;
   }
 
+  bool contains(std::uint32_t key) const {
+    const Entry& entry = entries_[slot(key)];
+    return entry.epoch == epoch_ && entry.key == key;
+  }
   /// @returns whether it was not in the set
   bool insert(std::uint32_t key) {
-    Entry& entry = entries_[(key * 2654435761U) >> 23U];
-    const bool is_new = entry.epoch != epoch_ || entry.key != key;
-    entry = {epoch_, key};
+    const bool is_new = !contains(key);
+    entries_[slot(key)] = {epoch_, key};
     return is_new;
   }
 
@@ -28,6 +31,8 @@ class VisitedSet {
   struct Entry {
     std::uint32_t epoch = 0, key = 0;
   };
+  static std::size_t slot(std::uint32_t key) { return (key * 2654435761U) >> 23U; }
+
   std::array<Entry, 512> entries_{};
   std::uint32_t epoch_ = 1;
 };

@@ -13,6 +13,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/allocations.h"
 #include "support/box_oracle.h"
+#include "support/box_truth.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/random_links.h"
@@ -23,6 +24,12 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+using test::expect_truth;
+using test::in_a_box;
+using test::sampled_depth;
+using test::Truth;
+using test::truth_of;
 
 TriangleMesh one_triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                           const Eigen::Vector3d& c) {
@@ -159,88 +166,9 @@ TEST(BoxIndex, HoldsEveryBoxOnce) {
   }
 }
 
-struct Truth {
-  double distance = kInfinity;  ///< surface to the nearest box; 0: touches or crosses
-  bool is_contact = false;      ///< a box lies wholly inside, or the surface crosses one
-};
-
-Truth truth_of(const TriangleMesh& mesh, const CloudSnapshot& map, const Eigen::Isometry3d& X_FL) {
-  Truth truth;
-  const Eigen::Isometry3d X_LM = X_FL.inverse() * map.X_FM;
-  for (const BoxTile& tile : map.boxes->bvh().tiles()) {
-    for (int k = 0; k < tile.count; ++k) {
-      const test::PlacedBox placed{tile.box(k), X_LM * Eigen::Translation3d(map.boxes->origin())};
-      const Eigen::Vector3d center = placed.X * placed.box.center();
-      const Eigen::AlignedBox3d around = test::bounds(mesh);
-      const double radii = 0.5 * (placed.box.sizes().norm() + around.sizes().norm());
-      if ((center - around.center()).norm() - radii > truth.distance) continue;
-      const double distance = test::oracle_box_distance(mesh, placed);
-      truth.distance = std::min(truth.distance, distance);
-      const bool inside = test::oracle_winding(mesh, center) > 0.5;
-      truth.is_contact = truth.is_contact || distance == 0.0 || inside;
-    }
-  }
-  return truth;
-}
-
-// The least signed distance of many points of the boxes: never below the true one.
-double sampled_depth(test::Rng* rng, const TriangleMesh& mesh, const CloudSnapshot& map,
-                     const Eigen::Isometry3d& X_FL, int samples) {
-  double deepest = kInfinity;
-  const Eigen::Isometry3d X_LO =
-      X_FL.inverse() * map.X_FM * Eigen::Translation3d(map.boxes->origin());
-  for (const BoxTile& tile : map.boxes->bvh().tiles()) {
-    for (int k = 0; k < tile.count; ++k) {
-      const Eigen::AlignedBox3d box = tile.box(k);
-      for (int i = 0; i < samples; ++i) {
-        const Eigen::Vector3d t = 0.5 * (test::random_vector(rng, 1.0).array() + 1.0);
-        const Eigen::Vector3d p = box.min() + t.cwiseProduct(box.sizes());
-        deepest = std::min(deepest, test::oracle_signed_distance(mesh, X_LO * p));
-      }
-    }
-  }
-  return deepest;
-}
-
-bool in_a_box(const CloudSnapshot& map, const Eigen::Vector3d& p_F) {
-  const Eigen::Vector3d p_O = map.X_FM.inverse() * p_F - map.boxes->origin();
-  for (const BoxTile& tile : map.boxes->bvh().tiles()) {
-    for (int k = 0; k < tile.count; ++k) {
-      if (tile.box(k).exteriorDistance(p_O) < 1e-9) return true;
-    }
-  }
-  return false;
-}
-
 std::vector<TriangleMesh> link_meshes() {
   return {test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 12, 8), test::box({0.05, 0.1, 0.2}),
           test::thin_plate(0.1, 0.001), test::icosphere(0.08, 1)};
-}
-
-// Expects the state and the bounds of the truth, and closest points that fit them.
-void expect_truth(const LinkProximity& result, const Truth& truth, const TriangleMesh& mesh,
-                  const CloudSnapshot& map, const Eigen::Isometry3d& X_FL,
-                  const QueryConfig& config) {
-  if (result.state == LinkState::kClear) {
-    ASSERT_GE(truth.distance, config.max_distance - 1e-9);
-    ASSERT_FALSE(truth.is_contact);
-    return;
-  }
-  ASSERT_NEAR(result.direction.norm(), 1.0, 1e-9);
-  ASSERT_LT((result.p_FCl - result.p_FCo - result.distance * result.direction).norm(), 1e-9);
-  ASSERT_LT((X_FL * result.p_LCl - result.p_FCl).norm(), 1e-12);
-  ASSERT_TRUE(in_a_box(map, result.p_FCo));
-  ASSERT_LT(test::oracle_distance(mesh, result.p_LCl), 1e-9);
-  ASSERT_LE(result.lower_bound, result.distance);
-  ASSERT_EQ(result.state == LinkState::kContact, truth.is_contact) << result.distance;
-  if (result.state == LinkState::kNear) {
-    ASSERT_LE(result.lower_bound, truth.distance);
-    ASSERT_GE(result.distance, truth.distance - 1e-9);
-    ASSERT_LE(result.distance - result.lower_bound, config.tolerance + 2e-6);
-    return;
-  }
-  const Eigen::Vector3d p_L = X_FL.inverse() * result.p_FCo;
-  ASSERT_NEAR(result.distance, test::oracle_signed_distance(mesh, p_L), 1e-9);
 }
 
 class Boxes : public ::testing::TestWithParam<double> {};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "internal/geometry/box_distance.h"
 #include "internal/geometry/triangle_bvh.h"
@@ -73,7 +74,9 @@ TEST(ClosestToBox, EachTriangleOnItsOwn) {
       X_OM.pretranslate(away);
       const double truth = closest_of_all(mesh, box, X_OM);
       const double limit = k % 3 == 0 ? kInf : test::uniform(&rng, 0.1, 3.0) * size;
-      const BoxDistance found = bvh.closest_to_box(box, X_OM, limit);
+      std::optional<Eigen::Vector3d> near_O;
+      if (k % 2 == 0) near_O = away + test::random_vector(&rng, (k % 5 == 0 ? 0.1 : 2.0) * size);
+      const BoxDistance found = bvh.closest_to_box(box, X_OM, limit, near_O);
       const double rounding = 1e-12 * (size + far) + 1e-12 * truth;
       if (truth >= limit + rounding) {
         EXPECT_EQ(found.distance, kInf);

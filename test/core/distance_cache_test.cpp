@@ -101,7 +101,7 @@ TEST(BoxDistanceCache, BoundsAreNeverAboveTheTruth) {
       Solid({GeometryElement{test::l_shape(0.2, 0.05), Eigen::Isometry3d::Identity(), ""}}),
       Solid({GeometryElement{Cylinder{0.06, 0.3}, Eigen::Isometry3d::Identity(), ""}}),
       Solid({GeometryElement{Box{{0.1, 0.2, 0.3}}, Eigen::Isometry3d::Identity(), ""}})};
-  int found = 0, tight = 0;
+  int found = 0, tight = 0, outside = 0;
   for (const Solid& solid : solids) {
     BoxDistanceCache cache;
     Eigen::Isometry3d X_LO = Eigen::Isometry3d::Identity();
@@ -116,18 +116,22 @@ TEST(BoxDistanceCache, BoundsAreNeverAboveTheTruth) {
         const Eigen::Vector3d half = Eigen::Vector3d(0.01, 0.02, 0.04).array() + grown;
         const Eigen::AlignedBox3d box(center - half, center + half);
         const PlacedBox placed(box, X_LO);
-        const double kept = cache.find(key, placed);
+        const auto [kept, is_outside] = cache.find(key, placed);
         const BoxDistance truth =
             distance_to_box(solid, box, X_LO.inverse(), std::numeric_limits<double>::infinity());
         ASSERT_LE(kept, truth.distance + 1e-12) << "step " << step << ", key " << key;
         found += kept > 0.0 ? 1 : 0;
+        outside += is_outside ? 1 : 0;
+        const bool is_whole = truth.distance > 1e-6 && !solid.is_inside(X_LO * center);
+        ASSERT_TRUE(is_whole || !is_outside) << "step " << step << ", key " << key;
         tight += kept > truth.distance - 0.002 ? 1 : 0;
-        if (step % 3 == 0) cache.store(key, placed, truth.lower_bound);
+        if (step % 3 == 0) cache.store(key, placed, {truth.lower_bound, is_whole});
       }
     }
   }
   EXPECT_GT(found, 5000);
   EXPECT_GT(tight, 5000);
+  EXPECT_GT(outside, 3000);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include "internal/geometry/box_distance.h"
 #include "ist_proximity/geometry/solid.h"
@@ -96,8 +97,10 @@ double support(const Solid& solid, const Eigen::Vector3d& n_L, double tolerance 
 /// surface (the signed distance of any point of the box decides).
 /// @param box_O  axis-aligned in a frame O, which the result is in
 /// @param X_OL   link frame -> O, rigid
+/// @param near_O  [m] if given, a place that the closest point of the solid may be near
 BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O,
-                            const Eigen::Isometry3d& X_OL, double max_distance);
+                            const Eigen::Isometry3d& X_OL, double max_distance,
+                            const std::optional<Eigen::Vector3d>& near_O = std::nullopt);
 
 /// Whether the solid is one mesh and nothing else.
 bool is_one_mesh(const Solid& solid);

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "internal/bvh/traversal_stack.h"
@@ -55,8 +56,12 @@ class TriangleBvh {
   /// that lies within a closed surface has a positive distance to it.
   /// @param box_O  axis-aligned in a frame O
   /// @param X_OM   the mesh's frame -> O
+  /// @param near_O  [m] if given, a place that the closest point of the surface may be near, such
+  /// as
+  ///                that of another pose: it is found sooner
   BoxDistance closest_to_box(const Eigen::AlignedBox3d& box_O, const Eigen::Isometry3d& X_OM,
-                             double max_distance) const;
+                             double max_distance,
+                             const std::optional<Eigen::Vector3d>& near_O = std::nullopt) const;
 
   /// [m] The support function: the largest n.x of the surface's points; -inf without triangles.
   /// @param tolerance  [m] the result may be this much too large, which is found sooner

@@ -29,26 +29,36 @@ double displacement(const PlacedBox& A, const PlacedBox& B);
 
 /// Lower bounds of exact distances of boxes to the surface of a link, kept for the poses and the
 /// snapshots to come, as DistanceCache keeps those of points: what is known of a place holds for
-/// any box, less its displacement from there.
+/// any box, less its displacement from there. A box that was outside a closed surface stays outside
+/// while it has not moved as far as the surface was away.
 class BoxDistanceCache {
  public:
+  struct Kept {
+    double lower_bound = -std::numeric_limits<double>::infinity();  ///< [m] -inf: none is known
+    bool is_outside = false;  ///< wholly outside a closed link
+  };
+
   BoxDistanceCache() : entries_(kEntries) {}
 
   /// @param key  finds the entry; it decides how good the bound is, not whether it holds
-  /// @returns [m] a lower bound of the distance; -inf: none is known
-  double find(std::uint32_t key, const PlacedBox& box) const;
-  void store(std::uint32_t key, const PlacedBox& box, double lower_bound);
+  /// @returns a lower bound of the distance to the surface, and whether the box is outside
+  Kept find(std::uint32_t key, const PlacedBox& box) const;
+  /// @param kept  of a link with holes, `is_outside` is false: a box may leave its inside, or come
+  ///              into it, where no surface is
+  void store(std::uint32_t key, const PlacedBox& box, const Kept& kept);
 
   std::size_t memory() const { return entries_.capacity() * sizeof(Entry); }  ///< [bytes]
 
  private:
   struct Entry {
     std::uint32_t key = 0;
-    double lower_bound = -std::numeric_limits<double>::infinity();
+    Kept kept;
     PlacedBox box;
   };
-  static constexpr std::size_t kEntries = 512;
-  static std::size_t slot(std::uint32_t key) { return (key * 2654435761U) >> 23U; }
+  static constexpr std::size_t kEntries = 1024, kWays = 4;
+  /// The first of the kWays entries that may hold a key.
+  static std::size_t first(std::uint32_t key) { return kWays * ((key * 2654435761U) >> 24U); }
+  static_assert(kEntries == kWays << 8U, "eight bits choose");
 
   std::vector<Entry> entries_;
 };
