@@ -13,6 +13,7 @@
 
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/proximity_cycle.h"
+#include "support/allocations.h"
 #include "support/cycle_parts.h"
 #include "support/scene.h"
 
@@ -118,6 +119,39 @@ TEST_F(SceneWarmUpTest, DoesNothingBeforeACycleAndAfterTheEnd) {
   warm_up_.note(scene_);
   warm_up_.end();
   EXPECT_EQ(warm_up_.run(*first_, fresh), 0.0);
+}
+
+// Neither a steady cycle nor the one that exchanges allocates.
+TEST_F(SceneWarmUpTest, CyclesAllocateNothing) {
+  auto poses = std::make_unique<test::StatedPoses>();
+  poses->set(scene_.X_FL);
+  ProximityCycle cycle(test::ready_model(robot_), ServerConfig(), std::move(poses),
+                       CloudSelection::Reader::kOnly);
+  LiveConfig live;
+  live.query.deadline = 0.0;
+  ros::Time now(100.0);
+  ProximityArray message;
+  for (int i = 0; i < 100; ++i) {
+    now += ros::Duration(0.001);
+    CloudSnapshot* const cloud = first_->cloud(now);
+    second_->cloud(now);
+    const bool is_new = i > 0 && i % 10 == 0;
+    if (is_new) {
+      *cloud = plane(0.4 + 0.002 * i);
+      SourceSnapshot fresh;
+      fresh.cloud = std::move(*cloud);
+      EXPECT_GT(warm_up_.run(*first_, fresh), 0.0);
+      *cloud = std::move(fresh.cloud);
+    }
+    const long before = test::allocations;
+    cycle.set_warm_up(&warm_up_);
+    cycle.run(now, sources_, live, "", &message);
+    const long count = test::allocations - before;
+    ASSERT_EQ(message.status, ProximityArray::OK) << message.status_text;
+    if (i > 20) {
+      EXPECT_EQ(count, 0) << (is_new ? "with a new cloud" : "steady") << ", cycle " << i;
+    }
+  }
 }
 
 // Cycles go on while a source's thread warms up; each answer holds for its own cloud.
