@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "internal/proximity/deadline.h"
+#include "internal/repulsion/coherent_queries.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/box_oracle.h"
@@ -217,6 +218,17 @@ class ImageSequences : public ::testing::Test {
     }
   }
 
+  // Makes a first answer with the present sources, to be stopped after some looks at the clock.
+  void warm_up(CoherentQueries* queries) {
+    std::vector<const CloudSnapshot*> clouds;
+    for (const SourcePtr& source : used_) clouds.push_back(&source->cloud);
+    Deadline::asks_left_for_test =
+        happens(0.5) ? static_cast<std::int64_t>(any_scale(1.0, 2000.0)) - 1 : 1000000;
+    queries->warm_up(X_FL_, {happens(0.9), happens(0.9)}, {clouds.data(), clouds.size()}, config_,
+                     {}, 1.0);
+    Deadline::asks_left_for_test = -1;
+  }
+
   test::Rng rng_;
   std::vector<TriangleMesh> meshes_;
   std::shared_ptr<RobotModel> model_;
@@ -249,6 +261,28 @@ TEST_F(ImageSequences, NoBoundIsAboveTheTruth) {
   }
   EXPECT_GT(unfinished_, 0);
   EXPECT_GT(with_extent_, 0);
+}
+
+// The same where first answers are made beside, and what they prove is exchanged at any time.
+TEST_F(ImageSequences, NoBoundIsAboveTheTruthAfterAWarmUp) {
+  for (int run = 0; run < test::scaled(4); ++run) {
+    auto own = std::make_unique<CoherentQueries>(model_, config_);
+    auto spare = std::make_unique<CoherentQueries>(model_, config_);
+    used_.clear();
+    for (int i = 0; i < 3; ++i) used_.push_back(next_source(nullptr));
+    known_ = used_;
+    for (int step = 0; step < 50; ++step) {
+      SCOPED_TRACE(::testing::Message() << "run " << run << ", step " << step);
+      change_sources();
+      if (happens(0.4)) warm_up(spare.get());
+      if (happens(0.3)) own.swap(spare);
+      if (happens(0.1)) change_sources();
+      if (happens(0.15)) change_question();
+      move();
+      ask_and_check(&own->query());
+      if (HasFatalFailure()) return;
+    }
+  }
 }
 
 }  // namespace
