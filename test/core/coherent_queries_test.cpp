@@ -141,7 +141,8 @@ TEST_F(CoherentQueriesTest, MayBeCutShort) {
 }
 
 TEST_F(CoherentQueriesTest, TakeAnotherPackingOfTheSameLinks) {
-  const auto finer = test::make_model({meshes_[0], meshes_[1]}, 0.002);
+  const std::shared_ptr<RobotModel> finer = test::make_model({meshes_[0], meshes_[1]}, 0.002);
+  finer->geometry_id = model_->geometry_id = 1;
   CoherentQueries queries(model_, QueryConfig());
   for (int image = 0; image < 4; ++image) {
     see();

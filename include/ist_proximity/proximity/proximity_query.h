@@ -96,9 +96,9 @@ struct QueryStatistics {
 /// (temporal coherence). Neither changes the bounds and states that an answer guarantees, and poses
 /// may jump.
 ///
-/// Working memory is about 670 kB a link: 320 kB of signed distances about the link, 220 kB of
-/// bounds of boxes and points (150 kB more for a mesh with holes), 96 kB of distances of points,
-/// 40 kB of BVTT fronts, 6 kB of visited obstacles, and 40 bytes for each node of its tree.
+/// Working memory is about 900 kB a link: 330 kB of signed distances about the link, 180 kB of
+/// bounds of BVH nodes and tiles (150 kB more for a mesh with holes), 160 kB of BVTT fronts, 80 and
+/// 120 kB of distances of points and of boxes, and 40 bytes for each node of its tree.
 class ProximityQuery {
  public:
   /// @param model  shared with the caller; not null
