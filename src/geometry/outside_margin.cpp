@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/open_edge_blocks.h"
+#include "geometry/open_edge_hierarchy.h"
 #include "geometry/solid_element.h"
 
 namespace ist {
@@ -17,8 +17,7 @@ constexpr double kSurelyOutside = 0.47;
 
 }  // namespace
 
-OutsideMargin outside_margin(const Solid& solid, const Eigen::Vector3d& p_L,
-                             double surface_distance) {
+OutsideMargin outside_margin(const Solid& solid, const Eigen::Vector3d& p_L, double largest) {
   const SolidElement& element = elements_of(solid).front();
   const Eigen::Vector3d p_E = element.X_EL * p_L;
   const double quick = element.bvh.quick_winding_number(p_E);
@@ -29,8 +28,8 @@ OutsideMargin outside_margin(const Solid& solid, const Eigen::Vector3d& p_L,
     result.is_inside = element.is_inside(p_E);
   }
   const double slack = kSurelyOutside - (quick + TriangleBvh::kQuickWindingError);
-  if (result.is_inside || !(slack > 0.0) || !(surface_distance > 0.0)) return result;
-  const double radius = std::min((1.0 - 1e-9) * surface_distance, kLargestMargin);
+  if (result.is_inside || !(slack > 0.0) || !(largest > 0.0)) return result;
+  const double radius = std::min((1.0 - 1e-9) * largest, kLargestMargin);
   result.margin = element.open_edges.steady_radius(p_E, slack, radius);
   return result;
 }

@@ -39,7 +39,7 @@ SolidElement::SolidElement(const GeometryElement& source, const CancelRequest& c
     bvh = TriangleBvh(*mesh, cancelled);
     normals = face_normals(*mesh);
     is_closed = is_closed_mesh(*mesh, cancelled);
-    if (!is_closed) open_edges = OpenEdgeBlocks(*mesh, cancelled);
+    if (!is_closed) open_edges = OpenEdgeHierarchy(*mesh, cancelled);
     return;
   }
   primitive = source.shape;

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "geometry/open_edge_blocks.h"
+#include "geometry/open_edge_hierarchy.h"
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/solid.h"
 
@@ -28,7 +28,7 @@ struct SolidElement {
   TriangleBvh box_sides;  ///< of a Box
   TriangleBvh bvh;
   std::vector<Eigen::Vector3d> normals;  ///< unit, by triangle; zero for triangles without area
-  OpenEdgeBlocks open_edges;             ///< of a mesh with holes
+  OpenEdgeHierarchy open_edges;          ///< of a mesh with holes
   Eigen::Isometry3d X_LE;
   Eigen::Isometry3d X_EL;
   bool is_closed = true;  ///< a primitive, or a mesh without holes

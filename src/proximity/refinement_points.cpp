@@ -86,7 +86,7 @@ PointRefinement::Side PointRefinement::known_side(ObstacleId id, const Eigen::Ve
   SignedDistanceGrid::Cell* cell = grid.find(p_LQ);
   if (cell == nullptr || deadline_passed()) return Side::kUnknown;
   const bool is_outside =
-      grid.bound(cell, {p_LQ}, kInfinity).is_outside || grid.outside_margin(cell, p_LQ) > 0.0;
+      grid.bound(cell, {p_LQ}, kInfinity).is_outside || grid.outside_margin(cell, {p_LQ}) > 0.0;
   return is_outside ? Side::kOutside : Side::kUnknown;
 }
 

@@ -224,20 +224,28 @@ SignedDistanceGrid::Bound SignedDistanceGrid::bound(Cell* cell, const Part& part
   return bound;
 }
 
-// The closest point is against the outward normal of a place outside.
-double SignedDistanceGrid::outside_margin(Cell* cell, const Eigen::Vector3d& p_LQ) const {
+// No surface is within C's distance of C, nor within the part's of its places. Where these spheres
+// overlap, a straight line from C to a place of the part crosses no surface, and a line from there
+// that is shorter than the part's distance does not either.
+double SignedDistanceGrid::outside_margin(Cell* cell, const Part& part) const {
   if (is_closed_ || !is_one_mesh_) return 0.0;
+  // The closest point is against the outward normal of a place outside.
+  if (!cell->has_margin && !(cell->witness < 0.0F)) return 0.0;
   const Eigen::Vector3d center = this->center(*cell);
-  const double distance = (p_LQ - center).norm() + kRounding;
+  const double reach = (part.center_L - center).norm() + part.radius + kRounding;
+  const double edge = size(level(*cell));
+  if (cell->has_margin && reach >= cell->margin * edge / kMarginParts) return 0.0;
+  const double distance = (1.0 - kStored) * std::abs(static_cast<double>(cell->floor));
+  const double part_distance =
+      bound(cell, part, std::numeric_limits<double>::infinity()).surface_distance;
+  if (!(reach < distance + part_distance)) return 0.0;
   if (!cell->has_margin) {
-    const double surface_distance = (1.0 - kStored) * std::abs(static_cast<double>(cell->floor));
-    if (!(cell->witness < 0.0F && distance < surface_distance)) return 0.0;
     cell->has_margin = true;
-    const double margin = ist::outside_margin(*solid_, center, surface_distance).margin;
-    const double parts = kMarginParts * margin / size(level(*cell));
+    const double most = 255.0 * edge / kMarginParts;
+    const double parts = kMarginParts * ist::outside_margin(*solid_, center, most).margin / edge;
     cell->margin = static_cast<std::uint8_t>(std::min(parts, 255.0));
   }
-  return cell->margin * size(level(*cell)) / kMarginParts * (1.0 - kStored) - distance;
+  return std::min(part_distance, cell->margin * edge / kMarginParts * (1.0 - kStored) - reach);
 }
 
 // The surface is no farther from any place of the part than a point of the triangle is.

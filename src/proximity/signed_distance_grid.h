@@ -85,9 +85,9 @@ class SignedDistanceGrid {
   double floor_bound(const Cell& cell, const Eigen::Vector3d& center_L, double radius) const;
   /// [m] No place of a part is deeper than minus this, by the cell's triangle; -inf: unknown.
   double depth_bound(const Cell& cell, const Part& part) const;
-  /// [m] Every place nearer than this to a place is outside a mesh with holes; not positive:
-  /// unknown.
-  double outside_margin(Cell* cell, const Eigen::Vector3d& p_LQ) const;
+  /// [m] Every place nearer than this to a place of a part is outside a mesh with holes; not
+  /// positive: unknown.
+  double outside_margin(Cell* cell, const Part& part) const;
   /// [m] Larger parts are bounded by no plane.
   double plane_radius() const { return plane_radius(level_); }
   /// Bounds of where the surface is about a place.
@@ -103,8 +103,8 @@ class SignedDistanceGrid {
     bool has_plane = false;                            ///< whether the plane was looked for
     bool is_outside_above_plane = false;               ///< every place there that the plane bounds
     bool has_margin = false;                           ///< whether the margin was looked for
-    /// Places nearer to C than so many 1 / kMarginParts of the cell's edge are outside a mesh with
-    /// holes.
+    /// Places that a way from C reaches which does not cross the surface, and is shorter than so
+    /// many 1 / kMarginParts of the cell's edge, are outside a mesh with holes.
     std::uint8_t margin = 0;
   };
 
@@ -112,7 +112,7 @@ class SignedDistanceGrid {
   static constexpr std::size_t kCells = 8192;
   static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
   static constexpr int kMaxLevel = 7;
-  static constexpr double kMarginParts = 192.0;  // a byte reaches the corners of the cell
+  static constexpr double kMarginParts = 64.0;  // a byte reaches four edges
 
   std::uint64_t key(const Eigen::Vector3d& p_LQ) const;
   static std::size_t slot(std::uint64_t key) { return (key * 0x9E3779B97F4A7C15ULL) >> 51U; }

@@ -198,7 +198,7 @@ class SingleTreeSearch {
     const Bound by_cover = cover_bound(part.center_L, part.radius);
     if (by_cover.now >= search_.prune_bound()) return by_cover;
     if (cell != nullptr) {
-      const double margin = grid_.outside_margin(cell, part.center_L) - part.radius;
+      const double margin = grid_.outside_margin(cell, part);
       if (margin > 0.0) return bound(kInfinity, margin);
     }
     if (cell != nullptr || part.radius > kLargestBox * grid_.plane_radius()) return by_cover;
@@ -207,7 +207,7 @@ class SingleTreeSearch {
     if (cell == nullptr) return by_cover;
     const double floor = grid_bound(cell, part);
     if (floor < search_.prune_bound()) {
-      const double margin = grid_.outside_margin(cell, part.center_L) - part.radius;
+      const double margin = grid_.outside_margin(cell, part);
       if (margin > 0.0) return bound(kInfinity, margin);
     }
     return bound(floor, kInfinity);
@@ -291,7 +291,7 @@ class SingleTreeSearch {
         return take(id, PointRefinement(obstacles_, &link_).measure_outside(id, p_OQ_[i], p_LQ));
       }
     } else {
-      const double margin = cell == nullptr ? 0.0 : grid_.outside_margin(cell, p_LQ);
+      const double margin = cell == nullptr ? 0.0 : grid_.outside_margin(cell, {p_LQ});
       if (margin > 0.0) return tile_.set(i, bound(kInfinity, margin));
       if (search_.prune_bound() <= 0.0 && take_outside(i, cell, &near)) return;
     }

@@ -108,12 +108,21 @@ TEST(SignedDistanceGrid, HoldsNearTheSurface) {
   }
 }
 
+// Two blocks with a slot between them; half of a face of one is missing, away from the slot.
+TriangleMesh slotted_block() {
+  const TriangleMesh block = test::box({0.1, 0.1, 0.04});
+  TriangleMesh open = block;
+  open.triangles.erase(open.triangles.begin() + 2);
+  return test::joined(block,
+                      test::moved(open, Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 0.044))));
+}
+
 // A mesh with holes: no place within the margin is inside, also in a sphere with an opening, whose
-// winding number changes slowly there.
+// winding number changes slowly there; and whatever cell says so, also from beyond a wall.
 TEST(SignedDistanceGrid, PlacesWithinTheMarginAreOutside) {
   TriangleMesh bowl = test::icosphere(0.1, 3);
   bowl.triangles.resize(bowl.triangles.size() - bowl.triangles.size() / 8);
-  const test::Trial trial({test::open_box({0.15, 0.1, 0.2}), bowl}, 0.005);
+  const test::Trial trial({test::open_box({0.15, 0.1, 0.2}), bowl, slotted_block()}, 0.005);
   test::Rng rng(96);
   for (const LinkModel& link : trial.model().links) {
     SCOPED_TRACE(link.name);
@@ -121,7 +130,7 @@ TEST(SignedDistanceGrid, PlacesWithinTheMarginAreOutside) {
     int margins = 0;
     for (int i = 0; i < 4000; ++i) {
       const Eigen::Vector3d p = link.tree.center() + test::random_vector(&rng, link.tree.radius());
-      const double margin = grid.outside_margin(grid.measure(p), p);
+      const double margin = grid.outside_margin(grid.measure(p), {p});
       if (!(margin > 0.0)) continue;
       ++margins;
       for (int k = 0; k < 4; ++k) {
@@ -130,6 +139,22 @@ TEST(SignedDistanceGrid, PlacesWithinTheMarginAreOutside) {
       }
     }
     EXPECT_GT(margins, 300);
+    int of_others = 0;
+    for (int i = 0; i < test::scaled(40000); ++i) {
+      SignedDistanceGrid::Part part;
+      part.center_L = link.tree.center() + test::random_vector(&rng, link.tree.radius());
+      part.radius = i % 2 == 0 ? 0.0 : test::uniform(&rng, 0.0, 0.005);
+      const double margin =
+          grid.outside_margin(grid.measure(part.center_L + test::random_vector(&rng, 0.008)), part);
+      if (!(margin > 0.0)) continue;
+      ++of_others;
+      for (int k = 0; k < 4; ++k) {
+        const Eigen::Vector3d direction = test::random_vector(&rng, 1.0).normalized();
+        ASSERT_FALSE(link.solid.is_inside(part.center_L + (part.radius + margin) * direction))
+            << margin << " at " << part.center_L.transpose();
+      }
+    }
+    EXPECT_GT(of_others, test::scaled(500));
   }
 }
 

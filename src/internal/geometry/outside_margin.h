@@ -16,12 +16,13 @@ namespace ist {
 /// the farther the holes are. Thread safe; allocates nothing.
 struct OutsideMargin {
   bool is_inside = false;
-  /// [m] Every place nearer than this is outside; 0: unknown. No more than the surface's distance.
+  /// [m] Every place is outside which a way from the point reaches that is shorter than this and
+  /// does not cross the surface; 0: unknown.
   double margin = 0.0;
 };
 
-/// @param surface_distance  [m] a lower bound of the distance of p_L to the surface
-OutsideMargin outside_margin(const Solid& solid, const Eigen::Vector3d& p_L,
-                             double surface_distance);
+/// @param largest  [m] the margin is no larger. With a lower bound of the distance of p_L to the
+///                 surface, every place nearer than the margin is outside
+OutsideMargin outside_margin(const Solid& solid, const Eigen::Vector3d& p_L, double largest);
 
 }  // namespace ist
