@@ -12,6 +12,7 @@
 
 #include "geometry/open_edge_hierarchy.h"
 #include "internal/geometry/solid_queries.h"
+#include "support/instruction_sets.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -218,8 +219,9 @@ TEST(OutsideMargin, FieldErrorIsBounded) {
   }
 }
 
-// What float loses is within what it says, where many edges of a mesh are near.
-TEST(OutsideMargin, FieldOfManyNearEdges) {
+// What float loses is within what it says, where many edges of a mesh are near, with every
+// instruction set.
+void check_many_near_edges() {
   test::Rng rng(185);
   for (int i = 0; i < test::scaled(20); ++i) {
     const std::vector<OpenEdgeHierarchy::Edge> edges = random_edges(2000, &rng);
@@ -238,6 +240,8 @@ TEST(OutsideMargin, FieldOfManyNearEdges) {
     ASSERT_GT(sums.curvature, curvature);
   }
 }
+
+TEST(OutsideMargin, FieldOfManyNearEdges) { test::for_each_instruction_set(check_many_near_edges); }
 
 // Two sheets whose borders meet in opposite directions change it little, though each one alone
 // would: the fields of their edges cancel.
