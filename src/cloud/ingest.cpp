@@ -136,7 +136,7 @@ struct Ingest::Impl {
       X_FC = X_FS * view->X_SC();
       *crop = crop_of(cloud, X_FC);
       set_axes(scene_axes(cloud, X_FC.linear(), true), crop);
-      self_filter.set_poses(robot, crop->X_FO, config.self_filter_padding);
+      self_filter.set_poses(robot, crop->X_FO, view->begin_pass(cloud, X_FC));
       again = ist::look_at_robot(cloud, *crop, &self_filter, view.get(), &builder, &looked);
     }
     return X_FC;

@@ -95,6 +95,8 @@ TEST(HostileView, NothingIsLostThatThePaddingKeeps) {
           }
         }
         z += 0.003 * uniform(-1, 1);
+        const bool is_on_board = i % camera.width / 12 == 1 && i / camera.width / 12 == 1;
+        if (scene % 2 == 0 && is_on_board) z -= 0.015;  // in front of the robot, or of nothing
         depths[i] = static_cast<float>(z);
         if (u < 0.01) depths[i] = 0.0F;
         if (u > 0.99) depths[i] = static_cast<float>(kInfinity);

@@ -16,6 +16,8 @@
 #include "ist_proximity/robot/robot_model.h"
 #include "support/allocations.h"
 #include "support/meshes.h"
+#include "support/sanitizers.h"
+#include "support/scene.h"
 #include "support/tiles.h"
 
 namespace ist {
@@ -344,6 +346,67 @@ TEST(ViewFilter, correctsTheSensorsPose) {
   EXPECT_GT(viewed.view.angle, 0.5 * 0.0175);
 }
 
+// An arm of three bars.
+std::vector<Body> thin_arm() {
+  Eigen::Isometry3d level = at(0.05, -0.1, 1.0), upright = at(-0.2, 0.05, 1.05),
+                    slanting = at(0.2, 0.1, 0.95);
+  level.linear() = Eigen::AngleAxisd(1.4, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  upright.linear() = Eigen::AngleAxisd(1.7, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  slanting.linear() =
+      Eigen::AngleAxisd(0.9, Eigen::Vector3d(1.0, 1.0, 0.0).normalized()).toRotationMatrix();
+  return {Body(Box{{0.07, 0.07, 0.5}}, level), Body(Box{{0.06, 0.06, 0.4}}, upright),
+          Body(Box{{0.06, 0.06, 0.4}}, slanting)};
+}
+
+// The sensor's pose is off by twice what is stated, which takes most of a thin robot out of the
+// skin. The first picture finds it all the same.
+TEST(ViewFilter, findsAPoseThatTakesTheRobotOutOfItsSkin) {
+  const std::vector<Body> robot = thin_arm();
+  test::Rng rng(77);
+  for (int i = 0; i < test::scaled(12); ++i) {
+    Eigen::Isometry3d X_SE = Eigen::Isometry3d::Identity();
+    const Eigen::Vector3d axis = test::random_vector(&rng, 1.0).normalized();
+    X_SE.linear() = Eigen::AngleAxisd(0.035, axis).toRotationMatrix();
+    X_SE.translation() = 0.01 * test::random_vector(&rng, 1.0).normalized();
+    Ingest ingest(config_of(SelfFilterMode::kView));
+    Image image;
+    const CloudSnapshot viewed =
+        run(&ingest, robot, {}, Eigen::Isometry3d::Identity(), X_SE, 1, &image);
+    EXPECT_FALSE(viewed.view.has_drifted) << i;
+    const Eigen::Isometry3d left = X_SE * viewed.view.X_SC;
+    for (const Body& body : robot) {
+      const Eigen::Vector3d p = body.X_FL.translation();
+      EXPECT_LT((left * p - p).norm(), 0.005) << i;
+    }
+    EXPECT_LT(share_of(image, kept_of(viewed), 0, 2).kept, 3) << i;
+  }
+}
+
+// A board that stands near the robot in the first picture, where the pose is looked for far about
+// the robot, is not taken for it: neither with the true pose nor with a wrong one.
+TEST(ViewFilter, takesNoBoardForTheRobotInTheFirstPicture) {
+  for (const bool is_thin : {false, true}) {
+    const std::vector<Body> robot = is_thin ? thin_arm() : arm();
+    const double front = is_thin ? 0.93 : 0.82;  // [m] some bars pass through the board
+    for (const double angle : {0.0, 0.02}) {
+      for (const double distance : {0.03, 0.05, 0.08}) {
+        for (const double x : {-0.25, 0.0, 0.25}) {
+          std::vector<Body> board;
+          board.emplace_back(Box{{0.3, 0.4, 0.01}}, at(x, 0.0, front - distance));
+          Ingest ingest(config_of(SelfFilterMode::kView));
+          Image image;
+          const CloudSnapshot viewed = run(&ingest, robot, board, Eigen::Isometry3d::Identity(),
+                                           camera_error(0.2 * angle, angle), 1, &image);
+          const Share kept = share_of(image, kept_of(viewed), 3, 3);
+          EXPECT_GT(kept.pixels, 1000);
+          EXPECT_GT(kept.kept, (is_thin ? 0.95 : 0.99) * kept.pixels)
+              << angle << ", " << distance << ", " << x;
+        }
+      }
+    }
+  }
+}
+
 // A correction that the stated errors do not allow is told and not applied: the skin is blind.
 TEST(ViewFilter, tellsADriftedSensor) {
   const std::vector<Body> robot = arm();
@@ -583,6 +646,39 @@ TEST(ViewCalibration, knowsWhatItDoesNotKnow) {
   EXPECT_NEAR(moved.z(), 1.004, 2e-4);
   EXPECT_NEAR(moved.x(), 0.0, 1e-4);
   EXPECT_GT(calibration.uncertainty(Eigen::Vector3d::UnitZ()), 0.005) << "along the wall";
+}
+
+// A pass of the first cloud that has taken an object for the robot: what it finds is no estimate,
+// and where fewer patches are found with it than without, it is not the beginning either.
+TEST(ViewCalibration, aWidePassIsNoEstimate) {
+  ViewFilterConfig config;
+  config.position_error = 0.02;
+  config.angle_error = 0.01;
+  for (const int found : {10, 60, 100}) {  // patches after the wide pass; 50 without it
+    ViewCalibration calibration(config);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> u(-0.3, 0.3);
+    const auto add = [&](int patches, double height) {
+      calibration.begin_pass();
+      for (int i = 0; i < patches; ++i) {
+        const Eigen::Vector3d n_S = -Eigen::Vector3d::Unit(2 - i % 3);  // all directions are seen
+        calibration.add({u(random), u(random), 1.0}, n_S, i % 3 == 0 ? height : 0.0, 0.002);
+      }
+    };
+    calibration.begin_cloud();
+    EXPECT_FALSE(calibration.has_estimate());
+    add(50, 0.0);
+    calibration.end_count();
+    add(200, 0.04);
+    ASSERT_TRUE(calibration.end_wide_pass());
+    EXPECT_FALSE(calibration.has_estimate());
+    EXPECT_NEAR(calibration.X_SC().translation().norm(), 0.04, 0.01);
+    EXPECT_GE(calibration.uncertainty(Eigen::Vector3d::UnitZ()), 0.02);
+    add(found, 0.0);
+    EXPECT_EQ(calibration.end_pass(), found < 50);
+    EXPECT_EQ(calibration.has_estimate(), found > 50);
+    if (found < 50) EXPECT_EQ(calibration.X_SC().matrix(), Eigen::Matrix4d::Identity());
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace ist {
 namespace {
@@ -66,9 +67,8 @@ void ViewCalibration::add(const Eigen::Vector3d& p_S, const Eigen::Vector3d& n_S
   ++count_;
 }
 
-bool ViewCalibration::end_pass() {
-  if (count_ < kFewestPatches) return false;
-  ++passes_;
+// Finds the estimate by this pass and what is known beforehand. @returns its information
+ViewCalibration::Matrix6 ViewCalibration::solve(Vector6* step) {
   middle_ = sum_p_ / count_;
   residual_ = std::sqrt(sum_sq_ / count_);
   const Matrix6 stated = stated_.asDiagonal();
@@ -76,26 +76,53 @@ bool ViewCalibration::end_pass() {
   const Matrix6 information = kept + fresh + sum_;
   const Vector6 right = -sum_height_ - kept * (applied_ - before_) - fresh * applied_;
   const Eigen::LDLT<Matrix6> solver(information);
-  const Vector6 step = solver.solve(right);
-  now_ = applied_ + step;
+  *step = solver.solve(right);
+  now_ = applied_ + *step;
   covariance_ = solver.solve(Matrix6::Identity());
+  return information;
+}
+
+bool ViewCalibration::end_pass() {
+  if (std::exchange(uncorrected_count_, 0) > count_) {
+    now_.setZero();
+    set_correction();
+    return true;
+  }
+  if (count_ < kFewestPatches) return false;
+  ++passes_;
+  Vector6 step;
+  const Matrix6 information = solve(&step);
   set_correction();
   const bool is_last =
       passes_ >= kMostPasses || has_drifted_ || displacement(step, middle_) < kStill;
   if (is_last) {
+    has_estimate_ = true;
     before_ = now_;
     information_ = information;
   }
   return !is_last;
 }
 
+bool ViewCalibration::end_wide_pass() {
+  if (count_ < kFewestPatches) return false;
+  Vector6 step;
+  solve(&step);
+  covariance_ = stated_.cwiseInverse().asDiagonal();
+  applied_ = now_;
+  apply();
+  return true;
+}
+
 void ViewCalibration::set_correction() {
   const double moved = displacement(now_, middle_);
-  const double reach = middle_.norm();
-  const double allowed = std::hypot(config_.position_error, config_.angle_error * reach);
+  const double allowed = stated_error(middle_.norm());
   // A rotation about the robot moves none of its points, but all that is farther away.
   has_drifted_ = moved > kDrift * allowed || now_.head<3>().norm() > kDrift * config_.angle_error;
   applied_ = has_drifted_ ? Vector6(Vector6::Zero()) : now_;
+  apply();
+}
+
+void ViewCalibration::apply() {
   X_SC_.setIdentity();
   const double angle = applied_.head<3>().norm();
   if (angle > 0.0) X_SC_.linear() = Eigen::AngleAxisd(angle, applied_.head<3>() / angle).matrix();

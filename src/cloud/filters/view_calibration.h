@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "ist_proximity/cloud/view_filter.h"
 
@@ -31,8 +32,22 @@ class ViewCalibration {
   /// Ends a pass. @returns whether the points moved so far that another pass is worthwhile
   bool end_pass();
 
+  /// Whether a cloud has shown enough of the robot.
+  bool has_estimate() const { return has_estimate_; }
+  /// Ends a pass that only counts the patches which are found without any correction.
+  void end_count() { uncorrected_count_ = count_; }
+  /// Ends a pass of the first cloud that has looked farther than the padding. Its points need not
+  /// be the robot's: what it finds is where the next pass begins, no estimate. Where that begins
+  /// with fewer patches than without any correction, it begins without one.
+  /// @returns false: there were too few patches
+  bool end_wide_pass();
+
   /// Corrected sensor frame: X_FS X_SC takes measured points to the fixed frame.
   const Eigen::Isometry3d& X_SC() const { return X_SC_; }
+  /// [m] Standard deviation of a point at a distance [m], as stated beforehand.
+  double stated_error(double distance) const {
+    return std::hypot(config_.position_error, config_.angle_error * distance);
+  }
   /// [m] Standard deviation of a corrected point along its worst direction.
   double uncertainty(const Eigen::Vector3d& p_S) const;
   /// Fills the members about the sensor's pose.
@@ -42,7 +57,9 @@ class ViewCalibration {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+  Matrix6 solve(Vector6* step);
   void set_correction();
+  void apply();
   double displacement(const Vector6& twist, const Eigen::Vector3d& p_S) const;
 
   ViewFilterConfig config_;
@@ -56,8 +73,8 @@ class ViewCalibration {
   Eigen::Vector3d sum_p_;   // of this pass [m]
   Eigen::Vector3d middle_;  // [m] of the points on the robot
   double sum_sq_ = 0.0, residual_ = 0.0;
-  int count_ = 0, passes_ = 0;
-  bool has_drifted_ = false;
+  int count_ = 0, passes_ = 0, uncorrected_count_ = 0;
+  bool has_drifted_ = false, has_estimate_ = false;
   Eigen::Isometry3d X_SC_ = Eigen::Isometry3d::Identity();
 };
 

@@ -21,6 +21,10 @@ constexpr std::uint32_t kWhole = (1U << kPixels) - 1U;
 constexpr double kClipped = 3.0;
 // Standard deviations of the sensor's corrected pose.
 constexpr double kPose = 3.0;
+// Passes of the first cloud with a larger padding, which falls from pass to pass: where the
+// sensor's pose is as wrong as is stated, few of the robot's points are within the padding at
+// first.
+constexpr int kWidePasses = 3;
 
 constexpr double kFlat = 0.0005;       // [m] a patch of surface deviates less from a plane
 constexpr double kGrazing = 0.15;      // cosine: below it, a patch is looked at pixel by pixel
@@ -80,7 +84,7 @@ bool is_view(const RawCloud& cloud) {
 }
 
 ViewFilter::ViewFilter(const ViewFilterConfig& config, double padding)
-    : config_(config), padding_(padding), calibration_(config) {}
+    : config_(config), padding_(padding), skin_(padding), calibration_(config) {}
 
 void ViewFilter::begin_cloud(Span<const PosedSolid> solids, double stamp) {
   links_.swap(last_links_);
@@ -103,10 +107,11 @@ void ViewFilter::begin_cloud(Span<const PosedSolid> solids, double stamp) {
         ((link.X_FL * center - before->X_FL * center).norm() + link.tree->radius() * turned) / step;
   }
   outside_before_.swap(outside_);
+  first_passes_ = calibration_.has_estimate() ? 0 : kWidePasses + 1;
   calibration_.begin_cloud();
 }
 
-void ViewFilter::begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS) {
+double ViewFilter::begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS) {
   cloud_ = &cloud;
   X_FS_ = X_FS;
   const std::size_t wide = (cloud.width + kTileSide - 1) / kTileSide,
@@ -123,9 +128,11 @@ void ViewFilter::begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS
   tiles_.clear();
   outside_.clear();
   calibration_.begin_pass();
+  double farthest = 0.0;
   for (LinkState& link : links_) {
     link.X_LS = link.X_FL.inverse() * X_FS;
     const Eigen::Vector3d center_S = link.X_LS.inverse() * link.tree->center();
+    farthest = std::max(farthest, center_S.norm());
     link.tolerance = kPose * calibration_.uncertainty(center_S) + config_.model_error +
                      link.speed * config_.time_error;
     const double sigma = config_.noise.sigma(center_S.norm());
@@ -133,6 +140,12 @@ void ViewFilter::begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS
         std::min(padding_, link.tolerance + kCertain * sigma / static_cast<double>(kTileSide));
     link.in_skin = link.unexplained = 0;
   }
+  skin_ = padding_;
+  if (first_passes_ > 0 && first_passes_ <= kWidePasses) {
+    const double largest_error = kPose * calibration_.stated_error(farthest);
+    skin_ = std::max(padding_, largest_error * first_passes_ / kWidePasses);
+  }
+  return skin_;
 }
 
 void ViewFilter::add_height(std::size_t k, double height, double noise, Tile* tile) const {
@@ -178,7 +191,7 @@ bool ViewFilter::add_patch(Tile* tile) {
   for (std::size_t k = 0; k < kPixels; ++k) {
     heights[k] = normal.dot(view_.p_S(k) - middle);
     // A point that is farther from the surface along its ray may be outside the skin.
-    if (std::abs(heights[k]) > (padding_ - 2.0 * kFlat) * cosine) return false;
+    if (std::abs(heights[k]) > (skin_ - 2.0 * kFlat) * cosine) return false;
   }
   tile->link = sights[0].link;
   tile->tolerance = static_cast<float>(links_[tile->link->number].tolerance);
@@ -229,7 +242,7 @@ ViewFilter::Passing ViewFilter::pass(std::size_t k, const SelfFilter& filter) co
     const double behind = distance_within(*link, o_L + last * d_L, limit);
     if (behind <= state.tolerance) return Passing::kRobot;
     const double distance =
-        std::min(behind, approach_within(*link, o_L, d_L, range, last, padding_ + kFlat));
+        std::min(behind, approach_within(*link, o_L, d_L, range, last, skin_ + kFlat));
     if (distance <= state.tolerance) return Passing::kRobot;
     if (distance <= limit) passing = Passing::kBlurred;
   }
@@ -240,7 +253,7 @@ ViewFilter::Passing ViewFilter::pass(std::size_t k, const SelfFilter& filter) co
 const SelfFilter::Link* ViewFilter::skin_of(std::size_t k, const TileView::Sight& sight,
                                             const Skin& skin) const {
   // The surface is no farther than it is along the ray.
-  if (std::abs(sight.t - view_.range(k)) <= padding_) return sight.link;
+  if (std::abs(sight.t - view_.range(k)) <= skin_) return sight.link;
   const std::vector<const SelfFilter::Link*>& links = skin.filter.near_links();
   if (skin.verdict == SelfFilter::Verdict::kOnRobot) return links.back();
   const Eigen::Vector3d p_O = skin.X_OS * view_.p_S(k);
@@ -258,9 +271,9 @@ void ViewFilter::add_pixel(std::size_t k, const Skin& skin, Tile* tile) {
   const SelfFilter::Link* const in_skin = skin_of(k, sight, skin);
   if (in_skin == nullptr) {
     // Close in front of the robot there is nothing but an obstacle.
-    const double limit = padding_ + kFront * config_.noise.sigma(range);
+    const double limit = skin_ + kFront * config_.noise.sigma(range);
     const double depth = sight.t - range;
-    if (sight.link != nullptr && depth > padding_ && depth < limit) tile->front |= bit;
+    if (sight.link != nullptr && depth > skin_ && depth < limit) tile->front |= bit;
     return;
   }
   if (tile->link == nullptr) {
@@ -290,7 +303,7 @@ void ViewFilter::add_tile(std::size_t row, std::size_t column, std::uint32_t kep
                           const Eigen::Isometry3d& X_OS) {
   view_.read(*cloud_, row, column, kept);
   if ((kept & 3U) == 3U) pixel_ = view_.direction(0).cross(view_.direction(1)).norm();
-  view_.begin(padding_ + kCertain * config_.noise.sigma(view_.farthest()));
+  view_.begin(skin_ + kCertain * config_.noise.sigma(view_.farthest()));
   const std::vector<const SelfFilter::Link*>& near_links = filter.near_links();
   const SelfFilter::Link* const likely = near_links.empty() ? nullptr : near_links.back();
   if (likely != nullptr) view_.add_link(*likely, links_[likely->number].X_LS);
@@ -368,7 +381,14 @@ bool ViewFilter::end_pass() {
   find_obstacles();
   for (Tile& tile : tiles_) finish(&tile);
   std::sort(outside_.begin(), outside_.end());
-  return calibration_.end_pass();
+  if (first_passes_ == 0) return calibration_.end_pass();
+  if (first_passes_ > kWidePasses) {
+    calibration_.end_count();
+    --first_passes_;
+  } else {
+    first_passes_ = calibration_.end_wide_pass() ? first_passes_ - 1 : 0;
+  }
+  return true;
 }
 
 const std::uint16_t* ViewFilter::robot_mask(std::size_t row, std::size_t column) const {

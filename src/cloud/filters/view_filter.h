@@ -40,8 +40,11 @@ class ViewFilter {
   /// The estimated correction of the sensor's pose.
   const Eigen::Isometry3d& X_SC() const { return calibration_.X_SC(); }
 
+  /// Begins a pass: the first one, or one that end_pass() has asked for.
   /// @param X_FS  corrected sensor frame -> fixed frame
-  void begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS);
+  /// @returns [m] the padding of this pass. It is larger than the filter's while the sensor's pose
+  ///          is not known well enough for its points to be within that
+  double begin_pass(const RawCloud& cloud, const Eigen::Isometry3d& X_FS);
   /// Adds a tile that may hold points of the robot.
   /// @param row, column  of its first pixel
   /// @param kept         bit 4 r + c: the pixel in row r and column c is in range
@@ -137,7 +140,9 @@ class ViewFilter {
 
   ViewFilterConfig config_;
   double padding_;
+  double skin_;  // [m] padding of this pass
   ViewCalibration calibration_;
+  int first_passes_ = 0;  // that are left: one that counts patches, then wide ones
   std::vector<LinkState> links_, last_links_;
   double stamp_ = 0.0, last_stamp_ = 0.0;
   const RawCloud* cloud_ = nullptr;

@@ -95,7 +95,6 @@ class OrganizedReader {
 
   // Looks at the blocks near the robot, without adding anything. @returns ViewFilter::end_pass()
   bool look_at_robot(LookedBlocks* looked) {
-    view_->begin_pass(cloud_, crop_.X_FO * crop_.X_OS);
     looked->blocks.resize(blocks_in(cloud_.height) * blocks_in(cloud_.width));
     LookedBlocks::Block* block = looked->blocks.data();
     for (row_ = 0; row_ < cloud_.height; row_ += kBlockSide) {
