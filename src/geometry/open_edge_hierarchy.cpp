@@ -68,7 +68,7 @@ OpenEdgeBlock make_block(const Edge* edges, std::size_t size) {
   return block;
 }
 
-// What a node knows of a child.
+// A child of a node, as that sees it.
 struct Cluster {
   Eigen::AlignedBox3d box;  // [m] of the edges
   Eigen::Vector3d center;   // [m]

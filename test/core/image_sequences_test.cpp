@@ -152,6 +152,11 @@ class ImageSequences : public ::testing::Test {
     return source;
   }
 
+  void begin() {
+    used_.clear();
+    for (int i = 0; i < 3; ++i) used_.push_back(next_source(nullptr));
+    known_ = used_;
+  }
   // One source at a time: it gets its next image, or one that was there before.
   void change_sources() {
     SourcePtr& replaced = used_[rng_() % used_.size()];
@@ -243,9 +248,7 @@ class ImageSequences : public ::testing::Test {
 TEST_F(ImageSequences, NoBoundIsAboveTheTruth) {
   for (int run = 0; run < test::scaled(4); ++run) {
     ProximityQuery query(model_, config_);
-    used_.clear();
-    for (int i = 0; i < 3; ++i) used_.push_back(next_source(nullptr));
-    known_ = used_;
+    begin();
     for (int step = 0; step < 50; ++step) {
       SCOPED_TRACE(::testing::Message() << "run " << run << ", step " << step);
       change_sources();
@@ -268,9 +271,7 @@ TEST_F(ImageSequences, NoBoundIsAboveTheTruthAfterAWarmUp) {
   for (int run = 0; run < test::scaled(4); ++run) {
     auto own = std::make_unique<CoherentQueries>(model_, config_);
     auto spare = std::make_unique<CoherentQueries>(model_, config_);
-    used_.clear();
-    for (int i = 0; i < 3; ++i) used_.push_back(next_source(nullptr));
-    known_ = used_;
+    begin();
     for (int step = 0; step < 50; ++step) {
       SCOPED_TRACE(::testing::Message() << "run " << run << ", step " << step);
       change_sources();

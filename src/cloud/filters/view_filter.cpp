@@ -25,6 +25,7 @@ constexpr double kPose = 3.0;
 // sensor's pose is as wrong as is stated, few of the robot's points are within the padding at
 // first.
 constexpr int kWidePasses = 3;
+constexpr unsigned kSearchEvery = 16;  // clouds, without the robot in view
 
 constexpr double kFlat = 0.0005;       // [m] a patch of surface deviates less from a plane
 constexpr double kGrazing = 0.15;      // cosine: below it, a patch is looked at pixel by pixel
@@ -107,7 +108,9 @@ void ViewFilter::begin_cloud(Span<const PosedSolid> solids, double stamp) {
         ((link.X_FL * center - before->X_FL * center).norm() + link.tree->radius() * turned) / step;
   }
   outside_before_.swap(outside_);
-  first_passes_ = calibration_.has_estimate() ? 0 : kWidePasses + 1;
+  // A robot that is out of view is not looked for in every cloud.
+  const bool may_see = !tiles_.empty() || searched_++ % kSearchEvery == 0;
+  first_passes_ = calibration_.has_estimate() || !may_see ? 0 : kWidePasses + 1;
   calibration_.begin_cloud();
 }
 

@@ -142,7 +142,8 @@ class ViewFilter {
   double padding_;
   double skin_;  // [m] padding of this pass
   ViewCalibration calibration_;
-  int first_passes_ = 0;  // that are left: one that counts patches, then wide ones
+  int first_passes_ = 0;   // that are left: one that counts patches, then wide ones
+  unsigned searched_ = 0;  // clouds without the robot in view
   std::vector<LinkState> links_, last_links_;
   double stamp_ = 0.0, last_stamp_ = 0.0;
   const RawCloud* cloud_ = nullptr;

@@ -13,7 +13,7 @@
 
 namespace ist {
 
-/// What a cycle asked last.
+/// The question of a cycle.
 struct AskedScene {
   std::shared_ptr<const RobotModel> model;  ///< that snapshots are made with
   std::vector<int> sources;                 ///< of the clouds, in their order
