@@ -298,6 +298,41 @@ TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
   EXPECT_GT(others.kept, 0.9 * others.pixels);
 }
 
+// In front of the robot, outside its padding of 20 mm, noise of 5 mm puts single pixels: 23 mm may
+// be noise, 33 mm is not. Three pixels next to one another are an obstacle.
+TEST(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
+  std::vector<Body> robot = arm();  // the others tell where the camera is
+  robot[0] = Body(Box{{0.2, 0.2, 0.1}}, at(0.0, 0.0, 1.05));
+  robot[1].X_FL.translation().x() -= 0.35;
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  struct Case {
+    double height;  // [m]
+    std::vector<std::size_t> pixels;
+    bool is_obstacle;
+  };
+  const std::size_t middle = kHeight / 2 * kWidth + kWidth / 2;
+  const std::vector<std::size_t> one = {middle + 1}, two = {middle + 1, middle + kWidth + 2},
+                                 three = {middle + 1, middle + 2, middle + kWidth + 1};
+  for (const Case& c : {Case{0.023, one, false}, Case{0.023, two, false}, Case{0.023, three, true},
+                        Case{0.033, one, true}, Case{0.1, one, true}}) {
+    Ingest ingest(config_of(SelfFilterMode::kView));
+    Image image;
+    run(&ingest, robot, {}, X_FS, X_FS, 5, &image);
+    image = picture(pointers(robot, {}), X_FS, kNoise, 5);
+    for (const std::size_t pixel : c.pixels) {
+      Eigen::Map<Eigen::Vector3f> p(&image.xyz[3 * pixel]);
+      p = ((1.0 - c.height) / static_cast<double>(p.z()) * p.cast<double>()).cast<float>();
+    }
+    CloudSnapshot viewed;
+    ingest.run(image.raw(), X_FS, posed(robot), 0.5, &viewed);
+    const std::set<std::uint32_t> kept = kept_of(viewed);
+    for (const std::size_t pixel : c.pixels) {
+      EXPECT_EQ(kept.count(static_cast<std::uint32_t>(pixel)) != 0, c.is_obstacle)
+          << c.pixels.size() << " pixels at " << c.height << " m";
+    }
+  }
+}
+
 // What the padding keeps, the view keeps; of what the padding drops, the view drops the robot.
 TEST(ViewFilter, dropsNothingThatThePaddingKeeps) {
   const std::vector<Body> robot = arm();

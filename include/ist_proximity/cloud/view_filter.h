@@ -11,7 +11,8 @@ namespace ist {
 /// How the self-filter decides which points are the robot's.
 enum class SelfFilterMode : std::uint8_t {
   kPadding,  ///< whatever is within the padding of a link
-  /// The ones of these that agree with where the sensor must see the robot (doc/self_filter.md).
+  /// The ones of these that agree with where the sensor must see the robot, and single pixels that
+  /// noise has put in front of it (doc/self_filter.md).
   /// Points that do not lie on rays from the sensor frame's origin, and clouds that are no image,
   /// are filtered by padding.
   kView,

@@ -276,7 +276,12 @@ void ViewFilter::add_pixel(std::size_t k, const Skin& skin, Tile* tile) {
     // Close in front of the robot there is nothing but an obstacle.
     const double limit = skin_ + kFront * config_.noise.sigma(range);
     const double depth = sight.t - range;
-    if (sight.link != nullptr && depth > skin_ && depth < limit) tile->front |= bit;
+    if (sight.link == nullptr || depth <= skin_ || depth >= limit) return;
+    tile->front |= bit;
+    const double cosine = -sight.normal.dot(view_.direction(k));
+    const double noise = config_.noise.sigma(range) * cosine;
+    const double tolerance = links_[sight.link->number].tolerance;
+    if (depth * cosine <= kCertain * noise + tolerance) tile->stray |= bit;
     return;
   }
   if (tile->link == nullptr) {

@@ -24,7 +24,7 @@ bool is_view(const RawCloud& cloud);
 /// Decides which points of an organized cloud are the robot's by where the sensor must see it
 /// (doc/self_filter.md). Only tiles of 4 x 4 pixels with points within the padding of a link are
 /// looked at; of those points it says which are obstacles all the same. What the padding keeps, it
-/// keeps too.
+/// keeps too, but for single pixels and pairs that noise may have put in front of the robot.
 ///
 /// A pass over a cloud is: begin_pass(), add_tile() for every tile near the robot, end_pass(), then
 /// robot_mask(). Keeps its memory. Not thread safe.
@@ -94,6 +94,7 @@ class ViewFilter {
     std::uint16_t skin = 0;                  // pixels within the padding
     std::uint16_t obstacle = 0;              // of these, those that are obstacles beyond doubt
     std::uint16_t front = 0;                 // pixels in front of the robot, outside its skin
+    std::uint16_t stray = 0;                 // of these, those that noise alone may have put there
     std::uint16_t certain = 0;  // pixels that are obstacles by what they show themselves
     std::uint16_t blurred = 0;  // pixels that pass a link by no more than the blur of its edge
     std::uint16_t near = 0;     // pixels that are obstacles, those next to others included

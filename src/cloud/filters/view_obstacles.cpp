@@ -158,7 +158,9 @@ void ViewFilter::drop_speckles() {
   }
   for (Tile& tile : tiles_) {
     tile.obstacle = tile.near;
-    if (tile.is_speckle) tile.front = 0;
+    if (!tile.is_speckle) continue;
+    tile.robot |= tile.stray;
+    tile.front = 0;
   }
 }
 
