@@ -299,36 +299,45 @@ TEST(ViewFilter, anObstacleEndsAtAnOutlineInTheImage) {
 }
 
 // In front of the robot, outside its padding of 20 mm, noise of 5 mm puts single pixels: 23 mm may
-// be noise, 33 mm is not. Three pixels next to one another are an obstacle.
+// be noise, 33 mm is not. What has three pixels is an obstacle, also where most of them are farther
+// from the robot, or in a tile of which none is near it.
 TEST(ViewFilter, singlePixelsOfNoiseAreTheRobots) {
   std::vector<Body> robot = arm();  // the others tell where the camera is
   robot[0] = Body(Box{{0.2, 0.2, 0.1}}, at(0.0, 0.0, 1.05));
   robot[1].X_FL.translation().x() -= 0.35;
   const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  const std::size_t middle = kHeight / 2 * kWidth + kWidth / 2;  // first pixel of a tile
+  const std::vector<std::size_t> one = {middle + 1}, two = {middle, middle + kWidth},
+                                 three = {middle + 1, middle + 2, middle + kWidth + 1};
+  std::vector<std::size_t> beside;  // the tile beside it
+  for (std::size_t k = 0; k < 16; ++k) beside.push_back(middle - 4 + k / 4 * kWidth + k % 4);
   struct Case {
     double height;  // [m]
-    std::vector<std::size_t> pixels;
+    std::vector<std::size_t> pixels, others;
+    double height_of_others;
     bool is_obstacle;
   };
-  const std::size_t middle = kHeight / 2 * kWidth + kWidth / 2;
-  const std::vector<std::size_t> one = {middle + 1}, two = {middle + 1, middle + kWidth + 2},
-                                 three = {middle + 1, middle + 2, middle + kWidth + 1};
-  for (const Case& c : {Case{0.023, one, false}, Case{0.023, two, false}, Case{0.023, three, true},
-                        Case{0.033, one, true}, Case{0.1, one, true}}) {
+  for (const Case& c : {Case{0.023, one, {}, 0.0, false}, Case{0.023, two, {}, 0.0, false},
+                        Case{0.023, three, {}, 0.0, true}, Case{0.033, one, {}, 0.0, true},
+                        Case{0.1, one, {}, 0.0, true}, Case{0.023, two, {middle + 1}, 0.045, true},
+                        Case{0.023, two, beside, 0.06, true}}) {
     Ingest ingest(config_of(SelfFilterMode::kView));
     Image image;
     run(&ingest, robot, {}, X_FS, X_FS, 5, &image);
     image = picture(pointers(robot, {}), X_FS, kNoise, 5);
-    for (const std::size_t pixel : c.pixels) {
+    const auto put = [&image](std::size_t pixel, double height) {
       Eigen::Map<Eigen::Vector3f> p(&image.xyz[3 * pixel]);
-      p = ((1.0 - c.height) / static_cast<double>(p.z()) * p.cast<double>()).cast<float>();
-    }
+      p = ((1.0 - height) / static_cast<double>(p.z()) * p.cast<double>()).cast<float>();
+    };
+    for (const std::size_t pixel : c.pixels) put(pixel, c.height);
+    for (const std::size_t pixel : c.others) put(pixel, c.height_of_others);
     CloudSnapshot viewed;
     ingest.run(image.raw(), X_FS, posed(robot), 0.5, &viewed);
     const std::set<std::uint32_t> kept = kept_of(viewed);
     for (const std::size_t pixel : c.pixels) {
       EXPECT_EQ(kept.count(static_cast<std::uint32_t>(pixel)) != 0, c.is_obstacle)
-          << c.pixels.size() << " pixels at " << c.height << " m";
+          << c.pixels.size() << " pixels at " << c.height << " m, " << c.others.size()
+          << " others at " << c.height_of_others << " m";
     }
   }
 }

@@ -131,6 +131,8 @@ class ViewFilter {
   void find_windows(std::size_t index);
   void grow();
   bool came_in(const Tile& tile) const;
+  int count_others(std::int64_t row, std::int64_t column, float last) const;
+  bool is_alone(const Tile& tile, std::size_t k) const;
   void drop_speckles();
   bool continues(std::int64_t row, std::int64_t column, float range, float step) const;
   void grow_pixels(float sigmas);

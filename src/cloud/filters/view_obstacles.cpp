@@ -9,6 +9,7 @@
 
 #include "cloud/filters/crop.h"
 #include "cloud/filters/view_filter.h"
+#include "cloud/format/point_reader.h"
 
 namespace ist {
 namespace {
@@ -145,6 +146,47 @@ int ViewFilter::count_obstacles(std::int64_t row, std::int64_t column, Outside o
   return count;
 }
 
+// The pixels of a tile that are not the robot's, no farther than `last` [m].
+int ViewFilter::count_others(std::int64_t row, std::int64_t column, float last) const {
+  int count = 0;
+  if (const Tile* tile = tile_at(row, column)) {
+    const unsigned others =
+        (static_cast<unsigned>(tile->kept) & ~static_cast<unsigned>(tile->skin)) | tile->obstacle;
+    for (std::size_t k = 0; k < kPixels; ++k) {
+      count += (others >> k & 1U) != 0 && tile->range[k] <= last ? 1 : 0;
+    }
+    return count;
+  }
+  // None of a tile that was not added is near the robot.
+  constexpr auto kSide = static_cast<std::int64_t>(kTileSide);
+  const std::int64_t first_row = std::max<std::int64_t>(row, 0) * kSide,
+                     first_column = std::max<std::int64_t>(column, 0) * kSide;
+  const std::int64_t end_row =
+                         std::min((row + 1) * kSide, static_cast<std::int64_t>(cloud_->height)),
+                     end_column =
+                         std::min((column + 1) * kSide, static_cast<std::int64_t>(cloud_->width));
+  for (std::int64_t r = first_row; r < end_row; ++r) {
+    for (std::int64_t c = first_column; c < end_column; ++c) {
+      const double range =
+          point_at(*cloud_, static_cast<std::size_t>(r), static_cast<std::size_t>(c)).norm();
+      count += range > 0.0 && range <= static_cast<double>(last) ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+// Whether a pixel outside the skin has fewer pixels with it than an obstacle has: others that are
+// not the robot's, no farther behind it than a surface's step.
+bool ViewFilter::is_alone(const Tile& tile, std::size_t k) const {
+  const float last = tile.range[k] + largest_step(tile.range[k]);
+  const std::int64_t row = tile.row / kTileSide, column = tile.column / kTileSide;
+  int count = 0;
+  for (std::int64_t i = 0; i < 9; ++i) {
+    count += count_others(row + i / 3 - 1, column + i % 3 - 1, last);
+  }
+  return count < kFewestPixels;
+}
+
 // In a minute a camera sees some 10^8 pixels of the robot, of which chance takes a few for
 // obstacles, each by itself.
 void ViewFilter::drop_speckles() {
@@ -153,14 +195,18 @@ void ViewFilter::drop_speckles() {
     const std::int64_t row = tile.row / kTileSide, column = tile.column / kTileSide;
     tile.is_speckle =
         tile.front != 0 && count_obstacles(row, column, Outside::kInFront) < kFewestPixels;
+    for (std::size_t k = 0; tile.stray != 0 && k < kPixels; ++k) {
+      if ((tile.stray >> k & 1U) == 0 || is_alone(tile, k)) continue;
+      tile.stray &= static_cast<std::uint16_t>(~(1U << k));
+    }
     if (tile.obstacle == 0 || tile.is_obstacle) continue;
     if (count_obstacles(row, column, Outside::kAll) < kFewestPixels) tile.near = 0;
   }
   for (Tile& tile : tiles_) {
     tile.obstacle = tile.near;
-    if (!tile.is_speckle) continue;
     tile.robot |= tile.stray;
-    tile.front = 0;
+    tile.front &= static_cast<std::uint16_t>(~tile.stray);
+    if (tile.is_speckle) tile.front = 0;
   }
 }
 
