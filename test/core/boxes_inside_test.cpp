@@ -136,7 +136,8 @@ TEST(BoxesInside, AreToldOnceForManySteps) {
   }
   std::printf("%.1f exact distances a step, %.1f afresh\n", 0.01 * static_cast<double>(kept),
               0.01 * static_cast<double>(afresh));
-  EXPECT_LT(4 * kept, afresh);
+  // Sanitizers have the link packed coarser, which leaves more to be measured at each step.
+  EXPECT_LT((test::kSanitized ? 3 : 4) * kept, afresh);
 }
 
 }  // namespace
