@@ -269,4 +269,15 @@ ConvexDistance convex_distance(const ConvexPart& p, const ConvexPart& q, double 
   return gjk(p, q, enough);
 }
 
+// By the support function: whatever rounding does to the closest point, a slab separates.
+double box_bound(const ConvexPart& part, const Eigen::Vector3d& center, const Eigen::Matrix3d& axes,
+                 const Eigen::Vector3d& half) {
+  const Eigen::Vector3d across = center - closest_point(part, center);
+  const double distance = across.norm();
+  if (!(distance > kTouch)) return 0.0;
+  const Eigen::Vector3d n = across / distance;
+  const double extent = (axes.transpose() * n).cwiseAbs().dot(half);
+  return std::max(n.dot(center) - extent - support(part, n), 0.0);
+}
+
 }  // namespace ist

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "internal/bvh/traversal_stack.h"
@@ -60,6 +61,24 @@ OrientedBox posed_box(const SurfaceBvh& bvh, SurfaceBvh::Slot slot, const Eigen:
   }
   Eigen::Map<Eigen::Vector3f>(box.direction) = direction;
   return box;
+}
+
+// The part in a slot, in the frame of the other surface; none: the slot holds more than one.
+std::optional<ConvexPart> single_part(const SurfaceBvh& bvh, SurfaceBvh::Slot slot,
+                                      const Eigen::Isometry3d& X) {
+  if (bvh.child(slot) >= 0) return std::nullopt;
+  return posed(part_of(bvh, slot), X);
+}
+
+// [m] box_bound() of a node's child.
+double child_bound(const ConvexPart& part, const SurfaceBvh::Node& node, std::size_t k) {
+  const auto column = [k](const float(*rows)[SurfaceBvh::kWidth]) {
+    return Eigen::Vector3d(static_cast<double>(rows[0][k]), static_cast<double>(rows[1][k]),
+                           static_cast<double>(rows[2][k]));
+  };
+  Eigen::Matrix3d axes;
+  axes << column(node.axis[0]), column(node.axis[1]), column(node.axis[2]);
+  return box_bound(part, column(node.center), axes, column(node.half));
 }
 
 }  // namespace
@@ -128,11 +147,11 @@ void SurfacePairSearch::move_to(const Eigen::Isometry3d& X_BA, double displaceme
 void SurfacePairSearch::prepare_boxes() {
   if (has_boxes_) return;
   has_boxes_ = true;
-  const Eigen::Isometry3d X_AB = X_BA_.inverse();
+  X_AB_ = X_BA_.inverse();
   R_BA_ = X_BA_.linear().cast<float>();
   p_BA_ = X_BA_.translation().cast<float>();
-  R_AB_ = X_AB.linear().cast<float>();
-  p_AB_ = X_AB.translation().cast<float>();
+  R_AB_ = X_AB_.linear().cast<float>();
+  p_AB_ = X_AB_.translation().cast<float>();
   set_direction();
 }
 
@@ -245,6 +264,9 @@ SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::ui
   } else {
     oriented_box_bounds(node, posed_box(a_, pair.a, R_BA_, p_BA_, -n_B_), bounds);
   }
+  const std::optional<ConvexPart> part =
+      of_a ? single_part(b_, pair.b, X_AB_) : single_part(a_, pair.a, X_BA_);
+  const double part_radius = of_a ? b_.radius(pair.b) : a_.radius(pair.a);
   const auto first = static_cast<SurfaceBvh::Slot>((of_a ? child_a : child_b) * SurfaceBvh::kWidth);
   Expansion result;
   result.count = 0;
@@ -253,7 +275,11 @@ SurfacePairSearch::Expansion SurfacePairSearch::expand(const Pair& pair, std::ui
   for (int k = 0; k < node.count; ++k) {
     const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(k));
     if (children != 0 && (children & bit) == 0) continue;
-    const double bound = std::max(static_cast<double>(bounds[k]) - rounding_, pair.bound);
+    double bound = std::max(static_cast<double>(bounds[k]) - rounding_, pair.bound);
+    // A part may be much smaller than the box about it, as half of a rectangle is.
+    if (part && bound < prune_bound && part_radius > static_cast<double>(node.radius[k])) {
+      bound = std::max(bound, child_bound(*part, node, static_cast<std::size_t>(k)) - rounding_);
+    }
     if (bound > 0.0 && bound >= prune_bound) {
       result.unwanted = static_cast<std::uint8_t>(result.unwanted | bit);
       result.least_unwanted = std::min(result.least_unwanted, bound);

@@ -167,7 +167,7 @@ class SurfacePairSearch {
   bool is_searching_ = false;  // at this pose
   bool has_boxes_ = false;     // prepare_boxes() was called at this pose
   HullSupport hull_support_;
-  Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d X_BA_ = Eigen::Isometry3d::Identity(), X_AB_ = X_BA_;
   Eigen::Matrix3f R_BA_, R_AB_;
   Eigen::Vector3f p_BA_, p_AB_;
   Eigen::Vector3f n_B_, n_A_;                     // unit, from B to A: that of the closest points

@@ -48,4 +48,12 @@ ConvexDistance triangle_distance(const ConvexPart& p, const ConvexPart& q);
 ConvexDistance convex_distance(const ConvexPart& p, const ConvexPart& q,
                                double enough = std::numeric_limits<double>::infinity());
 
+/// [m] A lower bound of the distance of a part to a box: the slab between them across the line from
+/// the box's centre to the closest point of the part. Its error is that of the rounding of
+/// coordinates. 0 where the centre is in the part, or there is no such slab.
+/// @param axes  of the box, unit, as columns
+/// @param half  [m] half edges along these
+double box_bound(const ConvexPart& part, const Eigen::Vector3d& center, const Eigen::Matrix3d& axes,
+                 const Eigen::Vector3d& half);
+
 }  // namespace ist
