@@ -12,6 +12,12 @@ target_link_libraries(proximity_node PRIVATE ist_proximity_ros)
 add_library(ist_proximity_nodelet MODULE src/nodes/proximity_nodelet.cpp)
 target_link_libraries(ist_proximity_nodelet PRIVATE ist_proximity_ros)
 
+if(IST_PROXIMITY_PRECOMPILE)
+  target_precompile_headers(ist_proximity_ros PRIVATE
+    <ros/ros.h> <sensor_msgs/PointCloud2.h> <Eigen/Core> <Eigen/Geometry>
+    <algorithm> <functional> <memory> <string> <vector>)
+endif()
+
 foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
   target_include_directories(${target} PRIVATE src)
   # Warnings in system headers are not ours to mend.
