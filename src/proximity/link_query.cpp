@@ -1,17 +1,13 @@
+// What is asked, what is known without a search, and the answer with its rounding.
+
 #include "proximity/link_query.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
 #include <utility>
 
 #include "proximity/depth_search.h"
-#include "proximity/dual_tree.h"
-#include "proximity/first_bound.h"
-#include "proximity/refinement.h"
-#include "proximity/separating_planes.h"
-#include "proximity/single_tree_search.h"
 
 namespace ist {
 namespace {
@@ -23,19 +19,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFloatError = 1e-6;
 // Error of a stored point: half a unit in the last place in each coordinate.
 constexpr double kPointError = 1.1e-7;
-// [m] More than double loses where distances are compared.
-constexpr double kRounding = 1e-12;
-// A link that is nearer than so many interior gaps is searched with signed distances.
-constexpr double kNearInGaps = 2.0;
-// So does one at a distance that is about that of the last crowded search, by this factor.
-constexpr double kSameCrowd = 1.5;
-// A link that is nearer than so many radii of its bounding sphere gets its first bound by more and
-// smaller spheres.
-constexpr double kFineSpheresWithin = 0.5;
-// Nodes that are divided for a first bound by a supporting plane.
-constexpr int kQuickSteps = 16;
-// [m] A link that no first bound was found for is tried again when it has moved so far.
-constexpr double kFirstBoundAgain = 0.02;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
@@ -44,21 +27,6 @@ bool answers(const QueryConfig& answered, const QueryConfig& asked) {
   return answered.max_distance == asked.max_distance && answered.margin == asked.margin &&
          answered.tolerance <= asked.tolerance &&
          answered.relative_tolerance <= asked.relative_tolerance;
-}
-
-// The child whose box is nearest to a place.
-int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
-  int nearest = 0;
-  double least_sq = kInfinity;
-  for (int k = 0; k < node.count; ++k) {
-    const Eigen::AlignedBox3d box(Eigen::Vector3d(node.min_x[k], node.min_y[k], node.min_z[k]),
-                                  Eigen::Vector3d(node.max_x[k], node.max_y[k], node.max_z[k]));
-    const double distance_sq = box.squaredExteriorDistance(p_O);
-    if (!(distance_sq < least_sq)) continue;
-    least_sq = distance_sq;
-    nearest = k;
-  }
-  return nearest;
 }
 
 }  // namespace
@@ -185,213 +153,6 @@ void LinkQuery::keep_answer() {
   answered.result = search;
 }
 
-// Whether the dual-tree traversal gave up, though there is time.
-bool LinkQuery::is_crowded(const DualTreeResult& found) const {
-  return found.stopped && !link_.search.deadline->has_passed();
-}
-
-// The four steps for one index: upper bound, search (which refines what survives its bounds),
-// depth.
-// @returns false: the deadline passed
-template <class Obstacles>
-bool LinkQuery::run(const Obstacles& obstacles) {
-  enter(obstacles);
-  if (is_near(obstacles)) return search_near(obstacles);
-  upper_bound(obstacles);
-  const DualTreeResult found = search(obstacles);
-  if (is_crowded(found)) {
-    link_.kept.crowded_at = link_.search.closest.exact.distance;
-    return search_near(obstacles);
-  }
-  if (found.may_be_inside && !found.stopped) search_inside(obstacles);
-  const bool stopped = found.stopped || link_.search.deadline->passed();
-  if (stopped) measure_closest(obstacles);
-  // A pair that was left may hold a point inside.
-  LinkSearch& search = link_.search;
-  if (stopped && search.pruned_bound <= link_.context.tree().interior_gap() + search.rounding) {
-    search.prune(-link_.context.tree().radius());
-  }
-  return !stopped;
-}
-
-// Whether the dual-tree traversal would have to measure many points: the link is so near to an
-// obstacle that cover spheres bound little, or there were many at about this distance.
-bool LinkQuery::is_near(const PointObstacles& /*obstacles*/) const {
-  const double distance = link_.search.closest.exact.distance;
-  if (!link_.context.solid().is_closed()) return distance < 0.0;
-  const double crowded_at = link_.kept.crowded_at;
-  return distance < kNearInGaps * link_.context.tree().interior_gap() ||
-         (distance > crowded_at / kSameCrowd && distance < kSameCrowd * crowded_at);
-}
-bool LinkQuery::is_near(const BoxObstacles& /*obstacles*/) { return false; }
-
-// All steps in one, near the link.
-bool LinkQuery::search_near(const PointObstacles& obstacles) {
-  link_.search.cover_bound = link_.context.solid().is_closed() ? kInfinity : -kInfinity;
-  return search_single_tree(obstacles, &link_);
-}
-bool LinkQuery::search_near(const BoxObstacles& /*obstacles*/) { return true; }
-
-void LinkQuery::search_inside(const PointObstacles& obstacles) {
-  search_single_tree(obstacles, &link_);
-}
-void LinkQuery::search_inside(const BoxObstacles& obstacles) { search_depth(obstacles, &link_); }
-
-// Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
-// point of the link to the last answer's obstacle is still a point of the link.
-void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
-  if (link_.search.is_answered) return;
-  const auto& last = link_.kept.last;
-  const auto measure_last = [&](const auto& obstacles) {
-    if (last.build_id == 0 || obstacles.bvh->build_id() != last.build_id) return;
-    enter(obstacles);
-    measure_again(obstacles);
-  };
-  for (std::size_t i = 0; i < clouds.size(); ++i) {
-    for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, measure_last);
-  }
-  if (distance() < kInfinity || !has_time) return;
-  // A new cloud has about the same obstacle about the same place, unless the link has left it.
-  const auto measure_near = [&](const Eigen::Vector3d& p_FQ) {
-    for (std::size_t i = 0; i < clouds.size(); ++i) {
-      for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL,
-                     [&](const auto& obstacles) { measure_near_place(obstacles, p_FQ); });
-    }
-  };
-  if (last.has_place) measure_near(last.p_FCo);
-  if (distance() == kInfinity) measure_near(link_.search.X_FL * link_.context.tree().center());
-}
-
-// Measures an obstacle that is near a place, though perhaps not the nearest: of the points of one
-// tile, the one nearest to the last closest point of the link. Noise has moved all of them.
-void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ) {
-  const Eigen::Vector3d p_OQ = obstacles.X_FO.inverse() * p_FQ;
-  std::int32_t child = obstacles.bvh->root();
-  while (child >= 0) {
-    const BoxNode& node = obstacles.bvh->nodes()[static_cast<std::size_t>(child)];
-    child = node.child[nearest_child(node, p_OQ)];
-  }
-  enter(obstacles);
-  PointTile scratch;
-  const PointTile& tile = obstacles.bvh->tile(static_cast<std::size_t>(~child), &scratch);
-  const auto& last = link_.kept.last;
-  const Eigen::Vector3d p_OC = last.has_place ? obstacles.X_OL * last.p_LCl : p_OQ;
-  int nearest = 0;
-  for (int k = 1; k < tile.count; ++k) {
-    if ((tile.point(k) - p_OC).squaredNorm() < (tile.point(nearest) - p_OC).squaredNorm()) {
-      nearest = k;
-    }
-  }
-  // A point of the link's surface is no nearer than the surface.
-  const double distance = last.has_place ? (tile.point(nearest) - p_OC).norm() : kInfinity;
-  PointRefinement(obstacles, &link_)
-      .measure({~child, nearest}, (1.0 + 1e-9) * distance + kRounding);
-}
-
-// Boxes have an upper bound of their own.
-void LinkQuery::measure_near_place(const BoxObstacles& /*obstacles*/,
-                                   const Eigen::Vector3d& /*p_FQ*/) {}
-
-void LinkQuery::measure_again(const PointObstacles& obstacles) {
-  const auto& last = link_.kept.last;
-  const double distance = (obstacles.X_LO * point_O(*obstacles.bvh, last.id) - last.p_LCl).norm();
-  PointRefinement(obstacles, &link_).measure(last.id, (1.0 + 1e-9) * distance + kRounding);
-}
-
-void LinkQuery::measure_again(const BoxObstacles& obstacles) {
-  const auto& last = link_.kept.last;
-  const Eigen::AlignedBox3d box = box_O(*obstacles.bvh, last.id);
-  BoxRefinement refinement(obstacles, &link_);
-  if (last.was_inside && link_.context.solid().is_closed()) {
-    // The deepest point of a box hardly changes. With holes, the centre of a box may decide.
-    refinement.take_point(clamp_to(box, obstacles.X_FO.inverse() * last.p_FCo), last.id);
-    if (distance() < 0.0) return;
-  }
-  const Eigen::Vector3d p_OCl = obstacles.X_OL * last.p_LCl;
-  const double distance = (p_OCl - clamp_to(box, p_OCl)).norm();
-  refinement.measure(last.id, (1.0 + 1e-9) * distance + kRounding, p_OCl);
-}
-
-// A point that the stopped search has measured as outside may be inside: it had yet to meet the
-// spheres that hold it.
-template <class Obstacles>
-void LinkQuery::measure_closest(const Obstacles& obstacles) {
-  const ClosestObstacle& closest = link_.search.closest;
-  if (closest.source != obstacles.source ||
-      closest.is_box != std::is_same_v<Obstacles, BoxObstacles>) {
-    return;
-  }
-  Refinement<Obstacles>(obstacles, &link_).measure(closest.id);
-}
-
-// Among points the search finds a first upper bound as soon as another traversal would.
-void LinkQuery::upper_bound(const PointObstacles& /*obstacles*/) {}
-
-// Among boxes, a first upper bound spares exact distances, which are slow; and a box that overlaps
-// inner spheres is measured at its deepest points.
-void LinkQuery::upper_bound(const BoxObstacles& obstacles) {
-  LinkSearch& search = link_.search;
-  if (std::min(search.closest.exact.distance, search.other_links) < kInfinity) return;
-  const NearestToInnerSpheres nearest = find_nearest_to_inner_spheres(dual_tree_input(obstacles));
-  search.statistics->node_pairs += nearest.node_pairs;
-  search.statistics->leaf_pairs += nearest.leaf_pairs;
-  if (nearest.tile < 0) return;
-  BoxRefinement refinement(obstacles, &link_);
-  const ObstacleId id{nearest.tile, nearest.lane};
-  refinement.measure(id);
-  if (nearest.distance < 0.0F) refinement.take_deepest_in_spheres(nearest.leaf, id);
-}
-
-// Steps 2 and 3: the dual-tree traversal hands what may be nearer than the upper bound to the
-// refinement, which measures it exactly and lowers the upper bound.
-template <class Obstacles>
-DualTreeResult LinkQuery::search(const Obstacles& obstacles) {
-  LinkSearch& search = link_.search;
-  search.visited.clear();
-  search.outside.clear();
-  search.boxes_inside.clear();
-  search.refined = 0;
-  search.box_bounds.clear();
-  auto input = dual_tree_input(obstacles);
-  input.front = link_.kept.fronts.find(obstacles.bvh->build_id());
-  if (input.front != nullptr) {
-    input.front->begin(obstacles.bvh->build_id(), obstacles.X_OL, link_.context.displacement,
-                       input.rounding);
-  }
-  Refinement<Obstacles> refinement(obstacles, &link_);
-  const DualTreeResult found = search_dual_tree(input, &refinement);
-  search.statistics->node_pairs += found.node_pairs;
-  search.statistics->leaf_pairs += found.leaf_pairs;
-  if (is_crowded(found)) return found;  // another search follows
-  search.prune(static_cast<double>(found.pruned_bound) - search.rounding);
-  search.cover_bound =
-      std::min(search.cover_bound, static_cast<double>(found.cover_bound) - search.rounding);
-  if (found.may_be_inside) search.cover_bound = -kInfinity;
-  return found;
-}
-
-template <class Bvh>
-DualTreeInput<Bvh> LinkQuery::dual_tree_input(const PosedIndex<Bvh>& obstacles) {
-  const LinkSearch& search = link_.search;
-  DualTreeInput<Bvh> input;
-  input.tree = &link_.context.tree();
-  input.bvh = obstacles.bvh;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      input.R_OL[3 * row + column] = static_cast<float>(obstacles.X_OL.linear()(row, column));
-    }
-    input.p_OL[row] = static_cast<float>(obstacles.X_OL.translation()[row]);
-  }
-  input.rounding = round_up(search.rounding);
-  input.prune_bound = search.traversal_prune_bound();
-  input.inside_bound = round_up(link_.context.tree().interior_gap() + search.rounding);
-  input.supports = &link_.kept.supports;
-  input.planes = supporting_planes(obstacles.X_OL, link_);
-  return input;
-}
-template DualTreeInput<PointBvh> LinkQuery::dual_tree_input(const PointObstacles& obstacles);
-template DualTreeInput<BoxBvh> LinkQuery::dual_tree_input(const BoxObstacles& obstacles);
-
 // Accounts for the rounding in the frame of an index.
 template <class Obstacles>
 void LinkQuery::enter(const Obstacles& obstacles) {
@@ -428,7 +189,7 @@ bool LinkQuery::is_settled(SnapshotSpan clouds) {
   search.region_bound -= pose_error(search.drift, extent(), 0.0);
   const LinkBound& kept = link_.kept.bound;
   const double bound = kept.at(search.scene, search.X_FL);
-  if (!is_inside_regions() || !(bound >= search.prune_bound() - kRounding) ||
+  if (!is_inside_regions() || !(bound >= search.prune_bound() - kDistanceRounding) ||
       !(search.closest.exact.distance > 0.0)) {
     return false;
   }
@@ -481,98 +242,6 @@ void LinkQuery::keep_bound(double bound, double cover_distance) {
   // Float loses more, the farther.
   if (bound > search.range()) bound -= kFloatError * (bound - search.range());
   link_.kept.bound.prove(search.scene, search.X_FL, bound, cover_distance, search.max_coordinate);
-}
-
-// Keeps the least of the bounds of all indices, if it is positive.
-// @param bound_of_index  (obstacles) -> [m] no obstacle has a smaller signed distance, but for the
-//                        rounding; not positive where one may be inside
-template <class BoundOfIndex>
-void LinkQuery::prove_bound(SnapshotSpan clouds, const BoundOfIndex& bound_of_index) {
-  double bound = kInfinity;
-  const auto take = [&](const auto& obstacles) {
-    enter(obstacles);
-    bound = std::min(bound, bound_of_index(obstacles));
-  };
-  for (std::size_t i = 0; i < clouds.size() && bound > 0.0; ++i) {
-    for_each_index(*clouds[i], static_cast<std::int32_t>(i), link_.search.X_FL, take);
-  }
-  bound -= link_.search.rounding;
-  // A mesh with holes is bounded by its cover spheres alone: the bound is a cover distance, too.
-  if (bound > 0.0) keep_bound(bound, bound);
-}
-
-// Obstacles that are farther from the cover spheres than the interior gap are outside the link, and
-// so is what is above a supporting plane.
-void LinkQuery::prove_first_bound(SnapshotSpan clouds, Deadline* deadline, double late) {
-  LinkSearch& search = link_.search;
-  if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
-  auto& last = link_.kept.first_bound;
-  const bool is_late = deadline->has_passed();
-  if (last.scene == search.scene && search.scene != kUnknownScene &&
-      !(is_late && last.was_proven) &&
-      link_.context.displacement.between(last.X_FL, search.X_FL) < kFirstBoundAgain) {
-    return;
-  }
-  last.scene = search.scene;
-  last.X_FL = search.X_FL;
-  last.by_planes = false;
-  const InnerSphereTree& tree = link_.context.tree();
-  prove_bound(clouds, [&](const auto& obstacles) {
-    const auto by_spheres = [&](bool is_fine) {
-      const auto bound = static_cast<double>(
-          first_bound(PosedSpheres(tree, obstacles.X_OL, is_fine), obstacles.bvh->nodes().data(),
-                      obstacles.bvh->root(), deadline, late));
-      const bool is_outside = bound - search.rounding > tree.interior_gap();  // false for NaN
-      return is_outside ? bound : -kInfinity;
-    };
-    const double bound = by_spheres(false);
-    if (bound >= kFineSpheresWithin * tree.radius() || deadline->passed_by(late)) return bound;
-    if (!link_.context.solid().is_closed()) return by_spheres(true);
-    return bound_by_planes(obstacles, deadline, late);
-  });
-  last.was_proven = link_.kept.bound.at(search.scene, search.X_FL) > 0.0;
-  // The next query tries again a bound that was cut short.
-  if (!last.was_proven && deadline->passed_by(late)) last.scene = kUnknownScene;
-}
-
-void LinkQuery::prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline) {
-  LinkSearch& search = link_.search;
-  auto& last = link_.kept.first_bound;
-  if (search.is_answered || last.scene != search.scene || last.by_planes ||
-      !link_.context.solid().is_closed() || !(search.closest.exact.distance > 0.0) ||
-      link_.kept.bound.at(search.scene, search.X_FL) > 0.0) {
-    return;
-  }
-  last.by_planes = true;
-  prove_bound(clouds,
-              [&](const auto& obstacles) { return bound_by_planes(obstacles, deadline, {}); });
-}
-
-// @param late  [s] the search may exceed the deadline by so much, and it is quick: by the plane
-// across
-//              the closest obstacle alone, in a few steps
-template <class Obstacles>
-double LinkQuery::bound_by_planes(const Obstacles& obstacles, Deadline* deadline,
-                                  std::optional<double> late) {
-  const LinkSearch& search = link_.search;
-  const InnerSphereTree& tree = link_.context.tree();
-  const PosedSpheres spheres(tree, obstacles.X_OL, true);
-  SeparatingPlanes planes(*link_.context.model, obstacles.X_OL);
-  const SignedDistance& closest = search.closest.exact;
-  if (closest.distance > 0.0 && closest.distance < kInfinity) {
-    planes.add(obstacles.X_OL.linear() * closest.normal);
-  }
-  SeparationInput<std::decay_t<decltype(*obstacles.bvh)>> input;
-  input.spheres = &spheres;
-  input.gap = round_up(tree.interior_gap() + search.rounding);
-  input.radius = static_cast<float>(tree.radius());
-  input.bvh = obstacles.bvh;
-  if (late) {
-    input.late = *late;
-    input.max_steps = kQuickSteps;
-    input.max_planes = planes.count();
-  }
-  return static_cast<double>(ist::bound_by_planes(input, &planes, deadline));
 }
 
 // The error of a distance by the coordinates of stored points and by poses that are not quite

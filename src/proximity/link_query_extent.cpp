@@ -14,8 +14,6 @@ namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// [m] More than double loses where distances are compared.
-constexpr double kRounding = 1e-12;
 // BVTT fronts of spheres and of points of one index are different fronts.
 constexpr std::uint64_t kExtentFront = std::uint64_t{1} << 63U;
 
@@ -55,7 +53,7 @@ double largest_radius_near(const PointObstacles& obstacles, const LinkExtent& ex
                            const InnerSphereTree& tree, double reach) {
   const Eigen::Vector3d p_OS = obstacles.X_FO.inverse() * extent.points.p_FS;
   const Eigen::Vector3d center_O = obstacles.X_OL * tree.center();
-  const double within_sq = std::pow(tree.radius() + reach + kRounding, 2);
+  const double within_sq = std::pow(tree.radius() + reach + kDistanceRounding, 2);
   const std::vector<BoxNode>& nodes = obstacles.bvh->nodes();
   TraversalStack<std::int32_t, stack_capacity(kMaxBoxLevels, kBoxWidth)> stack;
   PointTile scratch;

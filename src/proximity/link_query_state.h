@@ -26,6 +26,9 @@
 /// The state of a link's query: three types, by how long their content lives.
 namespace ist {
 
+/// [m] More than double loses where distances are compared.
+inline constexpr double kDistanceRounding = 1e-12;
+
 /// The part that belongs to the link for ever, whatever its pose and whatever the clouds.
 struct LinkContext {
   explicit LinkContext(const LinkModel& link) : model(&link), displacement(link), grid(link) {}

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -121,6 +122,8 @@ class SurfacePairSearch {
   struct HullAnswers {
     int asked = 0, answered = 0;
   };
+  /// The key of a pair of which nothing is proven.
+  static constexpr double kUnproven = -1e-30;
   /// Sizes that are told apart, by powers of two.
   static constexpr int kHullSizes = 8;
 
@@ -133,15 +136,22 @@ class SurfacePairSearch {
   void sort_front();
   void rebase_path();
   double path() const { return path_ + moved_; }
-  double bound_at(double key) const;
+  /// [m] The bound that is left of a key.
+  double bound_at(double key) const {
+    return key < 0.0 ? 0.0 : std::max(key - path() * (1.0 + 1e-14), 0.0);
+  }
   double plane_bound() const { return plane_bound_ - (path() - plane_path_) * (1.0 + 1e-14); }
-  bool is_wanted(double bound) const;
+  bool is_wanted(double bound) const { return bound < prune_bound_ || bound <= 0.0; }
   void update_prune_bound();
   double tolerance_at(double distance) const;
   void set_direction();
-  bool is_leaf(const Pair& pair) const;
+  bool is_leaf(const Pair& pair) const { return a_.child(pair.a) < 0 && b_.child(pair.b) < 0; }
   Expansion expand(const Pair& pair, std::uint8_t children, double prune_bound);
-  double overlap_order(const Pair& pair) const;
+  /// A number below 0 for boxes that overlap, which orders small ones first: they lead to an
+  /// intersection soonest.
+  double overlap_order(const Pair& pair) const {
+    return -1.0 / (a_.radius(pair.a) + b_.radius(pair.b) + 1e-30);
+  }
   double bound_by_hulls(const Pair& pair);
   double measure(const Pair& pair);
   void descend();

@@ -49,6 +49,8 @@ class SurfaceBvh {
   std::int32_t child(Slot slot) const { return node_of(slot).child[slot % kWidth]; }
   double radius(Slot slot) const { return node_of(slot).radius[slot % kWidth]; }
   const std::vector<ConvexPart>& parts() const { return parts_; }
+  /// The part of a slot that holds a single one.
+  const ConvexPart& part(Slot slot) const { return parts_[static_cast<std::size_t>(~child(slot))]; }
   /// [m] No point of a part is farther from L's origin.
   double extent() const { return extent_; }
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }  ///< of all parts, in L
