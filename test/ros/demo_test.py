@@ -95,21 +95,28 @@ class DemoTest(unittest.TestCase):
         return {name: distance for name, (distance, _) in every.items()}
 
     def check_truth(self, answer):
-        """Every link of an answer against the points that the queries saw."""
+        """Every link that is known against the points that the queries saw: of an answer that is OK
+        all links, to the tolerance, of others what they prove.
+        """
         stamp = answer.cloud_stamp.to_nsec()
         pt.wait_until(lambda: stamp in self.filtered, "the filtered cloud in use")
         points = self.points(self.filtered[stamp])
         X_BL = self.arm.link_poses(self.positions(answer.header.stamp))
         truth = self.distances(X_BL, points)
         self.assertEqual({one.link for one in answer.links}, set(truth))
+        is_ok = answer.status == ProximityArray.OK
         for one in answer.links:
+            if one.state == LinkProximity.UNKNOWN and not is_ok:
+                continue
             if one.state == LinkProximity.CLEAR:
                 self.assertGreater(truth[one.link], 0.5 - POSE_ERROR)
                 continue
             self.assertEqual(one.state, LinkProximity.NEAR)
-            self.assertAlmostEqual(one.distance, truth[one.link], delta=TOLERANCE + POSE_ERROR)
+            self.assertGreaterEqual(one.distance, truth[one.link] - POSE_ERROR)
             self.assertLessEqual(one.lower_bound, truth[one.link] + POSE_ERROR)
-            self.assertLessEqual(one.distance - one.lower_bound, TOLERANCE + 1e-6)
+            if is_ok:
+                self.assertAlmostEqual(one.distance, truth[one.link], delta=TOLERANCE + POSE_ERROR)
+                self.assertLessEqual(one.distance - one.lower_bound, TOLERANCE + 1e-6)
             X_FL, local = X_BL[one.link], pt.vector(one.point_on_link_local)
             np.testing.assert_allclose(
                 pt.apply(X_FL, local), pt.vector(one.point_on_link), atol=POSE_ERROR
@@ -208,13 +215,17 @@ class DemoTest(unittest.TestCase):
         self.assertLess(
             (answer.header.stamp - self.answers[i].header.stamp).to_sec(), 0.4, answer.header.stamp
         )
-        for message in self.answers[i:first]:
-            pt.check_invariants(self, message, max_distance=0.5)
-            self.assertTrue(pt.all_unknown(message))
         self.wait_for_ok(first + 100)
-        for message in self.answers[first : first + 100]:
-            # Nothing from before the jump.
-            self.assertLess(message.cloud_stamp, message.header.stamp + rospy.Duration(0.2))
+        for message in self.answers[i : first + 100]:
+            pt.check_invariants(self, message, max_distance=0.5)
+            if not pt.all_unknown(message):
+                # Nothing from before the jump. A loaded machine may be late with some links' poses,
+                # or with the answer: NO_POSE and DEGRADED tell of the other links what is proven.
+                self.assertLess(message.cloud_stamp, message.header.stamp + rospy.Duration(0.2))
+        for message in self.answers[i:first]:
+            self.assertNotEqual(message.status, ProximityArray.OK)
+            if not pt.all_unknown(message):
+                self.check_truth(message)
         answer, _ = self.wait_for_ok(len(self.answers))
         self.check_truth(answer)
 
