@@ -82,6 +82,7 @@ void run(const std::vector<int>& arms, const std::string& cache, const Frame& fr
       ist::parse_urdf(urdf_of(arms), ist::GeometrySource::kCollision,
                       [](const std::string&) { return std::string(IST_PROXIMITY_SOURCE_DIR); }));
   ist::RobotModelConfig config;
+  config.distance_fields = true;  // as the node has them
   config.cache_directory = cache;
   const auto model = ist::build_robot_model(*description, config);
   const ist::Kinematics kinematics(*description);

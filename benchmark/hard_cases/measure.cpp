@@ -154,6 +154,7 @@ const char* name_of(Asked asked) {
 std::shared_ptr<const RobotModel> packed(const RobotDescription& robot,
                                          const std::string& cache_directory, double max_error) {
   RobotModelConfig config;
+  config.distance_fields = true;  // as the node has them
   config.packing.max_error = max_error;
   config.cache_directory = cache_directory;
   return build_robot_model(robot, config);

@@ -71,6 +71,7 @@ std::shared_ptr<const RobotModel> Robot::pack(double max_error, int max_spheres)
     description.links.push_back(std::move(link));
   }
   RobotModelConfig config;
+  config.distance_fields = true;  // as the node has them
   config.packing.max_error = max_error;
   config.packing.max_spheres = max_spheres;
   config.cache_directory = cache_directory;

@@ -119,6 +119,7 @@ Robot::Robot(const std::string& urdf, const RobotConfig& config) {
   model_config.packing = config.packing;
   model_config.cache_directory = config.cache_directory;
   model_config.links = config.links;
+  model_config.distance_fields = config.distance_fields;
   parts.model = build_robot_model(parts.description, model_config, config.callbacks);
   if (!parts.model) throw ModelError("building the robot was cancelled");
   const std::vector<LinkModel>& links = parts.model->links;

@@ -19,6 +19,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFloatError = 1e-6;
 // Error of a stored point: half a unit in the last place in each coordinate.
 constexpr double kPointError = 1.1e-7;
+// [m] What a link whose distance is not known yet gets cells of its grid for: many small ones would
+// have to be measured.
+constexpr double kUnknownDistance = 0.15;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
 
@@ -97,7 +100,7 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
     return false;
   }
   const double distance = search.closest.exact.distance;
-  link_.context.grid.set_distance(distance < kInfinity ? distance : 0.0);
+  link_.context.grid.set_distance(distance < kInfinity ? distance : kUnknownDistance);
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
@@ -279,6 +282,7 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   last.p_LCl = closest.exact.witness;
   last.p_FCo = closest.p_FCo;
   last.was_inside = distance < 0.0;
+  last.X_FL = search.X_FL;
   last.has_place = true;
   result->state = distance < 0.0 ? LinkState::kContact : LinkState::kNear;
   result->distance = distance;

@@ -136,6 +136,12 @@ class LinkQuery {
   DualTreeResult search(const Obstacles& obstacles);
   template <class Obstacles>
   void measure_closest(const Obstacles& obstacles);
+  bool has_field() const;
+  bool has_hardly_moved() const;
+  bool is_field_too_coarse() const;
+  bool begins_with_field() const;
+  template <class Obstacles>
+  bool search_by_field(const Obstacles& obstacles, bool* is_complete);
   template <class Bvh>
   DualTreeInput<Bvh> dual_tree_input(const PosedIndex<Bvh>& obstacles);
 

@@ -34,6 +34,8 @@ bool LinkQuery::is_crowded(const DualTreeResult& found) const {
 template <class Obstacles>
 bool LinkQuery::run(const Obstacles& obstacles) {
   enter(obstacles);
+  bool is_complete;
+  if (search_by_field(obstacles, &is_complete)) return is_complete;
   if (is_near(obstacles)) return search_near(obstacles);
   upper_bound(obstacles);
   const DualTreeResult found = search(obstacles);

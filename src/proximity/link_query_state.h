@@ -91,6 +91,7 @@ struct LinkCoherence {
     bool has_place = false;                           ///< whether p_FCo is that of some answer
     Eigen::Vector3d p_FCo = Eigen::Vector3d::Zero();  ///< [m] closest point of the obstacle
     bool was_inside = false;                          ///< whether p_FCo was inside the link
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();  ///< pose of the link
   } last;
   /// The obstacle whose sphere was found nearest; build_id 0: none was.
   struct {
@@ -100,6 +101,8 @@ struct LinkCoherence {
   /// [m] The distance at which too many points were about equally near for the dual-tree traversal;
   /// inf: none.
   double crowded_at = std::numeric_limits<double>::infinity();
+  /// [m] The distance at which the field search gave up; inf: nowhere.
+  double too_coarse_at = std::numeric_limits<double>::infinity();
   /// The last complete answer: it is the same for the same question.
   struct {
     SceneId scene = kUnknownScene;                           ///< unknown: there is none

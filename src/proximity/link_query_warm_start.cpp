@@ -31,7 +31,7 @@ int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
 // Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
 // point of the link to the last answer's obstacle is still a point of the link.
 void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
-  if (link_.search.is_answered) return;
+  if (link_.search.is_answered || begins_with_field()) return;
   const auto& last = link_.kept.last;
   const auto measure_last = [&](const auto& obstacles) {
     if (last.build_id == 0 || obstacles.bvh->build_id() != last.build_id) return;

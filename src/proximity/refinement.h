@@ -51,6 +51,10 @@ class PointRefinement {
   /// @param lower_bound  [m] by the clipped cover spheres
   /// @returns [m] the new prune bound
   float refine(std::int32_t tile, int lane, float lower_bound);
+  /// Measures a point that is outside.
+  /// @param max_distance  [m] what its distance does not exceed
+  /// @returns [m] the new prune bound
+  float measure_near(std::int32_t tile, int lane, float max_distance);
   /// [m] A lower bound of the distance of the point that refine() got last; -inf: none is known.
   float refined_bound() const { return refined_bound_; }
   bool has_holes() const { return !link_.context.solid().is_closed(); }

@@ -45,6 +45,13 @@ float PointRefinement::refine(std::int32_t tile, int lane, float lower_bound) {
   return search.traversal_prune_bound();
 }
 
+float PointRefinement::measure_near(std::int32_t tile, int lane, float max_distance) {
+  const ObstacleId id{tile, lane};
+  const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id);
+  measure_outside(id, p_OQ, obstacles_.X_LO * p_OQ, static_cast<double>(max_distance));
+  return link_.search.traversal_prune_bound();
+}
+
 bool PointRefinement::is_crowded(std::uint64_t node_pairs) const {
   const LinkSearch& search = link_.search;
   if (search.measured < kMeasuredBeforeCells || !link_.context.solid().is_closed()) return false;

@@ -14,6 +14,7 @@
 
 #include "internal/bvh/build_id.h"
 #include "internal/geometry/cancelled.h"
+#include "internal/geometry/distance_field.h"
 #include "internal/geometry/solid_queries.h"
 #include "internal/packing/packing_cache.h"
 #include "internal/robot/link_packing.h"
@@ -249,8 +250,12 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   model.tree = InnerSphereTree(model.packing, model_->config_.tree);
   model.packing_id = next_build_id();
   throw_if(cancelled);
-  model.solid =
-      before != nullptr && same_geometry ? before->solid : make_solid(geometry, cancelled);
+  const bool is_known = before != nullptr && same_geometry;
+  model.solid = is_known ? before->solid : make_solid(geometry, cancelled);
+  if (is_known) model.field = before->field;
+  if (model.field == nullptr && model_->config_.distance_fields) {
+    model.field = std::make_shared<const DistanceField>(model.solid, cancelled);
+  }
   return model;
 }
 
@@ -350,7 +355,34 @@ AnytimeModel::Ptr AnytimeModel::with_packings_of(const AnytimeModel& other) cons
     known = found->second;
     step.touch(key);
   }
-  return step.finish(robot_.get(), nullptr);
+  if (step.finish(robot_.get(), nullptr) == nullptr) return nullptr;
+  const auto robot = std::make_shared<RobotModel>(*model->robot_);
+  for (LinkModel& link : robot->links) {
+    for (const LinkModel& theirs : other.robot_->links) {
+      if (link.field == nullptr && is_same_solid(link.solid, theirs.solid)) {
+        link.field = theirs.field;
+      }
+    }
+  }
+  model->robot_ = robot;
+  return model;
+}
+
+AnytimeModel::Ptr AnytimeModel::with_field(std::size_t link,
+                                           const RobotModelCallbacks& callbacks) const {
+  const auto model = std::make_shared<AnytimeModel>(*this);
+  const auto robot = std::make_shared<RobotModel>(*robot_);
+  try {
+    const Solid& solid = robot->links[link].solid;
+    const auto field = std::make_shared<const DistanceField>(solid, callbacks.cancelled);
+    for (LinkModel& other : robot->links) {
+      if (is_same_solid(other.solid, solid)) other.field = field;
+    }
+  } catch (const Cancelled&) {
+    return nullptr;
+  }
+  model->robot_ = robot;
+  return model;
 }
 
 AnytimeModel::Ptr AnytimeModel::with_link(std::shared_ptr<const RobotDescription> description,

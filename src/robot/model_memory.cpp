@@ -1,5 +1,6 @@
 #include "internal/robot/model_memory.h"
 
+#include "internal/geometry/distance_field.h"
 #include "internal/geometry/solid_queries.h"
 
 namespace ist {
@@ -11,6 +12,7 @@ ModelMemory memory_of(const RobotModel& model) {
     memory.trees += link.tree.nodes().capacity() * sizeof(SphereNode) +
                     link.tree.leaves().capacity() * sizeof(SphereLeaf);
     memory.solids += memory_of(link.solid);
+    if (link.field != nullptr) memory.fields += link.field->memory();
   }
   return memory;
 }

@@ -21,6 +21,7 @@ struct RobotConfig {
   std::string cache_directory;                           ///< empty: no cache
   std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
   PackageFinder find_package;      ///< empty: environment_package_finder()
+  bool distance_fields = false;    ///< see RobotModelConfig
   RobotModelCallbacks callbacks;   ///< progress, warnings, cancelling
 };
 

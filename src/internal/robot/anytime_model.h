@@ -49,7 +49,14 @@ class AnytimeModel {
   /// @returns null when cancelled
   Ptr refined(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
 
-  /// The same model with the packings of another one where those are finer.
+  /// The same model with the distance field of a link, measured in the calling thread. Other links
+  /// of the same solid get it too.
+  /// @param link  index in robot(), usable
+  /// @returns null when cancelled
+  Ptr with_field(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
+
+  /// The same model with the packings of another one where those are finer, and with the fields
+  /// that it has measured of the same solids.
   Ptr with_packings_of(const AnytimeModel& other) const;
 
   /// The model of a description that differs in one link. Shapes that are not known yet are packed

@@ -13,7 +13,8 @@
 #include "ros/common/thread_priority.h"
 #include "ros/model/model_loader.h"
 
-// Background packing: finer spheres for the links that need them, one link at a time.
+// Background work on the model: distance fields and finer spheres for the links that need them, one
+// link at a time.
 
 namespace ist {
 namespace {
@@ -41,7 +42,7 @@ std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) 
   for (std::size_t i = 0; i < needs_.size(); ++i) {
     needs_[i] = state.usage->take(i);
     const LinkModel& link = state.robot->links[i];
-    if (link.is_final || !link.usable()) continue;
+    if ((link.is_final && link.field != nullptr) || !link.usable()) continue;
     const bool pays = needs_[i].is_near || needs_[i].exact >= kExactThatPays ||
                       config_.self_collision.enabled;  // the width of its answers is the gap
     if (pays && (!chosen || is_before(i, *chosen))) chosen = i;
@@ -82,7 +83,10 @@ bool ModelLoader::refine_once() {
     ROS_WARN_STREAM(warning);
     warnings.push_back(warning);
   };
-  const AnytimeModel::Ptr refined = state->anytime->refined(*link, callbacks);
+  // A field makes queries of a coarse packing fast, and takes less time than finer spheres.
+  const AnytimeModel::Ptr refined = state->robot->links[*link].field == nullptr
+                                        ? state->anytime->with_field(*link, callbacks)
+                                        : state->anytime->refined(*link, callbacks);
   if (refined) take_packings(*state, refined, warnings);
   return refined != nullptr;
 }

@@ -81,13 +81,14 @@ double megabytes(std::size_t bytes) { return 1e-6 * static_cast<double>(bytes); 
 /// Adds how far background packing has got.
 void add_packings(const ModelState& state, DiagnosticStatus* status) {
   if (!state.robot) return;
-  std::size_t usable = 0, final = 0, spheres = 0;
+  std::size_t usable = 0, final = 0, spheres = 0, fields = 0;
   double largest_gap = 0.0;
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
     if (!link.usable()) continue;
     ++usable;
     final += link.is_final ? 1 : 0;
+    fields += link.field != nullptr ? 1 : 0;
     spheres += link.packing.spheres.size();
     largest_gap = std::max(largest_gap, link.packing.certificate.max_gap);
   }
@@ -95,13 +96,18 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
             std::to_string(final) + " of " + std::to_string(usable) +
                 (final < usable ? "; the others get finer spheres when it pays" : ""),
             status);
+  add_value("links with a distance field",
+            std::to_string(fields) + " of " + std::to_string(usable) +
+                (fields < usable ? "; the others get one when it pays" : ""),
+            status);
   add_value("spheres", spheres, status);
   const ModelMemory memory = memory_of(*state.robot);
   add_value("memory",
             format_text("%.1f MB: ", megabytes(memory.total())) +
                 format_text("packings %.1f, ", megabytes(memory.packings)) +
                 format_text("trees %.1f, ", megabytes(memory.trees)) +
-                format_text("exact geometry %.1f", megabytes(memory.solids)),
+                format_text("exact geometry %.1f, ", megabytes(memory.solids)) +
+                format_text("distance fields %.1f", megabytes(memory.fields)),
             status);
   add_value("largest gap", millimetres(largest_gap), status);
 }

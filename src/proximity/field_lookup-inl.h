@@ -1,0 +1,178 @@
+// Looks places up in a field of distances, as many at a time as a vector has lanes. Compiled once
+// per instruction set: to be included again for each.
+#if defined(IST_PROXIMITY_FIELD_LOOKUP_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_PROXIMITY_FIELD_LOOKUP_INL_H
+#undef IST_PROXIMITY_FIELD_LOOKUP_INL_H
+#else
+#define IST_PROXIMITY_FIELD_LOOKUP_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "internal/geometry/distance_field.h"
+#include "proximity/clipped_sphere-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist {
+namespace HWY_NAMESPACE {
+namespace field_search {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// The errors of float: a share of what is squared, and of a place [m]: 2^-24 of a coordinate in
+// cells, of which a grid has fewer than a thousand, in cells of a few centimetres.
+constexpr float kSquareError = 2e-6F, kPlaceError = 4e-6F;
+
+// sqrt(interpolated^2 - variance): see DistanceField.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V LessVariance(D d, V interpolated, V variance) {
+  const auto squared =
+      hn::Mul(hn::Mul(interpolated, interpolated), hn::Set(d, 1.0F - kSquareError));
+  return hn::Sqrt(
+      hn::Max(hn::NegMulAdd(variance, hn::Set(d, 1.0F + kSquareError), squared), hn::Zero(d)));
+}
+
+// The variance of a random node along an axis, in squared edges.
+template <class V>
+HWY_INLINE V Variance(V t) {
+  return hn::NegMulAdd(t, t, t);
+}
+
+class FieldLookup {
+ public:
+  explicit FieldLookup(const DistanceField& field)
+      : field_(field), diagonal_(field.bounds().diagonal().norm()) {}
+
+  // The finest grid that holds a sphere, and whose cells are not much smaller; else the coarsest.
+  const DistanceField::Level& LevelAt(const float* center, float radius) const {
+    for (const DistanceField::Level& level : field_.levels()) {
+      bool is_inside = radius <= kCellsPerRadius * level.cell;
+      for (int i = 0; i < 3; ++i) {
+        const float from_low = center[i] - level.low[i];
+        const float extent = static_cast<float>(level.size[i] - 1) * level.cell;
+        is_inside = is_inside && from_low >= radius && from_low + radius <= extent;
+      }
+      if (is_inside) return level;
+    }
+    return field_.levels().back();
+  }
+
+  // Lower bounds [m] of the distances of places.
+  // @param upper  receives upper bounds; kFarAway where none is known
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V Distance(D d, const DistanceField::Level& level, V x, V y, V z, V* upper) const {
+    const hn::RebindToSigned<D> di;
+    const V from_bounds = BoundsDistance(d, x, y, z);
+    const V gx = GridCoordinate(d, level, 0, x), gy = GridCoordinate(d, level, 1, y),
+            gz = GridCoordinate(d, level, 2, z);
+    // Written so that NaN is in no cell.
+    const auto is_in = hn::And(hn::And(IsInGrid(d, level, 0, gx), IsInGrid(d, level, 1, gy)),
+                               IsInGrid(d, level, 2, gz));
+    const auto ix = hn::ConvertTo(di, hn::IfThenElseZero(is_in, gx)),
+               iy = hn::ConvertTo(di, hn::IfThenElseZero(is_in, gy)),
+               iz = hn::ConvertTo(di, hn::IfThenElseZero(is_in, gz));
+    const V tx = hn::Sub(hn::IfThenElseZero(is_in, gx), hn::ConvertTo(d, ix)),
+            ty = hn::Sub(hn::IfThenElseZero(is_in, gy), hn::ConvertTo(d, iy)),
+            tz = hn::Sub(hn::IfThenElseZero(is_in, gz), hn::ConvertTo(d, iz));
+    const std::int32_t row = level.size[0], layer = row * level.size[1];
+    const auto at =
+        hn::Add(ix, hn::Add(hn::Mul(iy, hn::Set(di, row)), hn::Mul(iz, hn::Set(di, layer))));
+    const std::uint16_t* values = field_.values().data() + level.first;
+    V most = hn::Zero(d);
+    const auto along_x = [&](std::int32_t offset) {
+      return Edge(d, values, hn::Add(at, hn::Set(di, offset)), tx, &most);
+    };
+    const V near = Mix(ty, along_x(0), along_x(row));
+    const V far = Mix(ty, along_x(layer), along_x(layer + row));
+    const V interpolated = hn::Mul(Mix(tz, near, far), hn::Set(d, DistanceField::kStep));
+    const V variance = hn::Mul(hn::Set(d, level.cell * level.cell),
+                               hn::Add(Variance(tx), hn::Add(Variance(ty), Variance(tz))));
+    const V lower = hn::Sub(LessVariance(d, interpolated, variance), hn::Set(d, kPlaceError));
+    const auto is_known =
+        hn::And(is_in, hn::Lt(most, hn::Set(d, static_cast<float>(DistanceField::kFar))));
+    const float slack = level.cell * (kHalfDiagonal + 1.0F / DistanceField::kSlackParts) +
+                        DistanceField::kStep + kPlaceError;
+    *upper = hn::IfThenElse(is_known, hn::Add(interpolated, hn::Set(d, slack)),
+                            hn::Add(from_bounds, hn::Set(d, diagonal_)));
+    return hn::Max(hn::IfThenElseZero(is_in, lower), from_bounds);
+  }
+
+  // [m] No surface and no place inside is nearer to a place; not positive: unknown.
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V OutsideRadius(D d, V x, V y, V z) const {
+    const hn::RebindToSigned<D> di;
+    const DistanceField::Level& level = field_.levels().front();
+    const V from_bounds = BoundsDistance(d, x, y, z);
+    const V gx = GridCoordinate(d, level, 0, x), gy = GridCoordinate(d, level, 1, y),
+            gz = GridCoordinate(d, level, 2, z);
+    const auto is_in = hn::And(hn::And(IsInGrid(d, level, 0, gx), IsInGrid(d, level, 1, gy)),
+                               IsInGrid(d, level, 2, gz));
+    const auto nearest = [&](V g) { return hn::NearestInt(hn::IfThenElseZero(is_in, g)); };
+    const auto ix = nearest(gx), iy = nearest(gy), iz = nearest(gz);
+    const std::int32_t row = level.size[0], layer = row * level.size[1];
+    const auto at =
+        hn::Add(ix, hn::Add(hn::Mul(iy, hn::Set(di, row)), hn::Mul(iz, hn::Set(di, layer))));
+    const auto bytes =
+        hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(field_.outside().data()), at);
+    const V radius = hn::Mul(hn::ConvertTo(d, hn::And(bytes, hn::Set(di, 0xFF))),
+                             hn::Set(d, DistanceField::kOutsideStep));
+    const V from_node = hn::Mul(
+        dual_tree::Norm(hn::Sub(gx, hn::ConvertTo(d, ix)), hn::Sub(gy, hn::ConvertTo(d, iy)),
+                        hn::Sub(gz, hn::ConvertTo(d, iz))),
+        hn::Set(d, level.cell));
+    const V by_node = hn::Sub(hn::Sub(radius, from_node), hn::Set(d, kPlaceError));
+    return hn::Max(hn::IfThenElseZero(is_in, by_node),
+                   hn::Sub(from_bounds, hn::Set(d, kPlaceError)));
+  }
+
+ private:
+  // Larger spheres are not looked up in small cells: their radius is the larger error.
+  static constexpr float kCellsPerRadius = 8.0F;
+  static constexpr float kHalfDiagonal = 0.8661F;
+
+  template <class D, class V = hn::Vec<D>>
+  static HWY_INLINE V GridCoordinate(D d, const DistanceField::Level& level, int axis, V x) {
+    return hn::Mul(hn::Sub(x, hn::Set(d, level.low[axis])), hn::Set(d, level.per_cell));
+  }
+  template <class D, class V = hn::Vec<D>>
+  static HWY_INLINE hn::Mask<D> IsInGrid(D d, const DistanceField::Level& level, int axis, V g) {
+    return hn::And(hn::Ge(g, hn::Zero(d)),
+                   hn::Lt(g, hn::Set(d, static_cast<float>(level.size[axis] - 1))));
+  }
+  template <class V>
+  static HWY_INLINE V Mix(V t, V a, V b) {
+    return hn::MulAdd(t, hn::Sub(b, a), a);
+  }
+
+  // Interpolates along x between two nodes. The pair is read at once.
+  template <class D, class VI, class V = hn::Vec<D>>
+  static HWY_INLINE V Edge(D d, const std::uint16_t* values, VI at, V t, V* most) {
+    const hn::RebindToSigned<D> di;
+    const hn::RebindToUnsigned<D> du;
+    const auto pair =
+        hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(values), hn::ShiftLeft<1>(at));
+    const V a = hn::ConvertTo(d, hn::And(pair, hn::Set(di, 0xFFFF)));
+    const V b = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(du, pair))));
+    *most = hn::Max(*most, hn::Max(a, b));
+    return Mix(t, a, b);
+  }
+
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V BoundsDistance(D d, V x, V y, V z) const {
+    const Eigen::AlignedBox3f& box = field_.bounds();
+    const auto along = [&](int axis, V v) {
+      return dual_tree::IntervalDistance(d, hn::Set(d, box.min()[axis]),
+                                         hn::Set(d, box.max()[axis]), v);
+    };
+    return dual_tree::Norm(along(0, x), along(1, y), along(2, z));
+  }
+
+  const DistanceField& field_;
+  const float diagonal_;  // [m] of the box about the solid
+};
+
+}  // namespace field_search
+}  // namespace HWY_NAMESPACE
+}  // namespace ist
+HWY_AFTER_NAMESPACE();
+
+#endif  // IST_PROXIMITY_FIELD_LOOKUP_INL_H

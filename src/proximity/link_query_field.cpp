@@ -1,0 +1,108 @@
+// The search of an index of points by the link's field of distances.
+
+#include "internal/geometry/float_rounding.h"
+#include "proximity/field_search.h"
+#include "proximity/link_query.h"
+#include "proximity/refinement.h"
+
+namespace ist {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// [m] Nearer than this, the cells of the field are too large to tell much, and another search
+// begins at once.
+constexpr double kTooNear = 0.003;
+// [m] A link that has moved farther has another nearest obstacle: the field finds it sooner than
+// the last answer's obstacle is measured.
+constexpr double kFarMoved = 0.03;
+// Distances that differ by no more than this factor are about the same.
+constexpr double kSameDistance = 1.5;
+// The share of the tolerance that a search proves more than it has to: among slow motions the bound
+// of a link then lasts for several steps.
+constexpr double kAhead = 0.5;
+
+}  // namespace
+
+bool LinkQuery::has_field() const {
+  const auto& field = link_.context.model->field;
+  return field != nullptr && !field->empty();
+}
+
+// Whether the link is about where it was when it was asked last.
+bool LinkQuery::has_hardly_moved() const {
+  const auto& last = link_.kept.last;
+  return last.has_place &&
+         link_.context.displacement.between(last.X_FL, link_.search.X_FL) < kFarMoved;
+}
+
+// Whether the field search gave up lately, at about this distance.
+bool LinkQuery::is_field_too_coarse() const {
+  const double distance = link_.search.closest.exact.distance;
+  const double too_coarse_at = link_.kept.too_coarse_at;
+  return has_hardly_moved() && distance > too_coarse_at / kSameDistance &&
+         distance < kSameDistance * too_coarse_at;
+}
+
+// Whether the last answer's obstacle is of no use.
+bool LinkQuery::begins_with_field() const {
+  return has_field() && !link_.kept.last.was_inside && link_.search.config.deadline == 0.0 &&
+         !has_hardly_moved();
+}
+
+// @returns whether the search has answered for the index; if not, another one has to
+template <>
+bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_complete) {
+  LinkSearch& search = link_.search;
+  if (!has_field() || search.closest.exact.distance < kTooNear || is_field_too_coarse()) {
+    return false;
+  }
+  FieldSearchInput input;
+  input.field = link_.context.model->field.get();
+  input.bvh = obstacles.bvh;
+  FieldQueue queue;
+  input.queue = &queue;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      input.R_LO[3 * row + column] = static_cast<float>(obstacles.X_LO.linear()(row, column));
+    }
+    input.p_LO[row] = static_cast<float>(obstacles.X_LO.translation()[row]);
+  }
+  input.rounding = round_up(search.rounding);
+  input.prune_bound = search.traversal_prune_bound();
+  input.is_exact = search.config.tolerance == 0.0 && search.config.relative_tolerance == 0.0;
+  if (has_hardly_moved()) input.ahead = static_cast<float>(kAhead * search.config.tolerance);
+  input.planes = supporting_planes(obstacles.X_OL, link_);
+  input.support = link_.kept.supports.max_support;
+  PointRefinement refinement(obstacles, &link_);
+  const FieldSearchResult found = search_field(input, &refinement);
+  search.statistics->node_pairs += found.nodes;
+  search.statistics->leaf_pairs += found.tiles;
+  if (found.gave_up) {
+    link_.kept.too_coarse_at = search.closest.exact.distance;
+    return false;
+  }
+  if (found.has_inside) {
+    search.cover_bound = -kInfinity;
+    search_inside(obstacles);
+    *is_complete = !search.deadline->passed();
+    return true;
+  }
+  // What the deadline left may be inside.
+  const bool is_proven = found.pruned_bound > 0.0F;
+  search.prune(is_proven ? static_cast<double>(found.pruned_bound) - search.rounding
+                         : -link_.context.tree().radius());
+  if (!link_.context.solid().is_closed()) {
+    const double outside = static_cast<double>(found.outside_bound) - search.rounding;
+    search.cover_bound =
+        std::min(search.cover_bound, link_.context.tree().interior_gap() + outside);
+  }
+  *is_complete = found.has_time;
+  return true;
+}
+template <>
+bool LinkQuery::search_by_field(const BoxObstacles& /*obstacles*/, bool* /*is_complete*/) {
+  return false;
+}
+
+}  // namespace ist
