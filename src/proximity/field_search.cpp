@@ -26,12 +26,15 @@ constexpr float kMayBeInside = -1e3F;
 // So many points are measured before another search is better: where very many are about equally
 // near, and where the field's cells are too large. Tolerance 0 needs more of them.
 constexpr int kMaxMeasured = 32, kMaxMeasuredExact = 256;
+// A search that has visited so many tiles and measured nothing measures a point: the link's
+// supporting plane across its direction may separate the link from all others, as from a table.
+constexpr std::uint64_t kTilesBeforePlanes = 4;
 // So many points whose sides the field does not tell are asked about one by one.
-constexpr int kMaxAsked = 64;
+constexpr int kMaxAsked = 16;
 
 // Bounds of a node's children or of a tile's points.
 struct alignas(64) Bounds {
-  float distance[kBoxWidth];                       // [m] lower bounds; kMayBeInside
+  float distance[kBoxWidth];                       // [m] lower bounds; below 0: may be inside
   float outside[kBoxWidth];                        // [m] every place that is nearer is outside
   float x[kBoxWidth], y[kBoxWidth], z[kBoxWidth];  // [m] in the link's frame
   float radius[kBoxWidth];                         // [m] as FieldQueue::Entry
@@ -59,6 +62,13 @@ class Search {
       result_.has_time = !policy_.deadline_passed();
       if (!result_.has_time) break;
       const float bound = queue_.pop(&entry);
+      if (has_new_planes_ && entry.lane == FieldQueue::kNoPoint) {
+        const float height = planes_.Height(entry.min, entry.max) - in_.support;
+        if (height >= limit_) {
+          Prune(height, height);
+          continue;
+        }
+      }
       if (entry.lane != FieldQueue::kNoPoint) {
         Measure(entry, bound);
       } else if (entry.child < 0) {
@@ -107,10 +117,11 @@ class Search {
       outside = hn::Max(outside, hn::IfThenElse(is_center_outside, by_center, outside));
     }
     const auto is_outside = hn::Gt(outside, hn::Zero(d));
-    const auto by_field = hn::IfThenElse(is_outside, hn::Max(outside, hn::Max(by_center, least)),
-                                         hn::Set(d, kMayBeInside));
+    const auto unknown = hn::Set(d, kMayBeInside);
+    const auto by_field =
+        hn::IfThenElse(is_outside, hn::Max(outside, hn::Max(by_center, least)), unknown);
     const auto is_above = hn::Gt(height, hn::Zero(d));
-    const auto by_plane = hn::IfThenElse(is_above, height, hn::Set(d, kMayBeInside));
+    const auto by_plane = hn::IfThenElse(is_above, height, unknown);
     hn::Store(hn::Max(by_field, by_plane), d, bounds->distance + k);
     hn::Store(hn::Max(outside, by_plane), d, bounds->outside + k);
   }
@@ -256,6 +267,8 @@ class Search {
               planes_.Height(tile, k, planes_.offset() + in_.support), k, &bounds);
     }
     LowerLimit(hn::GetLane(hn::MinOfLanes(d, farthest)));
+    if (result_.tiles >= kTilesBeforePlanes && measured_ == 0)
+      MeasureLeast(entry, tile.count, &bounds);
     for (std::uint32_t bits = Below(bounds, tile.count); bits != 0; bits &= bits - 1) {
       const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
       Entry* point = Push(bounds, k);
@@ -263,6 +276,26 @@ class Search {
       point->child = entry.child;
       point->lane = k;
     }
+  }
+
+  // Measures the point of a tile that has the least bound, if it is known to be outside, and looks
+  // for planes across its direction.
+  void MeasureLeast(const Entry& tile, int count, Bounds* bounds) {
+    const float* least = std::min_element(bounds->distance, bounds->distance + count);
+    if (*least == kMayBeInside || !(*least < limit_)) return;
+    const auto k = static_cast<int>(least - bounds->distance);
+    Entry point{};
+    point.child = tile.child;
+    point.lane = k;
+    point.outside = bounds->outside[k];
+    point.radius = bounds->radius[k];
+    Measure(point, *least);
+    bounds->distance[k] = kFarAway;
+    SupportingPlanes updated;
+    if (!policy_.update_planes(&updated)) return;
+    planes_.Set(updated);
+    in_.support = policy_.link_support();
+    has_new_planes_ = true;
   }
 
   // Some point is no farther than this. It will be measured: its lower bound is less.
@@ -315,13 +348,14 @@ class Search {
     limit_ = std::min(limit_, prune_bound + in_.ahead);
   }
 
-  const FieldSearchInput& in_;
+  FieldSearchInput in_;
   PointRefinement& policy_;
   FieldQueue& queue_;
   const FieldLookup field_;
   dual_tree::PlaneFrame planes_;
   const bool is_closed_;
-  float limit_;  // [m]
+  float limit_;                   // [m]
+  bool has_new_planes_ = false;   // which entries of the queue do not know
   int asked_ = 0, measured_ = 0;  // points
   FieldSearchResult result_;
 };

@@ -99,8 +99,7 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
     take_kept_bound();
     return false;
   }
-  const double distance = search.closest.exact.distance;
-  link_.context.grid.set_distance(distance < kInfinity ? distance : kUnknownDistance);
+  set_grid_level();
   search.pruned_bound = search.cover_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
@@ -120,6 +119,11 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
     take_kept_bound();
   }
   return search.is_complete;
+}
+
+void LinkQuery::set_grid_level() {
+  const double distance = link_.search.closest.exact.distance;
+  link_.context.grid.set_distance(distance < kInfinity ? distance : kUnknownDistance);
 }
 
 // A link counts once in a query, however often it is run.

@@ -102,6 +102,7 @@ class LinkQuery {
   double proven(double bound) const;
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
+  void set_grid_level();
   void keep_bound();
   void keep_bound(double bound, double cover_distance);
   void keep_answer();

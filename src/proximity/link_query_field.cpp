@@ -1,5 +1,8 @@
 // The search of an index of points by the link's field of distances.
 
+#include <algorithm>
+#include <limits>
+
 #include "internal/geometry/float_rounding.h"
 #include "proximity/field_search.h"
 #include "proximity/link_query.h"
@@ -78,8 +81,13 @@ bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_comple
   const FieldSearchResult found = search_field(input, &refinement);
   search.statistics->node_pairs += found.nodes;
   search.statistics->leaf_pairs += found.tiles;
+  // The other searches begin with an obstacle that is about in the middle of the link's scene.
+  if ((found.gave_up || found.has_inside) && !has_hardly_moved()) {
+    measure_near_place(obstacles, search.X_FL * link_.context.tree().center());
+  }
   if (found.gave_up) {
-    link_.kept.too_coarse_at = search.closest.exact.distance;
+    set_grid_level();
+    if (has_hardly_moved()) link_.kept.too_coarse_at = search.closest.exact.distance;
     return false;
   }
   if (found.has_inside) {

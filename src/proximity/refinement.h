@@ -60,6 +60,8 @@ class PointRefinement {
   bool has_holes() const { return !link_.context.solid().is_closed(); }
   /// Calls update_supporting_planes().
   bool update_planes(SupportingPlanes* planes);
+  /// [m] The link's support along the normal of its supporting planes.
+  float link_support() const { return link_.kept.supports.max_support; }
   bool deadline_passed() { return link_.search.deadline->passed(); }
   /// Whether so many points are about equally near that the single-tree traversal is better.
   bool is_crowded(std::uint64_t node_pairs) const;
