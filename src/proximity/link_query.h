@@ -139,6 +139,7 @@ class LinkQuery {
   void measure_closest(const Obstacles& obstacles);
   bool has_field() const;
   bool has_hardly_moved() const;
+  bool is_too_near_for_field() const;
   bool is_field_too_coarse() const;
   bool begins_with_field() const;
   template <class Obstacles>

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// [m] Nearer than this, the cells of the field are too large to tell much, and another search
-// begins at once.
-constexpr double kTooNear = 0.003;
+// Nearer than so many of its smallest cells, a field tells little, and another search begins at
+// once.
+constexpr double kTooNearInCells = 0.6;
 // [m] A link that has moved farther has another nearest obstacle: the field finds it sooner than
 // the last answer's obstacle is measured.
 constexpr double kFarMoved = 0.03;
@@ -39,6 +39,11 @@ bool LinkQuery::has_hardly_moved() const {
          link_.context.displacement.between(last.X_FL, link_.search.X_FL) < kFarMoved;
 }
 
+bool LinkQuery::is_too_near_for_field() const {
+  const auto cell = static_cast<double>(link_.context.model->field->levels().front().cell);
+  return link_.search.closest.exact.distance < kTooNearInCells * cell;
+}
+
 // Whether the field search gave up lately, at about this distance.
 bool LinkQuery::is_field_too_coarse() const {
   const double distance = link_.search.closest.exact.distance;
@@ -57,9 +62,7 @@ bool LinkQuery::begins_with_field() const {
 template <>
 bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_complete) {
   LinkSearch& search = link_.search;
-  if (!has_field() || search.closest.exact.distance < kTooNear || is_field_too_coarse()) {
-    return false;
-  }
+  if (!has_field() || is_too_near_for_field() || is_field_too_coarse()) return false;
   FieldSearchInput input;
   input.field = link_.context.model->field.get();
   input.bvh = obstacles.bvh;

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/geometry/distance_field.h"
 #include "internal/robot/model_memory.h"
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
@@ -174,6 +175,48 @@ TEST(AnytimeModel, memoryGrowsWithTheSpheresAlone) {
   EXPECT_GT(first.solids, 0U);
   EXPECT_EQ(last.solids, first.solids);
   if (!test::kSanitized) EXPECT_GT(last.packings + last.trees, first.packings + first.trees);
+}
+
+// A field changes nothing but the time of queries, and stays while packings become finer.
+TEST(AnytimeModel, aLinkKeepsItsFieldWhileItIsPackedMoreFinely) {
+  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
+  const auto link = static_cast<std::size_t>(next_link(*first->robot(), -1));
+  const auto model = first->with_field(link);
+  const RobotModel &before = *first->robot(), &after = *model->robot();
+  EXPECT_TRUE(same_geometry(before, after));
+  EXPECT_EQ(before.links[link].field, nullptr);
+  ASSERT_NE(after.links[link].field, nullptr);
+  EXPECT_FALSE(after.links[link].field->empty());
+  EXPECT_GT(memory_of(after).fields, 0U);
+  for (std::size_t i = 0; i < before.links.size(); ++i) {
+    EXPECT_EQ(after.links[i].packing_id, before.links[i].packing_id);
+    if (i != link) EXPECT_EQ(after.links[i].field, nullptr);
+  }
+  const auto finer = model->refined(link);
+  EXPECT_NE(finer->robot()->links[link].packing_id, after.links[link].packing_id);
+  EXPECT_EQ(finer->robot()->links[link].field, after.links[link].field);
+  // A model that has grown meanwhile takes it, too.
+  const auto grown = first->refined(link)->with_packings_of(*model);
+  EXPECT_EQ(grown->robot()->links[link].field, after.links[link].field);
+}
+
+TEST(AnytimeModel, measuringAFieldCanBeCancelled) {
+  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
+  RobotModelCallbacks callbacks;
+  callbacks.cancelled = [] { return true; };
+  EXPECT_EQ(first->with_field(0, callbacks), nullptr);
+}
+
+TEST(AnytimeModel, fieldsOfAllLinksAreMeasuredWhereTheyAreAskedFor) {
+  const std::vector<LinkGeometry> links = {test::one(Sphere{0.1}), test::one(Box{{0.1, 0.2, 0.3}})};
+  RobotModelConfig config = config_to(kMaxError);
+  config.distance_fields = true;
+  for (const LinkModel& link : build_robot_model(*robot_of(links), config)->links) {
+    EXPECT_NE(link.field, nullptr);
+  }
+  for (const LinkModel& link : build_robot_model(*robot_of(links), config_to(kMaxError))->links) {
+    EXPECT_EQ(link.field, nullptr);
+  }
 }
 
 TEST(AnytimeModel, equalShapesGrowTogether) {

@@ -67,8 +67,9 @@ struct RobotProximity {
 
 /// Counts of a query's work, for tuning and tests.
 struct QueryStatistics {
-  std::uint64_t node_pairs = 0;         ///< pairs of tree node and BVH node that were expanded
-  std::uint64_t leaf_pairs = 0;         ///< pairs of sphere leaf and tile of obstacles
+  /// Pairs of tree node and BVH node that were expanded; BVH nodes of a search by the field.
+  std::uint64_t node_pairs = 0;
+  std::uint64_t leaf_pairs = 0;  ///< pairs of sphere leaf and tile of obstacles; tiles, as above
   std::uint64_t exact_evaluations = 0;  ///< points measured against the link's exact geometry
   std::uint64_t outside_region = 0;     ///< links whose range ends outside a cloud's region
   std::uint64_t unfinished = 0;         ///< links that a deadline left wider than the tolerance
@@ -85,6 +86,9 @@ struct QueryStatistics {
 /// link and inside, and where very many points are about equally near, a traversal of the BVH alone
 /// takes over: a grid of signed distances about the link bounds boxes and points for the whole
 /// link.
+///
+/// Links that have a distance field (LinkModel::field) are searched by it among points, unless they
+/// are in contact or nearly so.
 ///
 /// A query that has a deadline first proves a bound of every link and measures one obstacle for it;
 /// then it asks every link to within half of its distance, and then to within the tolerance, the
