@@ -93,15 +93,18 @@ class NewestModel {
   LinkUsage usage;
 };
 
-// The link that is not final and whose queries measured most points exactly since the last call,
-// those before the others that something is near; -1: all are final.
+// The link that is not final, or has no distance field, and whose queries measured most points
+// exactly since the last call, those before the others that something is near; -1: there is none.
 int link_to_refine(NewestModel* newest) {
   const AnytimeModel::Ptr model = newest->get();
   int chosen = -1;
   std::pair<bool, double> most(false, -1.0);
   for (std::size_t i = 0; i < newest->usage.size(); ++i) {
     const LinkUsage::Need need = newest->usage.take(i);
-    if (model->robot()->links[i].is_final || std::pair(need.is_near, need.exact) <= most) continue;
+    const LinkModel& link = model->robot()->links[i];
+    if ((link.is_final && link.field != nullptr) || std::pair(need.is_near, need.exact) <= most) {
+      continue;
+    }
     most = {need.is_near, need.exact};
     chosen = static_cast<int>(i);
   }
@@ -116,8 +119,11 @@ void refine(NewestModel* newest, const std::atomic<bool>& stop) {
   while (!stop) {
     const int link = link_to_refine(newest);
     if (link < 0) return;
+    const AnytimeModel::Ptr model = newest->get();
+    const auto i = static_cast<std::size_t>(link);
+    const bool has_field = model->robot()->links[i].field != nullptr;
     const AnytimeModel::Ptr next =
-        newest->get()->refined(static_cast<std::size_t>(link), callbacks);
+        has_field ? model->refined(i, callbacks) : model->with_field(i, callbacks);
     if (next) newest->set(next);
   }
 }

@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "proximity/field_lookup-inl.h"
@@ -267,6 +268,7 @@ class Search {
               planes_.Height(tile, k, planes_.offset() + in_.support), k, &bounds);
     }
     LowerLimit(hn::GetLane(hn::MinOfLanes(d, farthest)));
+    assert(tile.count > 0);  // LowerLimit() relies on it for every box
     if (result_.tiles >= kTilesBeforePlanes && measured_ == 0)
       MeasureLeast(entry, tile.count, &bounds);
     for (std::uint32_t bits = Below(bounds, tile.count); bits != 0; bits &= bits - 1) {
