@@ -129,6 +129,35 @@ TEST_F(FieldSearch, APointThatEntersThroughAHoleIsFound) {
   EXPECT_GT(contacts, 100);
 }
 
+// The same beside points along a wall, which stay nearer all the time: what is kept of the link's
+// distance says nothing of the point that enters.
+TEST_F(FieldSearch, APointThatEntersBesideNearerOnesIsFound) {
+  const LinkGeometry cup = test::one(test::open_box({0.1, 0.1, 0.1}));
+  const auto model = with_fields(test::model_of({cup}, 0.002));
+  QueryConfig config;
+  config.tolerance = 0.002;
+  int contacts = 0;
+  for (int side = 0; side < 6; ++side) {
+    const Eigen::Vector3d way = (side < 3 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(side % 3);
+    const Eigen::Vector3d beside = Eigen::Vector3d::Unit((side + 1) % 3);
+    std::vector<Eigen::Vector3d> points = {0.2 * way};
+    for (int k = -300; k <= 500; ++k) points.push_back(0.062 * beside + 0.001 * k * way);
+    const CloudSnapshot cloud = test::make_snapshot(points);
+    ProximityQuery query(model, config);
+    LinkProximity result;
+    for (int step = 0; step <= 400; ++step) {
+      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      X_FL.translation() = (0.13 + 0.0001 * step) * way;  // the hole is about the middle
+      ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &result));
+      SCOPED_TRACE(testing::Message() << "side " << side << ", step " << step);
+      test::expect_truth(result, test::truth_of(cup, X_FL, points, cloud), config, X_FL, kRounding);
+      if (HasFailure()) return;
+      contacts += result.state == LinkState::kContact ? 1 : 0;
+    }
+  }
+  EXPECT_GT(contacts, 100);
+}
+
 // A large hollow with a hole: a box of points deep inside is far from every surface.
 TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
   const LinkGeometry hollow = test::one(test::open_box({1.0, 1.0, 1.0}));
