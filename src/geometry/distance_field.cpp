@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/solid_element.h"
 #include "internal/geometry/outside_margin.h"
 #include "internal/geometry/solid_queries.h"
 
@@ -63,6 +64,15 @@ class DistanceField::Builder {
       bounds_.min()[axis] = -support(solid_, -n);
     }
     if (bounds_.isEmpty() || !bounds_.sizes().allFinite()) return false;
+    // The inside of a mesh with holes ends at the box about it in its own frame.
+    for (const SolidElement& element : elements_of(solid_)) {
+      if (element.is_closed) continue;
+      const Eigen::AlignedBox3d& box = element.bvh.bounds();
+      for (int corner = 0; corner < 8; ++corner) {
+        bounds_.extend(element.X_LE *
+                       box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner)));
+      }
+    }
     // More than float loses.
     const double slack = 1e-6 * (1.0 + std::max(bounds_.min().cwiseAbs().maxCoeff(),
                                                 bounds_.max().cwiseAbs().maxCoeff()));
@@ -132,6 +142,8 @@ class DistanceField::Builder {
 
   // [m] No surface and no place inside is nearer to the node that was measured last.
   double outside_radius(const Eigen::Vector3d& p_L) {
+    // The ball about the node before, which is a cell away, tells the side of all places in it.
+    side_radius_ -= cell_;
     const double from_bounds = bounds_.exteriorDistance(p_L);
     if (from_bounds >= distance_) return distance_;
     if (!(distance_ > 0.0)) return from_bounds;
@@ -140,8 +152,6 @@ class DistanceField::Builder {
                       std::min(outside_margin(solid_, p_L, distance_).margin, distance_));
     }
     if (!field_.is_closed_) return from_bounds;
-    // The ball about the node before tells the side of all places in it.
-    side_radius_ -= cell_;
     if (!(side_radius_ > 0.0)) {
       side_ = solid_.is_inside(p_L) ? Side::kInside : Side::kOutside;
     }

@@ -65,8 +65,9 @@ class Search {
       const float bound = queue_.pop(&entry);
       if (has_new_planes_ && entry.lane == FieldQueue::kNoPoint) {
         const float height = planes_.Height(entry.min, entry.max) - in_.support;
-        if (height >= limit_) {
-          Prune(height, height);
+        // Near holes no plane tells inside from outside.
+        if (height >= limit_ && (is_closed_ || entry.outside > 0.0F)) {
+          Prune(height, is_closed_ ? height : entry.outside);
           continue;
         }
       }
@@ -107,24 +108,25 @@ class Search {
   HWY_INLINE void Combine(hn::Vec<BoxTag> distance, hn::Vec<BoxTag> radius, hn::Vec<BoxTag> least,
                           hn::Vec<BoxTag> height, std::size_t k, Bounds* bounds) const {
     const BoxTag d;
-    const auto at_center = field_.OutsideRadius(
-        d, hn::Load(d, bounds->x + k), hn::Load(d, bounds->y + k), hn::Load(d, bounds->z + k));
+    const auto at_center =
+        hn::Sub(field_.OutsideRadius(d, hn::Load(d, bounds->x + k), hn::Load(d, bounds->y + k),
+                                     hn::Load(d, bounds->z + k)),
+                hn::Set(d, in_.rounding));
     const auto by_center = hn::Sub(distance, radius);
+    const auto unknown = hn::Set(d, kMayBeInside);
+    const auto by_plane = hn::IfThenElse(hn::Gt(height, hn::Zero(d)), height, unknown);
     // No surface is in the sphere about the centre that reaches as far as the distance: of a closed
-    // solid, all of it is where the centre is.
+    // solid, all of it is where the centre is. What is above its supporting plane is outside, too.
     auto outside = hn::Sub(at_center, radius);
     if (is_closed_) {
       const auto is_center_outside = hn::Gt(at_center, hn::Zero(d));
       outside = hn::Max(outside, hn::IfThenElse(is_center_outside, by_center, outside));
+      outside = hn::Max(outside, by_plane);
     }
     const auto is_outside = hn::Gt(outside, hn::Zero(d));
-    const auto unknown = hn::Set(d, kMayBeInside);
-    const auto by_field =
-        hn::IfThenElse(is_outside, hn::Max(outside, hn::Max(by_center, least)), unknown);
-    const auto is_above = hn::Gt(height, hn::Zero(d));
-    const auto by_plane = hn::IfThenElse(is_above, height, unknown);
-    hn::Store(hn::Max(by_field, by_plane), d, bounds->distance + k);
-    hn::Store(hn::Max(outside, by_plane), d, bounds->outside + k);
+    const auto bound = hn::Max(hn::Max(outside, by_plane), hn::Max(by_center, least));
+    hn::Store(hn::IfThenElse(is_outside, bound, unknown), d, bounds->distance + k);
+    hn::Store(outside, d, bounds->outside + k);
   }
 
   // Lower bounds of the distance at the corners of a box.

@@ -99,6 +99,30 @@ TEST(DistanceField, BallsHoldNothingThatIsInside) {
   EXPECT_GT(near_solids, 200);
 }
 
+// Links as large as an arm's, and larger: the rounding of float is more than that of small ones.
+TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
+  test::Rng rng(5);
+  int inside = 0;
+  for (const double size : {0.4, 0.8, 1.2, 2.0}) {
+    for (const TriangleMesh& mesh :
+         {test::box({size, 0.6 * size, 0.3 * size}), test::icosphere(0.5 * size, 3),
+          test::torus(0.4 * size, 0.15 * size, 24, 12)}) {
+      for (const Eigen::Isometry3d& X_LE :
+           {Eigen::Isometry3d::Identity(), test::random_pose(&rng, 0.1)}) {
+        const Solid solid({GeometryElement{mesh, X_LE, "test"}});
+        const DistanceField field(solid);
+        const DistanceField::Level& finest = field.levels().front();
+        for (std::size_t i = 0; i < nodes_of(finest); i += 7) {
+          if (!solid.is_inside(node(finest, i))) continue;
+          ++inside;
+          ASSERT_EQ(field.outside()[i], 0) << size;
+        }
+      }
+    }
+  }
+  EXPECT_GT(inside, 20000);
+}
+
 TEST(DistanceField, GridsLieWithinEachOtherAndReachFar) {
   const Solid solid({GeometryElement{Box{{0.3, 0.1, 0.2}}, Eigen::Isometry3d::Identity(), "box"}});
   const DistanceField field(solid);

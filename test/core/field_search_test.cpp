@@ -158,6 +158,34 @@ TEST_F(FieldSearch, APointThatEntersBesideNearerOnesIsFound) {
   EXPECT_GT(contacts, 100);
 }
 
+// The inside of a mesh with holes may reach beyond its surface, up to the box about it in its own
+// frame: above the rim of two cups, one in the other.
+TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFoundAsWithoutAField) {
+  const TriangleMesh cups =
+      test::joined(test::open_box({0.1, 0.1, 0.1}), test::open_box({0.09, 0.09, 0.09}));
+  int contacts = 0;
+  for (int round = 0; round < 60; ++round) {
+    const Eigen::Isometry3d X_LE = test::random_pose(&rng_, 0.0);
+    TriangleMesh turned = cups;
+    for (Eigen::Vector3d& v : turned.vertices) v = X_LE.inverse() * v;
+    const LinkGeometry link = {GeometryElement{turned, X_LE, "cups"}};
+    const auto without = test::model_of({link}, 0.01);
+    ProximityQuery query(with_fields(without), {}), other(without, {});
+    LinkProximity one, two;
+    for (int k = 0; k < 30; ++k) {
+      const std::vector<Eigen::Vector3d> points = {test::random_vector(&rng_, 0.08)};
+      const CloudSnapshot cloud = test::make_snapshot(points);
+      const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &one));
+      ASSERT_TRUE(other.run_link(0, X_FL, {&cloud}, &two));
+      ASSERT_EQ(one.state, two.state) << round;
+      ASSERT_NEAR(one.distance, two.distance, 1e-9) << round;
+      contacts += one.state == LinkState::kContact ? 1 : 0;
+    }
+  }
+  EXPECT_GT(contacts, 100);
+}
+
 // A large hollow with a hole: a box of points deep inside is far from every surface.
 TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
   const LinkGeometry hollow = test::one(test::open_box({1.0, 1.0, 1.0}));
