@@ -167,7 +167,7 @@ class DistanceField::Builder {
   Eigen::AlignedBox3d bounds_;  // [m] of the solid
   bool has_margins_ = false;
   double cell_ = 0.0;  // [m] of the level at work
-  // Of the node that was measured last.
+  // The next five are about the node that was measured last.
   double distance_ = 0.0, upper_ = 0.0;  // [m] bounds of its distance
   Eigen::Vector3d hint_L_ = Eigen::Vector3d::Zero();
   Side side_ = Side::kUnknown;  // of a closed solid

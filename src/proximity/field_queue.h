@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What a field search has still to look at, the least bound first: boxes of nodes and tiles, and
+/// The queue of a field search, the least bound first. It holds boxes of nodes and tiles, and
 /// single points. Nothing is allocated.
 class FieldQueue {
  public:

@@ -197,7 +197,7 @@ class Search {
 
   void ExpandNode(const Entry& entry, float entry_bound) {
     alignas(64) float corner[8];
-    // Where the link is nearer than the box is large, the corners say little.
+    // The corners say little where the link is nearer than the box is large.
     const bool has_corners = entry_bound > 0.5F * entry.radius;
     if (has_corners) {
       const float least = BoundCorners(entry, corner);

@@ -99,7 +99,7 @@ bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_comple
     *is_complete = !search.deadline->passed();
     return true;
   }
-  // What the deadline left may be inside.
+  // Points that the deadline left may be inside.
   const bool is_proven = found.pruned_bound > 0.0F;
   search.prune(is_proven ? static_cast<double>(found.pruned_bound) - search.rounding
                          : -link_.context.tree().radius());
