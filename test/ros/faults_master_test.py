@@ -8,6 +8,7 @@ import sys
 import time
 
 MARGIN = 0.05  # [m]
+TIMEOUT = 3.0  # [s] of clouds and poses: a test that sends late on a loaded machine is no fault
 
 
 def free_port():
@@ -50,7 +51,10 @@ class MasterTest(faults.FaultTest):
         super().check_distance(one, truth, MARGIN)
 
     def start(self):
-        return super().start(**{"query/margin": MARGIN})
+        self.cloud_timeout = TIMEOUT
+        return super().start(
+            **{"query/margin": MARGIN, "cloud_timeout": TIMEOUT, "pose_timeout": TIMEOUT}
+        )
 
     def watch(self, node, seconds):
         """Every message of some seconds is OK; the bounds are checked at the end."""
