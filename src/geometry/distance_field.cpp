@@ -23,6 +23,8 @@ constexpr std::array<Grid, 5> kGrids = {
 // Nodes of a grid, at most: about a large solid cells are larger.
 constexpr double kMaxNodes = 2e5;
 constexpr double kCellGrowth = 1.25;
+// The same of the grid of depths.
+constexpr double kDepthCell = 0.005, kMaxDepthNodes = 5e4;
 // [m] More than double loses in the distance of a link's places.
 constexpr double kRounding = 1e-9;
 
@@ -51,6 +53,7 @@ class DistanceField::Builder {
       if (i + 1 < kGrids.size() && cell >= kGrids[i + 1].cell) continue;
       add_level(box, cell);
     }
+    if (elements_of(solid_).size() == 1) add_depths();
     field_.values_.resize(field_.values_.size() + kPadding, kFar);
     field_.outside_.resize(field_.outside_.size() + kPadding, 0);
   }
@@ -82,7 +85,8 @@ class DistanceField::Builder {
     return true;
   }
 
-  void add_level(const Eigen::AlignedBox3d& box, double cell) {
+  // A grid about the middle of a box that holds the box.
+  static Level make_level(const Eigen::AlignedBox3d& box, double cell, std::size_t first) {
     const Eigen::Array3i size = nodes_of(box, cell);
     const Eigen::Vector3d low = box.center() - 0.5 * cell * (size - 1).cast<double>().matrix();
     Level level;
@@ -92,27 +96,82 @@ class DistanceField::Builder {
     }
     level.cell = static_cast<float>(cell);
     level.per_cell = 1.0F / level.cell;
-    level.first = field_.values_.size();
-    field_.values_.reserve(level.first + static_cast<std::size_t>(size.prod()) + kPadding);
-    const bool is_finest = field_.levels_.empty();
+    level.first = first;
+    return level;
+  }
+
+  static std::size_t count(const Level& level) {
+    std::size_t nodes = 1;
+    for (const std::int32_t size : level.size) nodes *= static_cast<std::size_t>(size);
+    return nodes;
+  }
+
+  // Measures the nodes of a grid and calls take() with the place of each.
+  template <class Take>
+  void measure_nodes(const Level& level, const Take& take) {
     cell_ = static_cast<double>(level.cell);
-    for (int z = 0; z < size.z(); ++z) {
-      for (int y = 0; y < size.y(); ++y) {
+    for (int z = 0; z < level.size[2]; ++z) {
+      for (int y = 0; y < level.size[1]; ++y) {
         forget();
-        for (int x = 0; x < size.x(); ++x) {
+        for (int x = 0; x < level.size[0]; ++x) {
           watch_.step();
           const Eigen::Vector3d p_L(node(level, 0, x), node(level, 1, y), node(level, 2, z));
           measure(p_L);
-          field_.values_.push_back(
-              static_cast<std::uint16_t>(steps(distance_, static_cast<double>(kStep), kFar)));
-          if (!is_finest) continue;
-          const double radius = outside_radius(p_L);
-          field_.outside_.push_back(
-              static_cast<std::uint8_t>(steps(radius, static_cast<double>(kOutsideStep), 255.0)));
+          take(p_L);
         }
       }
     }
+  }
+
+  void add_level(const Eigen::AlignedBox3d& box, double cell) {
+    const Level level = make_level(box, cell, field_.values_.size());
+    field_.values_.reserve(level.first + count(level) + kPadding);
+    const bool is_finest = field_.levels_.empty();
+    measure_nodes(level, [&](const Eigen::Vector3d& p_L) {
+      field_.values_.push_back(
+          static_cast<std::uint16_t>(steps(distance_, static_cast<double>(kStep), kFar)));
+      if (!is_finest) return;
+      const double radius = outside_radius(p_L);
+      field_.outside_.push_back(
+          static_cast<std::uint8_t>(steps(radius, static_cast<double>(kOutsideStep), 255.0)));
+    });
     field_.levels_.push_back(level);
+  }
+
+  void add_depths() {
+    double cell = kDepthCell;
+    while (nodes_of(bounds_, cell).cast<double>().prod() > kMaxDepthNodes) cell *= kCellGrowth;
+    const Level level = make_level(bounds_, cell, 0);
+    std::vector<Eigen::Vector3f> to_surface;
+    std::vector<std::uint16_t> balls;
+    to_surface.reserve(count(level));
+    balls.reserve(count(level));
+    float largest = 0.0F;
+    bool have_surface = true;
+    measure_nodes(level, [&](const Eigen::Vector3d& p_L) {
+      have_surface = have_surface && has_surface_;
+      to_surface.emplace_back((surface_L_ - p_L).cast<float>());
+      largest = std::max(largest, to_surface.back().cwiseAbs().maxCoeff());
+      balls.push_back(static_cast<std::uint16_t>(
+          steps(outside_radius(p_L), static_cast<double>(kBallStep), 65535.0)));
+    });
+    constexpr float kMost = 32767.0F;
+    if (!have_surface || !(largest > 0.0F) || !std::isfinite(largest)) return;
+    field_.surface_step_ = largest / kMost;
+    const auto join = [](std::uint16_t low, std::uint16_t high) {
+      return low | static_cast<std::uint32_t>(high) << 16U;
+    };
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+      std::uint16_t parts[3];
+      for (int axis = 0; axis < 3; ++axis) {
+        const float at = to_surface[i][axis] / field_.surface_step_;
+        parts[axis] = static_cast<std::uint16_t>(
+            static_cast<std::int16_t>(std::lround(std::clamp(at, -kMost, kMost))));
+      }
+      field_.surface_xy_.push_back(join(parts[0], parts[1]));
+      field_.surface_z_ball_.push_back(join(parts[2], balls[i]));
+    }
+    field_.depths_ = level;
   }
 
   static double node(const Level& level, int axis, int i) {
@@ -137,6 +196,8 @@ class DistanceField::Builder {
     const SignedDistance found =
         distance_outside(solid_, p_L, limit, hint_L_, tolerance, &distance_);
     upper_ = std::min(std::max(found.distance, 0.0), limit);
+    surface_L_ = found.witness;
+    has_surface_ = found.distance < std::numeric_limits<double>::infinity();
     hint_L_ = found.normal;
   }
 
@@ -167,9 +228,10 @@ class DistanceField::Builder {
   Eigen::AlignedBox3d bounds_;  // [m] of the solid
   bool has_margins_ = false;
   double cell_ = 0.0;  // [m] of the level at work
-  // The next five are about the node that was measured last.
+  // The next seven are about the node that was measured last.
   double distance_ = 0.0, upper_ = 0.0;  // [m] bounds of its distance
-  Eigen::Vector3d hint_L_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d hint_L_ = Eigen::Vector3d::Zero(), surface_L_ = Eigen::Vector3d::Zero();
+  bool has_surface_ = false;    // whether a point of the surface was found
   Side side_ = Side::kUnknown;  // of a closed solid
   double side_radius_ = 0.0;    // [m] places that are nearer are on the same side
 };

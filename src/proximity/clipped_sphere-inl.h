@@ -21,6 +21,14 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using BoxTag = hn::CappedTag<float, static_cast<std::size_t>(kBoxWidth)>;
 
+// Bit k for lane k.
+template <class D>
+HWY_INLINE std::uint32_t MaskBits(D d, hn::Mask<D> mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(d, mask, bits);
+  return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
+}
+
 // Distance of a value from an interval.
 template <class D>
 HWY_INLINE hn::Vec<D> IntervalDistance(D d, hn::Vec<D> low, hn::Vec<D> high, hn::Vec<D> value) {

@@ -124,6 +124,50 @@ class FieldLookup {
                    hn::Sub(from_bounds, hn::Set(d, kPlaceError)));
   }
 
+  // What a node of the grid of depths tells of places.
+  template <class D, class V = hn::Vec<D>>
+  struct ByNode {
+    V x, y, z;  // [m] from the node's surface point to the place
+    V ball;     // [m] no surface and no place inside is nearer to the place
+  };
+
+  // By the nodes nearest to the places. The grid must have nodes.
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE ByNode<D> ByNearestNode(D d, V x, V y, V z) const {
+    const auto at = [&](int axis, V v) {
+      return hn::NearestInt(DepthCoordinate(d, axis, v, field_.depths().size[axis] - 1));
+    };
+    return LookUp(d, x, y, z, at(0, x), at(1, y), at(2, z));
+  }
+
+  // By the eight nodes about the places.
+  // @param ball  as ByNode
+  // @returns [m] the least distances of the places from the nodes' surface points
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V ByEightNodes(D d, V x, V y, V z, V* ball) const {
+    const hn::RebindToSigned<D> di;
+    const auto low = [&](int axis, V v) {
+      return hn::ConvertTo(di, DepthCoordinate(d, axis, v, field_.depths().size[axis] - 2));
+    };
+    const auto ix = low(0, x), iy = low(1, y), iz = low(2, z), one = hn::Set(di, 1);
+    auto least_sq = hn::Set(d, kFarAway);
+    *ball = hn::Zero(d);
+    for (const auto& jx : {ix, hn::Add(ix, one)}) {
+      for (const auto& jy : {iy, hn::Add(iy, one)}) {
+        for (const auto& jz : {iz, hn::Add(iz, one)}) {
+          const auto v = LookUp(d, x, y, z, jx, jy, jz);
+          *ball = hn::Max(*ball, v.ball);
+          least_sq =
+              hn::Min(least_sq, hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::Mul(v.z, v.z))));
+        }
+      }
+    }
+    return hn::Sqrt(least_sq);
+  }
+
+  // [m] How much too short those distances may be.
+  float surface_error() const { return field_.surface_step() + kPlaceError; }
+
  private:
   // Larger spheres are not looked up in small cells: their radius is the larger error.
   static constexpr float kCellsPerRadius = 8.0F;
@@ -154,6 +198,43 @@ class FieldLookup {
     const V b = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(du, pair))));
     *most = hn::Max(*most, hn::Max(a, b));
     return Mix(t, a, b);
+  }
+
+  // Where a coordinate is in the grid of depths, at most `last`. NaN is in cell 0.
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V DepthCoordinate(D d, int axis, V x, std::int32_t last) const {
+    const V zero = hn::Zero(d), most = hn::Set(d, static_cast<float>(last));
+    const V g = hn::Min(hn::Max(GridCoordinate(d, field_.depths(), axis, x), zero), most);
+    return hn::IfThenElseZero(hn::And(hn::Ge(g, zero), hn::Le(g, most)), g);
+  }
+
+  template <class D, class VI, class V = hn::Vec<D>>
+  HWY_INLINE ByNode<D> LookUp(D d, V x, V y, V z, VI ix, VI iy, VI iz) const {
+    const hn::RebindToSigned<D> di;
+    const hn::RebindToUnsigned<D> du;
+    const DistanceField::Level& level = field_.depths();
+    const std::int32_t row = level.size[0], layer = row * level.size[1];
+    const auto at =
+        hn::Add(ix, hn::Add(hn::Mul(iy, hn::Set(di, row)), hn::Mul(iz, hn::Set(di, layer))));
+    const auto gather = [&](const std::vector<std::uint32_t>& values) {
+      return hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(values.data()), at);
+    };
+    const auto xy = gather(field_.surface_xy()), z_ball = gather(field_.surface_z_ball());
+    const auto low_half = [](VI v) { return hn::ShiftRight<16>(hn::ShiftLeft<16>(v)); };
+    const auto from_node = [&](int axis, V v, VI i) {
+      const V from_low = hn::Sub(v, hn::Set(d, level.low[axis]));
+      return hn::NegMulAdd(hn::ConvertTo(d, i), hn::Set(d, level.cell), from_low);
+    };
+    const V dx = from_node(0, x, ix), dy = from_node(1, y, iy), dz = from_node(2, z, iz);
+    const auto from_surface = [&](V v, VI offset) {
+      return hn::NegMulAdd(hn::ConvertTo(d, offset), hn::Set(d, field_.surface_step()), v);
+    };
+    const V radius =
+        hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(du, z_ball)))),
+                hn::Set(d, DistanceField::kBallStep));
+    const V ball = hn::Sub(hn::Sub(radius, dual_tree::Norm(dx, dy, dz)), hn::Set(d, kPlaceError));
+    return {from_surface(dx, low_half(xy)), from_surface(dy, hn::ShiftRight<16>(xy)),
+            from_surface(dz, low_half(z_ball)), ball};
   }
 
   template <class D, class V = hn::Vec<D>>

@@ -22,20 +22,20 @@ using dual_tree::BoxTag;
 using CornerTag = hn::CappedTag<float, 8>;
 using Entry = FieldQueue::Entry;
 
-// The bound [m] of what may be inside: it is looked at before all others.
+// The bound [m] of what may be inside, at any depth: it is looked at before all others.
 constexpr float kMayBeInside = -1e3F;
 // So many points are measured before another search is better: where very many are about equally
 // near, and where the field's cells are too large. Tolerance 0 needs more of them.
-constexpr int kMaxMeasured = 32, kMaxMeasuredExact = 256;
+constexpr int kMaxMeasured = 100, kMaxMeasuredExact = 256;
 // A search that has visited so many tiles and measured nothing measures a point: the link's
 // supporting plane across its direction may separate the link from all others, as from a table.
 constexpr std::uint64_t kTilesBeforePlanes = 4;
 // So many points whose sides the field does not tell are asked about one by one.
-constexpr int kMaxAsked = 16;
+constexpr int kMaxAsked = 64;
 
 // Bounds of a node's children or of a tile's points.
 struct alignas(64) Bounds {
-  float distance[kBoxWidth];                       // [m] lower bounds; below 0: may be inside
+  float distance[kBoxWidth];                       // [m] lower bounds; negative: of the depth
   float outside[kBoxWidth];                        // [m] every place that is nearer is outside
   float x[kBoxWidth], y[kBoxWidth], z[kBoxWidth];  // [m] in the link's frame
   float radius[kBoxWidth];                         // [m] as FieldQueue::Entry
@@ -49,6 +49,7 @@ class Search {
         queue_(*input.queue),
         field_(*input.field),
         is_closed_(input.field->is_closed()),
+        has_depths_(input.field->has_depths()),
         limit_(input.prune_bound + input.ahead) {
     planes_.Set(input.planes);
   }
@@ -59,7 +60,7 @@ class Search {
     entry.lane = FieldQueue::kNoPoint;
     entry.radius = kFarAway;
     ExpandNode(entry, kMayBeInside);
-    while (!queue_.empty() && queue_.least() < limit_ && !result_.has_inside && !result_.gave_up) {
+    while (!queue_.empty() && queue_.least() < limit_ && !result_.gave_up && result_.has_time) {
       result_.has_time = !policy_.deadline_passed();
       if (!result_.has_time) break;
       const float bound = queue_.pop(&entry);
@@ -102,31 +103,79 @@ class Search {
     }
   }
 
-  // Combines the bounds of spheres about places. What is above the supporting plane is outside.
+  // What the grid of depths tells of spheres about places.
+  struct Inside {
+    hn::Vec<BoxTag> depth;  // [m] no place is deeper inside
+    hn::Vec<BoxTag> ball;   // [m] as FieldLookup::ByNode, about the centre
+  };
+
+  // Combines the bounds of spheres about places.
   // @param distance  [m] of the places
   // @param least     [m] another bound of their distances
+  // @param inside    returns an Inside; it is called where the field has depths
+  template <class LookInside>
   HWY_INLINE void Combine(hn::Vec<BoxTag> distance, hn::Vec<BoxTag> radius, hn::Vec<BoxTag> least,
-                          hn::Vec<BoxTag> height, std::size_t k, Bounds* bounds) const {
+                          hn::Vec<BoxTag> height, const LookInside& inside, std::size_t k,
+                          Bounds* bounds) const {
     const BoxTag d;
-    const auto at_center =
+    const auto unknown = hn::Set(d, kMayBeInside), rounding = hn::Set(d, in_.rounding);
+    const auto by_center = hn::Sub(distance, radius);
+    const auto by_plane = hn::IfThenElse(hn::Gt(height, unknown), height, unknown);
+    auto at_center =
         hn::Sub(field_.OutsideRadius(d, hn::Load(d, bounds->x + k), hn::Load(d, bounds->y + k),
                                      hn::Load(d, bounds->z + k)),
-                hn::Set(d, in_.rounding));
-    const auto by_center = hn::Sub(distance, radius);
-    const auto unknown = hn::Set(d, kMayBeInside);
-    const auto by_plane = hn::IfThenElse(hn::Gt(height, hn::Zero(d)), height, unknown);
-    // No surface is in the sphere about the centre that reaches as far as the distance: of a closed
-    // solid, all of it is where the centre is. What is above its supporting plane is outside, too.
-    auto outside = hn::Sub(at_center, radius);
+                rounding);
+    auto outside = Outside(at_center, by_center, radius, by_plane);
+    auto lowest = unknown;
+    if (has_depths_ && !hn::AllTrue(d, hn::Gt(outside, hn::Zero(d)))) {
+      const Inside found = inside();
+      at_center = hn::Max(at_center, hn::Sub(found.ball, rounding));
+      outside = Outside(at_center, by_center, radius, by_plane);
+      lowest = hn::Neg(found.depth);
+      lowest = hn::IfThenElse(hn::Gt(lowest, unknown), lowest, unknown);
+    }
+    // The signed distance of a closed solid falls by no more than the way; and a way up to the
+    // supporting plane leads out of it.
     if (is_closed_) {
       const auto is_center_outside = hn::Gt(at_center, hn::Zero(d));
-      outside = hn::Max(outside, hn::IfThenElse(is_center_outside, by_center, outside));
-      outside = hn::Max(outside, by_plane);
+      lowest =
+          hn::Max(hn::Max(lowest, by_plane), hn::IfThenElse(is_center_outside, outside, lowest));
     }
     const auto is_outside = hn::Gt(outside, hn::Zero(d));
     const auto bound = hn::Max(hn::Max(outside, by_plane), hn::Max(by_center, least));
-    hn::Store(hn::IfThenElse(is_outside, bound, unknown), d, bounds->distance + k);
+    hn::Store(hn::IfThenElse(is_outside, bound, lowest), d, bounds->distance + k);
     hn::Store(outside, d, bounds->outside + k);
+  }
+
+  // [m] Every place that is nearer to a sphere is outside; not positive: unknown.
+  // @param at_center  [m] about the sphere's centre
+  // @param by_center  [m] no surface is nearer to the sphere
+  // @param by_plane   [m] height of the sphere above the supporting plane
+  HWY_INLINE hn::Vec<BoxTag> Outside(hn::Vec<BoxTag> at_center, hn::Vec<BoxTag> by_center,
+                                     hn::Vec<BoxTag> radius, hn::Vec<BoxTag> by_plane) const {
+    const BoxTag d;
+    const auto outside = hn::Sub(at_center, radius);
+    if (!is_closed_) return outside;
+    // No surface is in the sphere about the centre that reaches as far as the distance: of a closed
+    // solid, all of it is where the centre is. What is above its supporting plane is outside, too.
+    const auto is_center_outside = hn::Gt(at_center, hn::Zero(d));
+    const auto by_side = hn::IfThenElse(is_center_outside, by_center, outside);
+    return hn::Max(hn::Max(outside, by_side), by_plane);
+  }
+
+  // A box is no deeper than its farthest corner is from a surface point.
+  HWY_INLINE Inside LookInside(const Bounds& bounds, std::size_t k, hn::Vec<BoxTag> half_x,
+                               hn::Vec<BoxTag> half_y, hn::Vec<BoxTag> half_z) const {
+    const BoxTag d;
+    const auto v = field_.ByNearestNode(d, hn::Load(d, bounds.x + k), hn::Load(d, bounds.y + k),
+                                        hn::Load(d, bounds.z + k));
+    const auto along = [&](std::size_t axis, hn::Vec<BoxTag> half) {
+      const auto r = [&](std::size_t row) { return hn::Set(d, in_.R_LO[3 * row + axis]); };
+      const auto in_O = hn::MulAdd(r(0), v.x, hn::MulAdd(r(1), v.y, hn::Mul(r(2), v.z)));
+      return hn::Add(hn::Abs(in_O), half);
+    };
+    const auto farthest = dual_tree::Norm(along(0, half_x), along(1, half_y), along(2, half_z));
+    return {hn::Add(farthest, hn::Set(d, field_.surface_error())), v.ball};
   }
 
   // Lower bounds of the distance at the corners of a box.
@@ -216,9 +265,10 @@ class Search {
       const auto min_x = hn::Load(d, node.min_x + k), max_x = hn::Load(d, node.max_x + k),
                  min_y = hn::Load(d, node.min_y + k), max_y = hn::Load(d, node.max_y + k),
                  min_z = hn::Load(d, node.min_z + k), max_z = hn::Load(d, node.max_z + k);
-      const auto radius = hn::Mul(
-          half,
-          dual_tree::Norm(hn::Sub(max_x, min_x), hn::Sub(max_y, min_y), hn::Sub(max_z, min_z)));
+      const auto half_x = hn::Mul(half, hn::Sub(max_x, min_x)),
+                 half_y = hn::Mul(half, hn::Sub(max_y, min_y)),
+                 half_z = hn::Mul(half, hn::Sub(max_z, min_z));
+      const auto radius = dual_tree::Norm(half_x, half_y, half_z);
       ToLink(hn::Mul(half, hn::Add(min_x, max_x)), hn::Mul(half, hn::Add(min_y, max_y)),
              hn::Mul(half, hn::Add(min_z, max_z)), k, &bounds);
       hn::Store(radius, d, bounds.radius + k);
@@ -228,8 +278,9 @@ class Search {
                           hn::Load(d, bounds.z + k), &upper);
       farthest = hn::Min(farthest, hn::Add(upper, radius));
       const auto by_corners = has_corners ? Interpolate(entry, corner, node, k) : hn::Zero(d);
-      Combine(distance, radius, by_corners, planes_.Height(node, k, planes_.offset() + in_.support),
-              k, &bounds);
+      Combine(
+          distance, radius, by_corners, planes_.Height(node, k, planes_.offset() + in_.support),
+          [&] { return LookInside(bounds, k, half_x, half_y, half_z); }, k, &bounds);
     }
     LowerLimit(hn::GetLane(hn::MinOfLanes(d, farthest)));
     for (std::uint32_t bits = Below(bounds, node.count); bits != 0; bits &= bits - 1) {
@@ -266,8 +317,17 @@ class Search {
                           hn::Load(d, bounds.z + k), &upper);
       farthest = hn::Min(farthest, upper);
       hn::Store(upper, d, bounds.radius + k);
+      const auto look_inside = [&] {
+        Inside inside;
+        const auto least =
+            field_.ByEightNodes(d, hn::Load(d, bounds.x + k), hn::Load(d, bounds.y + k),
+                                hn::Load(d, bounds.z + k), &inside.ball);
+        inside.depth = hn::Add(least, hn::Set(d, field_.surface_error()));
+        hn::Store(hn::Min(upper, inside.depth), d, bounds.radius + k);
+        return inside;
+      };
       Combine(distance, hn::Zero(d), hn::Zero(d),
-              planes_.Height(tile, k, planes_.offset() + in_.support), k, &bounds);
+              planes_.Height(tile, k, planes_.offset() + in_.support), look_inside, k, &bounds);
     }
     LowerLimit(hn::GetLane(hn::MinOfLanes(d, farthest)));
     assert(tile.count > 0);  // LowerLimit() relies on it for every box
@@ -286,8 +346,8 @@ class Search {
   // for planes across its direction.
   void MeasureLeast(const Entry& tile, int count, Bounds* bounds) {
     const float* least = std::min_element(bounds->distance, bounds->distance + count);
-    if (*least == kMayBeInside || !(*least < limit_)) return;
     const auto k = static_cast<int>(least - bounds->distance);
+    if (!(bounds->outside[k] > 0.0F) || !(*least < limit_)) return;
     Entry point{};
     point.child = tile.child;
     point.lane = k;
@@ -316,9 +376,7 @@ class Search {
       const auto below = hn::Lt(bound, limit);
       pruned = hn::Min(pruned, hn::IfThenElse(below, pruned, bound));
       outside = hn::Min(outside, hn::IfThenElse(below, outside, hn::Load(d, bounds.outside + k)));
-      std::uint8_t mask[8] = {};
-      hn::StoreMaskBits(d, below, mask);
-      bits |= (mask[0] | static_cast<std::uint32_t>(mask[1]) << 8U) << k;
+      bits |= dual_tree::MaskBits(d, below) << k;
     }
     Prune(hn::GetLane(hn::MinOfLanes(d, pruned)), hn::GetLane(hn::MinOfLanes(d, outside)));
     return bits & ((1U << static_cast<unsigned>(count)) - 1U);
@@ -336,20 +394,30 @@ class Search {
   }
 
   void Measure(const Entry& point, float bound) {
-    float outside = point.outside;
-    if (bound == kMayBeInside) {
+    const float within = point.radius + in_.rounding;
+    if (!(point.outside > 0.0F)) {
+      const auto side = policy_.measure_if_inside(~point.child, point.lane, within);
+      if (side == NearSurface::Side::kUnknown) {
+        result_.has_time = false;
+        return Prune(bound, 0.0F);
+      }
+      if (side == NearSurface::Side::kInside) return TakeInside();
       result_.gave_up = ++asked_ > kMaxAsked;
       if (result_.gave_up) return;
-      result_.has_inside = !policy_.is_outside(~point.child, point.lane);
-      if (result_.has_inside) return;
-      outside = 0.0F;
     }
-    result_.outside_bound = std::min(result_.outside_bound, outside);
+    result_.outside_bound = std::min(result_.outside_bound, std::max(point.outside, 0.0F));
     result_.gave_up = ++measured_ > (in_.is_exact ? kMaxMeasuredExact : kMaxMeasured);
     if (result_.gave_up) return;
-    const float prune_bound =
-        policy_.measure_near(~point.child, point.lane, point.radius + in_.rounding);
+    const float prune_bound = policy_.measure_near(~point.child, point.lane, within);
     limit_ = std::min(limit_, prune_bound + in_.ahead);
+  }
+
+  // A point that is inside was measured.
+  void TakeInside() {
+    result_.has_inside = true;
+    result_.gave_up =
+        !has_depths_ || ++measured_ > (in_.is_exact ? kMaxMeasuredExact : kMaxMeasured);
+    limit_ = std::min(limit_, policy_.traversal_prune_bound() + in_.ahead);
   }
 
   FieldSearchInput in_;
@@ -357,7 +425,7 @@ class Search {
   FieldQueue& queue_;
   const FieldLookup field_;
   dual_tree::PlaneFrame planes_;
-  const bool is_closed_;
+  const bool is_closed_, has_depths_;
   float limit_;                   // [m]
   bool has_new_planes_ = false;   // which entries of the queue do not know
   int asked_ = 0, measured_ = 0;  // points

@@ -32,10 +32,11 @@ struct FieldSearchInput {
 };
 
 struct FieldSearchResult {
-  float pruned_bound = std::numeric_limits<float>::infinity();  ///< [m] least of all that is pruned
+  /// [m] Least lower bound of the signed distances of all that is pruned.
+  float pruned_bound = std::numeric_limits<float>::infinity();
   /// [m] Every place that is nearer than this to a point is outside; not positive: unknown.
   float outside_bound = std::numeric_limits<float>::infinity();
-  bool has_inside = false;  ///< a point is inside, and was measured; the search has ended
+  bool has_inside = false;  ///< a point is inside, and was measured
   bool has_time = true;     ///< false: the deadline passed; `pruned_bound` bounds what was left
   bool gave_up = false;     ///< another search is better
   std::uint64_t nodes = 0, tiles = 0;  ///< that were expanded
@@ -44,7 +45,10 @@ struct FieldSearchResult {
 /// Branch and bound over the boxes of an index of points for a whole link, best first. A box is
 /// bounded by the field's distance at its centre less its radius, by the distances at the corners
 /// of the box above it (see DistanceField), and by the link's supporting plane; a point by its own
-/// look-up. So nearly always a single point is measured exactly, the nearest one.
+/// look-up. So nearly always a single point is measured exactly, the nearest one. What may be
+/// inside comes first, by how deep it may be: a box by its farthest corner from a surface point
+/// that the field has for the node at its centre. A field without depths gives up where a point is
+/// inside.
 FieldSearchResult search_field(const FieldSearchInput& input, PointRefinement* policy);
 
 }  // namespace ist

@@ -1,6 +1,7 @@
 // The search of an index of points by the link's field of distances.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "internal/geometry/float_rounding.h"
@@ -13,8 +14,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Nearer than so many of its smallest cells, a field tells little, and another search begins at
-// once.
+// Nearer than so many of its smallest cells, a field without depths tells little, and another
+// search begins at once.
 constexpr double kTooNearInCells = 0.6;
 // [m] A link that has moved farther has another nearest obstacle: the field finds it sooner than
 // the last answer's obstacle is measured.
@@ -40,22 +41,23 @@ bool LinkQuery::has_hardly_moved() const {
 }
 
 bool LinkQuery::is_too_near_for_field() const {
-  const auto cell = static_cast<double>(link_.context.model->field->levels().front().cell);
-  return link_.search.closest.exact.distance < kTooNearInCells * cell;
+  const DistanceField& field = *link_.context.model->field;
+  const double near = kTooNearInCells * static_cast<double>(field.levels().front().cell);
+  return !field.has_depths() && link_.search.closest.exact.distance < near;
 }
 
 // Whether the field search gave up lately, at about this distance.
 bool LinkQuery::is_field_too_coarse() const {
-  const double distance = link_.search.closest.exact.distance;
-  const double too_coarse_at = link_.kept.too_coarse_at;
+  const double distance = std::abs(link_.search.closest.exact.distance);
+  const double too_coarse_at = std::abs(link_.kept.too_coarse_at);
   return has_hardly_moved() && distance > too_coarse_at / kSameDistance &&
          distance < kSameDistance * too_coarse_at;
 }
 
 // Whether the last answer's obstacle is of no use.
 bool LinkQuery::begins_with_field() const {
-  return has_field() && !link_.kept.last.was_inside && link_.search.config.deadline == 0.0 &&
-         !has_hardly_moved();
+  return has_field() && link_.search.config.deadline == 0.0 && !has_hardly_moved() &&
+         (!link_.kept.last.was_inside || link_.context.model->field->has_depths());
 }
 
 // @returns whether the search has answered for the index; if not, another one has to
@@ -68,12 +70,7 @@ bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_comple
   input.bvh = obstacles.bvh;
   FieldQueue queue;
   input.queue = &queue;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      input.R_LO[3 * row + column] = static_cast<float>(obstacles.X_LO.linear()(row, column));
-    }
-    input.p_LO[row] = static_cast<float>(obstacles.X_LO.translation()[row]);
-  }
+  to_row_major(obstacles.X_LO, input.R_LO, input.p_LO);
   input.rounding = round_up(search.rounding);
   input.prune_bound = search.traversal_prune_bound();
   input.is_exact = search.config.tolerance == 0.0 && search.config.relative_tolerance == 0.0;
@@ -84,26 +81,26 @@ bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_comple
   const FieldSearchResult found = search_field(input, &refinement);
   search.statistics->node_pairs += found.nodes;
   search.statistics->leaf_pairs += found.tiles;
-  // The other searches begin with an obstacle that is about in the middle of the link's scene.
-  if ((found.gave_up || found.has_inside) && !has_hardly_moved()) {
-    measure_near_place(obstacles, search.X_FL * link_.context.tree().center());
-  }
   if (found.gave_up) {
+    // The other searches begin with an obstacle that is about in the middle of the link's scene.
+    if (!has_hardly_moved()) {
+      measure_near_place(obstacles, search.X_FL * link_.context.tree().center());
+    }
+    if (found.has_inside && !input.field->has_depths()) {
+      search.cover_bound = -kInfinity;
+      search_inside(obstacles);
+      *is_complete = !search.deadline->passed();
+      return true;
+    }
     set_grid_level();
     if (has_hardly_moved()) link_.kept.too_coarse_at = search.closest.exact.distance;
     return false;
   }
+  search.prune(std::max(static_cast<double>(found.pruned_bound) - search.rounding,
+                        -link_.context.tree().radius()));
   if (found.has_inside) {
     search.cover_bound = -kInfinity;
-    search_inside(obstacles);
-    *is_complete = !search.deadline->passed();
-    return true;
-  }
-  // Points that the deadline left may be inside.
-  const bool is_proven = found.pruned_bound > 0.0F;
-  search.prune(is_proven ? static_cast<double>(found.pruned_bound) - search.rounding
-                         : -link_.context.tree().radius());
-  if (!link_.context.solid().is_closed()) {
+  } else if (!link_.context.solid().is_closed()) {
     const double outside = static_cast<double>(found.outside_bound) - search.rounding;
     search.cover_bound =
         std::min(search.cover_bound, link_.context.tree().interior_gap() + outside);

@@ -141,12 +141,7 @@ DualTreeInput<Bvh> LinkQuery::dual_tree_input(const PosedIndex<Bvh>& obstacles) 
   DualTreeInput<Bvh> input;
   input.tree = &link_.context.tree();
   input.bvh = obstacles.bvh;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      input.R_OL[3 * row + column] = static_cast<float>(obstacles.X_OL.linear()(row, column));
-    }
-    input.p_OL[row] = static_cast<float>(obstacles.X_OL.translation()[row]);
-  }
+  to_row_major(obstacles.X_OL, input.R_OL, input.p_OL);
   input.rounding = round_up(search.rounding);
   input.prune_bound = search.traversal_prune_bound();
   input.inside_bound = round_up(link_.context.tree().interior_gap() + search.rounding);

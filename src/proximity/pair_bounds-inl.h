@@ -77,13 +77,6 @@ HWY_INLINE void PoseCenters(const DualTreeInput<Bvh>& input, const float* x, con
   }
 }
 
-template <class D>
-HWY_INLINE std::uint32_t MaskBits(D d, hn::Mask<D> mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(d, mask, bits);
-  return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
-}
-
 // Moves the children whose bits are set far away.
 template <class D>
 HWY_INLINE hn::Vec<D> MaskOut(D d, hn::Vec<D> bound, std::uint32_t bits) {

@@ -33,6 +33,16 @@ struct PosedIndex {
   Eigen::Isometry3d X_FO, X_OL, X_LO;
 };
 
+/// A rotation, row-major, and a translation in float, as traversals have them.
+inline void to_row_major(const Eigen::Isometry3d& X, float R[9], float p[3]) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      R[3 * row + column] = static_cast<float>(X.linear()(row, column));
+    }
+    p[row] = static_cast<float>(X.translation()[row]);
+  }
+}
+
 using PointObstacles = PosedIndex<PointBvh>;
 using BoxObstacles = PosedIndex<BoxBvh>;
 

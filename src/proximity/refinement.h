@@ -38,6 +38,11 @@ class PointRefinement {
     if (found == Side::kInside) measure_inside(id, p_OQ, p_LQ);
     return found == Side::kOutside;
   }
+  /// Measures a point that may be inside, unless it turns out to be outside while no other is
+  /// inside.
+  /// @param within  [m] what its distance from the surface does not exceed
+  /// @returns outside: it was not measured; unknown: nor was it, the deadline passed
+  NearSurface::Side measure_if_inside(std::int32_t tile, int lane, float within);
   /// Points that are outside are told from others at once, or the rest is the depth search's.
   static bool leaves_inside() { return true; }
   float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }

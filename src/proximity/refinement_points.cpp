@@ -161,6 +161,29 @@ void PointRefinement::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
                      obstacles_, id);
 }
 
+// While a point is inside that is known, it matters only whether this one is deeper.
+PointRefinement::Side PointRefinement::measure_if_inside(std::int32_t tile, int lane,
+                                                         float within) {
+  LinkSearch& search = link_.search;
+  const ObstacleId id{tile, lane};
+  const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
+  NearSurface near;
+  near.within = static_cast<double>(within);
+  const double deepest = std::max(-search.prune_bound(), 0.0);
+  if (deepest == 0.0) {
+    near.side = side(id, p_LQ);
+    if (near.side != Side::kInside) return near.side;
+  }
+  search.count_exact();
+  const PointDepth found = point_depth(link_.context.solid(), p_LQ, deepest, near);
+  if (found.exact.distance < kInfinity) {
+    search.offer(found.exact, p_OQ, obstacles_, id);
+  } else {
+    search.prune(found.floor);
+  }
+  return Side::kInside;
+}
+
 double PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,
                                         const Eigen::Vector3d& p_LQ, double max_distance) {
   LinkSearch& search = link_.search;

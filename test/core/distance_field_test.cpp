@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <variant>
 #include <vector>
@@ -121,6 +123,53 @@ TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
     }
   }
   EXPECT_GT(inside, 20000);
+}
+
+// The surface points of the grid of depths are of the surface, and hardly farther than it is; its
+// balls hold nothing that is inside.
+TEST(DistanceField, DepthsAreFromTheSurface) {
+  test::Rng rng(6);
+  int fields = 0, balls = 0, inside = 0;
+  for (const LinkGeometry& link : test::random_links(&rng)) {
+    const Solid solid(link);
+    const DistanceField field(solid);
+    ASSERT_EQ(field.has_depths(), link.size() == 1);
+    if (!field.has_depths()) continue;
+    ++fields;
+    const DistanceField::Level& grid = field.depths();
+    ASSERT_EQ(field.surface_xy().size(), nodes_of(grid));
+    const auto unsigned_distance = [&](const Eigen::Vector3d& p) {
+      const auto* mesh = std::get_if<TriangleMesh>(&link[0].shape);
+      return mesh != nullptr ? test::oracle_distance(*mesh, p)
+                             : std::abs(test::oracle_signed_distance(link, p));
+    };
+    const double slack = 2e-6 + static_cast<double>(field.surface_step());
+    for (int k = 0; k < 200; ++k) {
+      const auto i = static_cast<std::size_t>(
+          test::uniform(&rng, 0.0, static_cast<double>(nodes_of(grid)) - 0.5));
+      const std::uint32_t xy = field.surface_xy()[i], z_ball = field.surface_z_ball()[i];
+      const auto part = [&](std::uint32_t half) {
+        return static_cast<std::int16_t>(half & 0xFFFFU) *
+               static_cast<double>(field.surface_step());
+      };
+      const Eigen::Vector3d to_surface(part(xy), part(xy >> 16U), part(z_ball));
+      const Eigen::Vector3d p = node(grid, i);
+      ASSERT_LE(unsigned_distance(p + to_surface), slack);
+      const double truth = unsigned_distance(p);
+      ASSERT_LE(to_surface.norm(),
+                truth + static_cast<double>(grid.cell / DistanceField::kSlackParts) + slack);
+      inside += solid.is_inside(p) ? 1 : 0;
+      const double radius = (z_ball >> 16U) * static_cast<double>(DistanceField::kBallStep);
+      ASSERT_LE(radius, truth + 1e-9);
+      if (radius == 0.0) continue;
+      ++balls;
+      ASSERT_FALSE(solid.is_inside(p + test::uniform(&rng, 0.0, radius) *
+                                           test::random_vector(&rng, 1.0).normalized()));
+    }
+  }
+  EXPECT_GT(fields, 10);
+  EXPECT_GT(balls, 500);
+  EXPECT_GT(inside, 500);
 }
 
 TEST(DistanceField, GridsLieWithinEachOtherAndReachFar) {

@@ -160,27 +160,30 @@ TEST_F(FieldSearch, APointThatEntersBesideNearerOnesIsFound) {
 
 // The inside of a mesh with holes may reach beyond its surface, up to the box about it in its own
 // frame: above the rim of two cups, one in the other.
-TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFoundAsWithoutAField) {
+TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
   const TriangleMesh cups =
       test::joined(test::open_box({0.1, 0.1, 0.1}), test::open_box({0.09, 0.09, 0.09}));
   int contacts = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 10; ++round) {
     const Eigen::Isometry3d X_LE = test::random_pose(&rng_, 0.0);
     TriangleMesh turned = cups;
     for (Eigen::Vector3d& v : turned.vertices) v = X_LE.inverse() * v;
     const LinkGeometry link = {GeometryElement{turned, X_LE, "cups"}};
     const auto without = test::model_of({link}, 0.01);
     ProximityQuery query(with_fields(without), {}), other(without, {});
-    LinkProximity one, two;
-    for (int k = 0; k < 30; ++k) {
+    LinkProximity result;
+    for (int k = 0; k < 80; ++k) {
       const std::vector<Eigen::Vector3d> points = {test::random_vector(&rng_, 0.08)};
       const CloudSnapshot cloud = test::make_snapshot(points);
       const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-      ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &one));
-      ASSERT_TRUE(other.run_link(0, X_FL, {&cloud}, &two));
-      ASSERT_EQ(one.state, two.state) << round;
-      ASSERT_NEAR(one.distance, two.distance, 1e-9) << round;
-      contacts += one.state == LinkState::kContact ? 1 : 0;
+      const test::Truth truth = test::truth_of(link, X_FL, points, cloud);
+      SCOPED_TRACE(testing::Message() << "round " << round << ", point " << k);
+      for (ProximityQuery* each : {&query, &other}) {
+        ASSERT_TRUE(each->run_link(0, X_FL, {&cloud}, &result));
+        test::expect_truth(result, truth, each->config(), X_FL, kRounding);
+      }
+      if (HasFailure()) return;
+      contacts += result.state == LinkState::kContact ? 1 : 0;
     }
   }
   EXPECT_GT(contacts, 100);
@@ -279,6 +282,36 @@ TEST_F(FieldSearch, MeasuresHardlyMoreThanOnePoint) {
   }
   EXPECT_GT(queries, 50U);
   EXPECT_LT(measured, 2 * queries);
+}
+
+// Nor in contact, however many points are inside.
+TEST_F(FieldSearch, MeasuresFewPointsInContact) {
+  QueryConfig config;
+  LinkProximity result;
+  for (const double tolerance : {0.0, 0.001}) {
+    config.tolerance = tolerance;
+    std::uint64_t measured = 0, queries = 0;
+    for (const TriangleMesh& mesh :
+         {test::box({0.2, 0.1, 0.15}), test::icosphere(0.1, 3), test::torus(0.12, 0.05, 20, 12),
+          test::open_box({0.1, 0.1, 0.1})}) {
+      const LinkGeometry link = test::one(mesh);
+      ProximityQuery query(with_fields(test::model_of({link}, 0.02)), config);
+      for (int round = 0; round < 20; ++round) {
+        const auto points = dense_points(&rng_, 2000);
+        const CloudSnapshot cloud = test::make_snapshot(points);
+        const Eigen::Isometry3d X_FL = test::random_pose(&rng_, 0.1);
+        ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &result));
+        if (!(result.distance < -0.01)) continue;
+        measured += query.statistics().exact_evaluations;
+        ++queries;
+        test::expect_truth(result, test::truth_of(link, X_FL, points, cloud), config, X_FL,
+                           kRounding);
+        if (HasFailure()) return;
+      }
+    }
+    EXPECT_GT(queries, 8U);
+    EXPECT_LT(measured, 15 * queries) << tolerance;
+  }
 }
 
 TEST_F(FieldSearch, AllocatesNothing) {

@@ -58,10 +58,23 @@ inline double oracle_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p
   return nearest;
 }
 
-/// Signed distance, negative inside (winding number above 0.5).
+/// Whether a point is in the axis-aligned box about a mesh, which holds all that counts as inside.
+inline bool oracle_box_contains(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
+  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Array3d high = -low;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      low = low.min(mesh.corner(t, k).array());
+      high = high.max(mesh.corner(t, k).array());
+    }
+  }
+  return (p.array() >= low).all() && (p.array() <= high).all();
+}
+
+/// Signed distance, negative inside (winding number above 0.5, within the box about the mesh).
 inline double oracle_signed_distance(const TriangleMesh& mesh, const Eigen::Vector3d& p) {
   const double distance = oracle_distance(mesh, p);
-  return oracle_winding(mesh, p) > 0.5 ? -distance : distance;
+  return oracle_box_contains(mesh, p) && oracle_winding(mesh, p) > 0.5 ? -distance : distance;
 }
 
 /// Smallest signed distance of any point (link frame) to the mesh; +inf without points.

@@ -87,8 +87,8 @@ struct QueryStatistics {
 /// takes over: a grid of signed distances about the link bounds boxes and points for the whole
 /// link.
 ///
-/// Links that have a distance field (LinkModel::field) are searched by it among points, unless they
-/// are in contact or nearly so.
+/// Links that have a distance field (LinkModel::field) are searched by it among points. Where it
+/// tells too little, one of these traversals follows.
 ///
 /// A query that has a deadline first proves a bound of every link and measures one obstacle for it;
 /// then it asks every link to within half of its distance, and then to within the tolerance, the

@@ -62,8 +62,8 @@ struct RobotModelConfig {
   std::string cache_directory;     ///< empty: no cache
   std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
   /// Whether LinkModel::field is measured for every link: it takes some tenths of a second and
-  /// 0.3 to 1 MB a link. Queries among points are up to twice as fast then, and hardly slower with
-  /// coarse packings.
+  /// 0.3 to 1 MB a link. Queries among points are up to twice as fast then, several times in
+  /// contact, and hardly slower with coarse packings.
   bool distance_fields = false;
   int threads = 0;  ///< packing threads; 0: as many as there are cores
 };

@@ -30,6 +30,11 @@ namespace ist {
 /// **Outside.** About each node of the finest grid, a ball holds no surface and no place inside the
 /// solid. The finest grid covers the box about the solid, and beyond that box all is outside.
 ///
+/// **Depth.** A grid over the box about the solid holds, for each node, the surface point s that is
+/// closest to it. A place p inside is no deeper than |p - s|, for any of them. For the nodes about
+/// p the error is of second order in the edge, but where the closest point jumps. It holds balls
+/// about the nodes, too, which are finer than those of the finest grid.
+///
 /// Immutable; const members are thread safe.
 class DistanceField {
  public:
@@ -38,7 +43,7 @@ class DistanceField {
     float low[3];          ///< [m] the first node, in the frame of the solid
     float cell, per_cell;  ///< [m], [1/m] the edge of a cell
     std::int32_t size[3];  ///< nodes along each axis, at least 2
-    std::size_t first;     ///< of its nodes in values()
+    std::size_t first;     ///< of its nodes in values(), or in one of the arrays below
   };
 
   /// @throws Cancelled
@@ -51,6 +56,17 @@ class DistanceField {
   const std::vector<std::uint16_t>& values() const { return values_; }
   /// Radii of the balls about the nodes of the finest grid, in units of kOutsideStep, rounded down.
   const std::vector<std::uint8_t>& outside() const { return outside_; }
+  /// The grid of depths. It has no nodes where the depth of a place is not its distance from the
+  /// surface: for a solid of several elements.
+  const Level& depths() const { return depths_; }
+  bool has_depths() const { return !surface_xy_.empty(); }
+  /// From each node of that grid to a surface point, in units of surface_step(): x in the lower
+  /// half, y in the upper one.
+  const std::vector<std::uint32_t>& surface_xy() const { return surface_xy_; }
+  /// The same: z in the lower half. In the upper one, the radius of the node's ball that holds
+  /// nothing inside, in units of kBallStep, rounded down.
+  const std::vector<std::uint32_t>& surface_z_ball() const { return surface_z_ball_; }
+  float surface_step() const { return surface_step_; }  ///< [m]
   /// [m] A box about the solid, rounded outward.
   const Eigen::AlignedBox3f& bounds() const { return bounds_; }
   /// Whether the solid is closed: then the distance of a place outside is that of all that is
@@ -58,12 +74,14 @@ class DistanceField {
   bool is_closed() const { return is_closed_; }
   std::size_t memory() const {  ///< [bytes]
     return sizeof *this + values_.capacity() * sizeof(std::uint16_t) + outside_.capacity() +
-           levels_.capacity() * sizeof(Level);
+           levels_.capacity() * sizeof(Level) + surface_xy_.capacity() * sizeof(std::uint32_t) +
+           surface_z_ball_.capacity() * sizeof(std::uint32_t);
   }
 
   static constexpr float kStep = 1.0F / 16384.0F;        ///< [m]
   static constexpr std::uint16_t kFar = 65535;           ///< 4 m
   static constexpr float kOutsideStep = 1.0F / 2048.0F;  ///< [m]
+  static constexpr float kBallStep = 1.0F / 32768.0F;    ///< [m] the largest ball has 2 m
   static constexpr float kSlackParts = 16.0F;
   /// Values are read by the pair and radii by fours: so many more of each can be read.
   static constexpr std::size_t kPadding = 3;
@@ -73,6 +91,9 @@ class DistanceField {
   std::vector<Level> levels_;
   std::vector<std::uint16_t> values_;
   std::vector<std::uint8_t> outside_;
+  Level depths_{};
+  std::vector<std::uint32_t> surface_xy_, surface_z_ball_;
+  float surface_step_ = 0.0F;
   Eigen::AlignedBox3f bounds_;
   bool is_closed_ = false;
 };
