@@ -17,10 +17,11 @@ class FieldQueue {
 
   struct Entry {
     float outside;         ///< [m] every place nearer to it is outside; not positive: unknown
+    float distance;        ///< [m] of a point that may be inside: no surface is nearer to it
     std::int32_t child;    ///< node, or tile if negative; the tile of a point
     int lane;              ///< of a point; else kNoPoint
     float radius;          ///< [m] of the box; an upper bound of a point's distance
-    float center[3];       ///< [m] of the box, in the link's frame
+    float center[3];       ///< [m] of the box, or the point, in the link's frame
     float min[3], max[3];  ///< [m] the box, in the index's frame
   };
 

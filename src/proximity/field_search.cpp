@@ -7,8 +7,10 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "proximity/field_lookup-inl.h"
 #include "proximity/refinement.h"
@@ -30,13 +32,15 @@ constexpr int kMaxMeasured = 100, kMaxMeasuredExact = 256;
 // A search that has visited so many tiles and measured nothing measures a point: the link's
 // supporting plane across its direction may separate the link from all others, as from a table.
 constexpr std::uint64_t kTilesBeforePlanes = 4;
-// So many points whose sides the field does not tell are asked about one by one.
+// So many points whose sides the field does not tell are asked about one by one. The balls about so
+// many of them that are outside tell the sides of others.
 constexpr int kMaxAsked = 64;
 
 // Bounds of a node's children or of a tile's points.
 struct alignas(64) Bounds {
   float distance[kBoxWidth];                       // [m] lower bounds; negative: of the depth
   float outside[kBoxWidth];                        // [m] every place that is nearer is outside
+  float surface[kBoxWidth];                        // [m] no surface is nearer
   float x[kBoxWidth], y[kBoxWidth], z[kBoxWidth];  // [m] in the link's frame
   float radius[kBoxWidth];                         // [m] as FieldQueue::Entry
 };
@@ -145,6 +149,7 @@ class Search {
     const auto bound = hn::Max(hn::Max(outside, by_plane), hn::Max(by_center, least));
     hn::Store(hn::IfThenElse(is_outside, bound, lowest), d, bounds->distance + k);
     hn::Store(outside, d, bounds->outside + k);
+    hn::Store(by_center, d, bounds->surface + k);
   }
 
   // [m] Every place that is nearer to a sphere is outside; not positive: unknown.
@@ -289,9 +294,6 @@ class Search {
       if (child == nullptr) continue;
       child->child = node.child[k];
       child->lane = FieldQueue::kNoPoint;
-      child->center[0] = bounds.x[k];
-      child->center[1] = bounds.y[k];
-      child->center[2] = bounds.z[k];
       child->min[0] = node.min_x[k];
       child->min[1] = node.min_y[k];
       child->min[2] = node.min_z[k];
@@ -389,14 +391,30 @@ class Search {
       return nullptr;
     }
     entry->outside = bounds.outside[k];
+    entry->distance = bounds.surface[k];
     entry->radius = bounds.radius[k];
+    entry->center[0] = bounds.x[k];
+    entry->center[1] = bounds.y[k];
+    entry->center[2] = bounds.z[k];
     return entry;
   }
 
   void Measure(const Entry& point, float bound) {
-    const float within = point.radius + in_.rounding;
-    if (!(point.outside > 0.0F)) {
-      const auto side = policy_.measure_if_inside(~point.child, point.lane, within);
+    if (!(point.outside > 0.0F)) return Ask(point, bound);
+    result_.outside_bound = std::min(result_.outside_bound, point.outside);
+    result_.gave_up = ++measured_ > (in_.is_exact ? kMaxMeasuredExact : kMaxMeasured);
+    if (result_.gave_up) return;
+    const float prune_bound =
+        policy_.measure_near(~point.child, point.lane, point.radius + in_.rounding);
+    limit_ = std::min(limit_, prune_bound + in_.ahead);
+  }
+
+  // Decides on which side a point is. If it is outside, its distance may still not matter.
+  void Ask(Entry point, float bound) {
+    float margin = BallAbout(point);
+    if (!(margin > 0.0F)) {
+      const auto side = policy_.measure_if_inside(
+          ~point.child, point.lane, point.distance - in_.rounding, point.radius + in_.rounding);
       if (side == NearSurface::Side::kUnknown) {
         result_.has_time = false;
         return Prune(bound, 0.0F);
@@ -404,12 +422,27 @@ class Search {
       if (side == NearSurface::Side::kInside) return TakeInside();
       result_.gave_up = ++asked_ > kMaxAsked;
       if (result_.gave_up) return;
+      margin = policy_.asked_margin() - in_.rounding;
+      balls_[static_cast<std::size_t>(asked_) % balls_.size()] = {point.center[0], point.center[1],
+                                                                  point.center[2], margin};
     }
-    result_.outside_bound = std::min(result_.outside_bound, std::max(point.outside, 0.0F));
-    result_.gave_up = ++measured_ > (in_.is_exact ? kMaxMeasuredExact : kMaxMeasured);
-    if (result_.gave_up) return;
-    const float prune_bound = policy_.measure_near(~point.child, point.lane, within);
-    limit_ = std::min(limit_, prune_bound + in_.ahead);
+    // Outside, if by no more than that.
+    point.outside = std::max(margin, std::numeric_limits<float>::min());
+    if (point.distance >= limit_) return Prune(point.distance, point.outside);
+    Entry* again = queue_.push(std::max(point.distance, 0.0F));
+    result_.gave_up = again == nullptr;
+    if (!result_.gave_up) *again = point;
+  }
+
+  // [m] Every place that is nearer to a point is outside, by the points that were asked about.
+  float BallAbout(const Entry& point) const {
+    float largest = 0.0F;
+    for (const Ball& ball : balls_) {
+      const float x = point.center[0] - ball.x, y = point.center[1] - ball.y,
+                  z = point.center[2] - ball.z;
+      largest = std::max(largest, ball.radius - std::sqrt(x * x + y * y + z * z) - in_.rounding);
+    }
+    return largest;
   }
 
   // A point that is inside was measured.
@@ -429,6 +462,10 @@ class Search {
   float limit_;                   // [m]
   bool has_new_planes_ = false;   // which entries of the queue do not know
   int asked_ = 0, measured_ = 0;  // points
+  struct Ball {
+    float x, y, z, radius;  // [m]
+  };
+  std::array<Ball, 16> balls_{};  // all places in them are outside
   FieldSearchResult result_;
 };
 

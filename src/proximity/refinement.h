@@ -40,15 +40,20 @@ class PointRefinement {
   }
   /// Measures a point that may be inside, unless it turns out to be outside while no other is
   /// inside.
-  /// @param within  [m] what its distance from the surface does not exceed
+  /// @param least_distance  [m] no part of the surface is nearer
+  /// @param within          [m] some part is no farther
   /// @returns outside: it was not measured; unknown: nor was it, the deadline passed
-  NearSurface::Side measure_if_inside(std::int32_t tile, int lane, float within);
+  NearSurface::Side measure_if_inside(std::int32_t tile, int lane, float least_distance,
+                                      float within);
+  /// [m] Every place nearer than this to the point that side() decided last is outside; 0: unknown.
+  float asked_margin() const { return asked_margin_; }
   /// Points that are outside are told from others at once, or the rest is the depth search's.
   static bool leaves_inside() { return true; }
   float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }
   using Side = NearSurface::Side;
   /// On which side of the link's surface a point is; unknown after the deadline.
-  Side side(ObstacleId id, const Eigen::Vector3d& p_LQ);
+  /// @param least_distance  [m] no part of the surface is nearer, as far as it is known
+  Side side(ObstacleId id, const Eigen::Vector3d& p_LQ, double least_distance = 0.0);
   /// The same, by what is kept and by the link's grid: outside or unknown.
   Side known_side(ObstacleId id, const Eigen::Vector3d& p_LQ);
   /// Measures a point that is outside the link, unless it was measured in this traversal or a kept
@@ -90,6 +95,7 @@ class PointRefinement {
   const PointObstacles& obstacles_;
   LinkQueryState& link_;
   float refined_bound_ = -std::numeric_limits<float>::infinity();
+  float asked_margin_ = 0.0F;
 };
 
 /// The same for solid boxes. While a box is outside the link, its distance is exact: triangle

@@ -98,7 +98,9 @@ PointRefinement::Side PointRefinement::known_side(ObstacleId id, const Eigen::Ve
 }
 
 // The winding number is asked last. It is not asked after the deadline.
-PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ) {
+PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ,
+                                            double least_distance) {
+  asked_margin_ = 0.0F;
   const SignedDistanceGrid::Bound bound = grid_bound({p_LQ}, kInfinity);
   if (bound.is_outside || known_side(id, p_LQ) == Side::kOutside) return Side::kOutside;
   if (deadline_passed()) return Side::kUnknown;
@@ -107,12 +109,14 @@ PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d
   const std::uint32_t key = coherent_key(obstacles_, id);
   link_.search.count_exact();
   const Solid& solid = link_.context.solid();
+  const double distance = std::max(bound.surface_distance, least_distance);
   const OutsideMargin found =
       solid.is_closed() || !is_one_mesh(solid)
-          ? OutsideMargin{solid.is_inside(p_LQ), solid.is_closed() ? bound.surface_distance : 0.0}
-          : outside_margin(solid, p_LQ, bound.surface_distance);
+          ? OutsideMargin{solid.is_inside(p_LQ), solid.is_closed() ? distance : 0.0}
+          : outside_margin(solid, p_LQ, distance);
   if (found.is_inside) return Side::kInside;
   if (found.margin > 0.0) kept.store(quantity, key, p_LQ, found.margin);
+  asked_margin_ = round_down(found.margin);
   return Side::kOutside;
 }
 
@@ -163,7 +167,7 @@ void PointRefinement::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
 
 // While a point is inside that is known, it matters only whether this one is deeper.
 PointRefinement::Side PointRefinement::measure_if_inside(std::int32_t tile, int lane,
-                                                         float within) {
+                                                         float least_distance, float within) {
   LinkSearch& search = link_.search;
   const ObstacleId id{tile, lane};
   const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
@@ -171,7 +175,7 @@ PointRefinement::Side PointRefinement::measure_if_inside(std::int32_t tile, int 
   near.within = static_cast<double>(within);
   const double deepest = std::max(-search.prune_bound(), 0.0);
   if (deepest == 0.0) {
-    near.side = side(id, p_LQ);
+    near.side = side(id, p_LQ, static_cast<double>(least_distance));
     if (near.side != Side::kInside) return near.side;
   }
   search.count_exact();
