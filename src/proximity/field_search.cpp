@@ -25,7 +25,7 @@ using CornerTag = hn::CappedTag<float, 8>;
 using Entry = FieldQueue::Entry;
 
 // The bound [m] of what may be inside, at any depth: it is looked at before all others.
-constexpr float kMayBeInside = -1e3F;
+constexpr float kMayBeInside = -kFarAway;
 // So many points are measured before another search is better: where very many are about equally
 // near, and where the field's cells are too large. Tolerance 0 needs more of them.
 constexpr int kMaxMeasured = 100, kMaxMeasuredExact = 256;

@@ -272,7 +272,8 @@ void LinkQuery::answer(SnapshotSpan clouds, LinkProximity* result) {
   last.build_id = 0;
   const ClosestObstacle& closest = search.closest;
   const double distance = closest.exact.distance;
-  if (distance > search.range() || is_clear_of_extents()) {
+  // Written so that nothing is in range of a pose that is not finite.
+  if (!(distance <= search.range()) || is_clear_of_extents()) {
     // UNKNOWN where nothing was measured and not all is known.
     if (!search.is_complete || !is_inside_regions()) return;
     result->state = LinkState::kClear;

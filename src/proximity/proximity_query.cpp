@@ -53,8 +53,8 @@ struct ProximityQuery::Impl {
   bool can_query(std::size_t i, Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                  SnapshotSpan clouds) const {
     const bool fits = X_FL.size() == links.size() && known.size() == links.size();
-    return fits && !clouds.empty() && known[i] && model->links[i].usable() &&
-           !model->links[i].tree.empty();
+    return fits && !clouds.empty() && known[i] && X_FL[i].matrix().allFinite() &&
+           model->links[i].usable() && !model->links[i].tree.empty();
   }
 
   // A query that has a deadline first asks every link to within half of its distance, which takes
@@ -220,7 +220,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
     return true;
   }
   const LinkModel& model = impl_->model->links[link];
-  if (clouds.empty() || !model.usable() || model.tree.empty()) {
+  if (clouds.empty() || !model.usable() || model.tree.empty() || !X_FL.matrix().allFinite()) {
     result->reset();
     impl_->links[link].forget();
     return true;

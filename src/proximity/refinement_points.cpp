@@ -183,7 +183,7 @@ PointRefinement::Side PointRefinement::measure_if_inside(std::int32_t tile, int 
   if (found.exact.distance < kInfinity) {
     search.offer(found.exact, p_OQ, obstacles_, id);
   } else {
-    search.prune(found.floor);
+    search.prune(std::max(found.floor, -deepest));
   }
   return Side::kInside;
 }

@@ -352,7 +352,7 @@ double processor_seconds() {
 }
 
 // A million triangles have three million edges, which were sorted without a question whether to go
-// on, three times for a packing: 0.3 s of processor time each, now less than 0.1 s.
+// on, three times for a packing: each took about a third of the time that reading the mesh takes.
 TEST(PackMesh, AsksWhetherToGoOnWhileALargeMeshIsRead) {
   const TriangleMesh mesh = test::torus(0.2, 0.05, test::kSanitized ? 100 : 1000, 600);
   const double begin = processor_seconds();
@@ -365,7 +365,7 @@ TEST(PackMesh, AsksWhetherToGoOnWhileALargeMeshIsRead) {
   });
   std::printf("%zu triangles: asked after %.0f ms at most, of %.1f s\n", mesh.triangles.size(),
               1e3 * longest, last - begin);
-  EXPECT_LT(longest, test::kSanitized ? 1.0 : 0.2);
+  if (!test::kSanitized) EXPECT_LT(longest, 0.25 * (last - begin));
 }
 
 // A mesh in millimetres takes minutes. After a request to stop, no later step may start.

@@ -112,7 +112,7 @@ class ProximityQuery {
   ProximityQuery& operator=(ProximityQuery&&) noexcept;
 
   /// @param X_FL    by link: link frame -> fixed frame, rigid to 1e-6 (see is_rigid); ignored
-  ///                where `known` is false
+  ///                where `known` is false. NaN or infinity make the link UNKNOWN
   /// @param known   by link: false makes the link UNKNOWN. Where it or X_FL has another size than
   ///                the model's links, every link is UNKNOWN
   /// @param clouds  the snapshots of all usable sources; none makes every link UNKNOWN
