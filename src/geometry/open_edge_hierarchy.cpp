@@ -1,4 +1,4 @@
-#include "internal/geometry/open_edge_hierarchy.h"
+#include "geometry/open_edge_hierarchy.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

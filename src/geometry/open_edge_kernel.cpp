@@ -11,7 +11,7 @@
 #include <limits>
 #include <vector>
 
-#include "internal/geometry/open_edge_hierarchy.h"
+#include "geometry/open_edge_hierarchy.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/open_edge_hierarchy.h"
 #include "geometry/solid_element.h"
-#include "internal/geometry/open_edge_hierarchy.h"
 
 namespace ist {
 namespace {

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "internal/geometry/open_edge_hierarchy.h"
+#include "geometry/open_edge_hierarchy.h"
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/solid.h"
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "internal/geometry/boundary_edges.h"
-#include "internal/geometry/open_edge_hierarchy.h"
 #include "sphere_search.h"
 
 namespace ist {
@@ -20,8 +19,6 @@ constexpr double kHoleCoverRadius = 0.5;
 // at most this share of the wanted gap.
 constexpr double kMaxUnclearSize = 0.25;
 constexpr double kWindingError = 0.01;
-// More than double loses in a radius, as a share.
-constexpr double kRadiusRounding = 1e-9;
 
 // cover_interior() covers every interior cell of half its target size with a sphere. A cell that is
 // smaller than this share of the target and not covered shows that the packing is another one.
@@ -98,11 +95,8 @@ class InteriorOctree {
   }
 
  protected:
-  InteriorOctree(const TriangleMesh& mesh, const TriangleBvh& bvh, bool is_closed, double target,
-                 PackingWatch* watch)
-      : bvh_(bvh), is_closed_(is_closed), target_(target), watch_(*watch) {
-    if (!is_closed) open_edges_ = OpenEdgeHierarchy(mesh, [watch] { return !watch->keeps_on(); });
-  }
+  InteriorOctree(const TriangleBvh& bvh, bool is_closed, double target, PackingWatch* watch)
+      : bvh_(bvh), is_closed_(is_closed), target_(target), watch_(*watch) {}
   ~InteriorOctree() = default;
 
   // Decides about an interior cell that no sphere and no surface covers. False: the cell must be
@@ -113,8 +107,7 @@ class InteriorOctree {
 
   const TriangleBvh& bvh_;
   const bool is_closed_;
-  OpenEdgeHierarchy open_edges_;  // of a mesh with holes
-  const double target_;           // [m] wanted gap
+  const double target_;  // [m] wanted gap
   PackingWatch& watch_;
   SphereSearch search_;      // cover spheres
   bool is_decided_ = false;  // nothing more need be looked at
@@ -181,37 +174,33 @@ class InteriorOctree {
   }
 
   // A cell that no triangle touches is on the side of its centre. In an open mesh the winding
-  // number changes smoothly instead, by the open edges alone.
+  // number changes smoothly instead: it is harmonic off the mesh, and Harnack's inequality bounds
+  // its rise from the centre to the cell's corners.
   CellKind classify(const Eigen::Vector3d& center, double circumradius, double distance) const {
     if (distance <= circumradius) return CellKind::kAtSurface;
     if (is_closed_) {
       return bvh_.is_inside(center) ? CellKind::kInside : CellKind::kOutside;
     }
+    const double q = circumradius / distance;
+    const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
     const double quick = bvh_.quick_winding_number(center);
-    if (stays_outside(center, circumradius, quick + TriangleBvh::kQuickWindingError)) {
+    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) {
       return CellKind::kOutside;
     }
     const double w = bvh_.winding_number(center);
-    if (stays_outside(center, circumradius, w + kWindingError)) return CellKind::kOutside;
+    if (std::max(w + kWindingError, 0.0) * rise < 0.5) return CellKind::kOutside;
     return w > 0.5 ? CellKind::kInside : CellKind::kUnclear;
-  }
-
-  // Whether the winding number stays below 0.5 in a sphere that the surface does not meet.
-  // @param w  no less than it is at the centre
-  bool stays_outside(const Eigen::Vector3d& center, double radius, double w) const {
-    const double wanted = (1.0 + kRadiusRounding) * radius;
-    return w < 0.5 && open_edges_.steady_radius(center, 0.5 - w, wanted) >= wanted;
   }
 };
 
 // Adds a sphere where a cell is not covered.
 class InteriorCover final : public InteriorOctree {
  public:
-  InteriorCover(const TriangleMesh& mesh, const TriangleBvh& bvh, const MedialSphereFinder& finder,
+  InteriorCover(const TriangleBvh& bvh, const MedialSphereFinder& finder,
                 const PackingConfig& config, PackingWatch* watch, SphereSearch* spheres,
                 Packing* packing)
       // The interior need not be covered more tightly than the surface.
-      : InteriorOctree(mesh, bvh, finder.is_closed(),
+      : InteriorOctree(bvh, finder.is_closed(),
                        std::max(config.max_error, packing->certificate.max_gap), watch),
         finder_(finder),
         config_(config),
@@ -257,7 +246,7 @@ class InteriorCheck final : public InteriorOctree {
  public:
   InteriorCheck(const TriangleMesh& mesh, const TriangleBvh& bvh, const Packing& packing,
                 double deviation, double gap, PackingWatch* watch)
-      : InteriorOctree(mesh, bvh, is_closed_mesh(mesh, [watch] { return !watch->keeps_on(); }), gap,
+      : InteriorOctree(bvh, is_closed_mesh(mesh, [watch] { return !watch->keeps_on(); }), gap,
                        watch) {
     for (const InnerSphere& sphere : packing.spheres) {
       search_.add(sphere.center, sphere.cover_radius - deviation);
@@ -279,10 +268,10 @@ class InteriorCheck final : public InteriorOctree {
 
 }  // namespace
 
-bool cover_interior(const TriangleMesh& mesh, const TriangleBvh& bvh,
-                    const MedialSphereFinder& finder, const PackingConfig& config,
-                    PackingWatch* watch, SphereSearch* spheres, Packing* packing) {
-  return InteriorCover(mesh, bvh, finder, config, watch, spheres, packing).run();
+bool cover_interior(const TriangleBvh& bvh, const MedialSphereFinder& finder,
+                    const PackingConfig& config, PackingWatch* watch, SphereSearch* spheres,
+                    Packing* packing) {
+  return InteriorCover(bvh, finder, config, watch, spheres, packing).run();
 }
 
 bool is_interior_covered(const TriangleMesh& mesh, const TriangleBvh& bvh, const Packing& packing,

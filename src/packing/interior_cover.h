@@ -20,9 +20,9 @@ namespace ist {
 ///                 or max_gap where that is larger, or more still where max_spheres leaves cells
 ///                 uncovered
 /// @returns false when `watch` stopped it: nothing is proven of the interior then
-bool cover_interior(const TriangleMesh& mesh, const TriangleBvh& bvh,
-                    const MedialSphereFinder& finder, const PackingConfig& config,
-                    PackingWatch* watch, SphereSearch* spheres, Packing* packing);
+bool cover_interior(const TriangleBvh& bvh, const MedialSphereFinder& finder,
+                    const PackingConfig& config, PackingWatch* watch, SphereSearch* spheres,
+                    Packing* packing);
 
 /// Whether no point inside the mesh is farther than `gap` [m] from the cover spheres, shown by the
 /// same octree. A packing whose `interior_gap` is from cover_interior() passes. False also when the

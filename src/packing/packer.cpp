@@ -98,7 +98,7 @@ Packing pack_watched(const TriangleMesh& mesh, const PackingConfig& config, Pack
   Packing packing;
   cover.certify(&packing);
   watch->begin_part(kSurfaceShare, 1.0);
-  if (watch->stopped() || !cover_interior(mesh, bvh, finder, config, watch, &spheres, &packing)) {
+  if (watch->stopped() || !cover_interior(bvh, finder, config, watch, &spheres, &packing)) {
     packing.certificate.interior_gap = size;
   }
   packing.certificate.reached = packing.certificate.max_gap <= config.max_error;

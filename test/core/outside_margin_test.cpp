@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-#include "internal/geometry/open_edge_hierarchy.h"
+#include "geometry/open_edge_hierarchy.h"
 #include "internal/geometry/solid_queries.h"
 #include "support/instruction_sets.h"
 #include "support/meshes.h"

@@ -41,10 +41,12 @@ LinkModel link_of_loose_triangles(std::size_t count) {
   return link;
 }
 
-// Open edges, caps, boxes and components of 200,000 triangles took 0.3 s without a
-// question.
+// Open edges, caps, boxes and components of 200,000 triangles took 0.3 s without a question, a
+// third of the time that it takes to make the link.
 TEST(PairBuilding, ASurfaceAsksOftenWhetherToGoOn) {
+  const double start = processor_time();
   const LinkModel link = link_of_loose_triangles(test::kSanitized ? 10000 : 200000);
+  const double making = processor_time() - start;
   constexpr double kTotal = 2.5;  // [s] then it is cancelled
   double longest = 0.0;
   const double begin = processor_time();
@@ -60,8 +62,9 @@ TEST(PairBuilding, ASurfaceAsksOftenWhetherToGoOn) {
     longest = std::max(longest, processor_time() - last);
   } catch (const Cancelled&) {
   }
-  EXPECT_LT(longest, test::kSanitized ? 1.0 : 0.15) << "[s] between two questions";
-  EXPECT_LT(processor_time() - begin, kTotal + (test::kSanitized ? 1.0 : 0.15));
+  const double limit = test::kSanitized ? 1.0 : 0.25 * making;
+  EXPECT_LT(longest, limit) << "[s] between two questions";
+  EXPECT_LT(processor_time() - begin, kTotal + limit);
 }
 
 TEST(PairBuilding, ACancelledQueryKnowsNothing) {

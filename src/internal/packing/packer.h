@@ -6,7 +6,7 @@
 namespace ist {
 
 /// Part of every cache key. Raise it whenever the same shape and configuration pack differently.
-constexpr int kPackingVersion = 5;
+constexpr int kPackingVersion = 4;
 
 /// Packs a mesh with inner spheres, in the order of `config.order`, until the certified gap of
 /// every surface patch and of the interior is at most `config.max_error`.
