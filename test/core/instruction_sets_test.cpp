@@ -84,7 +84,7 @@ TEST_F(InstructionSets, SameAnswers) {
   const auto model = test::model_of(links, 0.01);
   const std::vector<std::int64_t> targets = machine_targets();
   EXPECT_GT(targets.size(), 1U);
-  for (int scene = 0; scene < test::scaled(300); ++scene) {
+  for (int scene = 0; scene < test::scaled(100); ++scene) {
     const std::vector<Eigen::Vector3d> points = test::random_points(
         &rng, links[static_cast<std::size_t>(scene) % links.size()], 1 + scene % 100);
     const CloudSnapshot cloud = test::make_snapshot(points);
