@@ -124,7 +124,7 @@ class FieldLookup {
                    hn::Sub(from_bounds, hn::Set(d, kPlaceError)));
   }
 
-  // What a node of the grid of depths tells of places.
+  // A node of the grid of depths tells this of places.
   template <class D, class V = hn::Vec<D>>
   struct ByNode {
     V x, y, z;  // [m] from the node's surface point to the place
@@ -200,7 +200,7 @@ class FieldLookup {
     return Mix(t, a, b);
   }
 
-  // Where a coordinate is in the grid of depths, at most `last`. NaN is in cell 0.
+  // Returns a coordinate in cells of the grid of depths, at most `last`. NaN is in cell 0.
   template <class D, class V = hn::Vec<D>>
   HWY_INLINE V DepthCoordinate(D d, int axis, V x, std::int32_t last) const {
     const V zero = hn::Zero(d), most = hn::Set(d, static_cast<float>(last));

@@ -107,7 +107,7 @@ class Search {
     }
   }
 
-  // What the grid of depths tells of spheres about places.
+  // The grid of depths tells this of spheres about places.
   struct Inside {
     hn::Vec<BoxTag> depth;  // [m] no place is deeper inside
     hn::Vec<BoxTag> ball;   // [m] as FieldLookup::ByNode, about the centre
@@ -426,7 +426,7 @@ class Search {
       balls_[static_cast<std::size_t>(asked_) % balls_.size()] = {point.center[0], point.center[1],
                                                                   point.center[2], margin};
     }
-    // Outside, if by no more than that.
+    // A margin that is not known is taken for the least one.
     point.outside = std::max(margin, std::numeric_limits<float>::min());
     if (point.distance >= limit_) return Prune(point.distance, point.outside);
     Entry* again = queue_.push(std::max(point.distance, 0.0F));

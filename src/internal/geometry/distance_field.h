@@ -60,8 +60,8 @@ class DistanceField {
   /// surface: for a solid of several elements.
   const Level& depths() const { return depths_; }
   bool has_depths() const { return !surface_xy_.empty(); }
-  /// From each node of that grid to a surface point, in units of surface_step(): x in the lower
-  /// half, y in the upper one.
+  /// Each entry is a vector from a node of that grid to a surface point, in units of
+  /// surface_step(): x is in the lower half, y in the upper one.
   const std::vector<std::uint32_t>& surface_xy() const { return surface_xy_; }
   /// The same: z in the lower half. In the upper one, the radius of the node's ball that holds
   /// nothing inside, in units of kBallStep, rounded down.
