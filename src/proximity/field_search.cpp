@@ -7,11 +7,11 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
 
+#include "internal/geometry/float_rounding.h"
 #include "proximity/field_lookup-inl.h"
 #include "proximity/refinement.h"
 
@@ -23,6 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using dual_tree::BoxTag;
 using CornerTag = hn::CappedTag<float, 8>;
 using Entry = FieldQueue::Entry;
+using Side = NearSurface::Side;
 
 // The bound [m] of what may be inside, at any depth: it is looked at before all others.
 constexpr float kMayBeInside = -kFarAway;
@@ -32,9 +33,8 @@ constexpr int kMaxMeasured = 100, kMaxMeasuredExact = 256;
 // A search that has visited so many tiles and measured nothing measures a point: the link's
 // supporting plane across its direction may separate the link from all others, as from a table.
 constexpr std::uint64_t kTilesBeforePlanes = 4;
-// So many points whose sides the field does not tell are asked about one by one. The balls about so
-// many of them that are outside tell the sides of others.
-constexpr int kMaxAsked = 64;
+// So many points whose sides neither the field nor an earlier one tells are asked about one by one.
+constexpr int kMaxAsked = 256;
 
 // Bounds of a node's children or of a tile's points.
 struct alignas(64) Bounds {
@@ -411,21 +411,19 @@ class Search {
 
   // Decides on which side a point is. If it is outside, its distance may still not matter.
   void Ask(Entry point, float bound) {
-    float margin = BallAbout(point);
+    SideBalls::Found found = policy_.known_side(point.center);
+    float margin = round_down(found.margin) - in_.rounding;
     if (!(margin > 0.0F)) {
-      const auto side = policy_.measure_if_inside(
-          ~point.child, point.lane, point.distance - in_.rounding, point.radius + in_.rounding);
-      if (side == NearSurface::Side::kUnknown) {
-        result_.has_time = false;
-        return Prune(bound, 0.0F);
-      }
-      if (side == NearSurface::Side::kInside) return TakeInside();
       result_.gave_up = ++asked_ > kMaxAsked;
       if (result_.gave_up) return;
-      margin = policy_.asked_margin() - in_.rounding;
-      balls_[static_cast<std::size_t>(asked_) % balls_.size()] = {point.center[0], point.center[1],
-                                                                  point.center[2], margin};
+      found = policy_.ask_side(~point.child, point.lane, point.distance - in_.rounding);
+      margin = round_down(found.margin) - in_.rounding;
     }
+    if (found.side == Side::kUnknown) {
+      result_.has_time = false;
+      return Prune(bound, 0.0F);
+    }
+    if (found.side == Side::kInside) return MeasureInside(point);
     // A margin that is not known is taken for the least one.
     point.outside = std::max(margin, std::numeric_limits<float>::min());
     if (point.distance >= limit_) return Prune(point.distance, point.outside);
@@ -434,19 +432,8 @@ class Search {
     if (!result_.gave_up) *again = point;
   }
 
-  // [m] Every place that is nearer to a point is outside, by the points that were asked about.
-  float BallAbout(const Entry& point) const {
-    float largest = 0.0F;
-    for (const Ball& ball : balls_) {
-      const float x = point.center[0] - ball.x, y = point.center[1] - ball.y,
-                  z = point.center[2] - ball.z;
-      largest = std::max(largest, ball.radius - std::sqrt(x * x + y * y + z * z) - in_.rounding);
-    }
-    return largest;
-  }
-
-  // A point that is inside was measured.
-  void TakeInside() {
+  void MeasureInside(const Entry& point) {
+    policy_.measure_inside(~point.child, point.lane, point.radius + in_.rounding);
     result_.has_inside = true;
     result_.gave_up =
         !has_depths_ || ++measured_ > (in_.is_exact ? kMaxMeasuredExact : kMaxMeasured);
@@ -462,10 +449,6 @@ class Search {
   float limit_;                   // [m]
   bool has_new_planes_ = false;   // which entries of the queue do not know
   int asked_ = 0, measured_ = 0;  // points
-  struct Ball {
-    float x, y, z, radius;  // [m]
-  };
-  std::array<Ball, 16> balls_{};  // all places in them are outside
   FieldSearchResult result_;
 };
 

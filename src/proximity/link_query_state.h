@@ -18,6 +18,7 @@
 #include "proximity/coherence/extent_bound.h"
 #include "proximity/coherence/link_bound.h"
 #include "proximity/coherence/node_bounds.h"
+#include "proximity/coherence/side_balls.h"
 #include "proximity/posed_index.h"
 #include "proximity/signed_distance_grid.h"
 #include "proximity/supporting_planes.h"
@@ -83,6 +84,7 @@ struct LinkCoherence {
   BvttFronts fronts;
   DistanceCache distances;
   BoxDistanceCache box_distances;
+  SideBalls side_balls;
   /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
   struct {
     std::uint64_t build_id = 0;  ///< of its index; 0: there was no answer

@@ -17,6 +17,7 @@ namespace ist {
 class PointRefinement {
  public:
   static constexpr bool kHasExtent = false, kBoundsPoints = true;
+  using Side = NearSurface::Side;
 
   PointRefinement(const PointObstacles& obstacles, LinkQueryState* link)
       : obstacles_(obstacles), link_(*link) {}
@@ -34,27 +35,28 @@ class PointRefinement {
   bool is_outside(std::int32_t tile, int lane) {
     const ObstacleId id{tile, lane};
     const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
-    const Side found = side(id, p_LQ);
+    const Side found = side(id, p_LQ).side;
     if (found == Side::kInside) measure_inside(id, p_OQ, p_LQ);
     return found == Side::kOutside;
   }
-  /// Measures a point that may be inside, unless it turns out to be outside while no other is
-  /// inside.
-  /// @param least_distance  [m] no part of the surface is nearer
-  /// @param within          [m] some part is no farther
-  /// @returns outside: it was not measured; unknown: nor was it, the deadline passed
-  NearSurface::Side measure_if_inside(std::int32_t tile, int lane, float least_distance,
-                                      float within);
-  /// [m] Every place nearer than this to the point that side() decided last is outside; 0: unknown.
-  float asked_margin() const { return asked_margin_; }
   /// Points that are outside are told from others at once, or the rest is the depth search's.
   static bool leaves_inside() { return true; }
   float traversal_prune_bound() const { return link_.search.traversal_prune_bound(); }
-  using Side = NearSurface::Side;
-  /// On which side of the link's surface a point is; unknown after the deadline.
+  /// On which side of the link's surface a point is, and which places about it are, too; unknown
+  /// after the deadline. The margin may be 0.
   /// @param least_distance  [m] no part of the surface is nearer, as far as it is known
-  Side side(ObstacleId id, const Eigen::Vector3d& p_LQ, double least_distance = 0.0);
-  /// The same, by what is kept and by the link's grid: outside or unknown.
+  SideBalls::Found side(ObstacleId id, const Eigen::Vector3d& p_LQ, double least_distance = 0.0);
+  SideBalls::Found ask_side(std::int32_t tile, int lane, float least_distance) {
+    const ObstacleId id{tile, lane};
+    return side(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id),
+                static_cast<double>(least_distance));
+  }
+  /// The same for a place, by what was decided in this and in other queries.
+  SideBalls::Found known_side(const float p_LQ[3]) const {
+    return link_.kept.side_balls.find(
+        {static_cast<double>(p_LQ[0]), static_cast<double>(p_LQ[1]), static_cast<double>(p_LQ[2])});
+  }
+  /// The same for a point, by what is kept and by the link's grid: never inside.
   Side known_side(ObstacleId id, const Eigen::Vector3d& p_LQ);
   /// Measures a point that is outside the link, unless it was measured in this traversal or a kept
   /// bound proves that it does not matter.
@@ -86,7 +88,14 @@ class PointRefinement {
                          double max_distance = std::numeric_limits<double>::infinity());
 
   /// Measures a point that is known to be inside, if it may be the deepest.
-  void measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ);
+  /// @param within  [m] some part of the surface is no farther
+  void measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
+                      double within = std::numeric_limits<double>::infinity());
+  void measure_inside(std::int32_t tile, int lane, float within) {
+    const ObstacleId id{tile, lane};
+    const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id);
+    measure_inside(id, p_OQ, obstacles_.X_LO * p_OQ, static_cast<double>(within));
+  }
 
   /// By the link's grid; `enough` as above.
   SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
@@ -95,7 +104,6 @@ class PointRefinement {
   const PointObstacles& obstacles_;
   LinkQueryState& link_;
   float refined_bound_ = -std::numeric_limits<float>::infinity();
-  float asked_margin_ = 0.0F;
 };
 
 /// The same for solid boxes. While a box is outside the link, its distance is exact: triangle

@@ -98,26 +98,28 @@ PointRefinement::Side PointRefinement::known_side(ObstacleId id, const Eigen::Ve
 }
 
 // The winding number is asked last. It is not asked after the deadline.
-PointRefinement::Side PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ,
-                                            double least_distance) {
-  asked_margin_ = 0.0F;
+SideBalls::Found PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_LQ,
+                                       double least_distance) {
+  SideBalls& balls = link_.kept.side_balls;
+  SideBalls::Found found = balls.find(p_LQ);
+  if (found.side != Side::kUnknown) return found;
   const SignedDistanceGrid::Bound bound = grid_bound({p_LQ}, kInfinity);
-  if (bound.is_outside || known_side(id, p_LQ) == Side::kOutside) return Side::kOutside;
-  if (deadline_passed()) return Side::kUnknown;
-  DistanceCache& kept = link_.kept.distances;
-  const auto quantity = DistanceCache::Quantity::kOutside;
-  const std::uint32_t key = coherent_key(obstacles_, id);
+  if (bound.is_outside || known_side(id, p_LQ) == Side::kOutside) return {Side::kOutside, 0.0};
+  if (deadline_passed()) return found;
   link_.search.count_exact();
   const Solid& solid = link_.context.solid();
   const double distance = std::max(bound.surface_distance, least_distance);
-  const OutsideMargin found =
+  const SideMargin measured =
       solid.is_closed() || !is_one_mesh(solid)
-          ? OutsideMargin{solid.is_inside(p_LQ), solid.is_closed() ? distance : 0.0}
-          : outside_margin(solid, p_LQ, distance);
-  if (found.is_inside) return Side::kInside;
-  if (found.margin > 0.0) kept.store(quantity, key, p_LQ, found.margin);
-  asked_margin_ = round_down(found.margin);
-  return Side::kOutside;
+          ? SideMargin{solid.is_inside(p_LQ), solid.is_closed() ? distance : 0.0}
+          : side_margin(solid, p_LQ, distance);
+  found = {measured.is_inside ? Side::kInside : Side::kOutside, measured.margin};
+  balls.store(p_LQ, found);
+  if (!measured.is_inside && measured.margin > 0.0) {
+    link_.kept.distances.store(DistanceCache::Quantity::kOutside, coherent_key(obstacles_, id),
+                               p_LQ, measured.margin);
+  }
+  return found;
 }
 
 // A cell costs as much as a few points: where few have to be measured, it does not pay. After the
@@ -155,37 +157,19 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
   }
 }
 
+// While another point is known to be inside, it matters only whether this one is deeper.
 void PointRefinement::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
-                                     const Eigen::Vector3d& p_LQ) {
-  link_.search.count_exact();
-  NearSurface near;
-  if (is_one_mesh(link_.context.solid())) near.side = Side::kInside;
-  const double deepest = std::max(-link_.search.prune_bound(), 0.0);
-  link_.search.offer(point_depth(link_.context.solid(), p_LQ, deepest, near).exact, p_OQ,
-                     obstacles_, id);
-}
-
-// While a point is inside that is known, it matters only whether this one is deeper.
-PointRefinement::Side PointRefinement::measure_if_inside(std::int32_t tile, int lane,
-                                                         float least_distance, float within) {
+                                     const Eigen::Vector3d& p_LQ, double within) {
   LinkSearch& search = link_.search;
-  const ObstacleId id{tile, lane};
-  const Eigen::Vector3d p_OQ = point_O(*obstacles_.bvh, id), p_LQ = obstacles_.X_LO * p_OQ;
-  NearSurface near;
-  near.within = static_cast<double>(within);
-  const double deepest = std::max(-search.prune_bound(), 0.0);
-  if (deepest == 0.0) {
-    near.side = side(id, p_LQ, static_cast<double>(least_distance));
-    if (near.side != Side::kInside) return near.side;
-  }
   search.count_exact();
-  const PointDepth found = point_depth(link_.context.solid(), p_LQ, deepest, near);
+  const double deepest = std::max(-search.prune_bound(), 0.0);
+  const PointDepth found =
+      point_depth(link_.context.solid(), p_LQ, deepest, {within, Side::kInside});
   if (found.exact.distance < kInfinity) {
     search.offer(found.exact, p_OQ, obstacles_, id);
   } else {
     search.prune(std::max(found.floor, -deepest));
   }
-  return Side::kInside;
 }
 
 double PointRefinement::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,

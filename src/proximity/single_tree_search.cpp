@@ -310,7 +310,7 @@ class SingleTreeSearch {
     const double distance = grid_.bound(cell, {p_LQ_[i]}, kInfinity).surface_distance;
     if (distance <= -search_.prune_bound() && search_.prune_bound() < 0.0) return false;
     search_.count_exact();
-    const OutsideMargin found = outside_margin(link_.context.solid(), p_LQ_[i], distance);
+    const SideMargin found = outside_margin(link_.context.solid(), p_LQ_[i], distance);
     near->side = found.is_inside ? NearSurface::Side::kInside : NearSurface::Side::kOutside;
     if (found.is_inside) return false;
     tile_.set(i, found.margin > 0.0 ? Bound{0.0, kInfinity, found.margin}

@@ -42,7 +42,7 @@ TEST(OutsideMargin, HoldsNoPlaceInside) {
     for (int i = 0; i < test::scaled(3000); ++i) {
       const Eigen::Vector3d p = test::random_vector(&rng, i % 2 == 0 ? 0.15 : 0.11);
       const double distance = std::abs(solid.signed_distance(p).distance);
-      const OutsideMargin found = outside_margin(solid, p, distance);
+      const SideMargin found = outside_margin(solid, p, distance);
       ASSERT_EQ(found.is_inside, solid.is_inside(p));
       ASSERT_LE(found.margin, distance);
       if (!(found.margin > 0.0)) continue;
@@ -59,6 +59,51 @@ TEST(OutsideMargin, HoldsNoPlaceInside) {
   }
   EXPECT_GT(positive, test::scaled(2000));
   EXPECT_GT(large, test::scaled(1000));
+}
+
+// Every triangle twice: the winding number is above 1/2 beyond the open side, too.
+TriangleMesh doubled(TriangleMesh mesh) {
+  const std::vector<TriangleMesh::Triangle> triangles = mesh.triangles;
+  mesh.triangles.insert(mesh.triangles.end(), triangles.begin(), triangles.end());
+  return mesh;
+}
+
+// The same inside, where the box about the mesh ends the inside, too.
+TEST(OutsideMargin, SideMarginHoldsNoPlaceOfTheOtherSide) {
+  test::Rng rng(182);
+  int positive[2] = {}, near_box = 0;
+  for (const TriangleMesh& mesh :
+       {test::open_box({0.15, 0.1, 0.2}), doubled(test::open_box({0.15, 0.1, 0.2})), perforated(3),
+        perforated(1000)}) {
+    const Solid solid({GeometryElement{mesh, Eigen::Isometry3d::Identity(), "test"}});
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& vertex : mesh.vertices) box.extend(vertex);
+    for (int i = 0; i < test::scaled(3000); ++i) {
+      Eigen::Vector3d p = test::random_vector(&rng, i % 2 == 0 ? 0.15 : 0.11);
+      // Near the open side of the box, which no surface closes.
+      if (i % 3 == 0) p.z() = 0.1 - 0.01 * std::abs(p.z());
+      const double distance = std::abs(solid.signed_distance(p).distance);
+      const SideMargin found = side_margin(solid, p, distance);
+      const SideMargin outside = outside_margin(solid, p, distance);
+      ASSERT_EQ(found.is_inside, solid.is_inside(p));
+      ASSERT_EQ(found.is_inside, outside.is_inside);
+      ASSERT_LE(found.margin, distance);
+      ASSERT_EQ(outside.margin, found.is_inside ? 0.0 : found.margin);
+      if (!(found.margin > 0.0)) continue;
+      ++positive[found.is_inside ? 1 : 0];
+      near_box += found.is_inside && box.max().z() - p.z() < 1.001 * found.margin ? 1 : 0;
+      for (int k = 0; k < 10; ++k) {
+        const Eigen::Vector3d offset = found.margin *
+                                       (k % 2 == 0 ? 1.0 : std::sqrt(test::uniform(&rng, 0, 1))) *
+                                       test::random_vector(&rng, 1.0).normalized();
+        ASSERT_EQ(solid.is_inside(p + offset), found.is_inside)
+            << p.transpose() << ", " << offset.norm();
+      }
+    }
+  }
+  EXPECT_GT(positive[0], test::scaled(2000));
+  EXPECT_GT(positive[1], test::scaled(1000));
+  EXPECT_GT(near_box, test::scaled(20));
 }
 
 // A square about the z axis; its border is in `pieces` edges for each side.

@@ -1,0 +1,85 @@
+// Balls on one side of a link's surface, which tell the sides of other places.
+
+#include "proximity/coherence/side_balls.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "internal/geometry/outside_margin.h"
+#include "support/meshes.h"
+#include "support/scene.h"
+
+namespace ist {
+namespace {
+
+using Side = NearSurface::Side;
+
+TEST(SideBalls, TellTheSideOfThePlacesInThem) {
+  SideBalls balls;
+  const Eigen::Vector3d p(0.1, 0.2, 0.3), q(-0.1, 0.2, 0.3);
+  EXPECT_EQ(balls.find(p).side, Side::kUnknown);
+  balls.store(p, {Side::kOutside, 0.001});
+  balls.store(q, {Side::kInside, 0.0005});
+  EXPECT_EQ(balls.find(p).side, Side::kOutside);
+  EXPECT_NEAR(balls.find(p).margin, 0.001, 1e-7);
+  EXPECT_LE(balls.find(p).margin, 0.001);
+  EXPECT_EQ(balls.find(q).side, Side::kInside);
+  const Eigen::Vector3d step(0.0003, 0.0002, -0.0002);
+  EXPECT_NEAR(balls.find(p + step).margin, 0.001 - step.norm(), 1e-7);
+  EXPECT_LE(balls.find(p + step).margin, 0.001 - step.norm());
+  for (const Eigen::Vector3d& other :
+       {Eigen::Vector3d(p + 4 * step), Eigen::Vector3d(q + 2 * step), Eigen::Vector3d(0, 0, 0)}) {
+    EXPECT_EQ(balls.find(other).side, Side::kUnknown) << other.transpose();
+    EXPECT_EQ(balls.find(other).margin, 0.0);
+  }
+}
+
+TEST(SideBalls, TellNothingOfPlacesThatAreNotFinite) {
+  SideBalls balls;
+  balls.store(Eigen::Vector3d::Zero(), {Side::kOutside, 1.0});
+  for (const double value :
+       {std::numeric_limits<double>::quiet_NaN(), HUGE_VAL, -HUGE_VAL, 1e300}) {
+    const Eigen::Vector3d p(0.0, value, 0.0);
+    balls.store(p, {Side::kOutside, 1.0});
+    EXPECT_EQ(balls.find(p).side, Side::kUnknown) << value;
+  }
+  const Eigen::Vector3d q(0.5, 0.5, 0.5);
+  balls.store(q, {Side::kOutside, std::numeric_limits<double>::quiet_NaN()});
+  balls.store(q, {Side::kUnknown, 1.0});
+  balls.store(q, {Side::kInside, 0.0});
+  balls.store(q, {Side::kInside, -1.0});
+  EXPECT_EQ(balls.find(q).side, Side::kUnknown);
+}
+
+// Many more places than the table has room for, of a mesh with holes.
+TEST(SideBalls, AgreeWithTheWindingNumber) {
+  test::Rng rng(231);
+  const Solid solid(
+      {GeometryElement{test::open_box({0.15, 0.1, 0.2}), Eigen::Isometry3d::Identity(), ""}});
+  SideBalls balls;
+  std::vector<Eigen::Vector3d> places;
+  for (int i = 0; i < 400; ++i) places.push_back(test::random_vector(&rng, 0.11));
+  int outside = 0, inside = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(test::scaled(40000)); ++i) {
+    const Eigen::Vector3d p = test::random_vector(&rng, 0.004) + places[i % places.size()];
+    const SideBalls::Found found = balls.find(p);
+    if (found.side != Side::kUnknown) {
+      const Eigen::Vector3d q =
+          p + 0.999 * found.margin * test::random_vector(&rng, 1.0).normalized();
+      ASSERT_EQ(found.side == Side::kInside, solid.is_inside(p)) << p.transpose();
+      ASSERT_EQ(found.side == Side::kInside, solid.is_inside(q)) << q.transpose();
+      ++(found.side == Side::kInside ? inside : outside);
+      continue;
+    }
+    const SideMargin measured = side_margin(solid, p, std::abs(solid.signed_distance(p).distance));
+    balls.store(p, {measured.is_inside ? Side::kInside : Side::kOutside, measured.margin});
+  }
+  EXPECT_GT(outside, test::scaled(1000));
+  EXPECT_GT(inside, test::scaled(1000));
+}
+
+}  // namespace
+}  // namespace ist
