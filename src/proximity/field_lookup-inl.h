@@ -56,12 +56,24 @@ class FieldLookup {
     return field_.levels().back();
   }
 
-  // Lower bounds [m] of the distances of places.
-  // @param upper  receives upper bounds; kFarAway where none is known
+  // [m] The distances of places from the box about the solid.
   template <class D, class V = hn::Vec<D>>
-  HWY_INLINE V Distance(D d, const DistanceField::Level& level, V x, V y, V z, V* upper) const {
+  HWY_INLINE V FromBounds(D d, V x, V y, V z) const {
+    const Eigen::AlignedBox3f& box = field_.bounds();
+    const auto along = [&](int axis, V v) {
+      return dual_tree::IntervalDistance(d, hn::Set(d, box.min()[axis]),
+                                         hn::Set(d, box.max()[axis]), v);
+    };
+    return dual_tree::Norm(along(0, x), along(1, y), along(2, z));
+  }
+
+  // Lower bounds [m] of the distances of places.
+  // @param from_bounds  by FromBounds()
+  // @param upper        receives upper bounds; kFarAway where none is known
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE V Distance(D d, const DistanceField::Level& level, V x, V y, V z, V from_bounds,
+                        V* upper) const {
     const hn::RebindToSigned<D> di;
-    const V from_bounds = BoundsDistance(d, x, y, z);
     const V gx = GridCoordinate(d, level, 0, x), gy = GridCoordinate(d, level, 1, y),
             gz = GridCoordinate(d, level, 2, z);
     // Written so that NaN is in no cell.
@@ -97,11 +109,17 @@ class FieldLookup {
   }
 
   // [m] No surface and no place inside is nearer to a place; not positive: unknown.
+  // @param from_bounds  by FromBounds()
   template <class D, class V = hn::Vec<D>>
-  HWY_INLINE V OutsideRadius(D d, V x, V y, V z) const {
+  HWY_INLINE V OutsideRadius(D d, V x, V y, V z, V from_bounds) const {
     const hn::RebindToSigned<D> di;
+    const V by_bounds = hn::Sub(from_bounds, hn::Set(d, kPlaceError));
+    // No ball about a node is larger; and of a closed solid only the side of a place is asked.
+    constexpr float kLargest = 255.0F * DistanceField::kOutsideStep;
+    if (hn::AllTrue(d, hn::Gt(by_bounds, hn::Set(d, field_.is_closed() ? 0.0F : kLargest)))) {
+      return by_bounds;
+    }
     const DistanceField::Level& level = field_.levels().front();
-    const V from_bounds = BoundsDistance(d, x, y, z);
     const V gx = GridCoordinate(d, level, 0, x), gy = GridCoordinate(d, level, 1, y),
             gz = GridCoordinate(d, level, 2, z);
     const auto is_in = hn::And(hn::And(IsInGrid(d, level, 0, gx), IsInGrid(d, level, 1, gy)),
@@ -120,8 +138,7 @@ class FieldLookup {
                         hn::Sub(gz, hn::ConvertTo(d, iz))),
         hn::Set(d, level.cell));
     const V by_node = hn::Sub(hn::Sub(radius, from_node), hn::Set(d, kPlaceError));
-    return hn::Max(hn::IfThenElseZero(is_in, by_node),
-                   hn::Sub(from_bounds, hn::Set(d, kPlaceError)));
+    return hn::Max(hn::IfThenElseZero(is_in, by_node), by_bounds);
   }
 
   // A node of the grid of depths tells this of places.
@@ -235,16 +252,6 @@ class FieldLookup {
     const V ball = hn::Sub(hn::Sub(radius, dual_tree::Norm(dx, dy, dz)), hn::Set(d, kPlaceError));
     return {from_surface(dx, low_half(xy)), from_surface(dy, hn::ShiftRight<16>(xy)),
             from_surface(dz, low_half(z_ball)), ball};
-  }
-
-  template <class D, class V = hn::Vec<D>>
-  HWY_INLINE V BoundsDistance(D d, V x, V y, V z) const {
-    const Eigen::AlignedBox3f& box = field_.bounds();
-    const auto along = [&](int axis, V v) {
-      return dual_tree::IntervalDistance(d, hn::Set(d, box.min()[axis]),
-                                         hn::Set(d, box.max()[axis]), v);
-    };
-    return dual_tree::Norm(along(0, x), along(1, y), along(2, z));
   }
 
   const DistanceField& field_;

@@ -3,6 +3,7 @@
 #define HWY_TARGET_INCLUDE "proximity/field_search.cpp"
 #include "proximity/field_search.h"
 
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -35,6 +36,7 @@ constexpr int kMaxMeasured = 100, kMaxMeasuredExact = 256;
 constexpr std::uint64_t kTilesBeforePlanes = 4;
 // So many points whose sides neither the field nor an earlier one tells are asked about one by one.
 constexpr int kMaxAsked = 256;
+constexpr std::size_t kCacheLine = 64;  // [bytes]
 
 // Bounds of a node's children or of a tile's points.
 struct alignas(64) Bounds {
@@ -114,20 +116,21 @@ class Search {
   };
 
   // Combines the bounds of spheres about places.
-  // @param distance  [m] of the places
-  // @param least     [m] another bound of their distances
-  // @param inside    returns an Inside; it is called where the field has depths
+  // @param from_bounds  [m] of the places, by FieldLookup::FromBounds()
+  // @param distance     [m] of the places
+  // @param least        [m] another bound of their distances
+  // @param inside       returns an Inside; it is called where the field has depths
   template <class LookInside>
-  HWY_INLINE void Combine(hn::Vec<BoxTag> distance, hn::Vec<BoxTag> radius, hn::Vec<BoxTag> least,
-                          hn::Vec<BoxTag> height, const LookInside& inside, std::size_t k,
-                          Bounds* bounds) const {
+  HWY_INLINE void Combine(hn::Vec<BoxTag> from_bounds, hn::Vec<BoxTag> distance,
+                          hn::Vec<BoxTag> radius, hn::Vec<BoxTag> least, hn::Vec<BoxTag> height,
+                          const LookInside& inside, std::size_t k, Bounds* bounds) const {
     const BoxTag d;
     const auto unknown = hn::Set(d, kMayBeInside), rounding = hn::Set(d, in_.rounding);
     const auto by_center = hn::Sub(distance, radius);
     const auto by_plane = hn::IfThenElse(hn::Gt(height, unknown), height, unknown);
     auto at_center =
         hn::Sub(field_.OutsideRadius(d, hn::Load(d, bounds->x + k), hn::Load(d, bounds->y + k),
-                                     hn::Load(d, bounds->z + k)),
+                                     hn::Load(d, bounds->z + k), from_bounds),
                 rounding);
     auto outside = Outside(at_center, by_center, radius, by_plane);
     auto lowest = unknown;
@@ -201,7 +204,8 @@ class Search {
         }
       }
       auto upper = least;
-      const auto bound = field_.Distance(d, level, p[0], p[1], p[2], &upper);
+      const auto bound = field_.Distance(d, level, p[0], p[1], p[2],
+                                         field_.FromBounds(d, p[0], p[1], p[2]), &upper);
       least = hn::Min(least, bound);
       hn::Store(bound, d, corner + k);
     }
@@ -278,17 +282,21 @@ class Search {
              hn::Mul(half, hn::Add(min_z, max_z)), k, &bounds);
       hn::Store(radius, d, bounds.radius + k);
       auto upper = radius;
-      const auto distance =
-          field_.Distance(d, level, hn::Load(d, bounds.x + k), hn::Load(d, bounds.y + k),
-                          hn::Load(d, bounds.z + k), &upper);
+      const auto x = hn::Load(d, bounds.x + k), y = hn::Load(d, bounds.y + k),
+                 z = hn::Load(d, bounds.z + k);
+      const auto from_bounds = field_.FromBounds(d, x, y, z);
+      const auto distance = field_.Distance(d, level, x, y, z, from_bounds, &upper);
       farthest = hn::Min(farthest, hn::Add(upper, radius));
       const auto by_corners = has_corners ? Interpolate(entry, corner, node, k) : hn::Zero(d);
       Combine(
-          distance, radius, by_corners, planes_.Height(node, k, planes_.offset() + in_.support),
+          from_bounds, distance, radius, by_corners,
+          planes_.Height(node, k, planes_.offset() + in_.support),
           [&] { return LookInside(bounds, k, half_x, half_y, half_z); }, k, &bounds);
     }
     LowerLimit(hn::GetLane(hn::MinOfLanes(d, farthest)));
-    for (std::uint32_t bits = Below(bounds, node.count); bits != 0; bits &= bits - 1) {
+    const std::uint32_t below = Below(bounds, node.count);
+    PrefetchLeast(bounds, below, node);
+    for (std::uint32_t bits = below; bits != 0; bits &= bits - 1) {
       const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
       Entry* child = Push(bounds, k);
       if (child == nullptr) continue;
@@ -303,6 +311,28 @@ class Search {
     }
   }
 
+  // The child that has the least bound is most often the next one to be expanded.
+  void PrefetchLeast(const Bounds& bounds, std::uint32_t below, const BoxNode& node) const {
+    float least = kFarAway;
+    std::int32_t next = 0;
+    for (std::uint32_t bits = below; bits != 0; bits &= bits - 1) {
+      const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+      next = bounds.distance[k] < least ? node.child[k] : next;
+      least = std::min(least, bounds.distance[k]);
+    }
+    if (below == 0) return;
+    const auto prefetch = [](const auto* place) {
+      for (std::size_t line = 0; line < sizeof *place; line += kCacheLine) {
+        hwy::Prefetch(reinterpret_cast<const char*>(place) + line);
+      }
+    };
+    if (next < 0) {
+      prefetch(in_.bvh->place_of_tile(static_cast<std::size_t>(~next)));
+    } else {
+      prefetch(&in_.bvh->nodes()[static_cast<std::size_t>(next)]);
+    }
+  }
+
   void VisitTile(const Entry& entry) {
     ++result_.tiles;
     PointTile scratch;
@@ -314,21 +344,20 @@ class Search {
     for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
       ToLink(hn::Load(d, tile.x + k), hn::Load(d, tile.y + k), hn::Load(d, tile.z + k), k, &bounds);
       auto upper = farthest;
-      const auto distance =
-          field_.Distance(d, level, hn::Load(d, bounds.x + k), hn::Load(d, bounds.y + k),
-                          hn::Load(d, bounds.z + k), &upper);
+      const auto x = hn::Load(d, bounds.x + k), y = hn::Load(d, bounds.y + k),
+                 z = hn::Load(d, bounds.z + k);
+      const auto from_bounds = field_.FromBounds(d, x, y, z);
+      const auto distance = field_.Distance(d, level, x, y, z, from_bounds, &upper);
       farthest = hn::Min(farthest, upper);
       hn::Store(upper, d, bounds.radius + k);
       const auto look_inside = [&] {
         Inside inside;
-        const auto least =
-            field_.ByEightNodes(d, hn::Load(d, bounds.x + k), hn::Load(d, bounds.y + k),
-                                hn::Load(d, bounds.z + k), &inside.ball);
+        const auto least = field_.ByEightNodes(d, x, y, z, &inside.ball);
         inside.depth = hn::Add(least, hn::Set(d, field_.surface_error()));
         hn::Store(hn::Min(upper, inside.depth), d, bounds.radius + k);
         return inside;
       };
-      Combine(distance, hn::Zero(d), hn::Zero(d),
+      Combine(from_bounds, distance, hn::Zero(d), hn::Zero(d),
               planes_.Height(tile, k, planes_.offset() + in_.support), look_inside, k, &bounds);
     }
     LowerLimit(hn::GetLane(hn::MinOfLanes(d, farthest)));
