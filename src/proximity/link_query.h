@@ -47,6 +47,8 @@ class LinkQuery {
   /// @param deadline  if it has passed, no search follows. It is asked at every step
   /// @param late      [s] it may be exceeded by so much
   void prove_first_bound(SnapshotSpan clouds, Deadline* deadline, double late);
+  /// The same for a link that the deadline left without a positive bound, after run().
+  void prove_bound_late(SnapshotSpan clouds, Deadline* deadline, double late);
   /// The same with more time, for links that prove_first_bound() has proven nothing of.
   void prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline);
 

@@ -77,6 +77,15 @@ void LinkQuery::prove_first_bound(SnapshotSpan clouds, Deadline* deadline, doubl
   if (!last.was_proven && deadline->passed_by(late)) last.scene = kUnknownScene;
 }
 
+void LinkQuery::prove_bound_late(SnapshotSpan clouds, Deadline* deadline, double late) {
+  const LinkSearch& search = link_.search;
+  if (search.is_complete || search.lower_bound() > 0.0 || !(search.closest.exact.distance > 0.0)) {
+    return;
+  }
+  prove_first_bound(clouds, deadline, late);
+  take_kept_bound();
+}
+
 void LinkQuery::prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline) {
   LinkSearch& search = link_.search;
   auto& last = link_.kept.first_bound;

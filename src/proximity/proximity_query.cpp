@@ -96,8 +96,14 @@ struct ProximityQuery::Impl {
     std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
       return links[a].proven_bound() < links[b].proven_bound();
     });
-    if (deadline->passed()) return;
-    for (const std::size_t i : order) links[i].tighten(config);
+    if (!deadline->passed()) {
+      for (const std::size_t i : order) links[i].tighten(config);
+      return;
+    }
+    for (const std::size_t i : order) {
+      if (deadline->passed_by(kFirstBounds)) break;
+      links[i].prove_bound_late(clouds, deadline, kFirstBounds);
+    }
   }
 
   // Counts a link that a deadline left with wider bounds than were asked for.

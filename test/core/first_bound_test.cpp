@@ -213,6 +213,36 @@ TEST_F(NoTime, ClearLinksAreClear) {
   EXPECT_GT(clear, test::kSanitized ? -1 : 20);
 }
 
+// A box slides 0.1 mm above a plane of points. Wherever a query is stopped, in its first steps or
+// in a later one, a supporting plane still proves that the box is free.
+TEST(FirstBound, IsMadeUpForWhereverAQueryIsStopped) {
+  const auto model = test::make_model({Shape(Box{{0.2, 0.16, 0.1}})}, 0.005);
+  Points points;
+  for (int i = 0; i < 60; ++i) {
+    for (int k = 0; k < 60; ++k) points.emplace_back(0.01 * i - 0.3, 0.01 * k - 0.3, 0.0);
+  }
+  const CloudSnapshot plane = test::make_snapshot(points);
+  QueryConfig config;
+  config.tolerance = 0.001;
+  config.deadline = 1e3;
+  int proven = 0, answers = 0;
+  for (int asks = 0; asks < 40; ++asks) {
+    ProximityQuery query(model, config);
+    std::vector<LinkProximity> results;
+    for (int step = 0; step < 10; ++step) {
+      Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+      X_FL.translation() = Eigen::Vector3d(2.5e-4 * step, 0.0, 0.0501);
+      Deadline::asks_left_for_test = step == 0 ? -1 : asks;
+      query.run({&X_FL, 1}, {true}, {&plane}, &results);
+      Deadline::asks_left_for_test = -1;
+      ASSERT_LE(results[0].lower_bound, 1e-4 + 1e-9);
+      ++answers;
+      proven += results[0].lower_bound > 0.0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(proven, test::kSanitized ? -1 : 98 * answers / 100);
+}
+
 // A bound that was proven for one cloud is not taken for another, nor for a pose far away.
 TEST_F(NoTime, FirstBoundsBelongToTheirScene) {
   QueryConfig config;
