@@ -12,7 +12,7 @@ namespace {
 // [m] Larger margins are not looked for: the gradient's bound grows with them.
 constexpr double kLargestMargin = 0.05;
 // Places are outside below this winding number, and inside above 1 less it, in spite of the errors
-// of winding numbers, which are 0.01, and 0.06 for the quick one.
+// of winding numbers, which are 0.01 about, and larger for the quick one.
 constexpr double kSurelyOutside = 0.47;
 
 SideMargin measure(const Solid& solid, const Eigen::Vector3d& p_L, double largest,
@@ -20,17 +20,17 @@ SideMargin measure(const Solid& solid, const Eigen::Vector3d& p_L, double larges
   const SolidElement& element = elements_of(solid).front();
   const Eigen::Vector3d p_E = element.X_EL * p_L;
   const Eigen::AlignedBox3d& box = element.bvh.bounds();
-  constexpr double kError = TriangleBvh::kQuickWindingError;
-  const double quick = element.bvh.quick_winding_number(p_E);
+  double error;
+  const double quick = element.bvh.quick_winding_number(p_E, &error);
   SideMargin result;
   result.is_inside =
-      std::abs(quick - 0.5) > kError ? box.contains(p_E) && quick > 0.5 : element.is_inside(p_E);
-  double slack = kSurelyOutside - (quick + kError), radius = std::min(largest, kLargestMargin);
+      std::abs(quick - 0.5) > error ? box.contains(p_E) && quick > 0.5 : element.is_inside(p_E);
+  double slack = kSurelyOutside - (quick + error), radius = std::min(largest, kLargestMargin);
   if (result.is_inside) {
     // The inside ends at the box about the mesh, too.
     const double to_box = std::min((p_E - box.min()).minCoeff(), (box.max() - p_E).minCoeff());
     radius = also_inside ? std::min(radius, to_box) : 0.0;
-    slack = quick - kError - (1.0 - kSurelyOutside);
+    slack = quick - error - (1.0 - kSurelyOutside);
   }
   if (!(slack > 0.0) || !(radius > 0.0)) return result;
   result.margin = element.open_edges.steady_radius(p_E, slack, (1.0 - 1e-9) * radius);

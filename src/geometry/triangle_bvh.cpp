@@ -1,5 +1,6 @@
 #include "internal/geometry/triangle_bvh.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/triangle_bvh_builder.h"
@@ -54,16 +55,25 @@ double TriangleBvh::support_in_sphere(const Eigen::Vector3d& center_M, double ra
 }
 
 double TriangleBvh::winding_number(const Eigen::Vector3d& p_M) const {
-  return triangles_.empty() ? 0.0 : sum_winding(view(), p_M, kBeta);
+  return triangles_.empty() ? 0.0 : sum_winding(view(), p_M, kBeta).number;
 }
 
-double TriangleBvh::quick_winding_number(const Eigen::Vector3d& p_M) const {
-  return triangles_.empty() ? 0.0 : sum_winding(view(), p_M, kQuickBeta);
+// The error grows with the surface that is seen, whichever way it is turned: where several sheets
+// lie one behind another their errors add up, and their numbers may cancel.
+double TriangleBvh::quick_winding_number(const Eigen::Vector3d& p_M, double* error) const {
+  if (triangles_.empty()) {
+    if (error != nullptr) *error = 0.0;
+    return 0.0;
+  }
+  const WindingSum sum = sum_winding(view(), p_M, kQuickBeta);
+  if (error != nullptr) *error = kQuickWindingError * std::max(1.0, sum.far_size);
+  return sum.number;
 }
 
 bool TriangleBvh::is_inside(const Eigen::Vector3d& p_M) const {
-  const double w = quick_winding_number(p_M);
-  if (std::abs(w - 0.5) > kQuickWindingError) return w > 0.5;
+  double error;
+  const double w = quick_winding_number(p_M, &error);
+  if (std::abs(w - 0.5) > error) return w > 0.5;
   return winding_number(p_M) > 0.5;
 }
 

@@ -5,9 +5,14 @@
 /// The SIMD kernels of TriangleBvh. The hierarchy must not be empty.
 namespace ist {
 
+struct WindingSum {
+  double number;    ///< the winding number
+  double far_size;  ///< sum of the absolute values of the terms that are expansions
+};
+
 /// The winding number at p_M.
 /// @param beta  a node's expansion is used where the point is at least beta radii of the node away
-double sum_winding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta);
+WindingSum sum_winding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta);
 
 /// The kernel of TriangleBvh::closest.
 void find_closest(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, double max_distance_sq,

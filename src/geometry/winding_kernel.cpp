@@ -127,8 +127,9 @@ HWY_INLINE void AddTriangles(const TriangleBvh::View& bvh, const TriangleBvh::Le
 
 // Adds the expansions of those children of a node that are far from p, and marks the others: they
 // are `near`.
+// @param sizes  the terms' absolute values are added to it
 HWY_INLINE void AddExpansions(const TriangleBvh::Moments& node, const float* p, float beta_sq,
-                              float* sums, float* near) {
+                              float* sums, float* sizes, float* near) {
   const FloatTag d;
   for (std::size_t k = 0; k < kWidth; k += hn::Lanes(d)) {
     const auto dx = hn::Sub(hn::Load(d, node.x + k), hn::Set(d, p[0]));
@@ -155,22 +156,23 @@ HWY_INLINE void AddExpansions(const TriangleBvh::Moments& node, const float* p, 
     const auto term = hn::Mul(moments, hn::Mul(inverse, inverse_sq));
     const auto far_term = hn::IfThenElse(is_far, term, hn::Zero(d));
     hn::Store(hn::Add(hn::Load(d, sums + k), far_term), d, sums + k);
+    hn::Store(hn::Add(hn::Load(d, sizes + k), hn::Abs(far_term)), d, sizes + k);
     hn::Store(hn::IfThenElse(is_far, hn::Zero(d), hn::Set(d, 1.0F)), d, near + k);
   }
 }
 
-double Sum(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta) {
+WindingSum Sum(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta) {
   const Eigen::Vector3d local = p_M - bvh.origin;
   const float p[3] = {static_cast<float>(local.x()), static_cast<float>(local.y()),
                       static_cast<float>(local.z())};
   TriangleBvh::Stack<std::int32_t> stack;
   stack.push(0);
   Angles angles;
-  alignas(32) float far_sums[kWidth] = {};
+  alignas(32) float far_sums[kWidth] = {}, far_sizes[kWidth] = {};
   while (!stack.empty()) {
     const std::int32_t index = stack.pop();
     alignas(64) float near[kWidth];
-    AddExpansions(bvh.moments[index], p, beta * beta, far_sums, near);
+    AddExpansions(bvh.moments[index], p, beta * beta, far_sums, far_sizes, near);
     // Unused slots have no child: a NaN, which makes them near, must not lead back to the root.
     const auto count = static_cast<std::size_t>(bvh.boxes[index].count);
     for (std::size_t k = 0; k < count; ++k) {
@@ -183,18 +185,19 @@ double Sum(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta)
       }
     }
   }
-  double near_sum = angles.sum, far_sum = 0.0;
+  double near_sum = angles.sum, far_sum = 0.0, far_size = 0.0;
   for (std::size_t k = 0; k < kWidth; ++k) {
     near_sum += std::atan2(static_cast<double>(angles.im[k]), static_cast<double>(angles.re[k]));
     far_sum += static_cast<double>(far_sums[k]);
+    far_size += static_cast<double>(far_sizes[k]);
   }
   constexpr double kFourPi = 12.566370614359172;
-  return (far_sum + 2.0 * near_sum) / kFourPi;
+  return {(far_sum + 2.0 * near_sum) / kFourPi, far_size / kFourPi};
 }
 
 }  // namespace winding_number
 
-double SumWinding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta) {
+WindingSum SumWinding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta) {
   return winding_number::Sum(bvh, p_M, beta);
 }
 
@@ -207,7 +210,7 @@ namespace ist {
 
 HWY_EXPORT(SumWinding);
 
-double sum_winding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta) {
+WindingSum sum_winding(const TriangleBvh::View& bvh, const Eigen::Vector3d& p_M, float beta) {
   return HWY_DYNAMIC_DISPATCH(SumWinding)(bvh, p_M, beta);
 }
 

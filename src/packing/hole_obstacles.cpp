@@ -167,8 +167,9 @@ HoleObstacles::Obstacle HoleObstacles::nearest(const Eigen::Vector3d& x,
 }
 
 bool HoleObstacles::is_outside(const Eigen::Vector3d& p) const {
-  const double quick = bvh_.quick_winding_number(p);
-  if (std::abs(quick - kMinInside) > TriangleBvh::kQuickWindingError) return quick < kMinInside;
+  double error;
+  const double quick = bvh_.quick_winding_number(p, &error);
+  if (std::abs(quick - kMinInside) > error) return quick < kMinInside;
   return bvh_.winding_number(p) < kMinInside;
 }
 

@@ -183,8 +183,9 @@ class InteriorOctree {
     }
     const double q = circumradius / distance;
     const double rise = (1.0 + q) / ((1.0 - q) * (1.0 - q));
-    const double quick = bvh_.quick_winding_number(center);
-    if (std::max(quick + TriangleBvh::kQuickWindingError, 0.0) * rise < 0.5) {
+    double error;
+    const double quick = bvh_.quick_winding_number(center, &error);
+    if (std::max(quick + error, 0.0) * rise < 0.5) {
       return CellKind::kOutside;
     }
     const double w = bvh_.winding_number(center);

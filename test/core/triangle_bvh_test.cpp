@@ -191,6 +191,45 @@ TEST(TriangleBvh, WindingNumberEqualsTheSumOverAllTriangles) {
   }
 }
 
+// Where sheets lie one on another, or one in another, the errors of the expansion add up.
+TEST(TriangleBvh, ErrorOfTheQuickWindingNumberGrowsWithTheSheets) {
+  test::Rng rng(28);
+  double largest = 0.0;
+  int near_half = 0;
+  for (const double step : {0.0, 0.012, 0.1}) {
+    for (const int sheets : {1, 2, 8}) {
+      TriangleMesh mesh;
+      for (int i = 0; i < sheets; ++i) {
+        // A sphere that is cut open.
+        const TriangleMesh sphere = test::icosphere(0.1 * (1.0 - step * i), 3);
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        mesh.vertices.insert(mesh.vertices.end(), sphere.vertices.begin(), sphere.vertices.end());
+        for (TriangleMesh::Triangle triangle : sphere.triangles) {
+          if (sphere.vertices[triangle[0]].z() > 0.06) continue;
+          for (auto& vertex : triangle) vertex += first;
+          mesh.triangles.push_back(triangle);
+        }
+      }
+      const TriangleBvh bvh(mesh);
+      for (int i = 0; i < test::scaled(400); ++i) {
+        Eigen::Vector3d p = test::random_vector(&rng, 0.12);
+        if (i % 2 == 0) p.z() = 0.06 + 0.02 * p.z() / 0.12;  // about the rim
+        double error;
+        const double quick = bvh.quick_winding_number(p, &error);
+        const double w = test::oracle_winding(mesh, p);
+        ASSERT_LE(std::abs(quick - w), error) << sheets << " sheets, " << p.transpose();
+        ASSERT_GE(error, TriangleBvh::kQuickWindingError);
+        largest = std::max(largest, std::abs(quick - w));
+        if (std::abs(w - 0.5) < 0.02) continue;
+        near_half += std::abs(w - 0.5) < 0.2 ? 1 : 0;
+        ASSERT_EQ(bvh.is_inside(p), w > 0.5) << sheets << " sheets, " << p.transpose();
+      }
+    }
+  }
+  EXPECT_GT(largest, 0.15);
+  EXPECT_GT(near_half, test::scaled(100));
+}
+
 // The root mean square error of the expansion over points about a turned, open mesh. It is far
 // below the largest one: 4.3e-5, and 9.0e-5 without one of the terms of second order.
 TEST(TriangleBvh, WindingNumberIsExpandedToSecondOrder) {
