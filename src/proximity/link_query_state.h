@@ -76,7 +76,11 @@ struct SearchResult {
 /// answer promises.
 struct LinkCoherence {
   explicit LinkCoherence(const LinkModel& link)
-      : bound(link), extents(link), nodes(link), supports(link.tree) {}
+      : bound(link),
+        extents(link),
+        nodes(link),
+        side_balls(!link.solid.is_closed()),
+        supports(link.tree) {}
 
   LinkBound bound;
   ExtentBound extents;

@@ -18,7 +18,7 @@ namespace {
 using Side = NearSurface::Side;
 
 TEST(SideBalls, TellTheSideOfThePlacesInThem) {
-  SideBalls balls;
+  SideBalls balls(false);
   const Eigen::Vector3d p(0.1, 0.2, 0.3), q(-0.1, 0.2, 0.3);
   EXPECT_EQ(balls.find(p).side, Side::kUnknown);
   balls.store(p, {Side::kOutside, 0.001});
@@ -38,7 +38,7 @@ TEST(SideBalls, TellTheSideOfThePlacesInThem) {
 }
 
 TEST(SideBalls, TellNothingOfPlacesThatAreNotFinite) {
-  SideBalls balls;
+  SideBalls balls(false);
   balls.store(Eigen::Vector3d::Zero(), {Side::kOutside, 1.0});
   for (const double value :
        {std::numeric_limits<double>::quiet_NaN(), HUGE_VAL, -HUGE_VAL, 1e300}) {
@@ -59,7 +59,7 @@ TEST(SideBalls, AgreeWithTheWindingNumber) {
   test::Rng rng(231);
   const Solid solid(
       {GeometryElement{test::open_box({0.15, 0.1, 0.2}), Eigen::Isometry3d::Identity(), ""}});
-  SideBalls balls;
+  SideBalls balls(true);
   std::vector<Eigen::Vector3d> places;
   for (int i = 0; i < 400; ++i) places.push_back(test::random_vector(&rng, 0.11));
   int outside = 0, inside = 0;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "internal/geometry/float_rounding.h"
 
@@ -16,13 +15,6 @@ constexpr double kFarAway = 1e6;
 // [m] More than double loses in the distance of two places of a link.
 constexpr double kRounding = 1e-9;
 
-std::size_t set_of(std::int64_t x, std::int64_t y, std::int64_t z) {
-  const auto bits = [](std::int64_t i) { return static_cast<std::uint64_t>(i); };
-  const std::uint64_t mixed = bits(x) * 0x9E3779B97F4A7C15ULL ^ bits(y) * 0xC2B2AE3D27D4EB4FULL ^
-                              bits(z) * 0x165667B19E3779F9ULL;
-  return (mixed * 0x9E3779B97F4A7C15ULL) >> 54U;  // of 1024
-}
-
 // Written so that NaN has no cell.
 bool has_cell(const Eigen::Vector3d& p_LQ) {
   return std::abs(p_LQ.x()) < kFarAway && std::abs(p_LQ.y()) < kFarAway &&
@@ -35,6 +27,13 @@ std::int64_t cell_of(double coordinate) {
 
 }  // namespace
 
+std::size_t SideBalls::set_of(const std::int64_t cell[3]) const {
+  const auto bits = [cell](int axis) { return static_cast<std::uint64_t>(cell[axis]); };
+  const std::uint64_t mixed = bits(0) * 0x9E3779B97F4A7C15ULL ^ bits(1) * 0xC2B2AE3D27D4EB4FULL ^
+                              bits(2) * 0x165667B19E3779F9ULL;
+  return (mixed * 0x9E3779B97F4A7C15ULL) >> 32U & (sets_.size() - 1);
+}
+
 // The two nearest cells along each axis hold the centres of all balls about the place that are no
 // larger than half a cell, and of many others.
 SideBalls::Found SideBalls::find(const Eigen::Vector3d& p_LQ) const {
@@ -43,7 +42,8 @@ SideBalls::Found SideBalls::find(const Eigen::Vector3d& p_LQ) const {
   std::int64_t low[3];
   for (int axis = 0; axis < 3; ++axis) low[axis] = cell_of(p_LQ[axis] - 0.5 * kCell);
   for (int i = 0; i < 8; ++i) {
-    const Set& set = sets_[set_of(low[0] + i % 2, low[1] + i / 2 % 2, low[2] + i / 4)];
+    const std::int64_t cell[3] = {low[0] + i % 2, low[1] + i / 2 % 2, low[2] + i / 4};
+    const Set& set = sets_[set_of(cell)];
     for (const Ball& ball : set.balls) {
       const double x = p_LQ.x() - static_cast<double>(ball.x),
                    y = p_LQ.y() - static_cast<double>(ball.y),
@@ -62,7 +62,8 @@ void SideBalls::store(const Eigen::Vector3d& p_LQ, const Found& found) {
   const Eigen::Vector3f center = p_LQ.cast<float>();
   const float radius = round_down(found.margin - (p_LQ - center.cast<double>()).norm() - kRounding);
   if (!(radius > 0.0F)) return;
-  Set& set = sets_[set_of(cell_of(p_LQ.x()), cell_of(p_LQ.y()), cell_of(p_LQ.z()))];
+  const std::int64_t cell[3] = {cell_of(p_LQ.x()), cell_of(p_LQ.y()), cell_of(p_LQ.z())};
+  Set& set = sets_[set_of(cell)];
   Ball* smallest = set.balls;
   for (Ball& ball : set.balls) {
     if (std::abs(ball.radius) < std::abs(smallest->radius)) smallest = &ball;

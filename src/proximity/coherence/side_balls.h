@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "internal/geometry/solid_queries.h"
@@ -24,7 +25,8 @@ class SideBalls {
     double margin = 0.0;  ///< [m] every place nearer than this is on that side
   };
 
-  SideBalls() : sets_(kSets) {}
+  /// @param has_holes  whether the link is a mesh with holes: these need many balls
+  explicit SideBalls(bool has_holes) : sets_(has_holes ? kSetsWithHoles : kSets) {}
 
   Found find(const Eigen::Vector3d& p_LQ) const;
   /// @param found  of p_LQ; with a margin that is not positive, nothing is stored
@@ -37,10 +39,12 @@ class SideBalls {
     float x = 0.0F, y = 0.0F, z = 0.0F;  ///< [m]
     float radius = 0.0F;                 ///< [m] negative: of places inside; 0: no ball
   };
-  static constexpr std::size_t kWays = 2, kSets = 1024;
+  static constexpr std::size_t kWays = 2, kSetsWithHoles = 1024, kSets = 32;  // powers of two
   struct Set {
     Ball balls[kWays];
   };
+
+  std::size_t set_of(const std::int64_t cell[3]) const;
 
   std::vector<Set> sets_;
 };
