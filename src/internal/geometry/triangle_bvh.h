@@ -83,7 +83,7 @@ class TriangleBvh {
 
   /// The generalized winding number (Jacobson et al. 2013) at p_M: about 1 inside, 0 outside, in
   /// between near holes. It is computed by a hierarchical expansion of second order (Barill et al.
-  /// 2018) with an error below 0.01.
+  /// 2018) with an error below 0.01, and more where many sheets overlap.
   double winding_number(const Eigen::Vector3d& p_M) const;
 
   /// The same, several times faster, with a larger error.
