@@ -2,7 +2,6 @@
 // one available is chosen at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "geometry/closest_kernel.cpp"
-#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -12,6 +11,7 @@
 
 #include "geometry/child_support-inl.h"
 #include "geometry/triangle_kernels.h"
+#include "internal/bvh/prefetch.h"
 #include "internal/geometry/closest_point_on_triangle.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -167,18 +167,14 @@ class ClosestPointSearch {
     float distance_sq;  // [m^2] lower bound
   };
 
-  // Loads the memory that is most likely visited next: meshes are larger than the fastest caches.
+  // Loads the memory that is most likely visited next.
   HWY_INLINE void Prefetch(std::int32_t child) const {
     if (child < 0) {
-      PrefetchLines(&bvh_.leaves[~child], sizeof(TriangleBvh::Leaf));
+      prefetch_lines(&bvh_.leaves[~child], sizeof(TriangleBvh::Leaf));
     } else {
-      PrefetchLines(&bvh_.boxes[child], sizeof(TriangleBvh::Boxes));
-      PrefetchLines(&bvh_.slabs[child], sizeof(TriangleBvh::Slabs));
+      prefetch_lines(&bvh_.boxes[child], sizeof(TriangleBvh::Boxes));
+      prefetch_lines(&bvh_.slabs[child], sizeof(TriangleBvh::Slabs));
     }
-  }
-  static HWY_INLINE void PrefetchLines(const void* begin, std::size_t size) {
-    const auto* bytes = static_cast<const char*>(begin);
-    for (std::size_t i = 0; i < size; i += 64) hwy::Prefetch(bytes + i);
   }
 
   // Whether a part of the surface with this lower bound need not be visited.

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "geometry/ray_kernels.h"
+#include "internal/bvh/prefetch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
@@ -206,8 +207,7 @@ std::size_t FindCandidates(const TriangleBvh::View& bvh, const TriangleBvh::RayL
       const std::uint32_t rays = EnterLeaf(leaves[*leaf], packet);
       if (rays == 0) continue;
       entered[size] = {bvh.leaves + leaves[*leaf].leaf, rays};
-      const auto* bytes = reinterpret_cast<const std::uint8_t*>(entered[size].leaf);
-      for (std::size_t i = 0; i < sizeof(TriangleBvh::Leaf); i += 64) hwy::Prefetch(bytes + i);
+      prefetch_lines(entered[size].leaf, sizeof(TriangleBvh::Leaf));
       ++size;
     }
     for (std::size_t i = 0; i < size; ++i) {

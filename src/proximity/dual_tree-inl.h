@@ -7,12 +7,12 @@
 #define IST_PROXIMITY_DUAL_TREE_INL_H
 #endif
 
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
 #include <array>
 
+#include "internal/bvh/prefetch.h"
 #include "internal/bvh/traversal_stack.h"
 #include "proximity/dual_tree.h"
 #include "proximity/pair_bounds-inl.h"
@@ -346,22 +346,8 @@ class DualTree {
     PruneChildren(front_index, Less(children.pruned_bound, radius));
     PushChildren(pair, front_index, children.bits, bound, [&](int k, Pair* child) {
       SetBox(pair.box * kBoxWidth + k, child);
-      Prefetch(child->box);
+      prefetch_child(*in_.bvh, child->box);
     });
-  }
-
-  // Fetches what a child's expansion will look at: indices are larger than the fastest caches.
-  HWY_INLINE void Prefetch(std::int32_t box) const {
-    if (box < 0) {
-      PrefetchLines(in_.bvh->place_of_tile(static_cast<std::size_t>(~box)),
-                    sizeof(typename Bvh::Tile));
-    } else {
-      PrefetchLines(&box_nodes_[box], sizeof(BoxNode));
-    }
-  }
-  static HWY_INLINE void PrefetchLines(const void* begin, std::size_t size) {
-    const auto* bytes = static_cast<const char*>(begin);
-    for (std::size_t i = 0; i < size; i += 64) hwy::Prefetch(bytes + i);
   }
 
   HWY_INLINE void VisitLeaves(const Pair& pair, float radius) {

@@ -3,7 +3,6 @@
 #define HWY_TARGET_INCLUDE "proximity/field_search.cpp"
 #include "proximity/field_search.h"
 
-#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -12,6 +11,7 @@
 #include <cmath>
 #include <limits>
 
+#include "internal/bvh/prefetch.h"
 #include "internal/geometry/float_rounding.h"
 #include "proximity/field_lookup-inl.h"
 #include "proximity/refinement.h"
@@ -36,7 +36,6 @@ constexpr int kMaxMeasured = 100, kMaxMeasuredExact = 256;
 constexpr std::uint64_t kTilesBeforePlanes = 4;
 // So many points whose sides neither the field nor an earlier one tells are asked about one by one.
 constexpr int kMaxAsked = 256;
-constexpr std::size_t kCacheLine = 64;  // [bytes]
 
 // Bounds of a node's children or of a tile's points.
 struct alignas(64) Bounds {
@@ -320,17 +319,7 @@ class Search {
       next = bounds.distance[k] < least ? node.child[k] : next;
       least = std::min(least, bounds.distance[k]);
     }
-    if (below == 0) return;
-    const auto prefetch = [](const auto* place) {
-      for (std::size_t line = 0; line < sizeof *place; line += kCacheLine) {
-        hwy::Prefetch(reinterpret_cast<const char*>(place) + line);
-      }
-    };
-    if (next < 0) {
-      prefetch(in_.bvh->place_of_tile(static_cast<std::size_t>(~next)));
-    } else {
-      prefetch(&in_.bvh->nodes()[static_cast<std::size_t>(next)]);
-    }
+    if (below != 0) prefetch_child(*in_.bvh, next);
   }
 
   void VisitTile(const Entry& entry) {

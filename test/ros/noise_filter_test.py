@@ -77,8 +77,8 @@ class NoiseFilterTest(unittest.TestCase):
     def test_slower_than_timeout(self):
         """An ingest slower than the timeout is named; the driver is not said to have stopped."""
         # Nearly 1000 neighbors for each point: too few, so that all of them have to be looked at.
-        parameters = {"noise_filter/radius": 0.046, "noise_filter/neighbors": 1000}
-        cube = np.random.default_rng(1).uniform(-0.25, 0.25, (250000, 3))
+        parameters = {"noise_filter/radius": 0.055, "noise_filter/neighbors": 1000}
+        cube = np.random.default_rng(1).uniform(-0.25, 0.25, (150000, 3))
         self.world.points = cube + [0, 0, 0.7]
         self.start(**parameters)
         begin = len(self.node.messages)
@@ -89,7 +89,8 @@ class NoiseFilterTest(unittest.TestCase):
         for m in self.node.messages[begin:]:
             self.assertNotIn("has its driver stopped", m.status_text)
         self.world.points = 0.02 * cube[:1100] + [0, 0, 0.7]
-        self.node.wait_for_status(ProximityArray.OK)
+        # The cloud that is being read comes first: on a busy machine it takes long.
+        self.node.wait_for_status(ProximityArray.OK, timeout=90)
 
     def test_off(self):
         self.world.points = np.vstack([LONE, PATCH])
