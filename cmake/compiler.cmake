@@ -20,7 +20,7 @@ if(IST_PROXIMITY_WERROR)
   add_compile_options(-Werror)
 endif()
 
-# A tenth of the compiler's time is the collection of its garbage: with 0.1 GB more there is none.
+# The compiler collects no garbage before it has taken this many kilobytes, which few sources do.
 if(IST_PROXIMITY_PRECOMPILE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   add_compile_options(--param=ggc-min-heapsize=1000000)
 endif()

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "cloud/index/slice_kernel.h"
+#include "internal/bvh/prefetch.h"
 
 namespace ist {
 namespace {
@@ -109,7 +110,7 @@ void PointCells::skip_empty() {
   if (taken_ == end_.size()) return;
   const std::size_t begin = first_[taken_], end = end_[taken_];
   const std::size_t here = (end - 1) / kChunk == begin / kChunk ? end - begin : kChunk;
-  for (std::size_t i = 0; i < here; i += 4) hwy::Prefetch(&pool_[begin + i]);
+  prefetch_lines(&pool_[begin], here * sizeof(CloudPoint));
 }
 
 PointCells::Cell PointCells::next() {
