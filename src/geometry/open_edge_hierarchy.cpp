@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "internal/geometry/boundary_edges.h"
-
 namespace ist {
 namespace {
 
@@ -18,9 +16,9 @@ constexpr double kRounding = 5e-7;
 constexpr int kBisections = 6;
 constexpr float kFarAway = 1e6F;  // [m]
 
-std::vector<Edge> edges_of(const TriangleMesh& mesh, const CancelRequest& cancelled) {
+std::vector<Edge> edges_of(const TriangleMesh& mesh, const std::vector<OpenEdge>& open) {
   std::vector<Edge> edges;
-  for (const OpenEdge& edge : open_edges(mesh, cancelled)) {
+  for (const OpenEdge& edge : open) {
     edges.push_back(
         {mesh.vertices[edge.from], mesh.vertices[edge.to], static_cast<double>(edge.count)});
   }
@@ -135,7 +133,11 @@ OpenEdgeNode make_node(const Cluster* clusters, std::size_t size) {
 }  // namespace
 
 OpenEdgeHierarchy::OpenEdgeHierarchy(const TriangleMesh& mesh, const CancelRequest& cancelled)
-    : OpenEdgeHierarchy(edges_of(mesh, cancelled), cancelled) {}
+    : OpenEdgeHierarchy(mesh, open_edges(mesh, cancelled), cancelled) {}
+
+OpenEdgeHierarchy::OpenEdgeHierarchy(const TriangleMesh& mesh, const std::vector<OpenEdge>& open,
+                                     const CancelRequest& cancelled)
+    : OpenEdgeHierarchy(edges_of(mesh, open), cancelled) {}
 
 OpenEdgeHierarchy::OpenEdgeHierarchy(std::vector<Edge> edges, const CancelRequest& cancelled) {
   throw_if(cancelled);

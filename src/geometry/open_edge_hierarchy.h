@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "internal/geometry/boundary_edges.h"
 #include "internal/geometry/cancelled.h"
 #include "ist_proximity/geometry/shapes.h"
 
@@ -57,6 +58,10 @@ class OpenEdgeHierarchy {
   OpenEdgeHierarchy() = default;
   /// @throws Cancelled
   explicit OpenEdgeHierarchy(const TriangleMesh& mesh, const CancelRequest& cancelled = {});
+  /// @param open  open_edges(mesh)
+  /// @throws Cancelled
+  OpenEdgeHierarchy(const TriangleMesh& mesh, const std::vector<OpenEdge>& open,
+                    const CancelRequest& cancelled);
   /// @throws Cancelled
   explicit OpenEdgeHierarchy(std::vector<Edge> edges, const CancelRequest& cancelled = {});
 

@@ -38,8 +38,9 @@ SolidElement::SolidElement(const GeometryElement& source, const CancelRequest& c
   if (const auto* mesh = std::get_if<TriangleMesh>(&source.shape)) {
     bvh = TriangleBvh(*mesh, cancelled);
     normals = face_normals(*mesh);
-    is_closed = is_closed_mesh(*mesh, cancelled);
-    if (!is_closed) open_edges = OpenEdgeHierarchy(*mesh, cancelled);
+    boundary = ist::open_edges(*mesh, cancelled);
+    is_closed = boundary.empty();
+    if (!is_closed) open_edges = OpenEdgeHierarchy(*mesh, boundary, cancelled);
     return;
   }
   primitive = source.shape;

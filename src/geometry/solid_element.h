@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "geometry/open_edge_hierarchy.h"
+#include "internal/geometry/boundary_edges.h"
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/solid.h"
 
@@ -28,7 +29,8 @@ struct SolidElement {
   TriangleBvh box_sides;  ///< of a Box
   TriangleBvh bvh;
   std::vector<Eigen::Vector3d> normals;  ///< unit, by triangle; zero for triangles without area
-  OpenEdgeHierarchy open_edges;          ///< of a mesh with holes
+  std::vector<OpenEdge> boundary;        ///< of a mesh with holes: open_edges(mesh)
+  OpenEdgeHierarchy open_edges;          ///< the same edges
   Eigen::Isometry3d X_LE;
   Eigen::Isometry3d X_EL;
   bool is_closed = true;  ///< a primitive, or a mesh without holes

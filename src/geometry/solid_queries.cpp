@@ -133,7 +133,8 @@ std::size_t memory_of(const Solid& solid) {
   std::size_t bytes = 0;
   for (const SolidElement& element : elements_of(solid)) {
     bytes += sizeof element + element.bvh.memory() + element.box_sides.memory() +
-             element.normals.capacity() * sizeof(Eigen::Vector3d);
+             element.normals.capacity() * sizeof(Eigen::Vector3d) +
+             element.boundary.capacity() * sizeof(OpenEdge);
   }
   return bytes;
 }
@@ -141,6 +142,12 @@ std::size_t memory_of(const Solid& solid) {
 bool is_one_mesh(const Solid& solid) {
   const std::vector<SolidElement>& elements = elements_of(solid);
   return elements.size() == 1 && elements[0].is_mesh();
+}
+
+std::optional<MeshSurface> surface_of(const Solid& solid, std::size_t element) {
+  const std::vector<SolidElement>& elements = elements_of(solid);
+  if (element >= elements.size() || !elements[element].is_mesh()) return std::nullopt;
+  return MeshSurface{elements[element].bvh, elements[element].boundary};
 }
 
 bool is_same_solid(const Solid& one, const Solid& other) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "internal/geometry/boundary_edges.h"
 #include "internal/geometry/hole_caps.h"
 
 namespace ist {
@@ -50,10 +49,10 @@ std::array<Eigen::Vector3d, kDirections> make_directions() {
 
 }  // namespace
 
-HoleObstacles::HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance,
+HoleObstacles::HoleObstacles(const TriangleMesh& mesh, const MeshSurface& surface, double tolerance,
                              PackingWatch* watch)
-    : bvh_(bvh), watch_(*watch), tolerance_(tolerance) {
-  const std::vector<OpenEdge> open = open_edges(mesh, [this] { return !keeps_on(); });
+    : bvh_(surface.bvh), watch_(*watch), tolerance_(tolerance) {
+  const std::vector<OpenEdge>& open = surface.open_edges;
   if (open.empty()) return;
   TriangleMesh edges;
   edges.vertices = mesh.vertices;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "internal/geometry/mesh_surface.h"
 #include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/geometry/shapes.h"
 #include "packing_watch.h"
@@ -29,10 +30,10 @@ namespace ist {
 /// Watertight meshes have no openings and cost nothing.
 class HoleObstacles {
  public:
-  /// @param bvh        of the mesh; must outlive this
+  /// @param surface    of the mesh; its hierarchy must outlive this
   /// @param tolerance  [m] how much larger than necessary an obstacle may be; > 0
   /// @param watch      must outlive this; when it stops, the search ends and obstacles are missing
-  HoleObstacles(const TriangleMesh& mesh, const TriangleBvh& bvh, double tolerance,
+  HoleObstacles(const TriangleMesh& mesh, const MeshSurface& surface, double tolerance,
                 PackingWatch* watch);
 
   struct Obstacle {

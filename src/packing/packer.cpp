@@ -5,11 +5,13 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "hole_obstacles.h"
 #include "interior_cover.h"
 #include "internal/geometry/cancelled.h"
 #include "internal/geometry/limits.h"
+#include "internal/geometry/mesh_surface.h"
 #include "internal/geometry/tessellation.h"
 #include "ist_proximity/geometry/error.h"
 #include "medial_sphere.h"
@@ -81,10 +83,11 @@ Packing single_cover_sphere(const TriangleMesh& mesh) {
   return packing;
 }
 
-Packing pack_watched(const TriangleMesh& mesh, const PackingConfig& config, PackingWatch* watch) {
-  const TriangleBvh bvh(mesh, [&] { return !watch->keeps_on(); });
+Packing pack_watched(const TriangleMesh& mesh, const MeshSurface& surface,
+                     const PackingConfig& config, PackingWatch* watch) {
+  const TriangleBvh& bvh = surface.bvh;
   const double size = bvh.bounds().sizes().norm();
-  HoleObstacles holes(mesh, bvh,
+  HoleObstacles holes(mesh, surface,
                       std::max(kHoleTolerance * config.max_error, kMinHoleTolerance * size), watch);
   SphereSearch spheres;
   const bool may_overlap = config.order == PackingOrder::kMedial;
@@ -109,23 +112,27 @@ Packing pack_watched(const TriangleMesh& mesh, const PackingConfig& config, Pack
 }  // namespace
 
 Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
-                  const PackingProgress& progress) {
+                  const PackingProgress& progress, const MeshSurface* surface) {
   if (mesh.triangles.empty()) throw ModelError("cannot pack a mesh without triangles");
   check(mesh);
   PackingWatch watch(progress);
   try {
-    return pack_watched(mesh, config, &watch);
+    if (surface != nullptr) return pack_watched(mesh, *surface, config, &watch);
+    const auto stopped = [&] { return !watch.keeps_on(); };
+    const TriangleBvh bvh(mesh, stopped);
+    const std::vector<OpenEdge> open = open_edges(mesh, stopped);
+    return pack_watched(mesh, {bvh, open}, config, &watch);
   } catch (const Cancelled&) {
     return single_cover_sphere(mesh);
   }
 }
 
 Packing pack_element(const Shape& shape, const PackingConfig& config,
-                     const PackingProgress& progress) {
+                     const PackingProgress& progress, const MeshSurface* surface) {
   if (!std::holds_alternative<TriangleMesh>(shape)) check(shape);
   if (const auto* sphere = std::get_if<Sphere>(&shape)) return pack_sphere(*sphere);
   if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) {
-    return pack_mesh(*mesh, config, progress);
+    return pack_mesh(*mesh, config, progress, surface);
   }
   return pack_inscribed(packed_mesh(shape, config), config, progress);
 }

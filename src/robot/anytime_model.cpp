@@ -1,15 +1,11 @@
 #include "internal/robot/anytime_model.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <mutex>
 #include <set>
 #include <sstream>
-#include <system_error>
-#include <thread>
 #include <utility>
 
 #include "internal/bvh/build_id.h"
@@ -18,6 +14,7 @@
 #include "internal/geometry/solid_queries.h"
 #include "internal/packing/packing_cache.h"
 #include "internal/robot/link_packing.h"
+#include "internal/robot/threads.h"
 #include "ist_proximity/geometry/error.h"
 #include "monitored_links.h"
 #include "packing_jobs.h"
@@ -42,32 +39,11 @@ std::string millimetres(double metres) {
   return text;
 }
 
-// Calls function(i) for i < count on several threads. The first exception comes out.
-template <typename Function>
-void for_each_in_parallel(std::size_t count, int threads, const Function& function) {
-  std::atomic<std::size_t> next{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::size_t i; (i = next++) < count;) {
-      try {
-        function(i);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        if (!failure) failure = std::current_exception();
-        next = count;
-      }
-    }
-  };
-  std::vector<std::thread> others;
-  try {
-    while (others.size() + 1 < std::min(count, thread_count(threads))) others.emplace_back(work);
-  } catch (const std::system_error&) {
-    // The system has no more threads; fewer do the same.
-  }
-  work();
-  for (std::thread& thread : others) thread.join();
-  if (failure) std::rethrow_exception(failure);
+const LinkModel* find_link(const RobotModel* robot, const std::string& name) {
+  if (robot == nullptr) return nullptr;
+  const auto found = std::find_if(robot->links.begin(), robot->links.end(),
+                                  [&](const LinkModel& link) { return link.name == name; });
+  return found != robot->links.end() ? &*found : nullptr;
 }
 
 }  // namespace
@@ -76,6 +52,7 @@ void for_each_in_parallel(std::size_t count, int threads, const Function& functi
 struct AnytimeModel::Link : MonitoredLink {
   std::vector<std::string> keys;       ///< of the shapes, by element
   std::vector<PackingConfig> configs;  ///< of their final stage, by element
+  Solid solid;                         ///< empty where it cannot be made
 };
 
 AnytimeModel::AnytimeModel() = default;
@@ -95,6 +72,7 @@ class AnytimeModel::Step {
   }
 
   void choose_links();
+  bool make_solids(const RobotModel* before, const std::string* changed);
   void forget_unused_shapes();
   void add_unknown_shapes(Stage stage);
   void add_shapes_to_refine(std::size_t index);
@@ -107,6 +85,7 @@ class AnytimeModel::Step {
   void touch(const std::string& key) { touched_.insert(key); }
 
  private:
+  Solid solid_of(const Link& link, const LinkModel* before) const;
   void add_job(const Link& link, std::size_t element, const PackingConfig& stage);
   void take(PackingJob* job);
   LinkModel assemble(const Link& link, const LinkModel* before, bool same_geometry) const;
@@ -136,6 +115,33 @@ void AnytimeModel::Step::choose_links() {
   }
 }
 
+// Packing reads their hierarchies, so they are made first. False when cancelled.
+// @param before   supplies the solids that are known; may be null
+// @param changed  the link whose geometry may differ from `before`
+bool AnytimeModel::Step::make_solids(const RobotModel* before, const std::string* changed) {
+  const auto one = [&](std::size_t i) {
+    Link& link = model_->links_[i];
+    const bool may_be_known = changed == nullptr || link.name != *changed;
+    link.solid = solid_of(link, may_be_known ? find_link(before, link.name) : nullptr);
+  };
+  try {
+    for_each_in_parallel(model_->links_.size(), model_->config_.threads, one);
+  } catch (const Cancelled&) {
+    return false;
+  }
+  return true;
+}
+
+Solid AnytimeModel::Step::solid_of(const Link& link, const LinkModel* before) const {
+  if (!link.error.empty()) return {};
+  if (before != nullptr) return before->solid;
+  try {
+    return make_solid(link.description->geometry, [this] { return is_cancelled(); });
+  } catch (const ModelError&) {
+    return {};  // packing says the same of the element
+  }
+}
+
 // Packings of objects that are detached again are not kept.
 void AnytimeModel::Step::forget_unused_shapes() {
   std::set<std::string> used;
@@ -151,6 +157,7 @@ void AnytimeModel::Step::add_job(const Link& link, std::size_t element,
   job.key = link.keys[element];
   if (!touched_.insert(job.key).second) return;
   job.shape = &link.description->geometry[element].shape;
+  if (const auto surface = surface_of(link.solid, element)) job.surface.emplace(*surface);
   job.config = link.configs[element];
   job.stage = stage;
   job.link = static_cast<std::size_t>(&link - model_->links_.data());
@@ -250,9 +257,8 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   model.tree = InnerSphereTree(model.packing, model_->config_.tree);
   model.packing_id = next_build_id();
   throw_if(cancelled);
-  const bool is_known = before != nullptr && same_geometry;
-  model.solid = is_known ? before->solid : make_solid(geometry, cancelled);
-  if (is_known) model.field = before->field;
+  model.solid = link.solid;
+  if (before != nullptr && same_geometry) model.field = before->field;
   if (model.field == nullptr && model_->config_.distance_fields) {
     model.field = std::make_shared<const DistanceField>(model.solid, cancelled);
   }
@@ -268,13 +274,7 @@ AnytimeModel::Ptr AnytimeModel::Step::finish(const RobotModel* before, const std
   robot->links.resize(model_->links_.size());
   const auto one = [&](std::size_t i) {
     const Link& link = model_->links_[i];
-    const LinkModel* same = nullptr;
-    if (before != nullptr) {
-      const auto found =
-          std::find_if(before->links.begin(), before->links.end(),
-                       [&](const LinkModel& other) { return other.name == link.name; });
-      if (found != before->links.end()) same = &*found;
-    }
+    const LinkModel* same = find_link(before, link.name);
     const bool same_geometry = changed == nullptr || link.name != *changed;
     robot->links[i] = same != nullptr && same_geometry && !is_touched(link)
                           ? *same
@@ -330,6 +330,7 @@ AnytimeModel::Ptr AnytimeModel::build(std::shared_ptr<const RobotDescription> de
   model->config_ = config;
   Step step(model, callbacks);
   step.choose_links();
+  if (!step.make_solids(nullptr, nullptr)) return nullptr;
   step.add_unknown_shapes(stage);
   return step.pack(config.threads) ? step.finish(nullptr, nullptr) : nullptr;
 }
@@ -393,6 +394,7 @@ AnytimeModel::Ptr AnytimeModel::with_link(std::shared_ptr<const RobotDescription
   model->config_ = config;
   Step step(model, callbacks);
   step.choose_links();
+  if (!step.make_solids(robot_.get(), &link)) return nullptr;
   step.forget_unused_shapes();
   step.add_unknown_shapes(Stage::kFinal);
   return step.pack(config.threads) ? step.finish(robot_.get(), &link) : nullptr;

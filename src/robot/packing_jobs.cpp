@@ -4,19 +4,13 @@
 #include <chrono>
 #include <numeric>
 #include <optional>
-#include <system_error>
-#include <thread>
 #include <utility>
 
 #include "internal/packing/packer.h"
+#include "internal/robot/threads.h"
 #include "packing_stages.h"
 
 namespace ist {
-
-std::size_t thread_count(int threads) {
-  return threads > 0 ? static_cast<std::size_t>(threads)
-                     : std::max(1U, std::thread::hardware_concurrency());
-}
 
 PackingJobs::PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cache, Report report)
     : jobs_(*jobs),
@@ -30,15 +24,7 @@ PackingJobs::PackingJobs(std::vector<PackingJob>* jobs, const PackingCache& cach
 }
 
 bool PackingJobs::run(int threads) {
-  const std::size_t count = std::min(thread_count(threads), jobs_.size());
-  std::vector<std::thread> others;
-  try {
-    while (others.size() + 1 < count) others.emplace_back([this] { work(); });
-  } catch (const std::system_error&) {
-    // The system has no more threads; fewer do the same.
-  }
-  work();
-  for (std::thread& thread : others) thread.join();
+  run_on_threads(std::min(thread_count(threads), jobs_.size()), [this](std::size_t) { work(); });
   if (failure_) std::rethrow_exception(failure_);
   return !stopped_;
 }
@@ -79,10 +65,12 @@ void PackingJobs::pack(std::size_t index) {
     if (job.from_cache) {
       job.packing = std::move(*cached);
     } else if (!stopped) {
-      job.packing = pack_element(*job.shape, job.stage, [&](double fraction) {
+      const auto progress = [&](double fraction) {
         stopped = stopped || !report(index, fraction);
         return !stopped;
-      });
+      };
+      job.packing =
+          pack_element(*job.shape, job.stage, progress, job.surface ? &*job.surface : nullptr);
       job.is_final = is_final_stage(job.packing, job.stage, job.config);
       PackingCertificate& certificate = job.packing.certificate;
       job.fell_short = certificate.max_gap > job.stage.max_error &&

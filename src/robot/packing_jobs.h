@@ -4,9 +4,11 @@
 #include <exception>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "internal/geometry/mesh_surface.h"
 #include "internal/packing/packing_cache.h"
 #include "ist_proximity/geometry/shapes.h"
 #include "ist_proximity/packing/packing.h"
@@ -16,9 +18,10 @@ namespace ist {
 /// One distinct shape to pack, and the result.
 struct PackingJob {
   const Shape* shape = nullptr;
-  PackingConfig config;  ///< of the final packing
-  PackingConfig stage;   ///< what is packed now where the cache does not have the final packing
-  std::string key;       ///< of the final packing
+  std::optional<MeshSurface> surface;  ///< of a mesh
+  PackingConfig config;                ///< of the final packing
+  PackingConfig stage;  ///< what is packed now where the cache does not have the final packing
+  std::string key;      ///< of the final packing
   bool look_in_cache = true;
   std::size_t link = 0;  ///< the first link that needs it
   double work = 1.0;     ///< relative to other jobs
@@ -33,9 +36,6 @@ struct PackingJob {
   std::string error;  ///< why there is no packing
   std::string load_warning, store_warning;
 };
-
-/// How many threads a setting means; 0: as many as there are cores.
-std::size_t thread_count(int threads);
 
 /// Packs shapes on several threads, the most work first, through the cache.
 class PackingJobs {

@@ -5,15 +5,18 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/limits.h"
-#include "internal/geometry/mesh_io.h"
 #include "internal/robot/package_resolver.h"
 #include "internal/robot/urdfdom_parser.h"
 #include "ist_proximity/geometry/error.h"
+#include "mesh_reading.h"
 
 namespace ist {
 namespace {
@@ -181,21 +184,26 @@ urdf::ModelInterfaceSharedPtr parse_structure(const tinyxml2::XMLElement& robot)
   throw ModelError("robot description is no valid URDF: " + reasons);
 }
 
-// Needs of reading a mesh besides its element.
-struct MeshReader {
-  const PackageFinder& find_package;
-  const ReadingProgress& progress;
-  std::string link;
-
-  TriangleMesh read(const urdf::Mesh& mesh) const {
-    const auto cancelled = [&] { return progress && !progress(link, printable(mesh.filename)); };
-    throw_if(cancelled);
-    return load_mesh(resolve_uri(mesh.filename, find_package),
-                     {mesh.scale.x, mesh.scale.y, mesh.scale.z}, cancelled);
-  }
+// An element of a link while the meshes are not read yet.
+struct UnreadElement {
+  GeometryElement element;          // without its mesh
+  std::optional<std::size_t> mesh;  // in the MeshReading
+  std::string error;                // why there is no element
 };
 
-Shape to_shape(const urdf::Geometry& geometry, const MeshReader& reader) {
+struct UnreadLink {
+  LinkDescription link;  // without geometry
+  const char* tag;       // of its elements
+  std::vector<UnreadElement> elements;
+};
+
+// What elements need to name their meshes.
+struct MeshNames {
+  const PackageFinder& find_package;
+  MeshReading& reading;
+};
+
+Shape to_shape(const urdf::Geometry& geometry) {
   switch (geometry.type) {
     case urdf::Geometry::BOX: {
       const urdf::Vector3& size = static_cast<const urdf::Box&>(geometry).dim;
@@ -209,7 +217,7 @@ Shape to_shape(const urdf::Geometry& geometry, const MeshReader& reader) {
       return Sphere{static_cast<const urdf::Sphere&>(geometry).radius};
     }
     case urdf::Geometry::MESH:
-      return reader.read(static_cast<const urdf::Mesh&>(geometry));
+      return TriangleMesh{};
     default:  // newer versions of urdfdom know more shapes
       throw ModelError("its shape is not supported; use box, cylinder, sphere or mesh");
   }
@@ -261,8 +269,14 @@ JointDescription to_joint(const urdf::Joint& joint) {
   return result;
 }
 
+void check_shape(const Shape& shape) {
+  const std::string fault = shape_fault(shape);
+  if (!fault.empty()) throw ModelError(fault);
+}
+
 // Lets urdfdom parse a <collision> or <visual>, alone in a robot of one link.
-GeometryElement parse_element(const tinyxml2::XMLElement& xml, const MeshReader& reader) {
+UnreadElement parse_element(const tinyxml2::XMLElement& xml, const std::string& link_name,
+                            const MeshNames& names) {
   tinyxml2::XMLDocument document;
   document.Parse("<robot name='r'><link name='l'/></robot>");
   tinyxml2::XMLNode* copy = xml.DeepClone(&document);
@@ -288,15 +302,22 @@ GeometryElement parse_element(const tinyxml2::XMLElement& xml, const MeshReader&
   }
   if (geometry == nullptr) throw ModelError("its <geometry> cannot be read");
 
-  GeometryElement element;
+  UnreadElement unread;
+  GeometryElement& element = unread.element;
   element.X_LE = to_isometry(origin);
   if (!element.X_LE.matrix().allFinite()) throw ModelError("its <origin> is not finite");
   const std::string misplaced = position_fault("its <origin>", element.X_LE.translation());
   if (!misplaced.empty()) throw ModelError(misplaced);
-  element.shape = to_shape(*geometry, reader);
-  const std::string misshapen = shape_fault(element.shape);
-  if (!misshapen.empty()) throw ModelError(misshapen);
-  return element;
+  element.shape = to_shape(*geometry);
+  if (geometry->type == urdf::Geometry::MESH) {
+    const auto& mesh = static_cast<const urdf::Mesh&>(*geometry);
+    unread.mesh =
+        names.reading.add(link_name, mesh.filename, resolve_uri(mesh.filename, names.find_package),
+                          {mesh.scale.x, mesh.scale.y, mesh.scale.z});
+  } else {
+    check_shape(element.shape);
+  }
+  return unread;
 }
 
 // The element's shape for messages: a mesh's URI, or the name of the shape.
@@ -308,25 +329,46 @@ std::string source_name(const tinyxml2::XMLElement& xml) {
   return printable(file != nullptr && *file != '\0' ? file : shape->Name());
 }
 
-void parse_geometry(const tinyxml2::XMLElement& link_xml, const char* tag, const MeshReader& reader,
-                    LinkDescription* link) {
-  constexpr std::size_t kMaxErrorSize = 2000;  // a message is meant to be read
-  int number = 0;
-  for (const auto* xml = link_xml.FirstChildElement(tag); xml != nullptr;
-       xml = xml->NextSiblingElement(tag)) {
-    ++number;
-    const std::string source = source_name(*xml);
+void parse_elements(const tinyxml2::XMLElement& link_xml, const MeshNames& names,
+                    UnreadLink* link) {
+  for (const auto* xml = link_xml.FirstChildElement(link->tag); xml != nullptr;
+       xml = xml->NextSiblingElement(link->tag)) {
+    UnreadElement unread;
     try {
-      link->geometry.push_back(parse_element(*xml, reader));
-      link->geometry.back().source = source;
+      unread = parse_element(*xml, link->link.name, names);
     } catch (const ModelError& error) {
-      if (link->error.size() > kMaxErrorSize) continue;
-      link->error += link->error.empty() ? "link '" + link->name + "', " : "; and ";
-      link->error += std::string(tag) + " element " + std::to_string(number) + " (" + source +
-                     "): " + error.what();
+      unread.error = error.what();
+    }
+    unread.element.source = source_name(*xml);
+    link->elements.push_back(std::move(unread));
+  }
+}
+
+GeometryElement read_element(UnreadElement* unread, MeshReading* meshes) {
+  if (!unread->error.empty()) throw ModelError(unread->error);
+  if (unread->mesh) {
+    unread->element.shape = meshes->take(*unread->mesh);
+    check_shape(unread->element.shape);
+  }
+  return std::move(unread->element);
+}
+
+LinkDescription read_link(UnreadLink* unread, MeshReading* meshes) {
+  constexpr std::size_t kMaxErrorSize = 2000;  // a message is meant to be read
+  LinkDescription& link = unread->link;
+  for (std::size_t e = 0; e < unread->elements.size(); ++e) {
+    const std::string source = unread->elements[e].element.source;
+    try {
+      link.geometry.push_back(read_element(&unread->elements[e], meshes));
+    } catch (const ModelError& error) {
+      if (link.error.size() > kMaxErrorSize) continue;
+      link.error += link.error.empty() ? "link '" + link.name + "', " : "; and ";
+      link.error += std::string(unread->tag) + " element " + std::to_string(e + 1) + " (" + source +
+                    "): " + error.what();
     }
   }
-  if (!link->error.empty()) link->geometry.clear();  // part of a link would be an unsafe link
+  if (!link.error.empty()) link.geometry.clear();  // part of a link would be an unsafe link
+  return std::move(link);
 }
 
 }  // namespace
@@ -345,6 +387,8 @@ RobotDescription parse(const std::string& urdf_xml, GeometrySource source,
   description.name = model->getName();
   description.root_link = model->getRoot()->name;
   for (const auto& [name, joint] : model->joints_) description.joints.push_back(to_joint(*joint));
+  MeshReading meshes;
+  std::vector<UnreadLink> links;
   std::size_t elements = 0;
   for (const auto* xml = robot.FirstChildElement("link"); xml != nullptr;
        xml = xml->NextSiblingElement("link")) {
@@ -366,9 +410,11 @@ RobotDescription parse(const std::string& urdf_xml, GeometrySource source,
       throw ModelError("robot description has more than " + std::to_string(kMaxElements) +
                        " elements with geometry; the limit is reached at link '" + link.name + "'");
     }
-    parse_geometry(*xml, tag, {find_package, progress, link.name}, &link);
-    description.links.push_back(std::move(link));
+    links.push_back({std::move(link), tag, {}});
+    parse_elements(*xml, {find_package, meshes}, &links.back());
   }
+  meshes.read(progress);
+  for (UnreadLink& link : links) description.links.push_back(read_link(&link, &meshes));
   return description;
 }
 

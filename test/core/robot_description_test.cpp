@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <variant>
 #include <vector>
 
@@ -206,6 +210,58 @@ TEST(RobotDescription, loadsMeshesWithTheirScale) {
   const GeometryElement& element = description.links[0].geometry.at(0);
   EXPECT_EQ(element.source, "package://arm/meshes/a%20b.stl");
   EXPECT_NEAR(test::signed_volume(std::get<TriangleMesh>(element.shape)), 0.006, 1e-9);
+}
+
+// Meshes are read on several threads; each element gets its own, and faults come in the URDF's
+// order.
+TEST(RobotDescription, readsManyMeshesAtOnce) {
+  const test::TempDir dir;
+  constexpr int kFiles = 12;
+  const std::string faulty = dir.write("faulty.stl", "solid");
+  std::string content = "<link name=\"root\"/>";
+  for (int i = 0; i < 2 * kFiles; ++i) {
+    const int size = 1 + i % kFiles;  // every file twice
+    const std::string path =
+        dir.write("box" + std::to_string(size) + ".stl",
+                  test::binary_stl(test::box(Eigen::Vector3d::Constant(0.1 * size))));
+    const std::string name = "link" + std::to_string(i);
+    content += "<link name=\"" + name + "\">" + collision("<mesh filename=\"" + path + "\"/>");
+    if (i % 5 == 0) {
+      content +=
+          collision("<mesh filename=\"" + faulty + "\"/>") + collision("<sphere radius=\"-1\"/>");
+    }
+    content += "</link>" + fixed_joint("root", name);
+  }
+  std::atomic<int> inside{0}, most{0}, calls{0};
+  const RobotDescription description =
+      parse_urdf(robot(content), GeometrySource::kCollision, {},
+                 [&](const std::string& /*link*/, const std::string& /*mesh*/) {
+                   most = std::max(most.load(), ++inside);
+                   ++calls;
+                   std::this_thread::yield();
+                   --inside;
+                   return true;
+                 });
+  EXPECT_EQ(most, 1);
+  EXPECT_GE(calls, kFiles + 1);
+  ASSERT_EQ(description.links.size(), std::size_t{2 * kFiles});
+  for (std::size_t i = 0; i < description.links.size(); ++i) {
+    const LinkDescription& link = description.links[i];
+    EXPECT_EQ(link.name, "link" + std::to_string(i));
+    if (i % 5 == 0) {
+      EXPECT_TRUE(link.geometry.empty());
+      const std::size_t mesh = link.error.find("collision element 2");
+      ASSERT_NE(mesh, std::string::npos) << link.error;
+      EXPECT_NE(link.error.find("collision element 3", mesh), std::string::npos) << link.error;
+      continue;
+    }
+    ASSERT_EQ(link.geometry.size(), 1U) << link.error;
+    double largest = 0.0;
+    for (const Eigen::Vector3d& v : std::get<TriangleMesh>(link.geometry[0].shape).vertices) {
+      largest = std::max(largest, v.maxCoeff());
+    }
+    EXPECT_NEAR(largest, 0.05 * static_cast<double>(1 + i % kFiles), 1e-6);
+  }
 }
 
 TEST(RobotDescription, warnsAboutMeshesInMillimetres) {

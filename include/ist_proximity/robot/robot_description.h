@@ -68,7 +68,8 @@ using PackageFinder = std::function<std::string(const std::string& package)>;
 PackageFinder environment_package_finder();
 
 /// Called before a mesh is read, with the names of its link and its file, and every few
-/// milliseconds while it is read. Returning false ends the reading of the URDF.
+/// milliseconds while it is read. Returning false ends the reading of the URDF. Meshes are read on
+/// several threads: it is called from any of them, one call at a time.
 using ReadingProgress = std::function<bool(const std::string& link, const std::string& mesh)>;
 
 /// Reads a URDF (urdfdom) and the meshes it names (assimp).

@@ -2,12 +2,14 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <optional>
 
 #include "internal/geometry/box_distance.h"
+#include "internal/geometry/mesh_surface.h"
 #include "ist_proximity/geometry/solid.h"
 
 /// The library's own queries of a Solid. They are thread safe and allocate nothing.
@@ -110,5 +112,9 @@ std::size_t memory_of(const Solid& solid);
 
 /// Whether one is a copy of the other.
 bool is_same_solid(const Solid& one, const Solid& other);
+
+/// The surface of an element, valid as long as the solid; nothing where it is no mesh, or there is
+/// no such element.
+std::optional<MeshSurface> surface_of(const Solid& solid, std::size_t element);
 
 }  // namespace ist

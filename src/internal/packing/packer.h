@@ -5,6 +5,8 @@
 
 namespace ist {
 
+struct MeshSurface;
+
 /// Part of every cache key. Raise it whenever the same shape and configuration pack differently.
 constexpr int kPackingVersion = 4;
 
@@ -20,16 +22,18 @@ constexpr int kPackingVersion = 4;
 /// In disjoint packings no two inner spheres overlap, including those that cover the interior;
 /// their cover spheres do overlap.
 /// @param progress  may be empty
+/// @param surface   of the mesh, where it is known already; else null
 /// @throws ModelError if the mesh has no triangle, or a triangle with a corner that is not finite
 /// or
 ///         does not exist
 Packing pack_mesh(const TriangleMesh& mesh, const PackingConfig& config,
-                  const PackingProgress& progress = {});
+                  const PackingProgress& progress = {}, const MeshSurface* surface = nullptr);
 
 /// Packs one URDF element, in the element's frame. A sphere is packed by itself, without gap. Boxes
 /// and cylinders are packed through an inscribed mesh whose deviation is added to every gap.
 /// Otherwise as pack_mesh().
+/// @param surface  of a mesh, where it is known already; else null
 Packing pack_element(const Shape& shape, const PackingConfig& config,
-                     const PackingProgress& progress = {});
+                     const PackingProgress& progress = {}, const MeshSurface* surface = nullptr);
 
 }  // namespace ist
