@@ -138,9 +138,9 @@ void LinkQuery::count_outside_region() {
 void LinkQuery::take_kept_bound() {
   LinkSearch& search = link_.search;
   const LinkBound& kept = link_.kept.bound;
-  const double coherent = search.closest.exact.distance > 0.0
-                              ? std::min(kept.at(search.scene, search.X_FL), search.region_bound)
-                              : -kInfinity;
+  const double coherent =
+      bound_may_hold() ? std::min(kept.at(search.scene, search.X_FL), search.region_bound)
+                       : -kInfinity;
   const double bound = std::max(coherent, search.first_bound);
   if (!(bound > search.lower_bound())) return;
   search.pruned_bound = std::max(search.pruned_bound, bound);
@@ -182,6 +182,11 @@ double LinkQuery::extent() const {
   return tree.center().norm() + tree.radius();
 }
 
+// Whether a bound from another pose may hold: near holes it does not where a point is inside.
+bool LinkQuery::bound_may_hold() const {
+  return link_.search.closest.exact.distance > 0.0 || link_.context.solid().is_closed();
+}
+
 // Whether the bound that was proven at another pose is enough at this one.
 bool LinkQuery::is_settled(SnapshotSpan clouds) {
   LinkSearch& search = link_.search;
@@ -197,7 +202,7 @@ bool LinkQuery::is_settled(SnapshotSpan clouds) {
   const LinkBound& kept = link_.kept.bound;
   const double bound = kept.at(search.scene, search.X_FL);
   if (!is_inside_regions() || !(bound >= search.prune_bound() - kDistanceRounding) ||
-      !(search.closest.exact.distance > 0.0)) {
+      !bound_may_hold()) {
     return false;
   }
   search.pruned_bound = bound;

@@ -103,6 +103,7 @@ class LinkQuery {
  private:
   bool search_points(SnapshotSpan clouds, Deadline* deadline);
   double proven(double bound) const;
+  bool bound_may_hold() const;
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
   void set_grid_level();

@@ -14,7 +14,8 @@ class LinkBound {
  public:
   explicit LinkBound(const LinkModel& link);
 
-  /// @param bound           [m] no stored point has a smaller signed distance; kept where positive
+  /// @param bound           [m] no stored point has a smaller signed distance; kept where positive,
+  ///                        and of a closed solid
   /// @param cover_distance  [m] no stored point is nearer to what supporting planes leave of the
   ///                        cover spheres
   /// @param max_coordinate  [m] of the link in the frame of an index, for the error of stored
@@ -27,7 +28,8 @@ class LinkBound {
   /// far the link may move before a point may be inside.
   void set_link(const LinkModel& link);
 
-  /// [m] No stored point is nearer to the link at this pose; -inf: nothing is proven.
+  /// [m] No stored point has a smaller signed distance from the link at this pose; -inf: nothing is
+  /// proven.
   double at(SceneId scene, const Eigen::Isometry3d& X_FL) const;
 
   /// [m] How far the link may have moved since the bound was proven; inf: nothing is proven.
@@ -38,6 +40,7 @@ class LinkBound {
 
  private:
   static double least_cover_distance(const LinkModel& link);
+  bool holds(double bound, double moved) const;
 
   DisplacementBound displacement_;
   double least_cover_distance_;  ///< [m] see stays_outside()
