@@ -207,6 +207,12 @@ class Search {
     SideBalls::Found found = policy_.known_side(point.center);
     float margin = round_down(found.margin) - in_.rounding;
     if (!(margin > 0.0F)) {
+      // While another point is inside, one that is near the surface is not deeper, whatever its
+      // side: a distance costs less than a winding number.
+      if (limit_ < 0.0F &&
+          policy_.is_surface_within(~point.child, point.lane, -limit_ - in_.rounding)) {
+        return Prune(limit_, 0.0F);
+      }
       result_.gave_up = ++asked_ > kMaxAsked;
       if (result_.gave_up) return;
       found = policy_.ask_side(~point.child, point.lane, point.distance - in_.rounding);

@@ -138,9 +138,9 @@ void LinkQuery::count_outside_region() {
 void LinkQuery::take_kept_bound() {
   LinkSearch& search = link_.search;
   const LinkBound& kept = link_.kept.bound;
-  const double coherent =
-      bound_may_hold() ? std::min(kept.at(search.scene, search.X_FL), search.region_bound)
-                       : -kInfinity;
+  const double coherent = bound_may_hold()
+                              ? std::min(kept.at(search.scene, search.X_FL), search.region_bound)
+                              : -kInfinity;
   const double bound = std::max(coherent, search.first_bound);
   if (!(bound > search.lower_bound())) return;
   search.pruned_bound = std::max(search.pruned_bound, bound);

@@ -51,7 +51,9 @@ class PointRefinement {
     return side(id, obstacles_.X_LO * point_O(*obstacles_.bvh, id),
                 static_cast<double>(least_distance));
   }
-  /// The same for a place, by what was decided in this and in other queries.
+  /// Whether the surface is known to be within a distance of a point, for links of one mesh.
+  bool is_surface_within(std::int32_t tile, int lane, float distance);
+  /// The side of a place, by what was decided in this and in other queries.
   SideBalls::Found known_side(const float p_LQ[3]) const {
     return link_.kept.side_balls.find(
         {static_cast<double>(p_LQ[0]), static_cast<double>(p_LQ[1]), static_cast<double>(p_LQ[2])});

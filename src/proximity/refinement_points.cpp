@@ -122,6 +122,14 @@ SideBalls::Found PointRefinement::side(ObstacleId id, const Eigen::Vector3d& p_L
   return found;
 }
 
+bool PointRefinement::is_surface_within(std::int32_t tile, int lane, float distance) {
+  const Solid& solid = link_.context.solid();
+  if (!is_one_mesh(solid)) return false;
+  link_.search.count_exact();
+  const Eigen::Vector3d p_LQ = obstacles_.X_LO * point_O(*obstacles_.bvh, {tile, lane});
+  return is_within_distance(solid, p_LQ, static_cast<double>(distance));
+}
+
 // A cell costs as much as a few points: where few have to be measured, it does not pay. After the
 // deadline there is no time for one, nor for its plane.
 SignedDistanceGrid::Bound PointRefinement::grid_bound(const SignedDistanceGrid::Part& part,
