@@ -18,6 +18,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "internal/robot/anytime_model.h"
@@ -94,18 +95,19 @@ class NewestModel {
 };
 
 // The link that is not final, or has no distance field, and whose queries measured most points
-// exactly since the last call, those before the others that something is near; -1: there is none.
+// exactly since the last call, those before the others that have no field, and of these those that
+// something is near; -1: there is none.
 int link_to_refine(NewestModel* newest) {
   const AnytimeModel::Ptr model = newest->get();
   int chosen = -1;
-  std::pair<bool, double> most(false, -1.0);
+  std::tuple<bool, bool, double> most(false, false, -1.0);
   for (std::size_t i = 0; i < newest->usage.size(); ++i) {
     const LinkUsage::Need need = newest->usage.take(i);
     const LinkModel& link = model->robot()->links[i];
-    if ((link.is_final && link.field != nullptr) || std::pair(need.is_near, need.exact) <= most) {
-      continue;
-    }
-    most = {need.is_near, need.exact};
+    const bool has_field = link.field != nullptr;
+    const std::tuple<bool, bool, double> rank(!has_field, need.is_near, need.exact);
+    if ((link.is_final && has_field) || rank <= most) continue;
+    most = rank;
     chosen = static_cast<int>(i);
   }
   return chosen;

@@ -184,13 +184,19 @@ class DistanceField::Builder {
   // The first node of a row knows nothing of its neighbour.
   void forget() {
     upper_ = std::numeric_limits<double>::infinity();
+    has_surface_ = false;
     side_ = Side::kUnknown;
     side_radius_ = 0.0;
   }
 
   // A lower bound of the distance of the next node of a row, which is a cell away from the last.
   void measure(const Eigen::Vector3d& p_L) {
-    const double limit = (upper_ + cell_) * (1.0 + kRounding) + kRounding;
+    // The surface point of the last node is a surface point still.
+    const Eigen::Vector3d from_last = p_L - surface_L_;
+    const double to_last =
+        has_surface_ ? from_last.norm() : std::numeric_limits<double>::infinity();
+    if (has_surface_ && to_last > 0.0) hint_L_ = from_last / to_last;
+    const double limit = std::min(upper_ + cell_, to_last) * (1.0 + kRounding) + kRounding;
     const double tolerance =
         cell_ / static_cast<double>(kSlackParts) * std::min(cell_ / std::max(upper_, cell_), 1.0);
     const SignedDistance found =

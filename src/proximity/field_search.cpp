@@ -255,6 +255,24 @@ FieldSearchResult SearchField(const FieldSearchInput& input, PointRefinement* po
   return field_search::Search(input, policy).Run();
 }
 
+FieldPlace LookUpField(const DistanceField& field, const Eigen::Vector3d& p_L, float rounding) {
+  using namespace field_search;
+  FieldSearchInput input;
+  input.field = &field;
+  input.rounding = rounding;
+  for (int axis = 0; axis < 3; ++axis) input.R_LO[4 * axis] = 1.0F;
+  PointTile tile{};
+  Entry place{};
+  float* const rows[3] = {tile.x, tile.y, tile.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    place.center[axis] = static_cast<float>(p_L[axis]);
+    std::fill_n(rows[axis], kBoxWidth, place.center[axis]);
+  }
+  Bounds bounds;
+  FieldBounds(input).BoundPoints(tile, place, &bounds);
+  return {bounds.outside[0], bounds.surface[0] - rounding, bounds.radius[0] + rounding};
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
 HWY_AFTER_NAMESPACE();
@@ -262,7 +280,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
+HWY_EXPORT(LookUpField);
 HWY_EXPORT(SearchField);
+
+FieldPlace look_up_field(const DistanceField& field, const Eigen::Vector3d& p_L, float rounding) {
+  return HWY_DYNAMIC_DISPATCH(LookUpField)(field, p_L, rounding);
+}
 
 FieldSearchResult search_field(const FieldSearchInput& input, PointRefinement* policy) {
   return HWY_DYNAMIC_DISPATCH(SearchField)(input, policy);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <limits>
 
@@ -41,6 +42,17 @@ struct FieldSearchResult {
   bool gave_up = false;     ///< another search is better
   std::uint64_t nodes = 0, tiles = 0;  ///< that were expanded
 };
+
+/// What a field tells of a place, with the rounding taken off.
+struct FieldPlace {
+  float outside = 0.0F;  ///< [m] every place that is nearer is outside; not positive: unknown
+  float surface = 0.0F;  ///< [m] no surface is nearer
+  float within = std::numeric_limits<float>::infinity();  ///< [m] some surface is no farther
+};
+
+/// @param field     not empty
+/// @param rounding  [m] error of the place
+FieldPlace look_up_field(const DistanceField& field, const Eigen::Vector3d& p_L, float rounding);
 
 /// Branch and bound over the boxes of an index of points for a whole link, best first. A box is
 /// bounded by the field's distance at its centre less its radius, by the distances at the corners

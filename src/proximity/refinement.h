@@ -103,6 +103,8 @@ class PointRefinement {
   SignedDistanceGrid::Bound grid_bound(const SignedDistanceGrid::Part& part, double enough);
 
  private:
+  Side cheapest_side(ObstacleId id, const Eigen::Vector3d& p_LQ, double* max_distance);
+
   const PointObstacles& obstacles_;
   LinkQueryState& link_;
   float refined_bound_ = -std::numeric_limits<float>::infinity();

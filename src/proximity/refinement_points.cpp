@@ -4,6 +4,7 @@
 
 #include "internal/geometry/float_rounding.h"
 #include "internal/geometry/outside_margin.h"
+#include "proximity/field_search.h"
 #include "proximity/refinement.h"
 
 namespace ist {
@@ -154,15 +155,32 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
     measure_outside(id, p_OQ, p_LQ, max_distance);
     return;
   }
-  switch (known_side(id, p_LQ)) {
+  switch (cheapest_side(id, p_LQ, &max_distance)) {
     case Side::kOutside:
       measure_outside(id, p_OQ, p_LQ, max_distance);
       return;
     case Side::kInside:
+      measure_inside(id, p_OQ, p_LQ, max_distance);
+      return;
     case Side::kUnknown:
       link_.search.count_exact();
       link_.search.offer(link_.context.solid().signed_distance(p_LQ), p_OQ, obstacles_, id);
   }
+}
+
+// By the field, or else by what side() asks.
+// @param max_distance  [m] reduced to what the field tells
+PointRefinement::Side PointRefinement::cheapest_side(ObstacleId id, const Eigen::Vector3d& p_LQ,
+                                                     double* max_distance) {
+  const auto& field = link_.context.model->field;
+  double least_distance = 0.0;
+  if (field != nullptr && !field->empty()) {
+    const FieldPlace place = look_up_field(*field, p_LQ, round_up(link_.search.rounding));
+    *max_distance = std::min(*max_distance, static_cast<double>(place.within));
+    if (place.outside > 0.0F) return Side::kOutside;
+    least_distance = static_cast<double>(place.surface);
+  }
+  return side(id, p_LQ, least_distance).side;
 }
 
 // While another point is known to be inside, it matters only whether this one is deeper.

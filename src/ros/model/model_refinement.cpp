@@ -26,8 +26,9 @@ constexpr double kExactThatPays = 2.0;
 
 }  // namespace
 
-/// The link to refine next: one that something is near before the others, and of these the one
-/// whose queries measure most points exactly. None where finer spheres would not pay.
+/// The link to refine next: one without a distance field before the others, of these one that
+/// something is near, and of these the one whose queries measure most points exactly. None where
+/// finer spheres would not pay.
 std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) {
   if (state.phase != ModelState::Phase::kReady || !state.anytime) return std::nullopt;
   if (needs_.size() != state.usage->size() || needs_of_ != state.usage) {
@@ -35,14 +36,17 @@ std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) 
     needs_.assign(state.usage->size(), {});
   }
   std::optional<std::size_t> chosen;
+  const auto has_field = [&](std::size_t i) { return state.robot->links[i].field != nullptr; };
   const auto is_before = [&](std::size_t a, std::size_t b) {
+    // A field makes queries of a coarse packing fast, and takes less time than finer spheres.
+    if (has_field(a) != has_field(b)) return has_field(b);
     if (needs_[a].is_near != needs_[b].is_near) return needs_[a].is_near;
     return needs_[a].exact > needs_[b].exact;
   };
   for (std::size_t i = 0; i < needs_.size(); ++i) {
     needs_[i] = state.usage->take(i);
     const LinkModel& link = state.robot->links[i];
-    if ((link.is_final && link.field != nullptr) || !link.usable()) continue;
+    if ((link.is_final && has_field(i)) || !link.usable()) continue;
     const bool pays = needs_[i].is_near || needs_[i].exact >= kExactThatPays ||
                       config_.self_collision.enabled;  // the width of its answers is the gap
     if (pays && (!chosen || is_before(i, *chosen))) chosen = i;
@@ -83,7 +87,6 @@ bool ModelLoader::refine_once() {
     ROS_WARN_STREAM(warning);
     warnings.push_back(warning);
   };
-  // A field makes queries of a coarse packing fast, and takes less time than finer spheres.
   const AnytimeModel::Ptr refined = state->robot->links[*link].field == nullptr
                                         ? state->anytime->with_field(*link, callbacks)
                                         : state->anytime->refined(*link, callbacks);
