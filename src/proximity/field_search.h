@@ -43,7 +43,7 @@ struct FieldSearchResult {
   std::uint64_t nodes = 0, tiles = 0;  ///< that were expanded
 };
 
-/// What a field tells of a place, with the rounding taken off.
+/// Bounds that a field has of a place, with the rounding taken off.
 struct FieldPlace {
   float outside = 0.0F;  ///< [m] every place that is nearer is outside; not positive: unknown
   float surface = 0.0F;  ///< [m] no surface is nearer

@@ -1,5 +1,6 @@
 #include "mesh_reading.h"
 
+#include <algorithm>
 #include <mutex>
 #include <utility>
 
@@ -11,6 +12,9 @@
 
 namespace ist {
 namespace {
+
+// Each thread takes the memory of a mesh file and of its import: gigabytes for the largest.
+constexpr std::size_t kMostThreads = 4;
 
 // The bits of the numbers: NaN, which load_mesh() refuses, has no order.
 std::string key_of(const std::string& path, const Eigen::Vector3d& scale) {
@@ -31,7 +35,8 @@ std::size_t MeshReading::add(const std::string& link, const std::string& uri,
 void MeshReading::read(const ReadingProgress& progress) {
   std::mutex mutex;
   bool is_stopped = false;
-  for_each_in_parallel(files_.size(), 0, [&](std::size_t i) {
+  const auto threads = static_cast<int>(std::min(thread_count(0), kMostThreads));
+  for_each_in_parallel(files_.size(), threads, [&](std::size_t i) {
     File& file = files_[i];
     const auto cancelled = [&] {
       const std::lock_guard<std::mutex> lock(mutex);

@@ -12,7 +12,8 @@
 namespace ist {
 
 /// The meshes that a URDF names, each file at each scale once. They are collected first and read on
-/// several threads then: reading takes a good part of the time until a robot has its first model.
+/// up to four threads then: reading takes a good part of the time until a robot has its first
+/// model.
 class MeshReading {
  public:
   /// @param link   the name of the first link that wants it, for progress

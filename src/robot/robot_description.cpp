@@ -197,7 +197,7 @@ struct UnreadLink {
   std::vector<UnreadElement> elements;
 };
 
-// What elements need to name their meshes.
+// Elements need these to name their meshes.
 struct MeshNames {
   const PackageFinder& find_package;
   MeshReading& reading;

@@ -7,8 +7,8 @@
 
 namespace ist {
 
-/// What packing and its check read of a mesh's surface. Queries of the same mesh have it, too, so
-/// that it is built once for both.
+/// The hierarchy and the boundary edges of a mesh, which packing reads. Queries of the same mesh
+/// have them, too, so that they are built once for both.
 struct MeshSurface {
   const TriangleBvh& bvh;
   const std::vector<OpenEdge>& open_edges;  ///< open_edges(mesh)
