@@ -1,6 +1,7 @@
 #include "internal/robot/anytime_model.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdio>
 #include <mutex>
@@ -52,7 +53,7 @@ const LinkModel* find_link(const RobotModel* robot, const std::string& name) {
 struct AnytimeModel::Link : MonitoredLink {
   std::vector<std::string> keys;       ///< of the shapes, by element
   std::vector<PackingConfig> configs;  ///< of their final stage, by element
-  Solid solid;                         ///< empty where it cannot be made
+  Solid solid;                         ///< empty with an error
 };
 
 AnytimeModel::AnytimeModel() = default;
@@ -135,11 +136,7 @@ bool AnytimeModel::Step::make_solids(const RobotModel* before, const std::string
 Solid AnytimeModel::Step::solid_of(const Link& link, const LinkModel* before) const {
   if (!link.error.empty()) return {};
   if (before != nullptr) return before->solid;
-  try {
-    return make_solid(link.description->geometry, [this] { return is_cancelled(); });
-  } catch (const ModelError&) {
-    return {};  // packing says the same of the element
-  }
+  return make_solid(link.description->geometry, [this] { return is_cancelled(); });
 }
 
 // Packings of objects that are detached again are not kept.
@@ -257,6 +254,7 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   model.tree = InnerSphereTree(model.packing, model_->config_.tree);
   model.packing_id = next_build_id();
   throw_if(cancelled);
+  assert(!link.solid.empty());  // a link without its solid would be clear of everything
   model.solid = link.solid;
   if (before != nullptr && same_geometry) model.field = before->field;
   if (model.field == nullptr && model_->config_.distance_fields) {

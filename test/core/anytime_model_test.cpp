@@ -318,6 +318,19 @@ TEST(AnytimeModel, packsAsAShapeIsPackedByItself) {
   }
 }
 
+// A link without its solid would be clear of everything.
+TEST(AnytimeModel, refusesAnElementThatIsNowhere) {
+  for (const double x : {1e6, std::numeric_limits<double>::quiet_NaN()}) {
+    LinkGeometry geometry = test::one(test::torus(0.1, 0.03, 24, 12));
+    geometry[0].X_LE.translation().x() = x;
+    const auto model =
+        AnytimeModel::build(robot_of({geometry}), config_to(kMaxError), Stage::kFirst);
+    const LinkModel& link = model->robot()->links[0];
+    EXPECT_FALSE(link.usable()) << x;
+    EXPECT_NE(link.error.find("its origin"), std::string::npos) << link.error;
+  }
+}
+
 TEST(AnytimeModel, canBeCancelledAtEveryStep) {
   RobotModelCallbacks callbacks;
   callbacks.cancelled = [] { return true; };
