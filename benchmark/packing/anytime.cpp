@@ -94,19 +94,18 @@ class NewestModel {
   LinkUsage usage;
 };
 
-// The link that is not final, or has no distance field, and whose queries measured most points
-// exactly since the last call, those before the others that have no field, and of these those that
-// something is near; -1: there is none.
+// The link whose next step is the most urgent, of these one that something is near, and of these
+// the one whose queries measured most points exactly since the last call; -1: all are complete.
 int link_to_refine(NewestModel* newest) {
   const AnytimeModel::Ptr model = newest->get();
   int chosen = -1;
-  std::tuple<bool, bool, double> most(false, false, -1.0);
+  using LinkStep = AnytimeModel::LinkStep;
+  std::tuple<int, bool, double> most(-static_cast<int>(LinkStep::kNone), false, -1.0);
   for (std::size_t i = 0; i < newest->usage.size(); ++i) {
     const LinkUsage::Need need = newest->usage.take(i);
-    const LinkModel& link = model->robot()->links[i];
-    const bool has_field = link.field != nullptr;
-    const std::tuple<bool, bool, double> rank(!has_field, need.is_near, need.exact);
-    if ((link.is_final && has_field) || rank <= most) continue;
+    const LinkStep step = AnytimeModel::next_step(model->robot()->links[i]);
+    const std::tuple<int, bool, double> rank(-static_cast<int>(step), need.is_near, need.exact);
+    if (step == LinkStep::kNone || rank <= most) continue;
     most = rank;
     chosen = static_cast<int>(i);
   }
@@ -121,11 +120,8 @@ void refine(NewestModel* newest, const std::atomic<bool>& stop) {
   while (!stop) {
     const int link = link_to_refine(newest);
     if (link < 0) return;
-    const AnytimeModel::Ptr model = newest->get();
-    const auto i = static_cast<std::size_t>(link);
-    const bool has_field = model->robot()->links[i].field != nullptr;
     const AnytimeModel::Ptr next =
-        has_field ? model->refined(i, callbacks) : model->with_field(i, callbacks);
+        newest->get()->advanced(static_cast<std::size_t>(link), callbacks);
     if (next) newest->set(next);
   }
 }

@@ -23,6 +23,7 @@ constexpr std::array<Grid, 5> kGrids = {
 // Nodes of a grid, at most: about a large solid cells are larger.
 constexpr double kMaxNodes = 2e5;
 constexpr double kCellGrowth = 1.25;
+constexpr double kCoarseCells = 3.0;  // their edges, as multiples of fine ones
 // The same of the grid of depths.
 constexpr double kDepthCell = 0.005, kMaxDepthNodes = 5e4;
 // [m] More than double loses in the distance of a link's places.
@@ -37,7 +38,11 @@ Eigen::Array3i nodes_of(const Eigen::AlignedBox3d& box, double cell) {
 class DistanceField::Builder {
  public:
   Builder(const Solid& solid, const CancelRequest& cancelled, DistanceField* field)
-      : solid_(solid), watch_(cancelled), field_(*field) {}
+      : solid_(solid),
+        watch_(cancelled),
+        field_(*field),
+        scale_(field->detail_ == Detail::kCoarse ? kCoarseCells : 1.0),
+        node_share_(1.0 / (scale_ * scale_ * scale_)) {}
 
   void run() {
     if (solid_.empty() || !find_bounds()) return;
@@ -47,10 +52,9 @@ class DistanceField::Builder {
       Eigen::AlignedBox3d box = bounds_;
       box.min().array() -= kGrids[i].margin;
       box.max().array() += kGrids[i].margin;
-      double cell = kGrids[i].cell;
-      while (nodes_of(box, cell).cast<double>().prod() > kMaxNodes) cell *= kCellGrowth;
+      const double cell = cell_for(box, kGrids[i].cell, kMaxNodes);
       // Cells that are no smaller than those of the next grid are of no use.
-      if (i + 1 < kGrids.size() && cell >= kGrids[i + 1].cell) continue;
+      if (i + 1 < kGrids.size() && cell >= scale_ * kGrids[i + 1].cell) continue;
       add_level(box, cell);
     }
     if (elements_of(solid_).size() == 1) add_depths();
@@ -83,6 +87,15 @@ class DistanceField::Builder {
     bounds_.max().array() += slack;
     field_.bounds_ = bounds_.cast<float>();
     return true;
+  }
+
+  // [m] The edge of a cell.
+  // @param fine  of a fine field's cells about a small box
+  // @param most  nodes of a fine field's grid
+  double cell_for(const Eigen::AlignedBox3d& box, double fine, double most) const {
+    double cell = scale_ * fine;
+    while (nodes_of(box, cell).cast<double>().prod() > node_share_ * most) cell *= kCellGrowth;
+    return cell;
   }
 
   // A grid about the middle of a box that holds the box.
@@ -139,9 +152,7 @@ class DistanceField::Builder {
   }
 
   void add_depths() {
-    double cell = kDepthCell;
-    while (nodes_of(bounds_, cell).cast<double>().prod() > kMaxDepthNodes) cell *= kCellGrowth;
-    const Level level = make_level(bounds_, cell, 0);
+    const Level level = make_level(bounds_, cell_for(bounds_, kDepthCell, kMaxDepthNodes), 0);
     std::vector<Eigen::Vector3f> to_surface;
     std::vector<std::uint16_t> balls;
     to_surface.reserve(count(level));
@@ -231,7 +242,8 @@ class DistanceField::Builder {
   const Solid& solid_;
   CancelWatch watch_;
   DistanceField& field_;
-  Eigen::AlignedBox3d bounds_;  // [m] of the solid
+  const double scale_, node_share_;  // of edges and of nodes, by the detail
+  Eigen::AlignedBox3d bounds_;       // [m] of the solid
   bool has_margins_ = false;
   double cell_ = 0.0;  // [m] of the level at work
   // The next seven are about the node that was measured last.
@@ -242,7 +254,8 @@ class DistanceField::Builder {
   double side_radius_ = 0.0;    // [m] places that are nearer are on the same side
 };
 
-DistanceField::DistanceField(const Solid& solid, const CancelRequest& cancelled) {
+DistanceField::DistanceField(const Solid& solid, Detail detail, const CancelRequest& cancelled)
+    : detail_(detail) {
   Builder(solid, cancelled, this).run();
 }
 

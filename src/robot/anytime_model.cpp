@@ -40,6 +40,11 @@ std::string millimetres(double metres) {
   return text;
 }
 
+using Field = std::shared_ptr<const DistanceField>;
+bool is_finer(const Field& a, const Field& b) {
+  return a != nullptr && (b == nullptr || a->detail() > b->detail());
+}
+
 const LinkModel* find_link(const RobotModel* robot, const std::string& name) {
   if (robot == nullptr) return nullptr;
   const auto found = std::find_if(robot->links.begin(), robot->links.end(),
@@ -258,7 +263,8 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   model.solid = link.solid;
   if (before != nullptr && same_geometry) model.field = before->field;
   if (model.field == nullptr && model_->config_.distance_fields) {
-    model.field = std::make_shared<const DistanceField>(model.solid, cancelled);
+    model.field =
+        std::make_shared<const DistanceField>(model.solid, DistanceField::Detail::kFine, cancelled);
   }
   return model;
 }
@@ -358,7 +364,7 @@ AnytimeModel::Ptr AnytimeModel::with_packings_of(const AnytimeModel& other) cons
   const auto robot = std::make_shared<RobotModel>(*model->robot_);
   for (LinkModel& link : robot->links) {
     for (const LinkModel& theirs : other.robot_->links) {
-      if (link.field == nullptr && is_same_solid(link.solid, theirs.solid)) {
+      if (is_finer(theirs.field, link.field) && is_same_solid(link.solid, theirs.solid)) {
         link.field = theirs.field;
       }
     }
@@ -373,7 +379,9 @@ AnytimeModel::Ptr AnytimeModel::with_field(std::size_t link,
   const auto robot = std::make_shared<RobotModel>(*robot_);
   try {
     const Solid& solid = robot->links[link].solid;
-    const auto field = std::make_shared<const DistanceField>(solid, callbacks.cancelled);
+    const auto detail = robot->links[link].field == nullptr ? DistanceField::Detail::kCoarse
+                                                            : DistanceField::Detail::kFine;
+    const auto field = std::make_shared<const DistanceField>(solid, detail, callbacks.cancelled);
     for (LinkModel& other : robot->links) {
       if (is_same_solid(other.solid, solid)) other.field = field;
     }
@@ -382,6 +390,20 @@ AnytimeModel::Ptr AnytimeModel::with_field(std::size_t link,
   }
   model->robot_ = robot;
   return model;
+}
+
+AnytimeModel::LinkStep AnytimeModel::next_step(const LinkModel& link) {
+  if (!link.usable()) return LinkStep::kNone;
+  if (link.field == nullptr) return LinkStep::kCoarseField;
+  if (link.field->detail() == DistanceField::Detail::kCoarse) return LinkStep::kFineField;
+  return link.is_final ? LinkStep::kNone : LinkStep::kSpheres;
+}
+
+AnytimeModel::Ptr AnytimeModel::advanced(std::size_t link,
+                                         const RobotModelCallbacks& callbacks) const {
+  const LinkStep step = next_step(robot_->links[link]);
+  assert(step != LinkStep::kNone);
+  return step == LinkStep::kSpheres ? refined(link, callbacks) : with_field(link, callbacks);
 }
 
 AnytimeModel::Ptr AnytimeModel::with_link(std::shared_ptr<const RobotDescription> description,

@@ -186,6 +186,7 @@ TEST(AnytimeModel, aLinkKeepsItsFieldWhileItIsPackedMoreFinely) {
   EXPECT_EQ(before.links[link].field, nullptr);
   ASSERT_NE(after.links[link].field, nullptr);
   EXPECT_FALSE(after.links[link].field->empty());
+  EXPECT_EQ(after.links[link].field->detail(), DistanceField::Detail::kCoarse);
   EXPECT_GT(memory_of(after).fields, 0U);
   for (std::size_t i = 0; i < before.links.size(); ++i) {
     EXPECT_EQ(after.links[i].packing_id, before.links[i].packing_id);
@@ -197,6 +198,42 @@ TEST(AnytimeModel, aLinkKeepsItsFieldWhileItIsPackedMoreFinely) {
   // A model that has grown meanwhile takes it, too.
   const auto grown = first->refined(link)->with_packings_of(*model);
   EXPECT_EQ(grown->robot()->links[link].field, after.links[link].field);
+}
+
+TEST(AnytimeModel, aFineFieldTakesThePlaceOfACoarseOne) {
+  const auto first = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
+  const auto link = static_cast<std::size_t>(next_link(*first->robot(), -1));
+  const auto coarse = first->with_field(link), fine = coarse->with_field(link);
+  const auto field_of = [&](const AnytimeModel::Ptr& model) {
+    return model->robot()->links[link].field;
+  };
+  EXPECT_EQ(field_of(fine)->detail(), DistanceField::Detail::kFine);
+  EXPECT_GT(field_of(fine)->memory(), 3 * field_of(coarse)->memory());
+  EXPECT_EQ(field_of(coarse->with_packings_of(*fine)), field_of(fine));
+  EXPECT_EQ(field_of(fine->with_packings_of(*coarse)), field_of(fine));
+}
+
+// Every link takes its steps in the order of their urgency until it is complete.
+TEST(AnytimeModel, advancesByFieldsAndThenBySpheres) {
+  using LinkStep = AnytimeModel::LinkStep;
+  auto model = AnytimeModel::build(demo(), config_to(kMaxError), Stage::kFirst);
+  const auto link = static_cast<std::size_t>(next_link(*model->robot(), -1));
+  std::vector<LinkStep> steps;
+  for (;;) {
+    const LinkStep step = AnytimeModel::next_step(model->robot()->links[link]);
+    if (step == LinkStep::kNone) break;
+    steps.push_back(step);
+    model = model->advanced(link);
+  }
+  ASSERT_GE(steps.size(), 3U);
+  EXPECT_EQ(steps[0], LinkStep::kCoarseField);
+  EXPECT_EQ(steps[1], LinkStep::kFineField);
+  EXPECT_EQ(steps[2], LinkStep::kSpheres);
+  EXPECT_TRUE(std::is_sorted(steps.begin(), steps.end()));
+  EXPECT_TRUE(model->robot()->links[link].is_final);
+  LinkModel without_geometry;
+  without_geometry.error = "no geometry";
+  EXPECT_EQ(AnytimeModel::next_step(without_geometry), LinkStep::kNone);
 }
 
 TEST(AnytimeModel, measuringAFieldCanBeCancelled) {

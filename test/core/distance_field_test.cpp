@@ -19,6 +19,9 @@
 namespace ist {
 namespace {
 
+constexpr DistanceField::Detail kDetails[] = {DistanceField::Detail::kCoarse,
+                                              DistanceField::Detail::kFine};
+
 Eigen::Vector3d node(const DistanceField::Level& level, std::size_t i) {
   const auto nx = static_cast<std::size_t>(level.size[0]),
              ny = static_cast<std::size_t>(level.size[1]);
@@ -53,11 +56,26 @@ double distance_of(const LinkGeometry& link, const Eigen::Vector3d& p) {
   return std::max(least, 0.0);
 }
 
+struct FieldOfLink {
+  Solid solid;
+  LinkGeometry link;
+  DistanceField field;
+};
+
+// Coarse and fine in turn.
+std::vector<FieldOfLink> fields_of_random_links(test::Rng* rng) {
+  std::vector<FieldOfLink> fields;
+  for (const LinkGeometry& link : test::random_links(rng)) {
+    const Solid solid(link);
+    for (const auto detail : kDetails)
+      fields.push_back({solid, link, DistanceField(solid, detail)});
+  }
+  return fields;
+}
+
 TEST(DistanceField, NodesAreLowerBoundsAndHardlyTooLow) {
   test::Rng rng(3);
-  for (const LinkGeometry& link : test::random_links(&rng)) {
-    const Solid solid(link);
-    const DistanceField field(solid);
+  for (const auto& [solid, link, field] : fields_of_random_links(&rng)) {
     ASSERT_FALSE(field.empty());
     for (const DistanceField::Level& level : field.levels()) {
       const double slack = static_cast<double>(DistanceField::kStep) +
@@ -79,9 +97,7 @@ TEST(DistanceField, NodesAreLowerBoundsAndHardlyTooLow) {
 TEST(DistanceField, BallsHoldNothingThatIsInside) {
   test::Rng rng(4);
   int balls = 0, near_solids = 0;
-  for (const LinkGeometry& link : test::random_links(&rng)) {
-    const Solid solid(link);
-    const DistanceField field(solid);
+  for (const auto& [solid, link, field] : fields_of_random_links(&rng)) {
     const DistanceField::Level& finest = field.levels().front();
     for (std::size_t k = 0; k < 2000; ++k) {
       const auto i = static_cast<std::size_t>(
@@ -112,12 +128,14 @@ TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
       for (const Eigen::Isometry3d& X_LE :
            {Eigen::Isometry3d::Identity(), test::random_pose(&rng, 0.1)}) {
         const Solid solid({GeometryElement{mesh, X_LE, "test"}});
-        const DistanceField field(solid);
-        const DistanceField::Level& finest = field.levels().front();
-        for (std::size_t i = 0; i < nodes_of(finest); i += 7) {
-          if (!solid.is_inside(node(finest, i))) continue;
-          ++inside;
-          ASSERT_EQ(field.outside()[i], 0) << size;
+        for (const auto detail : kDetails) {
+          const DistanceField field(solid, detail);
+          const DistanceField::Level& finest = field.levels().front();
+          for (std::size_t i = 0; i < nodes_of(finest); i += 7) {
+            if (!solid.is_inside(node(finest, i))) continue;
+            ++inside;
+            ASSERT_EQ(field.outside()[i], 0) << size;
+          }
         }
       }
     }
@@ -130,9 +148,7 @@ TEST(DistanceField, NoNodeInsideIsTakenForOutside) {
 TEST(DistanceField, DepthsAreFromTheSurface) {
   test::Rng rng(6);
   int fields = 0, balls = 0, inside = 0;
-  for (const LinkGeometry& link : test::random_links(&rng)) {
-    const Solid solid(link);
-    const DistanceField field(solid);
+  for (const auto& [solid, link, field] : fields_of_random_links(&rng)) {
     ASSERT_EQ(field.has_depths(), link.size() == 1);
     if (!field.has_depths()) continue;
     ++fields;
@@ -174,17 +190,19 @@ TEST(DistanceField, DepthsAreFromTheSurface) {
 
 TEST(DistanceField, GridsLieWithinEachOtherAndReachFar) {
   const Solid solid({GeometryElement{Box{{0.3, 0.1, 0.2}}, Eigen::Isometry3d::Identity(), "box"}});
-  const DistanceField field(solid);
-  ASSERT_GE(field.levels().size(), 3U);
   const auto box_of = [](const DistanceField::Level& level) {
     return Eigen::AlignedBox3d(node(level, 0), node(level, nodes_of(level) - 1));
   };
-  for (std::size_t l = 1; l < field.levels().size(); ++l) {
-    EXPECT_TRUE(box_of(field.levels()[l]).contains(box_of(field.levels()[l - 1])));
-    EXPECT_GT(field.levels()[l].cell, field.levels()[l - 1].cell);
+  for (const auto detail : kDetails) {
+    const DistanceField field(solid, detail);
+    ASSERT_GE(field.levels().size(), 3U);
+    for (std::size_t l = 1; l < field.levels().size(); ++l) {
+      EXPECT_TRUE(box_of(field.levels()[l]).contains(box_of(field.levels()[l - 1])));
+      EXPECT_GT(field.levels()[l].cell, field.levels()[l - 1].cell);
+    }
+    EXPECT_TRUE(box_of(field.levels().front()).contains(field.bounds().cast<double>()));
+    EXPECT_TRUE(box_of(field.levels().back()).contains(Eigen::Vector3d(1.2, 1.2, 1.2)));
   }
-  EXPECT_TRUE(box_of(field.levels().front()).contains(field.bounds().cast<double>()));
-  EXPECT_TRUE(box_of(field.levels().back()).contains(Eigen::Vector3d(1.2, 1.2, 1.2)));
 }
 
 // About a large link cells are larger, so that memory is bounded.
@@ -192,9 +210,11 @@ TEST(DistanceField, MemoryIsBounded) {
   for (const double size : {1e-4, 0.3, 3.0, 300.0, 9000.0}) {
     const Solid solid({GeometryElement{Box{{size, 0.5 * size, 0.1 * size}},
                                        Eigen::Isometry3d::Identity(), "box"}});
-    const DistanceField field(solid);
+    const DistanceField field(solid), coarse(solid, DistanceField::Detail::kCoarse);
     EXPECT_FALSE(field.empty()) << size;
     EXPECT_LT(field.memory(), 3000000U) << size;
+    EXPECT_FALSE(coarse.empty()) << size;
+    EXPECT_LT(coarse.memory(), field.memory()) << size;
   }
 }
 
@@ -202,7 +222,9 @@ TEST(DistanceField, NothingHasAnEmptyField) { EXPECT_TRUE(DistanceField(Solid())
 
 TEST(DistanceField, CanBeCancelled) {
   const Solid solid({GeometryElement{Sphere{0.1}, Eigen::Isometry3d::Identity(), "sphere"}});
-  EXPECT_THROW(DistanceField(solid, [] { return true; }), Cancelled);
+  for (const auto detail : kDetails) {
+    EXPECT_THROW(DistanceField(solid, detail, [] { return true; }), Cancelled);
+  }
 }
 
 }  // namespace

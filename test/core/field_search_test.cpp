@@ -18,10 +18,15 @@ namespace {
 
 constexpr double kRounding = 2e-8;  // [m] of float, where it decides the side of a point
 
-std::shared_ptr<const RobotModel> with_fields(const std::shared_ptr<const RobotModel>& model) {
+// @param coarse  share of the links that get coarse fields, one in so many; 0: none
+std::shared_ptr<const RobotModel> with_fields(const std::shared_ptr<const RobotModel>& model,
+                                              std::size_t coarse = 0) {
+  using Detail = DistanceField::Detail;
   const auto robot = std::make_shared<RobotModel>(*model);
-  for (LinkModel& link : robot->links) {
-    link.field = std::make_shared<const DistanceField>(link.solid);
+  for (std::size_t i = 0; i < robot->links.size(); ++i) {
+    const Detail detail = coarse > 0 && i % coarse == 0 ? Detail::kCoarse : Detail::kFine;
+    LinkModel& link = robot->links[i];
+    link.field = std::make_shared<const DistanceField>(link.solid, detail);
   }
   return robot;
 }
@@ -65,7 +70,7 @@ QueryConfig random_config(test::Rng* rng) {
 class FieldSearch : public testing::Test {
  protected:
   FieldSearch()
-      : links_(test::random_links(&rng_)), model_(with_fields(test::model_of(links_, 0.02))) {}
+      : links_(test::random_links(&rng_)), model_(with_fields(test::model_of(links_, 0.02), 2)) {}
 
   test::Rng rng_{7};
   std::vector<LinkGeometry> links_;
@@ -170,7 +175,8 @@ TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
     for (Eigen::Vector3d& v : turned.vertices) v = X_LE.inverse() * v;
     const LinkGeometry link = {GeometryElement{turned, X_LE, "cups"}};
     const auto without = test::model_of({link}, 0.01);
-    ProximityQuery query(with_fields(without), {}), other(without, {});
+    ProximityQuery query(with_fields(without, static_cast<std::size_t>(round % 2)), {}),
+        other(without, {});
     LinkProximity result;
     for (int k = 0; k < 80; ++k) {
       const std::vector<Eigen::Vector3d> points = {test::random_vector(&rng_, 0.08)};
@@ -192,11 +198,12 @@ TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
 // A large hollow with a hole: a box of points deep inside is far from every surface.
 TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
   const LinkGeometry hollow = test::one(test::open_box({1.0, 1.0, 1.0}));
-  const auto model = with_fields(test::model_of({hollow}, 0.05));
+  const auto without = test::model_of({hollow}, 0.05);
+  const auto fine = with_fields(without), coarse = with_fields(without, 1);
   for (const double tolerance : {0.0, 0.001, 0.1}) {
     QueryConfig config;
     config.tolerance = tolerance;
-    ProximityQuery query(model, config);
+    ProximityQuery of_fine(fine, config), of_coarse(coarse, config);
     LinkProximity result;
     for (int round = 0; round < 50; ++round) {
       std::vector<Eigen::Vector3d> points;
@@ -205,10 +212,12 @@ TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
       for (int k = 0; k < 40; ++k) points.push_back(middle + test::random_vector(&rng_, size));
       const CloudSnapshot cloud = test::make_snapshot(points);
       const Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-      ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &result));
+      const test::Truth truth = test::truth_of(hollow, X_FL, points, cloud);
       SCOPED_TRACE(testing::Message() << "round " << round << ", tolerance " << tolerance);
-      test::expect_truth(result, test::truth_of(hollow, X_FL, points, cloud), config, X_FL,
-                         kRounding);
+      for (ProximityQuery* query : {&of_fine, &of_coarse}) {
+        ASSERT_TRUE(query->run_link(0, X_FL, {&cloud}, &result));
+        test::expect_truth(result, truth, config, X_FL, kRounding);
+      }
       if (HasFailure()) return;
     }
   }
@@ -268,7 +277,7 @@ TEST_F(FieldSearch, TheMinimumOfAllLinksIsTheSameWithoutFields) {
 TEST_F(FieldSearch, MeasuresHardlyMoreThanOnePoint) {
   QueryConfig config;
   config.max_distance = 10.0;
-  ProximityQuery query(model_, config);
+  ProximityQuery query(with_fields(model_), config);
   LinkProximity result;
   std::uint64_t measured = 0, queries = 0;
   for (int round = 0; round < 20; ++round) {

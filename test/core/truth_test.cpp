@@ -67,8 +67,9 @@ TEST(Truth, BoundsHoldInEveryCase) {
   EXPECT_GT(counts.without_contact, test::scaled(2 * 5000));
 }
 
-// The model grows from its first packing to its final one, a link at a time; every tenth part of
-// the way it answers all cases of one cloud.
+// The model grows from its first packing to its last step, as a node takes them: coarse fields of
+// all links, fine ones, then finer spheres. Every tenth part of the way it answers all cases of one
+// cloud.
 TEST(Truth, HoldsAtTenPointsOfAGrowingModel) {
   const auto data = test::data_dir();
   if (!data) GTEST_SKIP() << test::kNoData;
@@ -77,9 +78,12 @@ TEST(Truth, HoldsAtTenPointsOfAGrowingModel) {
   const auto robot = std::make_shared<const RobotDescription>(test::panda_description(*data));
   std::vector<AnytimeModel::Ptr> stages = {
       AnytimeModel::build(robot, config, AnytimeModel::Stage::kFirst)};
-  for (std::size_t i = 0; i < test::kPandaLinks; ++i) {
-    while (!stages.back()->robot()->links[i].is_final) {
-      stages.push_back(stages.back()->refined(i));
+  using LinkStep = AnytimeModel::LinkStep;
+  for (const auto step : {LinkStep::kCoarseField, LinkStep::kFineField, LinkStep::kSpheres}) {
+    for (std::size_t i = 0; i < test::kPandaLinks; ++i) {
+      while (AnytimeModel::next_step(stages.back()->robot()->links[i]) == step) {
+        stages.push_back(stages.back()->advanced(i));
+      }
     }
   }
   constexpr std::size_t kPoints = 10;

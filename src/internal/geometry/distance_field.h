@@ -46,8 +46,18 @@ class DistanceField {
     std::size_t first;     ///< of its nodes in values(), or in one of the arrays below
   };
 
+  /// How long the edges of all cells are.
+  enum class Detail {
+    kCoarse,  ///< three times as long as fine ones: a 27th of the nodes, of the time and of the
+              ///< memory
+    kFine,
+  };
+
   /// @throws Cancelled
-  explicit DistanceField(const Solid& solid, const CancelRequest& cancelled = {});
+  explicit DistanceField(const Solid& solid, Detail detail = Detail::kFine,
+                         const CancelRequest& cancelled = {});
+
+  Detail detail() const { return detail_; }
 
   bool empty() const { return levels_.empty(); }
   const std::vector<Level>& levels() const { return levels_; }  ///< finest first, each in the next
@@ -96,6 +106,7 @@ class DistanceField {
   float surface_step_ = 0.0F;
   Eigen::AlignedBox3f bounds_;
   bool is_closed_ = false;
+  Detail detail_ = Detail::kFine;
 };
 
 }  // namespace ist

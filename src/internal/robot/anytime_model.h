@@ -49,11 +49,24 @@ class AnytimeModel {
   /// @returns null when cancelled
   Ptr refined(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
 
-  /// The same model with the distance field of a link, measured in the calling thread. Other links
-  /// of the same solid get it too.
+  /// The same model with the distance field of a link, measured in the calling thread: a coarse one
+  /// where there is none, else a fine one. Other links of the same solid get it too.
   /// @param link  index in robot(), usable
   /// @returns null when cancelled
   Ptr with_field(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
+
+  /// A step that a link can take, what speeds up its queries most for its time first.
+  enum class LinkStep {
+    kCoarseField,  ///< with_field()
+    kFineField,    ///< with_field()
+    kSpheres,      ///< refined()
+    kNone,         ///< the link is complete, or has no geometry
+  };
+  static LinkStep next_step(const LinkModel& link);
+  /// The model after the next step of a link.
+  /// @param link  index in robot(), not complete
+  /// @returns null when cancelled
+  Ptr advanced(std::size_t link, const RobotModelCallbacks& callbacks = {}) const;
 
   /// The same model with the packings of another one where those are finer, and with the fields
   /// that it has measured of the same solids.

@@ -13,8 +13,8 @@
 #include "ros/common/thread_priority.h"
 #include "ros/model/model_loader.h"
 
-// Background work on the model: distance fields and finer spheres for the links that need them, one
-// link at a time.
+// Background work on the model: distance fields, coarse ones of all links first, and finer spheres
+// for the links that need them, one link at a time.
 
 namespace ist {
 namespace {
@@ -26,9 +26,9 @@ constexpr double kExactThatPays = 2.0;
 
 }  // namespace
 
-/// The link to refine next: one without a distance field before the others, of these one that
-/// something is near, and of these the one whose queries measure most points exactly. None where
-/// finer spheres would not pay.
+/// The link to refine next: the one whose next step is the most urgent, of these one that something
+/// is near, and of these the one whose queries measure most points exactly. None where no step
+/// would pay.
 std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) {
   if (state.phase != ModelState::Phase::kReady || !state.anytime) return std::nullopt;
   if (needs_.size() != state.usage->size() || needs_of_ != state.usage) {
@@ -36,17 +36,17 @@ std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) 
     needs_.assign(state.usage->size(), {});
   }
   std::optional<std::size_t> chosen;
-  const auto has_field = [&](std::size_t i) { return state.robot->links[i].field != nullptr; };
+  const auto next_step = [&](std::size_t i) {
+    return AnytimeModel::next_step(state.robot->links[i]);
+  };
   const auto is_before = [&](std::size_t a, std::size_t b) {
-    // A field makes queries of a coarse packing fast, and takes less time than finer spheres.
-    if (has_field(a) != has_field(b)) return has_field(b);
+    if (next_step(a) != next_step(b)) return next_step(a) < next_step(b);
     if (needs_[a].is_near != needs_[b].is_near) return needs_[a].is_near;
     return needs_[a].exact > needs_[b].exact;
   };
   for (std::size_t i = 0; i < needs_.size(); ++i) {
     needs_[i] = state.usage->take(i);
-    const LinkModel& link = state.robot->links[i];
-    if ((link.is_final && has_field(i)) || !link.usable()) continue;
+    if (next_step(i) == AnytimeModel::LinkStep::kNone) continue;
     const bool pays = needs_[i].is_near || needs_[i].exact >= kExactThatPays ||
                       config_.self_collision.enabled;  // the width of its answers is the gap
     if (pays && (!chosen || is_before(i, *chosen))) chosen = i;
@@ -87,9 +87,7 @@ bool ModelLoader::refine_once() {
     ROS_WARN_STREAM(warning);
     warnings.push_back(warning);
   };
-  const AnytimeModel::Ptr refined = state->robot->links[*link].field == nullptr
-                                        ? state->anytime->with_field(*link, callbacks)
-                                        : state->anytime->refined(*link, callbacks);
+  const AnytimeModel::Ptr refined = state->anytime->advanced(*link, callbacks);
   if (refined) take_packings(*state, refined, warnings);
   return refined != nullptr;
 }

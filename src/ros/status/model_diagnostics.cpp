@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <string>
 
+#include "internal/robot/anytime_model.h"
 #include "internal/robot/model_memory.h"
 #include "ros/common/text.h"
 #include "ros/status/diagnostic_values.h"
@@ -81,7 +82,7 @@ double megabytes(std::size_t bytes) { return 1e-6 * static_cast<double>(bytes); 
 /// Adds how far background packing has got.
 void add_packings(const ModelState& state, DiagnosticStatus* status) {
   if (!state.robot) return;
-  std::size_t usable = 0, final = 0, spheres = 0, fields = 0;
+  std::size_t usable = 0, final = 0, spheres = 0, fields = 0, coarse_fields = 0;
   double largest_gap = 0.0;
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
@@ -89,6 +90,7 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
     ++usable;
     final += link.is_final ? 1 : 0;
     fields += link.field != nullptr ? 1 : 0;
+    coarse_fields += AnytimeModel::next_step(link) == AnytimeModel::LinkStep::kFineField ? 1 : 0;
     spheres += link.packing.spheres.size();
     largest_gap = std::max(largest_gap, link.packing.certificate.max_gap);
   }
@@ -98,6 +100,7 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
             status);
   add_value("links with a distance field",
             std::to_string(fields) + " of " + std::to_string(usable) +
+                (coarse_fields > 0 ? ", " + std::to_string(coarse_fields) + " coarse" : "") +
                 (fields < usable ? "; the others get one when it pays" : ""),
             status);
   add_value("spheres", spheres, status);
