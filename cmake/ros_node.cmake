@@ -14,8 +14,9 @@ target_link_libraries(ist_proximity_nodelet PRIVATE ist_proximity_ros)
 
 if(IST_PROXIMITY_PRECOMPILE)
   target_precompile_headers(ist_proximity_ros PRIVATE
-    <ros/ros.h> <sensor_msgs/PointCloud2.h> <Eigen/Core> <Eigen/Geometry>
-    <algorithm> <functional> <memory> <string> <vector>)
+    <ros/ros.h> <sensor_msgs/PointCloud2.h> <ist_proximity/ProximityArray.h>
+    <Eigen/Core> <Eigen/Geometry> <algorithm> <chrono> <functional> <map> <memory> <mutex>
+    <optional> <sstream> <string> <thread> <vector>)
 endif()
 
 foreach(target ist_proximity_ros proximity_node ist_proximity_nodelet)
