@@ -78,8 +78,8 @@ set(test_headers
   <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry>
   <algorithm> <functional> <map> <memory> <random> <string> <thread> <variant> <vector>)
 if(IST_PROXIMITY_PRECOMPILE)
-  list(APPEND test_headers <support/meshes.h> <support/oracle.h> <support/random_links.h>
-    <support/scene.h> <support/shape_oracle.h> <support/trial.h>
+  list(APPEND test_headers <support/meshes.h> <support/random_links.h>
+    <support/scene.h> <support/shape_oracle.h>
     <ist_proximity/cloud/ingest.h> <ist_proximity/proximity/proximity_query.h>
     <ist_proximity/robot/robot_model.h>)
 endif()

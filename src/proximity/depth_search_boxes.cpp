@@ -65,7 +65,7 @@ class BoxDepthSearch {
     return link_.context.tree().interior_gap() + 3.0 * search_.rounding;
   }
 
-  void give_up() { search_.prune(-link_.context.tree().radius()); }
+  void give_up() { search_.prune(-link_.context.deepest()); }
 
   void push_children(const BoxNode& node) {
     const std::size_t first = stack_.size();

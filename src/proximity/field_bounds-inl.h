@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <cmath>
+
 #include "proximity/field_lookup-inl.h"
 #include "proximity/field_queue.h"
 #include "proximity/field_search.h"
@@ -55,6 +57,24 @@ class FieldBounds {
   void SetPlanes(const SupportingPlanes& planes, float support) {
     planes_.Set(planes);
     support_ = support;
+  }
+
+  // Places a box, given in the index's frame.
+  void PlaceBox(const float* min, const float* max, Entry* box) const {
+    float square = 0.0F;
+    for (int i = 0; i < 3; ++i) {
+      box->min[i] = min[i];
+      box->max[i] = max[i];
+      const float half = 0.5F * (max[i] - min[i]);
+      square += half * half;
+    }
+    box->radius = std::sqrt(square);
+    for (int row = 0; row < 3; ++row) {
+      box->center[row] = in_.p_LO[row];
+      for (int i = 0; i < 3; ++i) {
+        box->center[row] += in_.R_LO[3 * row + i] * (0.5F * (min[i] + max[i]));
+      }
+    }
   }
 
   // [m] The height of a box above the supporting plane.

@@ -16,13 +16,15 @@ class FieldQueue {
   static constexpr int kNoPoint = -1;
 
   struct Entry {
-    float outside;         ///< [m] every place nearer to it is outside; not positive: unknown
-    float distance;        ///< [m] of a point that may be inside: no surface is nearer to it
-    std::int32_t child;    ///< node, or tile if negative; the tile of a point
-    int lane;              ///< of a point; else kNoPoint
+    float outside;       ///< [m] every place nearer to it is outside; not positive: unknown
+    float distance;      ///< [m] of a point that may be inside: no surface is nearer to it
+    std::int32_t child;  ///< node, or tile if negative; the tile of a point
+    int lane;            ///< of a point; else kNoPoint
+    /// Of a node: as FieldFront::Part. Of a point: the number of its tile's part.
+    std::uint32_t slots;
     float radius;          ///< [m] of the box; an upper bound of a point's distance
     float center[3];       ///< [m] of the box, or the point, in the link's frame
-    float min[3], max[3];  ///< [m] the box, in the index's frame
+    float min[3], max[3];  ///< [m] the box, in the index's frame; not of a point
   };
 
   bool empty() const { return size_ == 0; }
@@ -55,13 +57,10 @@ class FieldQueue {
     return place.bound;
   }
 
-  /// [m] The least Entry::outside of all; inf: the queue is empty.
-  float least_outside() const {
-    float least = std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < size_; ++i) {
-      least = std::min(least, entries_[places_[i].entry].outside);
-    }
-    return least;
+  /// Calls visit(bound, entry) with each entry, in any order.
+  template <class Visit>
+  void for_each(const Visit& visit) const {
+    for (std::size_t i = 0; i < size_; ++i) visit(places_[i].bound, entries_[places_[i].entry]);
   }
 
  private:

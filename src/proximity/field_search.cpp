@@ -42,11 +42,8 @@ class Search {
         limit_(input.prune_bound + input.ahead) {}
 
   FieldSearchResult Run() {
+    Begin();
     Entry entry{};
-    entry.child = in_.bvh->root();
-    entry.lane = FieldQueue::kNoPoint;
-    entry.radius = kFarAway;
-    ExpandNode(entry, kMayBeInside);
     while (!queue_.empty() && queue_.least() < limit_ && !result_.gave_up && result_.has_time) {
       result_.has_time = !policy_.deadline_passed();
       if (!result_.has_time) break;
@@ -55,7 +52,7 @@ class Search {
         const float height = bounds_.Height(entry);
         // Near holes no plane tells inside from outside.
         if (height >= limit_ && (bounds_.is_closed() || entry.outside > 0.0F)) {
-          Prune(height, bounds_.is_closed() ? height : entry.outside);
+          Prune(entry, height, bounds_.is_closed() ? height : entry.outside);
           continue;
         }
       }
@@ -67,14 +64,81 @@ class Search {
         ExpandNode(entry, bound);
       }
     }
-    if (!queue_.empty()) Prune(queue_.least(), queue_.least_outside());
+    queue_.for_each([this](float bound, const Entry& left) { Prune(left, bound, left.outside); });
+    if (in_.front != nullptr) {
+      in_.front->end(is_front_whole_ && !result_.has_inside && !result_.gave_up);
+    }
     return result_;
   }
 
  private:
-  void Prune(float bound, float outside) {
+  // Begins with what the front does not prune, or with the root.
+  void Begin() {
+    if (in_.front == nullptr || in_.front->empty()) {
+      Entry root{};
+      root.child = in_.bvh->root();
+      root.lane = FieldQueue::kNoPoint;
+      root.slots = FieldFront::kAllSlots;
+      root.radius = kFarAway;
+      ExpandNode(root, kMayBeInside);
+      return;
+    }
+    in_.front->remove_if([this](const FieldFront::Part& part) {
+      // Near holes a point may come to be inside though no surface has come nearer.
+      const bool is_outside = bounds_.is_closed() || part.outside > 0.0F;
+      const bool is_pruned = part.bound >= limit_ && is_outside;
+      if (is_pruned) {
+        Lower(part.bound, part.outside);
+      } else {
+        PushPart(part);
+      }
+      return !is_pruned;
+    });
+  }
+
+  void PushPart(const FieldFront::Part& part) {
+    Entry* entry = queue_.push(part.outside > 0.0F ? part.bound : kMayBeInside);
+    result_.gave_up = result_.gave_up || entry == nullptr;
+    if (entry == nullptr) return;
+    entry->outside = part.outside;
+    entry->child = part.child;
+    entry->lane = FieldQueue::kNoPoint;
+    entry->slots = part.slots;
+    bounds_.PlaceBox(part.min, part.max, entry);
+    if (part.child == in_.bvh->root()) entry->radius = kFarAway;
+  }
+
+  void Lower(float bound, float outside) {
     result_.pruned_bound = std::min(result_.pruned_bound, bound);
     result_.outside_bound = std::min(result_.outside_bound, outside);
+  }
+
+  void Prune(const Entry& entry, float bound, float outside) {
+    Lower(bound, outside);
+    if (entry.lane != FieldQueue::kNoPoint) {
+      KeepPoint(entry, bound, outside);
+    } else {
+      Keep(entry, entry.slots, bound, outside);
+    }
+  }
+
+  // Keeps the bounds of some children of a node, or of a tile, for the poses to come.
+  // @returns the number of the part
+  std::uint32_t Keep(const Entry& entry, std::uint32_t slots, float bound, float outside) {
+    if (in_.front == nullptr) return 0;
+    FieldFront::Part part{bound, outside, entry.child, slots, {}, {}};
+    std::copy_n(entry.min, 3, part.min);
+    std::copy_n(entry.max, 3, part.max);
+    return in_.front->add(part);
+  }
+  void KeepPoint(const Entry& point, float bound, float outside) {
+    if (in_.front != nullptr) in_.front->lower(point.slots, bound, outside);
+  }
+
+  // What is left without a bound that another pose could use.
+  void Leave(float bound) {
+    is_front_whole_ = false;
+    Lower(bound, 0.0F);
   }
 
   void ExpandNode(const Entry& entry, float entry_bound) {
@@ -85,13 +149,16 @@ class Search {
       const float least = bounds_.BoundCorners(entry, &corners);
       const float squared = least * least - entry.radius * entry.radius * (1.0F + kSquareError);
       const float bound = squared > 0.0F ? std::sqrt(squared) - kPlaceError : 0.0F;
-      if (bound >= limit_) return Prune(bound, entry.outside);
+      if (bound >= limit_) return Prune(entry, bound, entry.outside);
     }
     ++result_.nodes;
     const BoxNode& node = in_.bvh->nodes()[static_cast<std::size_t>(entry.child)];
     Bounds bounds;
     LowerLimit(bounds_.BoundBoxes(node, entry, has_corners ? &corners : nullptr, &bounds));
-    const std::uint32_t below = Below(bounds, node.count);
+    const std::uint32_t slots = entry.slots & FirstSlots(node.count);
+    const auto [below, bound, outside] = Below(slots, &bounds);
+    Lower(bound, outside);
+    if (slots != below) Keep(entry, slots & ~below, bound, outside);
     PrefetchLeast(bounds, below, node);
     for (std::uint32_t bits = below; bits != 0; bits &= bits - 1) {
       const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
@@ -99,6 +166,7 @@ class Search {
       if (child == nullptr) continue;
       child->child = node.child[k];
       child->lane = FieldQueue::kNoPoint;
+      child->slots = FieldFront::kAllSlots;
       child->min[0] = node.min_x[k];
       child->min[1] = node.min_y[k];
       child->min[2] = node.min_z[k];
@@ -127,54 +195,80 @@ class Search {
     Bounds bounds;
     LowerLimit(bounds_.BoundPoints(tile, entry, &bounds));
     assert(tile.count > 0);  // LowerLimit() relies on it for every box
-    if (result_.tiles >= kTilesBeforePlanes && measured_ == 0)
-      MeasureLeast(entry, tile.count, &bounds);
-    for (std::uint32_t bits = Below(bounds, tile.count); bits != 0; bits &= bits - 1) {
+    const std::uint32_t part = Keep(entry, FieldFront::kAllSlots, kFarAway, kFarAway);
+    std::uint32_t points = FirstSlots(tile.count);
+    if (result_.tiles >= kTilesBeforePlanes && measured_ == 0) {
+      points &= ~MeasureLeast(entry, part, tile.count, bounds);
+    }
+    const auto [below, bound, outside] = Below(points, &bounds);
+    Lower(bound, outside);
+    if (in_.front != nullptr) in_.front->lower(part, bound, outside);
+    for (std::uint32_t bits = below; bits != 0; bits &= bits - 1) {
       const auto k = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
       Entry* point = Push(bounds, k);
       if (point == nullptr) continue;
       point->child = entry.child;
       point->lane = k;
+      point->slots = part;
     }
   }
 
+  static std::uint32_t FirstSlots(int count) { return (1U << static_cast<unsigned>(count)) - 1U; }
+
   // Measures the point of a tile that has the least bound, if it is known to be outside, and looks
   // for planes across its direction.
-  void MeasureLeast(const Entry& tile, int count, Bounds* bounds) {
-    const float* least = std::min_element(bounds->distance, bounds->distance + count);
-    const auto k = static_cast<int>(least - bounds->distance);
-    if (!(bounds->outside[k] > 0.0F) || !(*least < limit_)) return;
+  // @param part   of the tile
+  // @param count  of its points
+  // @returns the slot of the point as a bit; 0: none was measured
+  std::uint32_t MeasureLeast(const Entry& tile, std::uint32_t part, int count,
+                             const Bounds& bounds) {
+    const float* least = std::min_element(bounds.distance, bounds.distance + count);
+    const auto k = static_cast<int>(least - bounds.distance);
+    if (!(bounds.outside[k] > 0.0F) || !(*least < limit_)) return 0;
     Entry point{};
     point.child = tile.child;
     point.lane = k;
-    point.outside = bounds->outside[k];
-    point.radius = bounds->radius[k];
+    point.slots = part;
+    point.outside = bounds.outside[k];
+    point.radius = bounds.radius[k];
     Measure(point, *least);
-    bounds->distance[k] = kFarAway;
     SupportingPlanes updated;
-    if (!policy_.update_planes(&updated)) return;
-    bounds_.SetPlanes(updated, policy_.link_support());
-    has_new_planes_ = true;
+    if (policy_.update_planes(&updated)) {
+      bounds_.SetPlanes(updated, policy_.link_support());
+      has_new_planes_ = true;
+    }
+    return 1U << static_cast<unsigned>(k);
   }
 
   // Some point is no farther than this. It will be measured: its lower bound is less.
   void LowerLimit(float distance) { limit_ = std::min(limit_, distance + in_.rounding); }
 
-  // The first `count` that are below the limit. The others are pruned.
-  HWY_INLINE std::uint32_t Below(const Bounds& bounds, int count) {
+  // Some slots, by whether they are below the limit.
+  struct Split {
+    std::uint32_t below;   // bit k: slot k is
+    float bound, outside;  // [m] the least of the slots that are not; kFarAway: there are none
+  };
+  // @param slots   bit k: slot k is asked about
+  // @param bounds  those of other slots are overwritten
+  HWY_INLINE Split Below(std::uint32_t slots, Bounds* bounds) const {
     const BoxTag d;
+    for (std::uint32_t bits = ~slots & FieldFront::kAllSlots; bits != 0; bits &= bits - 1) {
+      const auto k = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
+      bounds->distance[k] = bounds->outside[k] = kFarAway;
+    }
     const auto limit = hn::Set(d, limit_);
     auto pruned = hn::Set(d, kFarAway), outside = pruned;
-    std::uint32_t bits = 0;
+    std::uint32_t below = 0;
     for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
-      const auto bound = hn::Load(d, bounds.distance + k);
-      const auto below = hn::Lt(bound, limit);
-      pruned = hn::Min(pruned, hn::IfThenElse(below, pruned, bound));
-      outside = hn::Min(outside, hn::IfThenElse(below, outside, hn::Load(d, bounds.outside + k)));
-      bits |= dual_tree::MaskBits(d, below) << k;
+      const auto bound = hn::Load(d, bounds->distance + k);
+      const auto is_below = hn::Lt(bound, limit);
+      pruned = hn::Min(pruned, hn::IfThenElse(is_below, pruned, bound));
+      outside =
+          hn::Min(outside, hn::IfThenElse(is_below, outside, hn::Load(d, bounds->outside + k)));
+      below |= dual_tree::MaskBits(d, is_below) << k;
     }
-    Prune(hn::GetLane(hn::MinOfLanes(d, pruned)), hn::GetLane(hn::MinOfLanes(d, outside)));
-    return bits & ((1U << static_cast<unsigned>(count)) - 1U);
+    return {below & slots, hn::GetLane(hn::MinOfLanes(d, pruned)),
+            hn::GetLane(hn::MinOfLanes(d, outside))};
   }
 
   Entry* Push(const Bounds& bounds, int k) {
@@ -195,6 +289,7 @@ class Search {
   void Measure(const Entry& point, float bound) {
     if (!(point.outside > 0.0F)) return Ask(point, bound);
     result_.outside_bound = std::min(result_.outside_bound, point.outside);
+    KeepPoint(point, bound, point.outside);
     result_.gave_up = ++measured_ > (in_.is_exact ? kMaxMeasuredExact : kMaxMeasured);
     if (result_.gave_up) return;
     const float prune_bound =
@@ -211,7 +306,7 @@ class Search {
       // side: a distance costs less than a winding number.
       if (limit_ < 0.0F &&
           policy_.is_surface_within(~point.child, point.lane, -limit_ - in_.rounding)) {
-        return Prune(limit_, 0.0F);
+        return Leave(limit_);
       }
       result_.gave_up = ++asked_ > kMaxAsked;
       if (result_.gave_up) return;
@@ -220,12 +315,14 @@ class Search {
     }
     if (found.side == Side::kUnknown) {
       result_.has_time = false;
-      return Prune(bound, 0.0F);
+      return Leave(bound);
     }
     if (found.side == Side::kInside) return MeasureInside(point);
     // A margin that is not known is taken for the least one.
     point.outside = std::max(margin, std::numeric_limits<float>::min());
-    if (point.distance >= limit_) return Prune(point.distance, point.outside);
+    if (point.distance >= limit_) {
+      return Prune(point, point.distance, point.outside);
+    }
     Entry* again = queue_.push(std::max(point.distance, 0.0F));
     result_.gave_up = again == nullptr;
     if (!result_.gave_up) *again = point;
@@ -246,6 +343,7 @@ class Search {
   float limit_;                   // [m]
   bool has_new_planes_ = false;   // which entries of the queue do not know
   int asked_ = 0, measured_ = 0;  // points
+  bool is_front_whole_ = true;    // whether each point is pruned or in the queue
   FieldSearchResult result_;
 };
 

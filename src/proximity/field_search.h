@@ -6,6 +6,7 @@
 
 #include "internal/cloud/point_bvh.h"
 #include "internal/geometry/distance_field.h"
+#include "proximity/coherence/field_front.h"
 #include "proximity/field_queue.h"
 #include "proximity/supporting_planes.h"
 
@@ -20,6 +21,7 @@ struct FieldSearchInput {
   const DistanceField* field = nullptr;  ///< not empty
   const PointBvh* bvh = nullptr;         ///< not empty
   FieldQueue* queue = nullptr;           ///< empty; the search leaves anything in it
+  FieldFront* front = nullptr;           ///< begun, and ended by the search; null: there is none
   float R_LO[9] = {};                    ///< rotation, row-major
   float p_LO[3] = {};                    ///< [m] translation
   float rounding = 0.0F;                 ///< [m] largest error of a coordinate or a bound
@@ -61,6 +63,9 @@ FieldPlace look_up_field(const DistanceField& field, const Eigen::Vector3d& p_L,
 /// inside comes first, by how deep it may be: a box by its farthest corner from a surface point
 /// that the field has for the node at its centre. A field without depths gives up where a point is
 /// inside.
+///
+/// Where the link has moved little since the last search, only parts of the index that the front's
+/// bounds do not prune are looked at. No front is left where a point is inside.
 FieldSearchResult search_field(const FieldSearchInput& input, PointRefinement* policy);
 
 }  // namespace ist

@@ -51,8 +51,7 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneI
   search.closest = ClosestObstacle();
   search.refined_bound = kInfinity;
   search.region_bound = kInfinity;
-  // Before anything is proven: no point is deeper than the radius of the bounding sphere.
-  search.pruned_bound = -link_.context.tree().radius();
+  search.pruned_bound = -link_.context.deepest();  // before anything is proven
   search.rounding = search.max_coordinate = search.index_error = 0.0;
   search.is_complete = false;
   search.measured = 0;
@@ -73,7 +72,7 @@ void LinkQuery::tighten(const QueryConfig& config) {
   search.first_bound = search.lower_bound();
   search.first_extent_bound = search.extents.lower_bound;
   search.refined_bound = kInfinity;
-  search.pruned_bound = -link_.context.tree().radius();
+  search.pruned_bound = -link_.context.deepest();
   search.is_complete = false;
 }
 
@@ -111,7 +110,11 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL,
                    [&](const auto& obstacles) { stopped = stopped || !run(obstacles); });
   }
-  if (stopped) search.prune(-link_.context.tree().radius());  // indices that were not reached
+  const double least = -link_.context.deepest();
+  if (stopped) search.prune(least);  // indices that were not reached
+  // Of what was stopped nothing may be known.
+  search.pruned_bound = std::max(search.pruned_bound, least);
+  search.refined_bound = std::max(search.refined_bound, least);
   search.is_complete = !stopped;
   if (search.is_complete) {
     keep_bound();
@@ -145,6 +148,7 @@ void LinkQuery::take_kept_bound() {
   if (!(bound > search.lower_bound())) return;
   search.pruned_bound = std::max(search.pruned_bound, bound);
   search.refined_bound = std::max(search.refined_bound, bound);
+  if (bound > coherent) return;  // it was proven at this pose
   search.max_coordinate =
       std::max(search.max_coordinate,
                kept.max_coordinate() + kept.displacement_to(search.scene, search.X_FL));
@@ -195,8 +199,12 @@ bool LinkQuery::is_settled(SnapshotSpan clouds) {
   for (const CloudSnapshot* cloud : clouds) {
     const RegionOfInterest& region = cloud->region;
     const double from_center = (search.X_FL * tree.center() - region.center_F).norm();
-    search.region_bound =
-        std::min(search.region_bound, std::max(region.radius - from_center, 0.0) - tree.radius());
+    const double beyond = std::max(region.radius - from_center, 0.0);
+    // What a mesh with holes encloses may be beyond the region.
+    const bool may_be_inside =
+        !link_.context.solid().is_closed() && beyond <= tree.radius() + tree.interior_gap();
+    search.region_bound = std::min(
+        search.region_bound, may_be_inside ? -link_.context.deepest() : beyond - tree.radius());
   }
   search.region_bound -= pose_error(search.drift, extent(), 0.0);
   const LinkBound& kept = link_.kept.bound;

@@ -96,8 +96,8 @@ class LinkQuery {
   std::size_t memory() const {
     const LinkCoherence& kept = link_.kept;
     return sizeof *this + link_.context.grid.memory() + kept.nodes.memory() + kept.fronts.memory() +
-           kept.distances.memory() + kept.box_distances.memory() + kept.side_balls.memory() +
-           kept.supports.memory();
+           kept.field_fronts.memory() + kept.distances.memory() + kept.box_distances.memory() +
+           kept.side_balls.memory() + kept.supports.memory();
   }
 
  private:

@@ -77,6 +77,14 @@ bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_comple
   if (has_hardly_moved()) input.ahead = static_cast<float>(kAhead * search.config.tolerance);
   input.planes = supporting_planes(obstacles.X_OL, link_);
   input.support = link_.kept.supports.max_support;
+  // In contact the points inside are found best from the root.
+  if (search.closest.exact.distance > 0.0) {
+    input.front = link_.kept.field_fronts.find(obstacles.bvh->build_id());
+  }
+  if (input.front != nullptr) {
+    input.front->begin(obstacles.bvh->build_id(), obstacles.X_OL, link_.context.displacement,
+                       input.rounding);
+  }
   PointRefinement refinement(obstacles, &link_);
   const FieldSearchResult found = search_field(input, &refinement);
   search.statistics->node_pairs += found.nodes;
@@ -97,7 +105,7 @@ bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_comple
     return false;
   }
   search.prune(std::max(static_cast<double>(found.pruned_bound) - search.rounding,
-                        -link_.context.tree().radius()));
+                        -link_.context.deepest()));
   if (found.has_inside) {
     search.cover_bound = -kInfinity;
   } else if (!link_.context.solid().is_closed()) {

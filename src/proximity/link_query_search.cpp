@@ -49,7 +49,7 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   // A pair that was left may hold a point inside.
   LinkSearch& search = link_.search;
   if (stopped && search.pruned_bound <= link_.context.tree().interior_gap() + search.rounding) {
-    search.prune(-link_.context.tree().radius());
+    search.prune(-link_.context.deepest());
   }
   return !stopped;
 }

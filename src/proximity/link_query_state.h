@@ -16,6 +16,7 @@
 #include "proximity/coherence/bvtt_front.h"
 #include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/extent_bound.h"
+#include "proximity/coherence/field_front.h"
 #include "proximity/coherence/link_bound.h"
 #include "proximity/coherence/node_bounds.h"
 #include "proximity/coherence/side_balls.h"
@@ -40,6 +41,12 @@ struct LinkContext {
 
   const InnerSphereTree& tree() const { return model->tree; }
   const Solid& solid() const { return model->solid; }
+  /// [m] No place inside the link is deeper. What a mesh with holes encloses may be outside of the
+  /// link's bounding sphere, but no farther from the cover spheres than the interior gap.
+  double deepest() const {
+    const double radius = tree().radius();
+    return solid().is_closed() ? radius : 2.0 * radius + tree().interior_gap();
+  }
 };
 
 /// The closest obstacle that a query has found, measured exactly.
@@ -86,6 +93,7 @@ struct LinkCoherence {
   ExtentBound extents;
   NodeBounds nodes;
   BvttFronts fronts;
+  FieldFronts field_fronts;
   DistanceCache distances;
   BoxDistanceCache box_distances;
   SideBalls side_balls;
@@ -135,6 +143,7 @@ struct LinkCoherence {
     extents.forget();
     nodes.forget();
     fronts.forget();
+    field_fronts.forget();
   }
 };
 

@@ -48,8 +48,9 @@ class DistanceField {
 
   /// How long the edges of all cells are.
   enum class Detail {
-    kCoarse,  ///< three times as long as fine ones: a 27th of the nodes, of the time and of the
-              ///< memory
+    /// About three times as long as fine ones, more about large, flat and thin solids: a 20th to a
+    /// 40th of the nodes, of the time and of the memory.
+    kCoarse,
     kFine,
   };
 

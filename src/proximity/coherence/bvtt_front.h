@@ -1,13 +1,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "internal/bvh/box_node.h"
 #include "proximity/coherence/displacement.h"
+#include "proximity/coherence/front_pose.h"
 
 namespace ist {
 
@@ -17,9 +18,7 @@ namespace ist {
 /// again whose pruned bound, less the displacement, is below what is asked for; nothing above them
 /// is visited.
 ///
-/// Stored bounds are relative to the front's first pose: the displacement since then is added when
-/// one is stored and subtracted when it is read. So one number updates all of them. It is a sum of
-/// displacements between successive poses, which is never below the displacement of any point.
+/// Stored bounds are relative to the front's first pose, see FrontPose.
 ///
 /// A pair of leaves is not expanded, but its points may be known to be farther from the
 /// whole link than their cover distances say: exact distances are stored as its bound. If the link
@@ -49,7 +48,7 @@ class BvttFront {
   /// @param is_complete  false: it was stopped, or a pair found no place; the front is discarded
   void end(bool is_complete);
   /// The index that the front belongs to; 0: there is no front.
-  std::uint64_t build_id() const { return build_id_; }
+  std::uint64_t build_id() const { return pose_.build_id(); }
 
   bool empty() const { return size_ == 0; }
   std::size_t size() const { return size_; }
@@ -61,7 +60,7 @@ class BvttFront {
   /// there are none.
   const float* stored_cover_bounds() const { return cover_bounds_.data(); }
   /// [m] What is added to a bound of this traversal when it is stored.
-  float offset() const { return offset_; }
+  float offset() const { return pose_.offset(); }
 
   /// Adds a pair. @returns its index, or kFull
   std::int32_t add(std::int32_t sphere, std::int32_t box) {
@@ -75,13 +74,13 @@ class BvttFront {
   /// Something with this lower bound [m] of this traversal was pruned below the pair.
   void prune(std::int32_t i, float bound) {
     float& stored = bounds_[static_cast<std::size_t>(i)];
-    stored = bound + offset_ < stored ? bound + offset_ : stored;
+    stored = std::min(stored, bound + offset());
   }
   /// The points that were pruned below the pair are outside a mesh with holes, and their cover
   /// distance is at least this [m].
   void keep_cover_bound(std::int32_t i, float bound) {
     float& stored = cover_bounds_[static_cast<std::size_t>(i)];
-    stored = bound + offset_ < stored ? bound + offset_ : stored;
+    stored = std::min(stored, bound + offset());
   }
   /// The pair is expanded once more: nothing is pruned below it for now.
   void reopen(std::int32_t i) {
@@ -98,33 +97,10 @@ class BvttFront {
 
   std::vector<Pair> pairs_;
   std::vector<float> bounds_, cover_bounds_;
-  std::size_t size_ = 0, first_size_ = 0;
-  std::uint64_t build_id_ = 0;
-  Eigen::Isometry3d X_OL_ = Eigen::Isometry3d::Identity();
-  double displacement_ = 0.0;  ///< [m] since the first pose
-  float offset_ = 0.0F;
+  std::size_t size_ = 0;
+  FrontPose pose_;
 };
 
-/// The fronts of one link, one for each of the last few indices.
-class BvttFronts {
- public:
-  /// The front of an index, or the one that has not been used for longest. Null where all were used
-  /// lately: with more indices in use than fronts, it is best that some keep theirs.
-  BvttFront* find(std::uint64_t build_id);
-  void forget();
-  std::size_t memory() const {  ///< [bytes]
-    std::size_t bytes = 0;
-    for (const Slot& slot : slots_) bytes += slot.front.memory();
-    return bytes;
-  }
-
- private:
-  struct Slot {
-    BvttFront front;
-    std::uint64_t last_used = 0;
-  };
-  std::array<Slot, 4> slots_;
-  std::uint64_t now_ = 0;
-};
+using BvttFronts = KeptFronts<BvttFront>;
 
 }  // namespace ist

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "internal/bvh/box_node.h"
+#include "proximity/coherence/front_pose.h"
+
+namespace ist {
+
+/// The front of a field search: the parts of an index that the last searches pruned, each with its
+/// bound. Together they hold every point of the index. At the next pose only those parts are looked
+/// at again whose bound, less the displacement, is below what is asked for; nothing above them is
+/// visited. It is a BvttFront for one tree instead of two. Bounds are stored as FrontPose says.
+///
+/// The bounds are of the link's geometry, whatever its packing and its field are.
+class FieldFront {
+ public:
+  /// All children of a node.
+  static constexpr std::uint32_t kAllSlots = (1U << static_cast<unsigned>(kBoxWidth)) - 1U;
+
+  /// Some children of a node, or a tile.
+  struct Part {
+    float bound;           ///< [m] as stored: a lower bound of their distance
+    float outside;         ///< [m] as stored: every place that is nearer to one of them is outside
+    std::int32_t child;    ///< the node, or the tile if negative
+    std::uint32_t slots;   ///< bit k: child k of the node
+    float min[3], max[3];  ///< [m] box about all of `child`, in the index's frame; not of the root
+  };
+
+  FieldFront() : parts_(kMaxParts) {}
+
+  /// As BvttFront::begin().
+  void begin(std::uint64_t build_id, const Eigen::Isometry3d& X_OL,
+             const DisplacementBound& displacement, float rounding) {
+    if (!pose_.move(build_id, X_OL, displacement, rounding, size_)) size_ = 0;
+    is_full_ = false;
+  }
+  /// @param is_complete  false: some point is in no part; the front is discarded
+  void end(bool is_complete) {
+    if (!is_complete || is_full_) {
+      size_ = 0;
+      pose_.forget();
+    }
+    pose_.end(size_);
+  }
+  /// The index that the front belongs to; 0: there is no front.
+  std::uint64_t build_id() const { return pose_.build_id(); }
+
+  bool empty() const { return size_ == 0; }
+  /// Adds a part with its bounds at the pose of this search.
+  /// @returns its number
+  std::uint32_t add(const Part& part) {
+    is_full_ = is_full_ || size_ == kMaxParts;
+    if (is_full_) return kMaxParts;
+    parts_[size_] = part;
+    parts_[size_].bound += pose_.offset();
+    parts_[size_].outside += pose_.offset();
+    return static_cast<std::uint32_t>(size_++);
+  }
+  /// Something with these bounds belongs to a part, too.
+  /// @param part  by add(), in this search
+  void lower(std::uint32_t part, float bound, float outside) {
+    if (part == kMaxParts) return;
+    parts_[part].bound = std::min(parts_[part].bound, bound + pose_.offset());
+    parts_[part].outside = std::min(parts_[part].outside, outside + pose_.offset());
+  }
+  /// Removes parts.
+  /// @param reopen  is called with each part, its bounds being those at the pose of this search;
+  ///                returns whether it is to be looked at again and removed
+  template <class Reopen>
+  void remove_if(const Reopen& reopen) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < size_; ++i) {
+      Part part = parts_[i];
+      part.bound -= pose_.offset();
+      part.outside -= pose_.offset();
+      if (!reopen(part)) parts_[kept++] = parts_[i];
+    }
+    size_ = kept;
+  }
+
+  std::size_t memory() const { return parts_.capacity() * sizeof(Part); }  ///< [bytes]
+
+ private:
+  static constexpr std::uint32_t kMaxParts = 256;  ///< a search that leaves more keeps no front
+
+  std::vector<Part> parts_;
+  std::size_t size_ = 0;
+  bool is_full_ = false;
+  FrontPose pose_;
+};
+
+using FieldFronts = KeptFronts<FieldFront>;
+
+}  // namespace ist
