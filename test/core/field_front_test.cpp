@@ -171,6 +171,42 @@ TEST(FieldFrontOfAQuery, AnswersHoldAlongAMotion) {
   EXPECT_GT(contacts, 100);
 }
 
+// A box dips into a plane of points, a little tilted otherwise each time: a point that was inside
+// is not the deepest one of the next time.
+TEST(FieldFrontOfAQuery, PointsThatWereInsideAreFoundAgain) {
+  test::Rng rng(13);
+  const LinkGeometry link = test::one(test::box({0.1, 0.1, 0.1}));
+  const auto model = with_fields({link});
+  std::vector<Eigen::Vector3d> points;
+  for (int k = 0; k < 3000; ++k) {
+    points.push_back(test::random_vector(&rng, 1.0).cwiseProduct(Eigen::Vector3d(0.1, 0.1, 1e-4)));
+  }
+  const CloudSnapshot cloud = test::make_snapshot(points);
+  for (const double tolerance : {0.0, 1e-4}) {
+    QueryConfig config;
+    config.tolerance = tolerance;
+    ProximityQuery query(model, config);
+    LinkProximity result;
+    int changes = 0;
+    bool was_inside = false;
+    for (int step = 0; step < std::max(test::scaled(400), 20); ++step) {
+      const Eigen::Vector3d axis = test::random_vector(&rng, 2e-3);
+      const double height = 0.05 + 4e-4 * std::sin(0.8 * step);
+      const Eigen::Isometry3d X_FL = Eigen::Translation3d(0.0, 0.0, height) *
+                                     Eigen::AngleAxisd(axis.norm(), axis.normalized());
+      ASSERT_TRUE(query.run_link(0, X_FL, {&cloud}, &result));
+      SCOPED_TRACE(testing::Message() << "step " << step << ", tolerance " << tolerance);
+      test::expect_truth(result, test::truth_of(link, X_FL, points, cloud), config, X_FL,
+                         kRounding);
+      if (HasFailure()) return;
+      const bool is_inside = result.state == LinkState::kContact;
+      changes += is_inside != was_inside ? 1 : 0;
+      was_inside = is_inside;
+    }
+    EXPECT_GT(changes, 5);
+  }
+}
+
 // Along a slow motion, hardly any node is expanded again.
 TEST(FieldFrontOfAQuery, NodesAboveTheFrontAreNotVisited) {
   test::Rng rng(12);
