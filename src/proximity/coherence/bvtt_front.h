@@ -101,6 +101,6 @@ class BvttFront {
   FrontPose pose_;
 };
 
-using BvttFronts = KeptFronts<BvttFront>;
+using BvttFronts = KeptFronts<BvttFront, 4>;
 
 }  // namespace ist

@@ -86,7 +86,7 @@ class FieldFront {
   std::size_t memory() const { return parts_.capacity() * sizeof(Part); }  ///< [bytes]
 
  private:
-  static constexpr std::uint32_t kMaxParts = 256;  ///< a search that leaves more keeps no front
+  static constexpr std::uint32_t kMaxParts = 192;  ///< a search that leaves more keeps no front
 
   std::vector<Part> parts_;
   std::size_t size_ = 0;
@@ -94,6 +94,6 @@ class FieldFront {
   FrontPose pose_;
 };
 
-using FieldFronts = KeptFronts<FieldFront>;
+using FieldFronts = KeptFronts<FieldFront, 3>;
 
 }  // namespace ist

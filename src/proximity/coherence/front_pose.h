@@ -45,7 +45,8 @@ class FrontPose {
 };
 
 /// The fronts of one link, one for each of the last few indices.
-template <class Front>
+/// @tparam kCount  so many
+template <class Front, std::size_t kCount>
 class KeptFronts {
  public:
   /// The front of an index, or the one that has not been used for longest. Null where all were used
@@ -83,7 +84,7 @@ class KeptFronts {
     Front front;
     std::uint64_t last_used = 0;
   };
-  std::array<Slot, 4> slots_;
+  std::array<Slot, kCount> slots_;
   std::uint64_t now_ = 0;
 };
 
