@@ -20,7 +20,7 @@ class FieldQueue {
     float distance;      ///< [m] of a point that may be inside: no surface is nearer to it
     std::int32_t child;  ///< node, or tile if negative; the tile of a point
     int lane;            ///< of a point; else kNoPoint
-    /// Of a node: as FieldFront::Part. Of a point: the number of its tile's part.
+    /// The children of a node, as in FieldFront::Part; for a point, the number of its tile's part.
     std::uint32_t slots;
     float radius;          ///< [m] of the box; an upper bound of a point's distance
     float center[3];       ///< [m] of the box, or the point, in the link's frame

@@ -135,7 +135,7 @@ class Search {
     if (in_.front != nullptr) in_.front->lower(point.slots, bound, outside);
   }
 
-  // What is left without a bound that another pose could use.
+  // Leaves something without a bound that another pose could use.
   void Leave(float bound) {
     is_front_whole_ = false;
     Lower(bound, 0.0F);

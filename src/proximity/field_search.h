@@ -64,8 +64,8 @@ FieldPlace look_up_field(const DistanceField& field, const Eigen::Vector3d& p_L,
 /// that the field has for the node at its centre. A field without depths gives up where a point is
 /// inside.
 ///
-/// Where the link has moved little since the last search, only parts of the index that the front's
-/// bounds do not prune are looked at. No front is left where a point is inside.
+/// A link that has moved little since its last search looks only at parts of the index that the
+/// front's bounds do not prune. No front is left where a point is inside.
 FieldSearchResult search_field(const FieldSearchInput& input, PointRefinement* policy);
 
 }  // namespace ist

@@ -112,7 +112,7 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
   }
   const double least = -link_.context.deepest();
   if (stopped) search.prune(least);  // indices that were not reached
-  // Of what was stopped nothing may be known.
+  // A search that was stopped may know nothing of what it left.
   search.pruned_bound = std::max(search.pruned_bound, least);
   search.refined_bound = std::max(search.refined_bound, least);
   search.is_complete = !stopped;

@@ -33,7 +33,7 @@ class FieldFront {
 
   FieldFront() : parts_(kMaxParts) {}
 
-  /// As BvttFront::begin().
+  /// Begins a search at a new pose, as BvttFront::begin() does.
   void begin(std::uint64_t build_id, const Eigen::Isometry3d& X_OL,
              const DisplacementBound& displacement, float rounding) {
     if (!pose_.move(build_id, X_OL, displacement, rounding, size_)) size_ = 0;
