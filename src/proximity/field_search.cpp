@@ -354,7 +354,9 @@ FieldSearchResult SearchField(const FieldSearchInput& input, PointRefinement* po
 }
 
 FieldPlace LookUpField(const DistanceField& field, const Eigen::Vector3d& p_L, float rounding) {
-  using namespace field_search;
+  using field_search::Bounds;
+  using field_search::Entry;
+  using field_search::FieldBounds;
   FieldSearchInput input;
   input.field = &field;
   input.rounding = rounding;
