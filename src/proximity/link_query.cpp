@@ -200,7 +200,7 @@ bool LinkQuery::is_settled(SnapshotSpan clouds) {
     const RegionOfInterest& region = cloud->region;
     const double from_center = (search.X_FL * tree.center() - region.center_F).norm();
     const double beyond = std::max(region.radius - from_center, 0.0);
-    // What a mesh with holes encloses may be beyond the region.
+    // A mesh with holes may enclose places beyond the region.
     const bool may_be_inside =
         !link_.context.solid().is_closed() && beyond <= tree.radius() + tree.interior_gap();
     search.region_bound = std::min(

@@ -41,7 +41,7 @@ struct LinkContext {
 
   const InnerSphereTree& tree() const { return model->tree; }
   const Solid& solid() const { return model->solid; }
-  /// [m] No place inside the link is deeper. What a mesh with holes encloses may be outside of the
+  /// [m] No place inside the link is deeper. A mesh with holes may enclose places outside of the
   /// link's bounding sphere, but no farther from the cover spheres than the interior gap.
   double deepest() const {
     const double radius = tree().radius();

@@ -48,8 +48,8 @@ class DistanceField {
 
   /// How long the edges of all cells are.
   enum class Detail {
-    /// About three times as long as fine ones, more about large, flat and thin solids: a 20th to a
-    /// 40th of the nodes, of the time and of the memory.
+    /// Three times as long as fine ones, and longer about large, flat and thin solids: far fewer
+    /// nodes.
     kCoarse,
     kFine,
   };
