@@ -129,7 +129,7 @@ class NoTime : public ::testing::Test {
 // answer, and its bound was minus the link's size. Now all of them are measured, and nearly all
 // that are free of contact are known to be.
 TEST_F(NoTime, EveryLinkHasAnObstacleAndABound) {
-  int unknown = 0, free = 0, proven = 0, links = 0;
+  int free = 0, proven = 0, links = 0;
   QueryConfig config;
   config.max_distance = 5.0;
   config.deadline = 1e-9;
@@ -137,11 +137,13 @@ TEST_F(NoTime, EveryLinkHasAnObstacleAndABound) {
     next_scene();
     ProximityQuery query(model_, config);
     std::vector<LinkProximity> results;
+    // What is made late is made, as where no other process takes the processor.
+    Deadline::late_for_test = 0.0;
     EXPECT_FALSE(query.run(X_FL_, known_, {&wall_, &near_}, &results));
+    Deadline::late_for_test = -1.0;
     for (std::size_t k = 0; k < results.size(); ++k) {
       ++links;
-      unknown += results[k].state == LinkState::kUnknown ? 1 : 0;
-      if (results[k].state == LinkState::kUnknown) continue;
+      ASSERT_NE(results[k].state, LinkState::kUnknown);
       const double exact = truth(k);
       ASSERT_LE(results[k].lower_bound, exact + 1e-9);
       ASSERT_GE(results[k].distance, exact - 1e-6);
@@ -149,8 +151,6 @@ TEST_F(NoTime, EveryLinkHasAnObstacleAndABound) {
       proven += exact > 0.1 && results[k].lower_bound > 0.0 ? 1 : 0;
     }
   }
-  // Another process may take the processor, and then the time is over before all are measured.
-  if (!test::kSanitized) EXPECT_LT(unknown, 0.3 * links);
   EXPECT_GT(free, test::kSanitized ? -1 : links / 5);
   EXPECT_GE(proven, 0.9 * free);
 }

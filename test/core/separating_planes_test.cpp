@@ -11,6 +11,7 @@
 #include "internal/cloud/point_bvh.h"
 #include "internal/geometry/float_rounding.h"
 #include "internal/geometry/tessellation.h"
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
@@ -163,20 +164,17 @@ TEST(SeparatingPlanes, ABoxJustAboveAPlaneIsFreeWithoutTime) {
   config.deadline = 1e-9;
   ProximityQuery query(model, config);
   std::vector<LinkProximity> results;
-  int known = 0, free = 0;
+  // What is made late is made, as where no other process takes the processor.
+  Deadline::late_for_test = 0.0;
   for (int step = 0; step < 100; ++step) {
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     X_FL.translation() = Eigen::Vector3d(1e-3 * step, 0.0, 0.0501);
     query.run({X_FL}, {true}, {&cloud}, &results);
-    // Another process may take the processor for as long as the first bounds have.
-    if (results[0].state == LinkState::kUnknown) continue;
-    ++known;
+    ASSERT_EQ(results[0].state, LinkState::kNear);
     ASSERT_LE(results[0].lower_bound, 1e-4 + 1e-9);
-    free += results[0].lower_bound > 0.0 ? 1 : 0;
+    EXPECT_GT(results[0].lower_bound, 0.0);
   }
-  if (test::kSanitized) return;
-  EXPECT_GT(known, 70);
-  EXPECT_GE(free, 0.7 * known);
+  Deadline::late_for_test = -1.0;
 }
 
 }  // namespace
