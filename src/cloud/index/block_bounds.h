@@ -14,6 +14,9 @@ namespace ist {
 constexpr std::size_t kBlockSide = 16;                       ///< pixels
 constexpr std::size_t kBlockTiles = kBlockSide / kTileSide;  ///< along each side of a block
 
+/// Bits of the pixels of a tile: bit 4 r + c for the one in row r and column c. All of them.
+constexpr std::uint32_t kWholeTile = 0xFFFFU;
+
 /// The first pixel of the tile in a slot, from the block's first pixel.
 constexpr std::size_t tile_row(std::size_t slot) { return kTileSide * (slot / kBlockTiles); }
 constexpr std::size_t tile_column(std::size_t slot) { return kTileSide * (slot % kBlockTiles); }
