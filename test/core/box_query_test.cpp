@@ -25,10 +25,10 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+using test::BoxTruth;
 using test::expect_truth;
 using test::in_a_box;
 using test::sampled_depth;
-using test::Truth;
 using test::truth_of;
 
 TriangleMesh one_triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
@@ -201,7 +201,7 @@ TEST_P(Boxes, AgainstOracle) {
       for (std::size_t i = 0; i < meshes.size(); ++i, ++cases) {
         SCOPED_TRACE("scene " + std::to_string(scene) + " step " + std::to_string(step) + " link " +
                      std::to_string(i));
-        const Truth truth = truth_of(meshes[i], map, X_FL[i]);
+        const BoxTruth truth = truth_of(meshes[i], map, X_FL[i]);
         const LinkProximity& result = results[i];
         ASSERT_NO_FATAL_FAILURE(expect_truth(result, truth, meshes[i], map, X_FL[i], config));
         clear += result.state == LinkState::kClear;

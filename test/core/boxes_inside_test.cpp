@@ -69,7 +69,7 @@ TEST(BoxesInside, AgainstOracleOnTheWay) {
       for (std::size_t i = 0; i < meshes.size(); ++i) {
         SCOPED_TRACE("scene " + std::to_string(scene) + " step " + std::to_string(step) + " link " +
                      std::to_string(i));
-        const test::Truth truth = test::truth_of(meshes[i], map, X_FL[i]);
+        const test::BoxTruth truth = test::truth_of(meshes[i], map, X_FL[i]);
         ASSERT_NO_FATAL_FAILURE(
             test::expect_truth(results[i], truth, meshes[i], map, X_FL[i], config));
         near += results[i].state == LinkState::kNear;

@@ -18,15 +18,15 @@
 namespace ist::test {
 
 /// Of a link among boxes.
-struct Truth {
+struct BoxTruth {
   double distance = std::numeric_limits<double>::infinity();  ///< surface to the nearest box; 0:
                                                               ///< touches or crosses
   bool is_contact = false;  ///< a box lies wholly inside, or the surface crosses one
 };
 
-inline Truth truth_of(const TriangleMesh& mesh, const CloudSnapshot& map,
-                      const Eigen::Isometry3d& X_FL) {
-  Truth truth;
+inline BoxTruth truth_of(const TriangleMesh& mesh, const CloudSnapshot& map,
+                         const Eigen::Isometry3d& X_FL) {
+  BoxTruth truth;
   const Eigen::Isometry3d X_LM = X_FL.inverse() * map.X_FM;
   for (const BoxTile& tile : map.boxes->bvh().tiles()) {
     for (int k = 0; k < tile.count; ++k) {
@@ -74,9 +74,9 @@ inline bool in_a_box(const CloudSnapshot& map, const Eigen::Vector3d& p_F) {
 }
 
 /// Expects the state and the bounds of the truth, and closest points that fit them.
-inline void expect_truth(const LinkProximity& result, const Truth& truth, const TriangleMesh& mesh,
-                         const CloudSnapshot& map, const Eigen::Isometry3d& X_FL,
-                         const QueryConfig& config) {
+inline void expect_truth(const LinkProximity& result, const BoxTruth& truth,
+                         const TriangleMesh& mesh, const CloudSnapshot& map,
+                         const Eigen::Isometry3d& X_FL, const QueryConfig& config) {
   if (result.state == LinkState::kClear) {
     ASSERT_GE(truth.distance, config.max_distance - 1e-9);
     ASSERT_FALSE(truth.is_contact);
