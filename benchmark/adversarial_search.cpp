@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -24,7 +25,11 @@
 #include <string>
 #include <vector>
 
+#include "ist_proximity/proximity/self_query.h"
 #include "support/adversarial_case.h"
+#include "support/meshes.h"
+#include "support/scene.h"
+#include "support/truth_interval.h"
 
 namespace ist {
 namespace {

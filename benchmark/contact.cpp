@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "internal/cloud/point_bvh.h"
+#include "internal/geometry/mesh_io.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
 #include "truth_scenes.h"

@@ -15,6 +15,7 @@
 #include <random>
 #include <vector>
 
+#include "internal/geometry/mesh_io.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support.h"
 #include "truth_scenes.h"

@@ -17,6 +17,7 @@
 #include "support/accuracy.h"
 #include "support/data_dir.h"
 #include "support/motions.h"
+#include "support/npy.h"
 #include "support/truth.h"
 
 namespace {

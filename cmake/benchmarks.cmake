@@ -14,10 +14,9 @@ foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
   add_executable(benchmark_${name} EXCLUDE_FROM_ALL ${source})
   # They read the test data with the tests' helpers.
-  target_include_directories(benchmark_${name} PRIVATE benchmark src test)
-  target_link_libraries(benchmark_${name} PRIVATE ist_proximity_core ist_proximity::hwy)
-  target_compile_definitions(benchmark_${name} PRIVATE
-    IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+  target_include_directories(benchmark_${name} PRIVATE benchmark)
+  target_link_libraries(benchmark_${name} PRIVATE
+    test_helpers ist_proximity_core ist_proximity::hwy)
   set_target_properties(benchmark_${name} PROPERTIES
     OUTPUT_NAME ${name} RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/benchmark)
   add_dependencies(benchmarks benchmark_${name})
@@ -225,11 +224,10 @@ if(catkin_FOUND)
     get_filename_component(name ${source} NAME_WE)
     file(GLOB parts CONFIGURE_DEPENDS benchmark/ros/${name}/*.cpp)
     add_executable(benchmark_${name} EXCLUDE_FROM_ALL ${source} ${parts})
-    target_include_directories(benchmark_${name} PRIVATE benchmark src test)
+    target_include_directories(benchmark_${name} PRIVATE benchmark)
     target_include_directories(benchmark_${name} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-    target_link_libraries(benchmark_${name} PRIVATE ist_proximity_ros)
+    target_link_libraries(benchmark_${name} PRIVATE test_helpers ist_proximity_ros)
     target_compile_definitions(benchmark_${name} PRIVATE
-      IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}"
       IST_PROXIMITY_NODE="$<TARGET_FILE:proximity_node>")
     add_dependencies(benchmark_${name} proximity_node)
     set_target_properties(benchmark_${name} PROPERTIES

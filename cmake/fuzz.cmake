@@ -10,9 +10,9 @@ if(catkin_FOUND)
 endif()
 
 add_library(fuzz_support INTERFACE)
-target_include_directories(fuzz_support INTERFACE ${CMAKE_CURRENT_SOURCE_DIR}/fuzz
-  ${CMAKE_CURRENT_SOURCE_DIR}/test ${CMAKE_CURRENT_SOURCE_DIR}/src)
-target_link_libraries(fuzz_support INTERFACE ist_proximity_core ist_proximity::xxhash)
+target_include_directories(fuzz_support INTERFACE ${CMAKE_CURRENT_SOURCE_DIR}/fuzz)
+target_link_libraries(fuzz_support INTERFACE
+  test_helpers ist_proximity_core ist_proximity::xxhash)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # A false alarm of GCC 12, as in the tests: of a std::variant it thinks that all are destroyed.
   target_compile_options(fuzz_support INTERFACE -Wno-maybe-uninitialized -Wno-free-nonheap-object)

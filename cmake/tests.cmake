@@ -9,37 +9,22 @@ if(NOT GTEST_FOUND AND NOT GTest_FOUND)
   return()
 endif()
 
-file(GLOB support_sources CONFIGURE_DEPENDS test/support/*.cpp)
 file(GLOB core_test_sources CONFIGURE_DEPENDS test/core/*_test.cpp)
 set(results_dir ${CMAKE_BINARY_DIR}/test_results/${PROJECT_NAME})
 
-# What every test program links: helpers (when there are any), the core and GoogleTest.
-if(support_sources)
-  add_library(test_support STATIC EXCLUDE_FROM_ALL ${support_sources})
-  set_target_properties(test_support PROPERTIES
-    ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
-  set(scope PUBLIC)
-else()
-  add_library(test_support INTERFACE)
-  set(scope INTERFACE)
-endif()
-target_include_directories(test_support ${scope} test src)
+# What every test program links: helpers, the core and GoogleTest.
+add_library(test_support STATIC EXCLUDE_FROM_ALL ${gtest_helper_sources})
+set_target_properties(test_support PROPERTIES
+  ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
 # False alarms of GCC: an EXPECT in an `if` without braces is safe, GoogleTest sees to that; and of
 # a std::variant on the stack GCC 12 thinks that every alternative is destroyed.
-target_compile_options(test_support ${scope} -Wno-dangling-else)
+target_compile_options(test_support PUBLIC -Wno-dangling-else)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  target_compile_options(test_support ${scope} -Wno-free-nonheap-object -Wno-maybe-uninitialized)
+  target_compile_options(test_support PUBLIC -Wno-free-nonheap-object -Wno-maybe-uninitialized)
 endif()
 # Highway: one test goes through the instruction sets.
-target_link_libraries(test_support ${scope} ist_proximity_core ist_proximity::hwy GTest::GTest)
-# Where tests find demo/ and, unless the environment variable IST_PROXIMITY_DATA says otherwise,
-# ../shared/data.
-target_compile_definitions(test_support ${scope}
-  IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
-if(IST_PROXIMITY_SANITIZE)
-  # Tests may do with fewer random cases: they are ten times as slow.
-  target_compile_definitions(test_support ${scope} IST_PROXIMITY_SANITIZED)
-endif()
+target_link_libraries(test_support PUBLIC
+  test_helpers ist_proximity_core ist_proximity::hwy GTest::GTest)
 
 # OctoMap's own library is what the reader of its maps is measured against.
 find_path(OCTOMAP_INCLUDE_DIR octomap/octomap.h)
@@ -133,11 +118,9 @@ if(catkin_FOUND AND TARGET ist_proximity_ros)
   foreach(source IN LISTS ros_test_sources)
     get_filename_component(test ${source} NAME_WE)
     add_executable(${test} EXCLUDE_FROM_ALL ${source})
-    target_include_directories(${test} PRIVATE src test)
     target_include_directories(${test} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
-    target_link_libraries(${test} PRIVATE ist_proximity_ros GTest::GTest GTest::Main)
-    target_compile_definitions(${test} PRIVATE
-      IST_PROXIMITY_SOURCE_DIR="${CMAKE_CURRENT_SOURCE_DIR}")
+    target_link_libraries(${test} PRIVATE
+      test_helpers ist_proximity_ros GTest::GTest GTest::Main)
     set_target_properties(${test} PROPERTIES
       RUNTIME_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/test)
     add_dependencies(tests ${test})

@@ -9,6 +9,8 @@
 #include "ist_proximity/cloud/ingest.h"
 #include "peers/scene.h"
 #include "support/box_oracle.h"
+#include "support/npy.h"
+#include "support/pcd.h"
 #include "support/truth.h"
 
 /// Scenes of the program `answers`: frames of the sensor, a motion, a map.

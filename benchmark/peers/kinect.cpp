@@ -3,6 +3,7 @@
 
 #include "internal/geometry/mesh_io.h"
 #include "peers/scene.h"
+#include "support/npy.h"
 #include "support/pcd.h"
 #include "support/truth.h"
 

@@ -3,7 +3,9 @@
 #include <limits>
 #include <numeric>
 #include <random>
+#include <utility>
 
+#include "internal/geometry/tessellation.h"
 #include "peers/scene.h"
 #include "support/meshes.h"
 #include "support/oracle.h"

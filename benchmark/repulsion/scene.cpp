@@ -7,8 +7,11 @@
 #include <limits>
 #include <random>
 
+#include "internal/geometry/mesh_io.h"
 #include "internal/geometry/tessellation.h"
 #include "ist_proximity/cloud/ingest.h"
+#include "support/npy.h"
+#include "support/pcd.h"
 #include "support/truth.h"
 
 namespace ist::benchmark {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <set>
 #include <string>
@@ -13,7 +14,9 @@
 #include "support/accuracy.h"
 #include "support/data_dir.h"
 #include "support/hard_scenes.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 #include "support/truth.h"
 

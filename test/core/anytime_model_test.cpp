@@ -12,6 +12,7 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "internal/geometry/distance_field.h"
@@ -20,7 +21,9 @@
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
 #include "support/demo_arm.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/temp_dir.h"
 #include "support/trial.h"
 

@@ -9,6 +9,7 @@
 
 #include "internal/geometry/box_distance.h"
 #include "internal/geometry/triangle_bvh.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "internal/geometry/mesh_io.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/data_dir.h"
 #include "support/oracle.h"

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
@@ -16,6 +17,7 @@
 #include "support/accuracy.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
 
 namespace ist {

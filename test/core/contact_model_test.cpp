@@ -9,6 +9,7 @@
 
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
 #include "support/temp_dir.h"
 
 namespace ist {

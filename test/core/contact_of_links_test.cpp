@@ -10,6 +10,8 @@
 #include "ist_proximity/contact/contact_volume.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/shape_oracle.h"
 
 namespace ist {

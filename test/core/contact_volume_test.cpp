@@ -11,6 +11,7 @@
 #include "support/allocations.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
 
 namespace ist {

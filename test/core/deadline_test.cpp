@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "internal/proximity/deadline.h"
@@ -16,6 +17,7 @@
 #include "ist_proximity/repulsion/repulsion.h"
 #include "support/contact_oracle.h"
 #include "support/meshes.h"
+#include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
 

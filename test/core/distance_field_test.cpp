@@ -13,6 +13,7 @@
 
 #include "internal/geometry/cancelled.h"
 #include "support/hard_shapes.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/shape_oracle.h"
 

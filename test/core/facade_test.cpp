@@ -12,6 +12,7 @@
 #include "ist_proximity/facade/robot.h"
 #include "support/demo_arm.h"
 #include "support/errors.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "internal/geometry/distance_field.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/trial.h"
 

@@ -15,6 +15,7 @@
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/trial.h"
 

@@ -10,7 +10,9 @@
 
 #include "internal/geometry/distance_field.h"
 #include "support/allocations.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/trial.h"
 
 namespace ist {

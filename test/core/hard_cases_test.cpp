@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {

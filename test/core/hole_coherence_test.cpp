@@ -13,6 +13,7 @@
 #include "support/oracle.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {

@@ -13,6 +13,7 @@
 #include "ist_proximity/geometry/solid.h"
 #include "proximity/surface_pair_search.h"
 #include "support/link_pair_oracle.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/random_numbers.h"
 #include "support/sanitizers.h"

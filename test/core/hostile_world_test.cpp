@@ -8,12 +8,14 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/known_world.h"
 #include "ist_proximity/proximity/world_file.h"
 #include "ist_proximity/proximity/world_query.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"

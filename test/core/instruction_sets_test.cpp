@@ -4,13 +4,18 @@
 #include <hwy/highway.h>
 #include <hwy/targets.h>
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "internal/cloud/point_bvh.h"
+#include "internal/geometry/triangle_bvh.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "support/box_oracle.h"
 #include "support/instruction_sets.h"
+#include "support/meshes.h"
+#include "support/oracle.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/trial.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "support/contact_oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

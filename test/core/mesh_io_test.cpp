@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"

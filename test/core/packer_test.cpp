@@ -7,8 +7,10 @@
 #include <cstdio>
 #include <ctime>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "internal/geometry/triangle_bvh.h"
 #include "internal/packing/packing_report.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/solid.h"

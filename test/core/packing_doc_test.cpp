@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -17,6 +18,7 @@
 #include "ist_proximity/geometry/error.h"
 #include "support/accuracy.h"
 #include "support/hostile_meshes.h"
+#include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/scene.h"
 

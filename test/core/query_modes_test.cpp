@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "support/allocations.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -14,6 +14,7 @@
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/random_robots.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -12,6 +12,7 @@
 #include "internal/geometry/float_rounding.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"

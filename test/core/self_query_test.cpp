@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"

@@ -10,6 +10,7 @@
 
 #include "internal/geometry/outside_margin.h"
 #include "support/meshes.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

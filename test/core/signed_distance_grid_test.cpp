@@ -4,12 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "support/hostile_meshes.h"
 #include "support/meshes.h"
+#include "support/sanitizers.h"
 #include "support/trial.h"
 
 namespace ist {

@@ -11,6 +11,7 @@
 #include "support/meshes.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {

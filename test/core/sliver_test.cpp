@@ -17,6 +17,7 @@
 #include "support/hard_shapes.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {

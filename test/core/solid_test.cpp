@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "internal/geometry/solid_queries.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

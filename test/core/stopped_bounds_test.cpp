@@ -11,7 +11,9 @@
 #include "internal/geometry/distance_field.h"
 #include "ist_proximity/proximity/proximity_query.h"
 #include "support/hostile_meshes.h"
+#include "support/meshes.h"
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/trial.h"
 

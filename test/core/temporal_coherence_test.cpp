@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "support/box_oracle.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
+#include "support/shape_oracle.h"
 #include "support/trial.h"
 
 namespace ist {

@@ -23,6 +23,7 @@
 #include "support/allocations.h"
 #include "support/instruction_sets.h"
 #include "support/random_links.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"

@@ -14,6 +14,7 @@
 #include "repulsion/blend_kernel.h"
 #include "support/contact_oracle.h"
 #include "support/instruction_sets.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 

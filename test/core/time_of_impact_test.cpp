@@ -9,6 +9,8 @@
 
 #include "proximity/motion_bound.h"
 #include "support/motions.h"
+#include "support/sanitizers.h"
+#include "support/shape_oracle.h"
 
 namespace ist {
 namespace {

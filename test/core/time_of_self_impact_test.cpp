@@ -10,7 +10,9 @@
 
 #include "support/link_pair_oracle.h"
 #include "support/motions.h"
+#include "support/random_robots.h"
 #include "support/sanitizers.h"
+#include "support/shape_oracle.h"
 
 namespace ist {
 namespace {

@@ -10,6 +10,7 @@
 #include "internal/geometry/closest_point_on_triangle.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
+#include "support/sanitizers.h"
 #include "support/scene.h"
 
 namespace ist {

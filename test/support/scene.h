@@ -2,70 +2,29 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <cstdint>
 #include <memory>
 #include <random>
-#include <string>
 #include <vector>
 
-#include "internal/packing/packer.h"
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/robot/robot_model.h"
-#include "support/sanitizers.h"
 
 /// Small robots and clouds for tests.
 namespace ist::test {
 
 using Rng = std::mt19937_64;
 
-inline double uniform(Rng* rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(*rng);
-}
+double uniform(Rng* rng, double low, double high);
 
-inline Eigen::Vector3d random_vector(Rng* rng, double size) {
-  return {uniform(rng, -size, size), uniform(rng, -size, size), uniform(rng, -size, size)};
-}
+Eigen::Vector3d random_vector(Rng* rng, double size);
 
-inline Eigen::Isometry3d random_pose(Rng* rng, double size) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  std::normal_distribution<double> normal;
-  const Eigen::Quaterniond q(normal(*rng), normal(*rng), normal(*rng), normal(*rng));
-  X.linear() = q.normalized().toRotationMatrix();
-  X.translation() = random_vector(rng, size);
-  return X;
-}
+Eigen::Isometry3d random_pose(Rng* rng, double size);
 
 /// A robot of one-element links.
-inline std::shared_ptr<RobotModel> make_model(const std::vector<Shape>& shapes, double max_error) {
-  auto model = std::make_shared<RobotModel>();
-  for (const Shape& shape : shapes) {
-    LinkModel link;
-    link.name = "link" + std::to_string(model->links.size());
-    PackingConfig config;
-    config.max_error = packed_to(max_error);
-    link.packing = pack_element(shape, config);
-    link.tree = InnerSphereTree(link.packing);
-    link.solid = Solid({GeometryElement{shape, Eigen::Isometry3d::Identity(), "test"}});
-    model->links.push_back(std::move(link));
-  }
-  return model;
-}
+std::shared_ptr<RobotModel> make_model(const std::vector<Shape>& shapes, double max_error);
 
 /// A snapshot of points given in the fixed frame; their ids are their indices.
-inline CloudSnapshot make_snapshot(const std::vector<Eigen::Vector3d>& points_F,
-                                   const Eigen::Vector3d& origin = Eigen::Vector3d::Zero()) {
-  std::vector<float> x, y, z;
-  std::vector<std::uint32_t> id;
-  for (const Eigen::Vector3d& p : points_F) {
-    id.push_back(static_cast<std::uint32_t>(id.size()));
-    x.push_back(static_cast<float>(p.x() - origin.x()));
-    y.push_back(static_cast<float>(p.y() - origin.y()));
-    z.push_back(static_cast<float>(p.z() - origin.z()));
-  }
-  CloudSnapshot snapshot;
-  snapshot.index.build(origin, x.data(), y.data(), z.data(), id.data(), x.size());
-  snapshot.counts.received = snapshot.counts.used = static_cast<std::uint32_t>(x.size());
-  return snapshot;
-}
+CloudSnapshot make_snapshot(const std::vector<Eigen::Vector3d>& points_F,
+                            const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
 
 }  // namespace ist::test

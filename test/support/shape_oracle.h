@@ -1,69 +1,31 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <variant>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/geometry/shapes.h"
 #include "support/oracle.h"
-#include "support/tiles.h"
 
 /// Exact signed distances of links, without tree and bound: of primitives by their distance
 /// functions, of meshes triangle by triangle.
 namespace ist::test {
 
-inline double oracle_signed_distance(const Box& box, const Eigen::Vector3d& p) {
-  const Eigen::Vector3d q = p.cwiseAbs() - 0.5 * box.size;
-  return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
-}
+double oracle_signed_distance(const Box& box, const Eigen::Vector3d& p);
 
-inline double oracle_signed_distance(const Cylinder& cylinder, const Eigen::Vector3d& p) {
-  const Eigen::Vector2d q(p.head<2>().norm() - cylinder.radius,
-                          std::abs(p.z()) - 0.5 * cylinder.length);
-  return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
-}
+double oracle_signed_distance(const Cylinder& cylinder, const Eigen::Vector3d& p);
 
-inline double oracle_signed_distance(const Sphere& sphere, const Eigen::Vector3d& p) {
-  return p.norm() - sphere.radius;
-}
+double oracle_signed_distance(const Sphere& sphere, const Eigen::Vector3d& p);
 
 /// Signed distance of a link to a point in its frame: the smallest of its elements.
-inline double oracle_signed_distance(const LinkGeometry& link, const Eigen::Vector3d& p_L) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const GeometryElement& element : link) {
-    const Eigen::Vector3d p_E = element.X_LE.inverse() * p_L;
-    smallest = std::min(
-        smallest,
-        std::visit([&](const auto& s) { return oracle_signed_distance(s, p_E); }, element.shape));
-  }
-  return smallest;
-}
+double oracle_signed_distance(const LinkGeometry& link, const Eigen::Vector3d& p_L);
 
 /// Smallest signed distance of any point (fixed frame); +inf without points.
-inline double oracle_minimum(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
-                             const std::vector<Eigen::Vector3d>& points_F) {
-  const Eigen::Isometry3d X_LF = X_FL.inverse();
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const Eigen::Vector3d& p_F : points_F) {
-    smallest = std::min(smallest, oracle_signed_distance(link, X_LF * p_F));
-  }
-  return smallest;
-}
+double oracle_minimum(const LinkGeometry& link, const Eigen::Isometry3d& X_FL,
+                      const std::vector<Eigen::Vector3d>& points_F);
 
 /// The points as the index holds them, rounded to float. Queries are exact for these.
-inline std::vector<Eigen::Vector3d> stored_points(const PointIndex& index) {
-  std::vector<Eigen::Vector3d> points;
-  points.reserve(index.size());
-  for (const PointTile& tile : tiles_of(index)) {
-    for (int k = 0; k < tile.count; ++k) {
-      points.push_back(index.X_FO() * tile.point(static_cast<int>(k)));
-    }
-  }
-  return points;
-}
+std::vector<Eigen::Vector3d> stored_points(const PointIndex& index);
 
 }  // namespace ist::test

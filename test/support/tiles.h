@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -11,41 +10,15 @@
 namespace ist::test {
 
 /// All tiles of an index, whether a query has looked at them or not.
-inline std::vector<PointTile> tiles_of(const PointBvh& bvh) {
-  std::vector<PointTile> tiles(bvh.tile_count());
-  PointTile scratch;
-  for (std::size_t i = 0; i < tiles.size(); ++i) tiles[i] = bvh.tile(i, &scratch);
-  return tiles;
-}
-inline std::vector<PointTile> tiles_of(const PointIndex& index) { return tiles_of(index.bvh()); }
+std::vector<PointTile> tiles_of(const PointBvh& bvh);
+std::vector<PointTile> tiles_of(const PointIndex& index);
 
 /// All tiles of a thinned cloud, whether a query has looked at them or not.
-inline std::vector<ThinnedTile> thinned_tiles_of(const PointIndex& index) {
-  const ThinnedCloud cloud = index.bvh().thinned();
-  std::vector<ThinnedTile> all;
-  if (cloud.empty()) return all;
-  ThinnedNode buffer;
-  for (std::size_t i = 0; i < cloud.nodes().size(); ++i) {
-    if (!ThinnedCloud::is_leaf(cloud.nodes()[i])) continue;
-    const auto tiles = cloud.tiles(static_cast<std::int32_t>(i), &buffer);
-    all.insert(all.end(), tiles.begin(), tiles.end());
-  }
-  return all;
-}
+std::vector<ThinnedTile> thinned_tiles_of(const PointIndex& index);
 
 /// The points of the thinned cloud in the fixed frame [m], by their ids.
-inline std::map<std::uint32_t, Eigen::Vector3d> thinned_points_of(const PointIndex& index) {
-  std::map<std::uint32_t, Eigen::Vector3d> points;
-  for (const ThinnedTile& tile : thinned_tiles_of(index)) {
-    for (int k = 0; k < tile.count; ++k) points[tile.id[k]] = index.X_FO() * tile.point(k);
-  }
-  return points;
-}
+std::map<std::uint32_t, Eigen::Vector3d> thinned_points_of(const PointIndex& index);
 
-inline bool same_points(const PointTile& a, const PointTile& b) {
-  return a.count == b.count && std::equal(a.x, a.x + kPointWidth, b.x) &&
-         std::equal(a.y, a.y + kPointWidth, b.y) && std::equal(a.z, a.z + kPointWidth, b.z) &&
-         std::equal(a.id, a.id + kPointWidth, b.id);
-}
+bool same_points(const PointTile& a, const PointTile& b);
 
 }  // namespace ist::test

@@ -1,0 +1,116 @@
+#include "support/motions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "support/random_robots.h"
+#include "support/shape_oracle.h"
+
+namespace ist::test {
+
+Arm random_arm(Rng* rng) {
+  static const auto shapes = make_model(
+      {Box{{0.1, 0.06, 0.3}}, Cylinder{0.05, 0.25}, Sphere{0.08}, Box{{0.2, 0.2, 0.02}}}, 0.01);
+  static const std::vector<Shape> kShapes = {Box{{0.1, 0.06, 0.3}}, Cylinder{0.05, 0.25},
+                                             Sphere{0.08}, Box{{0.2, 0.2, 0.02}}};
+  RobotDescription robot = random_robot(rng, 5);
+  for (JointDescription& joint : robot.joints) joint.X_PJ.translation() *= 0.4;
+  if (uniform(rng, 0, 1) < 0.1 && robot.joints.size() > 1) {
+    JointDescription& first = robot.joints[0];
+    first.type = JointType::kFloating;
+    for (JointDescription& joint : robot.joints) {
+      if (joint.mimic && joint.mimic->joint == first.name) joint.mimic.reset();
+    }
+  }
+  Arm arm;
+  auto model = std::make_shared<RobotModel>();
+  const auto kinematics = std::make_shared<Kinematics>(robot);
+  for (std::size_t i = 1; i < kinematics->bodies().size(); ++i) {
+    const auto shape = static_cast<std::size_t>(uniform(rng, 0, 3.999));
+    model->links.push_back(shapes->links[shape]);
+    model->links.back().name = kinematics->bodies()[i];
+    arm.links.push_back({GeometryElement{kShapes[shape], Eigen::Isometry3d::Identity(), "test"}});
+    arm.bodies.push_back(i);
+  }
+  arm.model = model;
+  arm.kinematics = kinematics;
+  return arm;
+}
+
+std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& motion, double time) {
+  const auto& joints = arm.kinematics->joints();
+  const double s = time / motion.joints.duration;
+  JointPoses poses = motion.still;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const double from = motion.joints.from[joints[j].source],
+                 to = motion.joints.to[joints[j].source];
+    if (std::isnan(from) || joints[j].has_unstated_pose() || joints[j].type == JointType::kFixed) {
+      continue;
+    }
+    const double q = from + s * (to - from);
+    poses.X_PC[j] = arm.kinematics->joint_pose(j, joints[j].multiplier * q + joints[j].offset);
+  }
+  BodyPoses bodies;
+  arm.kinematics->place_bodies(poses, motion.X_FR, &bodies);
+  return bodies.X_FB;
+}
+
+ArmMotion random_motion(Rng* rng, const Arm& arm) {
+  ArmMotion motion;
+  motion.joints.duration = uniform(rng, 0.5, 2.0);
+  motion.X_FR = random_pose(rng, 0.5);
+  std::vector<double> q;
+  for (const Kinematics::Joint& joint : arm.kinematics->joints()) {
+    const double way = joint.type == JointType::kPrismatic ? 0.25 : 1.5;
+    q.push_back(uniform(rng, -1, 1));
+    const bool stands = uniform(rng, 0, 1) < 0.2;
+    motion.joints.from.push_back(stands ? std::nan("") : q.back());
+    motion.joints.to.push_back(stands ? std::nan("") : q.back() + uniform(rng, -way, way));
+  }
+  arm.kinematics->place_joints(q, &motion.still);
+  for (std::size_t j = 0; j < q.size(); ++j) {
+    if (!arm.kinematics->joints()[j].has_unstated_pose()) continue;
+    motion.still.X_PC[j] = random_pose(rng, 0.3);
+    motion.still.known[j] = true;
+  }
+  const int count = 1 + static_cast<int>(uniform(rng, 0, 5));
+  for (int i = 0; i < count; ++i) {
+    const std::size_t body = arm.bodies[static_cast<std::size_t>(uniform(rng, 0, 0.999) *
+                                                                 static_cast<double>(arm.size()))];
+    const double time = uniform(rng, 0.3, 1.2) * motion.joints.duration;
+    motion.points.push_back(sampled_poses(arm, motion, time)[body] * random_vector(rng, 0.1));
+  }
+  return motion;
+}
+
+double sampled_distance(const Arm& arm, const ArmMotion& motion, double time) {
+  const std::vector<Eigen::Isometry3d> X_FB = sampled_poses(arm, motion, time);
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < arm.size(); ++i) {
+    smallest = std::min(smallest, oracle_minimum(arm.links[i], X_FB[arm.bodies[i]], motion.points));
+  }
+  return smallest;
+}
+
+double sampled_impact(const Arm& arm, const ArmMotion& motion) {
+  constexpr double kStep = 5e-4, kFastest = 40.0;
+  const auto in_contact = [&](double time) { return sampled_distance(arm, motion, time) <= 0.0; };
+  double before = 0.0;
+  for (double time = 0.0; time <= motion.joints.duration;) {
+    const double distance = sampled_distance(arm, motion, time);
+    if (distance <= 0.0) {
+      if (time == 0.0) return 0.0;
+      while (time - before > 1e-9) {
+        const double middle = 0.5 * (before + time);
+        (in_contact(middle) ? time : before) = middle;
+      }
+      return time;
+    }
+    before = time;
+    time += kStep * std::max(1.0, std::floor(distance / (kFastest * kStep)));
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace ist::test
