@@ -6,22 +6,13 @@
 #include <memory>
 #include <vector>
 
-#include "internal/geometry/distance_field.h"
+#include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/trial.h"
 
 namespace ist {
 namespace {
-
-std::shared_ptr<const RobotModel> model_with_fields(const std::vector<LinkGeometry>& links,
-                                                    double max_error) {
-  const auto robot = std::make_shared<RobotModel>(*test::model_of(links, max_error));
-  for (LinkModel& link : robot->links) {
-    link.field = std::make_shared<const DistanceField>(link.solid);
-  }
-  return robot;
-}
 
 // A box of points may be kilometres deep.
 TEST(FieldContact, ALargeLinkHasDeepPoints) {
@@ -30,7 +21,7 @@ TEST(FieldContact, ALargeLinkHasDeepPoints) {
   for (const TriangleMesh& mesh :
        {test::box({kSize, kSize, kSize}), test::open_box({kSize, kSize, kSize})}) {
     const LinkGeometry link = test::one(mesh);
-    const auto model = model_with_fields({link}, 100.0);
+    const auto model = test::with_fields(test::model_of({link}, 100.0));
     for (int round = 0; round < 10; ++round) {
       std::vector<Eigen::Vector3d> points;
       for (int k = 0; k < 300; ++k) points.push_back(test::random_vector(&rng, 0.499 * kSize));
@@ -54,7 +45,8 @@ TEST(FieldContact, TheMinimumOfSeveralElementsIsAsExactAsAsked) {
   const LinkGeometry two = {
       GeometryElement{test::open_box({0.1, 0.1, 0.1}), Eigen::Isometry3d::Identity(), "open box"},
       GeometryElement{test::box({0.1, 0.05, 0.05}), X_LE, "box"}};
-  const auto model = model_with_fields({test::one(Box{{0.1, 0.1, 0.1}}), two}, 0.02);
+  const auto model =
+      test::with_fields(test::model_of({test::one(Box{{0.1, 0.1, 0.1}}), two}, 0.02));
   QueryConfig config;
   config.tolerance = 0.0;
   test::Rng rng(1);
@@ -83,7 +75,8 @@ TEST(FieldContact, APoseThatIsNotFiniteIsUnknown) {
   std::vector<Eigen::Vector3d> points;
   for (int k = 0; k < 300; ++k) points.push_back(test::random_vector(&rng, 0.2));
   const CloudSnapshot cloud = test::make_snapshot(points);
-  for (const auto& model : {test::model_of(links, 0.01), model_with_fields(links, 0.01)}) {
+  for (const auto& model :
+       {test::model_of(links, 0.01), test::with_fields(test::model_of(links, 0.01))}) {
     ProximityQuery query(model, {});
     std::vector<LinkProximity> results;
     RobotProximity minimum;

@@ -10,8 +10,8 @@
 #include <memory>
 #include <vector>
 
-#include "internal/geometry/distance_field.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "support/distance_fields.h"
 #include "support/hard_shapes.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -112,12 +112,6 @@ TEST_F(MovingFront, IsDiscardedWhereItHasNoPlace) {
   EXPECT_TRUE(front_.empty());
 }
 
-std::shared_ptr<const RobotModel> with_fields(const std::vector<LinkGeometry>& links) {
-  const auto robot = std::make_shared<RobotModel>(*test::model_of(links, 0.02));
-  for (LinkModel& link : robot->links) link.field = std::make_shared<DistanceField>(link.solid);
-  return robot;
-}
-
 // A step of the length given, and as much of a turn about the link.
 Eigen::Isometry3d step_of(test::Rng* rng, double length) {
   const Eigen::Vector3d way = length * test::random_vector(rng, 1.0).normalized();
@@ -131,7 +125,7 @@ TEST(FieldFrontOfAQuery, AnswersHoldAlongAMotion) {
   test::Rng rng(11);
   std::vector<LinkGeometry> links = test::random_links(&rng);
   links.push_back(test::one(test::open_box({0.2, 0.2, 0.2})));
-  const auto model = with_fields(links);
+  const auto model = test::with_fields(test::model_of(links, 0.02));
   int near = 0, contacts = 0;
   for (std::size_t i = 0; i < links.size(); ++i) {
     for (const double tolerance : {0.0, 0.001}) {
@@ -177,7 +171,7 @@ TEST(FieldFrontOfAQuery, AnswersHoldAlongAMotion) {
 TEST(FieldFrontOfAQuery, PointsThatWereInsideAreFoundAgain) {
   test::Rng rng(13);
   const LinkGeometry link = test::one(test::box({0.1, 0.1, 0.1}));
-  const auto model = with_fields({link});
+  const auto model = test::with_fields(test::model_of({link}, 0.02));
   std::vector<Eigen::Vector3d> points;
   for (int k = 0; k < 3000; ++k) {
     points.push_back(test::random_vector(&rng, 1.0).cwiseProduct(Eigen::Vector3d(0.1, 0.1, 1e-4)));
@@ -211,7 +205,8 @@ TEST(FieldFrontOfAQuery, PointsThatWereInsideAreFoundAgain) {
 // Along a slow motion, hardly any node is expanded again.
 TEST(FieldFrontOfAQuery, NodesAboveTheFrontAreNotVisited) {
   test::Rng rng(12);
-  const auto model = with_fields({test::one(test::torus(0.12, 0.05, 40, 24))});
+  const auto model =
+      test::with_fields(test::model_of({test::one(test::torus(0.12, 0.05, 40, 24))}, 0.02));
   std::vector<Eigen::Vector3d> points;
   for (int k = 0; k < 40000; ++k) {
     const Eigen::Vector3d p = test::random_vector(&rng, 1.0);

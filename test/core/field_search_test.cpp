@@ -8,8 +8,8 @@
 #include <memory>
 #include <vector>
 
-#include "internal/geometry/distance_field.h"
 #include "support/allocations.h"
+#include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
 #include "support/sanitizers.h"
@@ -19,19 +19,6 @@ namespace ist {
 namespace {
 
 constexpr double kRounding = 2e-8;  // [m] of float, where it decides the side of a point
-
-// @param coarse  share of the links that get coarse fields, one in so many; 0: none
-std::shared_ptr<const RobotModel> with_fields(const std::shared_ptr<const RobotModel>& model,
-                                              std::size_t coarse = 0) {
-  using Detail = DistanceField::Detail;
-  const auto robot = std::make_shared<RobotModel>(*model);
-  for (std::size_t i = 0; i < robot->links.size(); ++i) {
-    const Detail detail = coarse > 0 && i % coarse == 0 ? Detail::kCoarse : Detail::kFine;
-    LinkModel& link = robot->links[i];
-    link.field = std::make_shared<const DistanceField>(link.solid, detail);
-  }
-  return robot;
-}
 
 std::vector<std::size_t> all(std::size_t count) {
   std::vector<std::size_t> indices;
@@ -72,7 +59,8 @@ QueryConfig random_config(test::Rng* rng) {
 class FieldSearch : public testing::Test {
  protected:
   FieldSearch()
-      : links_(test::random_links(&rng_)), model_(with_fields(test::model_of(links_, 0.02), 2)) {}
+      : links_(test::random_links(&rng_)),
+        model_(test::with_fields(test::model_of(links_, 0.02), 2)) {}
 
   test::Rng rng_{7};
   std::vector<LinkGeometry> links_;
@@ -112,7 +100,7 @@ TEST_F(FieldSearch, BoundsHoldAndZeroToleranceIsExact) {
 // where what was proven at the steps before is all that is looked at.
 TEST_F(FieldSearch, APointThatEntersThroughAHoleIsFound) {
   const LinkGeometry cup = test::one(test::open_box({0.1, 0.1, 0.1}));
-  const auto model = with_fields(test::model_of({cup}, 0.02));
+  const auto model = test::with_fields(test::model_of({cup}, 0.02));
   QueryConfig config;
   config.tolerance = 0.002;
   int contacts = 0;
@@ -140,7 +128,7 @@ TEST_F(FieldSearch, APointThatEntersThroughAHoleIsFound) {
 // distance says nothing of the point that enters.
 TEST_F(FieldSearch, APointThatEntersBesideNearerOnesIsFound) {
   const LinkGeometry cup = test::one(test::open_box({0.1, 0.1, 0.1}));
-  const auto model = with_fields(test::model_of({cup}, 0.002));
+  const auto model = test::with_fields(test::model_of({cup}, 0.002));
   QueryConfig config;
   config.tolerance = 0.002;
   int contacts = 0;
@@ -177,7 +165,7 @@ TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
     for (Eigen::Vector3d& v : turned.vertices) v = X_LE.inverse() * v;
     const LinkGeometry link = {GeometryElement{turned, X_LE, "cups"}};
     const auto without = test::model_of({link}, 0.01);
-    ProximityQuery query(with_fields(without, static_cast<std::size_t>(round % 2)), {}),
+    ProximityQuery query(test::with_fields(without, static_cast<std::size_t>(round % 2)), {}),
         other(without, {});
     LinkProximity result;
     for (int k = 0; k < 80; ++k) {
@@ -201,7 +189,7 @@ TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
 TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
   const LinkGeometry hollow = test::one(test::open_box({1.0, 1.0, 1.0}));
   const auto without = test::model_of({hollow}, 0.05);
-  const auto fine = with_fields(without), coarse = with_fields(without, 1);
+  const auto fine = test::with_fields(without), coarse = test::with_fields(without, 1);
   for (const double tolerance : {0.0, 0.001, 0.1}) {
     QueryConfig config;
     config.tolerance = tolerance;
@@ -279,7 +267,7 @@ TEST_F(FieldSearch, TheMinimumOfAllLinksIsTheSameWithoutFields) {
 TEST_F(FieldSearch, MeasuresHardlyMoreThanOnePoint) {
   QueryConfig config;
   config.max_distance = 10.0;
-  ProximityQuery query(with_fields(model_), config);
+  ProximityQuery query(test::with_fields(model_), config);
   LinkProximity result;
   std::uint64_t measured = 0, queries = 0;
   for (int round = 0; round < 20; ++round) {
@@ -306,7 +294,7 @@ TEST_F(FieldSearch, MeasuresFewPointsInContact) {
          {test::box({0.2, 0.1, 0.15}), test::icosphere(0.1, 3), test::torus(0.12, 0.05, 20, 12),
           test::open_box({0.1, 0.1, 0.1})}) {
       const LinkGeometry link = test::one(mesh);
-      ProximityQuery query(with_fields(test::model_of({link}, 0.02)), config);
+      ProximityQuery query(test::with_fields(test::model_of({link}, 0.02)), config);
       for (int round = 0; round < 20; ++round) {
         const auto points = dense_points(&rng_, 2000);
         const CloudSnapshot cloud = test::make_snapshot(points);

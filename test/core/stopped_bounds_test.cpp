@@ -8,8 +8,8 @@
 #include <memory>
 #include <vector>
 
-#include "internal/geometry/distance_field.h"
 #include "ist_proximity/proximity/proximity_query.h"
+#include "support/distance_fields.h"
 #include "support/hostile_meshes.h"
 #include "support/meshes.h"
 #include "support/random_links.h"
@@ -20,20 +20,10 @@
 namespace ist {
 namespace {
 
-using Detail = DistanceField::Detail;
-
-std::shared_ptr<const RobotModel> with_field(const std::shared_ptr<const RobotModel>& model,
-                                             Detail detail) {
-  const auto robot = std::make_shared<RobotModel>(*model);
-  LinkModel& link = robot->links.front();
-  link.field = std::make_shared<DistanceField>(link.solid, detail);
-  return robot;
-}
-
 // The model without a field, with a coarse one and with a fine one.
 std::vector<std::shared_ptr<const RobotModel>> models_of(const LinkGeometry& link) {
   const auto without = test::model_of({link}, 0.01);
-  return {without, with_field(without, Detail::kCoarse), with_field(without, Detail::kFine)};
+  return {without, test::with_fields(without, 1), test::with_fields(without)};
 }
 
 // The winding number of many copies of a triangle is large in all of the box about them, also at

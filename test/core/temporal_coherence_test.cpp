@@ -8,11 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <vector>
 
-#include "internal/geometry/distance_field.h"
 #include "support/box_oracle.h"
+#include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
 #include "support/shape_oracle.h"
@@ -269,11 +268,8 @@ INSTANTIATE_TEST_SUITE_P(Tolerances, CoherentQueries, ::testing::Values(0.0, 0.0
 TEST(CoherentQueries, ABoundServesManyPosesInContact) {
   test::Rng rng(66);
   QueryConfig config;
-  const auto model = std::make_shared<RobotModel>(links().model());
-  for (LinkModel& link : model->links) {  // a search of a field counts its nodes
-    link.field = std::make_shared<const DistanceField>(link.solid);
-  }
-  ProximityQuery query(model, config);
+  // A search of a field counts its nodes.
+  ProximityQuery query(test::with_fields(links().shared_model()), config);
   const std::size_t count = shapes().size();
   const std::vector<bool> known(count, true);
   std::vector<LinkProximity> results;
