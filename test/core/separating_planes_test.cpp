@@ -164,17 +164,17 @@ TEST(SeparatingPlanes, ABoxJustAboveAPlaneIsFreeWithoutTime) {
   config.deadline = 1e-9;
   ProximityQuery query(model, config);
   std::vector<LinkProximity> results;
-  // What is made late is made, as where no other process takes the processor.
-  Deadline::late_for_test = 0.0;
   for (int step = 0; step < 100; ++step) {
     Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
     X_FL.translation() = Eigen::Vector3d(1e-3 * step, 0.0, 0.0501);
+    // What is made late is made, as where no other process takes the processor.
+    Deadline::late_for_test = 0.0;
     query.run({X_FL}, {true}, {&cloud}, &results);
+    Deadline::late_for_test = -1.0;
     ASSERT_EQ(results[0].state, LinkState::kNear);
     ASSERT_LE(results[0].lower_bound, 1e-4 + 1e-9);
     EXPECT_GT(results[0].lower_bound, 0.0);
   }
-  Deadline::late_for_test = -1.0;
 }
 
 }  // namespace

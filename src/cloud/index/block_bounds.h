@@ -14,7 +14,7 @@ namespace ist {
 constexpr std::size_t kBlockSide = 16;                       ///< pixels
 constexpr std::size_t kBlockTiles = kBlockSide / kTileSide;  ///< along each side of a block
 
-/// Bits of the pixels of a tile: bit 4 r + c for the one in row r and column c. All of them.
+/// A tile's pixels are bits: 4 r + c is the one in row r and column c. This is all of them.
 constexpr std::uint32_t kWholeTile = 0xFFFFU;
 
 /// The first pixel of the tile in a slot, from the block's first pixel.
