@@ -1,6 +1,7 @@
 // URDF text: what is read is a tree of bodies, its kinematics place every body, shapes have exact
 // distances, and no body is farther away than the kinematic reach says.
-// Covers: src/robot/robot_description.cpp src/robot/urdfdom_parser.cpp
+// Covers: src/robot/robot_description.cpp src/robot/urdf_document.cpp src/robot/urdf_conversion.cpp
+// Covers: src/robot/urdfdom_parser.cpp
 // Covers: src/robot/kinematics.cpp src/robot/robot_region.cpp
 // Longest input: 1500
 

@@ -141,7 +141,6 @@ class LinkQuery {
   DualTreeResult search(const Obstacles& obstacles);
   template <class Obstacles>
   void measure_closest(const Obstacles& obstacles);
-  bool has_field() const;
   bool has_hardly_moved() const;
   bool is_too_near_for_field() const;
   bool is_field_too_coarse() const;

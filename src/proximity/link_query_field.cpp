@@ -28,11 +28,6 @@ constexpr double kAhead = 0.5;
 
 }  // namespace
 
-bool LinkQuery::has_field() const {
-  const auto& field = link_.context.model->field;
-  return field != nullptr && !field->empty();
-}
-
 // Whether the link is about where it was when it was asked last.
 bool LinkQuery::has_hardly_moved() const {
   const auto& last = link_.kept.last;
@@ -41,7 +36,7 @@ bool LinkQuery::has_hardly_moved() const {
 }
 
 bool LinkQuery::is_too_near_for_field() const {
-  const DistanceField& field = *link_.context.model->field;
+  const DistanceField& field = *link_.context.field();
   const double near = kTooNearInCells * static_cast<double>(field.levels().front().cell);
   return !field.has_depths() && link_.search.closest.exact.distance < near;
 }
@@ -56,17 +51,18 @@ bool LinkQuery::is_field_too_coarse() const {
 
 // Whether the last answer's obstacle is of no use.
 bool LinkQuery::begins_with_field() const {
-  return has_field() && link_.search.config.deadline == 0.0 && !has_hardly_moved() &&
-         (!link_.kept.last.was_inside || link_.context.model->field->has_depths());
+  const DistanceField* field = link_.context.field();
+  return field != nullptr && link_.search.config.deadline == 0.0 && !has_hardly_moved() &&
+         (!link_.kept.last.was_inside || field->has_depths());
 }
 
 // @returns whether the search has answered for the index; if not, another one has to
 template <>
 bool LinkQuery::search_by_field(const PointObstacles& obstacles, bool* is_complete) {
   LinkSearch& search = link_.search;
-  if (!has_field() || is_too_near_for_field() || is_field_too_coarse()) return false;
   FieldSearchInput input;
-  input.field = link_.context.model->field.get();
+  input.field = link_.context.field();
+  if (input.field == nullptr || is_too_near_for_field() || is_field_too_coarse()) return false;
   input.bvh = obstacles.bvh;
   FieldQueue queue;
   input.queue = &queue;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "internal/geometry/distance_field.h"
 #include "internal/geometry/float_rounding.h"
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
@@ -41,6 +42,10 @@ struct LinkContext {
 
   const InnerSphereTree& tree() const { return model->tree; }
   const Solid& solid() const { return model->solid; }
+  /// The distances about the link; null: there are none.
+  const DistanceField* field() const {
+    return model->field != nullptr && !model->field->empty() ? model->field.get() : nullptr;
+  }
   /// [m] No place inside the link is deeper. A mesh with holes may enclose places outside of the
   /// link's bounding sphere, but no farther from the cover spheres than the interior gap.
   double deepest() const {

@@ -49,12 +49,17 @@ struct ProximityQuery::Impl {
     }
   }
 
-  // Whether a link can be asked at all: there are clouds, and a pose for each link of this model.
+  // Whether a link can be asked at all: there are clouds, a pose, and geometry.
+  bool can_query(std::size_t i, const Eigen::Isometry3d& X_FL, SnapshotSpan clouds) const {
+    return !clouds.empty() && X_FL.matrix().allFinite() && model->links[i].usable() &&
+           !model->links[i].tree.empty();
+  }
+
+  // The same with a pose for each link of this model.
   bool can_query(std::size_t i, Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                  SnapshotSpan clouds) const {
     const bool fits = X_FL.size() == links.size() && known.size() == links.size();
-    return fits && !clouds.empty() && known[i] && X_FL[i].matrix().allFinite() &&
-           model->links[i].usable() && !model->links[i].tree.empty();
+    return fits && known[i] && can_query(i, X_FL[i], clouds);
   }
 
   // A query that has a deadline first asks every link to within half of its distance, which takes
@@ -225,8 +230,7 @@ bool ProximityQuery::run_link(std::size_t link, const Eigen::Isometry3d& X_FL, S
     result->reset();
     return true;
   }
-  const LinkModel& model = impl_->model->links[link];
-  if (clouds.empty() || !model.usable() || model.tree.empty() || !X_FL.matrix().allFinite()) {
+  if (!impl_->can_query(link, X_FL, clouds)) {
     result->reset();
     impl_->links[link].forget();
     return true;

@@ -172,9 +172,9 @@ void PointRefinement::measure(ObstacleId id, double max_distance) {
 // @param max_distance  [m] reduced to what the field tells
 PointRefinement::Side PointRefinement::cheapest_side(ObstacleId id, const Eigen::Vector3d& p_LQ,
                                                      double* max_distance) {
-  const auto& field = link_.context.model->field;
+  const DistanceField* field = link_.context.field();
   double least_distance = 0.0;
-  if (field != nullptr && !field->empty()) {
+  if (field != nullptr) {
     const FieldPlace place = look_up_field(*field, p_LQ, round_up(link_.search.rounding));
     *max_distance = std::min(*max_distance, static_cast<double>(place.within));
     if (place.outside > 0.0F) return Side::kOutside;

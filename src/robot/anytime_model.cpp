@@ -1,25 +1,15 @@
 #include "internal/robot/anytime_model.h"
 
-#include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
-#include <mutex>
-#include <set>
 #include <sstream>
 #include <utility>
 
-#include "internal/bvh/build_id.h"
+#include "anytime_step.h"
 #include "internal/geometry/cancelled.h"
 #include "internal/geometry/distance_field.h"
 #include "internal/geometry/solid_queries.h"
-#include "internal/packing/packing_cache.h"
-#include "internal/robot/link_packing.h"
-#include "internal/robot/threads.h"
 #include "ist_proximity/geometry/error.h"
-#include "monitored_links.h"
-#include "packing_jobs.h"
-#include "packing_stages.h"
 
 namespace ist {
 namespace {
@@ -34,296 +24,16 @@ void check_config(const PackingConfig& config) {
   if (!text.str().empty()) throw ModelError(text.str());
 }
 
-std::string millimetres(double metres) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.2f mm", 1e3 * metres);
-  return text;
-}
-
 using Field = std::shared_ptr<const DistanceField>;
 bool is_finer(const Field& a, const Field& b) {
   return a != nullptr && (b == nullptr || a->detail() > b->detail());
 }
 
-const LinkModel* find_link(const RobotModel* robot, const std::string& name) {
-  if (robot == nullptr) return nullptr;
-  const auto found = std::find_if(robot->links.begin(), robot->links.end(),
-                                  [&](const LinkModel& link) { return link.name == name; });
-  return found != robot->links.end() ? &*found : nullptr;
-}
-
 }  // namespace
-
-/// A monitored link, its place in the model being its index.
-struct AnytimeModel::Link : MonitoredLink {
-  std::vector<std::string> keys;       ///< of the shapes, by element
-  std::vector<PackingConfig> configs;  ///< of their final stage, by element
-  Solid solid;                         ///< empty with an error
-};
 
 AnytimeModel::AnytimeModel() = default;
 AnytimeModel::AnytimeModel(const AnytimeModel& other) = default;
 AnytimeModel::~AnytimeModel() = default;
-
-/// One step from a model to the next.
-class AnytimeModel::Step {
- public:
-  Step(std::shared_ptr<AnytimeModel> model, RobotModelCallbacks callbacks)
-      : model_(std::move(model)), callbacks_(std::move(callbacks)) {}
-
-  // Callbacks are called one at a time.
-  bool is_cancelled() const {
-    const std::lock_guard<std::mutex> lock(cancel_mutex_);
-    return callbacks_.cancelled && callbacks_.cancelled();
-  }
-
-  void choose_links();
-  bool make_solids(const RobotModel* before, const std::string* changed);
-  void forget_unused_shapes();
-  void add_unknown_shapes(Stage stage);
-  void add_shapes_to_refine(std::size_t index);
-  bool pack(int threads);
-  /// @param before   supplies the links that are the same; may be null
-  /// @param changed  the link whose geometry may differ from `before`
-  /// @returns null when cancelled
-  Ptr finish(const RobotModel* before, const std::string* changed);
-
-  void touch(const std::string& key) { touched_.insert(key); }
-
- private:
-  Solid solid_of(const Link& link, const LinkModel* before) const;
-  void add_job(const Link& link, std::size_t element, const PackingConfig& stage);
-  void take(PackingJob* job);
-  LinkModel assemble(const Link& link, const LinkModel* before, bool same_geometry) const;
-  bool is_touched(const Link& link) const;
-  void warn(const RobotModel& robot) const;
-
-  const std::shared_ptr<AnytimeModel> model_;
-  const RobotModelCallbacks callbacks_;
-  mutable std::mutex cancel_mutex_;
-  std::vector<PackingJob> jobs_;
-  std::set<std::string> touched_;  ///< keys of shapes that have another packing than before
-};
-
-void AnytimeModel::Step::choose_links() {
-  model_->links_.clear();
-  for (MonitoredLink& chosen : select_links(*model_->description_, model_->config_.links)) {
-    Link link;
-    static_cast<MonitoredLink&>(link) = std::move(chosen);
-    if (link.error.empty()) {
-      const LinkGeometry& geometry = link.description->geometry;
-      link.configs = link_configs(geometry, link.description->attached, model_->config_.packing);
-      for (std::size_t e = 0; e < geometry.size(); ++e) {
-        link.keys.push_back(packing_key(geometry[e].shape, link.configs[e]));
-      }
-    }
-    model_->links_.push_back(std::move(link));
-  }
-}
-
-// Packing reads their hierarchies, so they are made first. False when cancelled.
-// @param before   supplies the solids that are known; may be null
-// @param changed  the link whose geometry may differ from `before`
-bool AnytimeModel::Step::make_solids(const RobotModel* before, const std::string* changed) {
-  const auto one = [&](std::size_t i) {
-    Link& link = model_->links_[i];
-    const bool may_be_known = changed == nullptr || link.name != *changed;
-    link.solid = solid_of(link, may_be_known ? find_link(before, link.name) : nullptr);
-  };
-  try {
-    for_each_in_parallel(model_->links_.size(), model_->config_.threads, one);
-  } catch (const Cancelled&) {
-    return false;
-  }
-  return true;
-}
-
-Solid AnytimeModel::Step::solid_of(const Link& link, const LinkModel* before) const {
-  if (!link.error.empty()) return {};
-  if (before != nullptr) return before->solid;
-  return make_solid(link.description->geometry, [this] { return is_cancelled(); });
-}
-
-// Packings of objects that are detached again are not kept.
-void AnytimeModel::Step::forget_unused_shapes() {
-  std::set<std::string> used;
-  for (const Link& link : model_->links_) used.insert(link.keys.begin(), link.keys.end());
-  for (auto shape = model_->shapes_.begin(); shape != model_->shapes_.end();) {
-    shape = used.count(shape->first) > 0 ? std::next(shape) : model_->shapes_.erase(shape);
-  }
-}
-
-void AnytimeModel::Step::add_job(const Link& link, std::size_t element,
-                                 const PackingConfig& stage) {
-  PackingJob job;
-  job.key = link.keys[element];
-  if (!touched_.insert(job.key).second) return;
-  job.shape = &link.description->geometry[element].shape;
-  if (const auto surface = surface_of(link.solid, element)) job.surface.emplace(*surface);
-  job.config = link.configs[element];
-  job.stage = stage;
-  job.link = static_cast<std::size_t>(&link - model_->links_.data());
-  job.work = packing_work(*job.shape);
-  jobs_.push_back(std::move(job));
-}
-
-// One job for each distinct shape and configuration: two equal fingers are packed once.
-void AnytimeModel::Step::add_unknown_shapes(Stage stage) {
-  for (const Link& link : model_->links_) {
-    for (std::size_t e = 0; e < link.keys.size(); ++e) {
-      if (model_->shapes_.count(link.keys[e]) > 0) continue;
-      const Shape& shape = link.description->geometry[e].shape;
-      add_job(link, e,
-              stage == Stage::kFirst ? first_stage(shape, link.configs[e]) : link.configs[e]);
-    }
-  }
-}
-
-void AnytimeModel::Step::add_shapes_to_refine(std::size_t index) {
-  const Link& link = model_->links_[index];
-  for (std::size_t e = 0; e < link.keys.size(); ++e) {
-    const ShapePacking& known = *model_->shapes_.at(link.keys[e]);
-    if (known.is_final) continue;
-    add_job(link, e,
-            known.fell_short ? link.configs[e] : next_stage(known.packing, link.configs[e]));
-  }
-  for (PackingJob& job : jobs_) job.look_in_cache = false;  // the first stage has looked
-}
-
-// False when cancelled.
-bool AnytimeModel::Step::pack(int threads) {
-  const PackingCache cache(model_->config_.cache_directory);
-  const auto report = [&](const PackingJob& job, double fraction) {
-    if (is_cancelled()) return false;
-    if (callbacks_.progress) {
-      callbacks_.progress(
-          {model_->links_[job.link].name, job.link, model_->links_.size(), fraction});
-    }
-    return true;
-  };
-  if (is_cancelled() || !PackingJobs(&jobs_, cache, report).run(threads)) return false;
-  for (PackingJob& job : jobs_) take(&job);
-  return true;
-}
-
-void AnytimeModel::Step::take(PackingJob* job) {
-  auto shape = std::make_shared<ShapePacking>();
-  std::shared_ptr<const ShapePacking>& known = model_->shapes_[job->key];
-  if (known && !job->error.empty()) {
-    *shape = *known;
-    shape->is_final = true;
-    if (callbacks_.warning) {
-      callbacks_.warning("link '" + model_->links_[job->link].name +
-                         "' cannot be packed more finely: " + job->error);
-    }
-  } else {
-    shape->packing = std::move(job->packing);
-    shape->is_final = job->is_final || !job->error.empty();
-    shape->fell_short = job->fell_short;
-    shape->from_cache = job->from_cache;
-    shape->time = job->time + (known ? known->time : 0.0);
-    shape->error = job->error;
-  }
-  known = std::move(shape);
-}
-
-bool AnytimeModel::Step::is_touched(const Link& link) const {
-  return std::any_of(link.keys.begin(), link.keys.end(),
-                     [&](const std::string& key) { return touched_.count(key) > 0; });
-}
-
-LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before,
-                                       bool same_geometry) const {
-  LinkModel model;
-  model.name = link.name;
-  model.error = link.error;
-  if (!model.error.empty()) return model;
-  const LinkGeometry& geometry = link.description->geometry;
-  std::vector<const Packing*> packings;
-  model.from_cache = true;
-  for (std::size_t e = 0; e < geometry.size(); ++e) {
-    const ShapePacking& shape = *model_->shapes_.at(link.keys[e]);
-    if (!shape.error.empty()) {
-      model.error = "link '" + link.name + "', element " + std::to_string(e + 1) + " (" +
-                    geometry[e].source + ") cannot be packed: " + shape.error;
-      model.from_cache = false;
-      return model;
-    }
-    packings.push_back(&shape.packing);
-    model.from_cache = model.from_cache && shape.from_cache;
-    model.is_final = model.is_final && shape.is_final;
-    model.packing_time += shape.time;
-  }
-  const auto cancelled = [this] { return is_cancelled(); };
-  model.packing = combine(geometry, packings);
-  model.tree = InnerSphereTree(model.packing, model_->config_.tree);
-  model.packing_id = next_build_id();
-  throw_if(cancelled);
-  assert(!link.solid.empty());  // a link without its solid would be clear of everything
-  model.solid = link.solid;
-  if (before != nullptr && same_geometry) model.field = before->field;
-  if (model.field == nullptr && model_->config_.distance_fields) {
-    model.field =
-        std::make_shared<const DistanceField>(model.solid, DistanceField::Detail::kFine, cancelled);
-  }
-  return model;
-}
-
-AnytimeModel::Ptr AnytimeModel::Step::finish(const RobotModel* before, const std::string* changed) {
-  const auto robot = std::make_shared<RobotModel>();
-  robot->name = model_->description_->name;
-  robot->root_link = model_->description_->root_link;
-  robot->geometry_id =
-      before != nullptr && changed == nullptr ? before->geometry_id : next_build_id();
-  robot->links.resize(model_->links_.size());
-  const auto one = [&](std::size_t i) {
-    const Link& link = model_->links_[i];
-    const LinkModel* same = find_link(before, link.name);
-    const bool same_geometry = changed == nullptr || link.name != *changed;
-    robot->links[i] = same != nullptr && same_geometry && !is_touched(link)
-                          ? *same
-                          : assemble(link, same, same_geometry);
-  };
-  try {
-    for_each_in_parallel(robot->links.size(), before != nullptr ? 1 : model_->config_.threads, one);
-  } catch (const Cancelled&) {
-    return nullptr;
-  }
-  warn(*robot);
-  model_->robot_ = robot;
-  return model_;
-}
-
-void AnytimeModel::Step::warn(const RobotModel& robot) const {
-  if (!callbacks_.warning) return;
-  for (const PackingJob& job : jobs_) {
-    if (!job.load_warning.empty()) {
-      callbacks_.warning(job.load_warning + "; the link is packed again");
-    }
-  }
-  // A full or read-only disk says the same for every shape.
-  const auto refused = std::find_if(
-      jobs_.begin(), jobs_.end(), [](const PackingJob& job) { return !job.store_warning.empty(); });
-  if (refused != jobs_.end()) callbacks_.warning(refused->store_warning);
-  for (std::size_t l = 0; l < model_->links_.size(); ++l) {
-    const LinkModel& link = robot.links[l];
-    if (!link.usable() || !is_touched(model_->links_[l])) continue;
-    const bool is_new = model_->robot_ == nullptr;
-    if (is_new && model_->links_[l].description->used_visual_fallback) {
-      callbacks_.warning("link '" + link.name +
-                         "' has no collision geometry in the URDF; its visual geometry is used "
-                         "instead");
-    }
-    if (link.is_final && !link.packing.certificate.reached) {
-      const PackingConfig& wanted = model_->config_.packing;
-      callbacks_.warning(
-          "link '" + link.name + "' is packed with " + std::to_string(link.packing.spheres.size()) +
-          " spheres to an error of " + millimetres(link.packing.certificate.max_gap) +
-          " instead of " + millimetres(wanted.max_error) + ": packing/max_spheres (" +
-          std::to_string(wanted.max_spheres) + ") was reached first; raise it, or max_error");
-    }
-  }
-}
 
 AnytimeModel::Ptr AnytimeModel::build(std::shared_ptr<const RobotDescription> description,
                                       const RobotModelConfig& config, Stage stage,

@@ -1,150 +1,36 @@
-#include "ist_proximity/ros/proximity_server.h"
+// The two threads of ProximityServer, and what they publish.
 
 #include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>
 
 #include <algorithm>
-#include <atomic>
 #include <boost/make_shared.hpp>
-#include <chrono>
-#include <cstdint>
 #include <limits>
-#include <mutex>
-#include <thread>
+#include <utility>
 
-#include "ist_proximity/robot/link_poses.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/frame_name.h"
-#include "ros/common/stop_signal.h"
 #include "ros/common/stopwatch.h"
-#include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
-#include "ros/cycle/proximity_cycle.h"
-#include "ros/cycle/scene_warm_up.h"
 #include "ros/input/cloud_source.h"
 #include "ros/input/map_message.h"
-#include "ros/input/measurement.h"
 #include "ros/input/memory_source.h"
-#include "ros/input/unknown_space.h"
 #include "ros/input/world_source.h"
-#include "ros/model/contact_loader.h"
-#include "ros/model/counted_links.h"
-#include "ros/model/model_loader.h"
 #include "ros/output/message_invariants.h"
-#include "ros/output/message_pool.h"
-#include "ros/output/result_publisher.h"
-#include "ros/output/sphere_publisher.h"
-#include "ros/parameters/live_parameters.h"
-#include "ros/parameters/parameters.h"
-#include "ros/poses/joint_state_listener.h"
-#include "ros/poses/make_pose_source.h"
-#include "ros/poses/transform_buffer.h"
-#include "ros/poses/transform_listener.h"
-#include "ros/poses/transforms.h"
-#include "ros/poses/usual_period.h"
-#include "ros/services/link_pair_service.h"
-#include "ros/services/memory_service.h"
-#include "ros/services/model_services.h"
-#include "ros/services/query_service.h"
-#include "ros/services/self_proximity.h"
-#include "ros/status/diagnostics_publisher.h"
+#include "ros/proximity_server_impl.h"
 
 namespace ist {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-// A cycle runs at least this often with pose_source joint_states.
-constexpr std::chrono::milliseconds kMaxWaitForJointStates(100);
-constexpr double kLongestPeriod = 0.1;  // [s] the same
 
 // [s] Where a cycle is rarer than this, the first answer with a new cloud has all the time it
 // needs.
 constexpr double kLongestWarmPeriod = 0.005;
 
-// Whether the robot's root stands still is asked this often where the URDF does not say it.
-constexpr std::chrono::seconds kRootPeriod(1);
 // [m] Unknown space is drawn as far from the links as this.
 constexpr double kDrawnUnseen = 0.15;
 
 }  // namespace
-
-/// Owns all parts and runs two threads: the cycle and the diagnostics.
-///
-/// The cycle takes the newest poses and clouds, queries and publishes, and waits for nothing. It
-/// runs at ~rate of the wall clock, so that a paused /clock does not silence it, or with
-/// pose_source joint_states once for each joint state, and ten times a second while none come. The
-/// diagnostics thread runs once a second. The parts have threads of their own: one per source,
-/// ~query, ~self_proximity, the live parameters, the model and contact loaders, the listeners of tf
-/// and joint_states.
-class ProximityServer::Impl {
- public:
-  Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh, const ServerConfig& config);
-  ~Impl();
-
- private:
-  void add_source(const SourceConfig& config, const ros::Publisher& filtered);
-  void run_cycles();
-  bool wait_for_joint_states();
-  void run_cycle();
-  void run_cycle_guarded();
-  void publish_failure(const std::string& fault);
-  void notice_clock_jump(const ros::Time& now);
-  void take_model();
-  void choose_counted_links();
-  void notice_standing_root();
-  void refine_model(std::shared_ptr<const ModelState> model);
-  void set_source_targets(const QueryConfig& query);
-  double largest_extent() const;
-  void run_diagnostics();
-  void publish_diagnostics();
-  LiveConfig live_config() const;
-  double period() const;
-
-  const ServerConfig config_;
-  ros::NodeHandle nh_, private_nh_;
-  ResultPublisher results_;
-  SpherePublisher spheres_;
-  DiagnosticsPublisher diagnostics_;
-  TransformBuffer buffer_;
-  TransformListener listener_;
-  SourceMemories memories_;
-  SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
-  CloudSources sources_;
-  std::unique_ptr<MemoryService> memory_service_;
-  std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
-  ModelLoader loader_;
-  ModelServices model_services_;
-  LiveParameters live_;
-  ContactLoader contact_loader_;
-
-  StopSignal cycle_signal_;  ///< joint states are its events
-  StopSignal diagnostics_signal_;
-  std::atomic<std::uint64_t> joint_states_received_{0};
-  UsualPeriod joint_state_period_{kLongestPeriod};
-  std::unique_ptr<JointStateListener> joint_states_;  ///< null with pose_source tf
-
-  std::mutex report_mutex_;
-  CycleReport report_;  ///< shared by both threads
-
-  // Used by the cycle thread alone.
-  std::shared_ptr<const ModelState> model_;
-  std::unique_ptr<ProximityCycle> cycle_;  ///< null without a model
-  MessagePool<ist_proximity::ProximityArray> messages_;
-  double margin_ = 0.0;  ///< ~query/margin that the regions of interest are made with
-  CountedLinks counted_;
-  bool root_stands_still_ = false;  ///< in a fixed frame that the URDF lacks
-  Clock::time_point next_root_check_;
-  double region_radius_ = 0.0;  ///< [m] the largest of this robot
-  ros::Time last_now_;
-  ros::Time last_stamp_;  ///< of the last ~proximity
-
-  std::unique_ptr<QueryService> query_service_;
-  std::unique_ptr<SelfProximity> self_proximity_;  ///< null unless enabled
-  std::unique_ptr<LinkPairService> link_pairs_;    ///< the same
-  std::thread cycle_thread_, diagnostics_thread_;
-};
 
 ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh,
                             const ServerConfig& config)
@@ -332,113 +218,6 @@ void ProximityServer::Impl::notice_clock_jump(const ros::Time& now) {
     spheres_.repeat_after_clock_jump();
   }
   last_now_ = now;
-}
-
-/// Hands a new model to all parts.
-void ProximityServer::Impl::take_model() {
-  std::shared_ptr<const ModelState> model = loader_.state();
-  if (model == model_) return;
-  if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
-  warm_up_.begin(nullptr);  // of the last model
-  model_ = std::move(model);
-  region_radius_ = 0.0;
-  if (model_->phase == ModelState::Phase::kReady) {
-    cycle_ = std::make_unique<ProximityCycle>(
-        model_, config_,
-        make_pose_source(*model_, config_, buffer_, joint_states_.get(),
-                         JointPoseSource::Which::kTaken),
-        CloudSelection::Reader::kOnly, unknown_space_.get());
-    cycle_->continue_from(last_stamp_);
-  } else {
-    cycle_.reset();
-  }
-  if (joint_states_) {
-    listener_.ignore(model_->kinematics ? computed_frames(*model_->kinematics)
-                                        : std::vector<std::string>());
-    joint_states_->set_kinematics(model_->kinematics);
-  }
-  query_service_->set_model(model_);
-  if (self_proximity_) self_proximity_->set_model(model_);
-  if (link_pairs_) link_pairs_->set_model(model_);
-  spheres_.show(*model_);
-  set_source_targets(live_.get().query);
-  root_stands_still_ = false;
-  next_root_check_ = Clock::time_point();
-  choose_counted_links();
-}
-
-/// Decides which links count in ~min_distance and ~speed_scale, and tells it where it is new.
-void ProximityServer::Impl::choose_counted_links() {
-  const CountedLinks before = std::move(counted_);
-  counted_ = counted_links(*model_, config_, root_stands_still_);
-  results_.set_links(counted_);
-  std::string problem = counted_.problem;
-  if (model_->robot) {
-    const std::vector<std::string> missing =
-        SpeedScale(counted_.links).unknown_links(live_.get().speed_scale);
-    if (!missing.empty() && config_.speed_scale_enabled) {
-      problem += (problem.empty() ? "" : "; ") +
-                 ("~speed_scale/links names '" + join(missing, "', '")) +
-                 "', which is no monitored link: ~speed_scale stays 0";
-    }
-  }
-  const std::lock_guard<std::mutex> lock(report_mutex_);
-  if (!problem.empty() && problem != report_.counted_problem) ROS_WARN_STREAM(problem);
-  if (!counted_.explanation.empty() && counted_.explanation != before.explanation) {
-    ROS_INFO_STREAM(counted_.explanation);
-  }
-  report_.counted_problem = problem;
-  report_.counted_links = counted_.explanation;
-}
-
-/// A fixed frame outside of the URDF: the root stands still in it where tf says so for ever.
-void ProximityServer::Impl::notice_standing_root() {
-  if (!model_->robot || Clock::now() < next_root_check_) return;
-  if (!has_frame_outside(*model_, config_)) return;
-  next_root_check_ = Clock::now() + kRootPeriod;
-  Eigen::Isometry3d ignored;
-  ros::Time stamp;
-  const bool stands = look_up(buffer_, fixed_frame_of(*model_, config_), model_->root_link,
-                              ros::Time(), &ignored, &stamp)
-                          .empty() &&
-                      stamp.isZero();
-  if (stands == root_stands_still_) return;
-  root_stands_still_ = stands;
-  choose_counted_links();
-}
-
-/// Hands finer packings of the same robot to all parts, which go on with what they know.
-void ProximityServer::Impl::refine_model(std::shared_ptr<const ModelState> model) {
-  model_ = std::move(model);
-  cycle_->refine(model_);
-  query_service_->set_model(model_);
-  if (self_proximity_) self_proximity_->set_model(model_);
-  set_source_targets(live_.get().query);
-}
-
-/// [m] No obstacle of any source has a larger extent.
-double ProximityServer::Impl::largest_extent() const {
-  double largest = 0.0;
-  for (const SourceConfig& source : config_.sources) {
-    largest = std::max(largest, ist::largest_extent(source));
-  }
-  return largest;
-}
-
-/// Tells the sources the model, the fixed frame and the region of interest.
-void ProximityServer::Impl::set_source_targets(const QueryConfig& query) {
-  const std::string fixed_frame = fixed_frame_of(*model_, config_);
-  margin_ = query.margin;
-  RegionOfInterest region;
-  // The region follows from the joint limits of the URDF, which poses from tf need not respect.
-  const bool computes_poses = config_.pose_source == PoseSourceKind::kJointStates;
-  if (computes_poses && model_->robot && model_->kinematics) {
-    region = region_of_interest(*model_->robot, *model_->kinematics, fixed_frame,
-                                query.max_distance + query.margin + largest_extent());
-    // Clouds that were cropped before serve finer packings, too.
-    region_radius_ = region.radius = std::max(region.radius, region_radius_);
-  }
-  for (const auto& source : sources_) source->set_model(model_->robot, fixed_frame, region);
 }
 
 void ProximityServer::Impl::run_diagnostics() {

@@ -67,6 +67,8 @@ class ViewFilter {
   void report(ViewReport* report) const;
 
  private:
+  static constexpr std::size_t kPixels = TileView::kPixels;
+  static constexpr double kFlat = 0.0005;  ///< [m] a patch of surface deviates less from a plane
   // Standard deviations of noise. A camera shows the robot in some 10^4 windows thirty times a
   // second: a mean that is five off by chance comes once in ten seconds, one of three next to an
   // obstacle only where there is one.

@@ -15,7 +15,6 @@ namespace ist {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
-constexpr std::size_t kPixels = kTileSide * kTileSide;
 
 // [standard deviations] A mean that is more in front is an obstacle next to another one.
 constexpr double kBesideObstacle = 3.0;

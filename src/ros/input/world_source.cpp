@@ -5,13 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "internal/geometry/limits.h"
-#include "internal/geometry/mesh_io.h"
-#include "internal/robot/package_resolver.h"
-#include "ist_proximity/geometry/error.h"
-#include "ist_proximity/proximity/world_file.h"
 #include "ros/common/exceptions.h"
-#include "ros/common/frame_name.h"
 #include "ros/common/publish.h"
 #include "ros/common/thread_name.h"
 #include "ros/input/world_conversion.h"
@@ -26,11 +20,6 @@ using Kind = WorldFaultKind;
 const ros::WallDuration kPoll(0.02);
 // Messages change the world, so none may be lost.
 constexpr std::uint32_t kQueueSize = 1000;
-constexpr std::chrono::milliseconds kRobotPeriod(500);
-std::string frame_or_fixed(const std::string& frame) {
-  const std::string name = without_slash(frame);
-  return name.empty() ? kFixedFrame : name;
-}
 
 std::string place_of(const SourceConfig& config, const ros::NodeHandle& nh) {
   if (config.world.has_topic) return nh.resolveName(config.topic);
@@ -200,34 +189,6 @@ void WorldSource::show_faults() {
   state_.update([&](SourceReport* report) { report->incomplete = text; });
 }
 
-/// Reads the other robot's description as soon as it is there.
-void WorldSource::read_robot() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < next_reading_) return;
-  next_reading_ = now + kRobotPeriod;
-  std::vector<WorldObject> links;
-  std::vector<WorldFault> faults;
-  const std::string problem = robot_->read(&links, &faults);
-  if (!problem.empty()) {
-    if (faults_[fault_of(Kind::kRobot)] != problem) note_fault(fault_of(Kind::kRobot), problem);
-    return show_faults();
-  }
-  faults_.erase(fault_of(Kind::kRobot));
-  for (WorldObject& link : links) {
-    link.margin = config_.world.margin;
-    configured_.insert(link.name);
-  }
-  add(Kind::kRobot, links);
-  for (const WorldFault& fault : faults) {
-    note_fault(object_fault(fault.object), fault.text);
-    configured_.insert(fault.object);
-  }
-  show_faults();
-  is_robot_read_ = true;
-  ROS_INFO_STREAM("source '" << config_.name << "': another robot of " << links.size()
-                             << " links with geometry");
-}
-
 void WorldSource::count_publishers() {
   if (!config_.world.has_topic) return;
   const std::optional<std::uint32_t> publishers = publisher_count_.ask(subscriber_);
@@ -239,208 +200,6 @@ void WorldSource::count_publishers() {
     report->publishers = *publishers;
     if (advice) report->advice = *advice;
   });
-}
-
-void WorldSource::receive(const ist_proximity::WorldObjects& message) {
-  has_received_ = true;
-  state_.begin_work();
-  guard(Kind::kMessage, [&] { apply(message); });
-  state_.end_work();
-  note_receipt(message.header.stamp);
-}
-
-/// @param stamp  of the message; zero: it states none
-void WorldSource::note_receipt(const ros::Time& stamp) {
-  const ros::Time now = ros::Time::now();
-  stamp_ = stamp.isZero() ? now : std::min(stamp, now);
-  state_.update([&](SourceReport* report) {
-    ++report->messages;
-    report->newest = stamp_.toSec();
-  });
-}
-
-void WorldSource::apply(const ist_proximity::WorldObjects& message) {
-  const std::size_t limit = config_.world.limits.max_objects;
-  if (message.objects.size() > limit) {
-    note_fault(fault_of(Kind::kMessage),
-               "a message holds " + std::to_string(message.objects.size()) +
-                   " objects; allowed are " + std::to_string(limit) + " (~sources/" + config_.name +
-                   "/max_objects): it is not used");
-    return show_faults();
-  }
-  faults_.erase(fault_of(Kind::kMessage));
-  if (!message.replace_all) return change_all(message);
-  replace_from_topic([&] { change_all(message); });
-}
-
-/// Removes the objects of the topic and adds others. Where these exceed a limit, all stays as it
-/// was.
-void WorldSource::replace_from_topic(const std::function<void()>& change) {
-  WorldBuilder builder = builder_;
-  std::set<std::string> from_topic = from_topic_;
-  AttachedObjects attached = attached_;
-  std::map<std::string, std::string> to_restate = to_restate_;
-  WorldFaults faults = faults_;
-  for (const std::string& name : from_topic_) {
-    builder_.remove(name);
-    to_restate_.erase(name);
-    faults_.erase(object_fault(name));
-  }
-  from_topic_.clear();
-  faults_.erase(fault_of(Kind::kMany));
-  is_changed_ = true;
-  change();
-  const auto refused = faults_.find(fault_of(Kind::kMessage));
-  if (refused == faults_.end()) return;
-  // A limit is exceeded: the objects of before stay.
-  faults[fault_of(Kind::kMessage)] = refused->second;
-  builder_ = std::move(builder);
-  from_topic_ = std::move(from_topic);
-  attached_ = std::move(attached);
-  to_restate_ = std::move(to_restate);
-  faults_ = std::move(faults);
-  show_faults();
-}
-
-void WorldSource::change_all(const ist_proximity::WorldObjects& message) {
-  std::vector<WorldObject> added;
-  for (const ist_proximity::WorldObject& object : message.objects) {
-    const std::string name = printable(object.id);
-    try {
-      change(object, &added);
-    } catch (const ModelError& error) {
-      // An older description that the message holds must not end the fault of this one.
-      add(Kind::kMessage, std::exchange(added, {}));
-      note_fault(object_fault(object.id), "object '" + name + "': " + error.what());
-    }
-  }
-  add(Kind::kMessage, added);
-}
-
-/// Applies what a message says of one object; objects to add are collected, because many are built
-/// faster together.
-void WorldSource::change(const ist_proximity::WorldObject& message,
-                         std::vector<WorldObject>* added) {
-  using Message = ist_proximity::WorldObject;
-  if (message.operation == Message::ADD) {
-    remember_from_topic(message.id);
-    added->push_back(to_world_object(message, config_.world, [this] { return !running_.load(); }));
-    return;
-  }
-  if (!added->empty()) {  // in the order of the message
-    add(Kind::kMessage, *added);
-    added->clear();
-  }
-  is_changed_ = true;
-  if (message.operation == Message::REMOVE) {
-    builder_.remove(message.id);
-    from_topic_.erase(message.id);
-    faults_.erase(object_fault(message.id));
-  } else if (message.operation == Message::MOVE) {
-    const std::string fault =
-        builder_.move(message.id, frame_of(message.header.frame_id), to_object_pose(message.pose));
-    if (!fault.empty()) throw ModelError(fault);
-    faults_.erase(object_fault(message.id));
-  } else {
-    throw ModelError("operation is " + std::to_string(message.operation) +
-                     "; allowed is 0 (ADD), 1 (REMOVE), 2 (MOVE)");
-  }
-}
-
-/// Notes that an object is removed when those of the topic are replaced. One that parameters, the
-/// file or the other robot state as well stays, because nobody would send it again.
-void WorldSource::remember_from_topic(const std::string& name) {
-  // Names of objects that were never built are limited, too.
-  const std::size_t most = 2 * config_.world.limits.max_objects;
-  if (configured_.count(name) == 0 && from_topic_.size() < most) from_topic_.insert(name);
-}
-
-/// @param stated  by a message; may be empty
-std::string WorldSource::frame_of(const std::string& stated) const {
-  return frame_or_fixed(stated.empty() ? config_.world.frame_id : stated);
-}
-
-/// The links that ~allowed_contacts names for an object.
-std::vector<std::string> WorldSource::configured_contacts(const std::string& object) const {
-  std::vector<std::string> links;
-  for (const auto& [link, name] : config_.world.allowed_contacts) {
-    if (name == object) links.push_back(link);
-  }
-  return links;
-}
-
-/// @param what  the key of a fault of all of them
-void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objects) {
-  std::vector<WorldObject> complete;
-  std::set<std::string> names;
-  for (const WorldObject& object : objects) {
-    const bool is_twice = builder_.contains(object.name) || !names.insert(object.name).second;
-    if (what != Kind::kMessage && is_twice) {
-      note_fault(object_fault(object.name),
-                 "object '" + printable(object.name) +
-                     "' is stated twice, by parameters, the file or the other robot; "
-                     "names must be unique in a source");
-      continue;
-    }
-    complete.push_back(object);
-    complete.back().frame = frame_or_fixed(object.frame);
-    to_restate_.erase(object.name);
-    faults_.erase(object_fault(object.name));
-    const std::vector<std::string> links = configured_contacts(object.name);
-    std::vector<std::string>& allowed = complete.back().allowed_links;
-    allowed.insert(allowed.end(), links.begin(), links.end());
-  }
-  const std::vector<WorldFault> faults =
-      builder_.add(complete, [this] { return !running_.load(); });
-  for (const WorldFault& fault : faults) {
-    note_fault(fault.object.empty() ? fault_of(what) : object_fault(fault.object), fault.text);
-  }
-  is_changed_ = true;
-  show_faults();
-}
-
-/// Reads the objects of the parameters and of the file.
-void WorldSource::read_configured() {
-  const WorldConfig& world = config_.world;
-  std::vector<WorldObject> objects;
-  for (const WorldObjectConfig& config : world.objects) {
-    WorldObject object = config.object;
-    try {
-      if (!config.mesh.empty()) {
-        GeometryElement element;
-        element.source = config.mesh;
-        element.shape = load_mesh(resolve_uri(config.mesh, environment_package_finder()),
-                                  config.scale, [this] { return !running_.load(); });
-        object.geometry = {std::move(element)};
-      }
-      objects.push_back(std::move(object));
-    } catch (const ModelError& error) {
-      note_fault(object_fault(object.name), "object '" + object.name + "': " + error.what());
-    }
-  }
-  if (!config_.file.empty()) {
-    SceneFile scene = read_scene_file(config_.file, frame_or_fixed(world.frame_id), world.limits);
-    if (!scene.fault.empty()) note_fault(fault_of(Kind::kConfigured), scene.fault);
-    for (WorldObject& object : scene.objects) {
-      object.margin = world.margin;
-      objects.push_back(std::move(object));
-    }
-  }
-  for (const auto& contact : world.allowed_contacts) {
-    const std::string& allowed = contact.second;
-    const bool is_object = std::any_of(objects.begin(), objects.end(),
-                                       [&](const auto& object) { return object.name == allowed; });
-    if (!is_object && !world.has_topic) {
-      ROS_WARN_STREAM("source '" << config_.name << "': allowed_contacts names '" << allowed
-                                 << "', which is no object");
-    }
-  }
-  for (const WorldObjectConfig& config : world.objects) configured_.insert(config.object.name);
-  for (const WorldObject& object : objects) configured_.insert(object.name);
-  stamp_ = ros::Time::now();
-  add(Kind::kConfigured, objects);
-  ROS_INFO_STREAM("source '" << config_.name << "': a known world of " << builder_.size()
-                             << " objects");
 }
 
 void WorldSource::take_target() {
