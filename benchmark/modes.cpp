@@ -252,8 +252,7 @@ void print_instruction_sets(const Bench& bench) {
   choose(0);
 }
 
-// With --instr-atstart=no callgrind looks at nothing before: measuring the distance fields would
-// take it a quarter of an hour.
+// Callgrind, run with --instr-atstart=no, counts nothing before this call.
 void start_counting() {
 #ifdef CALLGRIND_START_INSTRUMENTATION
   CALLGRIND_START_INSTRUMENTATION;

@@ -1,4 +1,4 @@
-// The two threads of ProximityServer, and what they publish.
+// This part of ProximityServer runs its two threads and publishes their results.
 
 #include <ros/console.h>
 #include <sensor_msgs/PointCloud2.h>

@@ -1,4 +1,4 @@
-// The robot model: the part of ProximityServer that hands it to all others.
+// This part of ProximityServer hands the robot model to all others.
 
 #include <ros/console.h>
 

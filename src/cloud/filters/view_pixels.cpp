@@ -1,4 +1,4 @@
-// What the pixels of a tile show: the part of ViewFilter that looks at one tile.
+// This part of ViewFilter looks at one tile and decides what its pixels show.
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
-// The objects that parameters, the file and the other robot state: the part of WorldSource that
-// reads them, and that adds objects of any origin.
+// This part of WorldSource reads the objects that parameters, the file and the other robot state,
+// and adds objects of any origin.
 
 #include <ros/console.h>
 

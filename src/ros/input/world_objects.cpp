@@ -1,4 +1,4 @@
-// The WorldObjects messages of a known world: the part of WorldSource that applies them.
+// This part of WorldSource applies WorldObjects messages.
 
 #include <algorithm>
 #include <map>
