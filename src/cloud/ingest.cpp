@@ -8,6 +8,7 @@
 #include <string>
 
 #include "cloud/filters/self_filter.h"
+#include "cloud/index/near_region.h"
 #include "cloud/index/organized_cloud.h"
 #include "cloud/index/point_bvh_builder.h"
 #include "cloud/index/scene_axes.h"
@@ -114,6 +115,7 @@ struct Ingest::Impl {
   RegionOfInterest region;
   PointBvhBuilder builder;
   SelfFilter self_filter;
+  NearRegion near;
   std::unique_ptr<ViewFilter> view;  // null: the self-filter drops all that is within its padding
   LookedBlocks looked;               // of the cloud that `view` has seen last
 
@@ -197,8 +199,8 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
     kept = index_organized(cloud, crop, on_robot, view, view != nullptr ? &impl_->looked : nullptr,
                            &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
-    kept =
-        index_unorganized(cloud, crop, on_robot, &impl_->builder, &snapshot->index.bvh(), &counts);
+    kept = index_unorganized(cloud, crop, on_robot, &impl_->near, &impl_->builder,
+                             &snapshot->index.bvh(), &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -

@@ -113,20 +113,30 @@ TEST(PointCells, eachPointIsInOneCell) {
       cells.start(sample.data(), sample.size(), cloud.size());
       cells.add(cloud.data(), cloud.size());
       std::vector<bool> seen(cloud.size(), false);
-      for (auto cell = cells.next(); cell.size > 0; cell = cells.next()) {
+      std::size_t visited = 0;
+      cells.for_each_first([&visited](const CloudPoint&) { ++visited; });
+      for (; cells.next(); --visited) {
+        Cloud parts;
+        cells.for_each_part([&parts](const CloudPoint* part, std::size_t n) {
+          parts.insert(parts.end(), part, part + n);
+        });
+        const PointCells::Points cell = cells.points();
+        ASSERT_EQ(cell.size, parts.size());
         for (std::size_t i = 0; i < cell.size; ++i) {
           const std::uint32_t id = cell.points[i].id;
           ASSERT_LT(id, cloud.size());
           ASSERT_TRUE(is_same(cell.points[i], cloud[id]));
+          ASSERT_TRUE(is_same(cell.points[i], parts[i]));
           ASSERT_FALSE(seen[id]);
           ASSERT_TRUE(i == 0 || cell.points[i - 1].id < id)
               << "the order of the message must be kept";
           seen[id] = true;
         }
       }
+      EXPECT_EQ(visited, 0U) << "each cell has one first point";
       EXPECT_EQ(std::count(seen.begin(), seen.end(), true),
                 static_cast<std::ptrdiff_t>(cloud.size()));
-      EXPECT_EQ(cells.next().size, 0U);
+      EXPECT_FALSE(cells.next());
     }
   });
 }
@@ -139,9 +149,7 @@ TEST(PointCells, cellsAreSmall) {
   cells.start(sample.data(), sample.size(), cloud.size());
   cells.add(cloud.data(), cloud.size());
   std::size_t most = 0;
-  for (auto cell = cells.next(); cell.size > 0; cell = cells.next()) {
-    most = std::max(most, cell.size);
-  }
+  while (cells.next()) most = std::max(most, cells.points().size);
   EXPECT_LT(most, cloud.size() / 50);
 }
 

@@ -55,17 +55,12 @@ class Cropper {
       tally.outside_region += in_range - hn::CountTrue(d, keep);
     }
     const auto nan = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
-    const std::size_t kept = hn::CountTrue(d, keep);
-    auto to_x = nan;
-    if (kept > 0) {
-      to_x = hn::IfThenElse(keep, MovedAlong(0, x, y, z), nan);
-      hn::Store(hn::DemoteTo(f, MovedAlong(1, x, y, z)), f, batch_.y + k);
-      hn::Store(hn::DemoteTo(f, MovedAlong(2, x, y, z)), f, batch_.z + k);
-      tally.kept += kept;
-    }
-    hn::Store(hn::DemoteTo(f, to_x), f, batch_.x + k);
-    if (kept == hn::Lanes(d)) return;
     const auto infinity = hn::Set(d, std::numeric_limits<double>::infinity());
+    // Without branches: in a cloud whose points are in no order, none could be foretold.
+    hn::Store(hn::DemoteTo(f, hn::IfThenElse(keep, MovedAlong(0, x, y, z), nan)), f, batch_.x + k);
+    hn::Store(hn::DemoteTo(f, MovedAlong(1, x, y, z)), f, batch_.y + k);
+    hn::Store(hn::DemoteTo(f, MovedAlong(2, x, y, z)), f, batch_.z + k);
+    tally.kept += hn::CountTrue(d, keep);
     tally.not_a_number += hn::CountTrue(d, hn::Not(hn::Eq(sq, sq)));
     tally.infinite_square += hn::CountTrue(d, hn::Eq(sq, infinity));
   }

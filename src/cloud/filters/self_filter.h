@@ -48,6 +48,7 @@ class SelfFilter {
 
   /// Whether a point is the robot's. @param p_O  [m]
   bool is_on_link(const Link& link, const Eigen::Vector3d& p_O) const;
+  const std::vector<Link>& links() const { return links_; }
   /// The links of the group that began last.
   const std::vector<const Link*>& group() const { return group_; }
 

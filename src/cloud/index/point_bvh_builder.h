@@ -35,9 +35,12 @@ class PointBvhBuilder {
              const PointFilter& drop, PointBvh* bvh);
 
   /// Builds over the points in cells().
-  /// @param may_drop  may be empty: a filter may drop any point
-  void build(const Eigen::Isometry3d& X_FO, const PointFilter& drop, const BoxFilter& may_drop,
-             PointBvh* bvh);
+  /// @param may_drop    may be empty: a filter may drop any point
+  /// @param is_distant  may be empty. Called once for the box of each cell: whether no query will
+  ///                    look at its points soon. They are not sliced then, and not filtered: their
+  ///                    tiles are as large as the cell.
+  void build_from_cells(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
+                        const BoxFilter& may_drop, const BoxFilter& is_distant, PointBvh* bvh);
   PointCells& cells() { return cells_; }
 
   /// Builds tile by tile, for callers that know which points are neighbours: start(), then
@@ -84,6 +87,8 @@ class PointBvhBuilder {
 
   void read_few_lazy_tiles();
   void append_lazy(const std::uint32_t* first_pixels, std::size_t count);
+  PaddedBox cell_box() const;
+  void add_unsliced_cell(const PaddedBox& box);
   void add_points(CloudPoint* points, CloudPoint* spare, std::size_t n, const Filters& filters);
   void slice_into_tiles(CloudPoint* points, CloudPoint* spare, std::size_t n);
   template <typename Visit>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "cloud/index/point_bvh_builder.h"
 #include "internal/bvh/padded_box.h"
@@ -42,6 +43,30 @@ void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visi
   for (std::size_t i = 0; i < slices; ++i) {
     visit(parts * i / slices * part, std::min(parts * (i + 1) / slices * part, n));
   }
+}
+
+PaddedBox PointBvhBuilder::cell_box() const {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  PaddedBox box = {{kInfinity, kInfinity, kInfinity, 0.0F},
+                   {-kInfinity, -kInfinity, -kInfinity, 0.0F}};
+  cells_.for_each_part(
+      [&](const CloudPoint* points, std::size_t n) { box.extend(box_of(points, n)); });
+  return box;
+}
+
+// Adds the points of a cell in the order in which they were added.
+// @param box  of the cell's points
+void PointBvhBuilder::add_unsliced_cell(const PaddedBox& box) {
+  cells_.for_each_part([&](const CloudPoint* points, std::size_t n) {
+    PointTile* tiles = next_tiles((n + kWidth - 1) / kWidth);
+    for (std::size_t count = fill_tiles(points, n, tiles); count > 0; --count) {
+      bvh_->size_ += static_cast<std::size_t>(bvh_->tiles_[used_].count);
+      ungrouped_.push_back({box, ~static_cast<std::int32_t>(used_)});
+      ++used_;
+      if (ungrouped_.size() - group_begin_ == kWidth) end_group();
+    }
+  });
+  end_group();
 }
 
 // Adds the points of a cell: slices them until the parts fit a batch.
@@ -147,20 +172,27 @@ void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* poi
   for (std::size_t i = 0; i < n && count < sample.size(); i += stride) sample[count++] = points[i];
   cells_.start(sample.data(), count, n);
   cells_.add(points, n);
-  build(X_FO, drop, {}, bvh);
+  build_from_cells(X_FO, drop, {}, {}, bvh);
 }
 
-void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
-                            const BoxFilter& may_drop, PointBvh* bvh) {
+void PointBvhBuilder::build_from_cells(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
+                                       const BoxFilter& may_drop, const BoxFilter& is_distant,
+                                       PointBvh* bvh) {
   start(X_FO, bvh);
   // Far more than needed: the number of nodes differs from cloud to cloud of a stream, and memory
   // is to be allocated once.
   const std::size_t enough = cells_.size() / (4 * kWidth) + kWidth;
   if (bvh->nodes_.capacity() < enough) bvh->nodes_.reserve(2 * enough);
   ungrouped_.reserve(kEnough + TileBatch::kMost);
-  for (auto cell = cells_.next(); cell.size > 0; cell = cells_.next()) {
-    if (spare_.size() < cell.size + kPointSlack) spare_.resize(2 * (cell.size + kPointSlack));
-    add_points(cell.points, spare_.data(), cell.size, {drop, may_drop});
+  while (cells_.next()) {
+    const PaddedBox box = is_distant ? cell_box() : PaddedBox();
+    if (is_distant && is_distant(box)) {
+      add_unsliced_cell(box);
+    } else {
+      const PointCells::Points cell = cells_.points();
+      if (spare_.size() < cell.size + kPointSlack) spare_.resize(2 * (cell.size + kPointSlack));
+      add_points(cell.points, spare_.data(), cell.size, {drop, may_drop});
+    }
     end_cell();
   }
   finish();

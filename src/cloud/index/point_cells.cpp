@@ -34,7 +34,7 @@ void PointCells::start(CloudPoint* sample, std::size_t count, std::size_t n) {
   first_.fill(0);
   end_.fill(0);
   chunks_ = 1;
-  size_ = taken_ = 0;
+  size_ = cell_ = taken_ = 0;
   grid_ = PointGrid();
   if (count == 0) return;
   float max[3];
@@ -113,21 +113,26 @@ void PointCells::skip_empty() {
   prefetch_lines(&pool_[begin], here * sizeof(CloudPoint));
 }
 
-PointCells::Cell PointCells::next() {
+bool PointCells::next() {
   if (taken_ == 0) skip_empty();
-  if (taken_ == end_.size()) return {nullptr, 0};
-  const std::size_t i = taken_++;
+  if (taken_ == end_.size()) return false;
+  cell_ = taken_++;
   skip_empty();
-  const std::size_t end = end_[i], last = (end - 1) / kChunk;
-  std::size_t chunk = first_[i] / kChunk, count = 0;
-  if (chunk == last) return {&pool_[chunk * kChunk], end - chunk * kChunk};
-  for (;; chunk = next_[chunk]) {
-    const std::size_t begin = chunk * kChunk, here = chunk == last ? end - begin : kChunk;
-    if (cell_.size() < count + here + kPointSlack) cell_.resize(2 * (count + here + kPointSlack));
-    std::copy_n(&pool_[begin], here, &cell_[count]);
-    count += here;
-    if (chunk == last) return {cell_.data(), count};
-  }
+  return true;
+}
+
+PointCells::Points PointCells::points() {
+  const std::size_t begin = first_[cell_], end = end_[cell_];
+  if (begin / kChunk == (end - 1) / kChunk) return {&pool_[begin], end - begin};
+  std::size_t count = 0;
+  for_each_part([&](const CloudPoint* part, std::size_t n) {
+    if (gathered_.size() < count + n + kPointSlack) {
+      gathered_.resize(2 * (count + n + kPointSlack));
+    }
+    std::copy_n(part, n, &gathered_[count]);
+    count += n;
+  });
+  return {gathered_.data(), count};
 }
 
 }  // namespace ist

@@ -34,16 +34,36 @@ class PointCells {
   /// Number of points added.
   std::size_t size() const { return size_; }
 
-  /// The points of one cell, in the order in which they were added.
-  struct Cell {
+  /// Visits one point of each cell that is not empty.
+  template <typename Visit>
+  void for_each_first(const Visit& visit) const {
+    for (std::size_t i = 0; i < end_.size(); ++i) {
+      if (end_[i] != 0) visit(pool_[first_[i]]);
+    }
+  }
+
+  /// Some points of a cell.
+  struct Points {
     CloudPoint* points;
     std::size_t size;
   };
-  /// The next cell that is not empty, in Morton order: neighbours in this order are mostly
-  /// neighbours in space. Valid until the next call; may be overwritten, and kPointSlack points
-  /// after it may be read.
-  /// @returns an empty cell after the last one
-  Cell next();
+  /// Goes to the next cell that is not empty, in Morton order: neighbours in this order are mostly
+  /// neighbours in space. @returns false after the last one
+  bool next();
+  /// Visits the points of the cell, part by part, in the order in which they were added.
+  /// kPointSlack points after a part may be read.
+  template <typename Visit>
+  void for_each_part(const Visit& visit) const {
+    const std::size_t end = end_[cell_], last = (end - 1) / kChunk;
+    for (std::size_t chunk = first_[cell_] / kChunk;; chunk = next_[chunk]) {
+      const std::size_t begin = chunk * kChunk;
+      visit(&pool_[begin], chunk == last ? end - begin : kChunk);
+      if (chunk == last) return;
+    }
+  }
+  /// All points of the cell in one array, in the order in which they were added. Valid until the
+  /// next call; may be overwritten, and kPointSlack points after it may be read.
+  Points points();
 
  private:
   static constexpr std::size_t kChunk = 128;
@@ -56,10 +76,11 @@ class PointCells {
   CellBatch batch_;
   std::array<std::uint32_t, PointGrid::kMostCells> first_{}, end_{};  ///< points in pool_, or 0
   std::vector<CloudPoint> pool_;
-  std::vector<std::uint32_t> next_;  ///< by chunk: the next one of its cell
-  std::vector<CloudPoint> cell_;     ///< buffer for a cell of more than one chunk
+  std::vector<std::uint32_t> next_;   ///< by chunk: the next one of its cell
+  std::vector<CloudPoint> gathered_;  ///< buffer for a cell of more than one chunk
   std::size_t size_ = 0;
-  std::size_t taken_ = 0;   ///< cells that next() has returned or skipped
+  std::size_t cell_ = 0;    ///< that next() has gone to
+  std::size_t taken_ = 0;   ///< cells that next() has gone to or skipped
   std::size_t chunks_ = 1;  ///< in use; the first one stays empty
 };
 

@@ -30,6 +30,12 @@ HWY_INLINE hn::Vec<CellTag> Spread(const PointGrid& grid, int axis, hn::Vec<Poin
   return hn::And(hn::Or(bits, hn::ShiftLeft<2>(bits)), hn::Set(di, 0x249));
 }
 
+// `first` and the numbers after it. Iota of a variable goes through memory in Highway 1.0.
+HWY_INLINE hn::Vec<IdTag> From(std::uint32_t first) {
+  const IdTag du;
+  return hn::Add(hn::Iota(du, 0U), hn::Set(du, first));
+}
+
 // Appends the cells of the points in slots from k on that are to be kept. @returns how many
 template <class M>
 HWY_INLINE std::size_t Append(const PointGrid& grid, hn::Vec<PointTag> x, hn::Vec<PointTag> y,
@@ -39,7 +45,7 @@ HWY_INLINE std::size_t Append(const PointGrid& grid, hn::Vec<PointTag> x, hn::Ve
   const auto cell = hn::Or(hn::Or(Spread(grid, 0, x), hn::ShiftLeft<1>(Spread(grid, 1, y))),
                            hn::ShiftLeft<2>(Spread(grid, 2, z)));
   const auto entry =
-      hn::Or(hn::BitCast(du, hn::ShiftLeft<8>(cell)), hn::Iota(du, static_cast<std::uint32_t>(k)));
+      hn::Or(hn::BitCast(du, hn::ShiftLeft<8>(cell)), From(static_cast<std::uint32_t>(k)));
   hn::StoreU(compress::Compressor<PointTag>(keep)(du, entry), du, cells);
   return hn::CountTrue(PointTag(), keep);
 }
@@ -47,12 +53,11 @@ HWY_INLINE std::size_t Append(const PointGrid& grid, hn::Vec<PointTag> x, hn::Ve
 std::size_t FindCellsOfCrop(const PointGrid& grid, const CropBatch& crop, std::size_t count,
                             std::uint32_t first_id, CellBatch* batch) {
   const PointTag d;
-  const IdTag du;
   std::size_t kept = 0;
   for (std::size_t k = 0; k < count; k += hn::Lanes(d)) {
     const auto x = hn::Load(d, crop.x + k), y = hn::Load(d, crop.y + k),
                z = hn::Load(d, crop.z + k);
-    const auto id = hn::Iota(du, first_id + static_cast<std::uint32_t>(k));
+    const auto id = From(first_id + static_cast<std::uint32_t>(k));
     hn::StoreInterleaved4(x, y, z, hn::BitCast(d, id), d, &batch->points[k].x);
     const auto keep = hn::And(hn::Eq(x, x), hn::FirstN(d, count - k));
     kept += Append(grid, x, y, z, keep, k, batch->cells + kept);

@@ -96,12 +96,13 @@ bool FindSlices(const CloudPoint* points, std::size_t n, std::int32_t count, std
   return true;
 }
 
-HWY_INLINE void WriteTile(const CloudPoint* points, std::size_t n, const PointBox& box,
-                          TileBatch* batch) {
+PaddedBox BoxOfPoints(const CloudPoint* points, std::size_t n) { return Padded(BoxOf(points, n)); }
+
+HWY_INLINE void FillTile(const CloudPoint* points, std::size_t n, PointTile* to) {
   const PointTag d;
   const IdTag du;
   const auto far = hn::Set(d, kFarAway);
-  PointTile& tile = batch->tiles[batch->count];
+  PointTile& tile = *to;
   for (std::size_t k = 0; k < kTilePoints; k += hn::Lanes(d)) {
     const auto used = hn::FirstN(d, n > k ? n - k : 0);
     const PointVectors v = LoadPoints(points + k);
@@ -111,6 +112,19 @@ HWY_INLINE void WriteTile(const CloudPoint* points, std::size_t n, const PointBo
     hn::Store(hn::BitCast(du, hn::IfThenElseZero(used, v.id)), du, tile.id + k);
   }
   tile.count = static_cast<std::int32_t>(n);
+}
+
+std::size_t FillTiles(const CloudPoint* points, std::size_t n, PointTile* tiles) {
+  std::size_t count = 0;
+  for (std::size_t begin = 0; begin < n; begin += kTilePoints, ++count) {
+    FillTile(points + begin, std::min(kTilePoints, n - begin), &tiles[count]);
+  }
+  return count;
+}
+
+HWY_INLINE void WriteTile(const CloudPoint* points, std::size_t n, const PointBox& box,
+                          TileBatch* batch) {
+  FillTile(points, n, &batch->tiles[batch->count]);
   BoxNode& to = batch->boxes[batch->count / kTilePoints];
   const std::size_t slot = batch->count % kTilePoints;
   to.min_x[slot] = box.min[0];
@@ -182,6 +196,8 @@ void MakeTiles(CloudPoint* points, std::size_t n, TileBatch* batch) {
 
 }  // namespace slice
 
+using slice::BoxOfPoints;
+using slice::FillTiles;
 using slice::FindSlices;
 using slice::MakeTiles;
 
@@ -192,12 +208,22 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
+HWY_EXPORT(BoxOfPoints);
+HWY_EXPORT(FillTiles);
 HWY_EXPORT(FindSlices);
 HWY_EXPORT(MakeTiles);
 
 bool find_slices(const CloudPoint* points, std::size_t n, std::int32_t count, std::int32_t* slices,
                  BoxShape* shape) {
   return HWY_DYNAMIC_DISPATCH(FindSlices)(points, n, count, slices, shape);
+}
+
+PaddedBox box_of(const CloudPoint* points, std::size_t n) {
+  return HWY_DYNAMIC_DISPATCH(BoxOfPoints)(points, n);
+}
+
+std::size_t fill_tiles(const CloudPoint* points, std::size_t n, PointTile* tiles) {
+  return HWY_DYNAMIC_DISPATCH(FillTiles)(points, n, tiles);
 }
 
 void make_tiles(CloudPoint* points, std::size_t n, TileBatch* batch) {

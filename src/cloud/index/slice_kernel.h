@@ -5,6 +5,7 @@
 
 #include "cloud/format/cloud_point.h"
 #include "internal/bvh/box_node.h"
+#include "internal/bvh/padded_box.h"
 #include "internal/cloud/point_tile.h"
 
 namespace ist {
@@ -25,6 +26,10 @@ struct BoxShape {
 bool find_slices(const CloudPoint* points, std::size_t n, std::int32_t count, std::int32_t* slices,
                  BoxShape* shape);
 
+/// The box of some points.
+/// @param points  one at least, and kPointSlack more that may be read
+PaddedBox box_of(const CloudPoint* points, std::size_t n);
+
 /// Tiles that are being made, and their boxes.
 struct TileBatch {
   static constexpr std::size_t kMost = 1024;
@@ -39,5 +44,11 @@ struct TileBatch {
 /// apart (split_rule.h) are split further. Unused slots are far away.
 /// @param points  no more than TileBatch::kMost in all; their order changes
 void make_tiles(CloudPoint* points, std::size_t n, TileBatch* batch);
+
+/// Fills tiles with sixteen consecutive points each, the last with fewer. Unused slots are far
+/// away.
+/// @param points  n of them, and kPointSlack more that may be read
+/// @returns how many
+std::size_t fill_tiles(const CloudPoint* points, std::size_t n, PointTile* tiles);
 
 }  // namespace ist

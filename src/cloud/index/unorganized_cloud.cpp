@@ -44,8 +44,8 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sampl
 }  // namespace
 
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              SelfFilter* on_robot, PointBvhBuilder* builder, PointBvh* bvh,
-                              IngestCounts* counts) {
+                              SelfFilter* on_robot, NearRegion* near, PointBvhBuilder* builder,
+                              PointBvh* bvh, IngestCounts* counts) {
   const RawCloud points = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();
@@ -63,14 +63,18 @@ std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
     }
   }
   if (on_robot == nullptr) {
-    builder->build(crop.X_FO, {}, {}, bvh);
+    builder->build_from_cells(crop.X_FO, {}, {}, {}, bvh);
   } else {
-    builder->build(
+    near->start(on_robot->links());
+    cells.for_each_first([near](const CloudPoint& p) { near->add({p.x, p.y, p.z}); });
+    near->finish();
+    builder->build_from_cells(
         crop.X_FO,
         [on_robot](const PointTile& tile, const PaddedBox& box) {
           return on_robot->points_on_robot(tile, box);
         },
-        [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); }, bvh);
+        [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); },
+        [near](const PaddedBox& box) { return near->is_outside(box); }, bvh);
   }
   return kept;
 }

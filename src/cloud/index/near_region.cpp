@@ -1,0 +1,65 @@
+#include "cloud/index/near_region.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace ist {
+namespace {
+
+// [m] What a link may move until the next cloud comes and still find points in quick order.
+constexpr float kMotion = 0.1F;
+
+}  // namespace
+
+void NearRegion::start(const std::vector<SelfFilter::Link>& links) {
+  links_.resize(links.size());
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    const SphereNode& root = links[i].tree->nodes().front();
+    Link& link = links_[i];
+    const Eigen::Isometry3d X_OL = links[i].X_LO.inverse();
+    for (int k = 0; k < kSphereWidth; ++k) {
+      const bool is_used = k < root.count;
+      const Eigen::Vector3d p_L =
+          is_used ? Eigen::Vector3d(root.x[k], root.y[k], root.z[k]) : Eigen::Vector3d::Zero();
+      const Eigen::Vector3f p_O = (X_OL * p_L).cast<float>();
+      link.x[k] = p_O.x();
+      link.y[k] = p_O.y();
+      link.z[k] = p_O.z();
+      link.radius[k] = is_used ? root.radius[k] : -kFarAway;
+    }
+    link.clear_distance = links[i].clear_distance;
+    link.nearest = std::numeric_limits<float>::infinity();
+  }
+}
+
+void NearRegion::add(const Eigen::Vector3f& p_O) {
+  for (Link& link : links_) {
+    const Spheres sq =
+        (link.x - p_O.x()).square() + (link.y - p_O.y()).square() + (link.z - p_O.z()).square();
+    link.here = (sq.sqrt() - link.radius).minCoeff();
+    if (!(link.here > link.clear_distance)) return;  // may be the robot's
+  }
+  for (Link& link : links_) link.nearest = std::min(link.nearest, link.here);
+}
+
+// The distance of a link is at most that of its nearest sphere and a sphere's size more.
+void NearRegion::finish() {
+  for (Link& link : links_) {
+    const Spheres reach = 2.0F * link.radius + (link.clear_distance + link.nearest + kMotion);
+    link.reach_sq = (link.radius >= 0.0F).select(reach.square(), -1.0F);
+  }
+}
+
+bool NearRegion::is_outside(const PaddedBox& box) const {
+  const auto off = [](const Spheres& center, float min, float max) {
+    return (min - center).max(center - max).max(0.0F);
+  };
+  return !links_.empty() && std::all_of(links_.begin(), links_.end(), [&](const Link& link) {
+    const Spheres sq = off(link.x, box.min[0], box.max[0]).square() +
+                       off(link.y, box.min[1], box.max[1]).square() +
+                       off(link.z, box.min[2], box.max[2]).square();
+    return (sq > link.reach_sq).all();
+  });
+}
+
+}  // namespace ist

@@ -1,0 +1,234 @@
+#include "cloud/index/near_region.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/proximity/proximity_query.h"
+#include "ist_proximity/robot/link_poses.h"
+#include "support/random_links.h"
+#include "support/scene.h"
+#include "support/tiles.h"
+#include "support/trial.h"
+
+namespace ist {
+namespace {
+
+using Points = std::vector<Eigen::Vector3f>;
+using Poses = std::vector<Eigen::Isometry3d>;
+
+constexpr double kPadding = 0.02;
+constexpr double kRounding = 1e-6;
+
+// A robot of random links side by side, and the exact distance of points from it.
+struct Robot {
+  std::vector<LinkGeometry> links;
+  std::shared_ptr<const RobotModel> model;
+  std::vector<bool> known;
+  Poses X_FL;
+
+  explicit Robot(test::Rng* rng) : links(test::random_links(rng)) {
+    model = test::model_of(links, 0.01);
+    known.assign(links.size(), true);
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      X_FL.push_back(test::random_pose(rng, 0.3));
+      X_FL.back().pretranslate(Eigen::Vector3d(0.0, 0.4 * static_cast<double>(i % 4), 0.0));
+    }
+  }
+
+  double distance(std::size_t link, const Eigen::Vector3f& p_F) const {
+    const Eigen::Vector3d p_L = X_FL[link].inverse() * p_F.cast<double>();
+    return model->links[link].solid.signed_distance(p_L).distance;
+  }
+  double distance(const Eigen::Vector3f& p_F) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < links.size(); ++i) nearest = std::min(nearest, distance(i, p_F));
+    return nearest;
+  }
+  Poses moved(const Eigen::Vector3d& by) const {
+    Poses poses = X_FL;
+    for (Eigen::Isometry3d& X : poses) X.pretranslate(by);
+    return poses;
+  }
+};
+
+// Points all over a room, in patches of 5 cm.
+Points room(test::Rng* rng, std::size_t n, double size) {
+  Points points;
+  constexpr std::size_t kPatch = 20;
+  while (points.size() < n) {
+    const Eigen::Vector3d patch = test::random_vector(rng, size);
+    for (std::size_t k = 0; k < kPatch; ++k) {
+      points.push_back((patch + test::random_vector(rng, 0.05)).cast<float>());
+    }
+  }
+  return points;
+}
+
+PaddedBox box_of(const Eigen::AlignedBox3f& box) {
+  const Eigen::Vector3f &min = box.min(), &max = box.max();
+  return {{min.x(), min.y(), min.z(), 0.0F}, {max.x(), max.y(), max.z(), 0.0F}};
+}
+
+PaddedBox box_of(const Eigen::Vector3f& p) { return box_of(Eigen::AlignedBox3f(p)); }
+
+NearRegion region_of(const Robot& robot, const Poses& X_FL, const Points& points) {
+  const std::vector<PosedSolid> solids = posed_solids(*robot.model, X_FL, robot.known);
+  SelfFilter filter;
+  filter.set_poses(solids, Eigen::Isometry3d::Identity(), kPadding);
+  NearRegion region;
+  region.start(filter.links());
+  for (const Eigen::Vector3f& p : points) region.add(p);
+  region.finish();
+  return region;
+}
+
+TEST(NearRegion, holdsThePointNearestToEachLinkAndEveryPointOfTheRobot) {
+  std::size_t outside = 0, all = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    test::Rng rng(seed);
+    const Robot robot(&rng);
+    const Points points = room(&rng, 600, test::uniform(&rng, 0.5, 3.0));
+    const NearRegion region = region_of(robot, robot.X_FL, points);
+    std::vector<double> nearest(robot.links.size(), std::numeric_limits<double>::infinity());
+    std::vector<Eigen::Vector3f> where(robot.links.size());
+    for (const Eigen::Vector3f& p : points) {
+      const bool is_outside = region.is_outside(box_of(p));
+      outside += is_outside ? 1 : 0;
+      ++all;
+      const double distance = robot.distance(p);
+      ASSERT_FALSE(is_outside && distance <= kPadding + kRounding);
+      if (distance <= kPadding) continue;
+      for (std::size_t i = 0; i < nearest.size(); ++i) {
+        const double here = robot.distance(i, p);
+        if (here >= nearest[i]) continue;
+        nearest[i] = here;
+        where[i] = p;
+      }
+    }
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
+      ASSERT_FALSE(region.is_outside(box_of(where[i]))) << robot.model->links[i].name;
+    }
+  }
+  EXPECT_GT(outside, all / 20) << "the region is to leave something out";
+}
+
+// A box that reaches into the region is not outside, wherever its middle is.
+TEST(NearRegion, countsTheNearestPartOfABox) {
+  test::Rng rng(3);
+  const Robot robot(&rng);
+  const NearRegion region = region_of(robot, robot.X_FL, room(&rng, 2000, 3.0));
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3f center = test::random_vector(&rng, 4.0).cast<float>();
+    const Eigen::Vector3f half = test::random_vector(&rng, 0.5).cast<float>().cwiseAbs();
+    if (!region.is_outside(box_of(Eigen::AlignedBox3f(center - half, center + half)))) continue;
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3f corner =
+          center + half.cwiseProduct(Eigen::Vector3f((k & 1) != 0 ? 1.0F : -1.0F,
+                                                     (k & 2) != 0 ? 1.0F : -1.0F,
+                                                     (k & 4) != 0 ? 1.0F : -1.0F));
+      ASSERT_TRUE(region.is_outside(box_of(corner)));
+    }
+  }
+}
+
+TEST(NearRegion, holdsEverythingAsLongAsNoObstacleIsKnown) {
+  test::Rng rng(5);
+  const Robot robot(&rng);
+  const Points on_robot = {robot.X_FL[0].translation().cast<float>()};
+  const PaddedBox far = box_of(Eigen::Vector3f(100.0F, 0.0F, 0.0F));
+  EXPECT_FALSE(region_of(robot, robot.X_FL, {}).is_outside(far));
+  EXPECT_FALSE(region_of(robot, robot.X_FL, on_robot).is_outside(far));
+  EXPECT_TRUE(region_of(robot, robot.X_FL, {{2.0F, 0.0F, 0.0F}}).is_outside(far));
+}
+
+CloudSnapshot ingest(const Robot& robot, const Points& points) {
+  IngestConfig config;
+  config.min_range = 0.0;
+  config.max_range = 100.0;
+  config.self_filter_padding = kPadding;
+  CloudSnapshot snapshot;
+  Ingest(config).run(packed_cloud(points[0].data(), points.size(), 1),
+                     Eigen::Isometry3d::Identity(),
+                     posed_solids(*robot.model, robot.X_FL, robot.known), 0.0, &snapshot);
+  return snapshot;
+}
+
+// The points that are kept, which are exactly those off the robot.
+std::vector<Eigen::Vector3d> kept_points(const Robot& robot, const Points& points,
+                                         const CloudSnapshot& snapshot) {
+  std::set<std::uint32_t> ids;
+  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
+    for (int k = 0; k < tile.count; ++k) {
+      EXPECT_TRUE(ids.insert(tile.id[k]).second) << "point " << tile.id[k] << " is there twice";
+    }
+  }
+  std::vector<Eigen::Vector3d> kept;
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const bool is_kept = ids.count(i) > 0;
+    if (is_kept) kept.push_back(points[i].cast<double>());
+    const double off = robot.distance(points[i]) - kPadding;
+    if (std::abs(off) > kRounding) {
+      EXPECT_EQ(is_kept, off > 0.0);
+    }
+  }
+  EXPECT_EQ(ids.size(), kept.size());
+  EXPECT_EQ(snapshot.index.size(), kept.size());
+  return kept;
+}
+
+// Boxes as large as a cell cost time and change no answer: also not when the robot goes where no
+// query was expected.
+TEST(NearRegion, answersAreExactWhereverTheRobotGoes) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    test::Rng rng(seed);
+    const Robot robot(&rng);
+    const Points points = room(&rng, 4000, test::uniform(&rng, 1.0, 3.0));
+    const CloudSnapshot cloud = ingest(robot, points);
+    const std::vector<Eigen::Vector3d> kept = kept_points(robot, points, cloud);
+    ProximityQuery query(robot.model, {});
+    std::vector<LinkProximity> results;
+    for (const double way : {0.0, 0.05, 0.5, 2.0}) {
+      const Poses X_FL = robot.moved(way * test::random_vector(&rng, 1.0));
+      for (const double tolerance : {0.0, 0.001}) {
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", after " + std::to_string(way) + " m, to " +
+                     std::to_string(tolerance) + " m");
+        QueryConfig config;
+        config.tolerance = tolerance;
+        query.set_config(config);
+        ASSERT_TRUE(query.run(X_FL, robot.known, {&cloud}, &results));
+        for (std::size_t i = 0; i < robot.links.size(); ++i) {
+          SCOPED_TRACE(robot.model->links[i].name);
+          expect_truth(results[i], test::truth_of(robot.links[i], X_FL[i], kept, cloud), config,
+                       X_FL[i], 1e-6);
+        }
+      }
+    }
+  }
+}
+
+// What is thinned does not depend on how points are brought together.
+TEST(NearRegion, leavesTheThinnedPointsAsTheyAre) {
+  test::Rng rng(7);
+  Robot robot(&rng);
+  Points points = room(&rng, 20000, 2.0);
+  points.erase(std::remove_if(points.begin(), points.end(),
+                              [&](const auto& p) { return robot.distance(p) < 2.0 * kPadding; }),
+               points.end());
+  const CloudSnapshot in_part = ingest(robot, points);
+  robot.known.assign(robot.known.size(), false);
+  const CloudSnapshot sliced = ingest(robot, points);
+  ASSERT_EQ(in_part.index.size(), points.size());
+  ASSERT_EQ(sliced.index.size(), points.size());
+  const auto thinned = test::thinned_points_of(sliced.index);
+  EXPECT_EQ(test::thinned_points_of(in_part.index), thinned);
+  EXPECT_LT(thinned.size(), points.size());
+}
+
+}  // namespace
+}  // namespace ist
