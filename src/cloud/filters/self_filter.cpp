@@ -1,11 +1,9 @@
 #include "cloud/filters/self_filter.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
-#include "internal/bvh/traversal_stack.h"
 #include "internal/geometry/relative_pose.h"
 #include "internal/geometry/solid_queries.h"
 
@@ -151,56 +149,13 @@ bool SelfFilter::is_on_link(const Link& link, const Eigen::Vector3d& p_O) const 
          (verdict == Verdict::kUndecided && test_geometry(link, p_L));
 }
 
-// Tests all points within `radius` of a centre at once. Descends where a cover sphere may be near
-// enough, into the child that holds the centre deepest first; ends at the first inner sphere that
-// holds all of the points, or, with kProveClear, at the first cover sphere that is near enough.
+// Tests all points within `radius` of a centre at once.
 SelfFilter::Verdict SelfFilter::test_spheres(Effort effort, const Link& link,
                                              const Eigen::Vector3d& center_L, double radius) const {
-  const InnerSphereTree& tree = *link.tree;
   const Eigen::Vector3f c = center_L.cast<float>();
   const float near = link.clear_distance + static_cast<float>(radius) * (1.0F + 1e-6F);
   const float held = static_cast<float>(padding_ - radius) - link.rounding;
-
-  // Squared radius with the margin less squared distance of the centre [m^2], by sphere; positive:
-  // the centre is within.
-  std::array<float, kSphereWidth> inside;
-  const auto within = [&c, &inside](const float* x, const float* y, const float* z, const float* r,
-                                    float margin) {
-    bool any = false;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
-      const float dx = x[k] - c.x(), dy = y[k] - c.y(), dz = z[k] - c.z();
-      const float limit = std::max(r[k] + margin, 0.0F);
-      inside[k] = limit * limit - (dx * dx + dy * dy + dz * dz);
-      any |= inside[k] > 0.0F;
-    }
-    return any;
-  };
-
-  struct Entry {
-    std::int32_t child;
-    float inside;
-  };
-  TraversalStack<Entry, stack_capacity(kMaxTreeLevels, kSphereWidth)> stack;
-  stack.push({0, 0.0F});
-  bool is_undecided = false;
-  while (!stack.empty()) {
-    const std::int32_t child = stack.pop().child;
-    if (child < 0) {
-      const SphereLeaf& leaf = tree.leaves()[static_cast<std::size_t>(~child)];
-      if (within(leaf.x, leaf.y, leaf.z, leaf.inner_radius, held)) return Verdict::kOnRobot;
-      is_undecided = is_undecided || within(leaf.x, leaf.y, leaf.z, leaf.cover_radius, near);
-      if (effort == Effort::kProveClear && is_undecided) return Verdict::kUndecided;
-      continue;
-    }
-    const SphereNode& node = tree.nodes()[static_cast<std::size_t>(child)];
-    within(node.x, node.y, node.z, node.radius, near);
-    const std::size_t first = stack.size();
-    for (std::size_t k = 0; k < static_cast<std::size_t>(node.count); ++k) {
-      if (inside[k] > 0.0F)
-        stack.push_greatest_on_top<&Entry::inside>(first, {node.child[k], inside[k]});
-    }
-  }
-  return is_undecided ? Verdict::kUndecided : Verdict::kClear;
+  return ist::test_spheres(*link.tree, c.data(), near, held, effort == Effort::kProveClear);
 }
 
 bool SelfFilter::test_geometry(const Link& link, const Eigen::Vector3d& p_L) const {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "cloud/filters/sphere_verdict_kernel.h"
 #include "internal/bvh/padded_box.h"
 #include "internal/cloud/point_tile.h"
 #include "ist_proximity/geometry/span.h"
@@ -57,7 +58,7 @@ class SelfFilter {
   /// @returns false: none of the points in this box is the robot's
   bool begin_group(const PaddedBox& box);
 
-  enum class Verdict { kClear, kOnRobot, kUndecided };
+  using Verdict = SphereVerdict;
   /// Whether none or all points of a box in the group are the robot's, as far as spheres prove it.
   Verdict test(const PaddedBox& box);
   /// The links that points of the box tested last may be on. After kOnRobot: the last of them is
