@@ -47,7 +47,8 @@ using ist::benchmark::Scene;
 using ist::benchmark::ThreadTimer;
 using Poses = std::vector<Eigen::Isometry3d>;
 
-constexpr std::size_t kCycles = 33;  // at 1 kHz, between two images at 30 Hz
+constexpr std::size_t kCycles = 33;     // at 1 kHz, between two images at 30 Hz
+constexpr double kPeriod = 1.0 / 30.0;  // [s] of the images
 constexpr int kRepetitions = 30;
 constexpr std::size_t kLag = 2;  // cycles from the poses of the first answer to the next cycle
 constexpr double kWarmUpLimit = 0.005;   // [s] as in the node
@@ -81,7 +82,8 @@ class Node {
   void ingest(const Frame& frame, const Poses& X_FL) {
     ist::RawCloud raw = frame.raw();
     raw.owner = std::shared_ptr<const void>(&frame, [](const void*) {});  // as a message
-    ingest_.run(raw, frame.X_FS, ist::posed_solids(*robot_.model, X_FL, robot_.known), 0.0,
+    stamp_ += kPeriod;
+    ingest_.run(raw, frame.X_FS, ist::posed_solids(*robot_.model, X_FL, robot_.known), stamp_,
                 &snapshot_);
   }
   // The thread that reads the image makes the first answer with it.
@@ -120,6 +122,7 @@ class Node {
 
  private:
   const Robot& robot_;
+  double stamp_ = 0.0;  // [s] of the last image
   ist::Ingest ingest_;
   CloudSnapshot snapshot_;
   std::unique_ptr<ist::CoherentQueries> own_, spare_;

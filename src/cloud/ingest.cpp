@@ -199,7 +199,7 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
     kept = index_organized(cloud, crop, on_robot, view, view != nullptr ? &impl_->looked : nullptr,
                            &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
-    kept = index_unorganized(cloud, crop, on_robot, &impl_->near, &impl_->builder,
+    kept = index_unorganized(cloud, crop, on_robot, &impl_->near, stamp, &impl_->builder,
                              &snapshot->index.bvh(), &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());

@@ -11,6 +11,7 @@
 
 #include "internal/cloud/box_bvh.h"
 #include "internal/cloud/point_tile.h"
+#include "internal/geometry/lanes-inl.h"
 #include "proximity/supporting_planes.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -21,24 +22,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using BoxTag = hn::CappedTag<float, static_cast<std::size_t>(kBoxWidth)>;
 
-// Bit k for lane k.
-template <class D>
-HWY_INLINE std::uint32_t MaskBits(D d, hn::Mask<D> mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(d, mask, bits);
-  return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
-}
-
-// Distance of a value from an interval.
-template <class D>
-HWY_INLINE hn::Vec<D> IntervalDistance(D d, hn::Vec<D> low, hn::Vec<D> high, hn::Vec<D> value) {
-  return hn::Max(hn::Max(hn::Sub(low, value), hn::Sub(value, high)), hn::Zero(d));
-}
-
-template <class V>
-HWY_INLINE V Norm(V x, V y, V z) {
-  return hn::Sqrt(hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z))));
-}
+using lanes::IntervalDistance;
+using lanes::MaskBits;
+using lanes::Norm;
 
 // Radius of the circle where a plane at `plane_height` above a sphere's centre cuts the sphere, at
 // least.

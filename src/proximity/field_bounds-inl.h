@@ -11,7 +11,8 @@
 
 #include <cmath>
 
-#include "proximity/field_lookup-inl.h"
+#include "internal/geometry/field_lookup-inl.h"
+#include "proximity/clipped_sphere-inl.h"
 #include "proximity/field_queue.h"
 #include "proximity/field_search.h"
 
@@ -21,6 +22,11 @@ namespace HWY_NAMESPACE {
 namespace field_search {
 namespace hn = hwy::HWY_NAMESPACE;
 using dual_tree::BoxTag;
+using field_lookup::FieldLookup;
+using field_lookup::kPlaceError;
+using field_lookup::kSquareError;
+using field_lookup::LessVariance;
+using field_lookup::Variance;
 using CornerTag = hn::CappedTag<float, 8>;
 using Entry = FieldQueue::Entry;
 

@@ -18,6 +18,7 @@ void append_posed_solids(const RobotModel& model, Span<const Eigen::Isometry3d> 
     const LinkModel& link = model.links[i];
     if (!known[i] || !link.usable() || link.tree.empty()) continue;
     solids->push_back({&link.tree, &link.solid, X_FL[i]});
+    solids->back().field = link.field.get();
   }
 }
 

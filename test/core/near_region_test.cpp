@@ -76,12 +76,16 @@ PaddedBox box_of(const Eigen::AlignedBox3f& box) {
 
 PaddedBox box_of(const Eigen::Vector3f& p) { return box_of(Eigen::AlignedBox3f(p)); }
 
-NearRegion region_of(const Robot& robot, const Poses& X_FL, const Points& points) {
+constexpr double kPeriod = 0.033;  // [s] of the clouds
+
+NearRegion region_of(const Robot& robot, const Poses& X_FL, const Points& points,
+                     double period = kPeriod) {
   const std::vector<PosedSolid> solids = posed_solids(*robot.model, X_FL, robot.known);
   SelfFilter filter;
   filter.set_poses(solids, Eigen::Isometry3d::Identity(), kPadding);
   NearRegion region;
-  region.start(filter.links());
+  region.start(filter.links(), 7.0);
+  region.start(filter.links(), 7.0 + period);
   for (const Eigen::Vector3f& p : points) region.add(p);
   region.finish();
   return region;
@@ -147,15 +151,34 @@ TEST(NearRegion, holdsEverythingAsLongAsNoObstacleIsKnown) {
   EXPECT_TRUE(region_of(robot, robot.X_FL, {{2.0F, 0.0F, 0.0F}}).is_outside(far));
 }
 
+// The longer the time between clouds, the farther a link moves; without a time it may go anywhere
+// near.
+TEST(NearRegion, growsWithTheTimeBetweenClouds) {
+  test::Rng rng(6);
+  const Robot robot(&rng);
+  const Points points = {{0.0F, 0.0F, 3.0F}};
+  const auto reach = [&](double period) {
+    const NearRegion region = region_of(robot, robot.X_FL, points, period);
+    float x = 0.0F;
+    while (!region.is_outside(box_of(Eigen::Vector3f(x, 0.0F, 0.0F)))) x += 0.01F;
+    return static_cast<double>(x);
+  };
+  EXPECT_NEAR(reach(0.25) - reach(0.1), 0.3, 0.05);
+  EXPECT_NEAR(reach(0.001), reach(0.05), 0.02);
+  for (const double unknown : {0.0, -1.0, 1e9}) EXPECT_NEAR(reach(unknown), reach(0.5), 0.02);
+}
+
 CloudSnapshot ingest(const Robot& robot, const Points& points) {
   IngestConfig config;
   config.min_range = 0.0;
   config.max_range = 100.0;
   config.self_filter_padding = kPadding;
   CloudSnapshot snapshot;
-  Ingest(config).run(packed_cloud(points[0].data(), points.size(), 1),
-                     Eigen::Isometry3d::Identity(),
-                     posed_solids(*robot.model, robot.X_FL, robot.known), 0.0, &snapshot);
+  Ingest ingest(config);
+  for (const double stamp : {7.0, 7.0 + kPeriod}) {
+    ingest.run(packed_cloud(points[0].data(), points.size(), 1), Eigen::Isometry3d::Identity(),
+               posed_solids(*robot.model, robot.X_FL, robot.known), stamp, &snapshot);
+  }
   return snapshot;
 }
 

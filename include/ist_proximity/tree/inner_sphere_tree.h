@@ -11,6 +11,8 @@
 
 namespace ist {
 
+class DistanceField;
+
 /// How the spheres of a node are divided among its children.
 enum class TreeSplit {
   /// The group with the most spheres is halved at the median along its longest axis until there
@@ -118,6 +120,7 @@ struct PosedSolid {
   /// there.
   std::uint32_t first_point = 0;
   std::uint32_t last_point = std::numeric_limits<std::uint32_t>::max();  ///< the last such point
+  const DistanceField* field = nullptr;  ///< distances about `solid`; not owned; null: none
 };
 
 }  // namespace ist

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cloud/filters/field_verdict_kernel.h"
+#include "internal/geometry/distance_field.h"
 #include "internal/geometry/relative_pose.h"
 #include "internal/geometry/solid_queries.h"
 
@@ -46,6 +48,7 @@ void SelfFilter::set_poses(Span<const PosedSolid> solids, const Eigen::Isometry3
     link.number = i;
     link.tree = posed.tree;
     link.solid = posed.solid;
+    link.field = posed.field != nullptr && !posed.field->empty() ? posed.field : nullptr;
     link.X_LO = X_OL.inverse();
     link.center_O = (X_OL * tree.center()).cast<float>();
     link.rounding = static_cast<float>(kRounding * (size + X_OL.translation().norm()));
@@ -134,6 +137,14 @@ std::uint32_t SelfFilter::undecided_points_on_robot(const PointTile& tile) const
 std::uint32_t SelfFilter::points_on_link(const Link& link, const PointTile& tile,
                                          std::uint32_t measured) const {
   std::uint32_t mask = 0;
+  if (link.field != nullptr) {
+    constexpr float kSteps = 4.0F;  // a place is rounded more often in float than a centre
+    const FieldVerdict verdict =
+        test_by_field(*link.field, link.X_LO.cast<float>(), tile, static_cast<float>(padding_),
+                      kSteps * link.rounding);
+    mask = measured & verdict.on_robot;
+    measured &= ~(verdict.on_robot | verdict.clear);
+  }
   for (std::int32_t k = 0; k < tile.count; ++k) {
     if ((measured >> static_cast<std::uint32_t>(k) & 1U) == 0) continue;
     const Eigen::Vector3f p_O(tile.x[k], tile.y[k], tile.z[k]);

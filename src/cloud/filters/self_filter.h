@@ -19,9 +19,9 @@ namespace ist {
 ///
 /// The points of a box are first tested as one sphere: the trees' cover spheres prove that it is
 /// clear of the links, an inner sphere proves that it is the robot's. So most tiles near the robot
-/// are decided without a look at their points. The points are tested one by one only where both
-/// leave it open, and against the exact geometry only where that leaves it open, too. Keeps its
-/// memory. Not thread safe.
+/// are decided without a look at their points. Where both leave it open, the link's field of
+/// distances decides most of a tile's points; the others are tested one by one, against the exact
+/// geometry where spheres leave it open, too. Keeps its memory. Not thread safe.
 class SelfFilter {
  public:
   /// One of the solids.
@@ -29,6 +29,7 @@ class SelfFilter {
     std::size_t number;  ///< in `solids`
     const InnerSphereTree* tree;
     const Solid* solid;
+    const DistanceField* field;             ///< null: none
     Eigen::Isometry3d X_LO;                 ///< frame of the points -> link frame
     Eigen::Vector3f center_O;               ///< [m] of the link's bounding sphere
     float padded_radius;                    ///< [m] of the bounding sphere, and the clear distance

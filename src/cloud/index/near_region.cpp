@@ -1,17 +1,26 @@
 #include "cloud/index/near_region.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace ist {
 namespace {
 
-// [m] What a link may move until the next cloud comes and still find points in quick order.
-constexpr float kMotion = 0.1F;
+// [m/s] Few links of arms move faster.
+constexpr double kSpeed = 2.0;
+// [m] What a link may move until the next cloud comes: at least, and where that is not known.
+constexpr double kLeastMotion = 0.1, kMostMotion = 1.0;
+// [m] Points that are farther away are of no interest to most queries.
+constexpr float kFarthest = 1.0F;
 
 }  // namespace
 
-void NearRegion::start(const std::vector<SelfFilter::Link>& links) {
+void NearRegion::start(const std::vector<SelfFilter::Link>& links, double stamp) {
+  const double period = stamp - stamp_;
+  motion_ = static_cast<float>(period > 0.0 ? std::clamp(kSpeed * period, kLeastMotion, kMostMotion)
+                                            : kMostMotion);
+  stamp_ = stamp;
   links_.resize(links.size());
   for (std::size_t i = 0; i < links.size(); ++i) {
     const SphereNode& root = links[i].tree->nodes().front();
@@ -45,7 +54,9 @@ void NearRegion::add(const Eigen::Vector3f& p_O) {
 // The distance of a link is at most that of its nearest sphere and a sphere's size more.
 void NearRegion::finish() {
   for (Link& link : links_) {
-    const Spheres reach = 2.0F * link.radius + (link.clear_distance + link.nearest + kMotion);
+    const bool has_obstacle = std::isfinite(link.nearest);
+    const float to_nearest = has_obstacle ? std::min(link.nearest, kFarthest) : link.nearest;
+    const Spheres reach = 2.0F * link.radius + (link.clear_distance + to_nearest + motion_);
     link.reach_sq = (link.radius >= 0.0F).select(reach.square(), -1.0F);
   }
 }

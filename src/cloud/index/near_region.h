@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 #include "cloud/filters/self_filter.h"
@@ -17,7 +18,9 @@ class NearRegion {
  public:
   /// Begins a cloud.
   /// @param links  as SelfFilter has them, in the frame O of the points
-  void start(const std::vector<SelfFilter::Link>& links);
+  /// @param stamp  [s] of the cloud. The time since the last one tells what a link may move until
+  ///               the next one comes.
+  void start(const std::vector<SelfFilter::Link>& links, double stamp);
   /// Adds a point of the cloud: some are enough, spread over all of it. Those that may be the
   /// robot's tell nothing of its obstacles. @param p_O  [m]
   void add(const Eigen::Vector3f& p_O);
@@ -39,6 +42,8 @@ class NearRegion {
   };
 
   std::vector<Link> links_;
+  double stamp_ = std::numeric_limits<double>::infinity();  ///< [s] of the last cloud
+  float motion_ = 0.0F;                                     ///< [m] of a link until the next one
 };
 
 }  // namespace ist

@@ -44,8 +44,8 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sampl
 }  // namespace
 
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              SelfFilter* on_robot, NearRegion* near, PointBvhBuilder* builder,
-                              PointBvh* bvh, IngestCounts* counts) {
+                              SelfFilter* on_robot, NearRegion* near, double stamp,
+                              PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts) {
   const RawCloud points = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();
@@ -65,7 +65,7 @@ std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
   if (on_robot == nullptr) {
     builder->build_from_cells(crop.X_FO, {}, {}, {}, bvh);
   } else {
-    near->start(on_robot->links());
+    near->start(on_robot->links(), stamp);
     cells.for_each_first([near](const CloudPoint& p) { near->add({p.x, p.y, p.z}); });
     near->finish();
     builder->build_from_cells(

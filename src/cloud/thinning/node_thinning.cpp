@@ -3,48 +3,41 @@
 #include <algorithm>
 #include <tuple>
 
+#include "cloud/index/tile_bounds.h"
 #include "internal/bvh/traversal_stack.h"
 
 namespace ist {
 namespace {
 
-void write_unused(ThinnedTile* tile) {
+void put_unused_far_away(ThinnedTile* tile) {
   for (int k = tile->count; k < kPointWidth; ++k) {
     tile->x[k] = tile->y[k] = tile->z[k] = kFarAway;
     tile->id[k] = 0;
-    tile->weight[k] = 0.0F;
   }
 }
 
 void find_box(ThinnedTile* tile) {
-  const auto n = static_cast<std::size_t>(tile->count);
-  const auto range = [n](const float* v, float* min, float* max) {
-    const auto [least, most] = std::minmax_element(v, v + n);
-    *min = *least;
-    *max = *most;
-  };
-  range(tile->x, tile->box.min_x, tile->box.max_x);
-  range(tile->y, tile->box.min_y, tile->box.max_y);
-  range(tile->z, tile->box.min_z, tile->box.max_z);
+  repeat_last(tile);
+  const PaddedBox box = box_of(*tile);
+  tile->box = {{box.min[0]}, {box.min[1]}, {box.min[2]}, {box.max[0]}, {box.max[1]}, {box.max[2]}};
 }
 
+// Unused slots have no weight.
 void find_moments(ThinnedTile* tile) {
-  PointMoments moments = {};
-  const auto n = static_cast<std::size_t>(tile->count);
-  for (std::size_t k = 0; k < n; ++k) {
-    moments.weight += tile->weight[k];
-    moments.middle[0] += tile->weight[k] * tile->x[k];
-    moments.middle[1] += tile->weight[k] * tile->y[k];
-    moments.middle[2] += tile->weight[k] * tile->z[k];
-  }
-  for (float& m : moments.middle) m /= moments.weight;
-  for (std::size_t k = 0; k < n; ++k) {
-    const float x = tile->x[k] - moments.middle[0], y = tile->y[k] - moments.middle[1],
-                z = tile->z[k] - moments.middle[2], w = tile->weight[k];
-    const float products[6] = {x * x, y * y, z * z, x * y, y * z, z * x};
-    for (int i = 0; i < 6; ++i) moments.spread[i] += w * products[i];
-  }
-  tile->moments = moments;
+  const LaneMap x(tile->x), y(tile->y), z(tile->z), weight(tile->weight);
+  PointMoments& moments = tile->moments;
+  moments.weight = weight.sum();
+  moments.middle[0] = (weight * x).sum() / moments.weight;
+  moments.middle[1] = (weight * y).sum() / moments.weight;
+  moments.middle[2] = (weight * z).sum() / moments.weight;
+  const Lanes dx = x - moments.middle[0], dy = y - moments.middle[1], dz = z - moments.middle[2];
+  const Lanes wx = weight * dx, wy = weight * dy, wz = weight * dz;
+  moments.spread[0] = (wx * dx).sum();
+  moments.spread[1] = (wy * dy).sum();
+  moments.spread[2] = (wz * dz).sum();
+  moments.spread[3] = (wx * dy).sum();
+  moments.spread[4] = (wy * dz).sum();
+  moments.spread[5] = (wz * dx).sum();
 }
 
 }  // namespace
@@ -186,9 +179,11 @@ void NodeThinning::write(ThinnedNode* thinned) const {
     tile->weight[k] = cell_weight(candidates_.offset_sq[i]);
   }
   for (std::uint32_t i = 0; i < thinned->count; ++i) {
-    write_unused(&thinned->tiles[i]);
-    find_box(&thinned->tiles[i]);
-    find_moments(&thinned->tiles[i]);
+    ThinnedTile& done = thinned->tiles[i];
+    std::fill(done.weight + done.count, done.weight + kPointWidth, 0.0F);
+    find_box(&done);  // repeats the last point in unused slots
+    find_moments(&done);
+    put_unused_far_away(&done);
   }
 }
 

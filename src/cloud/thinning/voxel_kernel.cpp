@@ -6,6 +6,10 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <limits>
+
+#include "internal/geometry/lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
@@ -17,13 +21,6 @@ constexpr auto kSlots = static_cast<std::size_t>(kPointWidth);
 // The number of unused slots is larger than that of any point: those are kLargestRange and more
 // away, in voxels of kSmallestVoxel, at most.
 constexpr float kUnusedVoxel = 1e30F;
-
-template <class M>
-HWY_INLINE std::uint32_t MaskBits(const M& mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(VoxelTag(), mask, bits);
-  return bits[0] | static_cast<std::uint32_t>(bits[1]) << 8;
-}
 
 // Finds the voxels' numbers along an axis.
 // @returns squared distances to the voxels' centres along that axis, in voxels
@@ -64,39 +61,35 @@ HWY_INLINE void HashVoxels(TileVoxels* voxels, std::size_t first) {
   hn::Store(entry, d, voxels->entry + first);
 }
 
-// Numbers of a tile's slots twice, so that each lane meets all others at some shift.
-struct alignas(64) Twice {
-  float lane[2 * kSlots];
-
-  HWY_INLINE void Set(std::size_t first, hn::Vec<VoxelTag> v) {
-    hn::Store(v, VoxelTag(), lane + first);
-    hn::Store(v, VoxelTag(), lane + kSlots + first);
-  }
-  HWY_INLINE hn::Vec<VoxelTag> At(std::size_t first) const {
-    return hn::LoadU(VoxelTag(), lane + first);
-  }
-};
-
-// Bit k: another point of the same voxel is nearer to its centre than that in slot k.
-HWY_INLINE std::uint32_t Beaten(const TileVoxels& voxels) {
+// Bit k: no other point of the same voxel is nearer to its centre than that in slot k. Neighbours
+// lie in few voxels, which are looked at one by one.
+// @param used  bits of the slots that have points
+HWY_INLINE std::uint32_t Nearest(const TileVoxels& voxels, std::uint32_t used) {
   const VoxelTag d;
-  Twice x, y, z, offset_sq;
-  for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
-    x.Set(i, hn::Load(d, voxels.x + i));
-    y.Set(i, hn::Load(d, voxels.y + i));
-    z.Set(i, hn::Load(d, voxels.z + i));
-    offset_sq.Set(i, hn::Load(d, voxels.offset_sq + i));
-  }
+  const auto infinity = hn::Set(d, std::numeric_limits<float>::infinity());
+  alignas(64) float offset_sq[kSlots];  // infinite in other voxels
   std::uint32_t all = 0;
-  for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
-    const auto own_x = x.At(i), own_y = y.At(i), own_z = z.At(i), own = offset_sq.At(i);
-    auto beaten = hn::Lt(own, own);
-    for (std::size_t k = i + 1; k < i + kSlots; ++k) {
-      const auto same =
-          hn::And(hn::And(hn::Eq(x.At(k), own_x), hn::Eq(y.At(k), own_y)), hn::Eq(z.At(k), own_z));
-      beaten = hn::Or(beaten, hn::And(same, hn::Lt(offset_sq.At(k), own)));
+  for (std::uint32_t left = used; left != 0;) {
+    const std::size_t k = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+    const auto x = hn::Set(d, voxels.x[k]), y = hn::Set(d, voxels.y[k]),
+               z = hn::Set(d, voxels.z[k]);
+    std::uint32_t here = 0, nearest = 0;
+    auto least = infinity;
+    for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
+      const auto same = hn::And(
+          hn::And(hn::Eq(hn::Load(d, voxels.x + i), x), hn::Eq(hn::Load(d, voxels.y + i), y)),
+          hn::Eq(hn::Load(d, voxels.z + i), z));
+      const auto own = hn::IfThenElse(same, hn::Load(d, voxels.offset_sq + i), infinity);
+      hn::Store(own, d, offset_sq + i);
+      least = hn::Min(least, own);
+      here |= lanes::MaskBits(d, same) << i;
     }
-    all |= MaskBits(beaten) << i;
+    least = hn::MinOfLanes(d, least);
+    for (std::size_t i = 0; i < kSlots; i += hn::Lanes(d)) {
+      nearest |= lanes::MaskBits(d, hn::Eq(hn::Load(d, offset_sq + i), least)) << i;
+    }
+    all |= nearest;
+    left &= ~here;
   }
   return all;
 }
@@ -110,10 +103,9 @@ std::size_t FindVoxels(const VoxelGrid& grid, const PointTile& tile, TileVoxels*
     hn::Store(hn::Add(hn::Add(x, y), z), d, voxels->offset_sq + i);
     HashVoxels(voxels, i);
   }
-  // Unused slots beat none: no offset is larger than theirs, that of a corner.
   const std::uint32_t used = (1U << static_cast<std::uint32_t>(tile.count)) - 1U;
   std::size_t count = 0;
-  for (std::uint32_t best = used & ~Beaten(*voxels); best != 0; best &= best - 1) {
+  for (std::uint32_t best = Nearest(*voxels, used); best != 0; best &= best - 1) {
     voxels->nearest[count++] = static_cast<std::uint8_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(best));
   }
   return count;

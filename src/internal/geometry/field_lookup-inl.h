@@ -10,12 +10,12 @@
 #include <hwy/highway.h>
 
 #include "internal/geometry/distance_field.h"
-#include "proximity/clipped_sphere-inl.h"
+#include "internal/geometry/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
-namespace field_search {
+namespace field_lookup {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // The errors of float: a share of what is squared, and of a place [m]: 2^-24 of a coordinate in
@@ -61,10 +61,10 @@ class FieldLookup {
   HWY_INLINE V FromBounds(D d, V x, V y, V z) const {
     const Eigen::AlignedBox3f& box = field_.bounds();
     const auto along = [&](int axis, V v) {
-      return dual_tree::IntervalDistance(d, hn::Set(d, box.min()[axis]),
-                                         hn::Set(d, box.max()[axis]), v);
+      return lanes::IntervalDistance(d, hn::Set(d, box.min()[axis]), hn::Set(d, box.max()[axis]),
+                                     v);
     };
-    return dual_tree::Norm(along(0, x), along(1, y), along(2, z));
+    return lanes::Norm(along(0, x), along(1, y), along(2, z));
   }
 
   // Lower bounds [m] of the distances of places.
@@ -133,10 +133,10 @@ class FieldLookup {
         hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(field_.outside().data()), at);
     const V radius = hn::Mul(hn::ConvertTo(d, hn::And(bytes, hn::Set(di, 0xFF))),
                              hn::Set(d, DistanceField::kOutsideStep));
-    const V from_node = hn::Mul(
-        dual_tree::Norm(hn::Sub(gx, hn::ConvertTo(d, ix)), hn::Sub(gy, hn::ConvertTo(d, iy)),
-                        hn::Sub(gz, hn::ConvertTo(d, iz))),
-        hn::Set(d, level.cell));
+    const V from_node =
+        hn::Mul(lanes::Norm(hn::Sub(gx, hn::ConvertTo(d, ix)), hn::Sub(gy, hn::ConvertTo(d, iy)),
+                            hn::Sub(gz, hn::ConvertTo(d, iz))),
+                hn::Set(d, level.cell));
     const V by_node = hn::Sub(hn::Sub(radius, from_node), hn::Set(d, kPlaceError));
     return hn::Max(hn::IfThenElseZero(is_in, by_node), by_bounds);
   }
@@ -249,7 +249,7 @@ class FieldLookup {
     const V radius =
         hn::Mul(hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(du, z_ball)))),
                 hn::Set(d, DistanceField::kBallStep));
-    const V ball = hn::Sub(hn::Sub(radius, dual_tree::Norm(dx, dy, dz)), hn::Set(d, kPlaceError));
+    const V ball = hn::Sub(hn::Sub(radius, lanes::Norm(dx, dy, dz)), hn::Set(d, kPlaceError));
     return {from_surface(dx, low_half(xy)), from_surface(dy, hn::ShiftRight<16>(xy)),
             from_surface(dz, low_half(z_ball)), ball};
   }
@@ -258,7 +258,7 @@ class FieldLookup {
   const float diagonal_;  // [m] of the box about the solid
 };
 
-}  // namespace field_search
+}  // namespace field_lookup
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
 HWY_AFTER_NAMESPACE();
