@@ -157,6 +157,8 @@ void expect_exact(const std::vector<Eigen::Vector3f>& points, const PosedRobot& 
   EXPECT_LT(dropped, points.size() / 2);
 }
 
+const Eigen::Vector3d kFarAwayBase(691000.25, 5334000.5, 520.75);  // [m] as of a map
+
 TEST(SelfFilter, agreesWithExactDistance) {
   const RobotModel model = coarse_robot();
   const std::vector<Eigen::Vector3f> points = cloud_about_the_robot(30000);
@@ -168,8 +170,7 @@ TEST(SelfFilter, agreesWithExactDistance) {
 
 TEST(SelfFilter, agreesWithExactDistanceFarFromTheFixedFramesOrigin) {
   const RobotModel model = coarse_robot();
-  const Eigen::Vector3d base(691000.25, 5334000.5, 520.75);
-  expect_exact(cloud_about_the_robot(10000), posed(model, base), 0.02, base);
+  expect_exact(cloud_about_the_robot(10000), posed(model, kFarAwayBase), 0.02, kFarAwayBase);
 }
 
 // A field of distances decides most of a tile's points, and none of them otherwise than the exact
@@ -182,12 +183,13 @@ TEST(SelfFilter, agreesWithExactDistanceWhereThereAreFields) {
     for (std::size_t i = 0; i < robot.X_FL.size(); ++i) {
       robot.known.assign(robot.known.size(), false);
       robot.known[i] = true;
-      robot.X_FL[i].translation() = Eigen::Vector3d(0.0, 0.25, 0.1);
+      const Eigen::Vector3d base = seed == 3 ? kFarAwayBase : Eigen::Vector3d::Zero();
+      robot.X_FL[i].translation() = base + Eigen::Vector3d(0.0, 0.25, 0.1);
       const std::vector<Eigen::Vector3f> points = cloud_about_the_robot(6000);
       for (const double padding : {0.0, 0.005, 0.02, 0.1}) {
         SCOPED_TRACE(model->links[i].name + ", seed " + std::to_string(seed) + ", padding " +
                      std::to_string(padding));
-        expect_same_as_exact(points, robot, padding);
+        expect_same_as_exact(points, robot, padding, base);
       }
     }
   }
