@@ -11,8 +11,6 @@ namespace {
 constexpr double kSpeed = 2.0;
 // [m] What a link may move until the next cloud comes: at least, and where that is not known.
 constexpr double kLeastMotion = 0.1, kMostMotion = 1.0;
-// [m] Points that are farther away are of no interest to most queries.
-constexpr float kFarthest = 1.0F;
 
 }  // namespace
 

@@ -11,11 +11,14 @@
 namespace ist {
 
 /// The part of a cloud that queries look at soon: around each link as far as the point nearest to
-/// it, and what the link may move until the next cloud comes. Points outside of it need no index
-/// that is quick to search. The region is a guess, which changes the cost of a query and never its
-/// answer. Keeps its memory. Not thread safe.
+/// it, or kFarthest where that is less, and what the link may move until the next cloud comes.
+/// Points outside of it need no index that is quick to search. The region is a guess, which changes
+/// the cost of a query and never its answer. Keeps its memory. Not thread safe.
 class NearRegion {
  public:
+  /// [m] Points that are farther away are of no interest to most queries.
+  static constexpr float kFarthest = 1.0F;
+
   /// Begins a cloud.
   /// @param links  as SelfFilter has them, in the frame O of the points
   /// @param stamp  [s] of the cloud. The time since the last one tells what a link may move until
