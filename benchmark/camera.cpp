@@ -70,12 +70,18 @@ struct Robot {
   std::vector<bool> known;
 };
 
+ist::IngestConfig as_in_the_node() {
+  ist::IngestConfig config;
+  config.search_distance = ist::QueryConfig().max_distance;
+  return config;
+}
+
 // What the node does with images and poses, with its defaults.
 class Node {
  public:
   explicit Node(const Robot& robot)
       : robot_(robot),
-        ingest_({}),
+        ingest_(as_in_the_node()),
         own_(std::make_unique<ist::CoherentQueries>(robot.model, ist::QueryConfig())),
         spare_(std::make_unique<ist::CoherentQueries>(robot.model, ist::QueryConfig())) {}
 

@@ -2,8 +2,8 @@
 // thread and two; each instruction set. The motion is sampled at 1 kHz among the test data's depth
 // images (IST_PROXIMITY_DATA, or ../shared/data), or in the synthetic scene without them.
 //
-// Usage: modes CACHE_FOLDER prints the tables. modes CACHE_FOLDER exact|1mm|minimum|ingest runs one
-// kind a hundred times, for a profiler. scripts/benchmark calls both.
+// Usage: modes CACHE_FOLDER prints the tables. modes CACHE_FOLDER count runs ten images and each
+// kind of query a hundred times, for callgrind. scripts/benchmark calls both.
 
 #include <hwy/highway.h>
 #include <hwy/targets.h>
@@ -41,7 +41,7 @@ using ist::benchmark::ThreadTimer;
 using Poses = std::vector<Eigen::Isometry3d>;
 
 constexpr double kMaxError = 0.002;  // [m] packing
-constexpr std::size_t kCounted = 100;
+constexpr std::size_t kCounted = 100, kCountedImages = 10;
 
 QueryConfig query_config(double tolerance, double relative = 0.0) {
   QueryConfig config;
@@ -252,50 +252,64 @@ void print_instruction_sets(const Bench& bench) {
   choose(0);
 }
 
-// Callgrind, run with --instr-atstart=no, counts nothing before this call.
-void start_counting() {
+// What is called between these two is counted by callgrind, run with --instr-atstart=no. The count
+// is a dump of this name.
+void begin_count() {
 #ifdef CALLGRIND_START_INSTRUMENTATION
   CALLGRIND_START_INSTRUMENTATION;
+  CALLGRIND_ZERO_STATS;
+#endif
+}
+void end_count([[maybe_unused]] const char* name) {
+#ifdef CALLGRIND_START_INSTRUMENTATION
+  CALLGRIND_DUMP_STATS_AT(name);
+  CALLGRIND_STOP_INSTRUMENTATION;
 #endif
 }
 
-// Runs under a profiler that counts within ProximityQuery::run and similar functions only.
-void count(const std::string& cache, const std::string& what) {
+// Runs each kind of call for a profiler. The model, whose distance fields take minutes there, is
+// made once.
+void count(const std::string& cache) {
   const auto data = ist::test::data_dir();
   const DataSet set =
       data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
   const ist::benchmark::Frame& frame = set.scenes[0].frame;
   ist::Ingest ingest(ist::test::whole_cloud(false));
   CloudSnapshot cloud;
-  if (what == "ingest") start_counting();
-  for (std::size_t k = 0; k < (what == "ingest" ? kCounted / 10 : 1); ++k) {
+  begin_count();
+  for (std::size_t k = 0; k < kCountedImages; ++k) {
     ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &cloud);
   }
-  if (what == "ingest") return;
+  end_count("ingest");
   const auto model = set.robot.pack(kMaxError);
   const std::vector<bool> known(model->links.size(), true);
-  ProximityQuery query(model, query_config(what == "1mm" ? 0.001 : 0.0));
-  std::vector<LinkProximity> results;
+  const auto count_queries = [&](const char* name, double tolerance) {
+    ProximityQuery query(model, query_config(tolerance));
+    std::vector<LinkProximity> results;
+    begin_count();
+    for (std::size_t k = 0; k < kCounted; ++k) query.run(set.motion[k], known, {&cloud}, &results);
+    end_count(name);
+  };
+  count_queries("exact", 0.0);
+  count_queries("1mm", 0.001);
+  ProximityQuery query(model, query_config(0.0));
   ist::RobotProximity robot;
-  start_counting();
+  begin_count();
   for (std::size_t k = 0; k < kCounted; ++k) {
-    if (what == "minimum") {
-      query.run_minimum(set.motion[k], known, {&cloud}, &robot);
-    } else {
-      query.run(set.motion[k], known, {&cloud}, &results);
-    }
+    query.run_minimum(set.motion[k], known, {&cloud}, &robot);
   }
+  end_count("minimum");
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "Usage: modes CACHE_FOLDER [exact|1mm|minimum|ingest]\n");
+    std::fprintf(stderr, "Usage: modes CACHE_FOLDER [count]\n");
     return 2;
   }
   if (argc > 2) {
-    count(argv[1], argv[2]);
+    count(argv[1]);
     return 0;
   }
   const Bench bench(argv[1]);

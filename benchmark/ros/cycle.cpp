@@ -108,7 +108,9 @@ class CycleBenchmark {
   }
 
   void run() {
-    Ingest ingest{IngestConfig()};
+    IngestConfig config;
+    config.search_distance = ServerConfig().query.max_distance;
+    Ingest ingest(config);
     const std::vector<bool> known(trial_.robot->links.size(), true);
     std::vector<PosedSolid> solids;
     for (std::size_t k = 0; k < trial_.motion.size(); ++k) {

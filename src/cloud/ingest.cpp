@@ -49,6 +49,7 @@ void check(const IngestConfig& config) {
           "0 or more");
   require(config.max_range > config.min_range, "max_range", config.max_range,
           "more than min_range");
+  require(config.search_distance >= 0.0, "search_distance", config.search_distance, "0 or more");
   require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
           "self_filter_padding", config.self_filter_padding, "0 or more");
   require(config.thinning >= kSmallestVoxel && std::isfinite(config.thinning), "thinning",
@@ -199,8 +200,13 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
     kept = index_organized(cloud, crop, on_robot, view, view != nullptr ? &impl_->looked : nullptr,
                            &impl_->builder, &snapshot->index.bvh(), &counts);
   } else {
-    kept = index_unorganized(cloud, crop, on_robot, &impl_->near, stamp, &impl_->builder,
-                             &snapshot->index.bvh(), &counts);
+    NearRegion* near = nullptr;
+    if (on_robot != nullptr && std::isfinite(config.search_distance)) {
+      near = &impl_->near;
+      near->start(on_robot->links(), config.search_distance, stamp);
+    }
+    kept = index_unorganized(cloud, crop, on_robot, near, &impl_->builder, &snapshot->index.bvh(),
+                             &counts);
   }
   counts.received = static_cast<std::uint32_t>(cloud.size());
   counts.out_of_range = counts.received - counts.not_a_number - counts.infinite -

@@ -4,6 +4,15 @@
 
 namespace ist {
 
+PosedSolid posed_solid(const LinkModel& link, const Eigen::Isometry3d& X_FL) {
+  PosedSolid posed;
+  posed.tree = &link.tree;
+  posed.solid = &link.solid;
+  posed.X_FL = X_FL;
+  posed.field = link.field.get();
+  return posed;
+}
+
 std::vector<PosedSolid> posed_solids(const RobotModel& model, Span<const Eigen::Isometry3d> X_FL,
                                      const std::vector<bool>& known) {
   std::vector<PosedSolid> solids;
@@ -17,8 +26,7 @@ void append_posed_solids(const RobotModel& model, Span<const Eigen::Isometry3d> 
   for (std::size_t i = 0; i < count; ++i) {
     const LinkModel& link = model.links[i];
     if (!known[i] || !link.usable() || link.tree.empty()) continue;
-    solids->push_back({&link.tree, &link.solid, X_FL[i]});
-    solids->back().field = link.field.get();
+    solids->push_back(posed_solid(link, X_FL[i]));
   }
 }
 

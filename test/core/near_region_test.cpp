@@ -77,6 +77,7 @@ PaddedBox box_of(const Eigen::AlignedBox3f& box) {
 PaddedBox box_of(const Eigen::Vector3f& p) { return box_of(Eigen::AlignedBox3f(p)); }
 
 constexpr double kPeriod = 0.033;  // [s] of the clouds
+constexpr double kSearchDistance = 1.0;
 
 NearRegion region_of(const Robot& robot, const Poses& X_FL, const Points& points,
                      double period = kPeriod) {
@@ -84,8 +85,8 @@ NearRegion region_of(const Robot& robot, const Poses& X_FL, const Points& points
   SelfFilter filter;
   filter.set_poses(solids, Eigen::Isometry3d::Identity(), kPadding);
   NearRegion region;
-  region.start(filter.links(), 7.0);
-  region.start(filter.links(), 7.0 + period);
+  region.start(filter.links(), kSearchDistance, 7.0);
+  region.start(filter.links(), kSearchDistance, 7.0 + period);
   for (const Eigen::Vector3f& p : points) region.add(p);
   region.finish();
   return region;
@@ -116,7 +117,7 @@ TEST(NearRegion, holdsThePointNearestToEachLinkAndEveryPointOfTheRobot) {
       }
     }
     for (std::size_t i = 0; i < nearest.size(); ++i) {
-      if (nearest[i] > static_cast<double>(NearRegion::kFarthest)) continue;
+      if (nearest[i] > kSearchDistance) continue;
       ASSERT_FALSE(region.is_outside(box_of(where[i]))) << robot.model->links[i].name;
     }
   }
@@ -174,6 +175,7 @@ CloudSnapshot ingest(const Robot& robot, const Points& points) {
   config.min_range = 0.0;
   config.max_range = 100.0;
   config.self_filter_padding = kPadding;
+  config.search_distance = kSearchDistance;
   CloudSnapshot snapshot;
   Ingest ingest(config);
   for (const double stamp : {7.0, 7.0 + kPeriod}) {

@@ -180,6 +180,7 @@ TEST(SelfFilter, agreesWithExactDistanceWhereThereAreFields) {
     test::Rng rng(seed);
     const auto model = test::with_fields(test::model_of(test::random_links(&rng), 0.02));
     PosedRobot robot = posed(*model);
+    ASSERT_NE(robot.solids().front().field, nullptr);
     for (std::size_t i = 0; i < robot.X_FL.size(); ++i) {
       robot.known.assign(robot.known.size(), false);
       robot.known[i] = true;
@@ -360,6 +361,32 @@ TEST(SelfFilter, aSteadyStreamAllocatesNothing) {
     ingest.run(raw_of(*points), X_FS, robot, 0.0, &snapshot);
   }
   EXPECT_EQ(test::allocations - before, 0);
+  EXPECT_GT(snapshot.counts.on_robot, 0U);
+}
+
+// The robot comes from far away, where no part of the cloud is looked at, to where points are
+// dense.
+TEST(SelfFilter, aRobotThatComesNearAllocatesNothing) {
+  const RobotModel model = coarse_robot();
+  std::vector<Eigen::Vector3f> points = cloud_about_the_robot(40000);
+  for (std::size_t i = 0; i < points.size(); i += 2) points[i] *= 0.1F;
+  const Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
+  IngestConfig config = config_with(0.02);
+  config.search_distance = 0.1;
+  Ingest ingest(config);
+  CloudSnapshot snapshot;
+  const auto run = [&](double x, double stamp) {
+    ingest.run(raw_of(points), X_FS, posed(model, {x, 0.0, 0.0}).solids(), stamp, &snapshot);
+  };
+  run(9.0, 0.0);
+  run(9.0, 0.03);
+  for (int k = 0; k < 10; ++k) {
+    const PosedRobot robot = posed(model, {1.0 - 0.1 * k, 0.0, 0.0});
+    const std::vector<PosedSolid> solids = robot.solids();
+    const long before = test::allocations;
+    ingest.run(raw_of(points), X_FS, solids, 0.06 + 0.03 * k, &snapshot);
+    EXPECT_EQ(test::allocations - before, 0) << "step " << k;
+  }
   EXPECT_GT(snapshot.counts.on_robot, 0U);
 }
 

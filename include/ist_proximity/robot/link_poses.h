@@ -71,6 +71,11 @@ class ForwardKinematics {
 std::vector<bool> links_that_move(const RobotModel& model, const Kinematics& kinematics,
                                   const std::string& body);
 
+/// A link at a pose, as Ingest takes it for its self-filter.
+/// @param link  viewed by the result, which must not outlive it
+/// @param X_FL  link frame -> fixed frame, rigid
+PosedSolid posed_solid(const LinkModel& link, const Eigen::Isometry3d& X_FL);
+
 /// The links of a robot at their poses, as Ingest takes them for its self-filter. Links of unknown
 /// pose, with an error or without spheres are left out.
 /// @param model  viewed by the result, which must not outlive it

@@ -30,7 +30,8 @@ FieldVerdict TestByField(const DistanceField& field, const Eigen::Isometry3f& X_
                          const PointTile& tile, float padding, float rounding) {
   const PointTag d;
   const field_lookup::FieldLookup lookup(field);
-  // The finest grid holds all places that the padding may reach; farther ones are left open.
+  // The finest grid holds the places that are a few centimetres from the link or nearer. For others
+  // the box about the link decides, or nothing does.
   const DistanceField::Level& level = field.levels().front();
   FieldVerdict verdict = {0, 0};
   for (std::size_t k = 0; k < static_cast<std::size_t>(kPointWidth); k += hn::Lanes(d)) {

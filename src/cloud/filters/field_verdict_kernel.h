@@ -14,7 +14,7 @@ struct FieldVerdict {
   std::uint32_t clear;     ///< outside, and farther from the surface than the padding
 };
 
-/// Looks the points of a tile up in the field of a link. A point that has neither bit is left open.
+/// Looks the points of a tile up in the field of a link. A point that has neither bit is undecided.
 /// @param field     not empty
 /// @param X_LO      frame of the points -> link frame
 /// @param padding   [m]

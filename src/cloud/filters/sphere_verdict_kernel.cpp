@@ -50,7 +50,7 @@ struct Entry {
 };
 
 SphereVerdict TestSpheres(const SphereNode* nodes, const SphereLeaf* leaves, const float* p,
-                          float near, float held, bool is_brief) {
+                          float near, float held, bool stop_undecided) {
   const SphereTag d;
   SphereTreeStack<Entry> stack;
   stack.push({0, 0.0F});
@@ -62,11 +62,11 @@ SphereVerdict TestSpheres(const SphereNode* nodes, const SphereLeaf* leaves, con
       if (IsInAny(leaf, leaf.inner_radius, p, held)) return SphereVerdict::kOnRobot;
       if (verdict == SphereVerdict::kClear && IsInAny(leaf, leaf.cover_radius, p, near)) {
         verdict = SphereVerdict::kUndecided;
-        if (is_brief) return verdict;
+        if (stop_undecided) return verdict;
       }
       continue;
     }
-    // Once it is open, only an inner sphere can decide: it lies in the bounding sphere.
+    // Once it is undecided, only an inner sphere can decide: it lies in the bounding sphere.
     const SphereNode& node = nodes[child];
     const float margin = verdict == SphereVerdict::kClear ? near : held;
     alignas(32) float inside[kSphereWidth];
@@ -96,9 +96,9 @@ namespace ist {
 HWY_EXPORT(TestSpheres);
 
 SphereVerdict test_spheres(const InnerSphereTree& tree, const float center_L[3], float near,
-                           float held, bool is_brief) {
+                           float held, bool stop_undecided) {
   return HWY_DYNAMIC_DISPATCH(TestSpheres)(tree.nodes().data(), tree.leaves().data(), center_L,
-                                           near, held, is_brief);
+                                           near, held, stop_undecided);
 }
 
 }  // namespace ist

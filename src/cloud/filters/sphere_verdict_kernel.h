@@ -15,10 +15,10 @@ enum class SphereVerdict {
 /// enough, into the child that holds the centre deepest first; ends at the first inner sphere that
 /// holds all of the points.
 /// @param center_L   [m] link frame
-/// @param near       [m] a cover sphere nearer to the centre than this leaves it open
+/// @param near       [m] a cover sphere nearer to the centre than this leaves it undecided
 /// @param held       [m] an inner sphere holds all points when the centre is nearer to it than this
-/// @param is_brief   also ends, undecided, at the first cover sphere that is near enough
+/// @param stop_undecided   also ends, undecided, at the first cover sphere that is near enough
 SphereVerdict test_spheres(const InnerSphereTree& tree, const float center_L[3], float near,
-                           float held, bool is_brief);
+                           float held, bool stop_undecided);
 
 }  // namespace ist

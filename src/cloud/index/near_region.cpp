@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "internal/geometry/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -14,15 +15,18 @@ constexpr double kLeastMotion = 0.1, kMostMotion = 1.0;
 
 }  // namespace
 
-void NearRegion::start(const std::vector<SelfFilter::Link>& links, double stamp) {
+void NearRegion::start(const std::vector<SelfFilter::Link>& links, double search_distance,
+                       double stamp) {
   const double period = stamp - stamp_;
   motion_ = static_cast<float>(period > 0.0 ? std::clamp(kSpeed * period, kLeastMotion, kMostMotion)
                                             : kMostMotion);
   stamp_ = stamp;
+  search_distance_ = static_cast<float>(search_distance);
   links_.resize(links.size());
   for (std::size_t i = 0; i < links.size(); ++i) {
     const SphereNode& root = links[i].tree->nodes().front();
     Link& link = links_[i];
+    link.link = &links[i];
     const Eigen::Isometry3d X_OL = links[i].X_LO.inverse();
     for (int k = 0; k < kSphereWidth; ++k) {
       const bool is_used = k < root.count;
@@ -34,7 +38,6 @@ void NearRegion::start(const std::vector<SelfFilter::Link>& links, double stamp)
       link.z[k] = p_O.z();
       link.radius[k] = is_used ? root.radius[k] : -kFarAway;
     }
-    link.clear_distance = links[i].clear_distance;
     link.nearest = std::numeric_limits<float>::infinity();
   }
 }
@@ -43,18 +46,30 @@ void NearRegion::add(const Eigen::Vector3f& p_O) {
   for (Link& link : links_) {
     const Spheres sq =
         (link.x - p_O.x()).square() + (link.y - p_O.y()).square() + (link.z - p_O.z()).square();
-    link.here = (sq.sqrt() - link.radius).minCoeff();
-    if (!(link.here > link.clear_distance)) return;  // may be the robot's
+    link.to_spheres = (sq.sqrt() - link.radius).minCoeff();
+    if (!(link.to_spheres > link.link->clear_distance)) return;  // may be the robot's
   }
-  for (Link& link : links_) link.nearest = std::min(link.nearest, link.here);
+  for (Link& link : links_) {
+    if (!(link.to_spheres < link.nearest)) continue;
+    link.nearest = link.to_spheres;
+    link.p_O = p_O;
+  }
 }
 
-// The distance of a link is at most that of its nearest sphere and a sphere's size more.
+// [m] No obstacle that is farther from the link is its nearest one. Infinity: none is known.
+float NearRegion::distance_of_nearest(const Link& link) {
+  if (!std::isfinite(link.nearest)) return link.nearest;
+  const Eigen::Vector3d p_L = link.link->X_LO * link.p_O.cast<double>();
+  const double distance =
+      distance_outside(*link.link->solid, p_L, std::numeric_limits<double>::infinity()).distance;
+  return static_cast<float>(distance);
+}
+
 void NearRegion::finish() {
   for (Link& link : links_) {
-    const bool has_obstacle = std::isfinite(link.nearest);
-    const float to_nearest = has_obstacle ? std::min(link.nearest, kFarthest) : link.nearest;
-    const Spheres reach = 2.0F * link.radius + (link.clear_distance + to_nearest + motion_);
+    const float nearest = distance_of_nearest(link);
+    const float looked_at = std::isfinite(nearest) ? std::min(nearest, search_distance_) : nearest;
+    const Spheres reach = link.radius + (std::max(looked_at, link.link->clear_distance) + motion_);
     link.reach_sq = (link.radius >= 0.0F).select(reach.square(), -1.0F);
   }
 }

@@ -37,8 +37,9 @@ class PointBvhBuilder {
   /// Builds over the points in cells().
   /// @param may_drop    may be empty: a filter may drop any point
   /// @param is_distant  may be empty. Called once for the box of each cell: whether no query will
-  ///                    look at its points soon. They are not sliced then, and not filtered: their
-  ///                    tiles are as large as the cell.
+  ///                    look at its points soon, and `drop` would drop none of them. They are not
+  ///                    sliced then, and not filtered: their tiles are as large as the cell, or as
+  ///                    a part of it where there are many.
   void build_from_cells(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
                         const BoxFilter& may_drop, const BoxFilter& is_distant, PointBvh* bvh);
   PointCells& cells() { return cells_; }
@@ -87,8 +88,10 @@ class PointBvhBuilder {
 
   void read_few_lazy_tiles();
   void append_lazy(const std::uint32_t* first_pixels, std::size_t count);
-  PaddedBox cell_box() const;
-  void add_unsliced_cell(const PaddedBox& box);
+  void reserve();
+  bool add_if_distant(const BoxFilter& is_distant);
+  void add_distant_points(CloudPoint* points, CloudPoint* spare, std::size_t n);
+  void add_unsliced(const CloudPoint* points, std::size_t n, const PaddedBox& box);
   void add_points(CloudPoint* points, CloudPoint* spare, std::size_t n, const Filters& filters);
   void slice_into_tiles(CloudPoint* points, CloudPoint* spare, std::size_t n);
   template <typename Visit>

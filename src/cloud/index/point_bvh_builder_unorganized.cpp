@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "cloud/index/point_bvh_builder.h"
 #include "internal/bvh/padded_box.h"
@@ -13,6 +14,8 @@ namespace {
 
 constexpr auto kWidth = static_cast<std::size_t>(kPointWidth);
 constexpr std::size_t kEnough = 4 * kWidth;  // tiles for well filled nodes
+// Points that share a box, at most: a query that looks there looks at all of them.
+constexpr std::size_t kMostUnsliced = 4096;
 
 }  // namespace
 
@@ -45,28 +48,52 @@ void PointBvhBuilder::for_each_slice(std::size_t n, std::size_t part, const Visi
   }
 }
 
-PaddedBox PointBvhBuilder::cell_box() const {
+// Adds points in the order in which they come.
+// @param box  of all of them
+void PointBvhBuilder::add_unsliced(const CloudPoint* points, std::size_t n, const PaddedBox& box) {
+  PointTile* tiles = next_tiles((n + kWidth - 1) / kWidth);
+  for (std::size_t count = fill_tiles(points, n, tiles); count > 0; --count) {
+    bvh_->size_ += static_cast<std::size_t>(bvh_->tiles_[used_].count);
+    ungrouped_.push_back({box, ~static_cast<std::int32_t>(used_)});
+    ++used_;
+    if (ungrouped_.size() - group_begin_ == kWidth) end_group();
+  }
+}
+
+// Adds points of a distant cell: sliced only until no part has too many.
+// @param spare  buffer for n points
+void PointBvhBuilder::add_distant_points(CloudPoint* points, CloudPoint* spare, std::size_t n) {
+  if (n <= kMostUnsliced || !slicer_.sort(points, n, spare)) {
+    if (n > 0) add_unsliced(points, n, box_of(points, n));
+    end_group();
+    return;
+  }
+  for_each_slice(n, kMostUnsliced, [&](std::size_t begin, std::size_t end) {
+    add_distant_points(spare + begin, points + begin, end - begin);
+  });
+}
+
+// Adds the points of the cell where it is distant. @returns whether it is
+bool PointBvhBuilder::add_if_distant(const BoxFilter& is_distant) {
+  if (!is_distant) return false;
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   PaddedBox box = {{kInfinity, kInfinity, kInfinity, 0.0F},
                    {-kInfinity, -kInfinity, -kInfinity, 0.0F}};
-  cells_.for_each_part(
-      [&](const CloudPoint* points, std::size_t n) { box.extend(box_of(points, n)); });
-  return box;
-}
-
-// Adds the points of a cell in the order in which they were added.
-// @param box  of the cell's points
-void PointBvhBuilder::add_unsliced_cell(const PaddedBox& box) {
+  std::size_t count = 0;
   cells_.for_each_part([&](const CloudPoint* points, std::size_t n) {
-    PointTile* tiles = next_tiles((n + kWidth - 1) / kWidth);
-    for (std::size_t count = fill_tiles(points, n, tiles); count > 0; --count) {
-      bvh_->size_ += static_cast<std::size_t>(bvh_->tiles_[used_].count);
-      ungrouped_.push_back({box, ~static_cast<std::int32_t>(used_)});
-      ++used_;
-      if (ungrouped_.size() - group_begin_ == kWidth) end_group();
-    }
+    box.extend(box_of(points, n));
+    count += n;
   });
+  if (!is_distant(box)) return false;
+  if (count > kMostUnsliced) {
+    const PointCells::Points cell = cells_.points();
+    add_distant_points(cell.points, spare_.data(), cell.size);
+    return true;
+  }
+  cells_.for_each_part(
+      [&](const CloudPoint* points, std::size_t n) { add_unsliced(points, n, box); });
   end_group();
+  return true;
 }
 
 // Adds the points of a cell: slices them until the parts fit a batch.
@@ -119,7 +146,6 @@ void PointBvhBuilder::add_batch(const Filters& filters) {
     is_clear = is_clear && !may_drop_any(filters, bounds_of(boxes));
   }
   if (!is_clear) {
-    filtered_.reserve(TileBatch::kMost);
     filtered_.assign(tiles, tiles + count);
   }
   // Splits may have made more tiles than fit whole nodes: groups of about equal size.
@@ -175,22 +201,35 @@ void PointBvhBuilder::build(const Eigen::Isometry3d& X_FO, const CloudPoint* poi
   build_from_cells(X_FO, drop, {}, {}, bvh);
 }
 
+// Allocates far more than needed: the numbers of nodes and tiles differ from cloud to cloud of a
+// stream, and memory is to be allocated once.
+void PointBvhBuilder::reserve() {
+  const std::size_t nodes = cells_.size() / (4 * kWidth) + kWidth;
+  if (bvh_->nodes_.capacity() < nodes) bvh_->nodes_.reserve(2 * nodes);
+  const std::size_t tiles = 2 * cells_.size() / kWidth + kWidth;  // pages are taken when written
+  if (bvh_->tiles_.capacity() < tiles) {
+    bvh_->tiles_.clear();
+    bvh_->tiles_.reserve(tiles + tiles / 2);
+    bvh_->first_pixel_.clear();
+    bvh_->first_pixel_.reserve(tiles + tiles / 2);
+  }
+  ungrouped_.reserve(kEnough + TileBatch::kMost);
+  if (spare_.size() < cells_.largest() + kPointSlack) {
+    spare_.resize(2 * (cells_.largest() + kPointSlack));
+  }
+  slicer_.reserve(cells_.largest());
+  filtered_.reserve(TileBatch::kMost);
+}
+
 void PointBvhBuilder::build_from_cells(const Eigen::Isometry3d& X_FO, const PointFilter& drop,
                                        const BoxFilter& may_drop, const BoxFilter& is_distant,
                                        PointBvh* bvh) {
   start(X_FO, bvh);
-  // Far more than needed: the number of nodes differs from cloud to cloud of a stream, and memory
-  // is to be allocated once.
-  const std::size_t enough = cells_.size() / (4 * kWidth) + kWidth;
-  if (bvh->nodes_.capacity() < enough) bvh->nodes_.reserve(2 * enough);
-  ungrouped_.reserve(kEnough + TileBatch::kMost);
+  bool is_first = true;
   while (cells_.next()) {
-    const PaddedBox box = is_distant ? cell_box() : PaddedBox();
-    if (is_distant && is_distant(box)) {
-      add_unsliced_cell(box);
-    } else {
+    if (std::exchange(is_first, false)) reserve();
+    if (!add_if_distant(is_distant)) {
       const PointCells::Points cell = cells_.points();
-      if (spare_.size() < cell.size + kPointSlack) spare_.resize(2 * (cell.size + kPointSlack));
       add_points(cell.points, spare_.data(), cell.size, {drop, may_drop});
     }
     end_cell();

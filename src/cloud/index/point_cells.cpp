@@ -113,8 +113,24 @@ void PointCells::skip_empty() {
   prefetch_lines(&pool_[begin], here * sizeof(CloudPoint));
 }
 
+// Reserves as much for every cell as for the fullest one, so that it does not depend on the cells
+// that are gathered.
+void PointCells::find_largest() {
+  largest_ = 0;
+  for (cell_ = 0; cell_ < end_.size(); ++cell_) {
+    if (end_[cell_] == 0) continue;
+    std::size_t count = 0;
+    for_each_part([&count](const CloudPoint*, std::size_t n) { count += n; });
+    largest_ = std::max(largest_, count);
+  }
+  if (gathered_.size() < largest_ + kPointSlack) gathered_.resize(2 * (largest_ + kPointSlack));
+}
+
 bool PointCells::next() {
-  if (taken_ == 0) skip_empty();
+  if (taken_ == 0) {
+    find_largest();
+    skip_empty();
+  }
   if (taken_ == end_.size()) return false;
   cell_ = taken_++;
   skip_empty();
@@ -126,9 +142,6 @@ PointCells::Points PointCells::points() {
   if (begin / kChunk == (end - 1) / kChunk) return {&pool_[begin], end - begin};
   std::size_t count = 0;
   for_each_part([&](const CloudPoint* part, std::size_t n) {
-    if (gathered_.size() < count + n + kPointSlack) {
-      gathered_.resize(2 * (count + n + kPointSlack));
-    }
     std::copy_n(part, n, &gathered_[count]);
     count += n;
   });

@@ -47,6 +47,8 @@ class PointCells {
     CloudPoint* points;
     std::size_t size;
   };
+  /// Points in the fullest cell, as soon as next() was called.
+  std::size_t largest() const { return largest_; }
   /// Goes to the next cell that is not empty, in Morton order: neighbours in this order are mostly
   /// neighbours in space. @returns false after the last one
   bool next();
@@ -71,6 +73,7 @@ class PointCells {
   void scatter(std::size_t count);
   std::uint32_t next_chunk(std::size_t cell, std::uint32_t end);
   void skip_empty();
+  void find_largest();
 
   PointGrid grid_;
   CellBatch batch_;
@@ -78,7 +81,7 @@ class PointCells {
   std::vector<CloudPoint> pool_;
   std::vector<std::uint32_t> next_;   ///< by chunk: the next one of its cell
   std::vector<CloudPoint> gathered_;  ///< buffer for a cell of more than one chunk
-  std::size_t size_ = 0;
+  std::size_t size_ = 0, largest_ = 0;
   std::size_t cell_ = 0;    ///< that next() has gone to
   std::size_t taken_ = 0;   ///< cells that next() has gone to or skipped
   std::size_t chunks_ = 1;  ///< in use; the first one stays empty

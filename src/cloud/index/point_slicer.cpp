@@ -8,11 +8,15 @@
 
 namespace ist {
 
+void PointSlicer::reserve(std::size_t n) {
+  if (slices_.size() < n + kPointSlack) slices_.resize(2 * (n + kPointSlack));
+}
+
 bool PointSlicer::sort(const CloudPoint* from, std::size_t n, CloudPoint* to) {
   constexpr std::size_t kFew = 128, kFewSlices = 32;
   const std::size_t count = n <= kFew ? kFewSlices : kMostSlices;
   dense_begin_ = dense_end_ = 0;
-  if (slices_.size() < n + kPointSlack) slices_.resize(2 * (n + kPointSlack));
+  reserve(n);
   if (!find_slices(from, n, static_cast<std::int32_t>(count), slices_.data(), &shape_))
     return false;
   std::fill_n(at_.begin(), count, 0U);

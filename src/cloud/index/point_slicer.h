@@ -14,6 +14,8 @@ namespace ist {
 /// width. Keeps its memory. Not thread safe.
 class PointSlicer {
  public:
+  /// Allocates for n points, where that is not enough.
+  void reserve(std::size_t n);
   /// Sorts points.
   /// @param from  n of them, and kPointSlack more that may be read
   /// @param to    n of them, overwritten unless false is returned

@@ -44,8 +44,8 @@ std::size_t take_sample(const RawCloud& cloud, const CropParameters& crop, Sampl
 }  // namespace
 
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              SelfFilter* on_robot, NearRegion* near, double stamp,
-                              PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts) {
+                              SelfFilter* on_robot, NearRegion* region, PointBvhBuilder* builder,
+                              PointBvh* bvh, IngestCounts* counts) {
   const RawCloud points = flattened(cloud);
   Sample sample;
   PointCells& cells = builder->cells();
@@ -62,20 +62,20 @@ std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
       id += static_cast<std::uint32_t>(count);
     }
   }
-  if (on_robot == nullptr) {
-    builder->build_from_cells(crop.X_FO, {}, {}, {}, bvh);
-  } else {
-    near->start(on_robot->links(), stamp);
-    cells.for_each_first([near](const CloudPoint& p) { near->add({p.x, p.y, p.z}); });
-    near->finish();
-    builder->build_from_cells(
-        crop.X_FO,
-        [on_robot](const PointTile& tile, const PaddedBox& box) {
-          return on_robot->points_on_robot(tile, box);
-        },
-        [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); },
-        [near](const PaddedBox& box) { return near->is_outside(box); }, bvh);
+  PointFilter drop;
+  BoxFilter may_drop, is_distant;
+  if (on_robot != nullptr) {
+    drop = [on_robot](const PointTile& tile, const PaddedBox& box) {
+      return on_robot->points_on_robot(tile, box);
+    };
+    may_drop = [on_robot](const PaddedBox& box) { return on_robot->begin_group(box); };
   }
+  if (region != nullptr) {
+    cells.for_each_first([region](const CloudPoint& p) { region->add({p.x, p.y, p.z}); });
+    region->finish();
+    is_distant = [region](const PaddedBox& box) { return region->is_outside(box); };
+  }
+  builder->build_from_cells(crop.X_FO, drop, may_drop, is_distant, bvh);
   return kept;
 }
 

@@ -15,12 +15,13 @@ namespace ist {
 /// points that are not finite or not in range and sorts the others into the cells of a grid. Counts
 /// `not_a_number`, `infinite` and `outside_region`.
 /// @param on_robot  null: no self-filter
-/// @param near  where points are sliced into small tiles, overwritten; used with `on_robot` only
-/// @param stamp  [s] of the cloud
+/// @param region  where points are sliced into small tiles, begun with the links of `on_robot`;
+/// null:
+///                everywhere
 /// @param bvh  overwritten, its buffers reused
 /// @returns how many points are kept, before `on_robot` drops some
 std::size_t index_unorganized(const RawCloud& cloud, const CropParameters& crop,
-                              SelfFilter* on_robot, NearRegion* near, double stamp,
-                              PointBvhBuilder* builder, PointBvh* bvh, IngestCounts* counts);
+                              SelfFilter* on_robot, NearRegion* region, PointBvhBuilder* builder,
+                              PointBvh* bvh, IngestCounts* counts);
 
 }  // namespace ist

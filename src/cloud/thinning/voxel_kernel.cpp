@@ -89,7 +89,7 @@ HWY_INLINE std::uint32_t Nearest(const TileVoxels& voxels, std::uint32_t used) {
       nearest |= lanes::MaskBits(d, hn::Eq(hn::Load(d, offset_sq + i), least)) << i;
     }
     all |= nearest;
-    left &= ~here;
+    left &= ~here & (left - 1);  // ends also where a number is none
   }
   return all;
 }

@@ -92,11 +92,7 @@ void Placer::pose_robot(const SourceTarget& target, const ros::Time& stamp, std:
     last->known[i] = true;
     last->X_FL[i] = X_FL;
     last->solid[i] = placement->robot.size();
-    PosedSolid solid;
-    solid.tree = &links[i].tree;
-    solid.solid = &links[i].solid;
-    solid.X_FL = X_FL;
-    placement->robot.push_back(solid);
+    placement->robot.push_back(posed_solid(links[i], X_FL));
     placement->robot_instants.emplace_back(instant, instant);
   }
 }

@@ -170,6 +170,9 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
   }
   read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
+  for (SourceConfig& source : config.sources) {
+    source.ingest.search_distance = config.query.max_distance;
+  }
   read_unknown_space(&reader, &config);
   read_self_collision(&reader, &config.self_collision);
   read_attach(&reader, &config.attach);
