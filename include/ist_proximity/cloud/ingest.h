@@ -97,7 +97,7 @@ struct IngestConfig {
   double max_range = 3.0;   ///< [m] from the sensor; > min_range, may be inf
   /// [m] >= 0. Queries look no farther than this from where the robot is while the cloud is used;
   /// infinity: anywhere. The points of an unorganized cloud that are farther away, or behind nearer
-  /// ones, are indexed coarsely, which takes half of the time. Queries that look there all the same
+  /// ones, are indexed coarsely, which takes less time. Queries that look there all the same
   /// find the same, more slowly.
   double search_distance = std::numeric_limits<double>::infinity();
   bool self_filter = true;            ///< drop points on the robot

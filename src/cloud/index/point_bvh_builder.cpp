@@ -30,13 +30,6 @@ void remove(std::uint32_t dropped, PointTile* tile) {
   if (kept > 0) repeat_last(tile);
 }
 
-void put_unused_far_away(PointTile* tile) {
-  for (std::int32_t k = tile->count; k < kPointWidth; ++k) {
-    tile->x[k] = tile->y[k] = tile->z[k] = kFarAway;
-    tile->id[k] = 0;
-  }
-}
-
 // Whether neighbouring tiles are to be a node: they fill most of it and are close together.
 bool is_node_worthwhile(const HierarchyChild* tiles, std::size_t count) {
   if (count < kWidth / 2 || count > kWidth) return false;

@@ -22,7 +22,8 @@ namespace ist {
 /// Points in any order are brought together by the cells of a coarse grid. Each cell, which fits
 /// the first caches, is sliced across the longest side of its box, and the slices again, until
 /// sixteen neighbours are a tile. A tile whose points are apart (split_rule.h) is split further, so
-/// that no tile has a large box. Consecutive tiles are grouped into nodes.
+/// that no tile has a large box, but for tiles of distant cells. Consecutive tiles are grouped into
+/// nodes.
 class PointBvhBuilder {
  public:
   /// Builds over points in any order.

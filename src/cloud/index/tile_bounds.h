@@ -20,6 +20,14 @@ inline void repeat_last(PointTile* tile) {
   }
 }
 
+/// Moves unused slots far away.
+inline void put_unused_far_away(PointTile* tile) {
+  for (int k = tile->count; k < kPointWidth; ++k) {
+    tile->x[k] = tile->y[k] = tile->z[k] = kFarAway;
+    tile->id[k] = 0;
+  }
+}
+
 /// The box of all slots.
 inline PaddedBox box_of(const PointTile& tile) {
   const LaneMap x(tile.x), y(tile.y), z(tile.z);

@@ -9,13 +9,6 @@
 namespace ist {
 namespace {
 
-void put_unused_far_away(ThinnedTile* tile) {
-  for (int k = tile->count; k < kPointWidth; ++k) {
-    tile->x[k] = tile->y[k] = tile->z[k] = kFarAway;
-    tile->id[k] = 0;
-  }
-}
-
 void find_box(ThinnedTile* tile) {
   repeat_last(tile);
   const PaddedBox box = box_of(*tile);

@@ -8,6 +8,8 @@
 
 #include <limits>
 
+#include "internal/geometry/lanes-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
@@ -30,9 +32,7 @@ HWY_INLINE std::uint32_t ChildrenNear(const BoxNode& node, const RivalSpheres& s
         hn::Max(hn::Max(off(node.min_x + k, node.max_x + k, spheres.min[0], spheres.max[0]),
                         off(node.min_y + k, node.max_y + k, spheres.min[1], spheres.max[1])),
                 off(node.min_z + k, node.max_z + k, spheres.min[2], spheres.max[2]));
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::Le(off_all, hn::Zero(d)), bits);
-    near |= (bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U) << k;
+    near |= lanes::MaskBits(d, hn::Le(off_all, hn::Zero(d))) << k;
   }
   return near & ((1U << static_cast<std::uint32_t>(node.count)) - 1U);
 }
@@ -70,9 +70,7 @@ std::size_t FindMeetingSpheres(const BoxNode& node, std::size_t child, const Riv
   const Tag d;
   std::size_t count = 0;
   for (std::size_t i = 0; i < spheres.count; i += hn::Lanes(d)) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::Le(Gaps(node, child, spheres, i), hn::Zero(d)), bits);
-    std::uint32_t meeting = bits[0] | static_cast<std::uint32_t>(bits[1]) << 8U;
+    std::uint32_t meeting = lanes::MaskBits(d, hn::Le(Gaps(node, child, spheres, i), hn::Zero(d)));
     for (; meeting != 0; meeting &= meeting - 1) {
       const std::size_t number = i + hwy::Num0BitsBelowLS1Bit_Nonzero32(meeting);
       if (number < spheres.count) numbers[count++] = static_cast<std::uint16_t>(number);

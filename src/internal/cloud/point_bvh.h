@@ -17,9 +17,9 @@
 
 namespace ist {
 
-/// The data of a PointIndex: tiles of up to sixteen neighbouring points and a bounding volume
-/// hierarchy of boxes over them. A traversal takes it once, by PointIndex::bvh(). Immutable once
-/// built, thread safe.
+/// The data of a PointIndex: tiles of up to sixteen points, mostly neighbours, and a bounding
+/// volume hierarchy of boxes over them. A traversal takes it once, by PointIndex::bvh(). Immutable
+/// once built, thread safe.
 ///
 /// Tiles of an organized cloud whose bytes stay where they are get loaded when a query first looks
 /// at them; queries look at few.

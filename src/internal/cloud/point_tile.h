@@ -10,8 +10,8 @@ namespace ist {
 /// Points of a tile; as many as a node has children.
 constexpr int kPointWidth = kBoxWidth;
 
-/// Neighbouring points side by side for SIMD, in the index's frame O [m]. Unused slots are far
-/// away.
+/// Points, mostly neighbours, side by side for SIMD, in the index's frame O [m]. Unused slots are
+/// far away.
 struct alignas(64) PointTile {
   float x[kPointWidth], y[kPointWidth], z[kPointWidth];
   std::uint32_t id[kPointWidth];  ///< index of the point in the message it came from
