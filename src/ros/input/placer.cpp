@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "ist_proximity/robot/link_poses.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/poses/transforms.h"
