@@ -56,7 +56,7 @@ class Cropper {
     }
     const auto nan = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
     const auto infinity = hn::Set(d, std::numeric_limits<double>::infinity());
-    // Without branches: in a cloud whose points are in no order, none could be foretold.
+    // There are no branches: in a cloud whose points are in no order, none could be foretold.
     hn::Store(hn::DemoteTo(f, hn::IfThenElse(keep, MovedAlong(0, x, y, z), nan)), f, batch_.x + k);
     hn::Store(hn::DemoteTo(f, MovedAlong(1, x, y, z)), f, batch_.y + k);
     hn::Store(hn::DemoteTo(f, MovedAlong(2, x, y, z)), f, batch_.z + k);

@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What a field of distances proves of a tile's points: bit k is of the point in slot k.
+/// A field of distances proves this of a tile's points. Bit k is of the point in slot k.
 struct FieldVerdict {
   std::uint32_t on_robot;  ///< no farther from the surface than the padding
   std::uint32_t clear;     ///< outside, and farther from the surface than the padding

@@ -4,7 +4,7 @@
 
 namespace ist {
 
-/// What spheres prove of some points.
+/// Spheres prove one of these of some points.
 enum class SphereVerdict {
   kClear,      ///< none of them is the robot's
   kOnRobot,    ///< all of them are the robot's
