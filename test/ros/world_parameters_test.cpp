@@ -71,6 +71,16 @@ TEST(WorldParameters, AreRead) {
   EXPECT_EQ(wall.object.margin, 0.5);
 }
 
+// A source of any type is to be searched quickly as far as queries measure.
+TEST(SourceParameters, TheSearchDistanceIsThatOfTheQueries) {
+  std::vector<std::string> warnings;
+  XmlRpcValue tree = good();
+  EXPECT_EQ(parse_parameters(tree, &warnings).sources.at(0).ingest.search_distance,
+            QueryConfig().max_distance);
+  tree["max_distance"] = 2.5;
+  EXPECT_EQ(parse_parameters(tree, &warnings).sources.at(0).ingest.search_distance, 2.5);
+}
+
 TEST(WorldParameters, APlanningSceneIsATopicOfAnotherType) {
   XmlRpcValue tree = good();
   XmlRpcValue& cell = tree["sources"]["cell"];
