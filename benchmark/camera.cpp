@@ -6,15 +6,12 @@
 //
 // One thread, processor time of that thread, without ROS. The frames of the test data
 // (IST_PROXIMITY_DATA, or ../shared/data), or the synthetic one without them; the robot moves
-// through them. Usage: camera CACHE_FOLDER [--ours | --count WHAT]; scripts/benchmark calls it.
-// --ours: no other libraries. --count: runs "ingest", "list" or "frame" for a profiler, without
-// penetration.
+// through them. Usage: camera CACHE_FOLDER [--ours]; scripts/benchmark calls it.
+// --ours: no other libraries.
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstring>
-#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -49,17 +46,15 @@ using Poses = std::vector<Eigen::Isometry3d>;
 
 constexpr std::size_t kCycles = 33;     // at 1 kHz, between two images at 30 Hz
 constexpr double kPeriod = 1.0 / 30.0;  // [s] of the images
-constexpr int kRepetitions = 30;
 constexpr std::size_t kLag = 2;  // cycles from the poses of the first answer to the next cycle
 constexpr double kWarmUpLimit = 0.005;   // [s] as in the node
 constexpr std::size_t kFewSpheres = 59;  // as many as a common hand-made set for this arm
 
 // The robot as the node has it.
 struct Robot {
-  // @param touches  also packs it for contact volumes
-  Robot(const DataSet& set, const std::string& cache, bool touches)
+  Robot(const DataSet& set, const std::string& cache)
       : model(set.robot.pack(ist::PackingConfig().max_error)), known(model->links.size(), true) {
-    for (std::size_t i = 0; touches && i < model->links.size(); ++i) {
+    for (std::size_t i = 0; i < model->links.size(); ++i) {
       const ist::LinkGeometry geometry = {
           {set.robot.meshes[i], Eigen::Isometry3d::Identity(), "link"}};
       bodies.push_back(ist::build_contact_geometry(geometry, 0, model->links[i], {}, cache));
@@ -106,24 +101,12 @@ class Node {
       push_ = own_->repel(i, X_FL[i], {&snapshot_}, results_[i], {});
     }
   }
-  // As repel() where nothing is kept.
-  void blend(const Poses& X_FL) {
-    own_->forget_repulsion();
-    repel(X_FL);
-  }
   void penetrate(const Poses& X_FL) {
     for (std::size_t i = 0; i < results_.size(); ++i) {
       if (results_[i].state != LinkState::kContact) continue;
       volume_ =
           ist::contact_volume(robot_.model->links[i], *robot_.bodies[i], X_FL[i], {&snapshot_});
     }
-  }
-  const CloudSnapshot& snapshot() const { return snapshot_; }
-  std::size_t links_within(double distance) const {
-    return static_cast<std::size_t>(
-        std::count_if(results_.begin(), results_.end(), [distance](const LinkProximity& link) {
-          return link.state >= LinkState::kNear && link.distance < distance;
-        }));
   }
 
  private:
@@ -235,114 +218,17 @@ void print_peers(const DataSet& set, double ours) {
 }
 #endif
 
-// Where the robot is when nothing is within the influence distance of it.
-Poses far_above(Poses X_FL) {
-  for (Eigen::Isometry3d& X : X_FL) X.pretranslate(Eigen::Vector3d(0.0, 0.0, 3.0));
-  return X_FL;
-}
-
-// The configuration of the motion of which most nearly half the links are within the influence
-// distance; the number of those.
-std::size_t half_near(const DataSet& set, const Scene& scene, const Robot& robot,
-                      std::size_t* links) {
-  std::size_t best = 0, best_off = std::numeric_limits<std::size_t>::max();
-  Node node(robot);
-  for (std::size_t k = 0; k < set.motion.size(); k += kCycles) {
-    node.ingest(scene.frame, set.motion[k]);
-    node.query(set.motion[k]);
-    const std::size_t near = node.links_within(ist::RepulsionConfig().influence_distance);
-    const std::size_t half = (set.robot.meshes.size() + 1) / 2;
-    const std::size_t off = near > half ? near - half : half - near;
-    if (off >= best_off) continue;
-    best = k;
-    best_off = off;
-    *links = near;
-  }
-  return best;
-}
-
-// [us] Ingest, and the time that the first repulsion takes longer than the second one: thinning.
-double ingest_us(const Robot& robot, const Frame& frame, const Poses& X_FL) {
-  Node node(robot);
-  std::vector<double> us;
-  ThreadTimer timer;
-  for (int i = 0; i <= kRepetitions; ++i) {
-    timer.lap();
-    node.ingest(frame, X_FL);
-    const double ingest = timer.lap();
-    node.query(X_FL);
-    timer.lap();
-    node.blend(X_FL);
-    const double first = timer.lap();
-    node.blend(X_FL);
-    const double second = timer.lap();
-    if (i > 0) us.push_back(ingest + std::max(first - second, 0.0));
-  }
-  return quantile(us, 0.5);
-}
-
-void print_ingest(const DataSet& set, const Robot& robot) {
-  std::printf(
-      "\n# node ingest\n| frame | memcpy | image, robot far away | / memcpy | links near | image | "
-      "/ "
-      "memcpy | list, robot far away | / memcpy | list, links near | / memcpy |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (const Scene& scene : set.scenes) {
-    std::size_t links = 0;
-    const Poses& near = set.motion[half_near(set, scene, robot, &links)];
-    const Frame list = shuffled(scene.frame);
-    const double copy =
-        ist::benchmark::copy_us(scene.frame.data.data(), scene.frame.bytes(), kRepetitions);
-    std::printf("| %s | %.0f µs", scene.name.c_str(), copy);
-    const auto cell = [copy](double us) { std::printf(" | %.0f µs | %.1f", us, us / copy); };
-    cell(ingest_us(robot, scene.frame, far_above(near)));
-    std::printf(" | %zu of %zu", links, near.size());
-    cell(ingest_us(robot, scene.frame, near));
-    cell(ingest_us(robot, list, far_above(near)));
-    cell(ingest_us(robot, list, near));
-    std::printf(" |\n");
-  }
-}
-
-// Runs under a profiler that counts within the library's functions.
-void count(const DataSet& set, const Robot& robot, const std::string& what) {
-  if (what == "frame") {
-    for (const Scene& scene : set.scenes) {
-      Node node(robot);
-      for (std::size_t begin = 0; begin + kCycles <= set.motion.size(); begin += 3 * kCycles) {
-        node.ingest(scene.frame, set.motion[begin]);
-        if (begin > 0) node.warm_up(set.motion[begin - kLag]);
-        for (std::size_t k = begin; k < begin + kCycles; ++k) {
-          node.query(set.motion[k]);
-          node.repel(set.motion[k]);
-        }
-      }
-    }
-    return;
-  }
-  const Scene& scene = set.scenes[0];
-  std::size_t links = 0;
-  const Poses& near = set.motion[half_near(set, scene, robot, &links)];
-  Node node(robot);
-  const Frame frame = what == "list" ? shuffled(scene.frame) : scene.frame;
-  for (int i = 0; i < 10; ++i) node.ingest(frame, near);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "Usage: camera CACHE_FOLDER [--ours | --count ingest|list|frame]\n");
+    std::fprintf(stderr, "Usage: camera CACHE_FOLDER [--ours]\n");
     return 2;
   }
   const auto data = ist::test::data_dir();
   const DataSet set =
       data ? ist::benchmark::kinect_data(*data, argv[1]) : ist::benchmark::synthetic_data(argv[1]);
-  if (argc > 3) {
-    count(set, Robot(set, argv[1], false), argv[3]);
-    return 0;
-  }
-  const Robot robot(set, argv[1], true);
+  const Robot robot(set, argv[1]);
   std::printf(
       "# camera\n| method | image | first answer, beside the cycles | 33 cycles: distances | "
       "repulsion | penetration | one 30 Hz frame, median / p99 | / ours |\n"
@@ -353,6 +239,5 @@ int main(int argc, char** argv) {
 #ifdef IST_BENCHMARK_CGAL
   if (argc == 2) print_peers(set, frame);
 #endif
-  print_ingest(set, robot);
   return 0;
 }

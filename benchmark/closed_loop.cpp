@@ -3,7 +3,7 @@
 // the speed scale beside the repulsion and beside the nearest pair's direction.
 //
 // Usage: closed_loop [--first SEED] [--count N] [--threads N] [--noise MM] [--each] [--self]
-//                    [--save FILE] [--from FILE]... [--update-doc doc/dodge.md]
+//                    [--save FILE] [--from FILE]... [--update-doc doc/benchmark.md]
 //   --save  appends the measurements to a file
 //   --from  takes measurements from such files, in place of running the scenes: so that several
 //           machines share the work

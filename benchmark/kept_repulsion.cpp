@@ -1,7 +1,7 @@
 // How far off the repulsion vector is that follows a link between blends: the Panda's motion among
 // the recorded Kinect frames, an image each 33 ms and poses each millisecond, as the node has them.
 // Compared with the same mean over all pairs of spheres and thinned points, in double, at the pose.
-// A table for doc/repulsion.md.
+// A table for doc/accuracy.md.
 //
 // Usage: kept_repulsion CACHE_FOLDER [DOCUMENT]; scripts/benchmark --repulsion calls it. Needs the
 // test data: IST_PROXIMITY_DATA, or ../shared/data.

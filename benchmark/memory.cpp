@@ -1,19 +1,16 @@
 // What remembering costs: the time of a cloud of 640 x 480 points beside liboctomap's insertion of
 // the same clouds in the same run (octomap_server's: insertPointCloud with a largest range, a ray
-// for each point), the query with and without what is remembered, and memory over time. The
-// simulated arm moves among obstacles in front of a depth camera; then among thousands of boxes
-// that are hidden from it.
+// for each point), and the query with and without what is remembered. The simulated arm moves among
+// obstacles in front of a depth camera.
 //
-// Usage: memory [seconds of simulation] [minutes of clouds for memory over time] [document]
+// Usage: memory [seconds of simulation] [document]
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <limits>
 #include <memory>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -39,9 +36,6 @@ using ist::benchmark::ThreadTimer;
 constexpr double kResolution = 0.02;  // [m]
 constexpr double kMaxRange = 3.0;     // [m]
 constexpr int kPeerEvery = 10;        // liboctomap takes one cloud of so many
-constexpr std::size_t kKept = 30;     // clouds for memory over time
-constexpr int kSteps = 5000;          // [ms] of the query among hidden boxes
-constexpr double kClearance = 0.05;   // [m] of these from the arm, at every tenth of a second
 
 struct Times {
   std::vector<double> ingest, scan, insert, insert_each, boxes;  // [us] of a cloud
@@ -76,15 +70,6 @@ double insert_octomap(const ist::MemoryScan& scan, bool discretize, octomap::OcT
   return timer.lap();
 }
 #endif
-
-std::size_t resident_bytes() {
-  std::size_t pages = 0, ignored = 0;
-  if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
-    if (std::fscanf(file, "%zu %zu", &ignored, &pages) != 2) pages = 0;
-    std::fclose(file);
-  }
-  return 4096 * pages;
-}
 
 std::string line(const char* format, double a, double b) {
   std::array<char, 200> text{};
@@ -134,122 +119,10 @@ std::vector<ist::sim::Obstacle> walls() {
   return all;
 }
 
-// Sends the same clouds again and again, 30 a second of their stamps.
-std::string watch_memory(std::vector<ist::MemoryScan> scans, double minutes) {
-  ist::MemoryMap map(memory_config(true));
-  ist::VoxelBoxes boxes;
-  std::string text = "| minute | voxels in memory | occupied | process |\n|---|---|---|---|\n";
-  std::fputs(text.c_str(), stdout);
-  const auto clouds = static_cast<std::size_t>(60.0 * 30.0 * minutes);
-  for (std::size_t i = 0; i < clouds; ++i) {
-    ist::MemoryScan& scan = scans[i % scans.size()];
-    scan.stamp = static_cast<double>(i) / 30.0;
-    map.insert(scan);
-    map.hidden_boxes(&boxes);
-    ist::BoxIndex index;
-    index.build(boxes);
-    if ((i + 1) % 1800 != 0) continue;
-    const ist::MemoryCounts counts = map.counts();
-    std::array<char, 100> row{};
-    std::snprintf(row.data(), row.size(), "| %zu | %zu | %zu | %.1f MB |\n", (i + 1) / 1800,
-                  counts.nodes, counts.occupied, 1e-6 * static_cast<double>(resident_bytes()));
-    std::fputs(row.data(), stdout);
-    text += row.data();
-  }
-  return text;
-}
-
-// The arm's joints in query_hidden(), after so many milliseconds.
-Eigen::VectorXd joints_at(const ist::sim::Arm& arm, int step) {
-  Eigen::VectorXd q(static_cast<Eigen::Index>(arm.config().joints.size()));
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    q[i] = 0.8 * std::sin(1e-3 * step * (0.9 + 0.3 * static_cast<double>(i)));
-  }
-  return q;
-}
-
-// [m] The distance of a point from where the arm is at every tenth of a second in query_hidden().
-double distance_from_motion(const ist::RobotModel& model, const ist::sim::Arm& arm,
-                            const Eigen::Vector3d& p) {
-  double least = std::numeric_limits<double>::infinity();
-  for (int step = 0; step < kSteps; step += 100) {
-    const auto X_FL = arm.link_poses(joints_at(arm, step));
-    for (std::size_t i = 0; i < X_FL.size(); ++i) {
-      if (model.links[i].tree.empty()) continue;
-      const Eigen::Vector3d p_L = X_FL[i].inverse() * p;
-      least = std::min(least, model.links[i].solid.signed_distance(p_L).distance);
-    }
-  }
-  return least;
-}
-
-// Points about the arm, apart from most of its motion, and then a board close to the camera that
-// hides them.
-std::shared_ptr<ist::BoxIndex> hidden_clutter(std::size_t points, const ist::RobotModel& model,
-                                              const ist::sim::Arm& arm,
-                                              const Eigen::Vector3d& eye) {
-  ist::MemoryMap map(memory_config(true));
-  std::mt19937 random(1);
-  std::uniform_real_distribution<double> angle(-3.14159265, 3.14159265), height(0.0, 1.0),
-      distance(0.3, 1.2);
-  ist::MemoryScan seen, board;
-  seen.origin = board.origin = eye.cast<float>();
-  while (seen.hits.size() < points) {
-    const double a = angle(random), d = distance(random);
-    const Eigen::Vector3d p(d * std::cos(a), d * std::sin(a), height(random));
-    if (distance_from_motion(model, arm, p) < kClearance) continue;
-    seen.hits.push_back(p.cast<float>());
-    board.hits.push_back((eye + 0.3 * (p - eye).normalized()).cast<float>());
-  }
-  seen.stamp = 1.0;
-  board.stamp = 1.1;
-  map.insert(seen);
-  map.insert(board);
-  ist::VoxelBoxes boxes;
-  map.hidden_boxes(&boxes);
-  auto index = std::make_shared<ist::BoxIndex>();
-  index->build(boxes);
-  return index;
-}
-
-// The query of a moving arm, 1000 times a second, with so many boxes about it that are hidden.
-std::string query_hidden(const std::shared_ptr<const ist::RobotModel>& model,
-                         const ist::sim::Arm& arm, const Eigen::Vector3d& eye,
-                         const ist::CloudSnapshot& cloud) {
-  std::string text =
-      "| boxes hidden | queries | without memory, median / p99 | with, median / p99 | p99, with / "
-      "without |\n|---|---|---|---|---|\n";
-  for (const std::size_t points : {300U, 3000U, 30000U}) {
-    ist::CloudSnapshot memory;
-    memory.boxes = hidden_clutter(points, *model, arm, eye);
-    ist::ProximityQuery query(model, {}), query_with(model, {});
-    std::vector<ist::LinkProximity> results;
-    std::vector<double> without_us, with_us;
-    for (int step = 0; step < kSteps; ++step) {
-      const auto X_FL = arm.link_poses(joints_at(arm, step));
-      const std::vector<bool> known(X_FL.size(), true);
-      ThreadTimer timer;
-      query.run(X_FL, known, {&cloud}, &results);
-      without_us.push_back(timer.lap());
-      query_with.run(X_FL, known, {&cloud, &memory}, &results);
-      with_us.push_back(timer.lap());
-    }
-    std::array<char, 200> row{};
-    const double p99 = quantile(without_us, 0.99), p99_with = quantile(with_us, 0.99);
-    std::snprintf(row.data(), row.size(),
-                  "| %zu | %zu | %.3f / %.3f ms | %.3f / %.3f ms | %.2f |\n", memory.boxes->size(),
-                  with_us.size(), 1e-3 * quantile(without_us, 0.5), 1e-3 * p99,
-                  1e-3 * quantile(with_us, 0.5), 1e-3 * p99_with, p99_with / p99);
-    text += row.data();
-  }
-  return text;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 4.0;
-  const double minutes = argc > 2 ? std::atof(argv[2]) : 0.0;
   const ist::RobotDescription robot = ist::test::demo_robot();
   const auto model = ist::build_robot_model(robot, {});
   std::vector<ist::sim::DepthCameraConfig> cameras = ist::sim::demo_cameras();
@@ -278,7 +151,6 @@ int main(int argc, char** argv) {
   ist::VoxelBoxes boxes;
   ist::ProximityQuery query(model, {}), query_with(model, {});
   std::vector<ist::LinkProximity> results;
-  std::vector<ist::MemoryScan> kept;
   ist::sim::Picture picture;
   Times times;
   int frames = 0;
@@ -300,7 +172,6 @@ int main(int argc, char** argv) {
       index->build(boxes);
       memory.boxes = index;
       times.boxes.push_back(timer.lap());
-      if (kept.size() < kKept) kept.push_back(scan);
       if (frames++ % kPeerEvery != 0) continue;
       timer.lap();
       each.insert(scan);
@@ -332,13 +203,6 @@ int main(int argc, char** argv) {
               scan.free_ends.size());
   std::printf("%zu voxels known, %zu occupied, %zu in memory, %zu boxes hidden\n", counts.known,
               counts.occupied, counts.nodes, boxes.size());
-  const std::string hidden = query_hidden(model, world.arm(), cameras[0].X_FC.translation(), cloud);
-  std::printf("\n%s\n", hidden.c_str());
-  const std::string over_time = minutes > 0.0 ? watch_memory(std::move(kept), minutes) : "";
-  if (argc <= 3) return 0;
-  using ist::benchmark::write_table;
-  bool is_written = write_table(argv[3], "memory cost", text);
-  is_written = write_table(argv[3], "memory query", hidden) && is_written;
-  if (minutes > 0.0) is_written = write_table(argv[3], "memory over time", over_time) && is_written;
-  return is_written ? 0 : 1;
+  if (argc <= 2) return 0;
+  return ist::benchmark::write_table(argv[2], "memory cost", text) ? 0 : 1;
 }

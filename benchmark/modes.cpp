@@ -1,18 +1,10 @@
 // Cost of the kinds of query, as Markdown tables: every link, the robot's minimum, one link; one
-// thread and two; each instruction set. The motion is sampled at 1 kHz among the test data's depth
+// thread and two. The motion is sampled at 1 kHz among the test data's depth
 // images (IST_PROXIMITY_DATA, or ../shared/data), or in the synthetic scene without them.
 //
-// Usage: modes CACHE_FOLDER prints the tables. modes CACHE_FOLDER count runs ten images and each
-// kind of query a hundred times, for callgrind. scripts/benchmark calls both.
-
-#include <hwy/highway.h>
-#include <hwy/targets.h>
-#if __has_include(<valgrind/callgrind.h>)
-#include <valgrind/callgrind.h>
-#endif
+// Usage: modes CACHE_FOLDER; scripts/benchmark calls it.
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <string>
@@ -41,7 +33,6 @@ using ist::benchmark::ThreadTimer;
 using Poses = std::vector<Eigen::Isometry3d>;
 
 constexpr double kMaxError = 0.002;  // [m] packing
-constexpr std::size_t kCounted = 100, kCountedImages = 10;
 
 QueryConfig query_config(double tolerance, double relative = 0.0) {
   QueryConfig config;
@@ -52,20 +43,14 @@ QueryConfig query_config(double tolerance, double relative = 0.0) {
 }
 
 struct Bench {
-  // @param turn  applied to everything in the fixed frame
-  explicit Bench(const std::string& cache,
-                 const Eigen::Isometry3d& turn = Eigen::Isometry3d::Identity()) {
+  explicit Bench(const std::string& cache) {
     const auto data = ist::test::data_dir();
     set = data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
     model = set.robot.pack(kMaxError);
     known.assign(model->links.size(), true);
-    for (Poses& X_FL : set.motion) {
-      for (Eigen::Isometry3d& X : X_FL) X = turn * X;
-    }
     clouds.resize(set.scenes.size());
     for (std::size_t s = 0; s < clouds.size(); ++s) {
-      ist::benchmark::Frame& frame = set.scenes[s].frame;
-      frame.X_FS = turn * frame.X_FS;
+      const ist::benchmark::Frame& frame = set.scenes[s].frame;
       ist::Ingest(ist::test::whole_cloud(false)).run(frame.raw(), frame.X_FS, {}, 0.0, &clouds[s]);
     }
     find_free();
@@ -134,7 +119,7 @@ struct Bench {
   std::vector<std::vector<const Poses*>> free;  // by cloud
 };
 
-void print_modes(const Bench& bench, const Bench& turned) {
+void print_modes(const Bench& bench) {
   const auto all = [&](double tolerance, double relative = 0.0) {
     return bench.time([&] { return bench.every_link(query_config(tolerance, relative)); });
   };
@@ -155,11 +140,6 @@ void print_modes(const Bench& bench, const Bench& turned) {
   print("the robot's minimum, to 1 mm", minimum(0.001), coarse);
   print("the last link alone, to 1 mm",
         bench.time([&] { return bench.last_link(query_config(0.001)); }), coarse);
-  const auto all_turned = [&](double tolerance) {
-    return turned.time([&] { return turned.every_link(query_config(tolerance)); });
-  };
-  print("all links, exact; fixed frame turned", all_turned(0.0), exact);
-  print("all links, to 1 mm; fixed frame turned", all_turned(0.001), coarse);
 }
 
 double batch_us(const Bench& bench, int threads) {
@@ -214,109 +194,15 @@ void print_threads(const Bench& bench) {
               1e-3 * beside, alone / beside);
 }
 
-void choose(std::int64_t targets) {
-  hwy::SetSupportedTargetsForTest(targets);
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-}
-
-void print_instruction_sets(const Bench& bench) {
-  std::printf(
-      "# instruction sets\n| instruction set | image | all links, exact | to 1 mm | largest "
-      "difference of a distance |\n|---|---|---|---|---|\n");
-  choose(0);
-  std::vector<double> first;
-  // Instruction sets that the compiler does not support are skipped: the baseline would answer.
-  const std::int64_t all = hwy::SupportedTargets() & HWY_TARGETS;
-  for (std::int64_t left = all; left != 0; left &= left - 1) {
-    const std::int64_t target = left & -left;
-    choose(target);
-    const double image = ingest_us(bench, false);
-    std::vector<double> distances;
-    ProximityQuery query(bench.model, query_config(0.0));
-    std::vector<LinkProximity> results;
-    for (const Poses* X_FL : bench.free[0]) {
-      query.run(*X_FL, bench.known, {&bench.clouds[0]}, &results);
-      for (const LinkProximity& link : results) distances.push_back(link.distance);
-    }
-    if (first.empty()) first = distances;
-    double difference = 0.0;
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      difference = std::max(difference, std::abs(distances[i] - first[i]));
-    }
-    const auto median = [&](double tolerance) {
-      return quantile(bench.time([&] { return bench.every_link(query_config(tolerance)); }), 0.5);
-    };
-    std::printf("| %s | %.2f ms | %.0f µs | %.0f µs | %.1g m |\n", hwy::TargetName(target),
-                1e-3 * image, median(0.0), median(0.001), difference);
-  }
-  choose(0);
-}
-
-// What is called between these two is counted by callgrind, run with --instr-atstart=no. The count
-// is a dump of this name.
-void begin_count() {
-#ifdef CALLGRIND_START_INSTRUMENTATION
-  CALLGRIND_START_INSTRUMENTATION;
-  CALLGRIND_ZERO_STATS;
-#endif
-}
-void end_count([[maybe_unused]] const char* name) {
-#ifdef CALLGRIND_START_INSTRUMENTATION
-  CALLGRIND_DUMP_STATS_AT(name);
-  CALLGRIND_STOP_INSTRUMENTATION;
-#endif
-}
-
-// Runs each kind of call for a profiler. The model, whose distance fields take minutes there, is
-// made once.
-void count(const std::string& cache) {
-  const auto data = ist::test::data_dir();
-  const DataSet set =
-      data ? ist::benchmark::kinect_data(*data, cache) : ist::benchmark::synthetic_data(cache);
-  const ist::benchmark::Frame& frame = set.scenes[0].frame;
-  ist::Ingest ingest(ist::test::whole_cloud(false));
-  CloudSnapshot cloud;
-  begin_count();
-  for (std::size_t k = 0; k < kCountedImages; ++k) {
-    ingest.run(frame.raw(), frame.X_FS, {}, 0.0, &cloud);
-  }
-  end_count("ingest");
-  const auto model = set.robot.pack(kMaxError);
-  const std::vector<bool> known(model->links.size(), true);
-  const auto count_queries = [&](const char* name, double tolerance) {
-    ProximityQuery query(model, query_config(tolerance));
-    std::vector<LinkProximity> results;
-    begin_count();
-    for (std::size_t k = 0; k < kCounted; ++k) query.run(set.motion[k], known, {&cloud}, &results);
-    end_count(name);
-  };
-  count_queries("exact", 0.0);
-  count_queries("1mm", 0.001);
-  ProximityQuery query(model, query_config(0.0));
-  ist::RobotProximity robot;
-  begin_count();
-  for (std::size_t k = 0; k < kCounted; ++k) {
-    query.run_minimum(set.motion[k], known, {&cloud}, &robot);
-  }
-  end_count("minimum");
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::fprintf(stderr, "Usage: modes CACHE_FOLDER [count]\n");
+    std::fprintf(stderr, "Usage: modes CACHE_FOLDER\n");
     return 2;
   }
-  if (argc > 2) {
-    count(argv[1]);
-    return 0;
-  }
   const Bench bench(argv[1]);
-  // In this fixed frame, no surface is parallel to an axis.
-  const Eigen::AngleAxisd turn(0.5, Eigen::Vector3d(1.0, 2.0, 3.0).normalized());
-  print_modes(bench, Bench(argv[1], Eigen::Isometry3d(turn)));
+  print_modes(bench);
   print_threads(bench);
-  print_instruction_sets(bench);
   return 0;
 }

@@ -1,156 +1,200 @@
-// The tables of doc/packing.md: time against a yardstick, gaps by number of spheres in the three
-// orders, the certificate against the truth, growth, and splits of the tree.
+// Time to pack the Panda's visual meshes, against a yardstick of the same run: a table of
+// doc/benchmark.md. Needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
 //
-// Most of it needs the test data: IST_PROXIMITY_DATA, or ../shared/data.
+// Usage: packing [DOCUMENT]
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
-#include <functional>
-#include <sstream>
+#include <ctime>
+#include <limits>
+#include <random>
 #include <string>
+#include <thread>
 #include <vector>
 
+#ifdef IST_PROXIMITY_EMBREE
+#include <embree3/rtcore.h>
+#endif
+
+#include "document.h"
+#include "internal/geometry/closest_point_on_triangle.h"
 #include "internal/geometry/mesh_io.h"
-#include "packing/options.h"
+#include "internal/geometry/triangle_bvh.h"
+#include "ist_proximity/robot/robot_model.h"
+#include "support.h"
 #include "support/data_dir.h"
+#include "support/temp_dir.h"
 #include "support/truth.h"
+#include "truth_scenes.h"
 
 namespace ist::benchmark {
+namespace {
 
-std::vector<std::string> panda_names() {
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i + 1 < test::kPandaLinks; ++i) names.emplace_back(test::panda_mesh(i));
-  return names;
+// Wall time and processor time.
+struct Times {
+  double wall = 0.0, processor = 0.0;  // [s]
+  Times& operator+=(const Times& other) {
+    wall += other.wall;
+    processor += other.processor;
+    return *this;
+  }
+};
+
+class Stopwatch {
+ public:
+  Times times() const { return {1e-6 * microseconds_since(start_), processor() - processor_}; }
+
+ private:
+  static double processor() {
+    timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+  Clock::time_point start_ = Clock::now();
+  double processor_ = processor();
+};
+
+#ifdef IST_PROXIMITY_EMBREE
+struct Nearest {
+  const TriangleMesh* mesh;
+  double distance_sq;
+};
+
+bool nearer(RTCPointQueryFunctionArguments* arguments) {
+  auto* nearest = static_cast<Nearest*>(arguments->userPtr);
+  const RTCPointQuery& query = *arguments->query;
+  const auto t = arguments->primID;
+  const Eigen::Vector3d p(query.x, query.y, query.z);
+  const Eigen::Vector3d q = closest_point_on_triangle(
+      p, nearest->mesh->corner(t, 0), nearest->mesh->corner(t, 1), nearest->mesh->corner(t, 2));
+  const double distance_sq = (p - q).squaredNorm();
+  if (distance_sq >= nearest->distance_sq) return false;
+  nearest->distance_sq = distance_sq;
+  arguments->query->radius = static_cast<float>(std::sqrt(distance_sq));
+  return true;
 }
 
-std::vector<PandaLink> panda_links(const Options& options) {
-  std::vector<PandaLink> links;
-  if (options.data.empty()) return links;
-  const auto folder = options.data / "robots/franka_description/meshes/visual";
-  for (const std::string& name : panda_names()) {
-    const auto& wanted = options.links;
-    if (!wanted.empty() && std::count(wanted.begin(), wanted.end(), name) == 0) continue;
-    links.push_back({name, load_mesh((folder / (name + ".dae")).string())});
+// The yardstick: one million closest-point queries of one thread, spread over the meshes.
+Times yardstick(const std::vector<TriangleMesh>& links) {
+  constexpr int kQueries = 1000000;
+  RTCDevice device = rtcNewDevice(nullptr);
+  Times times;
+  std::mt19937_64 rng(1);
+  for (const TriangleMesh& mesh : links) {
+    RTCScene scene = rtcNewScene(device);
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                3 * sizeof(float), mesh.vertices.size()));
+    auto* corners = static_cast<unsigned*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(unsigned), mesh.triangles.size()));
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& v : mesh.vertices) {
+      for (int k = 0; k < 3; ++k) *vertices++ = static_cast<float>(v[k]);
+      box.extend(v);
+    }
+    for (const auto& triangle : mesh.triangles) {
+      for (const std::uint32_t v : triangle) *corners++ = v;
+    }
+    rtcSetGeometryPointQueryFunction(geometry, nearer);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+    std::vector<Eigen::Vector3d> points;
+    for (std::size_t i = 0; i < kQueries / links.size(); ++i) {
+      Eigen::Vector3d p;
+      for (int k = 0; k < 3; ++k) {
+        p[k] = std::uniform_real_distribution<double>(box.min()[k], box.max()[k])(rng);
+      }
+      points.push_back(p);
+    }
+    const Stopwatch watch;
+    for (const Eigen::Vector3d& p : points) {
+      Nearest nearest{&mesh, std::numeric_limits<double>::infinity()};
+      RTCPointQuery query{static_cast<float>(p.x()), static_cast<float>(p.y()),
+                          static_cast<float>(p.z()), 0.0F, std::numeric_limits<float>::infinity()};
+      RTCPointQueryContext context;
+      rtcInitPointQueryContext(&context);
+      rtcPointQuery(scene, &query, &context, nullptr, &nearest);
+    }
+    times += watch.times();
+    rtcReleaseScene(scene);
+  }
+  rtcReleaseDevice(device);
+  return times;
+}
+#endif
+
+// The 11 links, of which the fingers share one shape.
+RobotDescription panda(const std::vector<TriangleMesh>& links) {
+  RobotDescription robot;
+  robot.name = "panda";
+  for (std::size_t i = 0; i <= links.size(); ++i) {
+    LinkDescription link;
+    link.name = "link" + std::to_string(i);
+    link.geometry = {{links[std::min(i, links.size() - 1)], Eigen::Isometry3d::Identity(), ""}};
+    robot.links.push_back(std::move(link));
+  }
+  return robot;
+}
+
+// The Panda's visual meshes; the two fingers are one.
+std::vector<TriangleMesh> panda_links(const std::filesystem::path& data) {
+  std::vector<TriangleMesh> links;
+  const auto folder = data / "robots/franka_description/meshes/visual";
+  for (std::size_t i = 0; i + 1 < test::kPandaLinks; ++i) {
+    links.push_back(load_mesh((folder / (std::string(test::panda_mesh(i)) + ".dae")).string()));
   }
   return links;
 }
 
-namespace {
-
-struct Part {
-  const char* name;
-  Table (*make)();
-  bool (*measure)(const Options&, Table*);
-};
-constexpr Part kParts[] = {{"time", time_table, measure_time},
-                           {"anytime", anytime_table, measure_anytime},
-                           {"gaps", gaps_table, measure_gaps},
-                           {"certificate", certificate_table, measure_certificate},
-                           {"growth", growth_table, measure_growth},
-                           {"hierarchy", hierarchy_table, measure_hierarchy}};
-
-constexpr const char* kUsage =
-    "usage: packing [OPTION VALUE ...] [--update-doc] [TABLE ...]\n"
-    "TABLE: time anytime gaps certificate growth hierarchy; all of them by default\n"
-    "  --links NAME,...      of the Panda, for gaps and certificate: link0 ... link7,hand,finger\n"
-    "  --spheres N,...         for gaps (200,1000,5000,20000) and growth (50 ... 20000)\n"
-    "  --max-errors MM,...   for time and hierarchy (5,2)\n"
-    "  --scenes NAME,...     for hierarchy: Panda,demo,synthetic\n"
-    "  --instructions        for hierarchy: counts them, by valgrind; takes minutes a scene\n"
-    "  --threads N           for what is not timed; 0: as many as there are cores\n"
-    "  --cache FOLDER        keeps the packings that hierarchy needs\n"
-    "  --update-doc          writes the tables into doc/packing.md; rows that were not measured\n"
-    "                        this time stay\n"
-    "  --count SCENE         for hierarchy itself, under valgrind\n";
-
-std::vector<std::string> items(const std::string& list) {
-  std::vector<std::string> all;
-  std::istringstream stream(list);
-  for (std::string one; std::getline(stream, one, ',');) all.push_back(one);
-  return all;
-}
-
-// Returns false if an option is not known.
-bool read_arguments(int argc, char** argv, Options* options, std::string* scene) {
-  for (int i = 1; i < argc; ++i) {
-    const std::string name = argv[i];
-    if (name == "--update-doc") {
-      options->update_doc = true;
-      continue;
+int run(const std::string& document) {
+  const std::vector<TriangleMesh> links = panda_links(data_or_exit());
+  const RobotDescription robot = panda(links);
+  std::string table =
+      "| max_error [mm] | spheres | packing [s] | processor time [s] | in yardsticks | processor "
+      "time per core, in yardsticks | from the cache [s] | yardstick [s] |\n"
+      "|---|---|---|---|---|---|---|---|\n";
+  for (const double max_error : {0.005, 0.002}) {
+    Times unit;
+#ifdef IST_PROXIMITY_EMBREE
+    unit = yardstick(links);
+#endif
+    const test::TempDir folder;
+    RobotModelConfig config;
+    config.packing.max_error = max_error;
+    config.cache_directory = folder.path().string();
+    const Stopwatch watch;
+    const auto model = build_robot_model(robot, config);
+    const Times packing = watch.times();
+    double cached = std::numeric_limits<double>::infinity();
+    for (int round = 0; round < 5; ++round) {
+      const Stopwatch reading;
+      build_robot_model(robot, config);
+      cached = std::min(cached, reading.times().wall);
     }
-    if (name == "--instructions") {
-      options->instructions = true;
-      continue;
-    }
-    const bool is_part = std::any_of(std::begin(kParts), std::end(kParts),
-                                     [&](const Part& part) { return name == part.name; });
-    if (is_part) {
-      options->tables.push_back(name);
-      continue;
-    }
-    if (i + 1 == argc) return false;
-    const std::string value = argv[++i];
-    if (name == "--links") {
-      options->links = items(value);
-    } else if (name == "--scenes") {
-      options->scenes = items(value);
-    } else if (name == "--spheres") {
-      for (const std::string& one : items(value)) options->spheres.push_back(std::stoi(one));
-    } else if (name == "--max-errors") {
-      for (const std::string& one : items(value)) {
-        options->max_errors.push_back(1e-3 * std::stod(one));
-      }
-    } else if (name == "--threads") {
-      options->threads = std::stoi(value);
-    } else if (name == "--cache") {
-      options->cache_directory = value;
-    } else if (name == "--count") {
-      *scene = value;
-    } else {
-      return false;
-    }
+    std::size_t spheres = 0;
+    for (const LinkModel& link : model->links) spheres += link.packing.spheres.size();
+    const double cores = std::min<double>(std::max(1U, std::thread::hardware_concurrency()),
+                                          static_cast<double>(robot.links.size()));
+    const auto in_yardsticks = [](double time, double yardstick) {
+      return yardstick > 0.0 ? time / yardstick : 0.0;
+    };
+    char row[200];
+    std::snprintf(row, sizeof row, "| %g | %zu | %.2f | %.2f | %.2f | %.2f | %.3f | %.2f |\n",
+                  1e3 * max_error, spheres, packing.wall, packing.processor,
+                  in_yardsticks(packing.wall, unit.wall),
+                  in_yardsticks(packing.processor / cores, unit.processor), cached, unit.wall);
+    std::printf("%s", row);
+    table += row;
   }
-  return true;
-}
-
-int run(const Options& options) {
-  const std::string folder = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/";
-  const std::string document = folder + "packing.md";
-  int status = 0;
-  for (const Part& part : kParts) {
-    const auto& wanted = options.tables;
-    if (!wanted.empty() && std::count(wanted.begin(), wanted.end(), part.name) == 0) continue;
-    Table table = part.make();
-    if (!part.measure(options, &table)) {
-      std::fprintf(stderr, "%s was not measured. %s\n", part.name,
-                   options.data.empty() ? test::kNoData.c_str() : "");
-      status = 1;
-      continue;
-    }
-    table.print();
-    if (options.update_doc && !table.write(document)) status = 1;
-  }
-  if (options.update_doc) plot_growth(document, folder + "packing_growth.svg");
-  return status;
+  return document.empty() || write_table(document, "time", table) ? 0 : 1;
 }
 
 }  // namespace
 }  // namespace ist::benchmark
 
-int main(int argc, char** argv) {
-  ist::benchmark::Options options;
-  std::string scene;
-  if (!ist::benchmark::read_arguments(argc, argv, &options, &scene)) {
-    std::fputs(ist::benchmark::kUsage, stderr);
-    return 2;
-  }
-  options.program = argv[0];
-  options.data = ist::test::data_dir().value_or(std::filesystem::path());
-  if (!scene.empty()) {
-    ist::benchmark::count_instructions(options, scene);
-    return 0;
-  }
-  return ist::benchmark::run(options);
-}
+int main(int argc, char** argv) { return ist::benchmark::run(argc > 1 ? argv[1] : ""); }

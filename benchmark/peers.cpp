@@ -191,27 +191,16 @@ std::vector<bool> contacts(const std::shared_ptr<const ist::RobotModel>& model, 
 Methods all_methods(const DataSet& set) {
   Methods methods;
   const ist::benchmark::SphereSet spheres = few_spheres(set.robot, kFewSpheres);
-  add_floors(set.robot, spheres, &methods);
   add_ours(set.robot, &methods);
 #ifdef IST_BENCHMARK_NANOFLANN
   add_nanoflann(spheres, &methods);
 #endif
-#ifdef IST_BENCHMARK_PCL
-  add_pcl(spheres, &methods);
-#endif
   add_signed_grid(set.robot, &methods);
-  add_grid_of_groups(set.robot, &methods);
 #ifdef IST_BENCHMARK_EMBREE
   add_embree(set.robot, &methods);
 #endif
-#ifdef IST_BENCHMARK_CGAL
-  add_cgal(set.robot, &methods);
-#endif
 #ifdef IST_BENCHMARK_FCL
   add_fcl(set.robot, &methods);
-#endif
-#ifdef IST_BENCHMARK_DYNAMIC_EDT
-  add_dynamic_edt(spheres, &methods);
 #endif
   return methods;
 }

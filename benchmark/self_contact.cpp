@@ -1,7 +1,7 @@
 // What a self-filter tells of an obstacle that touches the robot, as Markdown: a bar touches the
 // simulated arm at random places, seen by a noisy, late camera whose pose is off.
 //
-// Usage: self_contact [--places N] [--seconds N] [--seeds N] [--update-doc doc/self_filter.md]
+// Usage: self_contact [--places N] [--seconds N] [--seeds N] [--update-doc doc/sources.md]
 
 #include <cstdio>
 #include <cstdlib>

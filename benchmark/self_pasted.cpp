@@ -2,7 +2,7 @@
 // with noise, and moves through them. Answers without the robot's pixels are the truth. As
 // Markdown.
 //
-// Usage: self_pasted CACHE_FOLDER [--images N] [--update-doc doc/self_filter.md]
+// Usage: self_pasted CACHE_FOLDER [--images N] [--update-doc doc/sources.md]
 
 #include <algorithm>
 #include <cmath>

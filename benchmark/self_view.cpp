@@ -1,7 +1,7 @@
 // The padding that the self-filter needs, as Markdown. The simulated arm moves in view of its
 // noisy, late camera, and the scene is empty otherwise: every obstacle that queries find is false.
 //
-// Usage: self_view [--seconds N] [--update-doc doc/dodge.md]
+// Usage: self_view [--seconds N] [--update-doc doc/sources.md]
 
 #include "self_view.h"
 

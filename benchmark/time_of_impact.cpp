@@ -1,4 +1,4 @@
-// Times of impact compared with dense sampling of exact distances: a table for doc/repulsion.md.
+// Times of impact compared with dense sampling of exact distances: a table for doc/accuracy.md.
 //
 // Usage: time_of_impact CACHE_FOLDER [DOCUMENT]; scripts/benchmark --repulsion calls it. The
 // Panda's motions need the test data: IST_PROXIMITY_DATA, or ../shared/data.

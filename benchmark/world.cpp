@@ -1,4 +1,4 @@
-// Links against a known world, beside FCL and Bullet in the same run: two arms in one cell, and a
+// Links against a known world, beside FCL in the same run: two arms in one cell, and a
 // cell of meshes with a thousand objects that are far. Motions at 1 kHz. With a document, writes
 // its table there.
 //
@@ -22,9 +22,6 @@
 #include "support/demo_arm.h"
 #include "support/meshes.h"
 #include "support/scene.h"
-#ifdef IST_PROXIMITY_HAS_BULLET
-#include "world/bullet.h"
-#endif
 #ifdef IST_PROXIMITY_HAS_FCL
 #include <fcl/fcl.h>
 #endif
@@ -267,11 +264,8 @@ std::string measure(const Case& c, int steps) {
 #ifdef IST_PROXIMITY_HAS_FCL
   Peer peer(links, objects, frames);
 #endif
-#ifdef IST_PROXIMITY_HAS_BULLET
-  const auto bullet = ist::benchmark::bullet_world(links, objects, frames);
-#endif
-  std::vector<double> ours[2], peers, bullets;
-  double searched = 0.0, differs = 0.0, bullet_differs = 0.0;
+  std::vector<double> ours[2], peers;
+  [[maybe_unused]] double differs = 0.0;
   std::vector<ist::LinkProximity> results;
   ist::benchmark::ThreadTimer timer;
   for (int step = 0; step < steps; ++step) {
@@ -284,7 +278,6 @@ std::string measure(const Case& c, int steps) {
       queries[k]->run(poses.X_FL, poses.known, {&world}, ist::TimePoint::max(), &results);
       ours[k].push_back(timer.lap());
     }
-    searched += static_cast<double>(queries[1]->statistics().pairs_searched);
 #ifdef IST_PROXIMITY_HAS_FCL
     if (step % kPeerStep == 0) {
       timer.lap();
@@ -296,19 +289,8 @@ std::string measure(const Case& c, int steps) {
       }
     }
 #endif
-#ifdef IST_PROXIMITY_HAS_BULLET
-    if (step % kPeerStep == 0) {
-      timer.lap();
-      const std::vector<double>& found = bullet->run(poses.X_FL, world.X_FB);
-      bullets.push_back(timer.lap());
-      for (std::size_t i = 0; i < found.size(); ++i) {
-        if (results[i].state != ist::LinkState::kNear || !(found[i] > 0.0)) continue;
-        bullet_differs = std::max(bullet_differs, std::abs(found[i] - results[i].distance));
-      }
-    }
-#endif
   }
-  const double of_peer = quantile(peers, 0.5), of_bullet = quantile(bullets, 0.5);
+  const double of_peer = quantile(peers, 0.5);
   const auto ratio = [](double theirs, double of_ours) {
     char text[32] = "-";
     if (theirs > 0.0) std::snprintf(text, sizeof text, "%.0f", theirs / of_ours);
@@ -316,15 +298,11 @@ std::string measure(const Case& c, int steps) {
   };
   char row[512];
   std::snprintf(row, sizeof row,
-                "| %s: %zu links, %zu objects | %.0f | %.0f | %.0f | %.0f | %.0f | %s | %s | %s | "
-                "%.0f | %.2g "
-                "| %.2g |\n",
+                "| %s: %zu links, %zu objects | %.0f | %.0f | %.0f | %.0f | %s | %s | %.2g |\n",
                 c.name.c_str(), links.size(), objects.size(), quantile(ours[0], 0.5),
-                quantile(ours[0], 0.99), quantile(ours[1], 0.5), of_peer, of_bullet,
+                quantile(ours[0], 0.99), quantile(ours[1], 0.5), of_peer,
                 ratio(of_peer, quantile(ours[0], 0.5)).c_str(),
-                ratio(of_peer, quantile(ours[1], 0.5)).c_str(),
-                ratio(of_bullet, quantile(ours[0], 0.5)).c_str(), searched / steps, 1e3 * differs,
-                1e3 * bullet_differs);
+                ratio(of_peer, quantile(ours[1], 0.5)).c_str(), 1e3 * differs);
   std::printf("%s", row);
   std::fflush(stdout);
   return row;
@@ -350,9 +328,8 @@ int main(int argc, char** argv) {
   cases.push_back(far);
   std::string rows =
       "| scene | ours to 1 mm, median [us] | p99 [us] | ours exact, median [us] | FCL [us] "
-      "| Bullet to 1 mm [us] | FCL / ours | FCL / exact | Bullet / ours | objects measured "
-      "| largest difference of FCL [mm] | of Bullet [mm] |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+      "| FCL / ours | FCL / exact | largest difference [mm] |\n"
+      "|---|---|---|---|---|---|---|---|\n";
   for (const Case& c : cases) rows += measure(c, steps);
   if (document.empty()) return 0;
   return ist::benchmark::write_table(document, "known world", rows) ? 0 : 1;

@@ -6,9 +6,6 @@ if(NOT IST_PROXIMITY_CLI11_INCLUDE_DIR)
   message(STATUS "ist_proximity: no benchmark/hard_cases and near_touch, CLI11 is missing "
     "(apt install libcli11-dev)")
 endif()
-if(NOT octomap_FOUND)
-  list(FILTER benchmark_sources EXCLUDE REGEX "/map_reading\\.cpp$")
-endif()
 add_custom_target(benchmarks)
 foreach(source IN LISTS benchmark_sources)
   get_filename_component(name ${source} NAME_WE)
@@ -26,27 +23,18 @@ foreach(name closed_loop hidden memory self_view self_contact)
   target_link_libraries(benchmark_${name} PRIVATE ist_proximity_simulator)
 endforeach()
 
-if(TARGET benchmark_map_reading)
-  target_include_directories(benchmark_map_reading SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
-  target_link_libraries(benchmark_map_reading PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
-endif()
 if(octomap_FOUND)
   target_compile_definitions(benchmark_memory PRIVATE IST_PROXIMITY_HAS_OCTOMAP)
   target_include_directories(benchmark_memory SYSTEM PRIVATE ${OCTOMAP_INCLUDE_DIR})
   target_link_libraries(benchmark_memory PRIVATE ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
 endif()
 
-# What the maps are measured beside, where it is installed.
+# What links are measured beside, where it is installed.
 find_path(FCL_INCLUDE_DIR fcl/fcl.h)
 find_library(FCL_LIBRARY fcl)
 find_library(CCD_LIBRARY ccd)
 mark_as_advanced(FCL_INCLUDE_DIR FCL_LIBRARY CCD_LIBRARY)
 if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
-  target_compile_definitions(benchmark_octomap PRIVATE IST_PROXIMITY_HAS_FCL)
-  target_include_directories(benchmark_octomap SYSTEM PRIVATE
-    ${FCL_INCLUDE_DIR} ${OCTOMAP_INCLUDE_DIR})
-  target_link_libraries(benchmark_octomap PRIVATE
-    ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
   target_compile_definitions(benchmark_link_pairs PRIVATE IST_PROXIMITY_HAS_FCL)
   target_sources(benchmark_link_pairs PRIVATE benchmark/link_pairs/fcl.cpp)
   target_include_directories(benchmark_link_pairs SYSTEM PRIVATE
@@ -59,47 +47,9 @@ if(FCL_INCLUDE_DIR AND FCL_LIBRARY AND CCD_LIBRARY AND octomap_FOUND)
   target_link_libraries(benchmark_world PRIVATE
     ${FCL_LIBRARY} ${CCD_LIBRARY} ${OCTOMAP_LIBRARY} ${OCTOMATH_LIBRARY})
 else()
-  message(STATUS "ist_proximity: benchmark/octomap, link_pairs and world without FCL (apt install libfcl-dev)")
+  message(STATUS "ist_proximity: benchmark/link_pairs and world without FCL (apt install libfcl-dev)")
 endif()
 
-# Bullet, where it is installed. Debian's default libraries are in single precision.
-find_path(BULLET_INCLUDE_DIR btBulletCollisionCommon.h PATH_SUFFIXES bullet)
-find_library(BULLET_COLLISION_LIBRARY BulletCollision)
-find_library(BULLET_MATH_LIBRARY LinearMath)
-mark_as_advanced(BULLET_INCLUDE_DIR BULLET_COLLISION_LIBRARY BULLET_MATH_LIBRARY)
-if(BULLET_INCLUDE_DIR AND BULLET_COLLISION_LIBRARY AND BULLET_MATH_LIBRARY)
-  target_sources(benchmark_link_pairs PRIVATE benchmark/link_pairs/bullet.cpp)
-  target_compile_definitions(benchmark_link_pairs PRIVATE IST_PROXIMITY_HAS_BULLET)
-  target_include_directories(benchmark_link_pairs SYSTEM PRIVATE ${BULLET_INCLUDE_DIR})
-  target_link_libraries(benchmark_link_pairs PRIVATE
-    ${BULLET_COLLISION_LIBRARY} ${BULLET_MATH_LIBRARY})
-  target_sources(benchmark_world PRIVATE benchmark/world/bullet.cpp)
-  target_compile_definitions(benchmark_world PRIVATE IST_PROXIMITY_HAS_BULLET)
-  target_include_directories(benchmark_world SYSTEM PRIVATE ${BULLET_INCLUDE_DIR})
-  target_link_libraries(benchmark_world PRIVATE
-    ${BULLET_COLLISION_LIBRARY} ${BULLET_MATH_LIBRARY})
-else()
-  message(STATUS "ist_proximity: benchmark/link_pairs and world without Bullet (apt install libbullet-dev)")
-endif()
-
-target_sources(benchmark_repulsion PRIVATE
-  benchmark/repulsion/measure.cpp
-  benchmark/repulsion/reference.cpp
-  benchmark/repulsion/scene.cpp)
-
-target_sources(benchmark_packing PRIVATE
-  benchmark/packing/anytime.cpp
-  benchmark/packing/certificate.cpp
-  benchmark/packing/gaps.cpp
-  benchmark/packing/growth.cpp
-  benchmark/packing/hierarchy.cpp
-  benchmark/packing/hierarchy_scene.cpp
-  benchmark/packing/plot.cpp
-  benchmark/packing/table.cpp
-  benchmark/packing/time.cpp
-  benchmark/peers/kinect.cpp
-  benchmark/peers/scene.cpp
-  benchmark/peers/synthetic.cpp)
 # A yardstick, where it is installed (libembree-dev).
 find_package(embree 3 QUIET)
 if(TARGET embree)
@@ -120,30 +70,19 @@ endif()
 # (scripts/install_dependencies benchmark).
 target_sources(benchmark_peers PRIVATE
   benchmark/peers/flat.cpp
-  benchmark/peers/floors.cpp
-  benchmark/peers/grid_of_groups.cpp
   benchmark/peers/image_pyramid.cpp
   benchmark/peers/kinect.cpp
   benchmark/peers/ours.cpp
   benchmark/peers/scene.cpp
   benchmark/peers/signed_grid.cpp
   benchmark/peers/synthetic.cpp)
-target_sources(benchmark_answers PRIVATE benchmark/peers/scene.cpp)
 target_sources(benchmark_kept_repulsion PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp)
 target_sources(benchmark_self_pasted PRIVATE benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
 target_sources(benchmark_link_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
-target_sources(benchmark_ingest PRIVATE
-  benchmark/peers/kinect.cpp
-  benchmark/peers/scene.cpp
-  benchmark/peers/synthetic.cpp)
 target_sources(benchmark_modes PRIVATE
-  benchmark/peers/kinect.cpp
-  benchmark/peers/scene.cpp
-  benchmark/peers/synthetic.cpp)
-target_sources(benchmark_noise_filter PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp
   benchmark/peers/synthetic.cpp)
@@ -174,25 +113,8 @@ function(ist_proximity_peer name header)
 endfunction()
 
 ist_proximity_peer(nanoflann nanoflann.hpp)
-# PCL's headers are in a folder with its version: Ubuntu 20.04, 22.04, Debian 12, Ubuntu 24.04.
-find_path(IST_PROXIMITY_pcl_INCLUDE_DIR pcl/kdtree/kdtree_flann.h
-  PATH_SUFFIXES pcl-1.10 pcl-1.12 pcl-1.13 pcl-1.14)
-set_source_files_properties(benchmark/peers/pcl.cpp PROPERTIES
-  INCLUDE_DIRECTORIES "${IST_PROXIMITY_pcl_INCLUDE_DIR}")
-ist_proximity_peer(pcl pcl/kdtree/kdtree_flann.h pcl_kdtree pcl_octree pcl_common)
-# What the noise filter is measured beside.
-find_library(IST_PROXIMITY_pcl_filters_LIBRARY pcl_filters)
-mark_as_advanced(IST_PROXIMITY_pcl_filters_LIBRARY)
-if(IST_PROXIMITY_pcl_INCLUDE_DIR AND IST_PROXIMITY_pcl_filters_LIBRARY)
-  target_compile_definitions(benchmark_noise_filter PRIVATE IST_PROXIMITY_HAS_PCL_FILTERS)
-  target_include_directories(benchmark_noise_filter SYSTEM PRIVATE ${IST_PROXIMITY_pcl_INCLUDE_DIR})
-  target_link_libraries(benchmark_noise_filter PRIVATE
-    ${IST_PROXIMITY_pcl_filters_LIBRARY} ${IST_PROXIMITY_pcl_common_LIBRARY})
-endif()
 ist_proximity_peer(embree embree3/rtcore.h embree3)
-ist_proximity_peer(cgal CGAL/AABB_tree.h gmp)
 ist_proximity_peer(fcl fcl/fcl.h fcl ccd octomap octomath)
-ist_proximity_peer(dynamic_edt dynamicEDT3D/dynamicEDTOctomap.h dynamicedt3d octomap octomath)
 
 # The cost of a camera, beside some of them. The robot's own points are dropped with CGAL's hulls.
 target_sources(benchmark_camera PRIVATE
@@ -201,6 +123,9 @@ target_sources(benchmark_camera PRIVATE
   benchmark/peers/kinect.cpp
   benchmark/peers/scene.cpp
   benchmark/peers/synthetic.cpp)
+find_path(IST_PROXIMITY_cgal_INCLUDE_DIR CGAL/AABB_tree.h)
+find_library(IST_PROXIMITY_gmp_LIBRARY gmp)
+mark_as_advanced(IST_PROXIMITY_cgal_INCLUDE_DIR IST_PROXIMITY_gmp_LIBRARY)
 if(IST_PROXIMITY_cgal_INCLUDE_DIR AND IST_PROXIMITY_gmp_LIBRARY)
   target_sources(benchmark_camera PRIVATE benchmark/peers/body_filter.cpp)
   set_source_files_properties(benchmark/peers/body_filter.cpp PROPERTIES COMPILE_OPTIONS -w)

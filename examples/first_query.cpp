@@ -35,7 +35,7 @@ int main(int argc, char** argv) try {
   query.run(poses.X_FL, poses.known, {&snapshot}, &results);
   for (const ist::LinkProximity& link : results) std::cout << link.lower_bound << " m\n";
 
-  ist::RobotProximity nearest;  // the nearest link only: several times faster
+  ist::RobotProximity nearest;  // the nearest link only: the others as far as needed
   query.run_minimum(poses.X_FL, poses.known, {&snapshot}, &nearest);
   std::cout << "nearest: " << nearest.nearest.lower_bound << " m\n";
 } catch (const std::exception& error) {  // a URDF that cannot be read, for example

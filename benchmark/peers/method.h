@@ -63,15 +63,10 @@ class Method {
 using Methods = std::vector<std::unique_ptr<Method>>;
 
 // Each function adds its methods. Those whose library is not installed do not exist.
-void add_floors(const Robot& robot, const SphereSet& spheres, Methods* methods);
 void add_ours(const Robot& robot, Methods* methods);
 void add_nanoflann(const SphereSet& spheres, Methods* methods);
-void add_pcl(const SphereSet& spheres, Methods* methods);
 void add_signed_grid(const Robot& robot, Methods* methods);
-void add_grid_of_groups(const Robot& robot, Methods* methods);
 void add_embree(const Robot& robot, Methods* methods);
-void add_cgal(const Robot& robot, Methods* methods);
 void add_fcl(const Robot& robot, Methods* methods);
-void add_dynamic_edt(const SphereSet& spheres, Methods* methods);
 
 }  // namespace ist::benchmark

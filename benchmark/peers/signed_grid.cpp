@@ -4,63 +4,84 @@
 #include <vector>
 
 #include "internal/geometry/triangle_bvh.h"
-#include "peers/flat.h"
+#include "ist_proximity/geometry/solid.h"
+#include "peers/image_pyramid.h"
+#include "peers/method.h"
 
-// A precomputed grid of distances around each link, looked up for every point that the link's box
-// does not prune. The witness point on the link is the point moved along the grid's gradient.
+// Precomputed signed distances around each link, fine near it and coarse farther away, looked up
+// for groups of pixels: a group's points are no nearer than its centre, less the group's radius.
 namespace ist::benchmark {
 namespace {
 
-constexpr float kCell = 0.0075F;  // [m]
-constexpr float kMargin =
-    0.1F;  // [m] around the link's box; points outside are projected onto the grid
+constexpr float kFineCell = 0.01F, kCoarseCell = 0.04F;     // [m]
+constexpr float kFineMargin = 0.12F, kCoarseMargin = 1.0F;  // [m] around the link's box
 
-struct Grid {
-  Eigen::Vector3f low;
-  Eigen::Vector3i size;         // nodes
-  std::vector<float> distance;  // [m] unsigned, by node, x fastest
-
-  explicit Grid(const TriangleMesh& mesh) {
-    const TriangleBvh bvh(mesh);
-    const Eigen::Vector3f min = bvh.bounds().min().cast<float>().array() - kMargin;
-    const Eigen::Vector3f max = bvh.bounds().max().cast<float>().array() + kMargin;
-    low = min;
-    size = ((max - min) / kCell).array().ceil().cast<int>() + 1;
-    for (int z = 0; z < size.z(); ++z) {
-      for (int y = 0; y < size.y(); ++y) {
-        for (int x = 0; x < size.x(); ++x) {
+// Signed distances at the nodes of a grid.
+class Grid {
+ public:
+  // @param inside  nodes within may be inside the mesh; the others are not
+  Grid(const TriangleBvh& bvh, const Solid& solid, const Eigen::AlignedBox3f& inside, float cell,
+       float margin)
+      : low_(inside.min().array() - margin), scale_(1.0F / cell), cell_(cell) {
+    size_ = ((inside.sizes().array() + 2.0F * margin) * scale_).ceil().cast<int>() + 1;
+    last_ = size_.cast<float>().array() - 1.0001F;
+    values_.reserve(static_cast<std::size_t>(size_.prod()));
+    for (int z = 0; z < size_.z(); ++z) {
+      for (int y = 0; y < size_.y(); ++y) {
+        for (int x = 0; x < size_.x(); ++x) {
           const Eigen::Vector3f p =
-              low + kCell * Eigen::Vector3f(Eigen::Vector3i(x, y, z).cast<float>());
-          distance.push_back(
-              static_cast<float>(std::sqrt(bvh.closest(p.cast<double>()).distance_sq)));
+              low_ + cell * Eigen::Vector3f(Eigen::Vector3i(x, y, z).cast<float>());
+          const Eigen::Vector3d q = p.cast<double>();
+          values_.push_back(static_cast<float>(inside.contains(p)
+                                                   ? solid.signed_distance(q).distance
+                                                   : std::sqrt(bvh.closest(q).distance_sq)));
         }
       }
     }
   }
 
-  float at(int x, int y, int z) const {
-    return distance[static_cast<std::size_t>((z * size.y() + y) * size.x() + x)];
+  bool contains(const Eigen::Vector3f& p) const {
+    const Eigen::Array3f g = (p - low_).array() * scale_;
+    return (g >= 0.0F).all() && (g <= last_).all();
   }
 
-  // Interpolates between the nodes. Outside, the distance to the nearest point inside is added.
+  // Trilinear. Outside, the distance to the nearest point of the grid is added.
   float operator()(const Eigen::Vector3f& p) const {
-    const Eigen::Vector3f last = size.cast<float>().array() - 1.001F;
-    const Eigen::Vector3f want = (p - low) / kCell;
-    const Eigen::Vector3f g = want.cwiseMax(0.0F).cwiseMin(last);
-    const Eigen::Vector3i i = g.cast<int>();
-    const Eigen::Vector3f f = g - i.cast<float>();
-    float sum = 0.0F;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int a = corner & 1, b = corner >> 1 & 1, c = corner >> 2;
-      const float weight = (a != 0 ? f.x() : 1.0F - f.x()) * (b != 0 ? f.y() : 1.0F - f.y()) *
-                           (c != 0 ? f.z() : 1.0F - f.z());
-      sum += weight * at(i.x() + a, i.y() + b, i.z() + c);
-    }
-    return sum + kCell * (want - g).norm();
+    const Eigen::Array3f want = (p - low_).array() * scale_;
+    const Eigen::Array3f g = want.max(0.0F).min(last_);
+    const Eigen::Array3i i = g.cast<int>();
+    const Eigen::Array3f f = g - i.cast<float>();
+    const float* v =
+        &values_[static_cast<std::size_t>((i.z() * size_.y() + i.y()) * size_.x() + i.x())];
+    const std::ptrdiff_t up = size_.x(), back = up * size_.y();
+    const auto mix = [](float a, float b, float s) { return a + s * (b - a); };
+    const float near = mix(mix(v[0], v[1], f.x()), mix(v[up], v[up + 1], f.x()), f.y());
+    v += back;
+    const float far = mix(mix(v[0], v[1], f.x()), mix(v[up], v[up + 1], f.x()), f.y());
+    return mix(near, far, f.z()) + cell_ * (want - g).matrix().norm();
+  }
+
+  std::size_t bytes() const { return values_.size() * sizeof(float); }
+
+ private:
+  Eigen::Vector3f low_;
+  float scale_, cell_;  // [1/m], [m]
+  Eigen::Array3i size_;
+  Eigen::Array3f last_;
+  std::vector<float> values_;  // [m] by node, x fastest
+};
+
+// Both grids of a link.
+class LinkGrid {
+ public:
+  explicit LinkGrid(const TriangleMesh& mesh) : LinkGrid(mesh, TriangleBvh(mesh)) {}
+
+  float operator()(const Eigen::Vector3f& p) const {
+    return fine_.contains(p) ? fine_(p) : coarse_(p);
   }
 
   Eigen::Vector3f slope(const Eigen::Vector3f& p) const {
-    const float h = 0.5F * kCell;
+    const float h = 0.5F * kFineCell;
     Eigen::Vector3f n;
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3f step = h * Eigen::Vector3f::Unit(axis);
@@ -68,41 +89,73 @@ struct Grid {
     }
     return n.normalized();
   }
+
+  std::size_t bytes() const { return fine_.bytes() + coarse_.bytes(); }
+
+ private:
+  LinkGrid(const TriangleMesh& mesh, const TriangleBvh& bvh)
+      : LinkGrid(bvh, Solid({GeometryElement{mesh, Eigen::Isometry3d::Identity(), "link"}}),
+                 Eigen::AlignedBox3f(bvh.bounds().min().cast<float>(),
+                                     bvh.bounds().max().cast<float>())) {}
+  LinkGrid(const TriangleBvh& bvh, const Solid& solid, const Eigen::AlignedBox3f& box)
+      : fine_(bvh, solid, box, kFineCell, kFineMargin),
+        coarse_(bvh, solid, box, kCoarseCell, kCoarseMargin) {}
+
+  Grid fine_, coarse_;
 };
 
-class SignedGrid : public PrunedByBox {
+class GridOfGroups : public Method {
  public:
-  explicit SignedGrid(const Robot& robot) : PrunedByBox(robot) {
-    name = "distance grid of 7.5 mm, link boxes";
+  explicit GridOfGroups(const Robot& robot) : last_(robot.meshes.size(), NearestPixel::kNone) {
     kind = Kind::kGrid;
-    is_unsigned = false;
-    for (const TriangleMesh& mesh : robot.meshes) grids_.emplace_back(mesh);
+    std::size_t bytes = 0;
+    for (const TriangleMesh& mesh : robot.meshes) {
+      grids_.emplace_back(mesh);
+      bytes += grids_.back().bytes();
+    }
+    name = "signed distance grid of 10 and 40 mm (" + std::to_string(bytes >> 20U) +
+           " MB), hierarchy of spheres over the image";
     // Within a cell the distance differs from the nodes' mean by at most half the diagonal. Outside
-    // the grid, the path over its side is longer than the straight one, by less than the side's
-    // length.
-    least_error = -0.5 * std::sqrt(3.0) * static_cast<double>(kCell);
+    // the grids, the path over their side is longer than the straight one.
+    least_error = -0.5 * std::sqrt(3.0) * static_cast<double>(kCoarseCell);
     largest_error = std::numeric_limits<double>::infinity();
     witness_error = std::numeric_limits<double>::infinity();
   }
 
- protected:
-  bool closest(std::size_t link, const Eigen::Vector3f& p_L, float* distance,
-               Eigen::Vector3d* surface_L) override {
-    const float d = grids_[link](p_L);
-    if (!(d < *distance)) return false;
-    *distance = d;
-    *surface_L = (p_L - d * grids_[link].slope(p_L)).cast<double>();
-    return true;
+  void ingest(const Frame& frame) override {
+    pyramid_.build(frame);
+    X_FS_ = frame.X_FS;
+  }
+
+  void query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) override {
+    for (std::size_t link = 0; link < X_FL.size(); ++link) {
+      const Eigen::Isometry3f X_LS = (X_FL[link].inverse() * X_FS_).cast<float>();
+      const LinkGrid& grid = grids_[link];
+      const NearestPixel nearest =
+          search_.run(pyramid_, X_LS, last_[link],
+                      [&](const Eigen::Vector3f& p_L, float /*bound*/,
+                          Eigen::Vector3f* /*witness_L*/) { return grid(p_L); });
+      last_[link] = nearest.pixel;
+      const Eigen::Vector3f p_L = X_LS * pyramid_.point(nearest.pixel);
+      const Eigen::Vector3f surface_L = p_L - nearest.distance * grid.slope(p_L);
+      (*answers)[link] = {static_cast<double>(nearest.distance),
+                          X_FL[link] * surface_L.cast<double>(),
+                          X_FS_ * pyramid_.point(nearest.pixel).cast<double>()};
+    }
   }
 
  private:
-  std::vector<Grid> grids_;
+  std::vector<LinkGrid> grids_;
+  ImagePyramid pyramid_;
+  PyramidSearch search_;
+  Eigen::Isometry3d X_FS_;
+  std::vector<std::size_t> last_;  // nearest pixel by link
 };
 
 }  // namespace
 
 void add_signed_grid(const Robot& robot, Methods* methods) {
-  methods->push_back(std::make_unique<SignedGrid>(robot));
+  methods->push_back(std::make_unique<GridOfGroups>(robot));
 }
 
 }  // namespace ist::benchmark

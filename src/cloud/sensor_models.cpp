@@ -1,4 +1,4 @@
-// Noise of common sensors, as published; doc/extent.md quotes the sources.
+// Noise of common sensors, as published; doc/sources.md quotes the sources.
 
 #include <algorithm>
 #include <cmath>

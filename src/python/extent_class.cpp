@@ -10,7 +10,7 @@ namespace py = pybind11;
 using Footprint = ExtentConfig::Footprint;
 
 constexpr const char* kDoc =
-    R"(How large the points of a sensor are, see doc/extent.md. Each point stands for a sphere, and
+    R"(How large the points of a sensor are, see doc/sources.md. Each point stands for a sphere, and
 lower_bound holds for the spheres. distance and the closest points stay those of the points.
 
 sensor: a name of Extent.sensors, whose published noise is used. Numbers that are given replace

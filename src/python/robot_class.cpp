@@ -299,11 +299,13 @@ void define_robot(py::module_* module) {
                           "dictionary by joint names; joints that it leaves out are at 0.")
                    .c_str(),
                py::arg("q"));
-  define_query(&type, "nearest", &nearest,
-               with_query("The nearest link only: several times faster.\n\nq: (joints,) or "
-                          "(n, joints) [rad, m], or a dictionary by joint names.")
-                   .c_str(),
-               py::arg("q"));
+  define_query(
+      &type, "nearest", &nearest,
+      with_query(
+          "The nearest link only; the others are asked as far as that needs.\n\nq: (joints,) or "
+          "(n, joints) [rad, m], or a dictionary by joint names.")
+          .c_str(),
+      py::arg("q"));
   define_query(&type, "distances_at", &distances_at,
                with_query("Distances at poses from any kinematics.\n\nposes: (links, 4, 4) or "
                           "(n, links, 4, 4), link frame -> root link's frame; a link whose pose is "

@@ -1,4 +1,4 @@
-// doc/contact.md states limits of the errors of contact volumes and of the jumps of wrenches. This
+// doc/accuracy.md states limits of the errors of contact volumes and of the jumps of wrenches. This
 // test measures them again: they must stay below the limits, and it must measure every row.
 // IST_PROXIMITY_UPDATE_DOC=1 writes the tables.
 
@@ -26,7 +26,7 @@ namespace {
 using test::ContactLink;
 using test::one;
 
-const std::string kDocument = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/contact.md";
+const std::string kDocument = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/accuracy.md";
 
 bool updating() { return std::getenv("IST_PROXIMITY_UPDATE_DOC") != nullptr; }
 

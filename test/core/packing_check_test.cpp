@@ -204,7 +204,7 @@ TEST(PackingCheck, CanBeCancelled) {
   EXPECT_LE(asked, 3);
 }
 
-// What the check costs beside packing; doc/packing.md quotes it.
+// What the check costs beside packing; doc/benchmark.md quotes it.
 TEST(PackingCheck, IsCheapBesidePacking) {
   const auto data = test::data_dir();
   if (!data) GTEST_SKIP() << test::kNoData;

@@ -1,5 +1,5 @@
-// doc/packing.md states the result for every hostile mesh. This test packs them again and checks
-// every certificate against brute force in double precision.
+// packing_outcomes.md states the result for every hostile mesh. This test packs them again and
+// checks every certificate against brute force in double precision.
 //
 // IST_PROXIMITY_UPDATE_DOC=1 writes the table.
 
@@ -25,7 +25,8 @@
 namespace ist {
 namespace {
 
-const std::string kDocument = std::string(IST_PROXIMITY_SOURCE_DIR) + "/doc/packing.md";
+const std::string kDocument =
+    std::string(IST_PROXIMITY_SOURCE_DIR) + "/test/core/packing_outcomes.md";
 constexpr int kPoints = 300;
 
 bool updating() { return std::getenv("IST_PROXIMITY_UPDATE_DOC") != nullptr; }
@@ -141,7 +142,7 @@ TEST(PackingDocument, HostileMeshesArePackedOrRefusedAsStated) {
       const double spheres = std::stod(result.substr(std::string("packed | ").size()));
       EXPECT_NEAR(spheres, std::stod(row[2]), 0.1 * spheres + 2.0);
     }
-    EXPECT_TRUE(found) << "not in doc/packing.md";
+    EXPECT_TRUE(found) << "not in packing_outcomes.md";
   }
   EXPECT_GE(names.size(), 25U);
   if (updating()) {

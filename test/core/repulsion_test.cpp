@@ -302,7 +302,7 @@ CloudSnapshot sphere_cloud(int count) {
 }
 
 // A bar turns and passes a sphere at 1 m/s, in steps of 1 ms. Direction and length change little in
-// each step, and little with half or twice as many points (doc/repulsion.md).
+// each step, and little with half or twice as many points (doc/accuracy.md).
 TEST(Repulsion, isSmoothAndIndependentOfTheNumberOfPoints) {
   const CloudSnapshot cloud = sphere_cloud(12000), half = sphere_cloud(6000),
                       twice = sphere_cloud(24000);

@@ -41,7 +41,7 @@ def test_python(text, folder):
     assert result.returncode == 0 and result.stdout.strip(), result.stderr
 
 
-def compiled(source, folder, *options):
+def compiled(source, folder):
     compiler = shutil.which(os.environ.get('CXX', 'c++'))
     if compiler is None:
         pytest.skip('no C++ compiler')
@@ -50,27 +50,16 @@ def compiled(source, folder, *options):
     eigen = subprocess.run(['pkg-config', '--cflags', 'eigen3'], check=False, capture_output=True,
                            text=True).stdout.split() or ['-I/usr/include/eigen3']
     return subprocess.run([compiler, '-std=c++17', '-fsyntax-only', '-Wall', f'-I{ROOT}/include', *eigen,
-                           *options, str(file)], check=False, capture_output=True, text=True)
+                           str(file)], check=False, capture_output=True, text=True)
 
 
 @pytest.mark.parametrize('text', snippets('cpp'))
 def test_cpp(text, tmp_path):
-    """A program, statements of one, or a source of the library with its name in the first line."""
-    name = re.match(r'// src/(\S+\.cpp)\n', text)
-    options = []
-    if name:
-        # Highway includes the file again, for each instruction set.
-        place = tmp_path / name.group(1)
-        place.parent.mkdir(parents=True)
-        place.write_text(text)
-        place.with_suffix('.h').write_text(
-            '#pragma once\n#include <cstddef>\nnamespace ist {\n'
-            'void scale(const float* in, std::size_t count, float factor, float* out);\n}\n')
-        options = [f'-I{tmp_path}']
-    elif 'main(' not in text:
+    """A program, or statements of one."""
+    if 'main(' not in text:
         text = ('#include "ist_proximity/facade/robot.h"\nint main() {\n' + text +
                 'return answers.empty() ? 1 : 0;\n}\n')
-    result = compiled(text, tmp_path, *options)
+    result = compiled(text, tmp_path)
     assert result.returncode == 0, result.stderr
 
 

@@ -20,15 +20,12 @@ import threading
 import time
 import unittest
 
+import fault_table
 import numpy as np
 import proximity_testing as pt
 import rospy
 from ist_proximity.msg import SpeedScaleState
 from proximity_testing import LinkProximity, ProximityArray
-
-REPOSITORY = os.path.join(os.path.dirname(os.path.realpath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(REPOSITORY, "scripts"))
-import fault_table  # noqa: E402
 
 STATUS = {
     getattr(ProximityArray, name): name

@@ -102,7 +102,7 @@ struct SensorModel {
   const char* origin;        ///< where the numbers were published
 };
 
-/// The sensors that are known by name; doc/extent.md says where their numbers are from.
+/// The sensors that are known by name; doc/sources.md says where their numbers are from.
 const std::vector<SensorModel>& sensor_models();
 /// Null: there is none of this name.
 const SensorModel* find_sensor_model(const std::string& name);

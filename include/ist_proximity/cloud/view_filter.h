@@ -12,7 +12,7 @@ namespace ist {
 enum class SelfFilterMode : std::uint8_t {
   kPadding,  ///< whatever is within the padding of a link
   /// The ones of these that agree with where the sensor must see the robot, and single pixels that
-  /// noise has put in front of it (doc/self_filter.md).
+  /// noise has put in front of it (doc/sources.md).
   /// Points that do not lie on rays from the sensor frame's origin, and clouds that are no image,
   /// are filtered by padding.
   kView,

@@ -48,7 +48,7 @@ constexpr double kFullDepth = 0.5;
 /// than their union has (the mean of 1/n over a sphere is at least one over the mean of n),
 /// whichever of the sources they come from, and two points at one position count as one. The cloud
 /// is thinned to a grid, so more points on the same surface change next to nothing. A surface
-/// counts as a layer on both sides of it, about 1.3 cells thick; doc/contact.md says how far that
+/// counts as a layer on both sides of it, about 1.3 cells thick; doc/accuracy.md says how far that
 /// is from an obstacle's true volume.
 ///
 /// **Nothing counts from outside.** A point counts from where it enters a sphere of the link's
@@ -79,7 +79,7 @@ ContactVolume contact_volume(const LinkModel& link, const ContactGeometry& geome
 /// Volume shared by two links. Each link's volume is divided into about four thousand elements; the
 /// share of each that is inside the other link's exact geometry counts, and the result is the mean
 /// of both ways. Spheres would not do: near a face they leave most of the volume empty. Flat faces
-/// that are parallel are exact at any depth; doc/contact.md has the errors of others. n is the
+/// that are parallel are exact at any depth; doc/accuracy.md has the errors of others. n is the
 /// second link's outward field for its elements, and the opposite of the first's for its own; near
 /// the other link's surface it is the normal of that. Of two balls the lens is taken.
 ///

@@ -73,7 +73,7 @@ class Robot {
   std::vector<LinkProximity> distances(Span<const double> q, const Obstacles& obstacles,
                                        const QueryConfig& config = {}) const;
 
-  /// The nearest link only: several times faster.
+  /// The nearest link only; the others are asked as far as that needs.
   /// @throws std::invalid_argument as distances()
   RobotProximity nearest(Span<const double> q, const Obstacles& obstacles,
                          const QueryConfig& config = {}) const;

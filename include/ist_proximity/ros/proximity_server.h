@@ -7,9 +7,9 @@
 namespace ist {
 
 /// The whole of ist_proximity as the node and the nodelet run it: it subscribes to clouds and joint
-/// states, measures in threads of its own and publishes the results (doc/topics.md lists topics,
-/// services and parameters). Services that change the model are answered from the callback queue of
-/// `private_nh`, which the caller spins.
+/// states, measures in threads of its own and publishes the results (doc/parameters.md lists
+/// topics, services and parameters). Services that change the model are answered from the callback
+/// queue of `private_nh`, which the caller spins.
 class ProximityServer {
  public:
   /// Reads the parameters and starts all threads; nothing is waited for.

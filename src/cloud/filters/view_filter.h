@@ -22,7 +22,7 @@ namespace ist {
 bool is_view(const RawCloud& cloud);
 
 /// Decides which points of an organized cloud are the robot's by where the sensor must see it
-/// (doc/self_filter.md). Only tiles of 4 x 4 pixels with points within the padding of a link are
+/// (doc/sources.md). Only tiles of 4 x 4 pixels with points within the padding of a link are
 /// looked at; of those points it says which are obstacles all the same. What the padding keeps, it
 /// keeps too, but for single pixels and pairs that noise may have put in front of the robot.
 ///

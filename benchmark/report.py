@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 """Makes the tables and plots of the numbers that scripts/benchmark measured. Needs Python only.
 
-Writes FOLDER/benchmark.csv and benchmark_growth.csv (with commit and machine), the plots
-FOLDER/benchmark.svg and benchmark_growth.svg, and the tables of FOLDER/benchmark.md and of the
-README: the lines between the markers `<!-- NAME -->` and `<!-- end of NAME -->`.
+Writes CSV files (with commit and machine) and plots to FOLDER, and the tables of FOLDER/benchmark.md and
+of the README: the lines between the markers `<!-- NAME -->` and `<!-- end of NAME -->`.
 """
 
 import argparse
@@ -61,20 +60,6 @@ def worst(row):
     return max(-row["error_least_mm"], row["error_largest_mm"])
 
 
-def number(value):
-    if abs(value) < 1e-3:
-        return "0"
-    return f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
-
-
-def error(row):
-    """[mm] mean and both ends; what float rounds is not worth its digits."""
-    if worst(row) < 0.01:
-        return "0"
-    return (f"{number(row['error_mean_mm'])} "
-            f"({number(row['error_least_mm'])} … {number(row['error_largest_mm'])})")
-
-
 FREE = "free_frame_us"  # where no link is in contact
 
 
@@ -89,99 +74,85 @@ def table(header, rows):
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
 
 
-def times(row, what):
-    return " / ".join(time(row[f"{what}_{k}"]) for k in ("us", "p99_us", "max_us"))
-
-
-def peers_table(rows):
-    return table(
-        ["method", "ingest", "query, median / p99 / largest",
-         "no link in contact, median / p99 / largest",
-         "error mean (least … largest) [mm]", "one 30 Hz frame, median / p99 / largest"],
-        [[label(r), time(r["ingest_us"])] + (["", "", "", ""] if r["kind"] == "floor" else [
-            times(r, "query"), times(r, "free_query"),
-            error(r), times(r, "frame") if r["frame_us"] else time(frame(r))]) for r in rows])
-
-
 def short_table(rows):
-    keep = [r for r in rows if r["kind"] not in ("ours", "floor")
-            or (r["kind"] == "ours" and r["max_error_mm"] == 5 and r["tolerance_mm"] < 20)]
+    rest = ("FCL, mesh and octree",)  # in the CSV
+    keep = [r for r in rows if (r["kind"] not in ("ours", "floor") and not r["method"].startswith(rest))
+            or (r["kind"] == "ours" and r["max_error_mm"] == 5 and r["tolerance_mm"] < 5)]
     keep.sort(key=lambda r: (r["kind"] != "ours", r["tolerance_mm"], worst(r) >= 0.01,
                              r["free_query_us"]))
     return table(["method", "ingest", "query, median, out of contact", "in all configurations",
-                  "worst error"],
+                  "motion at 1 kHz, median / p99", "one 30 Hz frame", "worst error"],
                  [[label(r), time(r["ingest_us"]), time(r["free_query_us"]), time(r["query_us"]),
-                   "0" if worst(r) < 0.01 else f"{worst(r):.2g} mm"] for r in keep])
+                   f"{time(r['motion_us'])} / {time(r['motion_p99_us'])}" if r["motion_queries"] else "",
+                   time(frame(r)), "0" if worst(r) < 0.01 else f"{worst(r):.2g} mm"] for r in keep])
 
 
-def motion_table(rows):
-    return table(
-        ["method", "queries", "median", "p99", "largest", "p99 / median", "largest / median",
-         "no contact: median", "p99", "largest", "first after an image: median / p99 / largest"],
-        [[label(r), f"{r['motion_queries']:.0f}", time(r["motion_us"]), time(r["motion_p99_us"]),
-          time(r["motion_max_us"]), f"{r['motion_p99_us'] / r['motion_us']:.1f}",
-          f"{r['motion_max_us'] / r['motion_us']:.1f}"] +
-         [time(r[f"free_motion_{k}"]) if r["free_motion_us"] else ""
-          for k in ("us", "p99_us", "max_us")] +
-         [times(r, "first") if r["first_us"] else ""]
-         for r in rows if r["motion_queries"]])
+def hard_table(rows):
+    """Warm median / 99th percentile and the first query after an image, with most points. Primitives are in the CSV."""
+    most = max(r["points"] for r in rows)
+    cell = {(r["scene"], r["link"], r["noise_mm"], r["tolerance_mm"], r["asked"]): r for r in rows
+            if r["points"] in (0, most)}
+
+    def warm(*key):
+        r = cell.get((*key, "warm"))
+        return f"{time(r['median_us'])} / {time(r['p99_us'])}" if r else ""
+
+    def new(*key):
+        r = cell.get((*key, "new image"))
+        return time(r["median_us"]) if r else ""
+    return table(["scene", "link", "to 1 mm", "with noise of 1 mm", "new image", "exact, no noise"],
+                 [[*source, warm(*source, 0, 1), warm(*source, 1, 1),
+                   new(*source, 1, 1) or new(*source, 0, 1), warm(*source, 0, 0)]
+                  for source in sources(rows) if " " in source[1] or source[1] == "bellows"])
 
 
-def growth_table(rows, what, unit):
-    chosen = [r for r in rows if r["what"] == what]
-    values = sorted({r["value"] for r in chosen})
-    cell = {(r["value"], r["tolerance_mm"]): f"{time(r['query_us'])} / {time(r['query_p99_us'])}"
-            for r in chosen}
-    return table([f"{what}{unit}", "to 1 mm, median / p99", "exact, median / p99"],
-                 [[f"{v:,.0f}" if v > 2 or v == int(v) else f"{v:g}", cell[v, 1.0], cell[v, 0.0]]
-                  for v in values])
+def sources(rows):
+    """The scenes with their links, in the order of the file."""
+    return list(dict.fromkeys((r["scene"], r["link"]) for r in rows))
 
 
-def best(rows, *, kinds, key):
-    chosen = [r for r in rows if r["kind"] in kinds]
-    return min(chosen, key=key) if chosen else None
-
-
-def ratios(rows):
-    """What the project set itself as goals: one row each."""
-    by = {(r["max_error_mm"], r["tolerance_mm"]): r for r in rows if r["kind"] == "ours"}
-    exact, coarse = by[5.0, 0.0], by[5.0, 1.0]
-    named = {}
-    for r in rows:  # the first of a name: nanoflann on all points, not on voxels
-        named.setdefault(r["method"].split(",")[0].split(" ")[0] + r["kind"], r)
+def near_table(rows):
+    cell = {(r["robot"], r["distance_mm"], r["tolerance_mm"], r["asked"]): r for r in rows}
     lines = []
+    for robot in dict.fromkeys(r["robot"] for r in rows if "level" not in r["robot"]):
+        for distance in (300, 5, -1):
+            if (robot, distance, 1, "warm") in cell:
+                fine, exact = cell[robot, distance, 1, "warm"], cell[robot, distance, 0, "warm"]
+                lines.append([robot, f"{distance:g} mm" if distance > 0 else f"{-distance:g} mm deep",
+                              f"{time(fine['median_us'])} / {time(fine['p99_us'])}",
+                              time(cell[robot, distance, 1, "new image"]["median_us"]),
+                              f"{time(exact['median_us'])} / {time(exact['p99_us'])}"])
+    return table(["robot", "nearest link", "to 1 mm", "new image", "exact"],
+                 lines)
 
-    def line(text, goal, free, everything=None):
-        lines.append([text, f"{free:.3g}", f"{everything:.3g}" if everything else "", goal])
 
-    memcpy = next(r for r in rows if r["kind"] == "floor")
-    line("ingest of 640×480 / memcpy of the frame", "≤ 2.5",
-         exact["ingest_us"] / memcpy["ingest_us"])
-    for peer, kind, ours, text, goal, percentile in (
-            ("Embree point query, hierarchy", "exact", exact, "exact, median query", "≥ 20", ""),
-            ("Embree point query, hierarchy", "exact", coarse, "to 1 mm, median query", "≥ 40", ""),
-            ("Embree point query, link boxes", "exact", exact, "exact, median query", "≥ 30", ""),
-            ("FCL", "exact", exact, "exact, median query", "≥ 20", ""),
-            ("signed distance grid", "grid", coarse, "to 1 mm, median query", "≥ 3", ""),
-            ("signed distance grid", "grid", coarse, "to 1 mm, 99th percentile", "≥ 1", "p99_")):
-        rival = next((r for r in rows if r["kind"] == kind and r["method"].startswith(peer)), None)
-        if rival:
-            line(f"{rival['method'].split(' (')[0]} / ours, {text}", goal,
-                 *(rival[f"{k}_{percentile}us"] / ours[f"{k}_{percentile}us"]
-                   for k in ("free_query", "query")))
-    rival = best(rows, kinds=("exact",), key=frame)
-    if rival:
-        line(f"work per 30 Hz frame: {rival['method']} / ours, exact",
-             "≥ 50", frame(rival, FREE) / frame(exact, FREE), frame(rival) / frame(exact))
-    if "nanoflannspheres" in named:
-        line("work per 30 Hz frame: nanoflann on all points / ours to 1 mm",
-             "≥ 5", frame(named["nanoflannspheres"], FREE) / frame(coarse, FREE),
-             frame(named["nanoflannspheres"]) / frame(coarse))
-    for key, text, goal in (("p99_us", "p99", "≤ 3"), ("max_us", "largest", "≤ 10")):
-        line(f"motion, exact: {text} / median", goal,
-             exact[f"free_motion_{key}"] / exact["free_motion_us"],
-             exact[f"motion_{key}"] / exact["motion_us"])
-    return table(["what", "out of contact", "all", "goal"], lines)
+def checks(rows, keys):
+    """The answers that were checked, once for each setting."""
+    once = {tuple(r.get(k) for k in keys): r for r in rows}.values()
+    checked, wrong = (sum(r[k] for r in once) for k in ("checked", "wrong"))
+    return f"{checked:,.0f} answers were checked by brute force; {wrong:,.0f} were wrong.\n"
+
+
+def deadline_table(rows):
+    """Of whole robots; their scenes are added up, widths are the worst."""
+    def percent(part, whole):
+        return f"{100 * part / whole:.0f} %" if whole else ""
+    lines = []
+    for link in dict.fromkeys(r["link"] for r in rows if r["link"].startswith(("Panda", "demo"))):
+        for asked in ("warm", "new image", "cold"):
+            of = [r for r in rows if (r["link"], r["asked"]) == (link, asked)]
+            line = [link, asked]
+            for share in (0.1, 0.25, 0.5):
+                at = [r for r in of if r["share"] == share]
+                add = {k: sum(r[k] for r in at) for k in ("proven_free", "free_links", "unknown", "links")}
+                width = max((r["width_mm"] for r in at), default=math.inf)
+                line.append(f"{percent(add['proven_free'], add['free_links'])} / "
+                            f"{percent(add['unknown'], add['links'])} / "
+                            f"{'∞' if math.isinf(width) else f'{width:.3g}'}")
+            lines.append(line + [time(max((r["overrun_max_us"] for r in of), default=0.0))])
+    wrong, stopped = (sum(r[k] for r in rows) for k in ("wrong", "stopped"))
+    return (table(["robot", "asked", "10 %", "25 %", "50 %", "overrun, largest"], lines) +
+            f"\nOf {stopped:,.0f} stopped queries, single bodies included, {wrong:,.0f} had a wrong bound.\n")
 
 
 class Drawing:
@@ -364,52 +335,55 @@ def sections(path):
     return parts
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", type=Path, metavar="TABLES",
-                        help="only these tables, in Markdown, each after a line '# NAME'")
-    parser.add_argument("peers", type=Path, nargs="?")
-    parser.add_argument("growth", type=Path, nargs="?")
-    parser.add_argument("ingest", type=Path, nargs="?", help="a table in Markdown")
-    parser.add_argument("modes", type=Path, nargs="?",
-                        help="tables in Markdown, each after a line '# NAME'")
-    for name in ("commit", "machine", "date"):
-        parser.add_argument("--" + name, required=True)
-    parser.add_argument("--folder", type=Path, required=True)
-    parser.add_argument("--readme", type=Path)
-    arguments = parser.parse_args()
-    if arguments.only:
-        run = f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"
-        parts = {**sections(arguments.only), "benchmark camera run": run}
-        fill(arguments.folder / "benchmark.md", parts)
-        if arguments.readme:
-            fill(arguments.readme, parts)
-        return
+def report_hard(arguments, run):
+    hard, near, deadline = (read(path) for path in arguments.results)
+    for name, rows in (("hard", hard), ("near", near), ("deadline", deadline)):
+        if rows:
+            write(arguments.folder / f"benchmark_{name}.csv", rows, arguments)
+    parts = {"benchmark hard run": run, "benchmark hard": hard_table(hard),
+             "benchmark hard checks": checks(hard + near, (
+                 "scene", "link", "points", "noise_mm", "robot", "distance_mm", "tolerance_mm")),
+             "benchmark deadline": deadline_table(deadline)}
+    if near:
+        parts["benchmark near"] = near_table(near)
+    fill(arguments.folder / "benchmark.md", parts)
 
-    peers, growth = read(arguments.peers), read(arguments.growth)
+
+def report_peers(arguments, run):
+    peers, growth = (read(path) for path in arguments.results[:2])
     write(arguments.folder / "benchmark.csv", peers, arguments)
     write(arguments.folder / "benchmark_growth.csv", growth, arguments)
-    parts = {"benchmark run": f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"}
-    sets = {name: [r for r in peers if r["data"] == name] for name in NAMES}
-    for name, rows in sets.items():
-        if rows:
-            parts[f"benchmark {name}"] = peers_table(rows)
-            parts[f"benchmark motion {name}"] = motion_table(rows)
-    shown = sets["kinect"] or sets["synthetic"]
-    parts["benchmark ingest"] = arguments.ingest.read_text(encoding="utf-8")
-    parts.update(sections(arguments.modes))
-    parts["benchmark ratios"] = ratios(shown)
-    parts["benchmark short"] = short_table(shown)
-    for what, unit in (("spheres", ""), ("points", ""), ("links", ""), ("distance", " [m]")):
-        parts[f"benchmark {what}"] = growth_table(growth, what, unit)
+    shown = [r for r in peers if r["data"] == "kinect"] or peers
+    parts = {"benchmark run": run, "benchmark short": short_table(shown), **sections(arguments.results[2])}
     fill(arguments.folder / "benchmark.md", parts)
-    if arguments.readme:
-        fill(arguments.readme, parts)
     title = f"Speed against error: {NAMES[shown[0]['data']]}, {arguments.commit}"
     (arguments.folder / "benchmark.svg").write_text(Plot(shown, title).svg(), encoding="utf-8")
     (arguments.folder / "benchmark_growth.svg").write_text(
         GrowthPlot(growth, f"Time of a query as things grow, {arguments.commit}").svg(),
         encoding="utf-8")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kind", choices=("peers", "hard", "camera"))
+    parser.add_argument("results", type=Path, nargs="+",
+                        help="peers: two CSV and tables; hard: three CSV; camera: tables. Tables are in "
+                             "Markdown, each after a line '# NAME'")
+    for name in ("commit", "machine", "date"):
+        parser.add_argument("--" + name, required=True)
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--readme", type=Path)
+    arguments = parser.parse_args()
+    run = f"Commit {arguments.commit}, {arguments.date}, {arguments.machine}.\n"
+    if arguments.kind == "peers":
+        report_peers(arguments, run)
+    elif arguments.kind == "hard":
+        report_hard(arguments, run)
+    else:
+        parts = {**sections(arguments.results[0]), "benchmark camera run": run}
+        fill(arguments.folder / "benchmark.md", parts)
+        if arguments.readme:
+            fill(arguments.readme, parts)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,11 @@
-#!/usr/bin/env python3
-"""The table of faults in doc/safety.md: reads its rows, and fills it from records of the rostests.
+"""The table of faults in doc/safety.md: its rows, which IST_PROXIMITY_UPDATE_DOC=1 makes the rostests write."""
 
-Usage: fault_table.py [--update-doc] [--document FILE] RECORD.json...
-
-Without --update-doc it prints the table that the records make. Tests write their records beside
-their results (build/ros/test_results/ist_proximity/*faults*.json); with IST_PROXIMITY_UPDATE_DOC=1
-in the environment they update the document themselves. Rows of faults without a record stay.
-"""
-
-import argparse
 import fcntl
-import json
 import pathlib
 
-DOCUMENT = pathlib.Path(__file__).resolve().parent.parent / "doc" / "safety.md"
+DOCUMENT = pathlib.Path(__file__).resolve().parents[2] / "doc" / "safety.md"
 BEGIN, END = "<!-- faults -->\n", "<!-- end of faults -->"
-COLUMNS = ("fault", "what was done", "status", "what the node said", "at most", "measured", "recovery")
+COLUMNS = ("fault", "what was done", "status", "at most", "measured", "recovery")
 NONE = "-"
 
 
@@ -24,12 +14,12 @@ def milliseconds(value):
 
 
 def row(record):
-    """The cells of a record: a dictionary with fault, done, status, said, limit_ms, reaction_ms,
+    """The cells of a record: a dictionary with fault, done, status, limit_ms, reaction_ms,
     recovery and recovery_ms, where times that do not apply are None."""
     recovery = record["recovery"]
     if record["recovery_ms"] is not None:
         recovery += ", %s" % milliseconds(record["recovery_ms"])
-    cells = (record["fault"], record["done"], record["status"], record["said"] or NONE)
+    cells = (record["fault"], record["done"], record["status"])
     cells += (milliseconds(record["limit_ms"]), milliseconds(record["reaction_ms"]), recovery)
     return [cell.replace("|", "/").replace("\n", " ") for cell in cells]
 
@@ -69,22 +59,3 @@ def update(records, document=DOCUMENT):
         ordered = [rows[fault] for fault in sorted(rows, key=str.lower)]
         file.write(before + BEGIN + table(ordered) + END + after)
         file.truncate()
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--update-doc", action="store_true")
-    parser.add_argument("--document", type=pathlib.Path, default=DOCUMENT)
-    parser.add_argument("records", nargs="+", type=pathlib.Path)
-    arguments = parser.parse_args()
-    records = []
-    for path in arguments.records:
-        records += json.loads(path.read_text(encoding="utf-8"))
-    if arguments.update_doc:
-        update(records, arguments.document)
-    else:
-        print(table([row(record) for record in records]), end="")
-
-
-if __name__ == "__main__":
-    main()
