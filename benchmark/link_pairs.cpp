@@ -59,14 +59,13 @@ std::vector<std::unique_ptr<PairPeer>> make_peers([[maybe_unused]] const Robot& 
 struct Measured {
   std::vector<double> us;
   std::vector<double> distances;  // [m] by pair, of the last run
-  int near = 0, wrong = 0;
+  int wrong = 0;
 
   // Compares with the exact distances where links are apart.
   void compare(const std::vector<PairProximity>& exact) {
     constexpr double kFloat = 2e-5;  // [m]
     for (std::size_t k = 0; k < exact.size(); ++k) {
       if (exact[k].state != LinkState::kNear) continue;
-      ++near;
       wrong += std::abs(distances[k] - exact[k].distance) > kFloat ? 1 : 0;
     }
   }
@@ -77,14 +76,9 @@ void step_towards(const std::vector<double>& to, std::vector<double>* q) {
   for (std::size_t j = 0; j < q->size(); ++j) (*q)[j] += 5e-4 * std::tanh(4.0 * (to[j] - (*q)[j]));
 }
 
-// Rows of a table of times, and of peers.
-struct TimeRows {
-  std::string ours, peers;
-};
-
 // Times of all pairs: ours to 1 mm and exact, and the peers', in the same run.
 // @param seed    of the configurations, or of the motion
-void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, TimeRows* rows) {
+void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, std::string* rows) {
   ist::test::Rng rng(seed);
   ist::ForwardKinematics forward(*robot.model, robot.kinematics);
   std::vector<PairProximity> results;
@@ -133,64 +127,16 @@ void measure_time(const Robot& robot, bool is_motion, unsigned seed, int count, 
     std::snprintf(name, sizeof name, "%d random", count);
   }
   const double to_1_mm = quantile(ours[0], 0.5), exact = quantile(ours[1], 0.5);
-  std::snprintf(row, sizeof row, "| %s | %s | %.0f | %.0f | %.0f | %.0f | %.0f | %.0f |\n",
-                robot.name.c_str(), name, to_1_mm, quantile(ours[0], 0.99),
-                ist::benchmark::mean(ours[0]), exact, ist::benchmark::mean(searched),
-                ist::benchmark::mean(steps));
-  rows->ours += row;
-  std::printf("%s", row);
-  for (std::size_t k = 0; k < peers.size(); ++k) {
-    const double us = quantile(measured[k].us, 0.5);
-    std::snprintf(
-        row, sizeof row, "| %s | %s | %s | %.0f | %s | %s | %s | %.2f |\n", robot.name.c_str(),
-        name, peers[k]->name().c_str(), us, ratio(us, to_1_mm).c_str(),
-        ratio(ist::benchmark::mean(measured[k].us), ist::benchmark::mean(ours[0])).c_str(),
-        ratio(us, exact).c_str(), 100.0 * measured[k].wrong / measured[k].near);
-    rows->peers += row;
-    std::printf("%s", row);
-  }
-  std::fflush(stdout);
-}
-
-// All pairs of a robot's links beside its links against a cloud, on one motion at 1 kHz, to 1 mm
-// and within 1 m as the node asks.
-std::string measure_beside_cloud(const Robot& robot) {
-  ist::test::Rng rng(9);
-  std::vector<Eigen::Vector3d> points;  // a floor and a wall
-  for (int i = 0; i < 300000; ++i) {
-    const double u = ist::test::uniform(&rng, -1.5, 1.5), v = ist::test::uniform(&rng, 0.0, 2.0);
-    points.push_back(i % 2 == 0 ? Eigen::Vector3d(u, v - 1.0, -0.05) : Eigen::Vector3d(0.7, u, v));
-  }
-  const ist::CloudSnapshot cloud = ist::test::make_snapshot(points);
-  ist::ForwardKinematics forward(*robot.model, robot.kinematics);
-  ist::SelfQuery pairs(robot.model, robot.pairs, {});
-  ist::ProximityQuery links(robot.model, {});
-  std::vector<PairProximity> of_pairs;
-  std::vector<ist::LinkProximity> of_links;
-  std::vector<double> pair_us, link_us, looked_at;
-  ist::benchmark::ThreadTimer timer;
-  std::vector<double> q = robot.random_position(&rng), to = robot.random_position(&rng);
-  for (int i = 0; i < 2000; ++i) {
-    step_towards(to, &q);
-    const ist::LinkPoses& poses = forward.run(q);
-    timer.lap();
-    pairs.run(poses.X_FL, poses.known, &of_pairs);
-    pair_us.push_back(timer.lap());
-    looked_at.push_back(100.0 * static_cast<double>(pairs.statistics().pairs_searched) /
-                        static_cast<double>(robot.pairs.size()));
-    timer.lap();
-    links.run(poses.X_FL, poses.known, {&cloud}, &of_links);
-    link_us.push_back(timer.lap());
-  }
-  char row[256];
-  std::snprintf(row, sizeof row, "| %s | %zu | %.0f / %.0f | %.0f | %zu | %.0f / %.0f | %.2f |\n",
-                robot.name.c_str(), robot.pairs.size(), quantile(pair_us, 0.5),
-                quantile(pair_us, 0.99), ist::benchmark::mean(looked_at), robot.model->links.size(),
-                quantile(link_us, 0.5), quantile(link_us, 0.99),
-                quantile(pair_us, 0.5) / quantile(link_us, 0.5));
+  const double of_peer = peers.empty() ? 0.0 : quantile(measured[0].us, 0.5);
+  std::snprintf(row, sizeof row,
+                "| %s | %s | %.0f / %.0f | %.0f | %.0f | %.0f | %.0f | %s | %s | %d |\n",
+                robot.name.c_str(), name, to_1_mm, quantile(ours[0], 0.99), exact,
+                ist::benchmark::mean(searched), ist::benchmark::mean(steps), of_peer,
+                ratio(of_peer, to_1_mm).c_str(), ratio(of_peer, exact).c_str(),
+                peers.empty() ? 0 : measured[0].wrong);
+  *rows += row;
   std::printf("%s", row);
   std::fflush(stdout);
-  return row;
 }
 
 // How the answers at one tolerance compare with brute force.
@@ -302,25 +248,15 @@ int main(int argc, char** argv) {
   };
   bool written = true;
   if (part == "all" || part == "time") {
-    TimeRows time;
-    time.ours =
-        "| robot | poses | to 1 mm, median [us] | p99 [us] | mean [us] | exact, median [us] | "
-        "pairs "
-        "looked at [%] | steps |\n|---|---|---|---|---|---|---|---|\n";
-    time.peers =
-        "| robot | poses | peer | median [us] | peer / ours to 1 mm | the same of means | peer / "
-        "ours exact | wrong [%] |\n"
-        "|---|---|---|---|---|---|---|---|\n";
+    std::string time =
+        "| robot | poses | to 1 mm, median / p99 [us] | exact, median [us] | pairs looked at [%] | "
+        "steps | FCL, exact [us] | FCL / to 1 mm | FCL / exact | FCL's wrong answers |\n"
+        "|---|---|---|---|---|---|---|---|---|---|\n";
     for (const Robot& robot : robots) {
       measure_time(robot, false, 7, std::min(configurations, 200), &time);
       measure_time(robot, true, kMotion, 1000, &time);
     }
-    std::string beside =
-        "| robot | pairs | all pairs, median / p99 [us] | pairs looked at [%] | links | against a "
-        "cloud, median / p99 [us] | pairs / cloud |\n|---|---|---|---|---|---|---|\n";
-    for (const Robot& robot : robots) beside += measure_beside_cloud(robot);
-    written = write("link pairs", time.ours) && write("link pair peers", time.peers) &&
-              write("link pairs beside a cloud", beside);
+    written = write("link pairs", time);
   }
   if (part == "all" || part == "accuracy") {
     std::string accuracy =

@@ -38,16 +38,15 @@ constexpr double kMaxRange = 3.0;     // [m]
 constexpr int kPeerEvery = 10;        // liboctomap takes one cloud of so many
 
 struct Times {
-  std::vector<double> ingest, scan, insert, insert_each, boxes;  // [us] of a cloud
-  std::vector<double> octomap, octomap_discrete;                 // [us] of the same
-  std::vector<double> query, query_with;                         // [us]
+  std::vector<double> ingest, scan, insert, boxes;  // [us] of a cloud
+  std::vector<double> octomap, octomap_discrete;    // [us] of the same
+  std::vector<double> query, query_with;            // [us]
 };
 
-ist::MemoryConfig memory_config(bool discretize) {
+ist::MemoryConfig memory_config() {
   ist::MemoryConfig config;
   config.resolution = kResolution;
   config.max_range = kMaxRange;
-  config.discretize = discretize;
   return config;
 }
 
@@ -90,7 +89,6 @@ std::string table(const Times& t) {
   text += row("memory: boxes of what is hidden, and their index", t.boxes);
   text += row("liboctomap, as octomap_server", t.octomap);
   text += row("liboctomap, discretized", t.octomap_discrete);
-  text += row("memory: insertion with a ray for each point", t.insert_each);
   text += row("query of all links, without memory", t.query);
   text += row("query of all links, with memory", t.query_with);
   const double ours = quantile(t.scan, 0.5) + quantile(t.insert, 0.5) + quantile(t.boxes, 0.5);
@@ -142,7 +140,7 @@ int main(int argc, char** argv) {
   ingest_config.max_range = kMaxRange;
   ingest_config.self_filter_padding = 0.03;
   ist::Ingest ingest(ingest_config);
-  ist::MemoryMap map(memory_config(true)), each(memory_config(false));
+  ist::MemoryMap map(memory_config());
 #ifdef IST_PROXIMITY_HAS_OCTOMAP
   octomap::OcTree tree(kResolution), discrete_tree(kResolution);
 #endif
@@ -173,9 +171,6 @@ int main(int argc, char** argv) {
       memory.boxes = index;
       times.boxes.push_back(timer.lap());
       if (frames++ % kPeerEvery != 0) continue;
-      timer.lap();
-      each.insert(scan);
-      times.insert_each.push_back(timer.lap());
 #ifdef IST_PROXIMITY_HAS_OCTOMAP
       times.octomap.push_back(insert_octomap(scan, false, &tree));
       times.octomap_discrete.push_back(insert_octomap(scan, true, &discrete_tree));

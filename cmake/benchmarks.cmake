@@ -50,13 +50,6 @@ else()
   message(STATUS "ist_proximity: benchmark/link_pairs and world without FCL (apt install libfcl-dev)")
 endif()
 
-# A yardstick, where it is installed (libembree-dev).
-find_package(embree 3 QUIET)
-if(TARGET embree)
-  target_link_libraries(benchmark_packing PRIVATE embree)
-  target_compile_definitions(benchmark_packing PRIVATE IST_PROXIMITY_EMBREE)
-endif()
-
 if(TARGET benchmark_hard_cases)
   file(GLOB hard_case_sources CONFIGURE_DEPENDS benchmark/hard_cases/*.cpp benchmark/near_touch/*.cpp)
   foreach(name hard_cases near_touch)
@@ -76,11 +69,7 @@ target_sources(benchmark_peers PRIVATE
   benchmark/peers/scene.cpp
   benchmark/peers/signed_grid.cpp
   benchmark/peers/synthetic.cpp)
-target_sources(benchmark_kept_repulsion PRIVATE
-  benchmark/peers/kinect.cpp
-  benchmark/peers/scene.cpp)
 target_sources(benchmark_self_pasted PRIVATE benchmark/peers/kinect.cpp benchmark/peers/scene.cpp)
-target_sources(benchmark_link_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_growth PRIVATE benchmark/peers/scene.cpp benchmark/peers/synthetic.cpp)
 target_sources(benchmark_modes PRIVATE
   benchmark/peers/kinect.cpp

@@ -243,25 +243,14 @@ bool run(const Options& options) {
   while (ros::ok() && !ears.is_ok()) wait(0.1);
   settle(options.tcp ? node->pid() : getpid());
   watches.count(true);
-  auto before = thread_times(getpid());
   wait(options.seconds);
-  const auto after = thread_times(getpid());
   watches.count(false);
   wait(0.5);  // for the last answers
   if (!ros::ok()) return false;
 
   const std::string latencies = latency_table(options, &watches);
-  std::string threads;
-  for (const auto& [name, time] : after) {
-    const double share = (time - before[name]) / options.seconds;
-    std::array<char, 128> text{};
-    std::snprintf(text.data(), text.size(), "| %s | %s | %.1f %% |\n", options.name.c_str(),
-                  name.c_str(), 100.0 * share);
-    if (share >= 0.001) threads += text.data();
-  }
-  std::printf("%s\n%s", latencies.c_str(), threads.c_str());
+  std::printf("%s", latencies.c_str());
   if (options.document.empty()) return true;
-  if (!options.tcp && !replace_rows(options, "threads", threads)) return false;
   return replace_rows(options, options.tcp ? "tcp" : "nodelets", latencies) &&
          (options.run.empty() || write_table(options.document, "ros run", options.run + ".\n"));
 }

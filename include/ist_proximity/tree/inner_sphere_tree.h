@@ -32,7 +32,7 @@ struct TreeConfig {
   TreeSplit split = TreeSplit::kNeuralGas;
   /// Magnification control of neural gas, 0 to 1: a sphere is weighted by this power of its volume.
   /// 1 draws prototypes to large spheres, as in the book; 0 weights all spheres alike, which serves
-  /// distances better (doc/packing.md).
+  /// distances better.
   double magnification = 0.0;
 };
 
