@@ -1,6 +1,6 @@
-// Cost of the kinds of query, as Markdown tables: every link, the robot's minimum, one link; one
-// thread and two. The motion is sampled at 1 kHz among the test data's depth
-// images (IST_PROXIMITY_DATA, or ../shared/data), or in the synthetic scene without them.
+// Cost of the kinds of query, as Markdown tables: every link, the robot's minimum, one link. The
+// motion is sampled at 1 kHz among the test data's depth images (IST_PROXIMITY_DATA, or
+// ../shared/data), or in the synthetic scene without them.
 //
 // Usage: modes CACHE_FOLDER; scripts/benchmark calls it.
 
@@ -8,11 +8,10 @@
 #include <cstdio>
 #include <functional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "ist_proximity/proximity/proximity_batch.h"
+#include "ist_proximity/proximity/proximity_query.h"
 #include "peers/scene.h"
 #include "support.h"
 #include "support/data_dir.h"
@@ -25,9 +24,7 @@ using ist::LinkProximity;
 using ist::LinkState;
 using ist::ProximityQuery;
 using ist::QueryConfig;
-using ist::benchmark::Clock;
 using ist::benchmark::DataSet;
-using ist::benchmark::microseconds_since;
 using ist::benchmark::quantile;
 using ist::benchmark::ThreadTimer;
 using Poses = std::vector<Eigen::Isometry3d>;
@@ -142,58 +139,6 @@ void print_modes(const Bench& bench) {
         bench.time([&] { return bench.last_link(query_config(0.001)); }), coarse);
 }
 
-double batch_us(const Bench& bench, int threads) {
-  Poses X_FL;
-  for (const auto& configuration : bench.set.scenes[0].configurations) {
-    X_FL.insert(X_FL.end(), configuration.X_FL.begin(), configuration.X_FL.end());
-  }
-  ist::ProximityBatch batch(bench.model, query_config(0.001), threads);
-  std::vector<LinkProximity> results;
-  std::vector<double> us;
-  for (int i = 0; i < 7; ++i) {
-    const Clock::time_point start = Clock::now();
-    batch.run(X_FL, bench.known, {&bench.clouds[0]}, &results);
-    us.push_back(microseconds_since(start));
-  }
-  return quantile(us, 0.5);
-}
-
-// The images of two sensors, each with its own Ingest.
-double ingest_us(const Bench& bench, bool side_by_side) {
-  const ist::benchmark::Frame& frame = bench.set.scenes[0].frame;
-  ist::Ingest ingests[2] = {ist::Ingest(ist::test::whole_cloud(false)),
-                            ist::Ingest(ist::test::whole_cloud(false))};
-  CloudSnapshot snapshots[2];
-  constexpr int kImages = 20;
-  const auto work = [&](int i) {
-    for (int k = 0; k < kImages; ++k) {
-      ingests[i].run(frame.raw(), frame.X_FS, {}, 0.0, &snapshots[i]);
-    }
-  };
-  work(0);
-  work(1);
-  const Clock::time_point start = Clock::now();
-  if (side_by_side) {
-    std::thread other(work, 1);
-    work(0);
-    other.join();
-  } else {
-    work(0);
-    work(1);
-  }
-  return microseconds_since(start) / (2 * kImages);
-}
-
-void print_threads(const Bench& bench) {
-  std::printf("# threads\n| wall time of | one thread | two | one / two |\n|---|---|---|---|\n");
-  const double one = batch_us(bench, 1), two = batch_us(bench, 2);
-  std::printf("| a batch of %zu configurations, to 1 mm | %.1f ms | %.1f ms | %.2f |\n",
-              bench.set.scenes[0].configurations.size(), 1e-3 * one, 1e-3 * two, one / two);
-  const double alone = ingest_us(bench, false), beside = ingest_us(bench, true);
-  std::printf("| an image, of two sensors | %.2f ms | %.2f ms | %.2f |\n", 1e-3 * alone,
-              1e-3 * beside, alone / beside);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -203,6 +148,5 @@ int main(int argc, char** argv) {
   }
   const Bench bench(argv[1]);
   print_modes(bench);
-  print_threads(bench);
   return 0;
 }

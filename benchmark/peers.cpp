@@ -60,7 +60,7 @@ void time_ingest(Method* method, const Scene& scene, Result* result) {
 
 void check(Method* method, const Scene& scene, Result* result) {
   std::vector<Answer> answers(scene.configurations.front().X_FL.size());
-  for (std::size_t k = 0; k < scene.configurations.size(); k += method->every) {
+  for (std::size_t k = 0; k < scene.configurations.size(); ++k) {
     const Configuration& truth = scene.configurations[k];
     method->query(truth.X_FL, &answers);
     for (std::size_t i = 0; i < answers.size(); ++i) {
@@ -88,7 +88,7 @@ void check(Method* method, const Scene& scene, Result* result) {
 void time_queries(Method* method, const Scene& scene, Result* result) {
   std::vector<Answer> answers(scene.configurations.front().X_FL.size());
   ThreadTimer timer;
-  for (std::size_t k = 0; k < scene.configurations.size(); k += method->every) {
+  for (std::size_t k = 0; k < scene.configurations.size(); ++k) {
     timer.lap();
     method->query(scene.configurations[k].X_FL, &answers);
     const double us = timer.lap();
@@ -226,13 +226,10 @@ bool run(const DataSet& set, const std::vector<std::string>& words, std::FILE* c
     Result result;
     for (std::size_t s = 0; s < set.scenes.size(); ++s) {
       time_ingest(method.get(), set.scenes[s], &result);
-      if (method->kind == Kind::kFloor) continue;
       check(method.get(), set.scenes[s], &result);
       time_queries(method.get(), set.scenes[s], &result);
-      if (method->every == 1) {
-        time_motion(method.get(), set, contact[s], &result);
-        time_frames(method.get(), set, images[s], contact[s], &result);
-      }
+      time_motion(method.get(), set, contact[s], &result);
+      time_frames(method.get(), set, images[s], contact[s], &result);
     }
     if (result.failures > 0) {
       std::fprintf(stderr, "  %zu of %zu answers are WRONG\n", result.failures, result.answers);

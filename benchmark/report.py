@@ -75,9 +75,8 @@ def table(header, rows):
 
 
 def short_table(rows):
-    rest = ("FCL, mesh and octree",)  # in the CSV
-    keep = [r for r in rows if (r["kind"] not in ("ours", "floor") and not r["method"].startswith(rest))
-            or (r["kind"] == "ours" and r["max_error_mm"] == 5 and r["tolerance_mm"] < 5)]
+    keep = [r for r in rows
+            if r["kind"] != "ours" or (r["max_error_mm"] == 5 and r["tolerance_mm"] < 5)]
     keep.sort(key=lambda r: (r["kind"] != "ours", r["tolerance_mm"], worst(r) >= 0.01,
                              r["free_query_us"]))
     return table(["method", "ingest", "query, median, out of contact", "in all configurations",
@@ -187,7 +186,7 @@ class Plot(Drawing):
     FLOOR_MM = 0.01  # exact to float: drawn here
 
     def __init__(self, rows, title):
-        super().__init__([r for r in rows if r["kind"] != "floor"], title)
+        super().__init__(rows, title)
         times = [r["free_query_us"] for r in self.rows]
         self.y = (math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
         self.x = (math.log10(self.FLOOR_MM) - 0.3, 3.0)  # room for labels

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -47,19 +46,6 @@ inline double quantile(std::vector<double> values, double q) {
       std::min(values.size() - 1, static_cast<std::size_t>(q * static_cast<double>(values.size())));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(at), values.end());
   return values[at];
-}
-
-/// [us] Median time of copying bytes: the least that a message costs.
-inline double copy_us(const void* data, std::size_t bytes, int repetitions) {
-  std::vector<unsigned char> copy(bytes);
-  std::vector<double> us;
-  ThreadTimer timer;
-  for (int i = 0; i < repetitions; ++i) {
-    timer.lap();
-    std::memcpy(copy.data(), data, bytes);
-    us.push_back(timer.lap());
-  }
-  return quantile(us, 0.5);
 }
 
 }  // namespace ist::benchmark

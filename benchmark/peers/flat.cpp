@@ -6,9 +6,6 @@
 namespace ist::benchmark {
 namespace {
 
-constexpr std::size_t kBlock =
-    1024;  // points; only the block with the nearest one is searched again
-
 IST_BENCHMARK_SIMD void box_pass(const float* x, const float* y, const float* z, std::size_t n,
                                  const float* R, const float* t, const float* low,
                                  const float* high, float* out) {
@@ -25,27 +22,6 @@ IST_BENCHMARK_SIMD void box_pass(const float* x, const float* y, const float* z,
   }
 }
 
-IST_BENCHMARK_SIMD float smallest_sq(const float* x, const float* y, const float* z, std::size_t n,
-                                     float cx, float cy, float cz) {
-  constexpr std::size_t kLanes = 32;
-  float best[kLanes];
-  for (float& lane : best) lane = std::numeric_limits<float>::max();
-  std::size_t i = 0;
-  for (; i + kLanes <= n; i += kLanes) {
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const float dx = x[i + k] - cx, dy = y[i + k] - cy, dz = z[i + k] - cz;
-      const float d = dx * dx + dy * dy + dz * dz;
-      best[k] = d < best[k] ? d : best[k];
-    }
-  }
-  for (; i < n; ++i) {
-    const float dx = x[i] - cx, dy = y[i] - cy, dz = z[i] - cz;
-    const float d = dx * dx + dy * dy + dz * dz;
-    best[0] = d < best[0] ? d : best[0];
-  }
-  return *std::min_element(best, best + kLanes);
-}
-
 }  // namespace
 
 void box_distances_sq(const Points& points, const Eigen::Isometry3d& X_LF,
@@ -55,27 +31,6 @@ void box_distances_sq(const Points& points, const Eigen::Isometry3d& X_LF,
   const Eigen::Vector3f t = X_LF.translation().cast<float>();
   box_pass(points.x.data(), points.y.data(), points.z.data(), points.size(), R.data(), t.data(),
            box.min().data(), box.max().data(), distances_sq->data());
-}
-
-std::size_t nearest_of_all(const Points& points, const Eigen::Vector3f& center) {
-  float best = std::numeric_limits<float>::infinity();
-  std::size_t first = 0;
-  for (std::size_t i = 0; i < points.size(); i += kBlock) {
-    const float value =
-        smallest_sq(&points.x[i], &points.y[i], &points.z[i], std::min(kBlock, points.size() - i),
-                    center.x(), center.y(), center.z());
-    if (value < best) {
-      best = value;
-      first = i;
-    }
-  }
-  std::size_t nearest = first;
-  for (std::size_t i = first; i < std::min(first + kBlock, points.size()); ++i) {
-    if ((points.at(i) - center).squaredNorm() < (points.at(nearest) - center).squaredNorm()) {
-      nearest = i;
-    }
-  }
-  return nearest;
 }
 
 void BySpheres::query(const std::vector<Eigen::Isometry3d>& X_FL, std::vector<Answer>* answers) {

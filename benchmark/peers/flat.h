@@ -24,9 +24,6 @@ namespace ist::benchmark {
 void box_distances_sq(const Points& points, const Eigen::Isometry3d& X_LF,
                       const Eigen::AlignedBox3f& box, std::vector<float>* distances_sq);
 
-/// Index of the point nearest to `center`.
-std::size_t nearest_of_all(const Points& points, const Eigen::Vector3f& center);
-
 /// Links as spheres. The nearest obstacle of each sphere is searched within the distance of the
 /// best sphere of the link so far.
 class BySpheres : public Method {

@@ -21,7 +21,6 @@ struct Answer {
 
 /// The representation that distances are computed with.
 enum class Kind {
-  kFloor,    ///< no answer: the cost of reading memory
   kOurs,     ///< the mesh, to a tolerance, by this library
   kExact,    ///< the mesh
   kSpheres,  ///< spheres instead of the link
@@ -54,8 +53,6 @@ class Method {
   bool is_unsigned = false;
   /// [m] Allowed difference between `distance` and the distance of the witness points.
   double witness_error = kRounding;
-  /// Step through the configurations, for methods that take long.
-  std::size_t every = 1;
 
   static constexpr double kRounding = 2e-5;  ///< [m] of float coordinates, with a margin
 };

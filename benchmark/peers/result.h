@@ -21,8 +21,6 @@ struct Result {
 
 inline const char* name_of(Kind kind) {
   switch (kind) {
-    case Kind::kFloor:
-      return "floor";
     case Kind::kOurs:
       return "ours";
     case Kind::kExact:

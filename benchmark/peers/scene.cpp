@@ -17,19 +17,6 @@ RawCloud Frame::raw() const {
   return cloud;
 }
 
-Frame shuffled(const Frame& frame) {
-  std::vector<std::size_t> order(frame.width * frame.height);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
-  Frame result = frame;
-  result.width = order.size();
-  result.height = 1;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::copy_n(&frame.data[4 * order[i]], 4, &result.data[4 * i]);
-  }
-  return result;
-}
-
 Frame next_image(const Frame& frame, double noise, std::mt19937_64* rng) {
   Frame next = frame;
   std::normal_distribution<double> normal;

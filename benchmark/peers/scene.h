@@ -26,9 +26,6 @@ struct Frame {
   RawCloud raw() const;
 };
 
-/// The same points in one row, in an order that is random and always the same.
-Frame shuffled(const Frame& frame);
-
 /// [1/m] A Kinect's noise along the ray, over the depth squared (Khoshelham and Elberink 2012).
 constexpr double kKinectNoise = 1.425e-3;
 
