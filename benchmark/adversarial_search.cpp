@@ -3,13 +3,15 @@
 //
 //   adversarial_search [--seconds N] [--seed S] [--keep FILE]
 //   adversarial_search --replay GENOME
+//   adversarial_search --moved-links SCENES [--seed S]
 //
 // For each promise it prints the largest violation found, in metres beyond what is allowed, and the
 // genome that makes it. Work is counted in points measured against exact geometry and pairs of
 // nodes and leaves, of a first query over a cloud of 4096 points, relative to the median of random
 // cases.
 // --keep appends the worst of each promise to a file, as test/support/adversarial_cases.txt holds
-// them.
+// them. --moved-links asks links that move among obstacles that stay, about eleven answers a scene
+// (support/moved_links.h), and counts bounds above the truth.
 
 #include <algorithm>
 #include <array>
@@ -28,6 +30,7 @@
 #include "ist_proximity/proximity/self_query.h"
 #include "support/adversarial_case.h"
 #include "support/meshes.h"
+#include "support/moved_links.h"
 #include "support/scene.h"
 #include "support/truth_interval.h"
 
@@ -44,6 +47,7 @@ constexpr std::size_t kWorkPoints = 4096;
 struct Options {
   double seconds = 60.0;
   std::uint64_t seed = 1;
+  std::int64_t moved_links = 0;  // scenes; 0: none
   std::string keep, replay;
 };
 
@@ -269,7 +273,18 @@ int replay(const std::string& text) {
   return 0;
 }
 
+int ask_moved_links(const Options& options) {
+  const test::MovedLinksReport report = test::search_moved_links(options.seed, options.moved_links);
+  std::printf("%lld answers, %lld bounds above the truth, by %.3g m at most (scene %llu)\n",
+              static_cast<long long>(report.answers), static_cast<long long>(report.wrong_bounds),
+              report.bound_excess, static_cast<unsigned long long>(report.worst_seed));
+  std::printf("distances off by %.3g m, intervals wider than the tolerance by %.3g m at most\n",
+              report.distance_excess, report.width_excess);
+  return report.wrong_bounds == 0 ? 0 : 1;
+}
+
 int run(const Options& options) {
+  if (options.moved_links > 0) return ask_moved_links(options);
   if (!options.replay.empty()) return replay(options.replay);
   Worst worst;
   std::vector<double> first_work, unused;
@@ -296,6 +311,7 @@ int main(int argc, char** argv) {
     const std::string name = argv[i], value = argv[i + 1];
     if (name == "--seconds") options.seconds = std::atof(value.c_str());
     if (name == "--seed") options.seed = std::strtoull(value.c_str(), nullptr, 10);
+    if (name == "--moved-links") options.moved_links = std::atoll(value.c_str());
     if (name == "--keep") options.keep = value;
     if (name == "--replay") options.replay = value;
   }

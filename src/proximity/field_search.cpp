@@ -11,6 +11,7 @@
 #include <cmath>
 #include <limits>
 
+#include "internal/bvh/padded_box.h"
 #include "internal/bvh/prefetch.h"
 #include "internal/geometry/float_rounding.h"
 #include "proximity/field_bounds-inl.h"
@@ -79,7 +80,8 @@ class Search {
       root.child = in_.bvh->root();
       root.lane = FieldQueue::kNoPoint;
       root.slots = FieldFront::kAllSlots;
-      root.radius = kFarAway;
+      const PaddedBox box = bounds_of(in_.bvh->nodes()[static_cast<std::size_t>(root.child)]);
+      bounds_.PlaceBox(box.min.data(), box.max.data(), &root);
       ExpandNode(root, kMayBeInside);
       return;
     }
@@ -105,7 +107,6 @@ class Search {
     entry->lane = FieldQueue::kNoPoint;
     entry->slots = part.slots;
     bounds_.PlaceBox(part.min, part.max, entry);
-    if (part.child == in_.bvh->root()) entry->radius = kFarAway;
   }
 
   void Lower(float bound, float outside) {

@@ -28,7 +28,7 @@ class FieldFront {
     float outside;         ///< [m] as stored: every place that is nearer to one of them is outside
     std::int32_t child;    ///< the node, or the tile if negative
     std::uint32_t slots;   ///< bit k: child k of the node
-    float min[3], max[3];  ///< [m] box about all of `child`, in the index's frame; not of the root
+    float min[3], max[3];  ///< [m] box about all of `child`, in the index's frame
   };
 
   FieldFront() : parts_(kMaxParts) {}
