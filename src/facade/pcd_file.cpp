@@ -1,6 +1,8 @@
 // The PCD format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html
 
+#include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -27,6 +29,7 @@ struct Header {
   std::vector<std::string> names, sizes, types, counts;
   std::size_t width = 0, height = 0, points = 0;
   bool has_points = false;
+  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();  // VIEWPOINT: the sensor's pose
   std::string encoding;
 
   std::vector<Field> fields;
@@ -36,6 +39,23 @@ struct Header {
 
 constexpr std::size_t kMaxFields = 1000;
 constexpr std::size_t kMaxColumns = 100000;
+
+/// VIEWPOINT tx ty tz qw qx qy qz.
+std::string read_viewpoint(const std::vector<std::string>& values, Eigen::Isometry3d* X_FS) {
+  std::array<double, 7> v{};
+  bool is_known = values.size() == v.size();
+  for (std::size_t i = 0; is_known && i < v.size(); ++i) {
+    TextScanner in(values[i]);
+    is_known = in.number(&v[i]) && in.at_end();
+  }
+  const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
+  const Eigen::Vector3d p(v[0], v[1], v[2]);
+  // Writers round the quaternion to six digits or so.
+  is_known = is_known && std::abs(q.norm() - 1.0) < 1e-3 && (p.array().abs() <= kMaxLength).all();
+  if (!is_known) return "has a VIEWPOINT that is no position within 10 km and unit quaternion";
+  *X_FS = Eigen::Translation3d(p) * q.normalized();
+  return "";
+}
 
 std::string read_line(const std::vector<std::string>& words, Header* header) {
   const std::string& key = words[0];
@@ -49,6 +69,7 @@ std::string read_line(const std::vector<std::string>& words, Header* header) {
   if (key == "SIZE") header->sizes = values;
   if (key == "TYPE") header->types = values;
   if (key == "COUNT") header->counts = values;
+  if (key == "VIEWPOINT") return read_viewpoint(values, &header->X_FS);
   if (key == "WIDTH") return read_count(&header->width);
   if (key == "HEIGHT") return read_count(&header->height);
   if (key == "POINTS") {
@@ -199,17 +220,8 @@ std::string read_compressed(const Header& header, const std::array<Field, 3>& xy
   return "";
 }
 
-}  // namespace
-
-std::string parse_pcd(const std::string& bytes, PointFile* file) {
-  TextScanner in(bytes);
-  Header header;
-  std::string problem = read_header(&in, &header);
-  std::array<Field, 3> xyz;
-  if (problem.empty()) problem = find_coordinates(header.fields, &xyz);
-  if (!problem.empty()) return problem;
-  file->width = header.width;
-  file->height = header.height;
+std::string read_body(const Header& header, const std::array<Field, 3>& xyz,
+                      const std::string& bytes, TextScanner in, PointFile* file) {
   const std::size_t count = header.width * header.height;
   if (header.encoding == "ascii") return read_ascii(header, xyz, &in, file);
   if (header.encoding == "binary_compressed") {
@@ -226,6 +238,23 @@ std::string parse_pcd(const std::string& bytes, PointFile* file) {
   };
   read_binary(count, xyz, bytes.data() + in.at(), position, file);
   return "";
+}
+
+}  // namespace
+
+std::string parse_pcd(const std::string& bytes, PointFile* file) {
+  TextScanner in(bytes);
+  Header header;
+  std::string problem = read_header(&in, &header);
+  std::array<Field, 3> xyz;
+  if (problem.empty()) problem = find_coordinates(header.fields, &xyz);
+  if (!problem.empty()) return problem;
+  file->width = header.width;
+  file->height = header.height;
+  problem = read_body(header, xyz, bytes, in, file);
+  if (header.X_FS.matrix().isIdentity(0.0)) return problem;
+  for (Eigen::Vector3d& p : file->points) p = header.X_FS * p;
+  return problem;
 }
 
 }  // namespace ist

@@ -179,6 +179,14 @@ std::string parse_ply(const std::string& bytes, PointFile* file) {
       header.encoding != "binary_big_endian") {
     return "has the format '" + printable(header.encoding) + "', which is not read";
   }
+  for (const Element& element : header.elements) {
+    const bool is_surface = element.name == "face" || element.name == "tristrips";
+    if (is_surface && element.count > 0) {
+      return "has " + std::to_string(element.count) + " of the element '" + element.name +
+             "': obstacles are points, and those of a surface would be its corners only. Sample " +
+             "the surface, or state it as a mesh of a known world";
+    }
+  }
   NumberReader numbers(bytes, in, header.encoding);
   for (const Element& element : header.elements) {
     if (element.name == "vertex") return read_vertices(element, &numbers, file);

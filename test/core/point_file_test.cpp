@@ -140,6 +140,34 @@ TEST(PointFile, EveryFormatGivesThePoints) {
   }
 }
 
+std::string with_viewpoint(const std::string& viewpoint) {
+  std::string bytes = pcd("ascii");
+  const std::string none = "0 0 0 1 0 0 0";
+  return bytes.replace(bytes.find(none), none.size(), viewpoint);
+}
+
+// The camera is at (1, 2, 3), turned by 90 degrees about z.
+TEST(PointFile, PointsArePlacedByTheViewpoint) {
+  PointFile file;
+  ASSERT_EQ(parse(with_viewpoint("1 2 3 0.70710678 0 0 0.70710678"), &file), "");
+  ASSERT_EQ(file.points.size(), kPoints.size());
+  const Eigen::Vector3d p = kPoints[0].cast<double>();
+  EXPECT_LT((file.points[0] - Eigen::Vector3d(1.0 - p.y(), 2.0 + p.x(), 3.0 + p.z())).norm(), 1e-7);
+  for (const char* wrong : {"0 0 0 0 0 0 0", "nan 0 0 1 0 0 0", "0 0 0 1", "1e9 0 0 1 0 0 0",
+                            "0 0 0 2 0 0 0", "0 0 x 1 0 0 0"}) {
+    test::expect_says(parse(with_viewpoint(wrong), &file), "VIEWPOINT");
+  }
+}
+
+TEST(PointFile, ASurfaceIsNotItsCorners) {
+  for (const std::string name : {"face", "tristrips"}) {
+    std::string bytes = ply("ascii");
+    bytes.replace(bytes.find("element face 0"), 14, "element " + name + " 1");
+    PointFile file;
+    test::expect_says(parse(bytes + "3 0 1 2\n", &file), "Sample the surface");
+  }
+}
+
 // A file that is cut off anywhere is refused, or is complete; nothing is read beyond its end.
 TEST(PointFile, CutOffFilesAreRefused) {
   for (const std::string& bytes : all_formats()) {

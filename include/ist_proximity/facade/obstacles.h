@@ -70,15 +70,18 @@ class Obstacles {
 
 /// Points of a file.
 struct PointFile {
-  std::vector<Eigen::Vector3d> points;  ///< [m] in the file's frame, NaN where nothing was measured
-  std::size_t width = 0;                ///< points in a row
-  std::size_t height = 0;               ///< rows; 1: a list
+  /// [m] NaN where nothing was measured. Those of a PCD file are in the frame that its VIEWPOINT,
+  /// the sensor's pose, is stated in.
+  std::vector<Eigen::Vector3d> points;
+  std::size_t width = 0;   ///< points in a row
+  std::size_t height = 0;  ///< rows; 1: a list
 };
 
 /// Reads the points of a PCD file (ascii, binary, binary_compressed) or of a PLY file's element
 /// "vertex" (ascii, binary of either byte order); other fields are ignored. Thread safe.
 /// @throws ModelError naming the file, the place and what is wrong: not a regular file, over 1 GB,
-///         cut off, no x, y and z, more than five million points
+///         cut off, no x, y and z, a VIEWPOINT that is no pose, more than five million points, or
+///         faces, whose corners alone would leave the surface out
 PointFile read_points(const std::string& path);
 
 }  // namespace ist
