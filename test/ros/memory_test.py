@@ -149,6 +149,19 @@ class MemoryTest(unittest.TestCase):
             lambda: path in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),
             "the file's fault in the diagnostics",
         )
+        # It is not overwritten: nobody knows what it held.
+        with open(path, "rb") as file:
+            held = file.read()
+        save.wait_for_service(pt.TIMEOUT)
+        answer = save()
+        self.assertFalse(answer.success)
+        self.assertIn("not overwritten", answer.message)
+        with open(path, "rb") as file:
+            self.assertEqual(file.read(), held)
+        os.rename(path, path + ".old")
+        answer = save()
+        self.assertTrue(answer.success, answer.message)
+        self.assertTrue(save().success)
 
     def test_a_frame_that_tf_does_not_know(self):
         self.start(memory={"enabled": True, "frame_id": "nowhere"})

@@ -87,6 +87,8 @@ void SourceMemory::begin_target(const SourceTarget& target) {
   body_noted_ = 0.0;
   links_.clear();
   const std::string& file = config_.memory.file;
+  file_problem_.clear();
+  is_file_read_ = true;
   if (file.empty() || !is_there(file)) return;  // it is written later
   file_problem_ = map_.read_file(file, ros::Time::now().toSec());
   if (!file_problem_.empty()) {
@@ -188,15 +190,22 @@ void SourceMemory::report(SourceReport* report) const {
   report->memory_occupied = counts_.occupied;
 }
 
-std::string SourceMemory::save(bool* is_saved) const {
+std::string SourceMemory::save(bool* is_saved) {
   *is_saved = false;
   const std::string& file = config_.memory.file;
   if (file.empty()) {
     return "source '" + config_.name + "' has no memory/file to write to";
   }
   const std::lock_guard<std::mutex> lock(mutex_);
+  // What is in a file that was not read is in nothing else.
+  if (is_there(file) && (!is_file_read_ || !file_problem_.empty())) {
+    return "'" + file + "' is not overwritten: what it holds has not been read" +
+           (is_file_read_ ? " (" + file_problem_ + ")" : ", as no cloud has come yet") +
+           "; move it away to save what is known now";
+  }
   const std::string fault = map_.write_file(file);
   *is_saved = fault.empty();
+  if (*is_saved) file_problem_.clear();
   return fault.empty() ? "source '" + config_.name + "': " + file : fault;
 }
 

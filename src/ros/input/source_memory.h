@@ -46,9 +46,9 @@ class SourceMemory {
 
   /// Writes the state of the memory to the members of a report that are about it.
   void report(SourceReport* report) const;
-  /// Writes ~memory/file.
+  /// Writes ~memory/file, but never over a file that has not been read, or could not be.
   /// @returns a sentence
-  std::string save(bool* is_saved) const;
+  std::string save(bool* is_saved);
   /// Adds what is known now, the robot's own space included, and forgets what is too old.
   /// @returns false: nothing is known yet
   bool add_to(SeenSpace* seen, KnownSpace* known);
@@ -88,7 +88,8 @@ class SourceMemory {
   double stamp_ = 0.0;  ///< [s] of the last cloud
   MemoryCounts counts_;
   std::string problem_, file_problem_;
-  double took_ = 0.0;  ///< [s] of the last cloud
+  bool is_file_read_ = false;  ///< or there was none
+  double took_ = 0.0;          ///< [s] of the last cloud
 };
 
 /// The memories of all sources that have one.
