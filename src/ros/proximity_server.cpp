@@ -156,6 +156,7 @@ void ProximityServer::Impl::publish_failure(const std::string& fault) {
   failed.problem = "the last cycle failed: " + fault;
   fill_without_model(failed, config_, ros::Time::now(), sources_, message.get(), &report_);
   ++report_.cycles;
+  spheres_.show_nearness(*message, config_.query.max_distance);
   results_.publish(
       message, nullptr, live_.get().speed_scale, [](ist_proximity::JointRepulsion*) {},
       [] { return MarkerScene(); });

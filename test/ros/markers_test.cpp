@@ -14,6 +14,7 @@
 #include "ros/input/unseen_markers.h"
 #include "ros/output/nearest_summary.h"
 #include "ros/output/nearness_color.h"
+#include "support/scene.h"
 
 namespace ist {
 namespace {
@@ -222,6 +223,17 @@ TEST(UnseenMarkers, CubesNearTheRobot) {
   }
   EXPECT_EQ(count, 20000U);
   EXPECT_NEAR(farthest, 1.28 - 1e-5 * 10000 + 0.005, 1e-3);
+}
+
+// A link that nothing has been measured of yet looks neither near nor far.
+TEST(Spheres, AreGreyUntilSomethingIsMeasured) {
+  const auto model = test::make_model({Sphere{0.1}, Box{{0.1, 0.1, 0.1}}}, 0.01);
+  const auto spheres = sphere_markers(*model, {0, 1}, 5);
+  ASSERT_GE(spheres.markers.size(), 2U);
+  for (const auto& marker : spheres.markers) {
+    EXPECT_EQ(marker.color.r, marker.color.g) << marker.ns;
+    EXPECT_EQ(marker.color.g, marker.color.b) << marker.ns;
+  }
 }
 
 }  // namespace

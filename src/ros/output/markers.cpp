@@ -30,13 +30,6 @@ constexpr double kListFollows = 0.05;       // share of its way that the list mo
 constexpr double kListJumps = 2.0;          // [m] farther ways it takes at once
 constexpr double kArrowPerRepulsion = 0.3;  // [m] for a repulsion of length 1
 
-/// Gives neighbours different colours, by the golden ratio on the circle of hues.
-std_msgs::ColorRGBA color_of_link(std::size_t index) {
-  const double hue = std::fmod(0.61803398875 * static_cast<double>(index), 1.0) * 2.0 * M_PI;
-  const auto channel = [hue](double phase) { return 0.55 + 0.4 * std::cos(hue - phase); };
-  return make_color(channel(0.0), channel(2.0 * M_PI / 3.0), channel(4.0 * M_PI / 3.0), 0.6);
-}
-
 void scale(double x, double y, double z, Marker* marker) {
   marker->scale.x = x;
   marker->scale.y = y;
@@ -200,6 +193,8 @@ MarkerArray ProximityMarkers::draw(const ist_proximity::ProximityArray& proximit
 MarkerArray sphere_markers(const RobotModel& model, const std::vector<std::size_t>& links,
                            std::size_t max_per_link) {
   MarkerArray result;
+  std_msgs::ColorRGBA color = nearness_color(std::nan(""), 1.0);  // until something is measured
+  color.a = kSphereAlpha;
   for (const std::size_t i : links) {
     const LinkModel& link = model.links[i];
     std::vector<InnerSphere> spheres = link.packing.spheres;
@@ -218,7 +213,7 @@ MarkerArray sphere_markers(const RobotModel& model, const std::vector<std::size_
       assign(spheres[k].center, &marker.pose.position);
       marker.pose.orientation.w = 1.0;
       scale(2 * spheres[k].radius, 2 * spheres[k].radius, 2 * spheres[k].radius, &marker);
-      marker.color = color_of_link(i);
+      marker.color = color;
       result.markers.push_back(marker);
     }
   }

@@ -73,8 +73,10 @@ class ProximityMarkers {
   std::map<Key, std_msgs::Header> shown_;
 };
 
+constexpr float kSphereAlpha = 0.6F;
+
 /// Draws the largest inner spheres of some links in the links' own frames, so that rviz moves them
-/// along. Each link has a namespace of its own.
+/// along. Each link has a namespace of its own. They are grey: nothing has been measured yet.
 /// @param links         indices into the model
 /// @param max_per_link  largest number of spheres of one link
 visualization_msgs::MarkerArray sphere_markers(const RobotModel& model,

@@ -17,7 +17,6 @@ constexpr std::size_t kMaxSpheresPerLink = 250;  // each sphere is a marker
 constexpr std::chrono::seconds kFirstDelay(1), kLastDelay(4);
 constexpr std::chrono::milliseconds kShadePeriod(500);
 constexpr int kShades = 8;  // steps of the scale of nearness
-constexpr float kSphereAlpha = 0.6F;
 
 // The step of a distance on the scale of nearness; -1: not known.
 int shade_of(double distance, double max_distance) {
@@ -50,6 +49,7 @@ void SpherePublisher::draw(const ModelState& model) {
   if (!shown_.markers.empty()) publish_message(publisher_, deleted(shown_));
   shown_.markers.clear();
   shades_.clear();
+  next_shades_ = {};
   if (!model.robot) return;
   shown_ = sphere_markers(*model.robot, model.monitored, kMaxSpheresPerLink);
   publish_message(publisher_, shown_);
