@@ -96,6 +96,10 @@ Span<const NearObject> WorldQuery::near_objects(std::size_t link) const {
   return {near.data(), near.size()};
 }
 
+bool WorldQuery::is_finished(std::size_t link) const {
+  return link < impl_->searches.size() && impl_->searches[link].is_finished();
+}
+
 void WorldQuery::Impl::note_allowed(const std::vector<std::string>& names,
                                     std::uint64_t* bits) const {
   const auto& links = robot->model->links;

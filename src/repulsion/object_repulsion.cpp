@@ -24,11 +24,11 @@ RepulsiveWrench with_objects(const Eigen::Isometry3d& X_FL, const RepulsiveWrenc
   RepulsiveWrench sum;
   double total = 0.0;
   const double of_cloud = repulsion_strength(clouds, config);
-  if (of_cloud > 0.0) {
-    const double w = weight(clouds.distance, both.distance, config);
-    sum.force += w * of_clouds.force;
-    sum.torque += w * of_clouds.torque;
-    total += w * of_cloud;
+  const double w_cloud = weight(clouds.distance, both.distance, config);
+  if (of_cloud > 0.0 && w_cloud > 0.0) {  // else a blend that is late does no harm
+    sum.force += w_cloud * of_clouds.force;
+    sum.torque += w_cloud * of_clouds.torque;
+    total += w_cloud * of_cloud;
   }
   for (const NearObject& object : objects) {
     const RepulsiveWrench one = nearest_repulsion(X_FL, object.answer, config);
@@ -37,7 +37,7 @@ RepulsiveWrench with_objects(const Eigen::Isometry3d& X_FL, const RepulsiveWrenc
     sum.torque += w * one.torque;
     total += w * repulsion_strength(object.answer, config);
   }
-  if (!(total > 0.0)) return nearest_repulsion(X_FL, both, config);  // the time was over
+  if (!(total > 0.0)) return RepulsiveWrench::unknown();  // the time was over
   sum.force *= strength / total;
   sum.torque *= strength / total;
   return sum;

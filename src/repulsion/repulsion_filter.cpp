@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace ist {
 namespace {
@@ -19,30 +20,69 @@ void RepulsionFilter::decay(double seconds, double lag) {
   speed_ = rest * slope - offset_ / lag;
 }
 
+void RepulsionFilter::hold(double time, double length, const Eigen::Isometry3d& X_FL,
+                           const Vector6& wrench) {
+  const Eigen::Matrix3d R_LF = X_FL.linear().transpose();
+  held_per_length_ << R_LF * wrench.head<3>(), R_LF * wrench.tail<3>();
+  held_per_length_ /= length;  // NaN where nothing is near: there is no direction to hold
+  hold_begin_ = time;
+  is_let_go_ = false;
+}
+
+// The wrench that was blended last, turned with the link; NaN where it is let go.
+RepulsionFilter::Vector6 RepulsionFilter::held(double time, double length,
+                                               const Eigen::Isometry3d& X_FL,
+                                               const LinkProximity& proximity,
+                                               const RepulsionConfig& config) {
+  if (length == 0.0) return Vector6::Zero();
+  if (!is_let_go_ && !held_per_length_.allFinite()) {
+    const RepulsiveWrench nearest = nearest_repulsion(X_FL, proximity, config);
+    Vector6 wrench;
+    wrench << nearest.force, nearest.torque;
+    hold(time, length, X_FL, wrench);
+  }
+  Vector6 wrench = Vector6::Constant(std::numeric_limits<double>::quiet_NaN());
+  is_let_go_ = is_let_go_ || time - hold_begin_ > kHoldTime;
+  if (is_let_go_) return wrench;
+  wrench << X_FL.linear() * held_per_length_.head<3>(), X_FL.linear() * held_per_length_.tail<3>();
+  return length * wrench;
+}
+
 RepulsiveWrench RepulsionFilter::update(double time, std::uint64_t obstacles,
                                         const RepulsiveWrench& raw, const LinkProximity& proximity,
-                                        const RepulsionConfig& config) {
+                                        const RepulsionConfig& config,
+                                        const Eigen::Isometry3d& X_FL) {
+  if (!(time >= time_)) reset();
+  const double length = config.gain * repulsion_strength(proximity, config);
   Vector6 now;
   now << raw.force, raw.torque;
-  if (!now.allFinite() || !(config.filter_time > 0.0)) {
+  const bool is_late = proximity.state != LinkState::kUnknown && !now.allFinite();
+  if (is_late) now = held(time, length, X_FL, proximity, config);
+  if (!now.allFinite()) {
+    const bool is_let_go = is_let_go_ && is_late;
     reset();
-    return raw;
+    is_let_go_ = is_let_go;
+    return RepulsiveWrench::unknown();
   }
-  if (started_ && time >= time_) {
+  if (!is_late) hold(time, length, X_FL, now);
+  if (!(config.filter_time > 0.0)) {
+    offset_.setZero();
+    speed_.setZero();
+  } else if (started_) {
     // The change came at some time since the last update; it decays over all of that.
-    if (obstacles != obstacles_) offset_ += raw_ - now;
+    if (obstacles != obstacles_ || (is_late_ && !is_late)) offset_ += raw_ - now;
     decay(time - time_, 0.5 * config.filter_time);
-  } else {
-    reset();
   }
   started_ = true;
+  is_late_ = is_late;
   time_ = time;
   obstacles_ = obstacles;
   raw_ = now;
+  if (!(config.filter_time > 0.0)) return {now.head<3>(), now.tail<3>()};
   const double limit = config.gain * std::min(1.0, repulsion_strength(proximity, config) / kFade);
   Vector6 filtered = now + offset_;
-  const double length = filtered.head<3>().norm();
-  if (length > limit) filtered *= limit / length;
+  const double filtered_length = filtered.head<3>().norm();
+  if (filtered_length > limit) filtered *= limit / filtered_length;
   if (limit == 0.0) {  // the next update starts without an offset, too
     filtered.setZero();
     offset_.setZero();

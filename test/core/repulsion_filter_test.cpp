@@ -130,6 +130,69 @@ TEST(RepulsionFilter, startsAnew) {
   fresh(filter.update(4.4, 6, raw, kNear, off), raw);
 }
 
+// What is late is the last blend, turned with the link and as long as the distance says; let go in
+// time, and not known then.
+TEST(RepulsionFilter, holdsTheLastWrenchWhereOneIsLate) {
+  const RepulsiveWrench late = RepulsiveWrench::unknown();
+  for (const double filter_time : {0.0, 0.05}) {
+    RepulsionConfig config;
+    config.filter_time = filter_time;
+    RepulsionFilter filter;
+    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
+    const RepulsiveWrench first = filter.update(0.0, 1, push(0.5), kNear, config, X_FL);
+    double time = 0.0, distance = 0.1;
+    while (time + kStep < RepulsionFilter::kHoldTime) {
+      time += kStep;
+      distance += 2e-4;
+      X_FL.prerotate(Eigen::AngleAxisd(2e-3, Vector3d::UnitZ()));
+      const RepulsiveWrench held = filter.update(time, 1, late, near_by(distance), config, X_FL);
+      const double share = (1.0 - distance / 0.3) / (1.0 - 0.1 / 0.3);
+      EXPECT_LT((held.force - share * (X_FL.linear() * first.force)).norm(), 1e-12) << time;
+      EXPECT_LT((held.torque - share * (X_FL.linear() * first.torque)).norm(), 1e-12) << time;
+    }
+    // A blend that comes at last is spread as the change of a new cloud is.
+    RepulsionFilter back = filter;
+    const RepulsiveWrench held = back.update(time, 1, late, near_by(distance), config, X_FL);
+    const RepulsiveWrench next =
+        back.update(time + kStep, 1, push(-0.3), near_by(distance), config, X_FL);
+    if (filter_time > 0.0) EXPECT_LT((next.force - held.force).norm(), 0.74 * kStep / 0.05);
+    if (filter_time == 0.0) EXPECT_EQ(next.force, push(-0.3).force);
+    EXPECT_TRUE(
+        filter.update(time + 2 * kStep, 1, late, kNear, config, X_FL).force.array().isNaN().all());
+    EXPECT_TRUE(filter.update(time + 3 * kStep, 1, late, kNear, config).force.hasNaN()) << "once";
+    EXPECT_EQ(filter.update(time + 4 * kStep, 1, push(0.2), kNear, config).force, push(0.2).force);
+  }
+}
+
+TEST(RepulsionFilter, holdsTheNearestPointWhereNothingWasBlended) {
+  const RepulsiveWrench late = RepulsiveWrench::unknown();
+  RepulsionFilter filter;
+  // Before the first blend, and where the last one was zero, the nearest point's is held.
+  LinkProximity first = near_by(0.29), other = near_by(0.29);
+  first.direction = Vector3d::UnitX();
+  other.direction = Vector3d::UnitY();
+  first.p_FCl = other.p_FCl = Vector3d::Zero();
+  const RepulsionConfig config;
+  const Vector3d expected = (1.0 - 0.29 / 0.3) * Vector3d::UnitX();
+  EXPECT_LT((filter.update(0.0, 1, late, first, config).force - expected).norm(), 1e-12);
+  EXPECT_LT((filter.update(0.01, 1, late, other, config).force - expected).norm(), 1e-12);
+  for (const double time : {0.3, 0.31, 0.9}) {
+    EXPECT_TRUE(filter.update(time, 1, late, other, config).force.hasNaN()) << time;
+  }
+  filter.update(1.0, 1, {}, near_by(0.4), config);
+  EXPECT_LT((filter.update(1.01, 1, late, first, config).force - expected).norm(), 1e-12);
+  EXPECT_LT((filter.update(1.02, 1, late, other, config).force - expected).norm(), 1e-12);
+  filter.reset();
+  // From the influence distance on the length is 0, late or not.
+  filter.update(0.2, 1, push(0.5), kNear, {});
+  EXPECT_TRUE(filter.update(0.201, 1, late, near_by(0.3), {}).force.isZero(0.0));
+  EXPECT_TRUE(filter.update(9.0, 1, late, near_by(0.3), {}).force.isZero(0.0));
+  // A link that is UNKNOWN in between forgets.
+  filter.update(9.1, 1, push(0.5), kNear, {});
+  filter.update(9.11, 1, late, LinkProximity(), {});
+  EXPECT_LT((filter.update(9.12, 1, late, first, {}).force - expected).norm(), 1e-12);
+}
+
 TEST(RepulsionFilter, recognizesNewClouds) {
   const CloudSnapshot a = test::make_snapshot({{0, 0, 0}}), b = test::make_snapshot({{0, 0, 0}});
   CloudSnapshot map;

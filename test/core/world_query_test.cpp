@@ -538,6 +538,16 @@ TEST(WorldQuery, RepulsionOfObjectsIsContinuous) {
   const Eigen::Vector3d push =
       with_objects(at(0.0, 0.0, 0.0), of_cloud, cloud, query.near_objects(0), cloud, config).force;
   EXPECT_NEAR((push - of_cloud.force).norm(), 0.0, 1e-12);
+  // A cloud's blend that is late is not known, and neither is what it counts in; far away it does
+  // not. Nor is the push of objects that were not measured in time.
+  const RepulsiveWrench late = RepulsiveWrench::unknown();
+  const Eigen::Isometry3d origin = at(0.0, 0.0, 0.0);
+  EXPECT_TRUE(
+      with_objects(origin, late, cloud, query.near_objects(0), cloud, config).force.hasNaN());
+  LinkProximity far = cloud;
+  far.distance = r.distance + config.smoothing;
+  EXPECT_TRUE(with_objects(origin, late, far, query.near_objects(0), r, config).force.allFinite());
+  EXPECT_TRUE(with_objects(origin, {}, no_cloud, {}, r, config).force.hasNaN());
 }
 
 TEST(WorldQuery, AllocatesNothingWhileTheWorldIsTheSame) {

@@ -4,11 +4,13 @@
 #include <ist_proximity/ProximityArray.h>
 #include <ros/time.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "internal/proximity/deadline.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/contact/contact_model.h"
 #include "ist_proximity/robot/link_poses.h"
@@ -230,6 +232,53 @@ TEST_F(Cycle, EndsAtItsDeadline) {
   EXPECT_EQ(message->status, ProximityArray::OK);
   EXPECT_GT(report_.worst_deadline.unblended, 0U);
   EXPECT_GT(report_.deadlines_missed, 50U);
+}
+
+// Wherever in the cycle the deadline passes, repulsion does not turn: what is late keeps the last
+// blend. Once that is older than RepulsionFilter::kHoldTime it is not known.
+TEST_F(Cycle, LateRepulsionDoesNotTurn) {
+  see_wall(0.1F);
+  live_.query.deadline = 1e4;  // so that the count alone decides
+  boost::shared_ptr<ProximityArray> message;
+  step(&message);
+  ASSERT_EQ(message->status, ProximityArray::OK) << message->status_text;
+  std::vector<Eigen::Vector3d> last(message->links.size(), Eigen::Vector3d::Zero());
+  std::size_t late = 0, compared = 0;
+  double largest = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    Deadline::asks_left_for_test = i % 3 == 0 ? -1 : 37 * i % 200;
+    step(&message);
+    late += report_.worst_deadline.unblended > 0 ? 1 : 0;
+    report_.worst_deadline = DeadlineCost();
+    for (std::size_t k = 0; k < last.size(); ++k) {
+      const auto& link = message->links[k];
+      const Eigen::Vector3d push(link.repulsion.x, link.repulsion.y, link.repulsion.z);
+      if (push.norm() > 1e-3 && last[k].norm() > 1e-3) {
+        ++compared;
+        largest = std::max(largest, std::acos(std::min(1.0, push.normalized().dot(last[k]))));
+      }
+      last[k] = push.norm() > 1e-3 ? push.normalized() : Eigen::Vector3d::Zero();
+    }
+  }
+  EXPECT_GT(late, 50U);
+  EXPECT_GT(compared, 300U);
+  EXPECT_LT(largest, 0.01) << "1e-4 rad of each joint in a step";
+
+  int known = 0;
+  for (int i = 0; i < 300; ++i) {
+    Deadline::asks_left_for_test = -1;
+    live_.query.deadline = 1e-9;
+    step(&message);
+    EXPECT_EQ(message->status, ProximityArray::DEGRADED);
+    const bool any =
+        std::any_of(message->links.begin(), message->links.end(), [](const auto& link) {
+          return link.state != link.UNKNOWN && link.repulsion.x != 0.0 &&
+                 link.repulsion.x == link.repulsion.x;
+        });
+    known += any ? 1 : 0;
+    if (any) EXPECT_LE(i, 1e3 * RepulsionFilter::kHoldTime);
+  }
+  EXPECT_GT(known, 100);
 }
 
 }  // namespace

@@ -88,6 +88,8 @@ class WorldQuery {
   /// The objects that were measured for a link in the last run(): at least those nearer than the
   /// influence distance, up to 24, unless the time was over. Valid until the next run().
   Span<const NearObject> near_objects(std::size_t link) const;
+  /// Whether the last run() came to an end for a link; else near_objects() may lack some.
+  bool is_finished(std::size_t link) const;
 
   const std::shared_ptr<const RobotSurfaces>& robot() const;  ///< the one given at construction
   const WorldQueryStatistics& statistics() const;             ///< of the last run()

@@ -21,7 +21,8 @@ namespace ist {
 /// @param clouds     the answer that it belongs to; CLEAR without clouds
 /// @param objects    WorldQuery::near_objects() with the same influence distance
 /// @param both       the nearer of clouds and objects
-/// @returns zero when CLEAR, NaN when UNKNOWN. Allocates nothing
+/// @returns zero when CLEAR; NaN when UNKNOWN, where `of_clouds` counts and is NaN, and where the
+///          objects are missing that `both` has measured. Allocates nothing
 RepulsiveWrench with_objects(const Eigen::Isometry3d& X_FL, const RepulsiveWrench& of_clouds,
                              const LinkProximity& clouds, Span<const NearObject> objects,
                              const LinkProximity& both, const RepulsionConfig& config);

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 
 #include "ist_proximity/cloud/cloud_snapshot.h"
@@ -116,16 +117,28 @@ double repulsion_strength(const LinkProximity& proximity, const RepulsionConfig&
 /// The filter applies to repulsion alone: distances and bounds are never delayed. An obstacle that
 /// appears next to a link is in `distance` at once, and in the repulsion gradually. An obstacle
 /// that moves out of the influence distance stops repelling at once: over the last tenth of that
-/// distance the length fades, whatever the filter holds. One thread.
+/// distance the length fades, whatever the filter holds.
+///
+/// A wrench that is late (a deadline passed before the blend) is the last one that was not, turned
+/// with the link and as long as the distance of now says; where there is none, or it was zero, that
+/// of the nearest point is held instead. Obstacles may have moved meanwhile, so it is let go after
+/// kHoldTime, and not known (NaN) until a blend is in time. One thread.
 class RepulsionFilter {
  public:
+  /// [s] A late wrench is held for so long at most; about what an arm at 1 m/s needs to come from
+  /// the default influence distance to an obstacle.
+  static constexpr double kHoldTime = 0.2;
+
   /// @param time       [s] of the poses; an earlier one than before starts anew
   /// @param obstacles  another number whenever the obstacles are others: see obstacles_key
-  /// @param raw        the wrench without a filter; NaN starts anew
+  /// @param raw        the wrench without a filter; NaN is late where the link is not UNKNOWN, else
+  ///                   it starts anew
   /// @param proximity  the link's answer that `raw` belongs to
   /// @param config     filter_time, gain and influence_distance are read
+  /// @param X_FL       link frame -> fixed frame
   RepulsiveWrench update(double time, std::uint64_t obstacles, const RepulsiveWrench& raw,
-                         const LinkProximity& proximity, const RepulsionConfig& config);
+                         const LinkProximity& proximity, const RepulsionConfig& config,
+                         const Eigen::Isometry3d& X_FL = Eigen::Isometry3d::Identity());
 
   /// The change at the next update() is spread like that of a new cloud, because the link's spheres
   /// are others.
@@ -138,8 +151,16 @@ class RepulsionFilter {
   using Vector6 = Eigen::Matrix<double, 6, 1>;
 
   void decay(double seconds, double lag);
+  Vector6 held(double time, double length, const Eigen::Isometry3d& X_FL,
+               const LinkProximity& proximity, const RepulsionConfig& config);
+  void hold(double time, double length, const Eigen::Isometry3d& X_FL, const Vector6& wrench);
 
   bool started_ = false;
+  bool is_late_ = false;      ///< the last update was
+  bool is_let_go_ = false;    ///< what was held is too old
+  double hold_begin_ = 0.0;   ///< [s] of the last update that was not late
+  Vector6 held_per_length_ =  ///< the wrench of that update, in the link's frame; NaN: none
+      Vector6::Constant(std::numeric_limits<double>::quiet_NaN());
   double time_ = 0.0;  ///< [s]
   std::uint64_t obstacles_ = 0;
   Vector6 raw_ = Vector6::Zero();     ///< at the last update

@@ -201,37 +201,28 @@ void ProximityCycle::find_urgent_links() {
 void ProximityCycle::compute_pushes(const LiveConfig& config, TimePoint end) {
   const std::uint64_t obstacles = obstacles_key(selection_.clouds()) ^ worlds_.key();
   for (const std::size_t i : urgent_) {
+    const Eigen::Isometry3d& X_FL = poses_.X_FL[i];
     std::uint64_t key = obstacles;
     RepulsiveWrench raw;
     if (!worlds_.any()) {
-      raw = push_of_clouds(i, results_[i], config, end, &key);
+      raw = queries_->repel(i, X_FL, selection_.clouds(), results_[i], config.repulsion, end);
     } else {
       LinkProximity clouds;
       clouds.state = LinkState::kClear;
       if (!selection_.clouds().empty()) {
         clouds = cloud_results_[i];
-        raw = push_of_clouds(i, clouds, config, end, &key);
+        raw = queries_->repel(i, X_FL, selection_.clouds(), clouds, config.repulsion, end);
       }
-      raw = with_objects(poses_.X_FL[i], raw, clouds, worlds_.near_objects(i), results_[i],
-                         config.repulsion);
+      raw = with_objects(X_FL, raw, clouds, worlds_.near_objects(i), results_[i], config.repulsion);
+      // Objects that were not measured in time come and go: the filter spreads the change.
+      if (!worlds_.is_finished(i)) key ^= ++partial_;
     }
-    pushes_[i] = filters_[i].update(poses_.stamp.toSec(), key, raw, results_[i], config.repulsion);
+    if (results_[i].state != LinkState::kUnknown && !raw.force.allFinite()) {
+      ++status_input_.deadline.unblended;  // the filter holds the last one
+    }
+    pushes_[i] =
+        filters_[i].update(poses_.stamp.toSec(), key, raw, results_[i], config.repulsion, X_FL);
   }
-}
-
-/// @param key  of the obstacles; changed where the blend is late
-RepulsiveWrench ProximityCycle::push_of_clouds(std::size_t link, const LinkProximity& result,
-                                               const LiveConfig& config, TimePoint end,
-                                               std::uint64_t* key) {
-  const Eigen::Isometry3d& X_FL = poses_.X_FL[link];
-  RepulsiveWrench raw =
-      queries_->repel(link, X_FL, selection_.clouds(), result, config.repulsion, end);
-  if (result.state != LinkState::kUnknown && !raw.force.allFinite()) {
-    raw = nearest_repulsion(X_FL, result, config.repulsion);
-    *key = ~*key;  // the filter spreads the change as if the obstacles were others
-    ++status_input_.deadline.unblended;
-  }
-  return raw;
 }
 
 void ProximityCycle::compute_wrenches(const LiveConfig& config, TimePoint end) {

@@ -48,8 +48,8 @@ class ProximityCycle {
   ///                 before costs no allocation
   /// @param config   query.deadline is in seconds here, from known poses on: distances take
   ///                 kQueryShare of it at most, repulsion ends at kRepulsionShare, and contact
-  ///                 volumes at the deadline. Repulsion that is late is that of the link's nearest
-  ///                 point, volumes that are late are NaN, and the status says so
+  ///                 volumes at the deadline. Repulsion that is late is held (see
+  ///                 RepulsionFilter), volumes that are late are NaN, and the status says so
   /// @param transform_problem  what tf's listener has to say; empty: nothing
   void run(const ros::Time& now, const CloudSources& sources, const LiveConfig& config,
            const std::string& transform_problem, ist_proximity::ProximityArray* message);
@@ -111,8 +111,6 @@ class ProximityCycle {
   void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();
   void compute_pushes(const LiveConfig& config, TimePoint end);
-  RepulsiveWrench push_of_clouds(std::size_t link, const LinkProximity& result,
-                                 const LiveConfig& config, TimePoint end, std::uint64_t* key);
   void compute_wrenches(const LiveConfig& config, TimePoint end);
   Wrench penetration(std::size_t link, const LiveConfig& config, TimePoint end);
   void add_self_repulsion(const ist_proximity::ProximityArray* self);
@@ -132,6 +130,7 @@ class ProximityCycle {
   SceneWarmUp* warm_up_ = nullptr;    ///< null: no other thread helps
   bool has_spare_ = false;            ///< whether there are spare queries
   std::uint64_t last_obstacles_ = 0;  ///< key of the clouds of the last cycle
+  std::uint64_t partial_ = 0;         ///< counts answers of objects that were not all measured
   AskedScene asked_;
   std::unique_ptr<UnknownSpaceQuery> unknown_space_;  ///< null: unknown space is free
   const bool unknown_is_obstacle_;

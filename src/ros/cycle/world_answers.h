@@ -50,6 +50,8 @@ class WorldAnswers {
   Span<const NearObject> near_objects(std::size_t link) const {
     return any_ ? query_->near_objects(link) : Span<const NearObject>();
   }
+  /// See WorldQuery::is_finished().
+  bool is_finished(std::size_t link) const { return !any_ || query_->is_finished(link); }
   void set_influence_distance(double distance) { influence_distance_ = distance; }
   /// Another one whenever the objects are others, but not when they move with their frames; 0
   /// without a world.

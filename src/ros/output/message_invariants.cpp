@@ -150,7 +150,8 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
   }
   check_interval(link, &check);
   if (link.state != LinkMessage::UNKNOWN) {
-    check.that(v.repulsion.allFinite(), "repulsion has to be finite", v.repulsion.transpose());
+    check.that(v.repulsion.allFinite() || all_nan(v.repulsion), "repulsion has to be known or not",
+               v.repulsion.transpose());
   }
   return check.broken();
 }
@@ -162,8 +163,8 @@ std::string broken_invariant(const ProximityArray& message, const InvariantInput
   check.that((message.status == ProximityArray::OK) == message.status_text.empty(),
              "status_text has to be empty where the status is OK, and only there",
              "'" + message.status_text + "'");
-  check.that(message.status <= ProximityArray::MODEL_ERROR,
-             "the status has to be one of the constants", int{message.status});
+  check.that(message.status <= ProximityArray::LOADING, "the status has to be one of the constants",
+             int{message.status});
   check.that(message.header.stamp.toSec() <= input.now.toSec() + kClockResolution + kRounding,
              "header.stamp must not be in the future", message.header.stamp);
   check.that(message.computation_time >= 0.0, "computation_time must not be negative",
