@@ -95,7 +95,7 @@ class AttachedTest(unittest.TestCase):
         self.assertTrue(node.reload().success)
         # Loading from the cache may take less than a cycle; then no message tells of it.
         node.wait_for(
-            lambda m: m.status == ProximityArray.MODEL_ERROR or len(node.messages) > begin + 200,
+            lambda m: m.status == ProximityArray.LOADING or len(node.messages) > begin + 200,
             "the model loaded again",
             start=begin,
         )

@@ -307,8 +307,8 @@ class BadModelTest(unittest.TestCase):
             f.write(b" " * 80 + np.uint32(count).tobytes() + facets.tobytes())
         node = self.start(pt.urdf(box='<mesh filename="file://%s"/>' % path))
         words = "reading mesh 'file://%s' of link 'box_link'" % path
-        node.wait_for_status(ProximityArray.MODEL_ERROR, words, start=0)
-        node.wait_for_status(ProximityArray.MODEL_ERROR, "packing link 'box_link'", start=0, timeout=60)
+        node.wait_for_status(ProximityArray.LOADING, words, start=0)
+        node.wait_for_status(ProximityArray.LOADING, "packing link 'box_link'", start=0, timeout=60)
         time.sleep(0.5)
         begin = time.time()
         self.assertEqual(node.stop(), 0)

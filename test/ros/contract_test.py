@@ -36,7 +36,7 @@ FIELDS = {
 }
 CONSTANTS = {
     LinkProximity: ["UNKNOWN", "CLEAR", "NEAR", "CONTACT"],
-    ProximityArray: ["OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR"],
+    ProximityArray: ["OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR", "LOADING"],
     SpeedScaleState: ["UNKNOWN", "STOP", "SLOW", "FREE", "SEPARATION"],
 }
 # Topics below the node's name: type, and whether it is latched.

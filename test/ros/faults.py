@@ -29,7 +29,7 @@ from proximity_testing import LinkProximity, ProximityArray
 
 STATUS = {
     getattr(ProximityArray, name): name
-    for name in ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR")
+    for name in ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR", "LOADING")
 }
 
 CLOUD_TIMEOUT = POSE_TIMEOUT = 0.5  # [s] the node's defaults

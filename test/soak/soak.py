@@ -39,7 +39,7 @@ from ist_proximity.msg import LinkProximity, ProximityArray  # noqa: E402
 
 NAMESPACE = "/soak"
 NODE = NAMESPACE + "/proximity"
-STATUSES = ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR")
+STATUSES = ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR", "LOADING")
 # [s] A joint that comes at 1 kHz may be older than header.stamp by about twice its spacing.
 JOINT_LAG = 0.003
 LAG_STEP = 1e-4  # [m] between the lags that are tried

@@ -14,7 +14,7 @@ STRIPS = (
     ("p99 of computation_time", "ms", 1e3, ("computation_p99_s",)),
     ("p99 of latency, status OK", "ms", 1e3, ("latency_p99_s",)),
     ("messages a second by status", "", 1,
-     ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR")),
+     ("OK", "NO_CLOUD", "STALE_CLOUD", "NO_POSE", "DEGRADED", "MODEL_ERROR", "LOADING")),
 )
 
 

@@ -22,6 +22,7 @@ void fill_without_model(const ModelState& model, const ServerConfig& config, con
                         const CloudSources& sources, ProximityArray* message, CycleReport* report) {
   StatusInput input;
   input.model_problem = model.problem;
+  input.is_loading = model.is_loading();
   input.clock_runs = !now.isZero();
   for (const auto& source : sources) {
     input.sources.emplace_back();

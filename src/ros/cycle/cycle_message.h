@@ -16,7 +16,8 @@ namespace ist {
 void fill_status(const StatusInput& input, const Status& status,
                  ist_proximity::ProximityArray* message);
 
-/// Fills the whole message while there is no model: MODEL_ERROR, and every link UNKNOWN.
+/// Fills the whole message while there is no model: MODEL_ERROR or LOADING, and every
+/// link UNKNOWN.
 void fill_without_model(const ModelState& model, const ServerConfig& config, const ros::Time& now,
                         const CloudSources& sources, ist_proximity::ProximityArray* message,
                         CycleReport* report);

@@ -78,7 +78,7 @@ std::string ModelLoader::reload(bool* found) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     auto state = std::make_shared<ModelState>(*state_);
-    state->phase = ModelState::Phase::kWaiting;
+    state->phase = *found ? ModelState::Phase::kReading : ModelState::Phase::kWaiting;
     state->problem = "the robot's model is being loaded again";
     state->fraction = 0.0;
     state->robot = nullptr;

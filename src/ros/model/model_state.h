@@ -45,6 +45,9 @@ struct ModelState {
   std::string kinematics_problem;  ///< why `kinematics` is null
   std::shared_ptr<const RobotDescription> description;  ///< the parsed URDF; known from kPacking on
   std::vector<AttachedObject> objects;                  ///< known when ready: parts of `robot`
+
+  /// Whether the model is being made: nothing is wrong, and nobody has to do anything but wait.
+  bool is_loading() const { return phase == Phase::kReading || phase == Phase::kPacking; }
 };
 
 /// Whether the second state is ready and differs from the first one in its packings alone.

@@ -106,13 +106,13 @@ void assign_source(const SourceReport& source, const Status& status, const ros::
   message->points_on_robot = counts.on_robot;
 }
 
-bool lacks_clouds(const ProximityArray& message) {
+bool is_incomplete(const ProximityArray& message) {
   return message.status == ProximityArray::NO_CLOUD ||
-         message.status == ProximityArray::STALE_CLOUD;
+         message.status == ProximityArray::STALE_CLOUD || message.status == ProximityArray::LOADING;
 }
 
 double min_distance(const ProximityArray& message, const std::vector<bool>& counts) {
-  if (lacks_clouds(message)) return kNaN;
+  if (is_incomplete(message)) return kNaN;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double smallest = kInfinity;
   for (std::size_t i = 0; i < message.links.size(); ++i) {

@@ -46,11 +46,12 @@ void assign_unknown_space(const SeenShare& seen, double lower_bound,
 void assign_source(const SourceReport& source, const Status& status, const ros::Time& stamp,
                    ist_proximity::SourceStatus* message);
 
-/// Whether a message says that a source which is required cannot be used, so that nothing is known.
-bool lacks_clouds(const ist_proximity::ProximityArray& message);
+/// Whether a message says that a source which is required cannot be used, so that nothing is known,
+/// or that the robot's model is not complete yet.
+bool is_incomplete(const ist_proximity::ProximityArray& message);
 
 /// Gives the smallest lower bound [m] of the links that count; NaN when one of them is UNKNOWN,
-/// when none counts, or when a required source is missing or stale. All CLEAR gives ~max_distance.
+/// when none counts, and where is_incomplete(). All CLEAR gives ~max_distance.
 /// @param counts  by link of the message; another length: every link counts
 double min_distance(const ist_proximity::ProximityArray& message, const std::vector<bool>& counts);
 

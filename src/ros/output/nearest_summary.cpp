@@ -24,6 +24,8 @@ const char* name_of(std::uint8_t status) {
       return "DEGRADED";
     case ProximityArray::MODEL_ERROR:
       return "MODEL_ERROR";
+    case ProximityArray::LOADING:
+      return "LOADING";
     default:
       return "OK";
   }

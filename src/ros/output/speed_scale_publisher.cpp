@@ -93,7 +93,7 @@ void SpeedScalePublisher::set_links(const CountedLinks& links) {
 }
 
 bool SpeedScalePublisher::is_usable(const ProximityArray& result) const {
-  return are_links_of(result, links_) && !lacks_clouds(result);
+  return are_links_of(result, links_) && !is_incomplete(result);
 }
 
 bool SpeedScalePublisher::is_fresh(const ProximityArray* self, const ros::Time& now) const {

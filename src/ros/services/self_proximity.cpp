@@ -207,6 +207,7 @@ void SelfProximity::publish_once() {
   input.clock_runs = !now.isZero();
   input.model_problem =
       model_->problem.empty() && !model_->kinematics ? no_kinematics(*model_) : model_->problem;
+  input.is_loading = model_->is_loading();
   message->header.frame_id = fixed_frame_of(*model_, config_);
   message->header.stamp = std::max(now, last_stamp_);
   if (query_) {

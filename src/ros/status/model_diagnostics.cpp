@@ -122,9 +122,8 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   DiagnosticStatus status = make_diagnostic(node, "model");
   const bool ready = state.phase == ModelState::Phase::kReady;
   if (!state.problem.empty()) {
-    const bool under_way =
-        state.phase == ModelState::Phase::kReading || state.phase == ModelState::Phase::kPacking;
-    raise(under_way ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem, &status);
+    raise(state.is_loading() ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem,
+          &status);
   }
   add_value("ready", ready ? "100 %" : format_text("%.0f %%", 100 * state.fraction), &status);
   add_value("links monitored", state.links.size(), &status);

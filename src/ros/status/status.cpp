@@ -105,8 +105,9 @@ void add_deadline(const DeadlineCost& cost, Sentences* sentences) {
                                                  "; raise either, or ~packing/max_error");
   }
   if (cost.unblended > 0) {
-    sentences->add(ProximityArray::DEGRADED, passed + "the repulsion of " + links(cost.unblended) +
-                                                 " was blended: it is that of the nearest point");
+    sentences->add(ProximityArray::DEGRADED,
+                   passed + "the repulsion of " + links(cost.unblended) +
+                       " was blended: the last one turns with its link for 0.2 s, then it is NaN");
   }
   if (cost.no_penetration > 0) {
     sentences->add(
@@ -150,8 +151,11 @@ bool StatusInput::is_fine() const {
 Status overall_status(const StatusInput& input, double now) {
   if (input.is_fine()) return {ProximityArray::OK, ""};
   Sentences sentences;
-  if (!input.model_problem.empty()) sentences.add(ProximityArray::MODEL_ERROR, input.model_problem);
+  if (!input.model_problem.empty() && !input.is_loading) {
+    sentences.add(ProximityArray::MODEL_ERROR, input.model_problem);
+  }
   sentences.add(ProximityArray::MODEL_ERROR, input.link_errors);
+  if (input.is_loading) sentences.add(ProximityArray::LOADING, input.model_problem);
   add_silent_sources(input, now, &sentences);
   sentences.add(ProximityArray::NO_POSE, input.pose_problems);
   add_unusable_sources(input, now, &sentences);

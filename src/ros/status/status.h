@@ -24,9 +24,9 @@ Status source_status(const SourceReport& source, double now);
 
 /// The cost of a deadline in one cycle, or in the worst of several.
 struct DeadlineCost {
-  std::size_t unfinished = 0;      ///< links whose bounds are wider than the tolerance, or UNKNOWN
-  double widest = 0.0;             ///< [m] of these bounds, where they are known
-  std::size_t unblended = 0;       ///< links whose repulsion is that of their nearest point alone
+  std::size_t unfinished = 0;  ///< links whose bounds are wider than the tolerance, or UNKNOWN
+  double widest = 0.0;         ///< [m] of these bounds, where they are known
+  std::size_t unblended = 0;   ///< links whose repulsion is the last one that was blended, or NaN
   std::size_t no_penetration = 0;  ///< links whose penetration is NaN
   double least_known = 1.0;        ///< share of the obstacles near such a link that was summed
 
@@ -37,7 +37,8 @@ struct DeadlineCost {
 
 /// Everything that decides the status of a ProximityArray.
 struct StatusInput {
-  std::string model_problem;             ///< not empty: there is no model (yet)
+  std::string model_problem;             ///< not empty: there is no model, or not all of it (yet)
+  bool is_loading = false;               ///< `model_problem` says how far the model is
   std::vector<std::string> link_errors;  ///< monitored links without usable geometry
   std::vector<SourceReport> sources;
   std::vector<Status> source_statuses;     ///< by source
@@ -56,10 +57,10 @@ struct StatusInput {
 /// partial view must not be shown as clear.
 bool clouds_usable(const StatusInput& input);
 
-/// Decides the status of a ProximityArray. The first that applies: a model or link error; a
-/// required source without any message; a stale required source; a missing pose; a required source
-/// whose messages cannot be used; a passed deadline and other doubts; OK. The text begins with the
-/// deciding sentence and continues with the others.
+/// Decides the status of a ProximityArray. The first that applies: a model or link error;
+/// a model that is being made; a required source without any message; a stale required source; a
+/// missing pose; a required source whose messages cannot be used; a passed deadline and other
+/// doubts; OK. The text begins with the deciding sentence and continues with the others.
 /// @param now  [s] ROS clock
 Status overall_status(const StatusInput& input, double now);
 
