@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "internal/bvh/build_id.h"
+#include "internal/geometry/cancelled.h"
 #include "internal/geometry/limits.h"
 #include "internal/robot/anytime_model.h"
 #include "ist_proximity/geometry/error.h"
@@ -117,7 +118,7 @@ bool build_missing(std::vector<Taken>* taken, const std::function<bool()>& cance
       continue;
     }
     one.shape.geometry = std::make_shared<const LinkGeometry>(*geometries[i]);
-    one.shape.shape = std::make_shared<const WorldShape>(std::move(link));
+    one.shape.shape = std::make_shared<const WorldShape>(std::move(link), cancelled);
     one.is_new = true;
   }
   return true;
@@ -179,7 +180,11 @@ std::vector<WorldFault> WorldBuilder::add(const std::vector<WorldObject>& object
       faults.push_back({object.name, sentence(object.name, fault)});
     }
   }
-  if (!build_missing(&taken, cancelled)) return faults;
+  try {
+    if (!build_missing(&taken, cancelled)) return faults;
+  } catch (const Cancelled&) {
+    return faults;
+  }
   for (const Taken& one : taken) {
     if (one.shape.shape) {
       insert(*one.object, one.shape.geometry, one.shape.shape);

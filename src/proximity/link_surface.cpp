@@ -72,11 +72,14 @@ double depth_limit_of(const LinkModel& link, const SurfaceBvh& surface) {
   return 0.5 * surface.bounds().sizes().minCoeff();
 }
 
-double opening_margin_of(const SurfaceBvh& surface, const SurfaceBvh& cells) {
+double opening_margin_of(const SurfaceBvh& surface, const SurfaceBvh& cells,
+                         const CancelRequest& cancelled) {
+  CancelWatch watch(cancelled);
   if (cells.empty()) return 0.0;
   if (surface.hull().empty()) return std::numeric_limits<double>::infinity();
   double margin = 0.0;
   for (const ConvexPart& cell : cells.parts()) {
+    watch.step();
     margin = std::max(margin, surface.hull().distance_at_most(cell.a) + cell.radius);
   }
   return margin;
@@ -99,7 +102,7 @@ LinkSurface::LinkSurface(const LinkModel& link, const CancelRequest& cancelled)
       surface(link.solid, cancelled),
       openings(link.solid, cancelled),
       opening_cells(openings.cells(), cancelled),
-      opening_margin(opening_margin_of(surface, opening_cells)),
+      opening_margin(opening_margin_of(surface, opening_cells, cancelled)),
       component_points(points_of_components(surface, cancelled)),
       displacement(box_of(link, surface, opening_cells)),
       depth_limit(depth_limit_of(link, surface)) {}

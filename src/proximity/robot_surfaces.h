@@ -11,7 +11,7 @@ namespace ist {
 
 struct RobotSurfaces {
   std::shared_ptr<const RobotModel> model;
-  std::vector<std::unique_ptr<const LinkSurface>> surfaces;  ///< by link; null: not usable
+  std::vector<std::shared_ptr<const LinkSurface>> surfaces;  ///< by link; null: not usable
   std::vector<Eigen::AlignedBox3d> boxes;                    ///< by link: see whole_box()
 };
 

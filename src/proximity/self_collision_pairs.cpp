@@ -6,6 +6,9 @@
 #include <cmath>
 #include <optional>
 #include <random>
+#include <set>
+#include <string_view>
+#include <utility>
 
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/link_poses.h"
@@ -34,11 +37,20 @@ struct Neighbours {
   std::vector<std::size_t> ancestor;  ///< the nearest with geometry; the root where there is none
 };
 
-bool names(const NamePairs& pairs, const std::string& a, const std::string& b) {
-  return std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) {
-    return (pair.first == a && pair.second == b) || (pair.first == b && pair.second == a);
-  });
-}
+// Pairs of names in any order. An SRDF may hold hundreds of thousands.
+class NamePairSet {
+ public:
+  explicit NamePairSet(const NamePairs& pairs) {
+    for (const auto& pair : pairs) pairs_.insert(std::minmax(pair.first, pair.second));
+  }
+  bool holds(const std::string& a, const std::string& b) const {
+    return pairs_.count(std::minmax(a, b)) > 0;
+  }
+
+ private:
+  std::set<std::pair<std::string_view, std::string_view>>
+      pairs_;  // of the names that it is made of
+};
 
 // A planar or floating joint has no rest position, so the bodies below it are a group of their own.
 // Places such joints anywhere. @returns by body: its group
@@ -84,6 +96,7 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
     if (body_of_link.back()) has_geometry[*body_of_link.back()] = true;
   }
   const Neighbours neighbours(kinematics, has_geometry);
+  const NamePairSet ignored_names(ignored);
   const auto usable = [&](std::size_t i) {
     return wanted[i] && model.links[i].usable() && body_of_link[i].has_value();
   };
@@ -91,7 +104,7 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     for (std::size_t k = i + 1; usable(i) && k < model.links.size(); ++k) {
       if (!usable(k) || neighbours.never_collide(*body_of_link[i], *body_of_link[k]) ||
-          names(ignored, model.links[i].name, model.links[k].name)) {
+          ignored_names.holds(model.links[i].name, model.links[k].name)) {
         continue;
       }
       pairs.push_back({i, k});
@@ -102,7 +115,8 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
 
 std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>& model,
                                          const Kinematics& kinematics,
-                                         const std::vector<LinkPair>& pairs) {
+                                         const std::vector<LinkPair>& pairs,
+                                         const std::function<bool()>& cancelled) {
   const auto& joints = kinematics.joints();
   std::vector<double> q;
   q.reserve(joints.size());
@@ -118,7 +132,7 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   };
   QueryConfig config;
   config.max_distance = 0.01;  // [m] nothing but contact matters
-  SelfQuery query(model, pairs, config);
+  SelfQuery query(model, pairs, config, cancelled);
   std::vector<PairProximity> results;
   query.run(links.X_FL, links.known, &results);
   std::vector<LinkPair> found;

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "internal/geometry/cancelled.h"
 #include "internal/proximity/deadline.h"
 #include "proximity/object_search.h"
 
@@ -24,14 +25,19 @@ bool is_placed(const PosedWorld& posed) {
 
 }  // namespace
 
-std::shared_ptr<const RobotSurfaces> make_robot_surfaces(std::shared_ptr<const RobotModel> model) {
+std::shared_ptr<const RobotSurfaces> make_robot_surfaces(std::shared_ptr<const RobotModel> model,
+                                                         const std::function<bool()>& cancelled) {
   auto robot = std::make_shared<RobotSurfaces>();
-  for (const LinkModel& link : model->links) {
-    robot->surfaces.emplace_back();
-    robot->boxes.emplace_back();
-    if (!link.usable() || link.tree.empty()) continue;
-    robot->surfaces.back() = std::make_unique<const LinkSurface>(link);
-    robot->boxes.back() = whole_box(link, *robot->surfaces.back());
+  try {
+    for (const LinkModel& link : model->links) {
+      robot->surfaces.emplace_back();
+      robot->boxes.emplace_back();
+      if (!link.usable() || link.tree.empty()) continue;
+      robot->surfaces.back() = LinkSurface::of(link, cancelled);
+      robot->boxes.back() = whole_box(link, *robot->surfaces.back());
+    }
+  } catch (const Cancelled&) {
+    return nullptr;
   }
   robot->model = std::move(model);
   return robot;

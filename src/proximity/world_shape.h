@@ -13,8 +13,9 @@ Eigen::AlignedBox3d whole_box(const LinkModel& link, const LinkSurface& surface)
 
 /// An object of the world as a link: its exact geometry, a coarse packing, and its surface.
 struct WorldShape {
-  explicit WorldShape(LinkModel model)
-      : link(std::move(model)), surface(link), box(whole_box(link, surface)) {}
+  /// @throws Cancelled when the request says so
+  WorldShape(LinkModel model, const CancelRequest& cancelled)
+      : link(std::move(model)), surface(link, cancelled), box(whole_box(link, surface)) {}
 
   LinkModel link;
   LinkSurface surface;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <set>
 #include <string>
 #include <vector>
@@ -63,6 +64,32 @@ TEST(SelfCollisionPairs, excludesAdjacentAndRigidlyConnectedLinks) {
   const Names without_a = {"base-b", "base-tip", "b-c", "tip-c"};
   EXPECT_EQ(robot.names(self_collision_pairs(*robot.model, robot.kinematics, wanted, {})),
             without_a);
+}
+
+// An SRDF may name hundreds of thousands of pairs; the node does not answer, nor end, before it has
+// looked at all of them.
+TEST(SelfCollisionPairs, ManyIgnoredNamesTakeNoTime) {
+  std::string urdf = "<robot name='r'>";
+  NamePairs ignored;
+  for (int i = 0; i < 60; ++i) {
+    const std::string name = "link_" + std::to_string(i);
+    urdf += "<link name='" + name + "'><collision><geometry><sphere radius='0.1'/></geometry>";
+    urdf += "</collision></link>";
+    if (i == 0) continue;
+    urdf += "<joint name='to_" + name + "' type='continuous'><parent link='link_" +
+            std::to_string(i - 1) + "'/><child link='" + name + "'/></joint>";
+  }
+  urdf += "</robot>";
+  for (int i = 0; i < 300000; ++i) ignored.emplace_back("link_7", "tool_" + std::to_string(i));
+  ignored.emplace_back("link_9", "link_5");
+  const RobotDescription description = parse_urdf(urdf, GeometrySource::kCollision, {});
+  const auto model = build_robot_model(description, {});
+  const Kinematics kinematics(description);
+  const auto begin = std::chrono::steady_clock::now();
+  const auto pairs = self_collision_pairs(*model, kinematics, std::vector<bool>(60, true), ignored);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+  EXPECT_EQ(pairs.size(), 60U * 59U / 2U - 59U - 1U);
+  EXPECT_LT(took.count(), 3.0) << "half a second; twelve where each pair looks at each name";
 }
 
 TEST(SelfCollisionPairs, siblingsAreNotAdjacent) {

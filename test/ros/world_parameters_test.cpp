@@ -3,12 +3,15 @@
 #include <gtest/gtest.h>
 #include <xmlrpcpp/XmlRpc.h>
 
+#include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "ros/input/world_faults.h"
 #include "ros/parameters/parameters.h"
 
 namespace ist {
@@ -163,6 +166,22 @@ TEST(WorldParameters, MistakesAreNamed) {
                  *cell = empty;
                }),
                "at least one of objects, file, topic, planning_scene or robot is needed");
+}
+
+// A message that cannot be used is told once, however often it comes; others are told until there
+// are too many to be read.
+TEST(WorldFaultLog, TellsWhatIsNewAndNotTooMuch) {
+  WorldFaultLog log;
+  const auto start = WorldFaultLog::Clock::now();
+  std::size_t lines = 0;
+  for (int i = 0; i < 1000; ++i) {  // 20 s at 50 Hz
+    lines += log.is_due("object 'a': no shape", start + i * std::chrono::milliseconds(20)) ? 1 : 0;
+  }
+  EXPECT_EQ(lines, 1U);
+  EXPECT_TRUE(log.is_due("object 'b': no shape", start));
+  for (int i = 0; i < 1000; ++i) lines += log.is_due(std::to_string(i), start) ? 1 : 0;
+  EXPECT_EQ(lines, WorldFaultLog::kMost - 1);
+  EXPECT_TRUE(log.is_due("object 'a': no shape", start + WorldFaultLog::kPeriod));
 }
 
 }  // namespace

@@ -120,9 +120,11 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
 /// Selects the pairs that are in contact at rest: with all joints at zero, or at the limit nearest
 /// to zero. A pair with a planar or floating joint between its links is not among them, because
 /// such a joint has no rest.
+/// @param cancelled  as for SelfQuery; no pair is selected then
 std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>& model,
                                          const Kinematics& kinematics,
-                                         const std::vector<LinkPair>& pairs);
+                                         const std::vector<LinkPair>& pairs,
+                                         const std::function<bool()>& cancelled = {});
 
 /// Reads the `<disable_collisions>` elements of an SRDF.
 /// @throws ModelError when the text is no SRDF

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -16,7 +17,10 @@ namespace ist {
 struct RobotSurfaces;
 
 /// Builds a hierarchy and a hull for each link: 3 s for a million triangles.
-std::shared_ptr<const RobotSurfaces> make_robot_surfaces(std::shared_ptr<const RobotModel> model);
+/// @param cancelled  asked now and then; true ends the work. May be empty
+/// @returns null when cancelled
+std::shared_ptr<const RobotSurfaces> make_robot_surfaces(
+    std::shared_ptr<const RobotModel> model, const std::function<bool()>& cancelled = {});
 
 /// An object of a world that a link is near.
 struct NearObject {

@@ -33,7 +33,8 @@ OtherRobot::OtherRobot(const OtherRobotConfig& config, const std::string& base_f
   joint_states_ = std::make_unique<JointStateListener>(own_buffer_.get(), remapped, [] {});
 }
 
-std::string OtherRobot::read(std::vector<WorldObject>* links, std::vector<WorldFault>* faults) {
+std::string OtherRobot::read(const std::function<bool()>& cancelled,
+                             std::vector<WorldObject>* links, std::vector<WorldFault>* faults) {
   std::string key, urdf;
   if (!nh_.searchParam(config_.description, key) || !nh_.getParam(key, urdf)) {
     return "waiting for the parameter '" + config_.description + "' with the other robot's URDF";
@@ -41,7 +42,9 @@ std::string OtherRobot::read(std::vector<WorldObject>* links, std::vector<WorldF
   std::shared_ptr<const Kinematics> kinematics;
   RobotDescription description;
   try {
-    description = parse_urdf(urdf, GeometrySource::kCollision, environment_package_finder());
+    description = parse_urdf(
+        urdf, GeometrySource::kCollision, environment_package_finder(),
+        [&](const std::string& /*link*/, const std::string& /*mesh*/) { return !cancelled(); });
     kinematics = std::make_shared<const Kinematics>(description);
   } catch (const ModelError& error) {
     return "the other robot's URDF in '" + key + "' cannot be used: " + error.what();

@@ -2,6 +2,7 @@
 
 #include <ros/node_handle.h>
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -24,9 +25,11 @@ class OtherRobot {
              const ros::NodeHandle& nh);
 
   /// Reads its description from the parameter server.
-  /// @param faults  one sentence for each link whose geometry cannot be read
+  /// @param cancelled  asked now and then; true ends the reading
+  /// @param faults     one sentence for each link whose geometry cannot be read
   /// @returns empty, or why it cannot be read yet
-  std::string read(std::vector<WorldObject>* links, std::vector<WorldFault>* faults);
+  std::string read(const std::function<bool()>& cancelled, std::vector<WorldObject>* links,
+                   std::vector<WorldFault>* faults);
 
   /// Whether a frame is known from its joint states alone, and so has no name in tf.
   bool owns(const std::string& frame) const;

@@ -43,7 +43,7 @@ void WorldSource::read_configured() {
         GeometryElement element;
         element.source = config.mesh;
         element.shape = load_mesh(resolve_uri(config.mesh, environment_package_finder()),
-                                  config.scale, [this] { return !running_.load(); });
+                                  config.scale, cancelled_);
         object.geometry = {std::move(element)};
       }
       objects.push_back(std::move(object));
@@ -83,7 +83,7 @@ void WorldSource::read_robot() {
   next_reading_ = now + kRobotPeriod;
   std::vector<WorldObject> links;
   std::vector<WorldFault> faults;
-  const std::string problem = robot_->read(&links, &faults);
+  const std::string problem = robot_->read(cancelled_, &links, &faults);
   if (!problem.empty()) {
     if (faults_[fault_of(Kind::kRobot)] != problem) note_fault(fault_of(Kind::kRobot), problem);
     return show_faults();
@@ -125,8 +125,7 @@ void WorldSource::add(WorldFaultKind what, const std::vector<WorldObject>& objec
     std::vector<std::string>& allowed = complete.back().allowed_links;
     allowed.insert(allowed.end(), links.begin(), links.end());
   }
-  const std::vector<WorldFault> faults =
-      builder_.add(complete, [this] { return !running_.load(); });
+  const std::vector<WorldFault> faults = builder_.add(complete, cancelled_);
   for (const WorldFault& fault : faults) {
     note_fault(fault.object.empty() ? fault_of(what) : object_fault(fault.object), fault.text);
   }

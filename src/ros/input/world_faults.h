@@ -1,5 +1,8 @@
 #pragma once
 
+#include <chrono>
+#include <cstddef>
+#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
@@ -30,5 +33,24 @@ inline WorldFaultKey object_fault(const std::string& name) {
   return {WorldFaultKind::kObject, name};
 }
 inline WorldFaultKey fault_of(WorldFaultKind kind) { return {kind, ""}; }
+
+/// Decides which faults are logged: each sentence once a minute, and no more than kMost of them. A
+/// sender may repeat a message that cannot be used many times a second, and each may differ.
+class WorldFaultLog {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kMost = 20;
+  static constexpr std::chrono::seconds kPeriod{60};
+
+  bool is_due(const std::string& sentence, Clock::time_point now) {
+    for (auto one = told_.begin(); one != told_.end();) {
+      one = now - one->second >= kPeriod ? told_.erase(one) : std::next(one);
+    }
+    return told_.size() < kMost && told_.emplace(sentence, now).second;
+  }
+
+ private:
+  std::map<std::string, Clock::time_point> told_;  ///< when
+};
 
 }  // namespace ist

@@ -20,6 +20,7 @@ using Kind = WorldFaultKind;
 }  // namespace
 
 void WorldSource::receive(const ist_proximity::WorldObjects& message) {
+  if (!running_) return;  // up to a thousand wait
   has_received_ = true;
   state_.begin_work();
   guard(Kind::kMessage, [&] { apply(message); });
@@ -102,7 +103,7 @@ void WorldSource::change(const ist_proximity::WorldObject& message,
   using Message = ist_proximity::WorldObject;
   if (message.operation == Message::ADD) {
     remember_from_topic(message.id);
-    added->push_back(to_world_object(message, config_.world, [this] { return !running_.load(); }));
+    added->push_back(to_world_object(message, config_.world, cancelled_));
     return;
   }
   if (!added->empty()) {  // in the order of the message

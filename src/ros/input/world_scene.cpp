@@ -65,6 +65,7 @@ PlanningScene read_message(const topic_tools::ShapeShifter& message, const World
 }  // namespace
 
 void WorldSource::receive_scene(const ros::MessageEvent<const topic_tools::ShapeShifter>& event) {
+  if (!running_) return;  // up to a thousand wait
   const bool is_other = is_other_publisher(event);
   use_scene([&] {
     PlanningScene scene = read_message(*event.getConstMessage(), config_.world.limits, config_.map);

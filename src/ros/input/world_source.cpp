@@ -165,7 +165,9 @@ void WorldSource::guard(WorldFaultKind what, const std::function<void()>& functi
 }
 
 void WorldSource::note_fault(const WorldFaultKey& key, const std::string& fault) {
-  ROS_ERROR_STREAM("source '" << config_.name << "': " << fault);
+  if (fault_log_.is_due(fault, WorldFaultLog::Clock::now())) {
+    ROS_ERROR_STREAM("source '" << config_.name << "': " << fault);
+  }
   // Names that are never sent again would fill the memory.
   const bool is_named = key.first == Kind::kObject || key.first == Kind::kClash;
   if (is_named && faults_.size() >= config_.world.limits.max_objects && faults_.count(key) == 0) {
@@ -212,7 +214,7 @@ void WorldSource::take_target() {
     is_changed_ = true;
   }
   if (!is_same_robot) {
-    surfaces_ = newest.model ? make_robot_surfaces(newest.model) : nullptr;
+    surfaces_ = newest.model ? make_robot_surfaces(newest.model, cancelled_) : nullptr;
   }
   target_ = std::move(newest);
 }

@@ -131,6 +131,7 @@ class WorldSource : public ObstacleSource {
   // Used by the source's thread alone.
   WorldBuilder builder_;
   WorldFaults faults_;
+  WorldFaultLog fault_log_;
   SourceTarget target_;
   std::shared_ptr<const RobotSurfaces> surfaces_;  ///< of target_.model
   bool is_robot_read_ = true, is_changed_ = false, has_received_ = false;
@@ -157,6 +158,7 @@ class WorldSource : public ObstacleSource {
   TopicAdvice topic_advice_;
   ros::Time stamp_;
   std::atomic<bool> running_{true};
+  const std::function<bool()> cancelled_ = [this] { return !running_.load(); };
   std::thread thread_;
 };
 

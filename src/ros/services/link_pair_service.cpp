@@ -84,8 +84,8 @@ void LinkPairService::sample_newest() {
     findings.model = newest_model_;
   }
   const auto& model = findings.model;
-  if (!model || !model->robot || !model->kinematics) return;
-  findings.chosen = choose_pairs(nh_, config_, *model).all;
+  if (!model || !model->is_ready() || !model->kinematics) return;
+  findings.chosen = choose_pairs(nh_, config_, *model, [&] { return is_outdated(*model); }).all;
   findings.problem = "the pairs are being sampled";
   const auto show = [&] {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -168,7 +168,7 @@ bool LinkPairService::answer(Service::Request& request, Service::Response& respo
     const std::lock_guard<std::mutex> lock(mutex_);
     findings = findings_;
     if (!findings) {
-      const bool is_ready = newest_model_ && newest_model_->phase == ModelState::Phase::kReady;
+      const bool is_ready = newest_model_ && newest_model_->is_ready();
       response.message = is_ready && newest_model_->kinematics ? "the pairs are being chosen"
                          : is_ready                            ? no_kinematics(*newest_model_)
                          : newest_model_                       ? newest_model_->problem

@@ -1,6 +1,7 @@
 #include "ros/services/pair_choice.h"
 
 #include <algorithm>
+#include <tuple>
 
 #include "ist_proximity/geometry/error.h"
 #include "ros/common/text.h"
@@ -8,10 +9,12 @@
 namespace ist {
 namespace {
 
+/// @param pairs  sorted
 bool holds(const std::vector<LinkPair>& pairs, const LinkPair& pair) {
-  return std::any_of(pairs.begin(), pairs.end(), [&](const LinkPair& other) {
-    return other.first == pair.first && other.second == pair.second;
-  });
+  return std::binary_search(
+      pairs.begin(), pairs.end(), pair, [](const LinkPair& one, const LinkPair& other) {
+        return std::tie(one.first, one.second) < std::tie(other.first, other.second);
+      });
 }
 
 NamePairs srdf_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
@@ -69,7 +72,7 @@ std::string PairChoice::text(const RobotModel& robot) const {
 }
 
 PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
-                        const ModelState& model) {
+                        const ModelState& model, const std::function<bool()>& cancelled) {
   PairChoice choice;
   const RobotModel& robot = *model.robot;
   choice.warnings = unknown_names(config, *model.kinematics);
@@ -87,7 +90,7 @@ PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
   }
   std::vector<LinkPair> at_rest;
   if (config.self_collision.ignore_contact_at_rest) {
-    at_rest = in_contact_at_rest(model.robot, *model.kinematics, left);
+    at_rest = in_contact_at_rest(model.robot, *model.kinematics, left, cancelled);
   }
   const auto reason_of = [&](const LinkPair& pair) {
     if (!wanted[pair.first] || !wanted[pair.second]) return PairReason::kUnusable;

@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,8 @@ struct PairChoice {
 
 /// @param nh     namespace in which, and above which, `robot_description_semantic` is searched
 /// @param model  ready, with kinematics
+/// @param cancelled  asked now and then; true ends the work, whose result is of no use then
 PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
-                        const ModelState& model);
+                        const ModelState& model, const std::function<bool()>& cancelled);
 
 }  // namespace ist

@@ -89,7 +89,6 @@ void SelfProximity::publish_failure(const std::string& fault) {
 }
 
 void SelfProximity::take_model() {
-  const auto is_stopped = [this] { return stop_signal_.stopped(); };
   bool is_refined = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -98,19 +97,20 @@ void SelfProximity::take_model() {
     model_ = newest_model_;
   }
   if (is_refined) {
-    query_ = std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, is_stopped);
+    query_ =
+        std::make_unique<SelfQuery>(model_->robot, query_->pairs(), config_.query, is_stopped_);
     return;
   }
   query_.reset();
-  if (!model_->robot || !model_->kinematics) return;
-  query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query, is_stopped);
+  if (!model_->is_ready() || !model_->kinematics) return;  // pairs need all links
+  query_ = std::make_unique<SelfQuery>(model_->robot, watched_pairs(), config_.query, is_stopped_);
   pose_source_ =
       make_pose_source(*model_, config_, buffer_, joints_, JointPoseSource::Which::kNewest);
   speeds_.assign(model_->robot->links.size(), ClosingSpeed());
 }
 
 std::vector<LinkPair> SelfProximity::watched_pairs() const {
-  const PairChoice choice = choose_pairs(nh_, config_, *model_);
+  const PairChoice choice = choose_pairs(nh_, config_, *model_, is_stopped_);
   for (const std::string& warning : choice.warnings) ROS_WARN_STREAM(warning);
   ROS_INFO_STREAM(choice.text(*model_->robot));
   return choice.watched();

@@ -68,6 +68,7 @@ class SelfProximity {
   ros::Publisher publisher_;
 
   StopSignal stop_signal_;
+  const std::function<bool()> is_stopped_ = [this] { return stop_signal_.stopped(); };
   mutable std::mutex mutex_;  // guards the next two members
   std::shared_ptr<const ModelState> newest_model_;
   ist_proximity::ProximityArrayConstPtr newest_;
