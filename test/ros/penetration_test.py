@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The contact wrench: zero apart, out of the obstacle in contact, without jumps, NaN where unknown."""
 
+import os
 import sys
 import unittest
 
@@ -24,6 +25,16 @@ def box_at(depth):
 def wrench(message, name="box_link"):
     one = pt.link(message, name).penetration
     return np.hstack([pt.vector(one.force), pt.vector(one.torque)])
+
+
+def nice_of(pid, thread):
+    """The nice value of a thread, by its name."""
+    for task in os.listdir("/proc/%d/task" % pid):
+        with open("/proc/%d/task/%s/stat" % (pid, task)) as f:
+            name, rest = f.read().split("(", 1)[1].rsplit(")", 1)
+        if name == thread:
+            return int(rest.split()[16])
+    raise AssertionError("no thread " + thread)
 
 
 class PenetrationTest(unittest.TestCase):
@@ -118,6 +129,11 @@ class PenetrationTest(unittest.TestCase):
         for message in node.messages[count:]:  # the swap loses nothing
             self.assertEqual(message.status, ProximityArray.OK, message.status_text)
         self.assertTrue(np.isfinite(wrench(self.move(0.03))).all())
+        # A volume that something in contact waits for does not wait for the rest of the machine.
+        pid = node.process.pid
+        usual = os.getpriority(os.PRIO_PROCESS, pid)
+        self.assertEqual(nice_of(pid, "ist contact"), usual)
+        self.assertGreater(nice_of(pid, "ist packing"), usual)
 
     def test_another_robot_while_volumes_are_packed(self):
         """Volumes are those of the newest model: of its links, as large as they are there."""

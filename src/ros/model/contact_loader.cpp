@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,7 +14,6 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/memory.h"
 #include "ros/common/thread_name.h"
-#include "ros/common/thread_priority.h"
 
 namespace ist {
 namespace {
@@ -64,7 +64,6 @@ bool ContactLoader::is_current(const ModelState& state) const {
 
 void ContactLoader::run() {
   name_thread("ist contact");
-  lower_thread_priority();
   do {
     bool is_new = false;
     const std::string fault = exception_of([this, &is_new] {
@@ -119,15 +118,16 @@ bool ContactLoader::is_needed(const ModelState& state, std::size_t link) {
          (state.robot->links[link].is_final || now - needed_[link] > kMaxWait);
 }
 
-/// Makes the next body that is needed.
+/// Makes the body that has been needed for the longest time.
 /// @returns false where there is none, or the work was cancelled
 bool ContactLoader::add_next(const ModelState& state) {
   const auto contacts = this->contacts();
-  const auto next =
-      std::find_if(state.monitored.begin(), state.monitored.end(), [&](std::size_t i) {
-        return !keys_[i].empty() && !contacts->links[i] && is_needed(state, i);
-      });
-  if (next == state.monitored.end()) return false;
+  std::optional<std::size_t> next;
+  for (const std::size_t i : state.monitored) {
+    if (keys_[i].empty() || contacts->links[i] || !is_needed(state, i)) continue;
+    if (!next || needed_[i] < needed_[*next]) next = i;
+  }
+  if (!next) return false;
   std::shared_ptr<const ContactGeometry>& body = known_[keys_[*next]];
   if (!body) {
     const LinkModel& link = state.robot->links[*next];

@@ -20,8 +20,9 @@ namespace ist {
 /// Makes the contact bodies in a thread of its own, while the node answers already: it packs the
 /// monitored links that need one disjointly, one after the other, or takes them from the cache.
 /// Those are, with ~penetration/enabled: auto, the links that something has come near. It follows
-/// every change of the robot's model; links that do not change keep their bodies. All members are
-/// thread safe.
+/// every change of the robot's model; links that do not change keep their bodies. The thread has
+/// the priority of all others: something is in contact, and waits for it. All members are thread
+/// safe.
 ///
 /// A volume is summed over the inner spheres of the packing for distances, too. So it is made when
 /// that packing is final, and the wrench does not jump while it gets finer; but not later than
