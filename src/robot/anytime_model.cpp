@@ -1,5 +1,6 @@
 #include "internal/robot/anytime_model.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <sstream>
@@ -24,6 +25,13 @@ void check_config(const PackingConfig& config) {
   if (!text.str().empty()) throw ModelError(text.str());
 }
 
+// Of the work on all links: when a group of them is ready.
+constexpr double kShares[] = {0.1, 0.3, 0.6, 1.0};
+
+bool has_pending(const RobotModel& robot) {
+  return std::any_of(robot.links.begin(), robot.links.end(), is_pending);
+}
+
 using Field = std::shared_ptr<const DistanceField>;
 bool is_finer(const Field& a, const Field& b) {
   return a != nullptr && (b == nullptr || a->detail() > b->detail());
@@ -37,16 +45,31 @@ AnytimeModel::~AnytimeModel() = default;
 
 AnytimeModel::Ptr AnytimeModel::build(std::shared_ptr<const RobotDescription> description,
                                       const RobotModelConfig& config, Stage stage,
-                                      const RobotModelCallbacks& callbacks) {
+                                      const RobotModelCallbacks& callbacks,
+                                      const Partial& partial) {
   check_config(config.packing);
-  const auto model = std::make_shared<AnytimeModel>();
-  model->description_ = std::move(description);
-  model->config_ = config;
-  Step step(model, callbacks);
-  step.choose_links();
-  if (!step.make_solids(nullptr, nullptr)) return nullptr;
-  step.add_unknown_shapes(stage);
-  return step.pack(config.threads) ? step.finish(nullptr, nullptr) : nullptr;
+  const auto empty = std::make_shared<AnytimeModel>();
+  empty->description_ = std::move(description);
+  empty->config_ = config;
+  Step first(empty, callbacks);
+  first.choose_links();
+  first.warn_of_visual_fallback();
+  Ptr made = empty;
+  double done = 0.0;
+  for (const double share : kShares) {
+    if (!partial && share < 1.0) continue;
+    Step step(std::make_shared<AnytimeModel>(*made), callbacks);
+    if (!step.begin_links(share)) continue;
+    step.set_progress(std::exchange(done, share), share);
+    if (!step.make_solids(made->robot_.get(), nullptr)) return nullptr;
+    step.add_unknown_shapes(stage);
+    if (!step.pack(config.threads)) return nullptr;
+    made = step.finish(made->robot_.get(), nullptr);
+    if (made == nullptr) return nullptr;
+    if (!has_pending(*made->robot_)) break;
+    partial(made);
+  }
+  return made;
 }
 
 AnytimeModel::Ptr AnytimeModel::refined(std::size_t link,

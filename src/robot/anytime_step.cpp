@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cstdio>
 #include <iterator>
+#include <numeric>
 
 #include "internal/bvh/build_id.h"
 #include "internal/geometry/cancelled.h"
@@ -48,12 +49,39 @@ void AnytimeModel::Step::choose_links() {
   }
 }
 
+bool AnytimeModel::Step::begin_links(double share) {
+  std::vector<Link>& links = model_->links_;
+  std::vector<double> work(links.size(), 0.0);
+  std::vector<std::size_t> order(links.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    if (!links[i].error.empty()) continue;
+    for (const GeometryElement& element : links[i].description->geometry) {
+      work[i] += packing_work(element.shape);
+    }
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return work[a] < work[b]; });
+  const double all = std::accumulate(work.begin(), work.end(), 0.0);
+  const bool is_first = model_->robot_ == nullptr;
+  double sum = 0.0;
+  bool any = share >= 1.0;
+  for (const std::size_t i : order) {
+    sum += work[i];
+    const bool was_pending = is_first || links[i].is_pending;
+    links[i].is_pending = sum > share * all && share < 1.0;
+    any = any || (was_pending && !links[i].is_pending);
+  }
+  return any;
+}
+
 // Packing reads their hierarchies, so they are made first. False when cancelled.
 // @param before   supplies the solids that are known; may be null
 // @param changed  the link whose geometry may differ from `before`
 bool AnytimeModel::Step::make_solids(const RobotModel* before, const std::string* changed) {
   const auto one = [&](std::size_t i) {
     Link& link = model_->links_[i];
+    if (link.is_pending || !link.solid.empty()) return;
     const bool may_be_known = changed == nullptr || link.name != *changed;
     link.solid = solid_of(link, may_be_known ? find_link(before, link.name) : nullptr);
   };
@@ -67,7 +95,7 @@ bool AnytimeModel::Step::make_solids(const RobotModel* before, const std::string
 
 Solid AnytimeModel::Step::solid_of(const Link& link, const LinkModel* before) const {
   if (!link.error.empty()) return {};
-  if (before != nullptr) return before->solid;
+  if (before != nullptr && !is_pending(*before)) return before->solid;
   return make_solid(link.description->geometry, [this] { return is_cancelled(); });
 }
 
@@ -97,7 +125,7 @@ void AnytimeModel::Step::add_job(const Link& link, std::size_t element,
 // One job for each distinct shape and configuration: two equal fingers are packed once.
 void AnytimeModel::Step::add_unknown_shapes(Stage stage) {
   for (const Link& link : model_->links_) {
-    for (std::size_t e = 0; e < link.keys.size(); ++e) {
+    for (std::size_t e = 0; e < link.keys.size() && !link.is_pending; ++e) {
       if (model_->shapes_.count(link.keys[e]) > 0) continue;
       const Shape& shape = link.description->geometry[e].shape;
       add_job(link, e,
@@ -123,8 +151,8 @@ bool AnytimeModel::Step::pack(int threads) {
   const auto report = [&](const PackingJob& job, double fraction) {
     if (is_cancelled()) return false;
     if (callbacks_.progress) {
-      callbacks_.progress(
-          {model_->links_[job.link].name, job.link, model_->links_.size(), fraction});
+      callbacks_.progress({model_->links_[job.link].name, job.link, model_->links_.size(),
+                           progress_begin_ + (progress_end_ - progress_begin_) * fraction});
     }
     return true;
   };
@@ -164,7 +192,8 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   LinkModel model;
   model.name = link.name;
   model.error = link.error;
-  if (!model.error.empty()) return model;
+  if (link.is_pending && model.error.empty()) model.error = kPending;
+  if (!model.usable()) return model;
   const LinkGeometry& geometry = link.description->geometry;
   std::vector<const Packing*> packings;
   model.from_cache = true;
@@ -200,25 +229,41 @@ AnytimeModel::Ptr AnytimeModel::Step::finish(const RobotModel* before, const std
   const auto robot = std::make_shared<RobotModel>();
   robot->name = model_->description_->name;
   robot->root_link = model_->description_->root_link;
-  robot->geometry_id =
-      before != nullptr && changed == nullptr ? before->geometry_id : next_build_id();
+  const bool is_partial =
+      before != nullptr && std::any_of(before->links.begin(), before->links.end(), is_pending);
+  const bool is_same_robot = before != nullptr && changed == nullptr && !is_partial;
+  robot->geometry_id = is_same_robot ? before->geometry_id : next_build_id();
   robot->links.resize(model_->links_.size());
   const auto one = [&](std::size_t i) {
     const Link& link = model_->links_[i];
     const LinkModel* same = find_link(before, link.name);
     const bool same_geometry = changed == nullptr || link.name != *changed;
-    robot->links[i] = same != nullptr && same_geometry && !is_touched(link)
+    robot->links[i] = same != nullptr && same_geometry && !is_touched(link) && !is_pending(*same)
                           ? *same
                           : assemble(link, same, same_geometry);
   };
   try {
-    for_each_in_parallel(robot->links.size(), before != nullptr ? 1 : model_->config_.threads, one);
+    const bool is_one = before != nullptr && !is_partial;
+    for_each_in_parallel(robot->links.size(), is_one ? 1 : model_->config_.threads, one);
   } catch (const Cancelled&) {
     return nullptr;
   }
   warn(*robot);
   model_->robot_ = robot;
   return model_;
+}
+
+void AnytimeModel::Step::warn_of_visual_fallback() const {
+  std::string names;
+  std::size_t count = 0;
+  for (const Link& link : model_->links_) {
+    if (!link.error.empty() || !link.description->used_visual_fallback) continue;
+    names += (count++ > 0 ? ", '" : "'") + link.name + "'";
+  }
+  if (count == 0 || !callbacks_.warning) return;
+  const bool is_one = count == 1;
+  callbacks_.warning((is_one ? "link " : "links ") + names + (is_one ? " has" : " have") +
+                     " no collision geometry in the URDF; the visual one is used instead");
 }
 
 void AnytimeModel::Step::warn(const RobotModel& robot) const {
@@ -235,12 +280,6 @@ void AnytimeModel::Step::warn(const RobotModel& robot) const {
   for (std::size_t l = 0; l < model_->links_.size(); ++l) {
     const LinkModel& link = robot.links[l];
     if (!link.usable() || !is_touched(model_->links_[l])) continue;
-    const bool is_new = model_->robot_ == nullptr;
-    if (is_new && model_->links_[l].description->used_visual_fallback) {
-      callbacks_.warning("link '" + link.name +
-                         "' has no collision geometry in the URDF; its visual geometry is used "
-                         "instead");
-    }
     if (link.is_final && !link.packing.certificate.reached) {
       const PackingConfig& wanted = model_->config_.packing;
       callbacks_.warning(

@@ -19,6 +19,7 @@ struct AnytimeModel::Link : MonitoredLink {
   std::vector<std::string> keys;       ///< of the shapes, by element
   std::vector<PackingConfig> configs;  ///< of their final stage, by element
   Solid solid;                         ///< empty with an error
+  bool is_pending = false;             ///< it is not made yet
 };
 
 /// One step from a model to the next.
@@ -34,6 +35,16 @@ class AnytimeModel::Step {
   }
 
   void choose_links();
+  void warn_of_visual_fallback() const;
+  /// Begins the links with the least work, up to a share of the work on all; all others are
+  /// pending.
+  /// @returns false where none is begun that was not before
+  bool begin_links(double share);
+  /// Of all steps, this one is the part from `begin` to `end`.
+  void set_progress(double begin, double end) {
+    progress_begin_ = begin;
+    progress_end_ = end;
+  }
   bool make_solids(const RobotModel* before, const std::string* changed);
   void forget_unused_shapes();
   void add_unknown_shapes(Stage stage);
@@ -58,6 +69,7 @@ class AnytimeModel::Step {
   const RobotModelCallbacks callbacks_;
   mutable std::mutex cancel_mutex_;
   std::vector<PackingJob> jobs_;
+  double progress_begin_ = 0.0, progress_end_ = 1.0;
   std::set<std::string> touched_;  ///< keys of shapes that have another packing than before
 };
 

@@ -27,10 +27,15 @@ void ProximityServer::Impl::take_model() {
   std::shared_ptr<const ModelState> model = loader_.state();
   if (model == model_) return;
   if (cycle_ && is_refinement(*model_, *model)) return refine_model(std::move(model));
+  if (cycle_ && model->robot == model_->robot) {  // a message of its loading
+    model_ = std::move(model);
+    query_service_->set_model(model_);
+    return cycle_->set_problem(*model_);
+  }
   warm_up_.begin(nullptr);  // of the last model
   model_ = std::move(model);
   region_radius_ = 0.0;
-  if (model_->phase == ModelState::Phase::kReady) {
+  if (model_->robot) {
     cycle_ = std::make_unique<ProximityCycle>(
         model_, config_,
         make_pose_source(*model_, config_, buffer_, joint_states_.get(),

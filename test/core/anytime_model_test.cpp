@@ -586,5 +586,48 @@ TEST(AnytimeQuery, aSwapOfOneLinkLeavesTheOthersAlone) {
   EXPECT_EQ(all.node_pairs, query.link_statistics()[1].node_pairs);
 }
 
+// Links are there as soon as they are made, those with little work first; the last model is the
+// same as one that is made at once.
+TEST(AnytimeModel, LinksAreReadyOneGroupAfterTheOther) {
+  const auto arm = demo();
+  const RobotModelConfig config = config_to(kMaxError);
+  std::vector<AnytimeModel::Ptr> parts;
+  double reported = 0.0;
+  RobotModelCallbacks callbacks;
+  callbacks.progress = [&](const ModelProgress& progress) {
+    EXPECT_GE(progress.fraction, reported - 1e-9);
+    reported = progress.fraction;
+  };
+  const auto whole =
+      AnytimeModel::build(arm, config, Stage::kFirst, callbacks,
+                          [&](const AnytimeModel::Ptr& part) { parts.push_back(part); });
+  const auto at_once = AnytimeModel::build(arm, config, Stage::kFirst);
+  ASSERT_GE(parts.size(), 2U);
+  EXPECT_NEAR(reported, 1.0, 1e-9);
+  std::size_t pending = arm->links.size();
+  for (std::size_t k = 0; k <= parts.size(); ++k) {
+    const bool is_last = k == parts.size();
+    const RobotModel& robot = *(is_last ? whole : parts[k])->robot();
+    ASSERT_EQ(robot.links.size(), at_once->robot()->links.size());
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < robot.links.size(); ++i) {
+      const LinkModel &link = robot.links[i], &truth = at_once->robot()->links[i];
+      EXPECT_EQ(link.name, truth.name);
+      if (!is_pending(link)) EXPECT_EQ(link.error, truth.error);
+      left += is_pending(link) ? 1 : 0;
+      if (!link.usable()) continue;
+      ASSERT_EQ(link.packing.spheres.size(), truth.packing.spheres.size()) << link.name;
+      EXPECT_FALSE(link.solid.empty());
+      EXPECT_FALSE(link.tree.empty());
+      // What is made stays.
+      if (!is_last) EXPECT_EQ(link.packing_id, whole->robot()->links[i].packing_id);
+    }
+    EXPECT_LT(left, pending);
+    pending = left;
+    if (!is_last) EXPECT_FALSE(same_geometry(robot, *whole->robot()));
+  }
+  EXPECT_EQ(pending, 0U);
+}
+
 }  // namespace
 }  // namespace ist

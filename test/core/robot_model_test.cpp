@@ -238,6 +238,16 @@ TEST(RobotModel, warnsAboutVisualFallbackAndTooFewSpheres) {
   EXPECT_NE(warnings[1].find("max_spheres (10)"), std::string::npos) << warnings[1];
   EXPECT_NE(warnings[1].find(" mm"), std::string::npos) << warnings[1];
   warnings.clear();
+  robot.links[0].used_visual_fallback = true;
+  config.links = {robot.links[0].name, "left"};
+  config.packing.max_spheres = 20000;
+  build_robot_model(robot, config, callbacks);
+  ASSERT_EQ(warnings.size(), 1U) << "one for all links";
+  EXPECT_NE(warnings[0].find("'" + robot.links[0].name + "', 'left' have no collision geometry"),
+            std::string::npos)
+      << warnings[0];
+  warnings.clear();
+  robot.links[0].used_visual_fallback = false;
   config.links = {"hand"};  // no warning for links that are not monitored
   config.packing.max_spheres = 20000;
   build_robot_model(robot, config, callbacks);

@@ -14,6 +14,7 @@ import proximity_testing as pt
 import rospy
 from proximity_testing import LinkProximity, ProximityArray
 from sensor_msgs.msg import PointField
+from std_msgs.msg import Float64
 
 FAR_BOX = pt.transform((0, 0.8, 0))
 MAX_POINTS = 1000
@@ -309,6 +310,18 @@ class BadModelTest(unittest.TestCase):
         words = "reading mesh 'file://%s' of link 'box_link'" % path
         node.wait_for_status(ProximityArray.LOADING, words, start=0)
         node.wait_for_status(ProximityArray.LOADING, "packing link 'box_link'", start=0, timeout=60)
+        # A link is answered as soon as it is ready, and no link before that.
+        message = node.wait_for(
+            lambda m: m.links and pt.link(m, "ball_link").state == LinkProximity.NEAR, "the ball"
+        )
+        self.assertEqual(message.status, ProximityArray.LOADING)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
+        least = rospy.wait_for_message(node.name + "/min_distance", Float64, pt.TIMEOUT)
+        self.assertTrue(np.isnan(least.data))
+        scale = rospy.wait_for_message(node.name + "/speed_scale", Float64, pt.TIMEOUT)
+        self.assertEqual(scale.data, 0.0)
+        self.assertEqual(node.messages[-1].status, ProximityArray.LOADING)
         time.sleep(0.5)
         begin = time.time()
         self.assertEqual(node.stop(), 0)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,6 +12,10 @@
 #include "ist_proximity/robot/robot_model.h"
 
 namespace ist {
+
+/// The `error` of a link that is not made yet, but will be.
+constexpr const char* kPending = "it is not ready yet";
+inline bool is_pending(const LinkModel& link) { return link.error == kPending; }
 
 /// A robot model on its way from coarse packings to fine ones, by an anytime algorithm (Dean and
 /// Boddy 1988): it can be used after every step. The certificate of a packing holds at every stage,
@@ -34,13 +39,19 @@ class AnytimeModel {
     kFinal,  ///< config.packing
   };
 
+  /// Takes a model in which some links are pending.
+  using Partial = std::function<void(const Ptr&)>;
+
   /// Packs every monitored link to a stage, equal shapes once, on config.threads threads.
   /// @param description  not null
+  /// @param partial      not empty: links are made in a few groups, those with the least work
+  /// first,
+  ///                     and it is called after each group but the last
   /// @returns null when cancelled
   /// @throws ModelError when the packing configuration is out of range
   static Ptr build(std::shared_ptr<const RobotDescription> description,
                    const RobotModelConfig& config, Stage stage,
-                   const RobotModelCallbacks& callbacks = {});
+                   const RobotModelCallbacks& callbacks = {}, const Partial& partial = {});
 
   /// Packs the shapes of one link to their next stage, in the calling thread. Other links of the
   /// same shapes get the packing too. A shape that cannot be packed more finely, for want of memory

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "internal/proximity/deadline.h"
+#include "internal/robot/anytime_model.h"
 #include "ist_proximity/repulsion/object_repulsion.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/stopwatch.h"
@@ -51,10 +52,10 @@ ProximityCycle::ProximityCycle(std::shared_ptr<const ModelState> model, const Se
       results_(robot_.links.size()),
       pushes_(robot_.links.size(), RepulsiveWrench::unknown()),
       wrenches_(robot_.links.size(), Wrench::unknown()) {
-  status_input_.model_problem = model_->problem;
+  set_problem(*model_);
   for (const std::size_t i : model_->monitored) {
     const LinkModel& link = robot_.links[i];
-    if (!link.usable()) status_input_.link_errors.push_back(link.error);
+    if (!link.usable() && !is_pending(link)) status_input_.link_errors.push_back(link.error);
   }
 }
 
@@ -106,6 +107,11 @@ void ProximityCycle::report(const ProximityArray& message, CycleReport* report) 
   report->add_times(message);
   if (status_input_.deadline.any()) ++report->deadlines_missed;
   report->worst_deadline.add(status_input_.deadline);
+}
+
+void ProximityCycle::set_problem(const ModelState& model) {
+  status_input_.model_problem = model.problem;
+  status_input_.is_loading = model.is_loading();
 }
 
 void ProximityCycle::set_warm_up(SceneWarmUp* warm_up) {

@@ -36,7 +36,7 @@ constexpr double kQueryShare = 0.7, kRepulsionShare = 0.9;
 /// newest data and never waits. One thread.
 class ProximityCycle {
  public:
-  /// @param model  ready
+  /// @param model  with a robot, of which links may be pending
   /// @param poses  of model->robot->links; null where the kinematics that it needs is faulty
   /// @param watch  outlives this; null with ~unknown_space free
   ProximityCycle(std::shared_ptr<const ModelState> model, const ServerConfig& config,
@@ -66,6 +66,9 @@ class ProximityCycle {
   /// the query's bounds go on.
   /// @param model  see is_refinement()
   void refine(const std::shared_ptr<const ModelState>& model);
+
+  /// Takes what is said of the model where its robot is the same: how far its loading is.
+  void set_problem(const ModelState& model);
 
   /// Makes the next answer's stamp not go back before this one, which another cycle gave.
   void continue_from(const ros::Time& stamp) { poses_.stamp = stamp; }

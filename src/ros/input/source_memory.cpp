@@ -9,6 +9,7 @@
 
 #include "internal/cloud/memory_body.h"
 #include "internal/cloud/memory_scan.h"
+#include "internal/robot/anytime_model.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stopwatch.h"
 #include "ros/input/map_message.h"
@@ -101,6 +102,10 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
                                  const SourceTarget& target, const SourceSnapshot& cloud) {
   for (std::size_t i = 0; i < placement.known.size(); ++i) {
     const LinkModel& link = target.model->links[i];
+    if (is_pending(link)) {
+      return "the last " + std::string(noun(config_.type)) + " is not remembered: link '" +
+             link.name + "' is not ready yet, and the robot itself would be";
+    }
     if (placement.known[i] || !link.usable() || link.tree.empty()) continue;
     return "the last " + std::string(noun(config_.type)) +
            " is not remembered: the pose of link '" + link.name +

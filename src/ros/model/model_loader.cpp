@@ -29,16 +29,6 @@ bool any_self_filter(const std::vector<SourceConfig>& sources) {
                      [](const SourceConfig& source) { return source.ingest.self_filter; });
 }
 
-void warn_of_visual_fallback(const RobotDescription& description) {
-  std::vector<std::string> names;
-  for (const LinkDescription& link : description.links) {
-    if (link.used_visual_fallback) names.push_back(link.name);
-  }
-  if (!names.empty()) {
-    ROS_WARN_STREAM("no collision geometry, the visual one is used: " << join(names, ", "));
-  }
-}
-
 }  // namespace
 
 ModelLoader::ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh)
@@ -186,8 +176,11 @@ RobotModelConfig ModelLoader::model_config(const RobotDescription& description,
   return config;
 }
 
-/// Completes a state whose robot is built.
-void ModelLoader::finish(const RobotDescription& description, ModelState* state) const {
+/// Completes a state whose robot is built, or a part of it.
+void ModelLoader::take_robot(const RobotDescription& description, const AnytimeModel::Ptr& made,
+                             ModelState* state) const {
+  state->anytime = made;
+  state->robot = made->robot();
   std::vector<std::string> wanted = config_.model.links;
   if (!wanted.empty()) {
     for (const AttachedObject& object : state->objects) add_name(object.link, &wanted);
@@ -202,8 +195,13 @@ void ModelLoader::finish(const RobotDescription& description, ModelState* state)
     state->monitored.push_back(i);
     state->links.push_back(name);
   }
-  state->usage = std::make_shared<LinkUsage>(state->robot->links.size());
+  if (!state->usage || state->usage->size() != state->robot->links.size()) {
+    state->usage = std::make_shared<LinkUsage>(state->robot->links.size());
+  }
   state->repulsion = nullptr;
+}
+
+void ModelLoader::finish(const RobotDescription& description, ModelState* state) const {
   state->phase = ModelState::Phase::kReady;
   state->problem = state->links.empty() ? "no link of the robot '" + description.name +
                                               "' has geometry: nothing can be measured"
@@ -240,7 +238,6 @@ void ModelLoader::load(const std::string& urdf) {
                  [this](const std::string& link, const std::string& mesh) {
                    return show_reading(link, mesh);
                  }));
-  warn_of_visual_fallback(*state.description);
   auto carrying = std::make_shared<const RobotDescription>(carry_over_objects(&state));
   if (state.objects.empty()) carrying = state.description;  // the same meshes once
   const RobotDescription& description = *carrying;
@@ -292,8 +289,10 @@ bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& descripti
   callbacks.cancelled = [this] { return cancelled(); };
   callbacks.warning = [&](const std::string& warning) {
     const std::lock_guard<std::mutex> lock(report_mutex);
+    std::vector<std::string>& told = state->warnings;
+    if (std::find(told.begin(), told.end(), warning) != told.end()) return;  // by another group
     ROS_WARN_STREAM(warning);
-    state->warnings.push_back(warning);
+    told.push_back(warning);
   };
   callbacks.progress = [&](const ModelProgress& progress) {
     const std::lock_guard<std::mutex> lock(report_mutex);
@@ -304,11 +303,19 @@ bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& descripti
     state->problem = sentence;
     set_state(*state);
   };
-  state->anytime = AnytimeModel::build(description, model_config(*description, state->objects),
-                                       AnytimeModel::Stage::kFirst, callbacks);
+  // Links answer as they get ready.
+  const auto partial = [&](const AnytimeModel::Ptr& made) {
+    const std::lock_guard<std::mutex> lock(report_mutex);
+    take_robot(*description, made, state);
+    set_state(*state);
+  };
+  const AnytimeModel::Ptr made =
+      AnytimeModel::build(description, model_config(*description, state->objects),
+                          AnytimeModel::Stage::kFirst, callbacks, partial);
   report.finish();
-  if (state->anytime) state->robot = state->anytime->robot();
-  return state->robot != nullptr;
+  if (!made) return false;
+  take_robot(*description, made, state);
+  return true;
 }
 
 }  // namespace ist

@@ -78,6 +78,8 @@ class ModelLoader {
   bool show_reading(const std::string& link, const std::string& mesh);
   RobotModelConfig model_config(const RobotDescription& description,
                                 const std::vector<AttachedObject>& objects) const;
+  void take_robot(const RobotDescription& description, const AnytimeModel::Ptr& made,
+                  ModelState* state) const;
   void finish(const RobotDescription& description, ModelState* state) const;
   RobotDescription carry_over_objects(ModelState* state);
   void set_state(ModelState state);

@@ -77,7 +77,7 @@ std::string ModelLoader::attach(const std::string& name, const ObjectReader& rea
 
 std::string ModelLoader::attach_read(const std::string& name, const ObjectReader& read) {
   const auto state = this->state();
-  if (!state->robot) return not_ready(*state);
+  if (!state->is_ready()) return not_ready(*state);
   const auto limit = static_cast<std::size_t>(config_.attach.max_objects);
   if (state->objects.size() >= limit) {
     return std::to_string(limit) +
@@ -107,7 +107,7 @@ std::string ModelLoader::detach(const std::string& name) {
   begin_deadline();
   for (;;) {
     const auto state = this->state();
-    if (state->robot) return detach_from(state, name);
+    if (state->is_ready()) return detach_from(state, name);
     const std::optional<std::string> done = detach_while_loading(name);
     if (done) return *done;
   }
@@ -129,7 +129,7 @@ std::string ModelLoader::detach_from(const std::shared_ptr<const ModelState>& st
 std::optional<std::string> ModelLoader::detach_while_loading(const std::string& name) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (state_->robot) return std::nullopt;
+    if (state_->is_ready()) return std::nullopt;
     const auto found = find_object(name, &objects_);
     if (found == objects_.end()) return not_attached(name, objects_);
     objects_.erase(found);
@@ -144,26 +144,30 @@ std::string ModelLoader::change_objects(const std::shared_ptr<const ModelState>&
                                         const std::string& link) {
   ModelState next = *state;
   next.objects = std::move(objects);
+  bool is_made = false;
   RobotModelCallbacks callbacks;
   callbacks.cancelled = [this] { return change_cancelled(); };
   callbacks.warning = [&](const std::string& warning) { ROS_WARN_STREAM(warning); };
   try {
     const auto description =
         std::make_shared<const RobotDescription>(with_objects(*state->description, next.objects));
-    next.anytime = state->anytime->with_link(description, link,
-                                             model_config(*description, next.objects), callbacks);
-    next.robot = next.anytime ? next.anytime->robot() : nullptr;
-    if (next.robot) finish(*description, &next);
+    const AnytimeModel::Ptr made = state->anytime->with_link(
+        description, link, model_config(*description, next.objects), callbacks);
+    is_made = made != nullptr;
+    if (is_made) {
+      take_robot(*description, made, &next);
+      finish(*description, &next);
+    }
   } catch (const ModelError& error) {
     return error.what();
   }
-  if (next.robot) {
+  if (is_made) {
     for (const LinkModel& built : next.robot->links) {
       if (built.name == link && !built.usable()) return built.error;
     }
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!next.robot || stop_ || changes_ended_ || change_revoked_ || reload_) return why_cancelled();
+  if (!is_made || stop_ || changes_ended_ || change_revoked_ || reload_) return why_cancelled();
   if (state_ != state) return "the robot's model has been loaded again meanwhile; try again";
   changing_.clear();  // from now on detach() finds it in the model
   objects_ = next.objects;

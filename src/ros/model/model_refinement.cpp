@@ -30,7 +30,7 @@ constexpr double kExactThatPays = 2.0;
 /// is near, and of these the one whose queries measure most points exactly. None where no step
 /// would pay.
 std::optional<std::size_t> ModelLoader::link_to_refine(const ModelState& state) {
-  if (state.phase != ModelState::Phase::kReady || !state.anytime) return std::nullopt;
+  if (!state.is_ready() || !state.anytime) return std::nullopt;
   if (needs_.size() != state.usage->size() || needs_of_ != state.usage) {
     needs_of_ = state.usage;
     needs_.assign(state.usage->size(), {});
@@ -97,7 +97,7 @@ void ModelLoader::take_packings(const ModelState& base, const AnytimeModel::Ptr&
                                 const std::vector<std::string>& warnings) {
   const std::lock_guard<std::mutex> change(change_mutex_);
   const auto state = this->state();
-  if (state->phase != ModelState::Phase::kReady || !state->anytime) return;
+  if (!state->is_ready() || !state->anytime) return;
   auto next = std::make_shared<ModelState>(*state);
   next->anytime =
       state->anytime == base.anytime ? refined : state->anytime->with_packings_of(*refined);

@@ -7,8 +7,8 @@
 namespace ist {
 
 bool is_refinement(const ModelState& before, const ModelState& after) {
-  return before.phase == ModelState::Phase::kReady && after.phase == ModelState::Phase::kReady &&
-         before.robot && after.robot && same_geometry(*before.robot, *after.robot);
+  return before.is_ready() && after.is_ready() && before.robot && after.robot &&
+         same_geometry(*before.robot, *after.robot);
 }
 
 std::string no_kinematics(const ModelState& model) {

@@ -30,16 +30,16 @@ struct ModelState {
   std::string root_link;              ///< empty until the URDF is known
   std::vector<std::string> links;     ///< monitored, in URDF order; known from kPacking on
   std::vector<std::string> warnings;  ///< given by packing
-  /// Known when ready. It holds every link with geometry, because the self-filter needs them all,
-  /// not only the monitored ones.
+  /// Known when ready, and while packing with links that are pending. It holds every link with
+  /// geometry, because the self-filter needs them all, not only the monitored ones.
   std::shared_ptr<const RobotModel> robot;
-  /// Known when ready: where `robot` comes from, and what finer packings are made of.
+  /// Known with `robot`: where that comes from, and what finer packings are made of.
   AnytimeModel::Ptr anytime;
   /// Repulsion of `robot`; null: the cycle makes its own. Finer packings bring it along.
   std::shared_ptr<const Repulsion> repulsion;
-  /// Known when ready; states of the same geometry share it.
+  /// Known with `robot`; states of one robot share it.
   std::shared_ptr<LinkUsage> usage;
-  std::vector<std::size_t> monitored;  ///< known when ready: indices into robot->links
+  std::vector<std::size_t> monitored;  ///< known with `robot`: indices into robot->links
   std::shared_ptr<const Kinematics>
       kinematics;                  ///< known from kPacking on; null where it is faulty
   std::string kinematics_problem;  ///< why `kinematics` is null
@@ -48,6 +48,7 @@ struct ModelState {
 
   /// Whether the model is being made: nothing is wrong, and nobody has to do anything but wait.
   bool is_loading() const { return phase == Phase::kReading || phase == Phase::kPacking; }
+  bool is_ready() const { return phase == Phase::kReady; }
 };
 
 /// Whether the second state is ready and differs from the first one in its packings alone.

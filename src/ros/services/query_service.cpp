@@ -121,7 +121,7 @@ std::string QueryService::take_model() {
     const std::lock_guard<std::mutex> lock(mutex_);
     model = newest_model_;
   }
-  if (!model || model->phase != ModelState::Phase::kReady) {
+  if (!model || !model->is_ready()) {
     return model ? model->problem : "the robot's model is not ready yet";
   }
   if (!model->kinematics) return no_kinematics(*model);

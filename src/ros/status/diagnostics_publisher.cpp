@@ -18,7 +18,7 @@ DiagnosticsPublisher::DiagnosticsPublisher(ros::NodeHandle nh, const std::string
 void DiagnosticsPublisher::publish(const CycleReport& report, const ModelState& model,
                                    const ContactModel* contacts, std::uint64_t triggers) {
   // The loader itself logs its progress until the model is ready.
-  if (model.phase == ModelState::Phase::kReady) {
+  if (model.is_ready()) {
     status_log_.update(report.status.code, report.status.text);
   }
   const auto now = std::chrono::steady_clock::now();

@@ -120,7 +120,7 @@ void add_packings(const ModelState& state, DiagnosticStatus* status) {
 DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& state,
                                    const ContactModel* contacts, ContactsWanted contacts_wanted) {
   DiagnosticStatus status = make_diagnostic(node, "model");
-  const bool ready = state.phase == ModelState::Phase::kReady;
+  const bool ready = state.is_ready();
   if (!state.problem.empty()) {
     raise(state.is_loading() ? DiagnosticStatus::WARN : DiagnosticStatus::ERROR, state.problem,
           &status);
@@ -133,6 +133,7 @@ DiagnosticStatus model_diagnostics(const std::string& node, const ModelState& st
   }
   for (const std::size_t i : state.monitored) {
     const LinkModel& link = state.robot->links[i];
+    if (is_pending(link)) continue;
     if (!link.usable()) {
       raise(DiagnosticStatus::ERROR, link.error, &status);
       add_value(link.name, link.error, &status);
