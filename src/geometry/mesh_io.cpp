@@ -85,7 +85,8 @@ Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
 // Collects triangles, with one vertex for all corners at the same coordinates.
 class MeshBuilder {
  public:
-  MeshBuilder(const std::string& path, const Eigen::Vector3d& scale) : path_(path), scale_(scale) {}
+  MeshBuilder(const std::string& path, const Eigen::Vector3d& scale, const CancelRequest& cancelled)
+      : path_(path), scale_(scale), watch_(cancelled) {}
 
   void add_node(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& X_MP) {
     const Eigen::Affine3d X_MN = X_MP * to_eigen(node.mTransformation);
@@ -111,6 +112,7 @@ class MeshBuilder {
     // A mirror reverses the corners' order; swapping two of them keeps outside outside.
     const bool mirrored = (scale_.prod() < 0.0) != (X_MN.linear().determinant() < 0.0);
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      watch_.step();
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices != 3) continue;
       if (mesh_.triangles.size() == kMaxTriangles) {
@@ -145,6 +147,7 @@ class MeshBuilder {
 
   const std::string& path_;
   const Eigen::Vector3d scale_;
+  CancelWatch watch_;
   TriangleMesh mesh_;
   std::unordered_map<std::array<double, 3>, std::uint32_t, Hash> vertices_;
 };
@@ -165,7 +168,7 @@ TriangleMesh load_mesh(const std::string& path, const Eigen::Vector3d& scale,
                    "); STL, DAE and OBJ are known to work");
   }
   const Eigen::Affine3d X_MR = Eigen::Affine3d::Identity();
-  MeshBuilder builder(path, unit * scale);
+  MeshBuilder builder(path, unit * scale, cancelled);
   if (is_collada) {
     // The root holds nothing but assimp's conversion of unit and up-axis.
     builder.add_children(*scene, *scene->mRootNode, X_MR);

@@ -32,8 +32,9 @@ struct PairChoice {
 
 /// @param nh     namespace in which, and above which, `robot_description_semantic` is searched
 /// @param model  ready, with kinematics
-/// @param cancelled  asked now and then; true ends the work, whose result is of no use then
+/// @param cancelled  asked now and then; true ends the work, whose result is of no use then. May be
+///                   empty
 PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
-                        const ModelState& model, const std::function<bool()>& cancelled);
+                        const ModelState& model, const std::function<bool()>& cancelled = {});
 
 }  // namespace ist
