@@ -99,19 +99,18 @@ double separation_scale(const SeparationConfig& config, double bound, double obs
 }
 
 // The scale that one link allows.
-// @param held  [m] the bound that hysteresis gives
+// @param held  [m] the bound that hysteresis gives, never above the link's own
 SpeedScaleAnswer scale_of_link(const SpeedScaleConfig& config, double stop, double free,
                                double held, const SpeedScaleInput& input, double age) {
   SpeedScaleAnswer answer;
-  answer.bound = std::min(held, input.lower_bound);
+  answer.bound = held;
   answer.stop_distance = stop;
   answer.free_distance = free;
   answer.scale = ramp(config, stop, free, held);
   answer.rule = answer.scale <= 0.0 ? SpeedRule::kStop : SpeedRule::kSlow;
   if (answer.scale >= 1.0) answer.rule = SpeedRule::kFree;
   if (!config.separation.enabled) return answer;
-  const double allowed =
-      separation_scale(config.separation, answer.bound, input.obstacle_speed, age);
+  const double allowed = separation_scale(config.separation, held, input.obstacle_speed, age);
   if (allowed < answer.scale) {
     answer.scale = allowed;
     answer.rule = SpeedRule::kSeparation;
@@ -207,15 +206,17 @@ SpeedScale::Distances SpeedScale::distances(const SpeedScaleConfig& config,
   return result;
 }
 
-// Follows the bound downward at once, and upward when it is more than the hysteresis larger.
-void SpeedScale::hold_bound(std::size_t link, const SpeedScaleInput& input, double hysteresis) {
+// Follows the bound downward at once, and upward when it is more than the hysteresis larger. A
+// CLEAR link's bound that is free already has no noise, because nothing was measured.
+void SpeedScale::hold_bound(std::size_t link, const SpeedScaleInput& input, double free,
+                            double hysteresis) {
   double& held = held_[link];
-  if (input.state == LinkState::kClear) {
-    held = kInfinity;
-  } else if (std::isnan(held) || input.lower_bound < held) {
-    held = input.lower_bound;
-  } else if (input.lower_bound - hysteresis > held) {
-    held = input.lower_bound - hysteresis;
+  const double bound = input.lower_bound;
+  const bool is_free = input.state == LinkState::kClear && bound >= free;
+  if (std::isnan(held) || bound < held || is_free) {
+    held = bound;
+  } else if (bound - hysteresis > held) {
+    held = bound - hysteresis;
   }
 }
 
@@ -239,9 +240,8 @@ SpeedScaleAnswer SpeedScale::update(const SpeedScaleConfig& config,
       answer.link = static_cast<std::int32_t>(i);
       return answer;
     }
-    hold_bound(i, input, config.hysteresis);
     const auto [stop, free] = distances(config, i);
-    // A link that is CLEAR is held at +inf, and known to be as far away as its bound says.
+    hold_bound(i, input, free, config.hysteresis);
     SpeedScaleAnswer one = scale_of_link(config, stop, free, held_[i], input, std::max(age, 0.0));
     if (one.scale > least.scale || (one.scale == least.scale && one.bound >= least.bound)) continue;
     one.link = static_cast<std::int32_t>(i);

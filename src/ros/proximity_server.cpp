@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <boost/make_shared.hpp>
-#include <limits>
 #include <utility>
 
 #include "ros/common/exceptions.h"
@@ -189,10 +188,7 @@ void ProximityServer::Impl::run_cycle() {
     ++report_.cycles;
   }
   last_stamp_ = message->header.stamp;
-  const double least_when_clear = config_.unknown_space == UnknownSpace::kObstacle
-                                      ? -std::numeric_limits<double>::infinity()
-                                      : config_.query.max_distance;
-  assert_invariants(*message, {ros::Time::now(), least_when_clear, live.query.margin});
+  assert_invariants(*message, {ros::Time::now(), least_when_clear(config_), live.query.margin});
   Stopwatch watch;
   spheres_.show_nearness(*message, config_.query.max_distance);
   const auto self = self_proximity_ ? self_proximity_->newest() : nullptr;

@@ -198,6 +198,7 @@ TEST(MemoryMap, ACloudWithoutMemorySaysHowMuchIsSkipped) {
   MemoryMap map(config);
   map.insert(wall(1.0F, 0.0));
   EXPECT_GT(map.counts().skipped, 0U);
+  EXPECT_GT(map.counts().lost, 0U);
   EXPECT_LE(map.counts().nodes, 4096U);
 }
 
@@ -225,6 +226,39 @@ TEST(MemoryMap, StampsThatGoBackAreTheLastOne) {
   map.clear();
   map.insert(wall(1.0F, 50.0));
   EXPECT_EQ(map.now(), 50.0) << "a new start";
+}
+
+// A clock that is set back makes nothing older or younger, and takes nothing away.
+TEST(MemoryMap, AClockThatIsSetBackLosesNothing) {
+  MemoryConfig config;
+  config.decay = 10.0;
+  MemoryMap map{config};
+  map.insert(wall(1.0F, 100.0));
+  map.insert(wall(1.0F, 101.0));
+  map.shift_times(-60.0);
+  EXPECT_EQ(map.now(), 41.0);
+  const std::size_t known = map.counts().known;
+  map.forget(50.5);
+  EXPECT_EQ(map.counts().known, known);
+  EXPECT_TRUE(map.has_obstacles());
+  map.forget(51.5);
+  EXPECT_EQ(map.counts().known, 0U);
+  EXPECT_FALSE(map.has_obstacles());
+}
+
+TEST(MemoryMap, FreeSpaceIsForgottenAlone) {
+  MemoryMap map{{}};
+  map.insert(wall(1.0F, 100.0));
+  const std::size_t occupied = map.counts().occupied;
+  map.clear_free();
+  EXPECT_EQ(map.counts().known, occupied);
+  EXPECT_EQ(map.state({1.01, 0.1, 0.1}), VoxelState::kOccupied);
+  EXPECT_EQ(map.state({0.5, 0.0, 0.0}), VoxelState::kUnknown);
+  VoxelBoxes boxes;
+  map.occupied_boxes(&boxes);
+  EXPECT_FALSE(boxes.empty());
+  map.insert(wall(1.0F, 100.1));
+  EXPECT_EQ(map.state({0.5, 0.0, 0.0}), VoxelState::kFree);
 }
 
 TEST(MemoryMap, CoordinatesThatNoKeyHolds) {

@@ -98,6 +98,27 @@ TEST_F(OneLink, HysteresisHoldsTheScaleWhileTheBoundRises) {
   EXPECT_NEAR(at(0.29), 0.95, 1e-12);
 }
 
+// Where unknown space counts, a CLEAR link's bound is small and noisy. It decides, as any link's
+// does.
+TEST_F(OneLink, ClearLinkIsHeldByItsOwnBound) {
+  const auto unseen = [](double bound) { return SpeedScaleInput{LinkState::kClear, bound}; };
+  EXPECT_EQ(run(unseen(0.021)).scale, 0.0);
+  EXPECT_EQ(run(unseen(0.021)).rule, SpeedRule::kStop);
+  EXPECT_EQ(run(unseen(0.021)).bound, 0.021);
+  EXPECT_EQ(run(unseen(-0.05)).scale, 0.0);
+  EXPECT_NEAR(run(unseen(0.23)).scale, 0.5, 1e-12);
+  EXPECT_NEAR(run(unseen(0.229)).scale, 0.495 + 0.005, 1e-12);  // held since 0.20
+  EXPECT_EQ(run(unseen(-kInfinity)).scale, 0.0);
+  EXPECT_EQ(run(clear()).scale, 1.0);
+  EXPECT_EQ(run(clear()).bound, kRange);
+  // Nothing in a range that is no longer than the free distance is free.
+  config.free_distance = kRange;
+  EXPECT_LT(run(unseen(0.9)).scale, 1.0);
+  EXPECT_EQ(run(clear()).scale, 1.0);
+  config.separation.enabled = true;
+  EXPECT_EQ(run(unseen(0.05)).scale, 0.0);
+}
+
 // A bound with 5 mm of noise (standard deviation), anywhere between contact and free: without
 // hysteresis the scale changes at every cycle and the robot starts and stops for ever.
 TEST_F(OneLink, NoChatterUnder5mmNoise) {

@@ -9,6 +9,7 @@ import numpy as np
 import proximity_testing as pt
 import rospy
 from joint_states_test import ARM, JointStatesTest, joint_state
+from memory_test import BALL, FAR, NEAR, VOXEL, distance_to
 from proximity_testing import LinkProximity, ProximityArray
 from rosgraph_msgs.msg import Clock
 from visualization_msgs.msg import MarkerArray
@@ -147,6 +148,38 @@ class ClockTest(unittest.TestCase):
         future.stop()
         for m in node.messages:
             pt.check_invariants(self, m)
+        world.stop()
+        self.assertEqual(node.stop(), 0)
+        clock.stop()
+
+    # What is hidden from the camera is remembered, whatever the clock does.
+    def test_memory_of_a_clock_that_is_set_back(self):
+        clock = SimulatedClock()
+        clock.start()
+        world = pt.World("/clock_memory").stand(pt.transform(BALL), pt.transform((0, 0, 5)))
+        world.points = FAR
+        world.start_tf()
+        world.start_clouds()
+        parameters = {"rate": 50, "links": ["ball_link"], "max_distance": 0.8}
+        parameters["memory"] = {"enabled": True, "decay": 1000.0, "resolution": VOXEL}
+        node = pt.ProximityNode("/clock_memory", parameters, pt.urdf())
+        ball = lambda m: pt.link(m, "ball_link")  # noqa: E731
+        node.wait_for(lambda m: m.status == 0 and ball(m).source == "cloud", "the far patch")
+        world.points = NEAR
+        node.wait_for(lambda m: ball(m).source == "cloud/memory", "the far patch remembered")
+        for jump in (-0.3, -0.3, -5.0, -400.0):
+            before = rospy.Time.now()
+            begin = len(node.messages)
+            clock.jump(jump)
+            node.wait_for(lambda m: m.status == 0 and m.header.stamp < before, "OK after the jump")
+            self.count_messages(node, 50)
+            for m in node.messages[begin:]:
+                if m.status == 0:
+                    self.assertEqual(ball(m).source, "cloud/memory")
+                    self.assertAlmostEqual(ball(m).distance, distance_to(FAR), delta=2 * VOXEL)
+                    self.assertLessEqual(ball(m).lower_bound, distance_to(FAR))
+                else:
+                    self.assertTrue(pt.all_unknown(m))
         world.stop()
         self.assertEqual(node.stop(), 0)
         clock.stop()

@@ -188,6 +188,60 @@ TEST_F(Cycle, MessagesThatAreUsedAgainHoldTheirOwnCycleOnly) {
   }
 }
 
+// Who may vouch for what is free, and what is said where nobody does.
+TEST(Vouching, NeedsAFreshSourceThatMeasures) {
+  struct Source {
+    char kind;  // s: sensor, a: one that has never been there, w: known world, m: memory
+    bool required, ok;
+  };
+  struct Case {
+    std::vector<Source> sources;
+    std::uint8_t status;
+  };
+  constexpr auto kOk = ProximityArray::OK, kStale = ProximityArray::STALE_CLOUD;
+  const std::vector<Case> cases = {
+      {{{'s', true, true}}, kOk},
+      {{{'s', true, false}}, kStale},
+      {{{'s', false, true}}, kOk},
+      {{{'s', false, false}}, kStale},
+      {{{'s', false, false}, {'m', false, true}}, kStale},
+      {{{'s', false, true}, {'m', false, false}}, kOk},
+      {{{'s', false, false}, {'m', false, true}, {'s', false, true}}, kOk},
+      {{{'s', false, false}, {'s', false, false}, {'m', false, true}}, kStale},
+      {{{'s', true, false}, {'s', false, true}}, kStale},
+      {{{'s', false, false}, {'w', true, true}}, kStale},  // a known world sees nothing
+      {{{'s', false, false}, {'w', false, true}, {'m', false, true}}, kStale},
+      {{{'s', false, true}, {'w', false, false}}, kOk},
+      {{{'s', false, true}, {'w', true, false}}, kStale},
+      {{{'w', true, true}}, kOk},  // and where it is all, distances to it were asked for
+      {{{'w', false, true}, {'w', false, false}}, kOk},
+      {{{'w', false, false}}, kStale},
+      {{{'w', true, true}, {'w', true, false}}, kStale},
+      {{{'a', false, false}, {'w', true, true}}, kOk},
+      {{{'a', false, false}, {'w', false, true}}, kStale},
+      {{{'a', true, false}, {'w', true, true}}, kStale},
+      {{{'a', false, false}, {'s', false, false}, {'w', true, true}}, kStale},
+      {{{'a', false, false}, {'m', false, true}}, kStale},
+  };
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    StatusInput input;
+    for (const Source& source : cases[k].sources) {
+      SourceReport report;
+      report.name = std::string(1, source.kind);
+      report.measures = source.kind == 's' || source.kind == 'a';
+      report.has_been_there = source.kind == 's';
+      report.is_memory = source.kind == 'm';
+      report.required = source.required;
+      report.messages = 1;
+      report.newest = source.ok ? 100.0 : 90.0;
+      input.sources.push_back(report);
+      input.source_statuses.push_back(source.ok ? Status{kOk, ""} : Status{kStale, "is old"});
+    }
+    EXPECT_EQ(overall_status(input, 100.0).code, cases[k].status) << "case " << k;
+    EXPECT_EQ(clouds_usable(input), cases[k].status == kOk) << "case " << k;
+  }
+}
+
 // The parts add up, and the report keeps them.
 TEST_F(Cycle, SaysWhereItsTimeGoes) {
   see_wall(0.1F);

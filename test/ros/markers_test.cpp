@@ -35,6 +35,7 @@ Link link(const std::string& name, double distance, double x = 0.0) {
               : distance == kInf   ? Link::CLEAR
               : distance < 0.0     ? Link::CONTACT
                                    : Link::NEAR;
+  one.lower_bound = std::isnan(distance) ? -kInf : distance;
   one.point_on_link.x = one.point_on_obstacle.x = x;
   one.point_on_obstacle.z = -distance;
   one.repulsion.z = 0.5;
@@ -63,6 +64,9 @@ TEST(NearestSummary, SaysWhatIsNearestAndWhatIsNotKnown) {
   EXPECT_EQ(summarize_nearest(array({link("a", 0.4), link("b", -0.02)}), 1.0, {}).text,
             "-0.020 m\nb");
   EXPECT_EQ(summarize_nearest(array({link("a", kInf)}), 0.5, {}).text, "> 0.50 m");
+  Link unseen = link("a", kInf);
+  unseen.lower_bound = 0.02;
+  EXPECT_EQ(summarize_nearest(array({unseen}), 0.5, {}).text, "> 0.02 m");
   all = summarize_nearest(array({link("a", kNaN), link("b", kNaN)}, ProximityArray::STALE_CLOUD),
                           1.0, {});
   EXPECT_EQ(all.link, -1);

@@ -196,9 +196,32 @@ class MemoryTest(unittest.TestCase):
             self.assertEqual(self.ball(message).source, "cloud/memory")
             self.assertAlmostEqual(self.ball(message).distance, distance_to(FAR), delta=2 * VOXEL)
 
+    # What was remembered is somewhere, and nobody knows where.
+    def test_its_frame_is_lost(self):
+        in_odom = ("odom", pt.transform((3.0, 0.0, 0.0)))
+        self.world.poses["base"] = in_odom
+        self.start(memory={"enabled": True, "decay": 1000.0, "resolution": VOXEL, "frame_id": "odom"})
+        self.node.wait_for(self.is_from("cloud"), "the far patch in view")
+        self.world.points = NEAR
+        self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered")
+        begin = len(self.node.messages)
+        del self.world.poses["base"]
+        lost = self.node.wait_for_status(ProximityArray.NO_CLOUD, "nobody knows where")
+        self.assertIn("odom", lost.status_text)
+        for message in self.node.messages[begin:]:
+            if message.status == ProximityArray.OK:
+                self.assertEqual(self.ball(message).source, "cloud/memory")
+            else:
+                self.assertTrue(pt.all_unknown(message))
+        self.world.poses["base"] = in_odom
+        self.node.wait_for(self.is_from("cloud/memory"), "the far patch remembered again")
+
+    # Obstacles that there was no place for are known as long as they are in view, and lost then.
     def test_too_little_memory_is_told(self):
         self.start(memory={"enabled": True, "resolution": 0.005, "max_nodes": 5000})
-        self.node.wait_for(self.is_from("cloud"), "answers of the camera")
+        message = self.node.wait_for_status(ProximityArray.NO_CLOUD, "voxels of obstacles are lost")
+        self.assertIn("max_nodes", message.status_text)
+        self.assertTrue(pt.all_unknown(message))
         self.node.wait_until(
             lambda: "max_nodes"
             in getattr(self.node.diagnostics.get("input cloud/memory"), "message", ""),

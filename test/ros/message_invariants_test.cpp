@@ -47,6 +47,8 @@ ProximityArray message() {
   clear.state = LinkState::kClear;
   clear.distance = kInf;
   clear.lower_bound = 1.0;
+  all.sources.resize(1);
+  all.sources[0].name = "camera";
   all.links.push_back(unknown_link("unknown"));
   all.links.push_back(to_message("clear", clear, none, Wrench::zero(), {}, ""));
   all.links.push_back(to_message("near", measured(0.3), none, Wrench::zero(), {}, "camera"));
@@ -65,6 +67,9 @@ TEST(MessageInvariants, findEachBreach) {
   const std::vector<std::pair<std::string, std::function<void(ProximityArray*)>>> breaches = {
       {"status_text", [](ProximityArray* m) { m->status = ProximityArray::OK; }},
       {"status_text", [](ProximityArray* m) { m->status_text.clear(); }},
+      {"no memory has to be OK", [](ProximityArray* m) { m->sources[0].name = "camera/memory"; }},
+      {"no memory has to be OK", [](ProximityArray* m) { m->sources[0].status = m->STALE_CLOUD; }},
+      {"UNKNOWN where", [](ProximityArray* m) { m->status = m->NO_CLOUD; }},
       {"future", [](ProximityArray* m) { m->header.stamp = ros::Time(100.02); }},
       {"computation_time", [](ProximityArray* m) { m->computation_time = kNaN; }},
       {"'unknown' in state 0: distance", link(kUnknown, [](Link* l) { l->distance = kInf; })},
@@ -102,6 +107,24 @@ TEST(MessageInvariants, findEachBreach) {
     const std::string found = broken_invariant(broken, input());
     EXPECT_NE(found.find(words), std::string::npos) << words << ": '" << found << "'";
   }
+}
+
+// One number decides: a summary that says more than the links is found.
+TEST(MessageInvariants, SummaryAgreesWithItsLinks) {
+  ProximityArray all = message();
+  const std::vector<bool> counts = {false, true, true, false};
+  const double least = all.links[2].lower_bound;
+  EXPECT_EQ(broken_agreement(all, counts, least, 0.5), "");
+  EXPECT_EQ(broken_agreement(all, counts, -0.1, 0.0), "");
+  EXPECT_EQ(broken_agreement(all, counts, kNaN, 0.0), "");
+  EXPECT_NE(broken_agreement(all, counts, kNaN, 0.1), "");
+  EXPECT_NE(broken_agreement(all, counts, least + 1e-3, 0.5), "");
+  EXPECT_NE(broken_agreement(all, counts, -0.1, 0.1), "");
+  EXPECT_NE(broken_agreement(all, counts, least, kNaN), "");
+  all.links[1].lower_bound = 0.021;  // CLEAR, and near to what was never seen
+  EXPECT_NE(broken_agreement(all, counts, least, 0.5), "");
+  EXPECT_EQ(broken_agreement(all, counts, 0.021, 0.0), "");
+  EXPECT_NE(broken_agreement(all, {true, true, true, true}, 0.021, 0.0), "");  // one is UNKNOWN
 }
 
 }  // namespace

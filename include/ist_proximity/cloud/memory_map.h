@@ -55,6 +55,8 @@ struct MemoryCounts {
   std::size_t nodes = 0;      ///< voxels that memory is in use for
   std::size_t forgotten = 0;  ///< voxels forgotten for want of memory, since the start
   std::size_t skipped = 0;    ///< voxels of the last cloud for which there was no memory
+  std::size_t lost =
+      0;  ///< occupied ones of both kinds, since the start: obstacles, unless in view
 };
 
 /// Boxes of one or several whole voxels [m].
@@ -91,6 +93,11 @@ class MemoryMap {
 
   /// Forgets everything.
   void clear();
+  /// Forgets what is free.
+  void clear_free();
+
+  /// Moves all times [s], as the clock that they are of has been set: nothing gets older by it.
+  void shift_times(double seconds);
 
   /// The state of the voxel that holds a point.
   VoxelState state(const Eigen::Vector3d& p_M) const;
@@ -109,6 +116,8 @@ class MemoryMap {
   void note_free(Span<const Eigen::Vector4f> spheres, double now);
 
   MemoryCounts counts() const;  ///< voxels at present
+  std::size_t lost() const;     ///< MemoryCounts::lost, without counting the others
+  bool has_obstacles() const;   ///< whether any voxel is occupied
   /// [s] of the last cloud or forget(); NaN: there was none.
   double now() const;
 

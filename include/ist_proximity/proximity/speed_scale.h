@@ -98,7 +98,9 @@ struct SpeedScaleAnswer {
 
 /// The share of its speed at which a robot may go: 0 within a link's stop distance, 1 outside its
 /// free distance, and rising in between, for the link that allows the least. It rests on
-/// `lower_bound`, which is proven, and never on `distance`. Anything that is not known makes it 0.
+/// `lower_bound`, which is proven, whatever the state: never on `distance`, and a link that is
+/// CLEAR may have a small bound where space has not been seen. Anything that is not known makes it
+/// 0.
 ///
 /// Hysteresis: a link's bound is followed downward at once, and upward at a distance of
 /// `hysteresis`, so the bound used is never above the link's own. Noise that is smaller than the
@@ -138,7 +140,7 @@ class SpeedScale {
   };
   Distances distances(const SpeedScaleConfig& config, std::size_t link) const;
   bool knows_all_links(const SpeedScaleConfig& config) const;
-  void hold_bound(std::size_t link, const SpeedScaleInput& input, double hysteresis);
+  void hold_bound(std::size_t link, const SpeedScaleInput& input, double free, double hysteresis);
 
   std::vector<std::string> links_;
   std::vector<double> held_;  ///< [m] by link: the bound that was used last; NaN: none

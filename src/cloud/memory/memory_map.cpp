@@ -37,6 +37,8 @@ void MemoryMap::forget(double now) {
 }
 
 void MemoryMap::clear() { impl_->voxels.clear(); }
+void MemoryMap::clear_free() { impl_->voxels.clear_free(); }
+void MemoryMap::shift_times(double seconds) { impl_->voxels.shift_times(seconds); }
 
 float MemoryMap::log_odds(const Eigen::Vector3d& p_M) const {
   VoxelKey key;
@@ -89,7 +91,18 @@ MemoryCounts MemoryMap::counts() const {
   counts.nodes = blocks.size() * kBlockVoxels;
   counts.forgotten = impl_->voxels.forgotten();
   counts.skipped = impl_->voxels.skipped();
+  counts.lost = lost();
   return counts;
+}
+
+std::size_t MemoryMap::lost() const { return impl_->voxels.lost(); }
+
+bool MemoryMap::has_obstacles() const {
+  const VoxelBlocks& blocks = impl_->voxels.blocks();
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    if (blocks[i].occupied != BlockBits{}) return true;
+  }
+  return false;
 }
 
 std::vector<std::uint8_t> MemoryMap::octree_bytes(std::size_t* nodes) const {

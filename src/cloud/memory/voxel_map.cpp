@@ -116,6 +116,27 @@ void VoxelMap::clear() {
   now_ = std::numeric_limits<double>::quiet_NaN();
 }
 
+void VoxelMap::clear_free() {
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    VoxelBlock& block = blocks_[i];
+    for_each_bit(without(block.known, block.occupied), [&](unsigned place) {
+      block.log_odds[place] = std::numeric_limits<float>::quiet_NaN();
+    });
+    block.known = block.occupied;
+  }
+  remove_empty_blocks();
+}
+
+void VoxelMap::shift_times(double seconds) {
+  epoch_ += seconds;
+  now_ += seconds;
+}
+
+void VoxelMap::remove_empty_blocks() {
+  blocks_.remove_if([](const VoxelBlock& block) { return block.known == BlockBits{}; });
+  reset_cursor();
+}
+
 std::uint32_t VoxelMap::tick(double time) const {
   const double ticks = (time - epoch_) / kTick;
   return ticks >= 0.0 ? static_cast<std::uint32_t>(std::min(ticks, kMaxTicks)) : 0;  // NaN: 0
@@ -254,6 +275,7 @@ void VoxelMap::mark_hits() {
   const auto end = std::unique(missing.begin(), missing.end());
   make_place(static_cast<std::size_t>(end - missing.begin()), true);
   mark_all();
+  lost_ += skipped_;
 }
 
 void VoxelMap::add_rays(const Eigen::Vector3f& origin) {
@@ -307,9 +329,7 @@ void VoxelMap::forget_old() {
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     any_empty = forget_before(limit, &blocks_[i]) || any_empty;
   }
-  if (!any_empty) return;
-  blocks_.remove_if([](const VoxelBlock& block) { return block.known == BlockBits{}; });
-  reset_cursor();
+  if (any_empty) remove_empty_blocks();
 }
 
 /// Forgets blocks: those that were measured longest ago, those without anything occupied first,
@@ -338,6 +358,7 @@ void VoxelMap::make_place(std::size_t wanted, bool obstacles) {
     if (allowed == 0 || !may_go(block) || age(block) > limit) return false;
     --allowed;
     forgotten_ += count_bits(block.known);
+    lost_ += count_bits(block.occupied);
     return true;
   });
   reset_cursor();

@@ -22,6 +22,8 @@ class VoxelMap {
   void set_region(const RegionOfInterest& region_M);
   void insert(const MemoryScan& scan);
   void clear();
+  void clear_free();
+  void shift_times(double seconds);
 
   /// Tells the time; it never goes back.
   void set_now(double time);
@@ -36,6 +38,7 @@ class VoxelMap {
   double time(std::uint32_t tick) const;  ///< [s] of a voxel's or block's time
   std::size_t forgotten() const { return forgotten_; }
   std::size_t skipped() const { return skipped_; }
+  std::size_t lost() const { return lost_; }
   float least() const { return least_; }
   float most() const { return most_; }
 
@@ -61,6 +64,7 @@ class VoxelMap {
   static void note(VoxelBlock* block, unsigned place, std::uint32_t time, bool is_hit);
   void apply();
   void make_place(std::size_t wanted, bool obstacles);
+  void remove_empty_blocks();
   void reset_cursor();
   /// Whether the cloud that is inserted has marked anything in a block.
   bool is_touched(const VoxelBlock& block) const {
@@ -75,7 +79,7 @@ class VoxelMap {
   double now_ = std::numeric_limits<double>::quiet_NaN();
   double epoch_ = 0.0;  ///< [s] at which ticks begin
   std::uint32_t frame_ = 1;
-  std::size_t forgotten_ = 0, skipped_ = 0;
+  std::size_t forgotten_ = 0, skipped_ = 0, lost_ = 0;
   std::size_t added_ = 0;  ///< blocks that the last cloud added
 
   // Of the cloud that is inserted.

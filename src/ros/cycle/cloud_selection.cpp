@@ -1,11 +1,25 @@
 #include "ros/cycle/cloud_selection.h"
 
+#include <ist_proximity/ProximityArray.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "ist_proximity/repulsion/repulsion.h"
 
 namespace ist {
+namespace {
+
+/// The number of the source whose memory a source is; its own, where it is none.
+std::size_t parent_of(const CloudSources& sources, std::size_t source) {
+  const ObstacleSource* parent = sources[source]->parent();
+  for (std::size_t i = 0; parent != nullptr && i < source; ++i) {
+    if (sources[i].get() == parent) return i;
+  }
+  return source;
+}
+
+}  // namespace
 
 void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
                             const std::shared_ptr<const RobotModel>& model,
@@ -16,10 +30,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
   selected_.clear();
   held_.clear();
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    const SourceSnapshot* snapshot =
-        sources[i]->parent() != nullptr
-            ? memory_of(sources, i)
-            : newest(sources[i].get(), model, poses_stamp, pose_timeout);
+    const SourceSnapshot* snapshot = newest(sources, i, model, poses_stamp, pose_timeout, *status);
     SourceReport& report = status->sources[i];
     sources[i]->report(&report);
     if (snapshot) {
@@ -30,7 +41,10 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
       report.snapshot_memory = snapshot->cloud.index.memory();
       report.ingest_time = snapshot->cloud.ingest_time;
     }
-    status->source_statuses[i] = source_status(report, now.toSec());
+    const std::size_t parent = parent_of(sources, i);
+    status->source_statuses[i] = parent == i
+                                     ? source_status(report, now.toSec())
+                                     : memory_status(report, status->source_statuses[parent]);
     selected_.push_back(snapshot);
   }
 
@@ -43,9 +57,7 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
   oldest_stamp_ = ros::Time();
   const bool usable = clouds_usable(*status);
   for (std::size_t i = 0; i < selected_.size(); ++i) {
-    // The rest of an incomplete world counts, where it is not required.
-    const bool is_incomplete = !status->sources[i].incomplete.empty();
-    if (!usable || !(status->source_statuses[i].ok() || is_incomplete)) selected_[i] = nullptr;
+    if (!usable || !is_obstacle(i, *status)) selected_[i] = nullptr;
     if (!selected_[i]) continue;
     if (selected_[i]->surfaces) {
       worlds_.push_back(&selected_[i]->world);
@@ -63,20 +75,34 @@ void CloudSelection::update(const ros::Time& now, const CloudSources& sources,
   }
 }
 
-/// What belongs to the snapshot of a source that was taken before: no cloud is ever combined with
-/// what is hidden from another one.
-const SourceSnapshot* CloudSelection::memory_of(const CloudSources& sources,
-                                                std::size_t source) const {
-  for (std::size_t i = 0; i < source; ++i) {
-    if (sources[i].get() != sources[source]->parent()) continue;
-    return selected_[i] != nullptr ? selected_[i]->memory.get() : nullptr;
+/// The newest snapshot of a source. What is hidden from a cloud belongs to its snapshot: no cloud
+/// is ever combined with what is hidden from another one. Beside a cloud that is not used, all that
+/// its source remembers is an obstacle.
+const SourceSnapshot* CloudSelection::newest(const CloudSources& sources, std::size_t source,
+                                             const std::shared_ptr<const RobotModel>& model,
+                                             const ros::Time& poses_stamp, double pose_timeout,
+                                             const StatusInput& status) {
+  const std::size_t parent = parent_of(sources, source);
+  if (parent != source && selected_[parent] != nullptr && is_obstacle(parent, status)) {
+    return selected_[parent]->memory.get();
   }
-  return nullptr;
+  return take_newest(sources[source].get(), model, poses_stamp, pose_timeout);
 }
 
-const SourceSnapshot* CloudSelection::newest(ObstacleSource* source,
-                                             const std::shared_ptr<const RobotModel>& model,
-                                             const ros::Time& poses_stamp, double pose_timeout) {
+/// Whether what a source has counts as an obstacle: where others vouch for what is free, also what
+/// is left of an incomplete source, and what a silent one remembers.
+bool CloudSelection::is_obstacle(std::size_t source, const StatusInput& status) const {
+  const Status& own = status.source_statuses[source];
+  const SourceReport& report = status.sources[source];
+  const bool is_incomplete =
+      own.code == ist_proximity::ProximityArray::NO_CLOUD && !report.incomplete.empty();
+  return own.ok() || is_incomplete || report.is_memory;
+}
+
+const SourceSnapshot* CloudSelection::take_newest(ObstacleSource* source,
+                                                  const std::shared_ptr<const RobotModel>& model,
+                                                  const ros::Time& poses_stamp,
+                                                  double pose_timeout) {
   if (reader_ == Reader::kOnly) return source->newest(model, poses_stamp, pose_timeout);
   held_.push_back(source->share(model, poses_stamp, pose_timeout));
   return held_.back().get();

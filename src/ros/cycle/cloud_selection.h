@@ -63,10 +63,14 @@ class CloudSelection {
   void exclude_unfiltered(std::vector<bool>* links) const;
 
  private:
-  const SourceSnapshot* memory_of(const CloudSources& sources, std::size_t source) const;
-  const SourceSnapshot* newest(ObstacleSource* source,
+  const SourceSnapshot* newest(const CloudSources& sources, std::size_t source,
                                const std::shared_ptr<const RobotModel>& model,
-                               const ros::Time& poses_stamp, double pose_timeout);
+                               const ros::Time& poses_stamp, double pose_timeout,
+                               const StatusInput& status);
+  bool is_obstacle(std::size_t source, const StatusInput& status) const;
+  const SourceSnapshot* take_newest(ObstacleSource* source,
+                                    const std::shared_ptr<const RobotModel>& model,
+                                    const ros::Time& poses_stamp, double pose_timeout);
 
   const Reader reader_;
   std::vector<const SourceSnapshot*> selected_;

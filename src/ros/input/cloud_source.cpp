@@ -99,6 +99,11 @@ std::shared_ptr<const SourceSnapshot> CloudSource::share(
   return place_map(buffer_, time, max_age, placed.get()).empty() ? placed : nullptr;
 }
 
+void CloudSource::report(SourceReport* report) {
+  state_.report(report);
+  if (memory_) report->incomplete = memory_->loss();
+}
+
 void CloudSource::run() {
   name_thread("ist " + config_.name);
   guard([this] { read_file(); });
@@ -112,6 +117,7 @@ void CloudSource::run() {
       drop_overdue();
       use_newest_ready();
       use_map();
+      if (memory_) memory_->grow_older();
       count_publishers();
     });
   }
@@ -146,6 +152,7 @@ void CloudSource::count_publishers() {
   if (!has_received_) advice = topic_advice_.ask();
   state_.update([&](SourceReport* report) {
     report->publishers = *publishers;
+    report->has_been_there |= *publishers > 0;
     if (advice) report->advice = *advice;
   });
 }
@@ -167,6 +174,7 @@ void CloudSource::take_target() {
     placer_.begin_target();
   }
   target_ = std::move(newest);
+  if (memory_ && target_.model) memory_->begin_target(target_);
   if (!target_.model) waiting_.clear();
 }
 
@@ -193,6 +201,7 @@ void CloudSource::receive(const Received& received) {
   bool is_used = true;
   state_.update([&](SourceReport* report) {
     ++report->messages;
+    report->has_been_there = true;
     if (is_believed) {
       report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
       report->ahead = ahead;

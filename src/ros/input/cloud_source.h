@@ -64,7 +64,7 @@ class CloudSource : public ObstacleSource {
                                const ros::Time& time, double max_age) override;
   std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
                                               const ros::Time& time, double max_age) override;
-  void report(SourceReport* report) override { state_.report(report); }
+  void report(SourceReport* report) override;
 
  private:
   using MeasurementPtr = std::shared_ptr<const Measurement>;

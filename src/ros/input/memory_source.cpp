@@ -9,6 +9,7 @@ void MemorySource::report(SourceReport* report) {
   report->type = "octomap_msgs/Octomap";
   report->noun = "memory";
   report->is_memory = true;
+  report->measures = false;
   report->required = false;
   memory_->report(report);
 }

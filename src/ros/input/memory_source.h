@@ -8,13 +8,13 @@
 
 namespace ist {
 
-/// What another source remembers, as a source of its own: NAME/memory. Its snapshots come with
-/// those of that source; see CloudSelection.
+/// What another source remembers, as a source of its own: NAME/memory. Beside a fresh cloud its
+/// snapshots come with those of that source (see CloudSelection), else they are its own.
 class MemorySource : public ObstacleSource {
  public:
   /// @param parent  outlives this
   /// @param memory  of `parent`
-  MemorySource(const ObstacleSource& parent, std::shared_ptr<const SourceMemory> memory,
+  MemorySource(const ObstacleSource& parent, std::shared_ptr<SourceMemory> memory,
                std::string topic)
       : parent_(parent), memory_(std::move(memory)), topic_(std::move(topic)) {}
 
@@ -22,19 +22,19 @@ class MemorySource : public ObstacleSource {
                  const RegionOfInterest& /*region*/) override {}
   const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& /*model*/,
                                const ros::Time& /*time*/, double /*max_age*/) override {
-    return nullptr;
+    return memory_->newest();
   }
   std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& /*model*/,
                                               const ros::Time& /*time*/,
                                               double /*max_age*/) override {
-    return nullptr;
+    return memory_->share();
   }
   void report(SourceReport* report) override;
   const ObstacleSource* parent() const override { return &parent_; }
 
  private:
   const ObstacleSource& parent_;
-  const std::shared_ptr<const SourceMemory> memory_;
+  const std::shared_ptr<SourceMemory> memory_;
   const std::string topic_;
 };
 

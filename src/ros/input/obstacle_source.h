@@ -39,8 +39,8 @@ class ObstacleSource {
   /// the memory of its strings. Thread safe.
   virtual void report(SourceReport* report) = 0;
 
-  /// The source with whose snapshots this one's come, as SourceSnapshot::memory; null: it has its
-  /// own. The parent comes first in CloudSources.
+  /// The source with whose snapshots this one's come while they are fresh, as
+  /// SourceSnapshot::memory; null: none. The parent comes first in CloudSources.
   virtual const ObstacleSource* parent() const { return nullptr; }
 };
 

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,10 @@ namespace {
 constexpr std::chrono::milliseconds kPublicationPeriod(500), kCountPeriod(200);
 // [s] Between two looks at where the robot is; it is a few centimetres farther then.
 constexpr double kBodyPeriod = 0.1;
+constexpr std::chrono::milliseconds kGrowthPeriod(100);
+// [s] A clock that is set back by more has begun anew with its world: a bag, a simulation. Stamps
+// of a sender are taken likewise.
+constexpr double kShortStep = 1.0;
 
 MemoryConfig map_config(const SourceConfig& config) {
   MemoryConfig map = config.memory.map;
@@ -56,15 +61,24 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
                                                          const SourceTarget& target,
                                                          const SourceSnapshot& cloud) {
   Stopwatch watch;
-  const std::lock_guard<std::mutex> lock(mutex_);
   begin_target(target);
-  problem_ = insert(measurement, placement, target, cloud);
-  if (problem_.empty()) {
-    newest_ = make_snapshot(cloud, &MemoryMap::hidden_boxes);
-  } else if (newest_) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  cloud_stamp_ = cloud.stamp;
+  counts_from_ = cloud.counts_from;
+  extent_ = extent_of_voxels(cloud.cloud.extent, map_.config().max_range);
+  told_next_.problem = insert(measurement, placement, target, cloud);
+  if (told_next_.problem.empty()) {
+    newest_ = make_snapshot(&MemoryMap::hidden_boxes);
+  } else if (!std::isnan(map_.now())) {
     // Space that the last remembered cloud answered for may be out of this one's view.
     map_.forget(cloud.cloud.stamp);
-    newest_ = make_snapshot(cloud, &MemoryMap::occupied_boxes);
+    find_frame(cloud.stamp);
+    newest_ = make_snapshot(&MemoryMap::occupied_boxes);
+  }
+  if (map_.lost() > lost_) {
+    lost_ = map_.lost();
+    note_loss("its memory is full, and " + std::to_string(lost_) +
+              " voxels of obstacles are lost so far" + advice());
   }
   publish_when_due(cloud.stamp);
   const auto now = std::chrono::steady_clock::now();
@@ -73,20 +87,61 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::take(const Measurement& meas
     counts_ = map_.counts();
   }
   took_ = watch.lap();
+  hand_over();
   return newest_;
 }
 
-/// Forgets everything where the clock or the fixed frame is another one; then, and at the start,
-/// the file is read.
 void SourceMemory::begin_target(const SourceTarget& target) {
   if (target.generation == generation_ && target.fixed_frame == fixed_frame_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::string frame_before = frame();
+  const bool is_first = generation_ == 0;
+  const double step = target.set_back - set_back_;
   generation_ = target.generation;
+  set_back_ = target.set_back;
   fixed_frame_ = target.fixed_frame;
+  if (is_first) {
+    read_file();
+  } else {
+    set_back(step);
+    if (frame() != frame_before) change_frame(frame_before);
+  }
+  hand_over();
+}
+
+void SourceMemory::change_frame(const std::string& before) {
+  if (map_.has_obstacles()) {
+    note_loss("its memory is lost: it was in the frame '" + before + "', and is in '" + frame() +
+              "' now");
+  }
   newest_.reset();
   map_.clear();
   body_.clear();
   body_noted_ = 0.0;
   links_.clear();
+  read_file();
+}
+
+/// Obstacles stay where they were seen, and get no older by it. Where so much time is missing that
+/// everything may have begun anew, what was free may not be free any more.
+void SourceMemory::set_back(double step) {
+  if (!(step > 0.0)) return;
+  map_.shift_times(-step);
+  body_.shift_times(-step);
+  stamp_ -= step;
+  told_next_.lost_until -= step;
+  body_noted_ -= step;
+  if (step > kShortStep) {
+    map_.clear_free();
+    body_.clear();
+    links_.clear();
+  }
+  const ros::Duration back(std::min(step, std::min(cloud_stamp_.toSec(), counts_from_.toSec())));
+  cloud_stamp_ -= back;
+  counts_from_ -= back;
+}
+
+void SourceMemory::read_file() {
   const std::string& file = config_.memory.file;
   file_problem_.clear();
   is_file_read_ = true;
@@ -95,6 +150,68 @@ void SourceMemory::begin_target(const SourceTarget& target) {
   if (!file_problem_.empty()) {
     ROS_WARN_STREAM("source '" << config_.name << "': the memory begins empty: " << file_problem_);
   }
+}
+
+void SourceMemory::grow_older() {
+  if (config_.required || std::chrono::steady_clock::now() < next_growth_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (std::isnan(map_.now())) return;
+  map_.forget(ros::Time::now().toSec());
+  find_frame(ros::Time::now());
+  hand_over();
+}
+
+/// Tells that obstacles are lost, for as long as they would have been remembered.
+void SourceMemory::note_loss(const std::string& text) {
+  told_next_.loss = text;
+  told_next_.lost_until = ros::Time::now().toSec() + map_.config().decay;
+}
+
+std::string SourceMemory::loss() const {
+  const std::lock_guard<std::mutex> lock(told_mutex_);
+  const bool is_lost = !told_.loss.empty() && ros::Time::now().toSec() < told_.lost_until;
+  return told_.unplaced.empty() && is_lost ? told_.loss : told_.unplaced;
+}
+
+/// Finds where the memory's frame is, or was at most the source's timeout ago.
+void SourceMemory::find_frame(const ros::Time& time) {
+  told_next_.unplaced.clear();
+  const std::string own = frame();
+  if (own == fixed_frame_) return;
+  Eigen::Isometry3d X_MF;
+  std::string fault = look_up(buffer_, own, fixed_frame_, time, &X_MF);
+  if (!fault.empty()) {
+    fault = look_up_newest(buffer_, own, fixed_frame_, time, config_.timeout, &X_MF);
+  }
+  if (fault.empty()) {
+    X_MF_ = X_MF;
+  } else if (map_.has_obstacles()) {
+    told_next_.unplaced = "nobody knows where what it remembers is (memory/frame_id): " + fault;
+  }
+}
+
+/// Hands what is told, and newest(), to those who must not wait for a cloud.
+void SourceMemory::hand_over() {
+  next_growth_ = std::chrono::steady_clock::now() + kGrowthPeriod;
+  told_next_.doubt = file_problem_.empty() ? shortage() : file_problem_;
+  told_next_.counts = counts_;
+  if (!config_.required && !std::isnan(map_.now())) {
+    told_next_.all = make_snapshot(&MemoryMap::occupied_boxes);
+    channel_.back() = told_next_.all;
+    channel_.publish();
+  }
+  const std::lock_guard<std::mutex> lock(told_mutex_);
+  told_ = told_next_;
+}
+
+const SourceSnapshot* SourceMemory::newest() {
+  channel_.update();
+  return channel_.front().get();
+}
+
+std::shared_ptr<const SourceSnapshot> SourceMemory::share() const {
+  const std::lock_guard<std::mutex> lock(told_mutex_);
+  return told_.all;
 }
 
 /// @returns empty on success, else why the cloud is not remembered
@@ -128,6 +245,7 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
   read_memory_scan(*measurement.raw_cloud(), cloud.cloud, X_MF_ * cloud.cloud.X_FS,
                    config_.ingest.min_range, map_.config().max_range, &scan_);
   map_.insert(scan_);
+  told_next_.unplaced.clear();
   stamp_ = cloud.cloud.stamp;
   note_body(placement, X_MF_, cloud.cloud.stamp);
   return "";
@@ -144,9 +262,11 @@ void SourceMemory::note_body(const Placement& placement, const Eigen::Isometry3d
   }
 }
 
-/// @param find_boxes  of MemoryMap: the boxes that queries get beside the cloud
+/// @param find_boxes  of MemoryMap: the boxes that queries get
+/// @returns null where nobody knows where they are
 std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
-    const SourceSnapshot& cloud, void (MemoryMap::*find_boxes)(VoxelBoxes*) const) const {
+    void (MemoryMap::*find_boxes)(VoxelBoxes*) const) const {
+  if (!told_next_.unplaced.empty()) return nullptr;
   VoxelBoxes boxes;
   (map_.*find_boxes)(&boxes);
   auto index = std::make_shared<BoxIndex>();
@@ -154,14 +274,14 @@ std::shared_ptr<const SourceSnapshot> SourceMemory::make_snapshot(
   auto snapshot = std::make_shared<SourceSnapshot>();
   snapshot->cloud.boxes = index;
   snapshot->cloud.X_FM = X_MF_.inverse();
-  snapshot->cloud.box_extent = extent_of_voxels(cloud.cloud.extent, map_.config().max_range);
+  snapshot->cloud.box_extent = extent_;
   snapshot->cloud.counts.received = static_cast<std::uint32_t>(counts_.known);
   snapshot->cloud.counts.used = static_cast<std::uint32_t>(boxes.size());
-  snapshot->cloud.stamp = cloud.cloud.stamp;
+  snapshot->cloud.stamp = cloud_stamp_.toSec();
   snapshot->cloud.ingest_time = took_;
-  snapshot->stamp = cloud.stamp;
-  snapshot->counts_from = cloud.counts_from;
-  snapshot->generation = cloud.generation;
+  snapshot->stamp = cloud_stamp_;
+  snapshot->counts_from = counts_from_;
+  snapshot->generation = generation_;
   return snapshot;
 }
 
@@ -183,16 +303,20 @@ std::string SourceMemory::frame() const {
 std::string SourceMemory::shortage() const {
   if (counts_.forgotten == 0 && counts_.skipped == 0) return "";
   return "memory is short: " + std::to_string(counts_.forgotten) +
-         " voxels were forgotten before their time; raise ~memory/max_nodes, which is " +
-         std::to_string(map_.config().max_nodes) + ", or lower decay, max_range or the resolution";
+         " voxels were forgotten before their time" + advice();
+}
+
+std::string SourceMemory::advice() const {
+  return "; raise ~memory/max_nodes, which is " + std::to_string(map_.config().max_nodes) +
+         ", or lower decay, max_range or the resolution";
 }
 
 void SourceMemory::report(SourceReport* report) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  report->problem = problem_;
-  report->doubt = file_problem_.empty() ? shortage() : file_problem_;
-  report->memory_voxels = counts_.nodes;
-  report->memory_occupied = counts_.occupied;
+  const std::lock_guard<std::mutex> lock(told_mutex_);
+  report->problem = told_.problem;
+  report->doubt = told_.doubt;
+  report->memory_voxels = told_.counts.nodes;
+  report->memory_occupied = told_.counts.occupied;
 }
 
 std::string SourceMemory::save(bool* is_saved) {

@@ -35,14 +35,33 @@ class SourceMemory {
   SourceMemory(const SourceConfig& config, const TransformBuffer& buffer, bool wants_body,
                const ros::Publisher& publisher);
 
-  /// Takes a cloud that has just been ingested. The source's thread only.
+  // The source's thread only.
+
+  /// Takes another fixed frame or clock. When the clock is set back, obstacles stay, as old as they
+  /// are; free space does where that is less than a second. What lies in another frame is lost.
+  void begin_target(const SourceTarget& target);
+
+  /// Takes a cloud that has just been ingested.
   /// @returns what is hidden from the cloud: boxes at the cloud's stamp; null: nothing is
   /// remembered yet
   std::shared_ptr<const SourceSnapshot> take(const Measurement& measurement,
                                              const Placement& placement, const SourceTarget& target,
                                              const SourceSnapshot& cloud);
 
-  // Thread safe.
+  /// Makes newest() again once in a while, as nobody else does while no cloud comes.
+  void grow_older();
+
+  /// All that is remembered, in view or not: what is known of obstacles while there is no fresh
+  /// cloud. Null: nothing, or the source is required, so that nothing is known then. It stays valid
+  /// until the next call and never waits. The cycle's thread only.
+  const SourceSnapshot* newest();
+
+  // Thread safe. What is told waits for no cloud.
+
+  /// The same for any other thread; valid as long as it is held.
+  std::shared_ptr<const SourceSnapshot> share() const;
+  /// What it has lost of obstacles that it would still remember, as a sentence; empty: nothing.
+  std::string loss() const;
 
   /// Writes the state of the memory to the members of a report that are about it.
   void report(SourceReport* report) const;
@@ -57,15 +76,29 @@ class SourceMemory {
   const SourceConfig& config() const { return config_; }
 
  private:
+  struct Told {
+    std::string problem, doubt;
+    std::string unplaced;     ///< why nobody knows where its obstacles are; empty: they are known
+    std::string loss;         ///< empty: nothing has been lost
+    double lost_until = 0.0;  ///< [s] when what was lost would have been forgotten
+    MemoryCounts counts;
+    std::shared_ptr<const SourceSnapshot> all;  ///< see share()
+  };
+
   std::string insert(const Measurement& measurement, const Placement& placement,
                      const SourceTarget& target, const SourceSnapshot& cloud);
-  void begin_target(const SourceTarget& target);
+  void change_frame(const std::string& before);
+  void find_frame(const ros::Time& time);
+  void set_back(double step);
+  void read_file();
+  void note_loss(const std::string& text);
+  void hand_over();
   void note_body(const Placement& placement, const Eigen::Isometry3d& X_MF, double stamp);
-  std::shared_ptr<const SourceSnapshot> make_snapshot(const SourceSnapshot& cloud,
-                                                      void (MemoryMap::*find_boxes)(VoxelBoxes*)
+  std::shared_ptr<const SourceSnapshot> make_snapshot(void (MemoryMap::*find_boxes)(VoxelBoxes*)
                                                           const) const;
   void publish_when_due(const ros::Time& stamp);
   std::string shortage() const;
+  std::string advice() const;
   std::string frame() const;
 
   const SourceConfig config_;
@@ -77,9 +110,14 @@ class SourceMemory {
   MemoryScan scan_;
   std::shared_ptr<const SourceSnapshot> newest_;
   std::uint64_t generation_ = 0;
+  double set_back_ = 0.0;  ///< [s] SourceTarget::set_back
   std::string fixed_frame_;
-  double body_noted_ = 0.0;  ///< [s]
-  std::chrono::steady_clock::time_point next_publication_, next_count_;
+  double body_noted_ = 0.0;              ///< [s]
+  std::size_t lost_ = 0;                 ///< MemoryCounts::lost, as told
+  ros::Time cloud_stamp_, counts_from_;  ///< of the last cloud
+  double extent_ = 0.0;                  ///< [m] of its points in voxels
+  std::chrono::steady_clock::time_point next_publication_, next_count_, next_growth_;
+  SnapshotChannel<std::shared_ptr<const SourceSnapshot>> channel_;  ///< of newest()
 
   mutable std::mutex mutex_;  ///< guards the members below
   MemoryMap map_, body_;
@@ -87,9 +125,13 @@ class SourceMemory {
   VoxelBoxes links_;    ///< [m] each holds a link, in M
   double stamp_ = 0.0;  ///< [s] of the last cloud
   MemoryCounts counts_;
-  std::string problem_, file_problem_;
+  std::string file_problem_;
   bool is_file_read_ = false;  ///< or there was none
-  double took_ = 0.0;          ///< [s] of the last cloud
+  Told told_next_;
+  double took_ = 0.0;  ///< [s] of the last cloud
+
+  mutable std::mutex told_mutex_;  ///< guards the next one, for copies only
+  Told told_;
 };
 
 /// The memories of all sources that have one.

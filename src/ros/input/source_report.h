@@ -17,9 +17,12 @@ struct SourceReport {
   std::string name;
   std::string topic;  ///< resolved; the path where is_file
   std::string type = "sensor_msgs/PointCloud2";
-  std::string noun = "cloud";                       ///< the word for one message
-  bool is_file = false;                             ///< a map file: read once and never stale
-  bool is_memory = false;                           ///< what another source remembers: never stale
+  std::string noun = "cloud";  ///< the word for one message
+  bool is_file = false;        ///< a map file: read once and never stale
+  bool is_memory = false;      ///< what another source remembers: as fresh as that one
+  /// Whether it can say what is free: a sensor, or a map that is measured again and again. Known
+  /// worlds and maps that stay for ever state what is there.
+  bool measures = true;
   double timeout = 0.5;                             ///< [s]
   std::string timeout_parameter = "cloud_timeout";  ///< its name
   bool required = true;
@@ -35,6 +38,7 @@ struct SourceReport {
   std::uint64_t restarts = 0;      ///< times that the stamps went back and were taken all the same
   std::uint64_t unusable = 0;      ///< dropped: malformed, in the future, or without transform
   std::uint32_t publishers = 0;
+  bool has_been_there = false;  ///< a publisher or a message, at any time since the start
   /// The advice until the first message: what the master knows of the topic and of others; may be
   /// empty.
   std::string advice;
@@ -48,7 +52,8 @@ struct SourceReport {
   double warm_up_time = 0.0;  ///< [s] what its first answer took; 0: there was no warm-up
   std::string problem;        ///< why the last message is not in use (yet); empty when it is
   std::string doubt;          ///< about messages that are used all the same; empty: none
-  /// Objects of a known world that cannot be used, though others can; empty: none.
+  /// Objects of a known world that cannot be used, though others can, or what the source's memory
+  /// has lost; empty: none.
   std::string incomplete;
 
   bool has_snapshot = false;  ///< whether a cloud is in use; the members below describe it

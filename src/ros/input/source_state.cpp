@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "ros/common/ros_time.h"
+
 namespace ist {
 
 SourceState::SourceState(const SourceConfig& config, const std::string& topic)
@@ -15,6 +17,7 @@ SourceState::SourceState(const SourceConfig& config, const std::string& topic)
   report_.timeout = config.timeout;
   report_.timeout_parameter = config.timeout_parameter;
   report_.required = config.required;
+  report_.measures = config.type != SourceType::kWorld && !config.is_permanent();
   if (config.ingest.self_filter) report_.blind_skin = config.ingest.self_filter_padding;
   report_.by_view =
       config.ingest.self_filter && config.ingest.self_filter_mode == SelfFilterMode::kView;
@@ -87,6 +90,7 @@ void SourceState::notice_clock_jump() {
   const ros::Time now = ros::Time::now();
   if (now < last_now_) {
     ++target_.generation;
+    target_.set_back += seconds_between(now, last_now_);
     if (!is_permanent_) {
       report_.messages = 0;
       report_.newest = std::numeric_limits<double>::quiet_NaN();

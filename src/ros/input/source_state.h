@@ -24,6 +24,7 @@ struct SourceTarget {
   std::string fixed_frame;
   RegionOfInterest region;
   std::uint64_t generation = 1;  ///< counts the backward jumps of the clock
+  double set_back = 0.0;         ///< [s] all of them together
 };
 
 /// The state that a source's thread and its readers share. The lock is held for copies only.

@@ -8,6 +8,7 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/publish.h"
 #include "ros/common/stopwatch.h"
+#include "ros/common/text.h"
 #include "ros/common/thread_name.h"
 #include "ros/input/unseen_markers.h"
 #include "ros/poses/transforms.h"
@@ -24,6 +25,8 @@ constexpr double kWorkingShare = 0.25;
 constexpr std::size_t kMaxBoxes = 1000000;
 constexpr double kSmaller = 0.8;
 constexpr std::chrono::milliseconds kPublicationPeriod(500);
+// [s] Stamps are not so far ahead of the clock, unless it has gone back (see SourceMemory).
+constexpr double kBeganAnew = 1.0;
 
 }  // namespace
 
@@ -57,6 +60,11 @@ std::shared_ptr<const UnknownSnapshot> UnknownSpaceWatch::share() const {
 std::string UnknownSpaceWatch::place(const UnknownSnapshot& unknown, const std::string& fixed_frame,
                                      const ros::Time& time, double max_age,
                                      Eigen::Isometry3d* X_FM) const {
+  const double ahead = unknown.stamp - time.toSec();
+  if (ahead > kBeganAnew) {
+    return "all space counts as unknown: " +
+           format_text("what was seen last is of %.2f s after the present", ahead);
+  }
   std::string problem;
   // An exception in every cycle would cost more than is_known().
   problem = is_known(buffer_, fixed_frame, unknown.frame, time, &problem)

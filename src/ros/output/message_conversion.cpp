@@ -113,15 +113,16 @@ bool is_incomplete(const ProximityArray& message) {
 
 double min_distance(const ProximityArray& message, const std::vector<bool>& counts) {
   if (is_incomplete(message)) return kNaN;
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  double smallest = kInfinity;
+  bool any = false;
+  double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < message.links.size(); ++i) {
     const LinkMessage& link = message.links[i];
     if (counts.size() == message.links.size() && !counts[i]) continue;
-    if (link.state == LinkMessage::UNKNOWN) return kNaN;
+    if (link.state == LinkMessage::UNKNOWN || std::isnan(link.lower_bound)) return kNaN;
     smallest = std::min(smallest, link.lower_bound);
+    any = true;
   }
-  return smallest == kInfinity ? kNaN : smallest;
+  return any ? smallest : kNaN;
 }
 
 }  // namespace ist

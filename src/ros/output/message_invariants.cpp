@@ -13,6 +13,7 @@
 #endif
 
 #include "ros/common/eigen_conversion.h"
+#include "ros/output/message_conversion.h"
 #include "ros/poses/clock_skew.h"
 
 namespace ist {
@@ -156,7 +157,47 @@ std::string check_link(const LinkMessage& link, const InvariantInput& input) {
   return check.broken();
 }
 
+bool knows_any(const ProximityArray& message) {
+  return std::any_of(message.links.begin(), message.links.end(),
+                     [](const LinkMessage& link) { return link.state != LinkMessage::UNKNOWN; });
+}
+
+/// Whether a source is OK that may vouch for what is free.
+bool has_voucher(const ProximityArray& message) {
+  const std::string memory = "/memory";
+  return std::any_of(message.sources.begin(), message.sources.end(), [&](const auto& source) {
+    const std::size_t size = source.name.size(), end = memory.size();
+    const bool is_memory = size > end && source.name.compare(size - end, end, memory) == 0;
+    return source.status == ProximityArray::OK && !is_memory;
+  });
+}
+
+#ifndef NDEBUG
+void end_if_broken(const std::string& broken, const ProximityArray& message) {
+  if (broken.empty()) return;
+  ROS_FATAL_STREAM("a message breaks its contract: " << broken << "\n" << message);
+  std::abort();
+}
+#endif
+
 }  // namespace
+
+double least_when_clear(const ServerConfig& config) {
+  return config.unknown_space == UnknownSpace::kObstacle ? -std::numeric_limits<double>::infinity()
+                                                         : config.query.max_distance;
+}
+
+std::string broken_agreement(const ProximityArray& message, const std::vector<bool>& counts,
+                             double min_distance, double scale) {
+  Check check("the summary: ");
+  const double least = ist::min_distance(message, counts);
+  check.that(std::isnan(min_distance) || min_distance <= least,
+             "min_distance must not be above a link's lower_bound", min_distance);
+  check.that(scale >= 0.0 && scale <= 1.0, "the scale has to be from 0 to 1", scale);
+  check.that(scale == 0.0 || min_distance > 0.0,
+             "the scale has to be 0 where min_distance is not known or not above 0", scale);
+  return check.broken();
+}
 
 std::string broken_invariant(const ProximityArray& message, const InvariantInput& input) {
   Check check("the message: ");
@@ -169,6 +210,13 @@ std::string broken_invariant(const ProximityArray& message, const InvariantInput
              "header.stamp must not be in the future", message.header.stamp);
   check.that(message.computation_time >= 0.0, "computation_time must not be negative",
              message.computation_time);
+  const bool lacks_clouds =
+      message.status == ProximityArray::NO_CLOUD || message.status == ProximityArray::STALE_CLOUD;
+  check.that(!lacks_clouds || !knows_any(message),
+             "links have to be UNKNOWN where the status is NO_CLOUD or STALE_CLOUD",
+             int{message.status});
+  check.that(!knows_any(message) || has_voucher(message),
+             "a source that is no memory has to be OK where links are known", "none");
   if (!check.broken().empty()) return check.broken();
   for (const LinkMessage& link : message.links) {
     std::string broken = check_link(link, input);
@@ -179,13 +227,22 @@ std::string broken_invariant(const ProximityArray& message, const InvariantInput
 
 void assert_invariants(const ProximityArray& message, const InvariantInput& input) {
 #ifndef NDEBUG
-  const std::string broken = broken_invariant(message, input);
-  if (broken.empty()) return;
-  ROS_FATAL_STREAM("a message breaks its contract: " << broken << "\n" << message);
-  std::abort();
+  end_if_broken(broken_invariant(message, input), message);
 #else
   (void)message;
   (void)input;
+#endif
+}
+
+void assert_agreement(const ProximityArray& message, const std::vector<bool>& counts,
+                      double min_distance, double scale) {
+#ifndef NDEBUG
+  end_if_broken(broken_agreement(message, counts, min_distance, scale), message);
+#else
+  (void)message;
+  (void)counts;
+  (void)min_distance;
+  (void)scale;
 #endif
 }
 

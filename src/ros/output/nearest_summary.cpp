@@ -38,9 +38,12 @@ NearestSummary summarize_nearest(const ProximityArray& proximity, double max_dis
   NearestSummary summary;
   const std::vector<Link>& links = proximity.links;
   std::size_t unknown = 0;
+  double least = max_distance;
   for (std::size_t i = 0; i < links.size(); ++i) {
     if (links[i].state == Link::UNKNOWN) ++unknown;
     const bool does_count = counts.size() != links.size() || counts[i];
+    if (does_count && links[i].state != Link::UNKNOWN)
+      least = std::min(least, links[i].lower_bound);
     if (links[i].state < Link::NEAR || !does_count) continue;
     const bool is_nearer =
         summary.link < 0 ||
@@ -57,8 +60,8 @@ NearestSummary summarize_nearest(const ProximityArray& proximity, double max_dis
     summary.text = format_text("%.3f m\n", nearest.distance) + nearest.link;
     summary.color = nearness_color(nearest.distance, max_distance);
   } else {
-    summary.text = format_text("> %.2f m", max_distance);
-    summary.color = nearness_color(max_distance, max_distance);
+    summary.text = format_text("> %.2f m", least);
+    summary.color = nearness_color(least, max_distance);
   }
   if (unknown > 0) summary.text += "\n" + std::to_string(unknown) + " links NOT KNOWN";
   if (proximity.status != ProximityArray::OK) {

@@ -34,11 +34,9 @@ Status file_status(const SourceReport& source) {
                                         (problem.empty() ? "its file is being read" : problem)};
 }
 
-Status memory_status(const SourceReport& source) {
-  if (source.has_snapshot) return {ProximityArray::OK, ""};
-  return {ProximityArray::NO_CLOUD,
-          "source '" + source.name +
-              "': " + (source.problem.empty() ? "nothing is remembered yet" : source.problem)};
+/// What is missing must not read as free.
+Status incomplete(const SourceReport& source) {
+  return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + source.incomplete};
 }
 
 Status without_messages(const SourceReport& source) {
@@ -121,12 +119,9 @@ Status stale_snapshot(const SourceReport& source, double age) {
 }  // namespace
 
 Status source_status(const SourceReport& source, double now) {
-  // What is missing must not read as free.
-  if (!source.incomplete.empty()) {
-    return {ProximityArray::NO_CLOUD, "source '" + source.name + "': " + source.incomplete};
-  }
+  if (source.is_memory) return memory_status(source, {ProximityArray::OK, ""});
+  if (!source.measures && !source.incomplete.empty()) return incomplete(source);
   if (source.is_file) return file_status(source);
-  if (source.is_memory) return memory_status(source);
   if (source.messages == 0) return without_messages(source);
   if (std::isnan(source.newest)) {  // all stamps are 0 or far in the future
     return {ProximityArray::STALE_CLOUD, title(source) + because(source.problem)};
@@ -143,7 +138,18 @@ Status source_status(const SourceReport& source, double now) {
     return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
                                           " is NaN, the sensor sees nothing at all"};
   }
+  if (!source.incomplete.empty()) return incomplete(source);
   return {ProximityArray::OK, ""};
+}
+
+Status memory_status(const SourceReport& memory, const Status& parent) {
+  const std::string title = "source '" + memory.name + "': ";
+  if (!memory.has_snapshot) {
+    return {ProximityArray::NO_CLOUD,
+            title + (memory.problem.empty() ? "nothing is remembered yet" : memory.problem)};
+  }
+  if (parent.ok()) return parent;
+  return {parent.code, title + "what it remembers counts as obstacles, and its sensor is silent"};
 }
 
 }  // namespace ist

@@ -42,17 +42,41 @@ class Sentences {
   std::vector<std::string> texts_;
 };
 
-/// By source: whether its status decides over the whole. Where no source is required, at least one
-/// is needed all the same.
+/// Which sources there are, and which of them can be used.
+struct Vouchers {
+  explicit Vouchers(const StatusInput& input) {
+    for (const SourceReport& source : input.sources) {
+      measures |= source.measures;
+      has_measured |= source.measures && source.has_been_there;
+    }
+    for (std::size_t i = 0; i < input.sources.size(); ++i) {
+      const bool is_ok = input.source_statuses[i].ok();
+      any_ok |= is_ok && can_vouch(input.sources[i]);
+      all_required_ok &= is_ok || !input.sources[i].required;
+    }
+  }
+  /// Whether a source says what is free, while it is OK.
+  bool can_vouch(const SourceReport& source) const {
+    if (source.measures || source.is_memory) return source.measures;
+    return !measures || (source.required && !has_measured);
+  }
+
+  bool measures = false;  ///< whether anything does that is configured
+  bool has_measured = false;
+  bool any_ok = false;  ///< any that can vouch
+  bool all_required_ok = true;
+};
+
+/// By source: whether its status decides over the whole. Where all that is required is there, at
+/// least one source that can vouch is needed all the same.
 std::vector<bool> deciding_sources(const StatusInput& input) {
-  const bool any_required = std::any_of(input.sources.begin(), input.sources.end(),
-                                        [](const SourceReport& source) { return source.required; });
-  const bool any_ok = std::any_of(input.source_statuses.begin(), input.source_statuses.end(),
-                                  [](const Status& status) { return status.ok(); });
+  const Vouchers vouchers(input);
+  const bool needs_one = vouchers.all_required_ok && !vouchers.any_ok;
   std::vector<bool> deciding(input.sources.size());
   for (std::size_t i = 0; i < deciding.size(); ++i) {
-    deciding[i] =
-        !input.source_statuses[i].ok() && (input.sources[i].required || (!any_required && !any_ok));
+    const SourceReport& source = input.sources[i];
+    deciding[i] = !input.source_statuses[i].ok() &&
+                  (source.required || (needs_one && vouchers.can_vouch(source)));
   }
   return deciding;
 }
@@ -129,15 +153,8 @@ void DeadlineCost::add(const DeadlineCost& other) {
 }
 
 bool clouds_usable(const StatusInput& input) {
-  bool any = false;
-  for (std::size_t i = 0; i < input.sources.size(); ++i) {
-    if (input.source_statuses[i].ok()) {
-      any = true;
-    } else if (input.sources[i].required) {
-      return false;
-    }
-  }
-  return any;
+  const Vouchers vouchers(input);
+  return vouchers.all_required_ok && vouchers.any_ok;
 }
 
 bool StatusInput::is_fine() const {

@@ -18,9 +18,12 @@ struct Status {
   bool ok() const { return code == 0; }
 };
 
-/// Decides NO_CLOUD, STALE_CLOUD or OK for one source; only a source that is OK may be used.
+/// Decides NO_CLOUD, STALE_CLOUD or OK for one source; only a source that is OK says what is free.
 /// @param now  [s] ROS clock
 Status source_status(const SourceReport& source, double now);
+
+/// The same for what a source remembers: it is no fresher than that source.
+Status memory_status(const SourceReport& memory, const Status& parent);
 
 /// The cost of a deadline in one cycle, or in the worst of several.
 struct DeadlineCost {
@@ -53,8 +56,11 @@ struct StatusInput {
   bool is_fine() const;
 };
 
-/// Whether queries may use clouds: every required source is usable, and at least one source is. A
-/// partial view must not be shown as clear.
+/// Whether queries may use clouds: every required source is usable, and at least one that can vouch
+/// for what is free. A partial view must not be shown as clear. Sources that measure vouch. Known
+/// worlds and maps that stay for ever do where nothing that measures is configured, or they are
+/// required and what measures is not and has never been there: they are all that was asked for
+/// then. A memory never does.
 bool clouds_usable(const StatusInput& input);
 
 /// Decides the status of a ProximityArray. The first that applies: a model or link error;
