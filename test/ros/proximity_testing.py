@@ -200,7 +200,13 @@ class ProximityNode:
     command = None
 
     def __init__(
-        self, namespace, parameters=None, urdf_text=None, listen=True, preexec_fn=None
+        self,
+        namespace,
+        parameters=None,
+        urdf_text=None,
+        listen=True,
+        preexec_fn=None,
+        diagnostics=True,
     ):
         self.namespace, self.name = namespace, namespace + "/proximity"
         self.messages, self.diagnostics = [], {}
@@ -215,6 +221,7 @@ class ProximityNode:
         self._subscribers = []
         if listen:
             self.subscribe("proximity", ProximityArray, self._on_message)
+        if listen and diagnostics:  # genpy makes its classes for one thread at a time
             self._subscribers.append(
                 rospy.Subscriber("/diagnostics", rospy.AnyMsg, self._on_diagnostics)
             )

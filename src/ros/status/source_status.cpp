@@ -149,7 +149,7 @@ Status memory_status(const SourceReport& memory, const Status& parent) {
             title + (memory.problem.empty() ? "nothing is remembered yet" : memory.problem)};
   }
   if (parent.ok()) return parent;
-  return {parent.code, title + "what it remembers counts as obstacles, and its sensor is silent"};
+  return {parent.code, title + "it is as fresh as its source: " + parent.text};
 }
 
 }  // namespace ist
