@@ -53,10 +53,14 @@ void check_beam(const ist::LaserScan& scan, std::size_t i, double min_range, dou
   const double range = static_cast<double>(scan.ranges[i]);
   if (std::isnan(range) || range < scan.range_min) {
     FUZZ_CHECK(p.array().isNaN().any(), "beam %zu of %g m is unknown", i, range);
-  } else if (range > scan.range_max || range == kInf) {
+  } else if (range < kInf && range > (scan.range_max + 1.0) * (1.0 + 1e-6)) {
+    FUZZ_CHECK(p.allFinite() && p.norm() > 3e9, "beam %zu of %g m is discarded", i, range);
+  } else if (range > scan.range_max) {
     FUZZ_CHECK(p.array().isInf().any() && !p.array().isNaN().any(), "beam %zu of %g m saw nothing",
                i, range);
-  } else if (range < min_range || range > max_range) {
+  } else if (range < min_range) {
+    FUZZ_CHECK(p.isZero(), "beam %zu of %g m is too near", i, range);
+  } else if (range > max_range) {
     FUZZ_CHECK(p.allFinite() && p.norm() > 1e9, "beam %zu of %g m is out of range", i, range);
   } else {
     const double off = (p - beam_end(scan, i, X_SE)).norm();

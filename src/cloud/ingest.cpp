@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "cloud/filters/one_place.h"
 #include "cloud/filters/self_filter.h"
 #include "cloud/index/near_region.h"
 #include "cloud/index/organized_cloud.h"
@@ -49,6 +50,7 @@ void check(const IngestConfig& config) {
           "0 or more");
   require(config.max_range > config.min_range, "max_range", config.max_range,
           "more than min_range");
+  require(config.sensor_range > 0.0, "sensor_range", config.sensor_range, "more than 0");
   require(config.search_distance >= 0.0, "search_distance", config.search_distance, "0 or more");
   require(config.self_filter_padding >= 0.0 && std::isfinite(config.self_filter_padding),
           "self_filter_padding", config.self_filter_padding, "0 or more");
@@ -121,7 +123,7 @@ struct Ingest::Impl {
   LookedBlocks looked;               // of the cloud that `view` has seen last
 
   CropParameters crop_of(const RawCloud& cloud, const Eigen::Isometry3d& X_FS) const {
-    CropParameters crop = crop_parameters(cloud, X_FS, config.min_range, config.max_range);
+    CropParameters crop = crop_parameters(cloud, X_FS, config);
     limit_to_region(region, X_FS, &crop);
     return crop;
   }
@@ -167,10 +169,11 @@ void Ingest::set_region_of_interest(const RegionOfInterest& region) {
   impl_->region = region;
 }
 
-void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
+void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<const PosedSolid> robot,
                  double stamp, CloudSnapshot* snapshot) {
   const auto start = std::chrono::steady_clock::now();
   const IngestConfig& config = impl_->config;
+  const Eigen::Isometry3d X_FS = X_FP * Eigen::Translation3d(cloud.origin);
   check(cloud, X_FS, config);
   PointExtent extent = extent_of(cloud, config);
   CropParameters crop = impl_->crop_of(cloud, X_FS);
@@ -213,9 +216,12 @@ void Ingest::run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<cons
                         counts.outside_region - static_cast<std::uint32_t>(kept);
   counts.used = static_cast<std::uint32_t>(snapshot->index.size());
   counts.on_robot = static_cast<std::uint32_t>(kept) - counts.used;
+  counts.at_one_place = points_at_one_place(cloud, crop);
+  counts.infinite_is_free = cloud.from_rays;
   if (!extent.is_zero()) extent.p_FS = X_FC.translation();
   snapshot->extent = extent;
   snapshot->X_FS = X_FC;
+  snapshot->believed_range = std::sqrt(crop.believed_sq);
   snapshot->thinning = config.thinning;
   snapshot->region = impl_->region;
   if (config.thin) snapshot->index.bvh().set_thinning(config.thinning);

@@ -1,7 +1,10 @@
 #include "ist_proximity/facade/obstacles.h"
 
+#include <stdexcept>
+#include <string>
 #include <utility>
 
+#include "internal/cloud/unmeasured.h"
 #include "obstacle_ingest.h"
 
 namespace ist {
@@ -10,6 +13,13 @@ namespace {
 std::shared_ptr<const CloudSnapshot> index(const RawCloud& cloud, const ObstaclesConfig& config) {
   auto snapshot = std::make_shared<CloudSnapshot>();
   ObstacleIngest(config).run(cloud, snapshot.get());
+  const IngestCounts& counts = snapshot->counts;
+  if (counts.saw_nothing()) {
+    throw std::invalid_argument("of " + std::to_string(counts.received) +
+                                " points none was measured: " + unmeasured(counts) +
+                                "; where nothing is known, nothing is free. An empty list says "
+                                "that there are no obstacles.");
+  }
   return snapshot;
 }
 

@@ -13,7 +13,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 constexpr const char* kDoc =
-    R"(Points of obstacles, indexed for queries. Points that are not finite are dropped.
+    R"(Points of obstacles, indexed for queries. Points that are not finite are dropped. An empty
+array says that there are no obstacles.
 
 points: (n, 3) [m], a list; or (h, w, 3), an image with nan where nothing was measured, which is
   indexed several times faster; or the path of a PCD or PLY file. float32 stays float32.
@@ -24,7 +25,8 @@ robot, q, self_filter_padding: points at most the padding [m] from the robot at 
 extent: how large points are, so that lower bounds hold for the surface in place of its samples: an
   Extent, or a number: their radius [m]. None: points are points.
 
-Raises ValueError for a wrong shape or setting, ModelError for a file that cannot be read.
+Raises ValueError for a wrong shape or setting, and where no point was measured: all are nan, infinite,
+nearer than min_range, or at one place (a driver without returns); ModelError for a file that cannot be read.
 Immutable; threads may share it; it pickles.)";
 
 Eigen::Isometry3d to_pose(const DoubleArray& X) {
@@ -154,6 +156,7 @@ void define_obstacles(py::module_* module) {
             result["infinite"] = counts.infinite;
             result["out_of_range"] = counts.out_of_range;
             result["on_robot"] = counts.on_robot;
+            result["measured"] = counts.measured();
             return result;
           },
           "Numbers of points by what was done with them")

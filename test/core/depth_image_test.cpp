@@ -10,6 +10,8 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <string>
+#include <tuple>
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
@@ -97,8 +99,8 @@ class PeerCloud {
                                    : std::round(1000.0 * depths[i]) / 1000.0;
       if (!(z > 0.0)) z = kNan;
       const auto u = static_cast<double>(i % width), v = static_cast<double>(i / width);
-      Eigen::Vector3d p((u - camera.P[2]) * z / camera.P[0], (v - camera.P[6]) * z / camera.P[5],
-                        z);
+      Eigen::Vector3d p(((u - camera.P[2]) * z - camera.P[3]) / camera.P[0],
+                        ((v - camera.P[6]) * z - camera.P[7]) / camera.P[5], z);
       if (std::isinf(z)) p.setConstant(kInf);
       points.push_back(p);
     }
@@ -197,7 +199,11 @@ TEST(DepthImage, DistancesAreThoseOfTheCloud) {
   query_config.tolerance = 0.0;
   for (int i = 0; i < 12; ++i) {
     const Format& format = kFormats[static_cast<std::size_t>(i) % kFormats.size()];
-    const CameraModel camera = camera_of(96, 80);
+    CameraModel camera = camera_of(96, 80);
+    if (i % 2 == 1) {  // a second stereo camera, 7 and 4 cm off the optical frame
+      camera.P[3] = -0.07 * camera.P[0];
+      camera.P[7] = 0.04 * camera.P[5];
+    }
     const std::vector<double> depths = scene_depths(96, 80, &rng);
     const Message message(depths, 96, camera, format);
     const PeerCloud peer(depths, 96, camera, format);
@@ -250,6 +256,52 @@ TEST(DepthImage, UnknownAndNothing) {
   EXPECT_EQ(snapshot.counts.used, 0U);
 }
 
+// P projects a point as sensor_msgs/CameraInfo states, whatever its baseline.
+TEST(DepthImage, BaselineOfP) {
+  const std::uint32_t width = 32, height = 16;
+  CameraModel camera = camera_of(width, height);
+  camera.P[3] = -0.07 * camera.P[0];
+  camera.P[7] = 0.02 * camera.P[5];
+  test::Rng rng(9);
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < std::size_t{width} * height; ++i) {
+    depths.push_back(test::uniform(&rng, 0.5, 2.0));
+  }
+  const Message message(depths, width, camera, {"32FC1"});
+  CloudSnapshot snapshot;
+  Ingest(IngestConfig()).run(message.raw, Eigen::Isometry3d::Identity(), {}, 0.0, &snapshot);
+  const auto points = points_by_id(snapshot.index);
+  ASSERT_EQ(points.size(), depths.size());
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> P(camera.P.data());
+  for (const auto& [id, p] : points) {
+    const Eigen::Vector3d uvw = P * p.homogeneous();
+    EXPECT_NEAR(uvw.x() / uvw.z(), id % width, 1e-4);
+    EXPECT_NEAR(uvw.y() / uvw.z(), id / width, 1e-4);
+  }
+}
+
+// The unit of an image replaces that of its encoding.
+TEST(DepthImage, Unit) {
+  const CameraModel camera = camera_of(8, 4);
+  for (const auto& [encoding, number, unit] :
+       {std::tuple{"16UC1", 1.4, 1e-4}, std::tuple{"32FC1", 1400.0, 1e-3}}) {
+    Message message(std::vector<double>(32, number), 8, camera, {encoding});
+    message.image.unit = unit;
+    ASSERT_EQ(check_depth_image(message.image, message.rays, &message.raw), "");
+    CloudSnapshot snapshot;
+    Ingest(test::whole_cloud(false))
+        .run(message.raw, Eigen::Isometry3d::Identity(), {}, 0.0, &snapshot);
+    const double z = points_by_id(snapshot.index).at(0).z();
+    EXPECT_NEAR(z, encoding == std::string("16UC1") ? 0.14 : 1.4, 1e-6);
+  }
+  Message message(std::vector<double>(32, 1.0), 8, camera, {"16UC1"});
+  for (const double unit : {-1.0, kNan, kInf}) {
+    message.image.unit = unit;
+    EXPECT_NE(check_depth_image(message.image, message.rays, &message.raw).find("unit is"),
+              std::string::npos);
+  }
+}
+
 // The same scene, seen by the whole sensor, by a region of it and with pixels put together.
 TEST(DepthImage, RegionAndBinning) {
   CameraModel camera = camera_of(64, 48);
@@ -299,7 +351,9 @@ TEST(DepthImage, FaultyCameras) {
       {"P[2] is nan", [](CameraModel* c) { c->P[2] = kNan; }},
       {"P[6] is inf", [](CameraModel* c) { c->P[6] = kInf; }},
       {"P[1] is 0.5, it must be 0", [](CameraModel* c) { c->P[1] = 0.5; }},
-      {"P[3] is -30", [](CameraModel* c) { c->P[3] = -30.0; }},
+      {"P[11] is 1, it must be 0", [](CameraModel* c) { c->P[11] = 1.0; }},
+      {"centre of projection at (20, -0, 0) m", [](CameraModel* c) { c->P[3] = -20.0 * c->P[0]; }},
+      {"P[7] is nan", [](CameraModel* c) { c->P[7] = kNan; }},
       {"P[10] is 0, it must be 1", [](CameraModel* c) { c->P[10] = 0.0; }},
       {"K[0] is nan", [](CameraModel* c) { c->P = {}, c->K[0] = kNan; }},
       {"width is 0", [](CameraModel* c) { c->width = 0; }},

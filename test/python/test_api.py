@@ -252,6 +252,19 @@ def test_wrong_extent(make, error, message):
         make()
 
 
+@pytest.mark.parametrize('points, message', [
+    (np.full((4, 6, 3), np.nan), 'of 24 points none was measured: 24 are NaN'),
+    (np.full((9, 3), -np.inf), '9 are infinite'),
+    (np.zeros((9, 3), 'f4'), '9 are at'),
+    (0.02 * np.eye(3), '3 are nearer than min_range'),
+])
+def test_nothing_measured(points, message):
+    """What was not measured is not free; an empty array says that there is nothing."""
+    with pytest.raises(ValueError, match=message):
+        ist.Obstacles(points, min_range=0.0 if np.all(points == 0) else 0.05)
+    assert len(ist.Obstacles(np.zeros((0, 3)))) == 0
+
+
 def test_cycle_cost(robot):
     """The first cycle after a new cloud costs more: nothing of the last answer holds for it."""
     y, z = np.meshgrid(np.linspace(-1, 1, 320), np.linspace(0, 1.5, 240))

@@ -195,9 +195,7 @@ class BadCloudTest(unittest.TestCase):
         """A cloud without points in range makes links CLEAR, with +inf."""
         nothing = {
             "empty": np.zeros((0, 3)),
-            "too near": np.array([[0.0, 0.0, 0.01]]),
             "too far": np.array([[0.0, 0.0, 30.0], [np.nan, 0, 0]]),
-            "infinite": np.full((3, 3), np.inf),
         }
         for name, points in nothing.items():
             with self.subTest(name):

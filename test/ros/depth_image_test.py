@@ -73,7 +73,7 @@ BAD_CAMERAS = [
     ({"P": [0.0] * 12}, "not calibrated"),
     ({"P": [0.0] + P[1:]}, "P[0] is 0"),
     ({"P": [float("nan")] + P[1:]}, "P[0] is nan"),
-    ({"P": P[:3] + [-9.0] + P[4:]}, "P[3] is -9"),
+    ({"P": P[:11] + [-9.0]}, "P[11] is -9"),
     ({"width": 0}, "width is 0"),
     ({"width": 640}, "its camera (width and height"),
 ]
@@ -154,6 +154,17 @@ class DepthImageTest(unittest.TestCase):
                 lambda m: m.status == 0 and m.sources[0].points_used == 0, "nothing in range"
             )
         self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
+
+    def test_baseline_and_unit(self):
+        """Gazebo's hackBaseline, and a camera that counts tenths of a millimetre."""
+        self.info = camera_info(P=P[:3] + [-0.07 * FOCAL_LENGTH] + P[4:])
+        self.start(depth_scale=1e-4)
+        tenths = 10 * depths()
+        seen = pt.apply(X_BASE_CAMERA, points(depths()) + [0.07, 0, 0])
+        with self.stream(lambda: image(tenths)):
+            answer = self.node.wait_for_status(ProximityArray.OK)
+        truth = pt.distance_to_ball(seen).min()
+        self.assertAlmostEqual(pt.link(answer, "ball_link").distance, truth, 5)
 
     def test_malformed(self):
         self.start()

@@ -122,8 +122,8 @@ class LaserScanTest(unittest.TestCase):
                 self.assertTrue(pt.all_unknown(message))
                 self.assertEqual(message.sources[0].points_received, 5)
             self.check_wall()
-        # Nothing within range: measured.
-        for far in (float("inf"), 9.0, 1e6):
+        # Nothing within range: measured. Drivers wrote range_max + 1 before REP 117.
+        for far in (float("inf"), 9.0, 11.0):
             with self.subTest(far), self.stream(lambda far=far: scan([far] * 5)):
                 message = self.node.wait_for(
                     lambda m: m.status == 0 and m.sources[0].points_received == 5, "the empty scan"

@@ -2,10 +2,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -89,13 +91,31 @@ struct IngestCounts {
   std::uint32_t not_a_number = 0;    ///< dropped: a coordinate is NaN
   std::uint32_t infinite = 0;        ///< dropped: a coordinate is infinite, and none is NaN
   std::uint32_t out_of_range = 0;    ///< dropped: nearer than min_range or farther than max_range
+  std::uint32_t too_near = 0;        ///< of these: nearer than min_range
+  std::uint32_t not_believed = 0;    ///< of these: farther than the sensor can measure
   std::uint32_t outside_region = 0;  ///< dropped: in range, but outside the region of interest
   std::uint32_t noise = 0;           ///< dropped by a noise filter that ran before
   std::uint32_t on_robot = 0;        ///< dropped by the self-filter
   std::uint32_t used = 0;            ///< in the index
+  /// Points in a range that counts that all have the same coordinates, where most points do: what
+  /// a driver writes in place of a measurement, or a stuck one repeats. Else 0.
+  std::uint32_t at_one_place = 0;
+  bool infinite_is_free = false;  ///< infinite points measured that nothing is in range
 
-  /// Whether the sensor saw nothing: the cloud has points, and every one is NaN or noise.
-  bool saw_nothing() const { return received > 0 && not_a_number + noise == received; }
+  /// Points that say something about space: an obstacle, or that there is none up to max_range.
+  std::uint32_t measured() const {
+    const std::uint64_t unknown = std::uint64_t{not_a_number} + noise + too_near + not_believed +
+                                  at_one_place + (infinite_is_free ? 0U : infinite);
+    return static_cast<std::uint32_t>(received - std::min<std::uint64_t>(unknown, received));
+  }
+  /// The share of the points that were measured; 1 for an empty cloud, a measurement of nothing.
+  double measured_share() const { return received > 0 ? 1.0 * measured() / received : 1.0; }
+  /// Whether the sensor saw nothing: there are points, and none was measured.
+  bool saw_nothing() const { return received > 0 && measured() == 0; }
+  /// Whether enough was measured that the cloud stands for the sensor's view.
+  bool saw_enough(double min_share) const {
+    return !saw_nothing() && measured_share() >= min_share;
+  }
 };
 
 /// One cloud or map as queries take it, immutable. A cloud consists of points in the fixed frame, a
@@ -105,7 +125,8 @@ struct CloudSnapshot {
   PointExtent extent;  ///< of the points
   /// Sensor frame -> fixed frame of a cloud, as a self-filter by view has corrected it.
   Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  double thinning = 0.01;                                  ///< [m] edge of a voxel
+  double believed_range = std::numeric_limits<double>::infinity();  ///< [m] none was farther
+  double thinning = 0.01;                                           ///< [m] edge of a voxel
   RegionOfInterest region;                                 ///< points outside were discarded
   std::shared_ptr<const BoxIndex> boxes;                   ///< the boxes of a map; null: none
   Eigen::Isometry3d X_FM = Eigen::Isometry3d::Identity();  ///< the boxes' frame -> fixed frame

@@ -20,6 +20,7 @@ struct DepthImage {
   bool is_bigendian = false;           ///< byte order of the numbers
   const std::uint8_t* data = nullptr;  ///< not owned
   std::size_t data_size = 0;           ///< [bytes]
+  double unit = 0.0;                   ///< [m] that a number of 1 means; 0: that of the encoding
 };
 
 /// A pinhole camera (the members of sensor_msgs/CameraInfo).
@@ -38,19 +39,22 @@ struct CameraModel {
 };
 
 /// The rays of an image's pixels: the pixel in column u and row v sees the points
-/// (x[u] z, y[v] z, z) in the camera's optical frame (REP 103: z forward, x right, y down).
+/// (x[u] z, y[v] z, z) from its centre of projection, in the axes of the camera's optical frame
+/// (REP 103: z forward, x right, y down).
 struct DepthRays {
   std::vector<double> x;  ///< by column
   std::vector<double> y;  ///< by row
+  /// [m] Centre of projection in the optical frame: (-P[3] / P[0], -P[7] / P[5], 0), so that P
+  /// projects as sensor_msgs/CameraInfo states.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
 };
 
 /// Computes the rays, with image_geometry's convention of binning and region of interest: K and P
 /// are those of the whole sensor. P is used, or K where all of P is zero.
 ///
 /// Faulty are: a width or height of 0, or above 65535; a region of interest outside the sensor; a
-/// focal length that is not positive; a number that is not finite; skew; the baseline of a second
-/// stereo camera (P[3], P[7]), since images are taken to be in the camera's own frame; an
-/// image whose pixels look more than 89 degrees off its axis.
+/// focal length that is not positive; a number that is not finite; skew; an image whose pixels look
+/// more than 89 degrees off its axis.
 /// @param rays  set when the camera is valid, else unchanged
 /// @returns an empty string, or one sentence with the faulty member and its value. Thread safe.
 std::string check_camera(const CameraModel& camera, std::shared_ptr<const DepthRays>* rays);

@@ -61,7 +61,16 @@ struct RawCloud {
   bool swap_bytes = false;                ///< the data's byte order is not the machine's
   DepthType depth = DepthType::kNone;     ///< of a depth image, which has no x, y and z
   std::shared_ptr<const DepthRays> rays;  ///< of a depth image's pixels
-  double pixel_angle = 0.0;  ///< [rad] largest angle between two neighbours; 0: not known
+  double pixel_angle = 0.0;   ///< [rad] largest angle between two neighbours; 0: not known
+  double depth_unit = 0.001;  ///< [m] a depth image's number of 1
+  /// [m] In the frame of the points, the place that they are relative to: from there the sensor
+  /// looks. Zero but for a depth image with a baseline.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  /// Each point is a range along a ray from the origin (depth images and scans). An infinite one
+  /// means that nothing is in range, and one at the origin that nothing was measured.
+  bool from_rays = false;
+  /// [m] Farther points were not measured, whatever IngestConfig says.
+  double believed_range = std::numeric_limits<double>::infinity();
   /// `data` stays unchanged as long as this lives, so that points may be read later, when a query
   /// needs them. Null: `data` is valid during the call only, and all points are read then.
   std::shared_ptr<const void> owner;
@@ -95,6 +104,9 @@ RawCloud packed_cloud(const Scalar* data, std::size_t width, std::size_t height,
 struct IngestConfig {
   double min_range = 0.05;  ///< [m] from the sensor; >= 0
   double max_range = 3.0;   ///< [m] from the sensor; > min_range, may be inf
+  /// [m] > 0, may be inf: the most that the sensor can measure. Points farther than this, and than
+  /// max_range, are not believed, as in another unit: IngestCounts::measured() leaves them out.
+  double sensor_range = std::numeric_limits<double>::infinity();
   /// [m] >= 0. Queries look no farther than this from where the robot is while the cloud is used;
   /// infinity: anywhere. The points of an unorganized cloud that are farther away, or behind nearer
   /// ones, are indexed coarsely, which takes less time. Queries that look there all the same
@@ -157,16 +169,18 @@ class Ingest {
   /// where the robot is are kept, and X_FS is corrected by what the points on the robot say of it
   /// (CloudSnapshot::view).
   /// @param cloud  checked by check_layout; points in the sensor frame S
-  /// @param X_FS   sensor frame -> fixed frame, rigid
+  /// @param X_FP   frame of the cloud's points -> fixed frame, rigid; but for RawCloud::origin,
+  /// this
+  ///               is the sensor's frame S
   /// @param robot  the robot's links at the cloud's stamp, see posed_solids(); for a measurement
   ///               that takes its time (a scan), at several instants: a point that is the robot's
   ///               at any of them is dropped. Empty: no self-filter
   /// @param stamp  [s]
   /// @param snapshot  overwritten, its buffers reused
-  /// @throws std::invalid_argument when X_FS is not finite or farther than 10^9 m from the origin,
+  /// @throws std::invalid_argument when X_FP is not finite or farther than 10^9 m from the origin,
   /// or
   ///         the cloud has more than max_points; the snapshot is as before then
-  void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FS, Span<const PosedSolid> robot,
+  void run(const RawCloud& cloud, const Eigen::Isometry3d& X_FP, Span<const PosedSolid> robot,
            double stamp, CloudSnapshot* snapshot);
 
   const IngestConfig& config() const;  ///< the one given to the constructor

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -52,15 +53,19 @@ struct ScanPoints {
 /// Places each beam's end where it was measured: in the sensor's pose at the beam's own time,
 /// interpolated between the first beam's and the last one's.
 ///
-/// REP 117: +inf and ranges above range_max mean that nothing was there, and become infinite
-/// points. NaN, -inf (too near to be measured) and ranges below range_min (with some drivers 0
-/// means "no echo") mean nothing, and become NaN points. Ranges outside min_range and max_range
-/// become points that Ingest counts as out of range. Ingest must be given no range limits of its
-/// own: it would measure distances from the sensor's place at the first beam, which are not ranges.
+/// REP 117: +inf means that nothing was there, and becomes an infinite point. So does a range above
+/// range_max by at most 1 m, which drivers wrote before that REP. A longer one is discarded, as
+/// the REP says, and so is one above `sensor_range`: Ingest counts it as not believed. NaN, -inf
+/// (too near to be measured) and ranges below range_min (with some drivers 0 means "no echo") mean
+/// nothing, and become NaN points. Ranges outside min_range and max_range become points that Ingest
+/// counts as out of range. Ingest must be given no range limits of its own: it would measure
+/// distances from the sensor's place at the first beam, which are not ranges.
 /// @param scan  checked by check_scan
 /// @param min_range, max_range  [m] of the points to keep, bounds included
 /// @param X_SE  sensor's frame at the last beam -> at the first, rigid
+/// @param sensor_range  [m] the most that the sensor can measure, beside its own range_max
 void to_points(const LaserScan& scan, double min_range, double max_range,
-               const Eigen::Isometry3d& X_SE, ScanPoints* points);
+               const Eigen::Isometry3d& X_SE, ScanPoints* points,
+               double sensor_range = std::numeric_limits<double>::infinity());
 
 }  // namespace ist

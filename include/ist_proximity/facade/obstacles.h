@@ -32,13 +32,14 @@ struct ObstaclesConfig {
   ExtentConfig extent;
 };
 
-/// Obstacle points, indexed for queries. Points that are not finite are dropped.
-/// Immutable, cheap to copy (copies share the index), thread safe.
+/// Obstacle points, indexed for queries. Points that are not finite are dropped. An empty list
+/// means that there are no obstacles; points of which none was measured (IngestCounts::measured())
+/// do not. Immutable, cheap to copy (copies share the index), thread safe.
 class Obstacles {
  public:
   /// A list of points [m] in frame S.
-  /// @throws std::invalid_argument when a setting is out of its range, or there are more than
-  ///         five million points
+  /// @throws std::invalid_argument when a setting is out of its range, there are more than five
+  ///         million points, or none of them was measured
   explicit Obstacles(Span<const Eigen::Vector3f> points, const ObstaclesConfig& config = {});
   /// The same in double.
   explicit Obstacles(Span<const Eigen::Vector3d> points, const ObstaclesConfig& config = {});

@@ -24,6 +24,7 @@ CropKernelParameters kernel_parameters(const CropParameters& crop) {
   }
   parameters.min_range_sq = crop.min_range_sq;
   parameters.max_range_sq = crop.max_range_sq;
+  parameters.believed_sq = crop.believed_sq;
   for (int axis = 0; axis < 3; ++axis) parameters.region_center[axis] = crop.region_center[axis];
   parameters.region_radius_sq = crop.region_radius_sq;
   return parameters;
@@ -90,6 +91,13 @@ std::uint32_t count_infinite(const SensorBatch<Scalar>& batch, std::size_t count
   return infinite;
 }
 
+void add(const CropTally& tally, IngestCounts* counts) {
+  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
+  counts->outside_region += static_cast<std::uint32_t>(tally.outside_region);
+  counts->too_near += static_cast<std::uint32_t>(tally.too_near);
+  counts->not_believed += static_cast<std::uint32_t>(tally.not_believed);
+}
+
 // A rectangle of a cloud. Where it has several rows, each takes kTileSide slots.
 struct Window {
   std::size_t row, column;  // of the first point
@@ -115,9 +123,11 @@ std::size_t crop_as(const RawCloud& cloud, const Window& window, const CropParam
     tally = crop_doubles(kernel_parameters(crop), batch.x, batch.y, batch.z, used, out);
   }
   const std::size_t never_received = used - window.rows * window.columns;
-  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number - never_received);
-  if (tally.infinite_square > 0) counts->infinite += count_infinite(batch, used);
-  counts->outside_region += static_cast<std::uint32_t>(tally.outside_region);
+  const std::uint32_t infinite = tally.infinite_square > 0 ? count_infinite(batch, used) : 0;
+  add(tally, counts);
+  counts->not_a_number -= static_cast<std::uint32_t>(never_received);
+  counts->infinite += infinite;
+  counts->not_believed -= infinite;
   return tally.kept;
 }
 
@@ -139,8 +149,7 @@ std::size_t crop_window(const RawCloud& cloud, const Window& window, const CropP
 // and the points have to be read one by one
 std::ptrdiff_t add_counts(const CropTally& tally, IngestCounts* counts) {
   if (tally.infinite_square > 0) return -1;
-  counts->not_a_number += static_cast<std::uint32_t>(tally.not_a_number);
-  counts->outside_region += static_cast<std::uint32_t>(tally.outside_region);
+  add(tally, counts);
   return static_cast<std::ptrdiff_t>(tally.kept);
 }
 

@@ -20,7 +20,8 @@ struct alignas(64) CropBatch {
 };
 
 /// Reads some points of one row from the message's bytes, decides in double which are kept, and
-/// moves those to O. Counts `not_a_number`, `infinite` and `outside_region`.
+/// moves those to O. Counts `not_a_number`, `infinite`, `outside_region`, `too_near` and
+/// `not_believed`.
 /// @param row, column  of the first point
 /// @param count  at most kCropBatch
 /// @returns how many are kept

@@ -63,6 +63,8 @@ class Cropper {
     tally.kept += hn::CountTrue(d, keep);
     tally.not_a_number += hn::CountTrue(d, hn::Not(hn::Eq(sq, sq)));
     tally.infinite_square += hn::CountTrue(d, hn::Eq(sq, infinity));
+    tally.too_near += hn::CountTrue(d, hn::Lt(sq, hn::Set(d, parameters_.min_range_sq)));
+    tally.not_believed += hn::CountTrue(d, hn::Gt(sq, hn::Set(d, parameters_.believed_sq)));
   }
 
   CropTally tally;

@@ -11,6 +11,7 @@ struct CropKernelParameters {
   double R[9];                        ///< rotation of X_OS, row-major
   double t[3];                        ///< [m] its translation
   double min_range_sq, max_range_sq;  ///< [m^2]
+  double believed_sq;                 ///< [m^2]
   double region_center[3];            ///< [m] in the sensor frame
   double region_radius_sq;            ///< [m^2] may be inf
 };
@@ -21,6 +22,8 @@ struct CropTally {
   std::size_t outside_region = 0;   ///< in range, but outside the region of interest
   std::size_t not_a_number = 0;     ///< a coordinate is NaN
   std::size_t infinite_square = 0;  ///< the squared range is infinite
+  std::size_t too_near = 0;         ///< nearer than the least range
+  std::size_t not_believed = 0;     ///< farther than is believed, `infinite_square` included
 };
 
 /// Moves the points that are kept to O; the others get NaN for x. The same bits on every machine:

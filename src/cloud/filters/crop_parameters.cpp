@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kFarFromSensor = 1000.0;  // [m]
 constexpr std::size_t kSamples = 256;      // points that the middle of a cloud is computed from
+constexpr double kAtOrigin = 1e-6;         // [m] nearer than any ray is measured
 
 // The middle of a cloud that is far from its sensor: the median, axis by axis, of some of its
 // points in the sensor frame [m]. Zero for other clouds.
@@ -43,13 +44,18 @@ Eigen::Vector3d middle_of(const RawCloud& cloud, double min_range_sq, double max
 }  // namespace
 
 CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
-                               double min_range, double max_range) {
-  const double largest = std::min(max_range, kLargestRange);
+                               const IngestConfig& config) {
+  const double nearest = cloud.from_rays ? std::max(config.min_range, kAtOrigin) : config.min_range;
+  const double largest = std::min(config.max_range, kLargestRange);
+  const double believed =
+      std::min(cloud.believed_range, std::max(config.sensor_range, config.max_range));
   CropParameters crop;
-  crop.min_range_sq = min_range * min_range;
+  crop.min_range_sq = nearest * nearest;
   crop.max_range_sq = largest * largest;
+  crop.believed_sq = std::min(std::max(believed * believed, crop.max_range_sq), crop.believed_sq);
   Eigen::Vector3d near_S = Eigen::Vector3d::Zero();
-  if (max_range > kFarFromSensor) near_S = middle_of(cloud, crop.min_range_sq, crop.max_range_sq);
+  if (config.max_range > kFarFromSensor)
+    near_S = middle_of(cloud, crop.min_range_sq, crop.max_range_sq);
   crop.X_FO.translation() = (X_FS * near_S).array().round();
   crop.X_OS = relative_pose(crop.X_FO, X_FS);
   return crop;

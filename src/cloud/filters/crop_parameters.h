@@ -15,6 +15,7 @@ struct CropParameters {
   Eigen::Isometry3d X_FO = Eigen::Isometry3d::Identity();  ///< frame O -> fixed frame
   Eigen::Isometry3d X_OS = Eigen::Isometry3d::Identity();  ///< sensor frame -> O
   double min_range_sq = 0.0, max_range_sq = 0.0;  ///< [m^2] of the points kept, bounds included
+  double believed_sq = std::numeric_limits<double>::max();  ///< [m^2] >= max_range_sq, finite
   Eigen::Vector3d region_center = Eigen::Vector3d::Zero();  ///< [m] in the sensor frame
   /// [m^2] Points outside this sphere are discarded.
   double region_radius_sq = std::numeric_limits<double>::infinity();
@@ -27,9 +28,9 @@ struct CropParameters {
 /// less than 0.01 mm.
 /// @param cloud      checked by check_layout
 /// @param X_FS       sensor frame -> fixed frame, rigid and finite
-/// @param min_range, max_range  [m] of the points kept, bounds included
+/// @param config     its ranges are read
 CropParameters crop_parameters(const RawCloud& cloud, const Eigen::Isometry3d& X_FS,
-                               double min_range, double max_range);
+                               const IngestConfig& config);
 
 /// Discards points outside a region of interest, too.
 /// @param X_FS  sensor frame -> fixed frame

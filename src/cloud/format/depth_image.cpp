@@ -10,8 +10,10 @@
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kMostPixels = 65535;  // along a side
-constexpr double kWidestRay = 57.3;           // tan(89 degrees)
+constexpr std::uint32_t kMostPixels = 65535;         // along a side
+constexpr double kMetre = 1.0, kMillimetre = 0.001;  // REP 118
+constexpr double kWidestRay = 57.3;                  // tan(89 degrees)
+constexpr double kFarthestCenter = 10.0;      // [m] from the optical frame: no camera is as large
 constexpr std::size_t kLongestEncoding = 32;  // characters that are repeated
 
 template <typename Value>
@@ -56,10 +58,8 @@ const char* element_fault(double value, int row, int column) {
   const bool is_center = row < 2 && column == 2;
   if (is_center) return nullptr;
   if (row == 2 && column == 2) return value == 1.0 ? nullptr : "it must be 1";
-  if (value == 0.0) return nullptr;
-  return column == 3 ? "it must be 0: the image of a second stereo camera (a baseline) is not "
-                       "supported"
-                     : "it must be 0";
+  const bool is_baseline = row < 2 && column == 3;
+  return is_baseline || value == 0.0 ? nullptr : "it must be 0";
 }
 
 std::string check_projection(const Projection& projection) {
@@ -151,6 +151,14 @@ std::string check_camera(const CameraModel& camera, std::shared_ptr<const DepthR
   const Axis down = {"height",         camera.height,       camera.roi_y_offset, camera.roi_height,
                      camera.binning_y, projection.at(1, 1), projection.at(1, 2)};
   auto result = std::make_shared<DepthRays>();
+  if (has_P) {
+    const Eigen::Vector3d& center =
+        result->center = {-camera.P[3] / camera.P[0], -camera.P[7] / camera.P[5], 0.0};
+    if (!(center.cwiseAbs().maxCoeff() <= kFarthestCenter)) {
+      return "P[3] and P[7] put the centre of projection at (" + text(center.x()) + ", " +
+             text(center.y()) + ", 0) m, allowed are at most 10 m.";
+    }
+  }
   for (const Axis* axis : {&across, &down}) {
     problem = check_axis(*axis);
     if (!problem.empty()) return problem;
@@ -180,6 +188,9 @@ std::string check_depth_image(const DepthImage& image, const std::shared_ptr<con
   const std::size_t pixel = is_float ? sizeof(float) : sizeof(std::uint16_t);
   std::string problem = check_sizes(image, pixel, max_points);
   if (!problem.empty()) return problem;
+  if (!(image.unit >= 0.0) || !std::isfinite(image.unit)) {
+    return fault("unit", image.unit, "it must be a length in m, or 0");
+  }
   if (rays == nullptr) return "the camera of the image is not known.";
   if (image.width != rays->x.size() || image.height != rays->y.size()) {
     return "the image has " + text(image.width) + " x " + text(image.height) +
@@ -194,6 +205,9 @@ std::string check_depth_image(const DepthImage& image, const std::shared_ptr<con
   cloud->row_step = image.step;
   cloud->depth = is_float ? DepthType::kFloat32 : DepthType::kUint16;
   cloud->rays = rays;
+  cloud->origin = rays->center;
+  cloud->from_rays = true;
+  cloud->depth_unit = image.unit > 0.0 ? image.unit : is_float ? kMetre : kMillimetre;
   cloud->pixel_angle = std::max(spacing(rays->x), spacing(rays->y));
   cloud->swap_bytes = image.is_bigendian != kMachineIsBigEndian;
   return {};

@@ -10,18 +10,15 @@
 namespace ist {
 namespace {
 
-constexpr double kMillimetre = 0.001;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// The depth of a pixel [m]; NaN where nothing is known.
-struct Millimetres {
+// The depth of a pixel in the image's unit; NaN where nothing is known.
+struct Integers {
   using Bits = std::uint16_t;
-  static double depth(Bits bits) {
-    return bits == 0 ? kNaN : static_cast<double>(bits) * kMillimetre;
-  }
+  static double depth(Bits bits) { return bits == 0 ? kNaN : static_cast<double>(bits); }
 };
 
-struct Metres {
+struct Floats {
   using Bits = std::uint32_t;
   static double depth(Bits bits) {
     float value;
@@ -39,11 +36,11 @@ void read_as(const RawCloud& image, std::size_t row, std::size_t column, std::si
   using Bits = typename Pixel::Bits;
   const std::uint8_t* bytes = image.data + row * image.row_step + column * sizeof(Bits);
   const double* ray_x = image.rays->x.data() + column;
-  const double ray_y = image.rays->y[row];
+  const double ray_y = image.rays->y[row], unit = image.depth_unit;
   for (std::size_t i = 0; i < count; ++i) {
     Bits bits;
     std::memcpy(&bits, bytes + i * sizeof(Bits), sizeof bits);
-    const double depth = Pixel::depth(kSwap ? swapped(bits) : bits);
+    const double depth = unit * Pixel::depth(kSwap ? swapped(bits) : bits);
     x[i] = ray_x[i] * depth;
     y[i] = ray_y * depth;
     z[i] = depth;
@@ -60,9 +57,9 @@ void read_as(const RawCloud& image, std::size_t row, std::size_t column, std::si
 void read_depth_pixels(const RawCloud& image, std::size_t row, std::size_t column,
                        std::size_t count, double* x, double* y, double* z) {
   const bool is_float = image.depth == DepthType::kFloat32;
-  const auto read = is_float ? image.swap_bytes ? &read_as<Metres, true> : &read_as<Metres, false>
-                    : image.swap_bytes ? &read_as<Millimetres, true>
-                                       : &read_as<Millimetres, false>;
+  const auto read = is_float ? image.swap_bytes ? &read_as<Floats, true> : &read_as<Floats, false>
+                    : image.swap_bytes ? &read_as<Integers, true>
+                                       : &read_as<Integers, false>;
   read(image, row, column, count, x, y, z);
 }
 

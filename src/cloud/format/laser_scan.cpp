@@ -20,12 +20,25 @@ std::string fault(const char* member, double value, const char* expected) {
   return text.str();
 }
 
-enum class Beam { kHit, kNothing, kUnknown, kOutOfRange };
+// [m] Before REP 117, drivers wrote range_max + 1 where nothing was there.
+constexpr double kAboveMaximum = 1.0, kRounded = 1.0 + 1e-6;  // the sum as float
+// [m] Along a ray, places that Ingest takes for farther than max_range, and for not believed.
+constexpr double kFar = 2.0 * kLargestRange, kNotBelieved = 4.0 * kLargestRange;
 
-Beam judge(const LaserScan& scan, double range, double min_range, double max_range) {
+enum class Beam { kHit, kNothing, kUnknown, kTooNear, kTooFar, kNotBelieved };
+
+struct RangeLimits {
+  double min, max, sensor;  // [m]
+};
+
+Beam judge(const LaserScan& scan, double range, const RangeLimits& limits) {
   if (!(range >= scan.range_min)) return Beam::kUnknown;  // NaN and -inf too
-  if (range > scan.range_max || range == kInfinity) return Beam::kNothing;
-  return range < min_range || range > max_range ? Beam::kOutOfRange : Beam::kHit;
+  if (range == kInfinity) return Beam::kNothing;
+  const double above_maximum = (scan.range_max + kAboveMaximum) * kRounded;
+  if (range > limits.sensor || range > above_maximum) return Beam::kNotBelieved;
+  if (range > scan.range_max) return Beam::kNothing;
+  if (range < limits.min) return Beam::kTooNear;
+  return range > limits.max ? Beam::kTooFar : Beam::kHit;
 }
 
 }  // namespace
@@ -71,11 +84,14 @@ std::string check_scan(const LaserScan& scan, const ScanLimits& limits) {
 RawCloud ScanPoints::raw() const {
   RawCloud cloud = packed_cloud(xyz.data(), xyz.size() / 3, 1);
   cloud.pixel_angle = beam_angle;
+  cloud.from_rays = true;
+  cloud.believed_range = 0.5 * (kFar + kNotBelieved);
   return cloud;
 }
 
 void to_points(const LaserScan& scan, double min_range, double max_range,
-               const Eigen::Isometry3d& X_SE, ScanPoints* points) {
+               const Eigen::Isometry3d& X_SE, ScanPoints* points, double sensor_range) {
+  const RangeLimits limits = {min_range, max_range, std::max(sensor_range, max_range)};
   points->beam_angle = std::abs(scan.angle_increment);
   const bool moves = scan.count > 1 && scan.time_increment != 0.0;
   const Eigen::Quaterniond q_SE(X_SE.linear());
@@ -84,15 +100,20 @@ void to_points(const LaserScan& scan, double min_range, double max_range,
     const auto beam = static_cast<double>(i);
     const double range = static_cast<double>(scan.ranges[i]);
     Eigen::Vector3d p = Eigen::Vector3d::Zero();
-    switch (judge(scan, range, min_range, max_range)) {
+    switch (judge(scan, range, limits)) {
       case Beam::kUnknown:
         p.setConstant(kNaN);
         break;
       case Beam::kNothing:
         p.setConstant(kInfinity);
         break;
-      case Beam::kOutOfRange:
-        p.x() = 2.0 * kLargestRange;
+      case Beam::kTooNear:
+        break;  // at the origin
+      case Beam::kTooFar:
+        p.x() = kFar;
+        break;
+      case Beam::kNotBelieved:
+        p.x() = kNotBelieved;
         break;
       case Beam::kHit: {
         const double angle = scan.angle_min + beam * scan.angle_increment;

@@ -183,7 +183,7 @@ class BlockBounder {
   }
 
   HWY_INLINE BlockState Run() {
-    block_.may_have_edge = block_.not_a_number = 0;
+    block_.may_have_edge = block_.not_a_number = block_.too_near = block_.not_believed = 0;
     const D d;
     for (std::size_t r = 0; r < kBlockTiles; ++r) {
       BoundTileRow(r);
@@ -254,12 +254,15 @@ class BlockBounder {
     const auto kept = hn::And(hn::Ge(sq, hn::Set(d, transform_.keep_from)),
                               hn::Le(sq, hn::Set(d, transform_.keep_to)));
     const auto nan = hn::Not(hn::Eq(sq, sq));
-    const auto out = hn::Or(nan, hn::Or(hn::Lt(sq, hn::Set(d, transform_.drop_below)),
-                                        hn::Gt(sq, hn::Set(d, transform_.drop_above))));
+    const auto near = hn::Lt(sq, hn::Set(d, transform_.drop_below));
+    const auto out = hn::Or(nan, hn::Or(near, hn::Gt(sq, hn::Set(d, transform_.drop_above))));
     // Infinite coordinates and finite ones with an infinite square are told apart in double.
     const auto infinite = hn::Eq(sq, hn::Set(d, kInfinity));
     is_unclear_ = is_unclear_ || !hn::AllTrue(d, hn::Or(kept, out)) || !hn::AllFalse(d, infinite);
     block_.not_a_number += static_cast<std::uint32_t>(hn::CountTrue(d, nan));
+    block_.too_near += static_cast<std::uint32_t>(hn::CountTrue(d, near));
+    block_.not_believed +=
+        static_cast<std::uint32_t>(hn::CountTrue(d, hn::Gt(sq, hn::Set(d, transform_.believed))));
     const std::uint32_t bits = Bits(d, kept);
     for (std::size_t k = 0; k < kTiles<D>; ++k) {
       const std::uint32_t one = bits >> k & 0x1111U;  // a bit of each pixel

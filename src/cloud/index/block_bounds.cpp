@@ -37,12 +37,14 @@ BlockTransform::BlockTransform(const CropParameters& crop) {
   drop_below = static_cast<float>(min_sq > kSmallestSquare ? (1.0 - kSquareError) * min_sq : 0.0);
   keep_to = static_cast<float>((1.0 - kSquareError) * max_sq);
   drop_above = static_cast<float>(std::max((1.0 + kSquareError) * max_sq, kSmallestSquare));
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  believed = static_cast<float>(std::min(crop.believed_sq, kLargest));
 }
 
 BlockTransform BlockTransform::without_limits() const {
   BlockTransform transform = *this;
   transform.keep_from = transform.drop_below = 0.0F;
-  transform.keep_to = transform.drop_above = std::numeric_limits<float>::max();
+  transform.keep_to = transform.drop_above = transform.believed = std::numeric_limits<float>::max();
   return transform;
 }
 

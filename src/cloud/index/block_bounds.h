@@ -40,6 +40,7 @@ struct BlockTransform {
   /// [m^2] Squared ranges. A pixel from `keep_from` to `keep_to` is kept, one below `drop_below` or
   /// above `drop_above` is not, whatever float rounds off. The others are decided in double.
   float keep_from, keep_to, drop_below, drop_above;
+  float believed;  ///< [m^2] CropParameters::believed_sq, which float may round
 };
 
 /// Points of four floats (x, y, z and anything), as they are in a message or copied from it.
@@ -61,7 +62,8 @@ struct alignas(64) BlockBounds {
   /// Bit k: the tile in slot k may span a depth discontinuity, as far as its corners show: they say
   /// how far apart pixels are on its surface. Undefined where not all pixels are kept.
   std::uint32_t may_have_edge;
-  std::uint32_t not_a_number;  ///< pixels
+  /// Pixels that are NaN, nearer than the least range, and farther than is believed.
+  std::uint32_t not_a_number, too_near, not_believed;
 };
 
 enum class BlockState {

@@ -105,11 +105,13 @@ void BlockReader::copy_depths(std::size_t row) {
   }
 }
 
-// The pixels kept, after bound_block(); counts those that are NaN.
+// The pixels kept, after bound_block(); counts the others.
 std::size_t BlockReader::count_kept(BlockState state, const BlockBounds& block) {
   if (state == BlockState::kAll) return kBlockSide * kBlockSide;
   counts_.not_a_number +=
       block.not_a_number - static_cast<std::uint32_t>(kBlockSide * kBlockSide - received());
+  counts_.too_near += block.too_near;
+  counts_.not_believed += block.not_believed;
   std::size_t count = 0;
   for (const std::uint32_t kept : block.kept) count += std::bitset<kSlots>(kept).count();
   return count;

@@ -17,7 +17,8 @@ namespace ist {
 class BlockReader {
  public:
   /// @param cloud, crop  outlive this
-  /// @param counts       outlives this; `not_a_number`, `infinite` and `outside_region` are counted
+  /// @param counts       outlives this; `not_a_number`, `infinite`, `outside_region`,
+  ///   `too_near` and `not_believed` are counted
   BlockReader(const RawCloud& cloud, const CropParameters& crop, IngestCounts* counts);
 
   /// The next calls are for the block that begins at this pixel.

@@ -66,7 +66,7 @@ void read_memory_scan(const RawCloud& cloud, const CloudSnapshot& snapshot,
         p_S = Eigen::Vector3d(cloud.rays->x[column], cloud.rays->y[row], 1.0);
         range = p_S.norm();
         p_S *= max_range * kCut / range;
-      } else if (range < min_range) {
+      } else if (range < min_range || range > snapshot.believed_range) {
         continue;
       } else if (range > max_range) {
         p_S *= max_range * kCut / range;

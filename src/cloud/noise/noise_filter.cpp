@@ -66,9 +66,7 @@ struct NoiseFilter::Impl {
   void build_index();
   bool has_neighbors(std::uint32_t point) const;
   bool count_in_tile(const PointTile& tile, std::uint32_t point, int* count) const;
-  RawCloud view() const;
-
-  double pixel_angle = 0.0;  ///< [rad] of the cloud
+  RawCloud view(const RawCloud& of) const;
 };
 
 void NoiseFilter::Impl::read(const RawCloud& cloud, double max_range) {
@@ -163,7 +161,8 @@ bool NoiseFilter::Impl::has_neighbors(std::uint32_t point) const {
   return false;
 }
 
-RawCloud NoiseFilter::Impl::view() const {
+// The points as they are now, of a cloud that read() has read.
+RawCloud NoiseFilter::Impl::view(const RawCloud& of) const {
   RawCloud raw;
   raw.data = reinterpret_cast<const std::uint8_t*>(points.data());
   raw.width = width;
@@ -173,7 +172,10 @@ RawCloud NoiseFilter::Impl::view() const {
   raw.y = sizeof(double);
   raw.z = 2 * sizeof(double);
   raw.is_double = true;
-  raw.pixel_angle = pixel_angle;
+  raw.pixel_angle = of.pixel_angle;
+  raw.origin = of.origin;
+  raw.from_rays = of.from_rays;
+  raw.believed_range = of.believed_range;
   return raw;
 }
 
@@ -186,11 +188,10 @@ NoiseFilter::~NoiseFilter() = default;
 
 RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t* dropped) {
   Impl& my = *impl_;
-  my.pixel_angle = cloud.pixel_angle;
   my.read(cloud, max_range);
   my.find_undecided();
   *dropped = 0;
-  if (my.undecided.empty()) return my.view();
+  if (my.undecided.empty()) return my.view(cloud);
   my.build_index();
   std::size_t noise = 0;
   for (const std::uint32_t point : my.undecided) {
@@ -199,7 +200,7 @@ RawCloud NoiseFilter::run(const RawCloud& cloud, double max_range, std::uint32_t
   }
   for (std::size_t i = 0; i < noise; ++i) my.points[my.undecided[i]].setConstant(kNaN);
   *dropped = static_cast<std::uint32_t>(noise);
-  return my.view();
+  return my.view(cloud);
 }
 
 }  // namespace ist

@@ -198,6 +198,8 @@ void CloudSource::receive(const Received& received) {
                                                  "their receipt; compare the clocks");
   }
   if (problem.empty() && is_believed && is_new_start(stamp)) start_again(stamp);
+  const bool is_same = received.content == content_;
+  content_ = received.content;
   bool is_used = true;
   state_.update([&](SourceReport* report) {
     ++report->messages;
@@ -205,6 +207,9 @@ void CloudSource::receive(const Received& received) {
     if (is_believed) {
       report->newest = std::fmax(report->newest, stamp.toSec() - std::fmax(ahead, 0.0));
       report->ahead = ahead;
+    }
+    if (received.content != 0 && !(is_same && report->same_since <= ros::Time::now().toSec())) {
+      report->same_since = ros::Time::now().toSec();
     }
     if (is_believed && stamp < in_use_) {
       ++report->out_of_order;

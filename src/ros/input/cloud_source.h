@@ -110,8 +110,9 @@ class CloudSource : public ObstacleSource {
   Ingest ingest_;
   MeasurementQueue waiting_;
   MeasurementPtr last_map_;
-  bool map_is_new_ = false;  ///< last_map_ is not in use with this model yet
-  ros::Time in_use_;         ///< stamp of the newest snapshot of this generation
+  bool map_is_new_ = false;    ///< last_map_ is not in use with this model yet
+  ros::Time in_use_;           ///< stamp of the newest snapshot of this generation
+  std::uint64_t content_ = 0;  ///< Received::content of the newest message
   std::chrono::steady_clock::time_point waits_since_;  ///< nothing waited, or one was ingested
   bool waits_for_tf_ = false;                          ///< the reported problem is that wait
   PublisherCount publisher_count_;

@@ -79,7 +79,8 @@ std::string DepthCamera::fault(const std::string& frame_id) const {
 }
 
 Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera& camera,
-                    std::size_t max_points, const std::shared_ptr<NoiseFilter>& noise) {
+                    double unit, std::size_t max_points,
+                    const std::shared_ptr<NoiseFilter>& noise) {
   const std_msgs::Header& header = message->header;
   std::string fault = camera.fault(header.frame_id);
   if (!fault.empty()) return {header, fault, nullptr};
@@ -91,6 +92,7 @@ Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera
   image.is_bigendian = message->is_bigendian != 0;
   image.data = message->data.data();
   image.data_size = message->data.size();
+  image.unit = unit;
   RawCloud raw;
   fault = check_depth_image(image, camera.rays(), &raw, max_points);
   if (!fault.empty()) return {header, "malformed image: " + fault, nullptr};

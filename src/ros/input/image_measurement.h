@@ -42,9 +42,10 @@ class DepthCamera {
 };
 
 /// Reads a depth image.
+/// @param unit        [m] as DepthImage::unit
 /// @param max_points  an image of more pixels is faulty
 /// @param noise       null: no noise filter
 Received read_image(const sensor_msgs::ImageConstPtr& message, const DepthCamera& camera,
-                    std::size_t max_points, const std::shared_ptr<NoiseFilter>& noise);
+                    double unit, std::size_t max_points, const std::shared_ptr<NoiseFilter>& noise);
 
 }  // namespace ist

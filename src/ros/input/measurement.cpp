@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <boost/function.hpp>
+#include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "ros/common/eigen_conversion.h"
@@ -21,9 +23,43 @@ constexpr std::uint32_t kQueueSize = 2;
 // within kMaxPosition of the fixed frame's origin along each axis, so that no link is so far. [m]
 constexpr double kFarthestPoint = 4.0 * kMaxPosition;
 
+// [m] Nothing is nearer to a sensor's origin: drivers write (0, 0, 0) for no return.
+constexpr double kAtOrigin = 1e-6;
+
 // [rad] A camera has at least 160 pixels across 90 degrees. With fewer, its clouds may be cropped a
 // little nearer than max_distance, and links out there say so.
 constexpr double kLargestPixelAngle = 0.0125;
+
+// FNV-1a by words of eight bytes; never 0.
+std::uint64_t hash_of(const void* data, std::size_t size) {
+  constexpr std::uint64_t kOffset = 14695981039346656037ULL, kPrime = 1099511628211ULL;
+  std::uint64_t hash = kOffset;
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
+  for (std::size_t i = 0; i < size; i += sizeof(std::uint64_t)) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes + i, std::min(sizeof word, size - i));
+    hash = (hash ^ word) * kPrime;
+    hash ^= hash >> 32U;  // so that the highest bits of a word count for the lowest, too
+  }
+  return std::max<std::uint64_t>(hash, 1);
+}
+
+const std::vector<std::uint8_t>& numbers(const sensor_msgs::PointCloud2& message) {
+  return message.data;
+}
+const std::vector<std::uint8_t>& numbers(const sensor_msgs::Image& message) { return message.data; }
+const std::vector<float>& numbers(const sensor_msgs::LaserScan& message) { return message.ranges; }
+
+// What the numbers of a message are, where ~frozen_after asks for it.
+template <typename Message>
+std::uint64_t content_of(const Message& message, const SourceConfig& config) {
+  if (std::isinf(config.frozen_after)) return 0;
+  const auto& all = numbers(message);
+  return hash_of(all.data(), all.size() * sizeof all[0]);
+}
+std::uint64_t content_of(const topic_tools::ShapeShifter& /*map*/, const SourceConfig& /*config*/) {
+  return 0;
+}
 
 template <typename Message>
 using Factory = boost::function<boost::shared_ptr<Message>()>;
@@ -34,9 +70,11 @@ ros::Subscriber subscribe_as(const SourceConfig& config, ros::NodeHandle* nh,
                              const ReadingBegins& begin, const Receiver& receive, const Read& read,
                              const Factory<Message>& make = ros::DefaultMessageCreator<Message>()) {
   const boost::function<void(const boost::shared_ptr<const Message>&)> callback =
-      [begin, receive, read](const boost::shared_ptr<const Message>& message) {
+      [begin, receive, read, config](const boost::shared_ptr<const Message>& message) {
         begin();
-        receive(read(message));
+        Received received = read(message);
+        received.content = content_of(*message, config);
+        receive(received);
       };
   ros::SubscribeOptions options;
   options.init<Message>(config.topic, kQueueSize, callback, make);
@@ -66,6 +104,7 @@ double largest_extent(const SourceConfig& config) {
 
 IngestConfig ingest_config(const SourceConfig& config) {
   IngestConfig ingest = config.ingest;
+  ingest.min_range = std::max(ingest.min_range, kAtOrigin);
   ingest.max_range = std::min(ingest.max_range, kFarthestPoint);
   if (config.type == SourceType::kScan) {  // read_scan() applies the limits to each beam
     ingest.extent.max_range = ingest.max_range;
@@ -86,7 +125,7 @@ Subscription subscribe(const SourceConfig& config, ros::NodeHandle* nh, const Re
     subscription.messages = subscribe_as<sensor_msgs::LaserScan>(
         config, nh, begin, receive,
         [ranges, limits](const sensor_msgs::LaserScanConstPtr& message) {
-          return read_scan(message, ranges.min_range, ranges.max_range, limits);
+          return read_scan(message, ranges, limits);
         });
     return subscription;
   }
@@ -111,8 +150,9 @@ Subscription subscribe(const SourceConfig& config, ros::NodeHandle* nh, const Re
     subscription.camera_info = nh->subscribe<sensor_msgs::CameraInfo>(topic, 1, take);
     subscription.messages = subscribe_as<sensor_msgs::Image>(
         config, nh, begin, receive,
-        [camera, max_points, noise](const sensor_msgs::ImageConstPtr& message) {
-          return read_image(message, *camera, max_points, noise);
+        [camera, max_points, noise,
+         unit = config.depth_unit](const sensor_msgs::ImageConstPtr& message) {
+          return read_image(message, *camera, unit, max_points, noise);
         },
         from_pool<sensor_msgs::Image>());
     return subscription;

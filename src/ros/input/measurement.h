@@ -75,7 +75,8 @@ struct Received {
   std_msgs::Header header;
   std::string fault;
   std::shared_ptr<const Measurement> measurement;
-  std::string doubt = {};  ///< a sentence about a message that is used all the same
+  std::string doubt = {};     ///< a sentence about a message that is used all the same
+  std::uint64_t content = 0;  ///< equal for messages of the same bytes; 0: not asked
 };
 using Receiver = std::function<void(const Received&)>;
 /// Called before a message is read, which takes long for a large map.

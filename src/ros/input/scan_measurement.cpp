@@ -27,12 +27,11 @@ ros::Time shifted(const ros::Time& stamp, double seconds) {
 class ScanMeasurement : public Measurement {
  public:
   ScanMeasurement(const sensor_msgs::LaserScanConstPtr& message, const LaserScan& scan,
-                  double min_range, double max_range)
+                  const IngestConfig& ranges)
       : Measurement(message->header, message->ranges.size() * sizeof(float)),
         message_(message),
         scan_(scan),
-        min_range_(min_range),
-        max_range_(max_range) {}
+        ranges_(ranges) {}
 
   std::vector<ros::Time> instants() const override {
     const double duration = scan_.duration();
@@ -46,8 +45,8 @@ class ScanMeasurement : public Measurement {
 
   void ingest(const Placement& placement, Ingest* ingest, CloudSnapshot* snapshot) const override {
     ScanPoints points;
-    to_points(scan_, min_range_, max_range_, placement.X_FS.inverse() * placement.X_FS_end,
-              &points);
+    to_points(scan_, ranges_.min_range, ranges_.max_range,
+              placement.X_FS.inverse() * placement.X_FS_end, &points, ranges_.sensor_range);
     ingest->run(points.raw(), placement.X_FS, robot_by_beam(placement), header().stamp.toSec(),
                 snapshot);
     const Eigen::Vector3d moved = placement.X_FS_end.translation() - placement.X_FS.translation();
@@ -75,13 +74,13 @@ class ScanMeasurement : public Measurement {
 
   sensor_msgs::LaserScanConstPtr message_;
   LaserScan scan_;  ///< views the message
-  double min_range_, max_range_;
+  IngestConfig ranges_;
 };
 
 }  // namespace
 
-Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_range,
-                   double max_range, const ScanLimits& limits) {
+Received read_scan(const sensor_msgs::LaserScanConstPtr& message, const IngestConfig& ranges,
+                   const ScanLimits& limits) {
   LaserScan scan;
   scan.angle_min = static_cast<double>(message->angle_min);
   scan.angle_increment = static_cast<double>(message->angle_increment);
@@ -92,8 +91,7 @@ Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_ran
   scan.count = message->ranges.size();
   const std::string fault = check_scan(scan, limits);
   if (!fault.empty()) return {message->header, "malformed scan: " + fault, nullptr};
-  return {message->header, "",
-          std::make_shared<ScanMeasurement>(message, scan, min_range, max_range)};
+  return {message->header, "", std::make_shared<ScanMeasurement>(message, scan, ranges)};
 }
 
 }  // namespace ist

@@ -9,8 +9,8 @@ namespace ist {
 
 /// Reads a LaserScan. Each beam is placed with the sensor's pose at the beam's own time, and the
 /// self-filter uses the robot's poses at several instants of the scan.
-/// @param min_range, max_range  [m] points outside these limits are dropped
-Received read_scan(const sensor_msgs::LaserScanConstPtr& message, double min_range,
-                   double max_range, const ScanLimits& limits);
+/// @param ranges  its min_range, max_range and sensor_range apply to each beam
+Received read_scan(const sensor_msgs::LaserScanConstPtr& message, const IngestConfig& ranges,
+                   const ScanLimits& limits);
 
 }  // namespace ist

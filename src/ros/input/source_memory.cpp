@@ -228,6 +228,10 @@ std::string SourceMemory::insert(const Measurement& measurement, const Placement
            " is not remembered: the pose of link '" + link.name +
            "' was not known, and the robot itself would be";
   }
+  if (!cloud.cloud.counts.saw_enough(config_.min_measured)) {
+    return "the last " + std::string(noun(config_.type)) +
+           " is not remembered: too little of it was measured";
+  }
   const std::string frame = without_slash(config_.memory.frame_id);
   Eigen::Isometry3d X_MF = Eigen::Isometry3d::Identity();
   if (!frame.empty() && frame != target.fixed_frame) {

@@ -26,6 +26,12 @@ struct SourceReport {
   double timeout = 0.5;                             ///< [s]
   std::string timeout_parameter = "cloud_timeout";  ///< its name
   bool required = true;
+  double min_measured = 0.0;  ///< the share of the points that has to be measured
+  double sensor_range = 0.0;  ///< [m] farther points are not believed
+  /// [s] Messages may hold the same bytes for so long, and the receipt of the first that held those
+  /// of the newest; NaN: not asked.
+  double frozen_after = std::numeric_limits<double>::infinity();
+  double same_since = std::numeric_limits<double>::quiet_NaN();
   /// [m] Points this near to a link are taken for the robot, so obstacles in this skin are not
   /// seen. NaN without self-filter.
   double blind_skin = std::numeric_limits<double>::quiet_NaN();

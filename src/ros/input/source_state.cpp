@@ -1,5 +1,6 @@
 #include "ros/input/source_state.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "ros/common/ros_time.h"
@@ -18,6 +19,9 @@ SourceState::SourceState(const SourceConfig& config, const std::string& topic)
   report_.timeout_parameter = config.timeout_parameter;
   report_.required = config.required;
   report_.measures = config.type != SourceType::kWorld && !config.is_permanent();
+  report_.min_measured = config.min_measured;
+  report_.frozen_after = config.frozen_after;
+  report_.sensor_range = std::max(config.ingest.sensor_range, config.ingest.max_range);
   if (config.ingest.self_filter) report_.blind_skin = config.ingest.self_filter_padding;
   report_.by_view =
       config.ingest.self_filter && config.ingest.self_filter_mode == SelfFilterMode::kView;
@@ -93,7 +97,7 @@ void SourceState::notice_clock_jump() {
     target_.set_back += seconds_between(now, last_now_);
     if (!is_permanent_) {
       report_.messages = 0;
-      report_.newest = std::numeric_limits<double>::quiet_NaN();
+      report_.newest = report_.same_since = std::numeric_limits<double>::quiet_NaN();
       report_.problem.clear();
     }
   }

@@ -103,6 +103,8 @@ void assign_source(const SourceReport& source, const Status& status, const ros::
   message->age = has && !source.is_file ? seconds_between(source.counts_from, stamp) : kNaN;
   message->points_received = counts.received;
   message->points_used = counts.used + counts.outside_region;
+  message->measured_share =
+      has ? static_cast<float>(counts.measured_share()) : std::numeric_limits<float>::quiet_NaN();
   message->points_on_robot = counts.on_robot;
 }
 

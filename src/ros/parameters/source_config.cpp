@@ -40,6 +40,8 @@ const char* noun(SourceType type) {
   return "cloud";
 }
 
+double usual_range(SourceType type) { return type == SourceType::kDepthImage ? 10.0 : 100.0; }
+
 bool SourceConfig::is_permanent() const {
   const bool stays = type == SourceType::kMap || type == SourceType::kWorld;
   return stays && (!file.empty() || std::isinf(timeout));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 
 #include "internal/cloud/noise_filter.h"
@@ -30,6 +31,14 @@ struct SourceMemoryConfig {
   std::string file;      ///< absolute path of a .bt file; empty: nothing is kept
 };
 
+/// Depth cameras have 10 to 60 % of pixels without a measurement, and lidars up to 85 %, where they
+/// look at the sky. What sees less than a tenth does not see the view that it stands for.
+constexpr double kMinMeasured = 0.1;
+
+/// [m] The default of sensor_range. The depth cameras that arms carry measure up to 10 m, and other
+/// sensors 100 m; lengths in millimetres are longer from 10 and 100 mm on.
+double usual_range(SourceType type);
+
 /// One entry of ~sources.
 struct SourceConfig {
   std::string name = "cloud";
@@ -41,6 +50,12 @@ struct SourceConfig {
   double timeout = 0.5;          ///< [s] an older message is STALE_CLOUD; > 0, may be inf
   std::string timeout_parameter = "cloud_timeout";
   bool required = true;  ///< false: the absence of this source shows in its own status only
+  /// 0 to 1: a source of which a smaller share of the points was measured is NO_CLOUD.
+  double min_measured = kMinMeasured;
+  /// [s] > 0: a source whose messages have held the same bytes for longer is STALE_CLOUD. Infinity:
+  /// never, as a simulation without noise repeats itself.
+  double frozen_after = std::numeric_limits<double>::infinity();
+  double depth_unit = 0.0;  ///< [m] of depth images: that a number of 1 means; 0: the encoding's
   IngestConfig ingest;
   NoiseFilterConfig noise;    ///< used for clouds and depth images
   ScanLimits scan;            ///< used for scans

@@ -34,6 +34,7 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
   const double default_max_range = ingest->max_range;
   reader->read(prefix + "min_range", Range::non_negative("m", 1e4), &ingest->min_range);
   reader->read(prefix + "max_range", Range::positive("m", kInf, true), &ingest->max_range);
+  reader->read(prefix + "sensor_range", Range::positive("m", kInf, true), &ingest->sensor_range);
   reader->read(prefix + "self_filter", &ingest->self_filter);
   reader->read(prefix + "self_filter_padding", Range::non_negative("m", 1.0),
                &ingest->self_filter_padding);
@@ -45,6 +46,12 @@ void read_ingest(ParameterReader* reader, const std::string& prefix, IngestConfi
     reader->add_error(text.str());
     ingest->max_range = default_max_range;
   }
+}
+
+// When a sensor whose messages come all the same is blind, or stuck.
+void read_failures(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+  reader->read(prefix + "min_measured", Range{"", 0.0, 1.0}, &source->min_measured);
+  reader->read(prefix + "frozen_after", Range::positive("s", kInf, true), &source->frozen_after);
 }
 
 void read_noise(ParameterReader* reader, const std::string& prefix, NoiseFilterConfig* noise) {
@@ -158,7 +165,9 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   } else if (source->type == SourceType::kWorld) {
     read_world(reader, prefix, source);
   } else {
+    if (!reader->has("sensor_range")) source->ingest.sensor_range = usual_range(source->type);
     read_ingest(reader, prefix, &source->ingest);
+    read_failures(reader, prefix, source);
     read_extent(reader, prefix, &source->ingest.extent);
     require_extent(reader, prefix, source->ingest.max_range, &source->ingest.extent);
     if (source->type != SourceType::kScan) read_noise(reader, prefix, &source->noise);
@@ -173,6 +182,7 @@ void read_source(ParameterReader* reader, const std::string& prefix, SourceConfi
   }
   if (source->type == SourceType::kDepthImage) {
     reader->read(prefix + "camera_info", &source->camera_info);
+    reader->read(prefix + "depth_scale", Range{"m", 0.0, 1.0}, &source->depth_unit);
   }
   reader->read(prefix + "required", &source->required);
 }
@@ -183,7 +193,9 @@ std::vector<SourceConfig> read_sources(ParameterReader* reader) {
   // Parameters beside ~sources belong to the single source; with ~sources they are its defaults.
   SourceConfig single;
   reader->read("cloud_timeout", Range::positive("s", kInf, true), &single.timeout);
+  single.ingest.sensor_range = usual_range(single.type);
   read_ingest(reader, "", &single.ingest);
+  read_failures(reader, "", &single);
   read_extent(reader, "", &single.ingest.extent);
   if (!reader->has("sources")) {
     require_extent(reader, "", single.ingest.max_range, &single.ingest.extent);

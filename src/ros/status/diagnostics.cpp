@@ -75,6 +75,10 @@ void add_source_counts(const SourceReport& source, double rate, double now,
     if (source.counts.noise > 0) add_value("points taken for noise", source.counts.noise, status);
     add_value("points NaN", source.counts.not_a_number, status);
     add_value("points infinite", source.counts.infinite, status);
+    add_value("points too near", source.counts.too_near, status);
+    add_value("points not believed", source.counts.not_believed, status);
+    add_value("identical points", source.counts.at_one_place, status);
+    add_value("share measured", format_text("%.3f", source.counts.measured_share()), status);
     add_value("time to ingest", milliseconds(source.ingest_time), status);
     add_value("time of the first answer with it", milliseconds(source.warm_up_time), status);
     add_value("memory of the cloud's index",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "internal/cloud/unmeasured.h"
 #include "ros/common/text.h"
 #include "ros/status/status.h"
 
@@ -116,6 +117,34 @@ Status stale_snapshot(const SourceReport& source, double age) {
                                            cause};
 }
 
+/// The prefix of the parameters of a source.
+std::string prefix_of(const SourceReport& source) {
+  return source.timeout_parameter == "cloud_timeout" ? "" : "sources/" + source.name + "/";
+}
+
+/// Whether the newest message, which is fresh, shows the sensor's view.
+Status view_status(const SourceReport& source) {
+  const IngestCounts& counts = source.counts;
+  if (counts.saw_enough(source.min_measured)) return {ProximityArray::OK, ""};
+  if (counts.not_a_number + counts.noise == counts.received) {
+    return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
+                                          " is NaN, the sensor sees nothing at all"};
+  }
+  const std::string prefix = prefix_of(source);
+  const std::string question =
+      counts.not_believed <= counts.received / 2
+          ? "; is the sensor covered or blind?"
+          : format_text(": more than %g m (~", source.sensor_range) + prefix +
+                "sensor_range), or than range_max of a scan; are its lengths in metres?";
+  return {ProximityArray::NO_CLOUD,
+          title(source) + ": " +
+              format_text("only %.1f %% of the newest ", 100.0 * counts.measured_share()) +
+              source.noun + " was measured, " +
+              format_text("at least %g %% are needed (~", 100.0 * source.min_measured) + prefix +
+              "min_measured): of " + std::to_string(counts.received) + " points " +
+              unmeasured(counts) + question};
+}
+
 }  // namespace
 
 Status source_status(const SourceReport& source, double now) {
@@ -134,10 +163,14 @@ Status source_status(const SourceReport& source, double now) {
   }
   const double age = now - source.counts_from.toSec();
   if (age > source.timeout) return stale_snapshot(source, age);
-  if (source.counts.saw_nothing()) {
-    return {ProximityArray::NO_CLOUD, title(source) + ": every point of the newest " + source.noun +
-                                          " is NaN, the sensor sees nothing at all"};
+  if (now - source.same_since > source.frozen_after) {  // false for NaN
+    return {ProximityArray::STALE_CLOUD,
+            title(source) + ": all of its " + source.noun + "s have held the same bytes for " +
+                seconds(now - source.same_since) + ", allowed is " + seconds(source.frozen_after) +
+                " (~" + prefix_of(source) + "frozen_after): its driver repeats itself"};
   }
+  const Status view = view_status(source);
+  if (!view.ok()) return view;
   if (!source.incomplete.empty()) return incomplete(source);
   return {ProximityArray::OK, ""};
 }

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "ist_proximity/cloud/cloud_snapshot.h"
+
+namespace ist {
+
+/// What the points are that were not measured: "2 are NaN, 1 are nearer than min_range".
+std::string unmeasured(const IngestCounts& counts);
+
+}  // namespace ist
