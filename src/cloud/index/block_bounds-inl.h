@@ -255,14 +255,17 @@ class BlockBounder {
                               hn::Le(sq, hn::Set(d, transform_.keep_to)));
     const auto nan = hn::Not(hn::Eq(sq, sq));
     const auto near = hn::Lt(sq, hn::Set(d, transform_.drop_below));
-    const auto out = hn::Or(nan, hn::Or(near, hn::Gt(sq, hn::Set(d, transform_.drop_above))));
+    const auto out_of_range = hn::Or(near, hn::Gt(sq, hn::Set(d, transform_.drop_above)));
+    const auto out = hn::Or(nan, out_of_range);
     // Infinite coordinates and finite ones with an infinite square are told apart in double.
     const auto infinite = hn::Eq(sq, hn::Set(d, kInfinity));
     is_unclear_ = is_unclear_ || !hn::AllTrue(d, hn::Or(kept, out)) || !hn::AllFalse(d, infinite);
     block_.not_a_number += static_cast<std::uint32_t>(hn::CountTrue(d, nan));
-    block_.too_near += static_cast<std::uint32_t>(hn::CountTrue(d, near));
-    block_.not_believed +=
-        static_cast<std::uint32_t>(hn::CountTrue(d, hn::Gt(sq, hn::Set(d, transform_.believed))));
+    if (!hn::AllFalse(d, out_of_range)) {
+      block_.too_near += static_cast<std::uint32_t>(hn::CountTrue(d, near));
+      block_.not_believed +=
+          static_cast<std::uint32_t>(hn::CountTrue(d, hn::Gt(sq, hn::Set(d, transform_.believed))));
+    }
     const std::uint32_t bits = Bits(d, kept);
     for (std::size_t k = 0; k < kTiles<D>; ++k) {
       const std::uint32_t one = bits >> k & 0x1111U;  // a bit of each pixel
