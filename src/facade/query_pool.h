@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -17,7 +18,7 @@ struct QueryWorker {
               const std::shared_ptr<const Kinematics>& kinematics)
       : query(model, {}),
         forward(*model, kinematics),
-        q(kinematics->joints().size(), 0.0),
+        q(kinematics->joints().size(), std::numeric_limits<double>::quiet_NaN()),
         known(model->links.size()),
         results(model->links.size()) {}
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace ist {
 namespace {
@@ -12,9 +13,7 @@ double largest_offset(const Kinematics::Joint& joint, const JointMotion& motion,
                       const JointPoses& still, std::size_t index) {
   const double to_joint = joint.X_PJ.translation().norm();
   if (joint.type == JointType::kPrismatic && joint_speed(joint, motion) > 0.0) {
-    const auto position = [&](double q) { return std::abs(joint.multiplier * q + joint.offset); };
-    return to_joint +
-           std::max(position(motion.from[joint.source]), position(motion.to[joint.source]));
+    return to_joint + std::max(std::abs(motion.from[index]), std::abs(motion.to[index]));
   }
   return still.known[index] ? still.X_PC[index].translation().norm() : to_joint;
 }
@@ -23,8 +22,20 @@ double largest_offset(const Kinematics::Joint& joint, const JointMotion& motion,
 
 double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion) {
   if (joint.type == JointType::kFixed || joint.has_unstated_pose()) return 0.0;
-  const double change = motion.to[joint.source] - motion.from[joint.source];
-  return std::isfinite(change) ? std::abs(joint.multiplier * change) / motion.duration : 0.0;
+  const std::size_t index = joint.child - 1;
+  const double change = motion.to[index] - motion.from[index];
+  return std::isfinite(change) ? std::abs(change) / motion.duration : 0.0;
+}
+
+JointMotion with_mimics(const Kinematics& kinematics, JointMotion motion) {
+  for (std::size_t j = 0; j < motion.from.size(); ++j) {
+    const Kinematics::Joint& joint = kinematics.joints()[j];
+    if (joint.source == j) continue;
+    for (std::vector<double>* q : {&motion.from, &motion.to}) {
+      if (std::isnan((*q)[j])) (*q)[j] = joint.multiplier * (*q)[joint.source] + joint.offset;
+    }
+  }
+  return motion;
 }
 
 MotionBound::MotionBound(const Kinematics& kinematics, const JointMotion& motion,

@@ -55,6 +55,9 @@ class MotionBound {
 /// rounding; +inf for a speed of 0.
 double time_within(double distance, double speed, double growth);
 
+/// The motion with the positions of all mimic joints, which the functions here read.
+JointMotion with_mimics(const Kinematics& kinematics, JointMotion motion);
+
 /// How fast [rad/s, m/s] the motion moves a joint, mimic joints included; 0: not at all.
 double joint_speed(const Kinematics::Joint& joint, const JointMotion& motion);
 

@@ -13,9 +13,7 @@ void place_moved_joints(const Kinematics& kinematics, const JointMotion& motion,
   *moved = still;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!(joint_speed(joints[j], motion) > 0.0)) continue;
-    const std::size_t source = joints[j].source;
-    const double q = (1.0 - s) * motion.from[source] + s * motion.to[source];
-    moved->X_PC[j] = kinematics.joint_pose(j, joints[j].multiplier * q + joints[j].offset);
+    moved->X_PC[j] = kinematics.joint_pose(j, (1.0 - s) * motion.from[j] + s * motion.to[j]);
     moved->known[j] = true;
   }
 }

@@ -120,7 +120,9 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   const auto& joints = kinematics.joints();
   std::vector<double> q;
   q.reserve(joints.size());
-  for (const auto& joint : joints) q.push_back(std::clamp(0.0, joint.lower, joint.upper));
+  for (const auto& joint : joints) {
+    q.push_back(joint.is_free() ? std::clamp(0.0, joint.lower, joint.upper) : std::nan(""));
+  }
   JointPoses poses;
   kinematics.place_joints(q, &poses);
   const std::vector<std::size_t> group_of_body = rest_unstated_joints(kinematics, &poses);
@@ -167,7 +169,8 @@ std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& m
       const double low = std::isfinite(joints[j].lower) ? joints[j].lower : -free_range;
       const double high = std::isfinite(joints[j].upper) ? joints[j].upper : free_range;
       // Not std::uniform_real_distribution, which differs between libraries.
-      q[j] = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+      const double drawn = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+      q[j] = joints[j].is_free() ? drawn : std::nan("");  // mimics follow
     }
     kinematics.place_joints(q, &poses);
     const std::vector<std::size_t> group_of_body = rest_unstated_joints(kinematics, &poses);

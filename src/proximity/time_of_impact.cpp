@@ -166,18 +166,19 @@ void TimeOfImpact::set_surfaces(std::shared_ptr<const RobotSurfaces> surfaces,
   impl_->worlds->set_link_margins(std::move(margins));
 }
 
-void TimeOfImpact::run(const JointMotion& motion, const JointPoses& still,
+void TimeOfImpact::run(const JointMotion& stated, const JointPoses& still,
                        const Eigen::Isometry3d& X_FR, const std::vector<bool>& wanted,
                        SnapshotSpan clouds, Span<const PosedWorld* const> worlds,
                        std::vector<ImpactTime>* results) {
   const std::size_t count = impl_->model->links.size();
   const std::size_t joints = impl_->forward.kinematics().joints().size();
   results->assign(count, ImpactTime());
-  const bool fits = wanted.size() == count && motion.from.size() == joints &&
-                    motion.to.size() == joints && still.X_PC.size() == joints &&
+  const bool fits = wanted.size() == count && stated.from.size() == joints &&
+                    stated.to.size() == joints && still.X_PC.size() == joints &&
                     still.known.size() == joints;
   if (!worlds.empty() && !impl_->worlds) return;
-  if (!fits || !(motion.duration > 0.0) || !std::isfinite(motion.duration)) return;
+  if (!fits || !(stated.duration > 0.0) || !std::isfinite(stated.duration)) return;
+  const JointMotion motion = with_mimics(impl_->forward.kinematics(), stated);
   impl_->carried.take(worlds, impl_->forward.kinematics());
   impl_->bound_carried(motion, still);
   for (std::size_t i = 0; i < count; ++i) {

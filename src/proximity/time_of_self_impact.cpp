@@ -121,14 +121,15 @@ void TimeOfSelfImpact::set_config(const QueryConfig& config) {
   impl_->config.deadline = 0.0;
 }
 
-void TimeOfSelfImpact::run(const JointMotion& motion, const JointPoses& still,
+void TimeOfSelfImpact::run(const JointMotion& stated, const JointPoses& still,
                            const std::vector<bool>& wanted, std::vector<ImpactTime>* results) {
   const std::size_t joints = impl_->forward.kinematics().joints().size();
   results->assign(impl_->pairs.size(), ImpactTime());
-  const bool fits = wanted.size() == impl_->pairs.size() && motion.from.size() == joints &&
-                    motion.to.size() == joints && still.X_PC.size() == joints &&
+  const bool fits = wanted.size() == impl_->pairs.size() && stated.from.size() == joints &&
+                    stated.to.size() == joints && still.X_PC.size() == joints &&
                     still.known.size() == joints;
-  if (!fits || !(motion.duration > 0.0) || !std::isfinite(motion.duration)) return;
+  if (!fits || !(stated.duration > 0.0) || !std::isfinite(stated.duration)) return;
+  const JointMotion motion = with_mimics(impl_->forward.kinematics(), stated);
   const auto can_measure = [&](std::size_t link) {
     return link < impl_->model->links.size() && impl_->model->links[link].usable() &&
            impl_->forward.body(link).has_value();

@@ -170,7 +170,9 @@ void Kinematics::place_joints(const std::vector<double>& q, JointPoses* poses) c
     const Joint& joint = joints_[j];
     if (joint.has_unstated_pose()) continue;
     const bool fixed = joint.type == JointType::kFixed;
-    const double position = fixed ? 0.0 : joint.multiplier * q[joint.source] + joint.offset;
+    const bool follows = joint.source != j && std::isnan(q[j]);
+    const double own = follows ? joint.multiplier * q[joint.source] + joint.offset : q[j];
+    const double position = fixed ? 0.0 : own;
     if (!std::isfinite(position)) continue;
     if (joint.type == JointType::kPrismatic && std::abs(position) > kMaxLength) continue;
     poses->X_PC[j] = joint_pose(j, position);

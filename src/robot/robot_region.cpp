@@ -20,7 +20,10 @@ double largest_offset(const Kinematics& kinematics, const Kinematics::Joint& joi
   if (joint.type != JointType::kPrismatic) return to_joint;
   const Kinematics::Joint& source = kinematics.joints()[joint.source];
   const auto slide = [&](double q) { return std::abs(joint.multiplier * q + joint.offset); };
-  const double farthest = std::max(slide(source.lower), slide(source.upper));
+  double farthest = std::max(slide(source.lower), slide(source.upper));
+  // Its own position may be stated.
+  const double own = std::max(std::abs(joint.lower), std::abs(joint.upper));
+  if (std::isfinite(own)) farthest = std::max(farthest, own);
   return farthest <= kMaxLength ? to_joint + farthest : kInfinity;  // it may be NaN
 }
 

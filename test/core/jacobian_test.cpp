@@ -84,7 +84,9 @@ TEST(Jacobian, randomRobotsAgainstFiniteDifferences) {
     }
     const Kinematics k(robot);
     std::vector<double> q;
-    for (std::size_t j = 0; j < k.joints().size(); ++j) q.push_back(test::uniform(&rng, -2, 2));
+    for (const Kinematics::Joint& joint : k.joints()) {
+      q.push_back(joint.is_free() ? test::uniform(&rng, -2, 2) : std::nan(""));
+    }
     const Eigen::Isometry3d X_FR = test::random_pose(&rng, 1.0);
     const auto X_FB = place(k, q, X_FR);
     for (std::size_t body = 0; body < k.bodies().size(); ++body) {

@@ -105,8 +105,7 @@ TEST(Kinematics, chainsOfMimics) {
       joint("c", "revolute", 2, 3, axis) +
       joint("d", "revolute", 3, 4, axis + "<mimic joint=\"c\"/>"));
   const double c = 0.7, b = 3 * c + 0.5, a = -2 * b + 0.1;
-  // The position of a mimic joint itself is ignored.
-  const Placed placed = place(k, {{"c", c}, {"a", 99.0}, {"b", kNaN}});
+  Placed placed = place(k, {{"c", c}});
   const auto X = [&](const std::string& link) { return placed.bodies.X_FB[*k.find_body(link)]; };
   EXPECT_NEAR(X("l2").translation().z(), b, 1e-15);
   const Eigen::Matrix3d turned_a =
@@ -117,6 +116,14 @@ TEST(Kinematics, chainsOfMimics) {
   EXPECT_TRUE(X("l4").linear().isApprox(turned_c_d, 1e-14));
   for (const char* name : {"a", "b", "d"}) EXPECT_FALSE(k.joints()[*k.find_joint(name)].is_free());
   EXPECT_TRUE(k.joints()[*k.find_joint("c")].is_free());
+  // A stated position counts; it needs no joint to follow, and moves none.
+  placed = place(k, {{"c", c}, {"b", 0.2}});
+  EXPECT_EQ(X("l2").translation().z(), 0.2);
+  EXPECT_TRUE(X("l1").linear().isApprox(turned_a, 1e-14));
+  EXPECT_TRUE(X("l4").linear().isApprox(turned_c_d, 1e-14));
+  placed = place(k, {{"b", 0.2}});
+  EXPECT_TRUE(placed.bodies.known[*k.find_body("l2")]);
+  EXPECT_FALSE(placed.bodies.known[*k.find_body("l3")]);
 }
 
 TEST(Kinematics, bodiesBelowUnknownJointsAreUnknown) {

@@ -43,13 +43,13 @@ std::vector<Eigen::Isometry3d> sampled_poses(const Arm& arm, const ArmMotion& mo
   const double s = time / motion.joints.duration;
   JointPoses poses = motion.still;
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const double from = motion.joints.from[joints[j].source],
-                 to = motion.joints.to[joints[j].source];
-    if (std::isnan(from) || joints[j].has_unstated_pose() || joints[j].type == JointType::kFixed) {
-      continue;
-    }
-    const double q = from + s * (to - from);
-    poses.X_PC[j] = arm.kinematics->joint_pose(j, joints[j].multiplier * q + joints[j].offset);
+    if (joints[j].has_unstated_pose() || joints[j].type == JointType::kFixed) continue;
+    const auto end = [&](const std::vector<double>& q) {  // a mimic is where it is stated
+      return std::isnan(q[j]) ? joints[j].multiplier * q[joints[j].source] + joints[j].offset
+                              : q[j];
+    };
+    const double q = (1.0 - s) * end(motion.joints.from) + s * end(motion.joints.to);
+    if (!std::isnan(q)) poses.X_PC[j] = arm.kinematics->joint_pose(j, q);
   }
   BodyPoses bodies;
   arm.kinematics->place_bodies(poses, motion.X_FR, &bodies);

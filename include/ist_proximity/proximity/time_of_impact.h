@@ -16,8 +16,8 @@ namespace ist {
 
 /// A straight motion in joint space at constant speeds.
 struct JointMotion {
-  /// [rad, m] positions at the start, by joint of the kinematics; read for free joints. NaN in both
-  /// `from` and `to`: the joint stands still.
+  /// [rad, m] positions at the start, by joint of the kinematics. NaN in both `from` and `to`: the
+  /// joint stands still, or follows the one that it mimics.
   std::vector<double> from;
   std::vector<double> to;  ///< [rad, m] positions at the end, likewise
   double duration = 1.0;   ///< [s] > 0

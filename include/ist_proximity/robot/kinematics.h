@@ -31,7 +31,7 @@ struct BodyPoses {
 /// RobotModel, which are some of the bodies and have their own order.
 ///
 /// Revolute, continuous and prismatic joints have one position [rad, m]. A mimic joint takes its
-/// position from the joint it follows, through any number of others, never a position of its own.
+/// position from the joint it follows, through any number of others, unless its own is stated.
 /// One number does not determine the pose of a planar or floating joint: the caller fills it in
 /// (from tf, for example); until then the bodies below such a joint are not known.
 /// Immutable; const members are thread safe.
@@ -77,8 +77,8 @@ class Kinematics {
   Eigen::Isometry3d joint_pose(std::size_t joint, double q) const;
 
   /// Poses of all joints that positions determine.
-  /// @param q      by joint, NaN where not known; read for free joints only. With another size no
-  ///               joint is known
+  /// @param q      by joint, NaN where not known; a mimic joint at NaN follows its source. With
+  ///               another size no joint is known
   /// @param poses  overwritten; planar and floating joints are not known
   void place_joints(const std::vector<double>& q, JointPoses* poses) const;
 
