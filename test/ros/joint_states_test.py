@@ -4,6 +4,7 @@
 import os
 import subprocess
 import sys
+import time
 import unittest
 
 import numpy as np
@@ -26,20 +27,21 @@ ARM = """<robot name="arm">
   <joint name="slide" type="prismatic"><parent link="column"/><child link="ball_link"/>
     <axis xyz="2 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint>
   <joint name="follow" type="prismatic"><parent link="column"/><child link="box_link"/>
-    <axis xyz="1 0 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/>
+    <axis xyz="1 0 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/>
     <mimic joint="slide" multiplier="-1.5" offset="-0.5"/></joint>
   <joint name="to_camera" type="fixed"><parent link="ball_link"/><child link="camera"/>
     <origin xyz="0.3 0 0"/></joint>
 </robot>"""
 
 
-def arm_poses(turn, slide):
-    """Returns X_BL by link."""
+def arm_poses(turn, slide, follow=None):
+    """Returns X_BL by link; the mimic follows unless it is stated."""
+    follow = -1.5 * slide - 0.5 if follow is None else follow
     column = pt.transform((0, 0, 0.5), angle=turn)
     ball = column @ pt.transform((slide, 0, 0))
     return {
         "ball_link": ball,
-        "box_link": column @ pt.transform((-1.5 * slide - 0.5, 0, 0)),
+        "box_link": column @ pt.transform((follow, 0, 0)),
         "camera": ball @ pt.transform((0.3, 0, 0)),
     }
 
@@ -169,6 +171,56 @@ class JointStatesTest(unittest.TestCase):
         node.wait_for_status(ProximityArray.OK)
         self.assertEqual(node.diagnostic("pose", "topic"), self.namespace + "/joint_states")
         self.assertGreater(int(node.diagnostic("pose", "joint states used")), 100)
+
+    def test_stated_mimic(self):
+        """A mimic joint is where it is stated, as with robot_state_publisher, or else follows."""
+        node = self.start(max_distance=3.0)
+        points = np.array([[0.6, 0.6, 0.6]])  # in base
+        self.world.repeat(20, lambda: self.world.cloud_publisher.publish(pt.cloud(points, "base")))
+        stated = {"turn": 0.3, "slide": 0.5, "follow": -1.0}  # it would be at -1.25
+        self.world.repeat(100, lambda: self.publisher.publish(joint_state(stated)))
+
+        def check(name):
+            one = pt.link(node.messages[-1], name)
+            X = arm_poses(**{"slide": np.nan, **stated})[name]
+            truth = pt.DISTANCE[name](pt.apply(pt.inverse(X), points)).min()
+            self.assertAlmostEqual(one.distance, truth, delta=0.001)
+            self.assertLessEqual(one.lower_bound, truth + 1e-5)
+
+        node.wait_for_status(ProximityArray.OK)
+        check("box_link")
+        node.wait_until(lambda: "pose" in node.diagnostics, "diagnostics")
+        log = "joint 'follow' is stated at -1.000, but would be at -1.250 as a mimic of joint 'slide'"
+        node._log.seek(0)
+        self.assertEqual(node._log.read().decode().count(log), 1)
+
+        # The mimic alone: its leader is not known.
+        del stated["slide"]
+        message = node.wait_for_status(ProximityArray.NO_POSE, "joint 'slide'")
+        check("box_link")
+        self.assertEqual(pt.link(message, "ball_link").state, LinkProximity.UNKNOWN)
+
+        # A mimic that was not where its leader puts it is not known without a statement.
+        stated["slide"] = 0.5
+        node.wait_for_status(ProximityArray.OK)
+        del stated["follow"]
+        message = node.wait_for_status(ProximityArray.NO_POSE, "joint 'follow'")
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.UNKNOWN)
+        check("ball_link")
+        time.sleep(1.2)
+        self.assertEqual(node.messages[-1].status, ProximityArray.NO_POSE)
+
+        # One that was follows again.
+        stated["follow"] = -1.25
+        node.wait_for_status(ProximityArray.OK)
+        check("box_link")
+        del stated["follow"]
+        node.wait_for_status(ProximityArray.NO_POSE)
+        node.wait_for_status(ProximityArray.OK)
+        stated["slide"] = 0.3
+        begin = len(node.messages)
+        node.wait_for(lambda m: len(node.messages) > begin + 20, "answers")
+        check("box_link")
 
     def test_outside_region_of_interest(self):
         """Points that no link can come near are dropped; a joint outside its limits misses them."""

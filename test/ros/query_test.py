@@ -86,9 +86,10 @@ class QueryTest(unittest.TestCase):
         # A joint that is left out keeps its present position.
         self.check(self.ask({"turn": 1.0}).results[0], {"turn": 1.0, "slide": NOW["slide"]})
         self.check(self.ask({}).results[0], NOW)
-        # The position of a mimic joint is ignored, as with joint states.
-        result = self.ask({"turn": 1.0, "slide": 0.1, "follow": 3.0}).results[0]
-        self.check(result, {"turn": 1.0, "slide": 0.1})
+        # A mimic joint is where it is stated, as with joint states.
+        for stated in ({"turn": 1.0, "slide": 0.1}, {"turn": 1.0}):
+            q = dict(stated, follow=0.3)
+            self.check(self.ask(q).results[0], {"slide": NOW["slide"], **q})
         # Some links.
         answer = self.ask(NOW, links=["box_link"])
         self.check(answer.results[0], NOW, ["box_link"])

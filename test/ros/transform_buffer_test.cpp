@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/make_shared.hpp>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -117,6 +118,120 @@ TEST(TransformBuffer, namesDisagreeingPublishers) {
   EXPECT_NE(text.find("/other"), std::string::npos) << text;
   EXPECT_NE(text.find("0.300 m apart"), std::string::npos) << text;
   EXPECT_EQ(buffer.dispute("world", "base"), "");
+}
+
+// Whoever states a frame, and however: two that differ by more than rounding are named.
+TEST(TransformBuffer, namesDisagreeingStatics) {
+  struct Case {
+    const char* what;
+    bool first_is_static, second_is_static;
+    const char* parent;  // of the second
+    double x;            // [m] of the second; the first says 0
+    const char* words;   // empty: they agree
+  };
+  for (const Case& c : {Case{"both static", true, true, "base", 0.1, "0.100 m apart"},
+                        Case{"dynamic after static", true, false, "base", 0.1, "0.100 m apart"},
+                        Case{"static after dynamic", false, true, "base", 0.002, "0.002 m apart"},
+                        Case{"parents", true, true, "arm", 0.0, "is 'base' or 'arm'"},
+                        Case{"dynamic parents", false, false, "arm", 0.0, "is 'base' or 'arm'"},
+                        Case{"rounding", true, true, "base", 0.0005, ""},
+                        Case{"rounding of a dynamic one", true, false, "/base", 0.0005, ""}}) {
+    SCOPED_TRACE(c.what);
+    TransformBuffer buffer(ros::Duration(10.0));
+    const ros::Time now(100.0);
+    buffer.add(transform("world", "base", 0.0), "/urdf", true, now);
+    buffer.add(transform("base", "arm", 0.0), "/urdf", true, now);
+    buffer.add(transform("base", "camera", 99.9), "/urdf", c.first_is_static, now);
+    buffer.add(transform(c.parent, "camera", 99.95, c.x), "/driver", c.second_is_static, now);
+    const std::string text = buffer.dispute("world", "camera");
+    EXPECT_EQ(text.empty(), *c.words == 0) << text;
+    EXPECT_NE(text.find(c.words), std::string::npos) << text;
+    if (*c.words == 0) continue;
+    EXPECT_NE(text.find("/urdf and /driver"), std::string::npos) << text;
+    EXPECT_NE(text.find("since 100.0 s"), std::string::npos) << text;
+    EXPECT_EQ(buffer.dispute("world", "arm"), "");
+    // One that takes back what it said ends it.
+    buffer.add(transform("base", "camera", 99.96), "/driver", c.second_is_static, now);
+    EXPECT_EQ(buffer.dispute("world", "camera"), "");
+  }
+}
+
+// A node that is gone disputes nothing, and the one that is left counts.
+TEST(TransformBuffer, disputesEndWithTheirPublisher) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  auto first = boost::make_shared<ros::M_string>(), second = boost::make_shared<ros::M_string>();
+  ros::Time now(100.0);
+  const auto x_of = [&](const char* frame) {
+    return buffer.lookupTransform("base", frame, ros::Time()).transform.translation.x;
+  };
+  buffer.add(transform("base", "camera", 0.0, 0.1), {"/a", first}, true, now);
+  buffer.add(transform("base", "camera", 0.0, 0.2), {"/b", second}, true, now);
+  buffer.end_disputes(now);
+  EXPECT_NE(buffer.dispute("base", "camera"), "");
+  second.reset();
+  buffer.end_disputes(now);
+  EXPECT_EQ(buffer.dispute("base", "camera"), "");
+  EXPECT_EQ(x_of("camera"), 0.1);
+  // It has come back under another name, with another calibration, after the first one went.
+  first.reset();
+  const auto third = boost::make_shared<ros::M_string>();
+  buffer.add(transform("base", "camera", 0.0, 0.3), {"/c", third}, true, now);
+  EXPECT_EQ(buffer.dispute("base", "camera"), "");
+  EXPECT_EQ(x_of("camera"), 0.3);
+  // It corrects itself.
+  buffer.add(transform("base", "camera", 0.0, 0.4), {"/c", third}, true, now);
+  EXPECT_EQ(buffer.dispute("base", "camera"), "");
+  // A dynamic one that falls silent leaves the static one.
+  for (int i = 0; i < 10; ++i) {
+    now += ros::Duration(0.1);
+    buffer.add(transform("base", "camera", now.toSec(), 0.5), "/d", false, now);
+    EXPECT_NE(buffer.dispute("base", "camera"), "");
+  }
+  now += ros::Duration(0.9);
+  buffer.end_disputes(now);
+  EXPECT_NE(buffer.dispute("base", "camera"), "");
+  now += ros::Duration(0.2);
+  buffer.end_disputes(now);
+  EXPECT_EQ(buffer.dispute("base", "camera"), "");
+  EXPECT_EQ(x_of("camera"), 0.4);
+  // The URDF's own numbers are compared with a transform that is not used.
+  buffer.add(transform("base", "tool", 0.0, 0.1), "the URDF", true, now);
+  buffer.compare(transform("base", "tool", 0.0, 0.2), "/driver", now);
+  EXPECT_NE(buffer.dispute("base", "tool").find("the URDF and /driver"), std::string::npos);
+  EXPECT_EQ(x_of("tool"), 0.1);
+  buffer.withdraw("the URDF");
+  buffer.end_disputes(now);
+  EXPECT_EQ(buffer.dispute("base", "tool"), "");
+}
+
+// A slow publisher beside a fast one, three publishers, and clocks that differ.
+TEST(TransformBuffer, disputesDoNotFlicker) {
+  TransformBuffer buffer(ros::Duration(10.0));
+  bool is_disputed = false;
+  for (int i = 0; i < 1000; ++i) {
+    const ros::Time now(100.0 + 0.01 * i);
+    buffer.add(transform("base", "arm", now.toSec(), 0.1), "/fast", false, now);
+    if (i % 200 == 100) buffer.add(transform("base", "arm", now.toSec(), 0.2), "/slow", false, now);
+    buffer.end_disputes(now);
+    if (is_disputed) {
+      ASSERT_NE(buffer.dispute("base", "arm"), "") << i;
+    }
+    is_disputed = is_disputed || !buffer.dispute("base", "arm").empty();
+  }
+  EXPECT_TRUE(is_disputed);
+
+  PublisherTrack three, skewed;
+  std::string other;
+  PublisherTrack::Values here = PublisherTrack::Values::Zero(), there = here, others;
+  there[0] = 0.1;
+  for (int i = 0; i < 100; ++i) {
+    const double t = 100.0 + 0.02 * i;
+    three.add("/a", ros::Time(t), here, &other, &others);
+    three.add("/b", ros::Time(t + 0.005), here, &other, &others);
+    EXPECT_EQ(three.add("/c", ros::Time(t + 0.01), there, &other, &others), i > 0);
+    skewed.add("/late", ros::Time(t), here, &other, &others);
+    EXPECT_EQ(skewed.add("/ahead", ros::Time(t + 0.5), there, &other, &others), i >= 25) << i;
+  }
 }
 
 // One publisher never disagrees with itself, and one that takes over does not either.

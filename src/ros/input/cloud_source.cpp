@@ -80,7 +80,11 @@ const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel
                                           const ros::Time& time, double max_age) {
   const std::shared_ptr<SourceSnapshot>& snapshot = exchange_.newest();
   if (!state_.is_current(snapshot.get(), model)) return nullptr;
-  if (!is_map_) return snapshot.get();
+  if (!is_map_) {
+    const std::string dispute = buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame);
+    state_.set_placing_problem(dispute);
+    return dispute.empty() ? snapshot.get() : nullptr;
+  }
   if (map_ != snapshot) {
     map_ = snapshot;
     placed_map_ = *snapshot;
@@ -94,7 +98,10 @@ std::shared_ptr<const SourceSnapshot> CloudSource::share(
     const std::shared_ptr<const RobotModel>& model, const ros::Time& time, double max_age) {
   std::shared_ptr<const SourceSnapshot> snapshot = exchange_.share();
   if (!state_.is_current(snapshot.get(), model)) return nullptr;
-  if (!is_map_) return snapshot;
+  if (!is_map_) {
+    const bool is_disputed = !buffer_.dispute(snapshot->fixed_frame, snapshot->map_frame).empty();
+    return is_disputed ? nullptr : snapshot;
+  }
   const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
   return place_map(buffer_, time, max_age, placed.get()).empty() ? placed : nullptr;
 }

@@ -43,9 +43,7 @@ std::string Placer::missing_transform(const Measurement& measurement,
   std::string problem;
   for (const ros::Time& time : {instants.front(), instants.back()}) {
     if (is_known(buffer_, target.fixed_frame, sensor, time, &problem)) continue;
-    const std::string cause = buffer_.why_refused(target.fixed_frame, sensor);
-    if (!cause.empty()) problem += ": " + cause;
-    return problem;
+    return with_cause(buffer_, target.fixed_frame, sensor, problem);
   }
   if (!self_filter_) return "";
   for (const ros::Time& time : {instants.front(), instants.back()}) {

@@ -23,7 +23,7 @@ struct SourceSnapshot {
   /// link are still among the obstacles. Empty: the source does not filter.
   std::vector<bool> filtered;
   std::uint64_t generation = 0;        ///< see SourceTarget; 0: not filled yet
-  std::string fixed_frame, map_frame;  ///< the frames between which a map is placed
+  std::string fixed_frame, map_frame;  ///< the frames between which the cloud or map is placed
   /// The map's boxes -> `map_frame`.
   Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
   /// What the source remembers and the cloud does not show; null: nothing.

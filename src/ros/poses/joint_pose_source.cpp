@@ -40,8 +40,8 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
     for (; body > 0; body = tree[body - 1].parent) {
       const std::size_t source = tree[body - 1].source;
       if (!tree[source].is_free()) continue;
-      moved_by_[i].push_back(source);
-      matters_[source] = true;
+      moved_by_[i].push_back(body - 1);
+      matters_[body - 1] = matters_[source] = true;
     }
   }
 }
@@ -117,18 +117,25 @@ ros::Time JointPoseSource::read_positions(const ros::Time& now) {
   joint_problems_.assign(joints.size(), PoseProblem());
   std::size_t newest = joints.size();
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (!joints[j].is_free()) continue;
+    if (!has_own(j)) continue;
     joint_problems_[j] = problem_of(j, now);
     if (!joint_problems_[j].empty()) continue;
     if (newest == joints.size() || positions_[j].stamp > positions_[newest].stamp) newest = j;
   }
   if (newest == joints.size()) return ros::Time();
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (!joints[j].is_free() || !joint_problems_[j].empty()) continue;
+    if (!has_own(j) || !joint_problems_[j].empty()) continue;
     joint_problems_[j] = {is_late(j, newest), true};
     if (joint_problems_[j].empty()) q_[j] = positions_[j].q;
   }
   return positions_[newest].stamp;
+}
+
+/// Whether a joint's own position counts: a mimic joint has none while nobody states it.
+bool JointPoseSource::has_own(std::size_t joint) const {
+  const Kinematics::Joint& at = kinematics_->joints()[joint];
+  if (at.source == joint) return at.is_free();
+  return !positions_[joint].stamp.isZero() || positions_[joint].refusal;
 }
 
 /// Whether a joint that matters is behind the instant because its newest sample was refused.
@@ -158,8 +165,6 @@ bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string
                                     Eigen::Isometry3d* X, PoseProblem* problem) {
   if (is_known(buffer_, parent, child, instant, &problem->text)) {
     problem->text = ist::look_up(buffer_, parent, child, instant, X);
-    if (!problem->empty()) return false;
-    problem->text = buffer_.dispute(parent, child);
     // Transforms that are stamped ahead are known for longer than their publisher lives.
     const double age = seconds_between(buffer_.counts_from(parent, child, instant), now);
     if (problem->empty() && age > timeout_) {
@@ -168,9 +173,7 @@ bool JointPoseSource::look_up_in_tf(const std::string& parent, const std::string
     problem->explained = !problem->empty();
     return problem->empty();
   }
-  const std::string cause = buffer_.why_refused(parent, child);
-  problem->explained = !cause.empty();
-  if (problem->explained) problem->text += ": " + cause;
+  problem->text = with_cause(buffer_, parent, child, problem->text, &problem->explained);
   ros::Time stamp;
   Eigen::Isometry3d ignored;
   std::string ignored_problem;
@@ -211,9 +214,11 @@ void JointPoseSource::look_up(const ros::Time& now, StampedLinkPoses* poses) {
   PoseProblem root_problem;
   const bool root_known =
       look_up_in_tf(fixed_frame_, kinematics_->bodies()[0], now, instant, &X_FR, &root_problem);
-  // A mimic joint is unknown for the same reason as the joint that it follows.
+  // A mimic joint is unknown for the same reason as the joint that it follows, or its own.
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (joints[j].source != j) joint_problems_[j] = joint_problems_[joints[j].source];
+    if (joints[j].source == j) continue;
+    if (!has_own(j)) joint_problems_[j] = joint_problems_[joints[j].source];
+    joints_.known[j] = joints_.known[j] && joint_problems_[j].empty();
   }
   poses->stamp = instant;
   if (tf_is_behind_) {

@@ -47,6 +47,7 @@ class JointPoseSource : public PoseSource {
 
  private:
   ros::Time read_positions(const ros::Time& now);
+  bool has_own(std::size_t joint) const;
   PoseProblem problem_of(std::size_t joint, const ros::Time& now) const;
   std::string is_late(std::size_t joint, std::size_t newest) const;
   bool must_hold(const ros::Time& instant) const;

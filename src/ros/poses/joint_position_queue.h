@@ -24,7 +24,8 @@ struct JointPosition {
   std::size_t companion = 0;
   std::shared_ptr<const std::string> refusal;  ///< why the newest sample is not used; null: it is
   bool is_missing =
-      false;  ///< the newest message had new positions of other joints, not of this one
+      false;            ///< the newest message had new positions of other joints, not of this one
+  bool strays = false;  ///< a mimic joint that was elsewhere than where its leader puts it
   bool is_implausible = false;                 ///< far outside the joint's limits
   std::shared_ptr<const std::string> dispute;  ///< null unless two publishers have disagreed
   std::chrono::steady_clock::time_point dispute_time;

@@ -6,6 +6,7 @@
 #include <boost/function.hpp>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "ros/common/eigen_conversion.h"
 #include "ros/common/frame_name.h"
@@ -22,7 +23,9 @@ constexpr std::chrono::seconds kProblemAge(1);
 // A message with more names is refused: it would take longer than a cycle to read, and no robot has
 // as many joints.
 constexpr std::size_t kMaxNames = 10000;
+constexpr double kAgreement = 0.01;  // [rad, m] between a mimic joint and where its leader puts it
 constexpr double kMaxSpacing = 1.0;  // [s] after a longer pause, the usual spacing is not known
+constexpr const char* kUrdf = "the URDF";  // who states the fixed joints
 constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
 }  // namespace
@@ -50,21 +53,22 @@ void JointStateListener::set_kinematics(std::shared_ptr<const Kinematics> kinema
   const std::lock_guard<std::mutex> lock(mutex_);
   if (kinematics == kinematics_) return;
   kinematics_ = std::move(kinematics);
+  buffer_.withdraw(kUrdf);
   index_.clear();
-  moved_by_.clear();
+  led_by_.clear();
   forget();
   report_.messages = report_.used = report_.dropped = report_.skipped = 0;
   report_.problem.clear();
   if (!kinematics_) return;
   const std::size_t count = kinematics_->joints().size();
-  moved_by_.resize(count);
+  led_by_.resize(count);
   for (std::size_t j = 0; j < count; ++j) {
     const Kinematics::Joint& joint = kinematics_->joints()[j];
     index_[joint.name] = j;
     if (joint.type == JointType::kFixed) {
-      put_into_tf(j, ros::Time(), true);
+      put_into_tf(j, 0.0, ros::Time(), true);
     } else if (!joint.has_unstated_pose()) {
-      moved_by_[joint.source].push_back(j);
+      if (joint.source != j) led_by_[joint.source].push_back(j);
     }
   }
 }
@@ -118,6 +122,7 @@ void JointStateListener::forget() {
   const std::size_t joints = kinematics_ ? kinematics_->joints().size() : 0;
   positions_.reset(joints);
   tracks_.assign(joints, PublisherTrack());
+  stated_.clear();
   place_.assign(joints, kNowhere);
 }
 
@@ -173,6 +178,7 @@ std::string JointStateListener::why_unusable(const sensor_msgs::JointState& mess
 /// Finds the joints that a message states, each once, and what is wrong with them.
 /// @param complains  whether names that are no joints are reported
 void JointStateListener::collect(const sensor_msgs::JointState& message, bool complains) {
+  for (const Stated& one : stated_) place_[one.joint] = kNowhere;
   stated_.clear();
   const std::string* unknown = nullptr;
   std::size_t unknowns = 0;
@@ -185,8 +191,7 @@ void JointStateListener::collect(const sensor_msgs::JointState& message, bool co
     }
     const std::size_t j = found->second;
     const Kinematics::Joint& joint = kinematics_->joints()[j];
-    if (!joint.is_free()) {
-      // Many publishers state mimic joints too, which follow theirs; a fixed joint stays in place.
+    if (!joint.is_free() && joint.source == j) {  // a fixed joint stays in place
       if (joint.has_unstated_pose() && complains) {
         drop("joint '" + joint.name + "' is planar or floating, so its pose must come from tf", 1);
       }
@@ -206,7 +211,6 @@ void JointStateListener::collect(const sensor_msgs::JointState& message, bool co
                                 first.q, q);
     }
   }
-  for (const Stated& one : stated_) place_[one.joint] = kNowhere;
   if (unknowns == 0 || !complains) return;
   const std::string others =
       unknowns > 1 ? ", like " + std::to_string(unknowns - 1) + " others of the message" : "";
@@ -248,6 +252,9 @@ bool JointStateListener::read(const sensor_msgs::JointState& message,
   }
   if (first == kNowhere) return false;
   positions_.at(first).companion = last;
+  for (const Stated& one : stated_) {
+    if (!kinematics_->joints()[one.joint].is_free()) compare_with_leader(one.joint);
+  }
   for (const Stated& one : stated_) positions_.at(one.joint).is_missing = !one.fault.empty();
   return true;
 }
@@ -294,9 +301,37 @@ void JointStateListener::use(const Stated& stated, const ros::Time& stamp) {
   position.refusal.reset();
   position.is_missing = false;
   position.is_implausible = is_implausible(joint, stated.q);
-  if (is_later) {
-    for (const std::size_t j : moved_by_[stated.joint]) put_into_tf(j, stamp, false);
+  if (!is_later) return;
+  put_into_tf(stated.joint, stated.q, stamp, false);
+  follow(stated.joint, stated.q, stamp);
+}
+
+/// Moves the mimics of a joint that has moved, but for those that are stated.
+void JointStateListener::follow(std::size_t leader, double q, const ros::Time& stamp) {
+  for (const std::size_t j : led_by_[leader]) {
+    if (place_[j] != kNowhere) continue;  // the same message states it
+    JointPosition& own = positions_.at(j);
+    const bool has_stopped = !own.strays && seconds_between(own.stamp, stamp) > kMaxSpacing;
+    if (own.stamp.isZero() || has_stopped) own = JointPosition();
+    if (!own.stamp.isZero()) continue;
+    const Kinematics::Joint& joint = kinematics_->joints()[j];
+    put_into_tf(j, joint.multiplier * q + joint.offset, stamp, false);
   }
+}
+
+/// Notes whether a mimic joint is where its leader puts it, and tells once that it is not.
+void JointStateListener::compare_with_leader(std::size_t joint) {
+  JointPosition& own = positions_.at(joint);
+  if (std::isnan(own.q)) return;
+  const Kinematics::Joint& at = kinematics_->joints()[joint];
+  const double led = at.multiplier * positions_.newest()[at.source].q + at.offset;
+  const bool strayed = std::exchange(own.strays, !(std::abs(own.q - led) <= kAgreement));
+  if (!own.strays || strayed || std::isnan(led)) return;
+  drop("joint '" + at.name +
+           format_text("' is stated at %.3f, but would be at %.3f as ", own.q, led) +
+           "a mimic of joint '" + kinematics_->joints()[at.source].name +
+           "'; where it is stated counts",
+       0);
 }
 
 void JointStateListener::note_publisher(const Stated& stated, const ros::Time& stamp,
@@ -315,15 +350,16 @@ void JointStateListener::note_publisher(const Stated& stated, const ros::Time& s
   drop(text, 0);
 }
 
-void JointStateListener::put_into_tf(std::size_t joint, const ros::Time& stamp, bool is_static) {
+void JointStateListener::put_into_tf(std::size_t joint, double q, const ros::Time& stamp,
+                                     bool is_static) {
   const Kinematics::Joint& at = kinematics_->joints()[joint];
-  const double q = is_static ? 0.0 : at.multiplier * positions_.newest()[at.source].q + at.offset;
   geometry_msgs::TransformStamped message;
   message.transform = to_message(kinematics_->joint_pose(joint, q));
   message.header.stamp = stamp;
   message.header.frame_id = kinematics_->bodies()[at.parent];
   message.child_frame_id = kinematics_->bodies()[at.child];
-  const std::string problem = buffer_.add(message, "joint_states", is_static, last_now_);
+  const std::string problem =
+      buffer_.add(message, is_static ? kUrdf : "joint_states", is_static, last_now_);
   if (!problem.empty()) drop(problem, 1);
 }
 

@@ -42,6 +42,10 @@ struct JointStateReport {
 /// used and reported, because the robot is there. A stamp that is ahead of the clock by up to a
 /// second counts from its receipt.
 ///
+/// A mimic joint that is stated is where it is stated, also where its leader puts it elsewhere,
+/// which is reported. Once a second has passed without a statement, it follows its leader again,
+/// unless the two differed.
+///
 /// Every joint's pose also goes into a tf buffer, which interpolates it at the stamps of clouds and
 /// combines it with all other frames: cameras on links, the frame in which the robot stands.
 ///
@@ -91,7 +95,9 @@ class JointStateListener {
   ros::Time counted_stamp(const ros::Time& stamp);
   void use(const Stated& stated, const ros::Time& stamp);
   void note_publisher(const Stated& stated, const ros::Time& stamp, const std::string& publisher);
-  void put_into_tf(std::size_t joint, const ros::Time& stamp, bool is_static);
+  void follow(std::size_t leader, double q, const ros::Time& stamp);
+  void compare_with_leader(std::size_t joint);
+  void put_into_tf(std::size_t joint, double q, const ros::Time& stamp, bool is_static);
   void notice_clock_jump();
   void forget();
   void copy(const JointPositions& from, const Kinematics& kinematics, JointPositions* positions);
@@ -106,7 +112,7 @@ class JointStateListener {
   std::mutex mutex_;  // guards the members below; held for copies and one message only
   std::shared_ptr<const Kinematics> kinematics_;
   std::unordered_map<std::string, std::size_t> index_;  ///< index of a joint by its name
-  std::vector<std::vector<std::size_t>> moved_by_;      ///< by joint: the joints that it moves
+  std::vector<std::vector<std::size_t>> led_by_;        ///< by joint: the joints that mimic it
   JointPositionQueue positions_;
   std::vector<PublisherTrack> tracks_;  ///< by joint
   std::vector<Stated> stated_;          ///< the positions of the message being read

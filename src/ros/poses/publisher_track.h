@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <string>
+#include <vector>
 
 namespace ist {
 
@@ -13,8 +14,9 @@ namespace ist {
 ///
 /// A value is compared with the line between the two values of another publisher about it, so that
 /// a motion is no disagreement: it may differ by 0.01 (m, rad) and by what an acceleration of 50
-/// (m/s2, rad/s2) explains. One publisher that takes over from another agrees with it in this
-/// sense.
+/// (m/s2, rad/s2) explains. While a publisher's values stay, older ones of others are compared with
+/// them too, so that two clocks hide no disagreement. One publisher that takes over from another
+/// agrees with it in this sense.
 class PublisherTrack {
  public:
   /// A position [rad, m]; or translation [m] and quaternion of a transform.
@@ -36,10 +38,13 @@ class PublisherTrack {
   struct Publisher {
     std::string name;
     std::array<Sample, 2> samples;  ///< the newest first; stamp 0: none yet
+    Sample stays;                   ///< the first of those from which no later one differs
+    double longest = 0.0;           ///< [s] between two samples since then
   };
 
-  /// A third publisher takes the place of the one that has been silent longer.
-  std::array<Publisher, 2> publishers_;
+  static bool disagrees(const Publisher& mine, const Sample& sample);
+
+  std::vector<Publisher> publishers_;
 };
 
 }  // namespace ist

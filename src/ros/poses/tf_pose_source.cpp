@@ -24,17 +24,12 @@ bool TfPoseSource::newest(std::size_t link, const ros::Time& now, ros::Time* sta
   Eigen::Isometry3d ignored;
   problem->text = ist::look_up(buffer_, fixed_frame_, frame, ros::Time(), &ignored, stamp);
   if (problem->empty()) {
-    problem->text = buffer_.dispute(fixed_frame_, frame);
-    problem->explained = !problem->empty();
-    if (problem->explained) return false;
     if (stamp->isZero()) return true;
     const double age = seconds_between(buffer_.counts_from(fixed_frame_, frame, *stamp), now);
     if (age <= timeout_) return true;
     problem->text = too_old(fixed_frame_, frame, age, timeout_);
   }
-  const std::string cause = buffer_.why_refused(fixed_frame_, frame);
-  problem->explained = !cause.empty();
-  if (problem->explained) problem->text += ": " + cause;
+  problem->text = with_cause(buffer_, fixed_frame_, frame, problem->text, &problem->explained);
   return false;
 }
 

@@ -18,6 +18,12 @@ constexpr std::chrono::seconds kMemory(1);
 constexpr std::size_t kMaxFrames = 10000;  // a limit of memory; robots have some hundred
 constexpr std::size_t kMaxDepth = 1000;    // tf's own
 
+// Where a static transform is stated twice, the numbers differ by their rounding only. [m, rad]
+constexpr double kRounding = 1e-3;
+// [s] A publisher that has been silent for so long has stopped: less than three periods for none.
+constexpr double kSilence = 1.0, kUnknownSilence = 3.0, kMaxSilence = 10.0;
+constexpr double kSilentPeriods = 3.0;
+
 PublisherTrack::Values values_of(const geometry_msgs::Transform& transform) {
   const auto& p = transform.translation;
   const auto& q = transform.rotation;
@@ -29,6 +35,18 @@ PublisherTrack::Values values_of(const geometry_msgs::Transform& transform) {
 std::string title(const geometry_msgs::TransformStamped& transform) {
   return "the transform from '" + without_slash(transform.child_frame_id) + "' to '" +
          without_slash(transform.header.frame_id) + "' ";
+}
+
+std::string parent_of(const geometry_msgs::TransformStamped& transform) {
+  return without_slash(transform.header.frame_id);
+}
+
+/// How far apart two poses are: [m] and [rad].
+std::pair<double, double> apart(const geometry_msgs::Transform& one,
+                                const geometry_msgs::Transform& other) {
+  const PublisherTrack::Values a = values_of(one), b = values_of(other);
+  const double cosine = std::min(1.0, std::abs(a.tail<4>().dot(b.tail<4>())));
+  return {(a - b).head<3>().norm(), 2.0 * std::acos(cosine)};
 }
 
 }  // namespace
@@ -83,22 +101,21 @@ void TransformBuffer::accept(const std::string& child) {
 }
 
 std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transform,
-                                 const std::string& publisher, bool is_static,
-                                 const ros::Time& now) {
+                                 const Publisher& publisher, bool is_static, const ros::Time& now) {
   const std::string fault = check(transform, is_static, now);
   if (!fault.empty()) return refuse(transform, fault, is_static);
   const std::string child = without_slash(transform.child_frame_id);
+  std::unique_lock<std::mutex> lock(mutex_);
+  const auto found = records_.find(child);
+  if (found == records_.end() && records_.size() >= kMaxFrames) {
+    lock.unlock();
+    return refuse(transform, format_text("is not used: there are %zu frames", kMaxFrames),
+                  is_static);
+  }
+  Record& record = found == records_.end() ? records_[child] : found->second;
+  note_statement(transform, publisher, is_static, now, &record);
   if (!is_static) {
     const ros::Time& stamp = transform.header.stamp;
-    std::unique_lock<std::mutex> lock(mutex_);
-    const auto found = records_.find(child);
-    if (found == records_.end() && records_.size() >= kMaxFrames) {
-      lock.unlock();
-      return refuse(transform, format_text("is not used: there are %zu frames", kMaxFrames),
-                    is_static);
-    }
-    Record& record = found == records_.end() ? records_[child] : found->second;
-    note_publisher(transform, publisher, &record);
     record.parent = without_slash(transform.header.frame_id);
     // tf2 would log these: sent twice, or older than what it keeps.
     if (stamp == record.newest) return "";
@@ -120,9 +137,10 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
       if (!record.refusal_stays) record.refusal.clear();
     }
   }
+  lock.unlock();
   std::string problem;
   try {
-    if (setTransform(transform, publisher, is_static)) {
+    if (setTransform(transform, publisher.name, is_static)) {
       accept(child);
       return "";
     }
@@ -133,32 +151,159 @@ std::string TransformBuffer::add(const geometry_msgs::TransformStamped& transfor
   return refuse(transform, problem, is_static);
 }
 
-/// The caller holds mutex_.
-void TransformBuffer::note_publisher(const geometry_msgs::TransformStamped& transform,
-                                     const std::string& publisher, Record* record) {
+void TransformBuffer::compare(const geometry_msgs::TransformStamped& transform,
+                              const Publisher& publisher, const ros::Time& now) {
+  if (!check(transform, true, now).empty()) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = records_.find(without_slash(transform.child_frame_id));
+  if (found == records_.end()) return;
+  const auto& statements = found->second.statements;
+  const bool is_static = std::any_of(statements.begin(), statements.end(),
+                                     [](const Statement& one) { return one.is_static; });
+  if (is_static) note_statement(transform, publisher, true, now, &found->second);
+}
+
+void TransformBuffer::withdraw(const std::string& publisher) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (auto& [child, record] : records_) {
+    auto& statements = record.statements;
+    statements.erase(
+        std::remove_if(statements.begin(), statements.end(),
+                       [&](const Statement& one) { return one.publisher.name == publisher; }),
+        statements.end());
+  }
+}
+
+/// Notes what a publisher says of a frame, and whether another one says otherwise. The caller holds
+/// mutex_.
+void TransformBuffer::note_statement(const geometry_msgs::TransformStamped& transform,
+                                     const Publisher& publisher, bool is_static,
+                                     const ros::Time& now, Record* record) {
+  auto& statements = record->statements;
+  auto own = std::find_if(statements.begin(), statements.end(), [&](const Statement& one) {
+    return one.publisher.name == publisher.name;
+  });
+  double silence = kUnknownSilence;
+  if (own == statements.end()) {
+    own = statements.insert(own, {publisher, is_static, transform, now});
+  } else {
+    const double period = seconds_between(own->received, now);
+    if (!own->is_static) silence = std::clamp(kSilentPeriods * period, kSilence, kMaxSilence);
+    own->publisher.connection = publisher.connection;
+    own->is_static = is_static;
+    own->transform = transform;
+    own->received = now;
+  }
+  own->silence = silence;
   std::string other;
-  PublisherTrack::Values there;
-  const PublisherTrack::Values here = values_of(transform.transform);
-  if (!record->track.add(publisher, transform.header.stamp, here, &other, &there)) return;
-  const double apart = (here - there).head<3>().norm();
-  record->dispute = title(transform) + "has two publishers that disagree, " + other + " and " +
-                    publisher + format_text(": they are %.3f m apart; stop one of them", apart);
-  record->dispute_time = dispute_time_ = Clock::now();
+  PublisherTrack::Values ignored;
+  if (!is_static && record->track.add(publisher.name, transform.header.stamp,
+                                      values_of(transform.transform), &other, &ignored)) {
+    for (const Statement& one : statements) {
+      if (one.publisher.name == other) silence = std::max(silence, one.silence);
+    }
+    record->rivals = {other, publisher.name};
+    record->rivals_until = std::max(record->rivals_until, now + ros::Duration(silence));
+  }
+  if (statements.size() > 1) compare_statements(now, record);
+}
+
+/// @param rivals  the names of two whose motions differ
+std::string TransformBuffer::why_disagreeing(const Statement& a, const Statement& b,
+                                             const std::array<std::string, 2>& rivals) {
+  const std::string parent_a = parent_of(a.transform), parent_b = parent_of(b.transform);
+  const std::string names = a.publisher.name + " and " + b.publisher.name;
+  if (parent_a != parent_b) {
+    return "frame '" + without_slash(a.transform.child_frame_id) +
+           "' has two publishers that disagree, " + names + ": its parent is '" + parent_a +
+           "' or '" + parent_b + "'";
+  }
+  const auto [distance, angle] = apart(a.transform.transform, b.transform.transform);
+  const bool are_rivals =
+      std::find(rivals.begin(), rivals.end(), a.publisher.name) != rivals.end() &&
+      std::find(rivals.begin(), rivals.end(), b.publisher.name) != rivals.end();
+  const bool is_static = a.is_static || b.is_static;
+  if (!are_rivals && !(is_static && std::max(distance, angle) > kRounding)) return "";
+  return title(a.transform) + "has two publishers that disagree, " + names +
+         format_text(": they are %.3f m apart", distance) +
+         (angle > kRounding ? format_text(" and turned by %.2f deg", angle * 180.0 / M_PI) : "");
+}
+
+/// Forgets publishers that say nothing any more, and finds the first two that disagree. The caller
+/// holds mutex_.
+void TransformBuffer::compare_statements(const ros::Time& now, Record* record) {
+  static const std::array<std::string, 2> none;
+  auto& statements = record->statements;
+  const auto is_over = [&](const Statement& one) {
+    return one.is_static ? one.publisher.is_gone()
+                         : seconds_between(one.received, now) > one.silence;
+  };
+  // Where all are over, tf has what came last.
+  const bool all_over = std::all_of(statements.begin(), statements.end(), is_over);
+  const Statement last = *std::max_element(
+      statements.begin(), statements.end(),
+      [](const Statement& x, const Statement& y) { return x.received < y.received; });
+  statements.erase(std::remove_if(statements.begin(), statements.end(), is_over), statements.end());
+  if (all_over) statements.push_back(last);
+  std::string dispute;
+  for (auto b = statements.begin(); b != statements.end() && dispute.empty(); ++b) {
+    for (auto a = statements.begin(); a != b && dispute.empty(); ++a) {
+      dispute = why_disagreeing(*a, *b, now < record->rivals_until ? record->rivals : none);
+    }
+  }
+  // The numbers of a dispute that lasts stay those of its beginning, so that its text does.
+  if (dispute.empty() == record->dispute.empty()) return;
+  if (!dispute.empty()) {
+    dispute += format_text(", since %.1f s; stop one of them", now.toSec());
+    return set_dispute(dispute, record);
+  }
+  set_dispute("", record);
+  for (const Statement& one : statements) {
+    if (one.is_static) setTransform(one.transform, one.publisher.name, true);
+  }
+}
+
+/// The caller holds mutex_.
+void TransformBuffer::set_dispute(const std::string& dispute, Record* record) {
+  if (record->dispute.empty() && !dispute.empty()) ++disputes_;
+  if (!record->dispute.empty() && dispute.empty()) --disputes_;
+  record->dispute = dispute;
+}
+
+void TransformBuffer::end_disputes(const ros::Time& now) {
+  if (disputes_ == 0) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (auto& [child, record] : records_) {
+    if (record.dispute.empty()) continue;
+    if (record.statements.empty()) {
+      set_dispute("", &record);
+    } else {
+      compare_statements(now, &record);
+    }
+  }
 }
 
 void TransformBuffer::clear() {
   const std::lock_guard<std::mutex> lock(mutex_);
   tf2::BufferCore::clear();
   for (auto entry = records_.begin(); entry != records_.end();) {
-    if (!entry->second.refusal_stays) {
+    Record& record = entry->second;
+    Record kept;
+    kept.parent = record.parent;
+    if (record.refusal_stays) kept.refusal = record.refusal;
+    kept.refusal_stays = record.refusal_stays;
+    for (const Statement& one : record.statements) {
+      if (!one.is_static) continue;
+      kept.statements.push_back(one);
+      kept.statements.back().received = ros::Time();
+    }
+    if (!kept.refusal_stays && kept.statements.empty()) {
+      set_dispute("", &record);
       entry = records_.erase(entry);
       continue;
     }
-    Record kept;
-    kept.parent = entry->second.parent;
-    kept.refusal = entry->second.refusal;
-    kept.refusal_stays = true;
-    entry->second = kept;
+    kept.dispute = record.dispute;  // compared again by end_disputes()
+    record = std::move(kept);
     ++entry;
   }
   any_ahead_ = false;
@@ -239,13 +384,11 @@ std::string TransformBuffer::why_refused(const std::string& fixed, const std::st
 }
 
 std::string TransformBuffer::dispute(const std::string& fixed, const std::string& frame) const {
+  if (disputes_ == 0) return "";
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto now = Clock::now();
-  if (now - dispute_time_ > kMemory) return "";
   for (const std::string& child : between(fixed, frame)) {
     const auto record = records_.find(child);
-    if (record == records_.end() || record->second.dispute.empty()) continue;
-    if (now - record->second.dispute_time < kMemory) return record->second.dispute;
+    if (record != records_.end() && !record->second.dispute.empty()) return record->second.dispute;
   }
   return "";
 }

@@ -1,9 +1,13 @@
 #pragma once
 
 #include <geometry_msgs/TransformStamped.h>
+#include <ros/datatypes.h>
 #include <ros/time.h>
 #include <tf2/buffer_core.h>
 
+#include <array>
+#include <atomic>
+#include <boost/weak_ptr.hpp>
 #include <chrono>
 #include <cstddef>
 #include <mutex>
@@ -21,19 +25,52 @@ namespace ist {
 /// fresh pose. Here the reason stays for a second after the last refusal, and goes to the status. A
 /// static transform is sent once, so the reason of its refusal stays until another takes its place.
 /// The buffer also remembers which transforms were stamped ahead of the clock, so that their age
-/// counts from their receipt, and which frames two publishers state differently. Thread safe.
+/// counts from their receipt.
+///
+/// It notices which frames two publishers state differently: in two parents, at places that no
+/// motion explains (see PublisherTrack), or, where one of them is static, more than rounding apart.
+/// What a publisher says last counts, so that a correction is no dispute. A dispute ends when they
+/// agree, when the one has been silent for a second, or for three of its periods if that is longer,
+/// and with the connection of a static publisher. The static transform that is left counts then.
+/// Thread safe.
 class TransformBuffer : public tf2::BufferCore {
  public:
   /// @param cache_time  how long transforms are kept
   explicit TransformBuffer(const ros::Duration& cache_time) : tf2::BufferCore(cache_time) {}
 
+  /// A node that states transforms.
+  struct Publisher {
+    Publisher(std::string name_of_node)
+        : name(std::move(name_of_node)) {}                       // NOLINT: a name will do
+    Publisher(const char* name_of_node) : name(name_of_node) {}  // NOLINT: likewise
+    Publisher(std::string name_of_node, const boost::shared_ptr<ros::M_string>& header)
+        : name(std::move(name_of_node)), connection(header), has_connection(header != nullptr) {}
+
+    std::string name;
+    /// The header of its connection, which roscpp frees with the connection.
+    boost::weak_ptr<ros::M_string> connection;
+    bool has_connection = false;  ///< false: it is there for good
+
+    bool is_gone() const { return has_connection && connection.expired(); }
+  };
+
   /// Adds a transform, unless it is refused: numbers that are no rotation or not finite, no frame
   /// names, no stamp, a stamp more than a second ahead of the clock.
-  /// @param publisher  name of the node that sent it
+  /// @param publisher  that sent it
   /// @param now        the ROS clock's time
   /// @returns empty, or a sentence that says why the transform is not used
-  std::string add(const geometry_msgs::TransformStamped& transform, const std::string& publisher,
+  std::string add(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
                   bool is_static, const ros::Time& now);
+
+  /// Compares a static transform that is not to be used with the static ones of its frame.
+  void compare(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
+               const ros::Time& now);
+
+  /// Forgets that a publisher states anything; its transforms stay.
+  void withdraw(const std::string& publisher);
+
+  /// Ends the disputes that are over.
+  void end_disputes(const ros::Time& now);
 
   /// Forgets everything but static transforms.
   void clear();
@@ -50,8 +87,8 @@ class TransformBuffer : public tf2::BufferCore {
   /// @param fixed  where the way up ends, if it is on the way
   std::string why_refused(const std::string& fixed, const std::string& frame) const;
 
-  /// Says that two publishers state a transform between two frames differently; empty when that has
-  /// not happened in the last second.
+  /// Says that two publishers state a transform between two frames differently, and since when;
+  /// empty where none is in dispute. It costs nothing while there is no dispute at all.
   std::string dispute(const std::string& fixed, const std::string& frame) const;
 
   /// The instant from which the age of a pose counts: its stamp, or the receipt of a transform
@@ -61,6 +98,15 @@ class TransformBuffer : public tf2::BufferCore {
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  /// What a publisher said last of one child frame.
+  struct Statement {
+    Publisher publisher;
+    bool is_static;
+    geometry_msgs::TransformStamped transform;
+    ros::Time received;
+    double silence = 0.0;  ///< [s] after which it says nothing any more; not of a static one
+  };
 
   /// Knowledge of the transforms of one child frame.
   struct Record {
@@ -73,8 +119,10 @@ class TransformBuffer : public tf2::BufferCore {
     Clock::time_point refusal_time;
     bool refusal_stays = false;  ///< of a static transform, which is not sent again
     PublisherTrack track;
-    std::string dispute;
-    Clock::time_point dispute_time;
+    std::vector<Statement> statements;  ///< by publisher, in the order of their first ones
+    std::string dispute;                ///< empty: none
+    std::array<std::string, 2> rivals;  ///< by the track, which disagree until then
+    ros::Time rivals_until;
   };
 
   std::string check(const geometry_msgs::TransformStamped& transform, bool is_static,
@@ -82,8 +130,12 @@ class TransformBuffer : public tf2::BufferCore {
   std::string refuse(const geometry_msgs::TransformStamped& transform, const std::string& fault,
                      bool is_static);
   void accept(const std::string& child);
-  void note_publisher(const geometry_msgs::TransformStamped& transform,
-                      const std::string& publisher, Record* record);
+  void note_statement(const geometry_msgs::TransformStamped& transform, const Publisher& publisher,
+                      bool is_static, const ros::Time& now, Record* record);
+  static std::string why_disagreeing(const Statement& a, const Statement& b,
+                                     const std::array<std::string, 2>& rivals);
+  void compare_statements(const ros::Time& now, Record* record);
+  void set_dispute(const std::string& dispute, Record* record);
   bool way_up(const std::string& end, const std::string& frame,
               std::vector<std::string>* way) const;
   std::vector<std::string> between(const std::string& fixed, const std::string& frame) const;
@@ -92,8 +144,9 @@ class TransformBuffer : public tf2::BufferCore {
   std::unordered_map<std::string, Record> records_;  ///< by child frame, without a slash
   std::string last_refusal_;
   std::size_t lasting_refusals_ = 0;  ///< records whose refusal stays
-  Clock::time_point last_refusal_time_, skew_time_, dispute_time_;
+  Clock::time_point last_refusal_time_, skew_time_;
   bool any_ahead_ = false;  ///< whether a record has been ahead since the last clear()
+  std::atomic<std::size_t> disputes_{0};  ///< records with a dispute
 };
 
 }  // namespace ist

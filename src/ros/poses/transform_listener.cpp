@@ -1,7 +1,6 @@
 #include "ros/poses/transform_listener.h"
 
 #include <ros/console.h>
-#include <ros/message_event.h>
 
 #include <boost/function.hpp>
 
@@ -15,16 +14,12 @@ TransformListener::TransformListener(TransformBuffer* buffer, ros::NodeHandle nh
   const auto hints = ros::TransportHints().tcpNoDelay();
   using Event = ros::MessageEvent<const tf2_msgs::TFMessage>;
   using Callback = boost::function<void(const Event&)>;
-  const Callback receive_moving = [this](const Event& event) {
-    receive(*event.getConstMessage(), event.getPublisherName(), false);
-  };
-  const Callback receive_static = [this](const Event& event) {
-    receive(*event.getConstMessage(), event.getPublisherName(), true);
-  };
+  const Callback receive_moving = [this](const Event& event) { receive(event, false); };
+  const Callback receive_static = [this](const Event& event) { receive(event, true); };
   moving_ = nh.subscribe<tf2_msgs::TFMessage, const Event&>("/tf", 100, receive_moving, {}, hints);
   static_ =
       nh.subscribe<tf2_msgs::TFMessage, const Event&>("/tf_static", 100, receive_static, {}, hints);
-  thread_.start("ist tf");
+  thread_.start("ist tf", [this] { buffer_.end_disputes(ros::Time::now()); });
 }
 
 TransformListener::~TransformListener() {
@@ -44,12 +39,17 @@ void TransformListener::notice_clock_jump() {
   last_now_ = now;
 }
 
-void TransformListener::receive(const tf2_msgs::TFMessage& message, const std::string& publisher,
+void TransformListener::receive(const ros::MessageEvent<const tf2_msgs::TFMessage>& event,
                                 bool is_static) {
   notice_clock_jump();
   const ros::Time now = ros::Time::now();
-  for (const auto& transform : message.transforms) {
-    if (is_ignored(transform.child_frame_id)) continue;
+  const TransformBuffer::Publisher publisher(event.getPublisherName(),
+                                             event.getConnectionHeaderPtr());
+  for (const auto& transform : event.getConstMessage()->transforms) {
+    if (is_ignored(transform.child_frame_id)) {
+      if (is_static) buffer_.compare(transform, publisher, now);
+      continue;
+    }
     const std::string problem = buffer_.add(transform, publisher, is_static, now);
     if (!problem.empty()) ROS_WARN_STREAM_THROTTLE(5.0, problem);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <tf2_msgs/TFMessage.h>
 
@@ -32,16 +33,16 @@ class TransformListener {
   /// transforms stay. Thread safe.
   void notice_clock_jump();
 
-  /// Ignores transforms of these frames from now on, because joint states supply them. Thread safe.
+  /// Does not use transforms of these frames from now on, because joint states supply them. Static
+  /// ones that differ from the URDF's are disputes all the same. Thread safe.
   void ignore(const std::vector<std::string>& child_frames);
 
   /// A sentence about a transform that was rejected, or stamped ahead of the clock, during the last
-  /// second; empty when there was none.
-  /// Thread safe.
+  /// second; empty when there was none. Thread safe.
   std::string problem() const;
 
  private:
-  void receive(const tf2_msgs::TFMessage& message, const std::string& publisher, bool is_static);
+  void receive(const ros::MessageEvent<const tf2_msgs::TFMessage>& event, bool is_static);
   bool is_ignored(const std::string& child_frame) const;
 
   TransformBuffer& buffer_;

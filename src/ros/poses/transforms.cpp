@@ -25,7 +25,7 @@ std::string trimmed(std::string tf_error) {
 
 }  // namespace
 
-std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
+std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
                     const std::string& frame, const ros::Time& time, Eigen::Isometry3d* X_FT,
                     ros::Time* stamp) {
   if (has_slash(fixed) || has_slash(frame)) {
@@ -36,6 +36,8 @@ std::string look_up(const tf2::BufferCore& buffer, const std::string& fixed,
     if (stamp) *stamp = ros::Time();
     return "";
   }
+  const std::string dispute = buffer.dispute(fixed, frame);
+  if (!dispute.empty()) return dispute;
   geometry_msgs::TransformStamped transform;
   try {
     transform = buffer.lookupTransform(fixed, frame, time);
@@ -61,30 +63,29 @@ std::string look_up_newest(const TransformBuffer& buffer, const std::string& fix
   std::string problem;
   // An exception in every cycle would cost more than this question.
   if (!is_known(buffer, fixed, frame, ros::Time(), &problem)) {
-    const std::string cause = buffer.why_refused(fixed, frame);
-    return cause.empty() ? problem : problem + ": " + cause;
+    return with_cause(buffer, fixed, frame, problem);
   }
   ros::Time stamp;
   Eigen::Isometry3d X;
   problem = look_up(buffer, fixed, frame, ros::Time(), &X, &stamp);
-  if (problem.empty()) problem = buffer.dispute(fixed, frame);
   if (!problem.empty()) return problem;
   const double age =
       stamp.isZero() ? 0.0 : seconds_between(buffer.counts_from(fixed, frame, stamp), now);
   if (age > max_age) {
-    const std::string cause = buffer.why_refused(fixed, frame);
-    return too_old(fixed, frame, age, max_age) + (cause.empty() ? "" : ": " + cause);
+    return with_cause(buffer, fixed, frame, too_old(fixed, frame, age, max_age));
   }
   *X_FT = X;
   return "";
 }
 
-bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std::string& frame,
+bool is_known(const TransformBuffer& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem) {
   if (has_slash(fixed) || has_slash(frame)) {
     return is_known(buffer, without_slash(fixed), without_slash(frame), time, problem);
   }
   if (frame == fixed) return true;
+  *problem = buffer.dispute(fixed, frame);
+  if (!problem->empty()) return false;
   std::string error;
   try {
     if (buffer.canTransform(fixed, frame, time, &error)) return true;
@@ -93,6 +94,14 @@ bool is_known(const tf2::BufferCore& buffer, const std::string& fixed, const std
   }
   *problem = "no transform from '" + frame + "' to '" + fixed + "': " + trimmed(error);
   return false;
+}
+
+std::string with_cause(const TransformBuffer& buffer, const std::string& fixed,
+                       const std::string& frame, const std::string& problem, bool* explained) {
+  const bool is_dispute = !buffer.dispute(fixed, frame).empty();
+  const std::string cause = is_dispute ? "" : buffer.why_refused(fixed, frame);
+  if (explained) *explained = is_dispute || !cause.empty();
+  return cause.empty() ? problem : problem + ": " + cause;
 }
 
 std::string too_old(const std::string& fixed, const std::string& frame, double age,

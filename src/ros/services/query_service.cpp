@@ -199,7 +199,7 @@ namespace {
 std::string half_stated_joint(const std::vector<Kinematics::Joint>& joints,
                               const JointMotion& motion, std::size_t state) {
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    if (!joints[j].is_free() || std::isnan(motion.from[j]) == std::isnan(motion.to[j])) continue;
+    if (std::isnan(motion.from[j]) == std::isnan(motion.to[j])) continue;
     return "joint '" + joints[j].name + "' is stated in one of states[" + std::to_string(state) +
            "] and states[" + std::to_string(state + 1) + "] only: a motion has to state it in all";
   }
