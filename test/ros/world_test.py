@@ -141,6 +141,43 @@ class WorldTest(unittest.TestCase):
         self.world.poses["carriage"] = ("base", pt.transform((0, 3, 0)))
         self.is_at_table()
 
+    def test_2_late_frames(self):
+        """What a frame moves in the time that its pose is late is taken off the bound, and told."""
+        del self.world.poses["carriage"]
+        late, speed, begin = 0.2, 0.5, rospy.Time.now().to_sec() + 1.0
+
+        def y(t):
+            return 1.0 - speed * min(max(t - begin, 0.0), 1.4)  # of the slider's centre
+
+        def send():
+            stamp = rospy.Time.now() - rospy.Duration(late)
+            X = pt.transform((0, y(stamp.to_sec()), 0))
+            self.world.publish_transforms([pt.transform_message("base", "carriage", X, stamp)])
+
+        sender = self.world.repeat(50, send)
+        first = len(self.node.messages)
+        self.node.wait_for(lambda m: m.header.stamp.to_sec() > begin + 2.0, "the slider's way")
+        told = 0
+        for message in self.node.messages[first:]:
+            t = message.header.stamp.to_sec()
+            one = pt.link(message, "ball_link")
+            if t < begin:
+                if t > begin - 0.4:
+                    self.assertEqual(message.status, ProximityArray.OK, message.status_text)
+                continue
+            if not begin + late + 0.5 < t < begin + 1.35:
+                continue
+            truth = min(y(t) - 0.2, 0.3)  # the table is there, too
+            self.assertLessEqual(one.lower_bound, truth + 1e-3)
+            self.assertGreater(one.lower_bound, truth - 1.2 * late * speed - 0.03)
+            if message.status == ProximityArray.DEGRADED:
+                self.assertIn("the newest pose of frame 'carriage' is 0.", message.status_text)
+                told += 1
+        self.assertGreater(told, 10)
+        sender.stop()
+        self.world.poses["carriage"] = ("base", pt.transform((0, 3, 0)))
+        self.is_at_table()
+
     def test_3_topic(self):
         self.send(box("part", 0.0, 0.3), box("other", 0.0, 0.0, 0.9))
         part = self.ball(lambda l: abs(l.distance - 0.1) < 1e-6, "the part")

@@ -156,25 +156,50 @@ void ProximityCycle::run_query(const LiveConfig& config, TimePoint begin) {
   known_ = measurable_;
   for (std::size_t i = 0; i < known_.size(); ++i) known_[i] = known_[i] && poses_.known[i];
   place_carried_objects();
+  LateFrames late_worlds(robot_, poses_.X_FL, known_), late_maps(robot_, poses_.X_FL, known_);
+  note_late_frames(&late_worlds, &late_maps);
   // The world is known exactly and costs little: it may take half of the time.
   worlds_.set_influence_distance(config.repulsion.influence_distance);
   worlds_.run(robot_, poses_.X_FL, known_, selection_, query, poses_.stamp.toSec(),
-              end_of(query.deadline, 0.5 * kQueryShare, begin), &status_input_.deadline);
+              end_of(query.deadline, 0.5 * kQueryShare, begin), &late_worlds,
+              &status_input_.deadline);
   if (query.deadline > 0.0) {
     const std::chrono::duration<double> left =
         end_of(query.deadline, kQueryShare, begin) - Stopwatch::Clock::now();
     query.deadline = std::max(left.count(), kLeastDeadline);
   }
   ProximityQuery& clouds = queries_->query();
+  const double max_distance = query.max_distance;
+  query.max_distance = late_maps.range(max_distance);
   clouds.set_config(query);
   clouds.run(poses_.X_FL, known_, selection_.clouds(), &results_);
   const QueryStatistics& statistics = clouds.statistics();
   status_input_.outside_region = statistics.outside_region > 0;
   status_input_.deadline.unfinished += statistics.unfinished;
   status_input_.deadline.widest = std::max(status_input_.deadline.widest, statistics.widest);
+  late_maps.lower(max_distance, &results_);
+  for (const LateFrames* late : {&late_worlds, &late_maps}) {
+    const std::string doubt = late->doubt(query.tolerance);
+    if (!doubt.empty()) status_input_.pose_doubts.push_back(doubt);
+  }
   cloud_results_ = results_;
   worlds_.combine(selection_.clouds(), &results_);
   note_usage(config);
+}
+
+/// Finds the frames of worlds and maps whose poses are older than the links'.
+void ProximityCycle::note_late_frames(LateFrames* worlds, LateFrames* maps) const {
+  const bool is_stated = pose_source_ && pose_source_->is_stated();
+  for (const SourceSnapshot* source : selection_.selected()) {
+    if (!source) continue;
+    const std::size_t objects = source->surfaces ? source->world.X_FB.size() : 0;
+    for (std::size_t i = 0; i < source->lags.size(); ++i) {
+      const Lag& lag = source->lags[i];
+      // What the robot carries moves with the configuration that is stated.
+      if (is_stated && model_->kinematics && model_->kinematics->find_body(lag.frame)) continue;
+      (i < objects ? worlds : maps)->add(lag);
+    }
+  }
 }
 
 /// In a configuration that the robot is not in, the objects that it carries are elsewhere, too.

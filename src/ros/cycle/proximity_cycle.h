@@ -15,6 +15,7 @@
 #include "ist_proximity/proximity/proximity_query.h"
 #include "ist_proximity/repulsion/repulsion.h"
 #include "ros/cycle/cloud_selection.h"
+#include "ros/cycle/late_frames.h"
 #include "ros/cycle/scene_warm_up.h"
 #include "ros/cycle/unknown_space_query.h"
 #include "ros/cycle/world_answers.h"
@@ -110,6 +111,7 @@ class ProximityCycle {
   void take_warm_queries();
   void note_asked(const LiveConfig& config);
   void run_query(const LiveConfig& config, TimePoint begin);
+  void note_late_frames(LateFrames* worlds, LateFrames* maps) const;
   void place_carried_objects();
   void ask_unknown_space(const LiveConfig& config);
   void find_urgent_links();

@@ -55,7 +55,8 @@ void WorldAnswers::note_motion(const CloudSelection& selection, double time) {
 
 void WorldAnswers::run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
                        const std::vector<bool>& known, const CloudSelection& selection,
-                       const QueryConfig& query, double time, TimePoint end, DeadlineCost* cost) {
+                       QueryConfig query, double time, TimePoint end, LateFrames* late,
+                       DeadlineCost* cost) {
   is_nearest_.assign(X_FL.size(), false);
   any_ = !selection.worlds().empty();
   time_ = time;
@@ -65,9 +66,12 @@ void WorldAnswers::run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_
     query_->set_link_margins(link_margins(robot));
   }
   note_motion(selection, time);
+  const double max_distance = query.max_distance;
+  query.max_distance = late->range(max_distance);
   query_->set_config(query);
   query_->set_influence_distance(influence_distance_);
   query_->run(X_FL, known, selection.worlds(), end, &answers_);
+  late->lower(max_distance, &answers_);
   cost->unfinished += query_->statistics().unfinished;
   cost->widest = std::max(cost->widest, query_->statistics().widest);
 }

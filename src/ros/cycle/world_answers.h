@@ -8,6 +8,7 @@
 #include "ist_proximity/proximity/closing_speed.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "ros/cycle/cloud_selection.h"
+#include "ros/cycle/late_frames.h"
 #include "ros/parameters/parameters.h"
 #include "ros/status/status.h"
 
@@ -20,10 +21,11 @@ class WorldAnswers {
 
   /// Measures the links against the worlds of a selection.
   /// @param time  [s] of the poses
+  /// @param late  frames of the worlds; receives what it took off
   /// @param cost  links that `end` left unfinished are added
   void run(const RobotModel& robot, Span<const Eigen::Isometry3d> X_FL,
-           const std::vector<bool>& known, const CloudSelection& selection,
-           const QueryConfig& query, double time, TimePoint end, DeadlineCost* cost);
+           const std::vector<bool>& known, const CloudSelection& selection, QueryConfig query,
+           double time, TimePoint end, LateFrames* late, DeadlineCost* cost);
 
   /// Takes the nearer of cloud and world for each link; the lower bound is that of both. A link
   /// that is UNKNOWN to either is UNKNOWN.

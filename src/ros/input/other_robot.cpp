@@ -1,5 +1,6 @@
 #include "ros/input/other_robot.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "ist_proximity/geometry/error.h"
@@ -12,13 +13,22 @@ namespace {
 /// Frames that are known from the other robot's joint states alone.
 constexpr const char* kOwnFrame = "(other robot) ";
 
-/// Looks up a pose at an instant, or else the newest one.
-std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
-                         const std::string& frame, const ros::Time& time, double max_age,
-                         Eigen::Isometry3d* X) {
-  std::string ignored;
-  if (is_known(buffer, fixed, frame, time, &ignored)) return look_up(buffer, fixed, frame, time, X);
-  return look_up_newest(buffer, fixed, frame, time, max_age, X);
+/// How a frame that is in a frame R moves in another that R moves in.
+Lag compose(const Lag& outer, const Eigen::Isometry3d& X_FR, const Lag& inner) {
+  Lag both = inner;
+  for (Eigen::Isometry3d& moved : both.moved) moved = X_FR * moved * X_FR.inverse();
+  if (outer.moved.empty()) return both;
+  if (both.moved.empty()) return outer;
+  // The one of the higher share counts for both.
+  if (outer.age * both.window > both.age * outer.window) {
+    both.age = outer.age;
+    both.window = outer.window;
+  }
+  both.moved.resize(std::max(both.moved.size(), outer.moved.size()), Eigen::Isometry3d::Identity());
+  for (std::size_t k = 0; k < outer.moved.size(); ++k) {
+    both.moved[k] = outer.moved[k] * both.moved[k];
+  }
+  return both;
 }
 
 }  // namespace
@@ -72,7 +82,8 @@ bool OtherRobot::owns(const std::string& frame) const {
 
 std::string OtherRobot::look_up_frame(const TransformBuffer& buffer, const std::string& fixed_frame,
                                       const std::string& frame, const ros::Time& time,
-                                      double max_age, Eigen::Isometry3d* X_FB, bool* is_own) const {
+                                      double max_age, Eigen::Isometry3d* X_FB, Lag* lag,
+                                      bool* is_own) const {
   *is_own = owns(frame);
   if (!*is_own) return "";
   const std::string link = frame.substr(std::char_traits<char>::length(kOwnFrame));
@@ -84,18 +95,21 @@ std::string OtherRobot::look_up_frame(const TransformBuffer& buffer, const std::
   const std::string base = base_frame_.empty() ? config_.tf_prefix + root : base_frame_;
   Eigen::Isometry3d X_FR = Eigen::Isometry3d::Identity(), X_RB = Eigen::Isometry3d::Identity();
   std::string problem;
+  Lag lag_FR, lag_RB;
   if (base != fixed_frame) {
-    problem = look_up_near(buffer, fixed_frame, base, time, max_age, &X_FR);
+    problem = look_up_near(buffer, fixed_frame, base, time, max_age, &X_FR, &lag_FR);
   }
   if (problem.empty() && link != root) {
-    problem = look_up_near(*own_buffer_, root, link, time, max_age, &X_RB);
+    problem = look_up_near(*own_buffer_, root, link, time, max_age, &X_RB, &lag_RB);
     if (!problem.empty()) {
       problem =
           "the other robot's joint states (" + config_.joint_states + ") give no pose: " + problem;
     }
   }
-  if (problem.empty()) *X_FB = X_FR * X_RB;
-  return problem;
+  if (!problem.empty()) return problem;
+  *X_FB = X_FR * X_RB;
+  *lag = compose(lag_FR, X_FR, lag_RB);
+  return "";
 }
 
 }  // namespace ist

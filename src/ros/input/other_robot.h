@@ -13,6 +13,7 @@
 #include "ros/parameters/world_config.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/transform_buffer.h"
+#include "ros/poses/transforms.h"
 
 namespace ist {
 
@@ -36,11 +37,12 @@ class OtherRobot {
 
   /// Looks up where a frame of its links is.
   /// @param buffer  with the poses of frames other than its own
+  /// @param lag     see ist::look_up_near()
   /// @param is_own  whether the frame is one of its own: else nothing is done
   /// @returns empty on success, else a sentence. Thread safe
   std::string look_up_frame(const TransformBuffer& buffer, const std::string& fixed_frame,
                             const std::string& frame, const ros::Time& time, double max_age,
-                            Eigen::Isometry3d* X_FB, bool* is_own) const;
+                            Eigen::Isometry3d* X_FB, Lag* lag, bool* is_own) const;
 
  private:
   const OtherRobotConfig config_;

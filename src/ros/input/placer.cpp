@@ -123,13 +123,9 @@ std::string Placer::place(const Measurement& measurement, const SourceTarget& ta
 std::string place_map(const TransformBuffer& buffer, const ros::Time& time, double max_age,
                       SourceSnapshot* snapshot) {
   const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
-  Eigen::Isometry3d& X_FM = snapshot->cloud.X_FM;
-  std::string ignored;
-  // An exception in every cycle would cost more than is_known().
-  if (is_known(buffer, fixed, frame, time, &ignored)) {
-    return look_up(buffer, fixed, frame, time, &X_FM);
-  }
-  return look_up_newest(buffer, fixed, frame, time, max_age, &X_FM);
+  snapshot->lags.resize(1);
+  return look_up_near(buffer, fixed, frame, time, max_age, &snapshot->cloud.X_FM,
+                      &snapshot->lags[0]);
 }
 
 }  // namespace ist

@@ -10,6 +10,7 @@
 #include "ist_proximity/cloud/cloud_snapshot.h"
 #include "ist_proximity/proximity/world_query.h"
 #include "ist_proximity/robot/robot_model.h"
+#include "ros/poses/transforms.h"
 
 namespace ist {
 
@@ -26,6 +27,8 @@ struct SourceSnapshot {
   std::string fixed_frame, map_frame;  ///< the frames between which the cloud or map is placed
   /// The map's boxes -> `map_frame`.
   Eigen::Isometry3d X_BM = Eigen::Isometry3d::Identity();
+  /// Of the frames of a map or of known objects whose poses are late.
+  std::vector<Lag> lags;
   /// What the source remembers and the cloud does not show; null: nothing.
   std::shared_ptr<const SourceSnapshot> memory;
   /// A known world, and the surfaces of the model's links; null: a cloud. The boxes of the cloud

@@ -65,11 +65,8 @@ std::string UnknownSpaceWatch::place(const UnknownSnapshot& unknown, const std::
     return "all space counts as unknown: " +
            format_text("what was seen last is of %.2f s after the present", ahead);
   }
-  std::string problem;
-  // An exception in every cycle would cost more than is_known().
-  problem = is_known(buffer_, fixed_frame, unknown.frame, time, &problem)
-                ? look_up(buffer_, fixed_frame, unknown.frame, time, X_FM)
-                : look_up_newest(buffer_, fixed_frame, unknown.frame, time, max_age, X_FM);
+  const std::string problem =
+      look_up_near(buffer_, fixed_frame, unknown.frame, time, max_age, X_FM, nullptr);
   return problem.empty() ? "" : "all space counts as unknown (memory/frame_id): " + problem;
 }
 

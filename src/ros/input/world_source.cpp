@@ -104,13 +104,16 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
                                SourceSnapshot* snapshot) const {
   const std::string& fixed = snapshot->fixed_frame;
   const std::vector<std::string>& frames = snapshot->world.world->frames();
+  snapshot->lags.assign(frames.size() + (snapshot->cloud.boxes ? 1 : 0), Lag());
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    std::string problem = place_frame(fixed, frames[i], time, max_age, &snapshot->world.X_FB[i]);
+    std::string problem =
+        place_frame(fixed, frames[i], time, max_age, &snapshot->world.X_FB[i], &snapshot->lags[i]);
     if (!problem.empty()) return problem;
   }
   if (!snapshot->cloud.boxes) return "";
   Eigen::Isometry3d X_FB = Eigen::Isometry3d::Identity();
-  std::string problem = place_frame(fixed, snapshot->map_frame, time, max_age, &X_FB);
+  std::string problem =
+      place_frame(fixed, snapshot->map_frame, time, max_age, &X_FB, &snapshot->lags.back());
   if (problem.empty()) snapshot->cloud.X_FM = X_FB * snapshot->X_BM;
   return problem;
 }
@@ -118,19 +121,17 @@ std::string WorldSource::place(const ros::Time& time, double max_age,
 /// Looks up where a frame is at an instant, or else at the newest one that tf knows.
 /// @param X_FB  the identity at first
 std::string WorldSource::place_frame(const std::string& fixed_frame, const std::string& frame,
-                                     const ros::Time& time, double max_age,
-                                     Eigen::Isometry3d* X_FB) const {
+                                     const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB,
+                                     Lag* lag) const {
   if (frame == kFixedFrame) return "";  // it is the identity for good
   bool is_own = false;
   std::string unplaced;
   if (robot_) {
-    unplaced = robot_->look_up_frame(buffer_, fixed_frame, frame, time, max_age, X_FB, &is_own);
+    unplaced =
+        robot_->look_up_frame(buffer_, fixed_frame, frame, time, max_age, X_FB, lag, &is_own);
   }
   if (!unplaced.empty() || is_own) return unplaced;
-  std::string ignored;
-  return is_known(buffer_, fixed_frame, frame, time, &ignored)
-             ? look_up(buffer_, fixed_frame, frame, time, X_FB)
-             : look_up_newest(buffer_, fixed_frame, frame, time, max_age, X_FB);
+  return look_up_near(buffer_, fixed_frame, frame, time, max_age, X_FB, lag);
 }
 
 void WorldSource::run() {

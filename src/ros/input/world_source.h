@@ -113,7 +113,8 @@ class WorldSource : public ObstacleSource {
   void publish_markers();
   std::string place(const ros::Time& time, double max_age, SourceSnapshot* snapshot) const;
   std::string place_frame(const std::string& fixed_frame, const std::string& frame,
-                          const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB) const;
+                          const ros::Time& time, double max_age, Eigen::Isometry3d* X_FB,
+                          Lag* lag) const;
 
   const SourceConfig config_;
   const TransformBuffer& buffer_;

@@ -1,5 +1,7 @@
 #include "ros/poses/transforms.h"
 
+#include <algorithm>
+#include <cmath>
 #include <exception>
 
 #include "ros/common/eigen_conversion.h"
@@ -12,6 +14,11 @@ namespace {
 
 // [m] The queries compute in float, which resolves a millimetre there.
 constexpr double kMaxDistance = 1e4;
+
+// Of the motion of a frame whose pose is late: shorter ones would measure the noise of its pose.
+// [s]
+constexpr double kLeastWindow = 0.1;
+constexpr int kWindows = 3;
 
 bool has_slash(const std::string& frame) { return !frame.empty() && frame[0] == '/'; }
 
@@ -59,7 +66,7 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
 
 std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
-                           Eigen::Isometry3d* X_FT) {
+                           Eigen::Isometry3d* X_FT, ros::Time* newest) {
   std::string problem;
   // An exception in every cycle would cost more than this question.
   if (!is_known(buffer, fixed, frame, ros::Time(), &problem)) {
@@ -75,6 +82,35 @@ std::string look_up_newest(const TransformBuffer& buffer, const std::string& fix
     return with_cause(buffer, fixed, frame, too_old(fixed, frame, age, max_age));
   }
   *X_FT = X;
+  if (newest) *newest = stamp;
+  return "";
+}
+
+std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
+                         const std::string& frame, const ros::Time& time, double max_age,
+                         Eigen::Isometry3d* X_FT, Lag* lag) {
+  if (lag) *lag = Lag();
+  std::string problem;
+  if (is_known(buffer, fixed, frame, time, &problem)) {
+    return look_up(buffer, fixed, frame, time, X_FT);
+  }
+  ros::Time stamp;
+  problem = look_up_newest(buffer, fixed, frame, time, max_age, X_FT, &stamp);
+  if (!problem.empty() || !lag || stamp.isZero()) return problem;
+  lag->frame = frame;
+  lag->age = std::abs(seconds_between(stamp, time));
+  lag->window = std::max(lag->age, kLeastWindow);
+  Eigen::Isometry3d X_after = *X_FT;
+  for (int k = 0; k < kWindows && stamp.toSec() > lag->window; ++k) {
+    Eigen::Isometry3d X;
+    stamp -= ros::Duration(lag->window);
+    if (!is_known(buffer, fixed, frame, stamp, &problem) ||
+        !look_up(buffer, fixed, frame, stamp, &X).empty()) {
+      break;
+    }
+    lag->moved.push_back(X_after * X.inverse());
+    X_after = X;
+  }
   return "";
 }
 

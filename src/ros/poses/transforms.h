@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <string>
+#include <vector>
 
 #include "ros/poses/transform_buffer.h"
 
@@ -29,11 +30,27 @@ std::string look_up(const TransformBuffer& buffer, const std::string& fixed,
 bool is_known(const TransformBuffer& buffer, const std::string& fixed, const std::string& frame,
               const ros::Time& time, std::string* problem);
 
+/// How a frame moved until its newest pose, which is older than the instant that it is asked for.
+struct Lag {
+  std::string frame;
+  double age = 0.0;     ///< [s] of the pose at that instant; 0: it is not late
+  double window = 1.0;  ///< [s] in each of which it moved by the poses of `moved`, in frame F
+  std::vector<Eigen::Isometry3d> moved;
+};
+
+/// Looks up the pose at an instant, or else the newest one, as look_up_newest(). The windows of
+/// `lag` are three, each as long as the age or 0.1 s, so that a frame that turns back is not taken
+/// for one that stands; there are fewer where the frame is new.
+/// @param lag  may be null
+std::string look_up_near(const TransformBuffer& buffer, const std::string& fixed,
+                         const std::string& frame, const ros::Time& time, double max_age,
+                         Eigen::Isometry3d* X_FT, Lag* lag);
+
 /// Looks up the newest pose, which must not be more than `max_age` [s] older than `now`. The age of
 /// transforms that were stamped ahead of the clock counts from their receipt.
 std::string look_up_newest(const TransformBuffer& buffer, const std::string& fixed,
                            const std::string& frame, const ros::Time& now, double max_age,
-                           Eigen::Isometry3d* X_FT);
+                           Eigen::Isometry3d* X_FT, ros::Time* stamp = nullptr);
 
 /// Adds to a sentence on a pose that is not known why transforms are refused, where they are.
 /// @param explained  receives whether the sentence names the cause; may be null

@@ -1,0 +1,84 @@
+#include "ros/cycle/late_frames.h"
+
+#include <algorithm>
+
+#include "ros/common/text.h"
+
+namespace ist {
+namespace {
+
+constexpr double kMostTurned = 0.5;  // [rad] in the age of a pose
+
+double turn_of(const Eigen::Isometry3d& moved) { return Eigen::AngleAxisd(moved.linear()).angle(); }
+
+}  // namespace
+
+void LateFrames::add(const Lag& lag) {
+  if (!lag.moved.empty()) lags_.push_back(&lag);
+}
+
+/// [m] How much nearer to a link an obstacle may have come that is `bound` from it.
+double LateFrames::shift(std::size_t link, double bound, const Lag** lag) const {
+  const InnerSphereTree& tree = robot_.links[link].tree;
+  const Eigen::Vector3d center = X_FL_[link] * tree.center();
+  double most = 0.0;
+  for (const Lag* one : lags_) {
+    for (const Eigen::Isometry3d& moved : one->moved) {
+      const double turned = turn_of(moved) * (tree.radius() + std::max(bound, 0.0));
+      const double there = one->age / one->window * ((moved * center - center).norm() + turned);
+      if (there <= most) continue;
+      most = there;
+      if (lag) *lag = one;
+    }
+  }
+  return most;
+}
+
+double LateFrames::range(double max_distance) const {
+  double farthest = max_distance, turn = 0.0;
+  if (lags_.empty()) return farthest;
+  for (const Lag* lag : lags_) {
+    for (const Eigen::Isometry3d& moved : lag->moved) {
+      turn = std::max(turn, lag->age / lag->window * turn_of(moved));
+    }
+  }
+  for (std::size_t i = 0; i < known_.size(); ++i) {
+    if (!known_[i] || !robot_.links[i].usable()) continue;
+    // What is farther away moves more where its frame turns.
+    const double first = shift(i, max_distance, nullptr);
+    farthest = std::max(farthest, max_distance + first / (1.0 - std::min(turn, kMostTurned)));
+  }
+  return farthest;
+}
+
+void LateFrames::lower(double max_distance, std::vector<LinkProximity>* answers) {
+  if (lags_.empty()) return;
+  for (std::size_t i = 0; i < answers->size(); ++i) {
+    LinkProximity& answer = (*answers)[i];
+    if (answer.state == LinkState::kUnknown) continue;
+    const Lag* lag = nullptr;
+    const double off = shift(i, answer.lower_bound, &lag);
+    answer.lower_bound -= off;
+    if (answer.state == LinkState::kClear) {
+      // range() falls short of it only where a frame turns more than kMostTurned.
+      if (answer.lower_bound < max_distance * (1.0 - 1e-12)) answer.reset();
+      answer.lower_bound = std::max(answer.lower_bound, max_distance);
+    } else {
+      answer.sensor_width += off;
+    }
+    if (off <= most_) continue;
+    most_ = off;
+    latest_ = lag;
+  }
+}
+
+std::string LateFrames::doubt(double tolerance) const {
+  if (!latest_ || most_ <= tolerance) return "";
+  return "the newest pose of frame '" + latest_->frame +
+         format_text(
+             "' is %.3f s older than the links': in that time what stands in it moves up to ",
+             latest_->age) +
+         format_text("%.1f mm, which is taken off the bounds", 1e3 * most_);
+}
+
+}  // namespace ist
