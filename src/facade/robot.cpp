@@ -114,6 +114,8 @@ Robot::Robot(const std::string& urdf, const RobotConfig& config) {
     for (const std::string& doubt : doubtful_sizes(parts.description, config.links)) {
       config.callbacks.warning(doubt);
     }
+    const std::string no_limits = doubtful_limits(parts.description);
+    if (!no_limits.empty()) config.callbacks.warning(no_limits);
   }
   RobotModelConfig model_config;
   model_config.packing = config.packing;

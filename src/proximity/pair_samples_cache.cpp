@@ -11,7 +11,7 @@ namespace ist {
 namespace {
 
 // Raise it whenever the same robot is sampled differently.
-constexpr std::uint32_t kSamplingVersion = 1;
+constexpr std::uint32_t kSamplingVersion = 2;
 constexpr char kMagic[] = "ISTPAIR";  // 8 bytes with its final 0
 
 void write_pose(const Eigen::Isometry3d& X, ByteWriter* out) {

@@ -1,7 +1,5 @@
 #include "ist_proximity/proximity/self_query.h"
 
-#include <tinyxml2.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "ist_proximity/geometry/error.h"
+#include "ist_proximity/proximity/collision_rules.h"
 #include "ist_proximity/robot/link_poses.h"
 
 namespace ist {
@@ -28,9 +26,10 @@ struct Neighbours {
     }
   }
 
+  bool never_move(std::size_t a, std::size_t b) const { return rigid_group[a] == rigid_group[b]; }
   bool never_collide(std::size_t a, std::size_t b) const {
     const auto [above, below] = std::minmax(a, b);  // a body's number is above its parent's
-    return rigid_group[a] == rigid_group[b] || ancestor[below] == above;
+    return never_move(a, b) || ancestor[below] == above;
   }
 
   std::vector<std::size_t> rigid_group;  ///< the body nearest to the root that fixed joints lead to
@@ -52,15 +51,37 @@ class NamePairSet {
       pairs_;  // of the names that it is made of
 };
 
-// A planar or floating joint has no rest position, so the bodies below it are a group of their own.
-// Places such joints anywhere. @returns by body: its group
-std::vector<std::size_t> rest_unstated_joints(const Kinematics& kinematics, JointPoses* poses) {
+// What keeps a joint from being drawn over all its positions.
+enum class Drawing { kComplete, kOneTurn, kImpossible };
+
+// A joint without limits that turns is back where it was after a turn, so a turn is all its
+// positions. A slide has no such range, and neither has a joint that another one drives by a gear
+// which needs several turns for one.
+Drawing drawing_of(const Kinematics& kinematics, std::size_t j) {
+  const Kinematics::Joint& joint = kinematics.joints()[j];
+  if (joint.has_unstated_pose()) return Drawing::kImpossible;
+  if (joint.type == JointType::kFixed) return Drawing::kComplete;
+  const Kinematics::Joint& source = kinematics.joints()[joint.source];
+  if (std::isfinite(source.lower) && std::isfinite(source.upper)) return Drawing::kComplete;
+  if (source.type == JointType::kPrismatic || joint.type == JointType::kPrismatic ||
+      std::abs(joint.multiplier) < 1.0) {
+    return Drawing::kImpossible;
+  }
+  return source.type == JointType::kContinuous ? Drawing::kComplete : Drawing::kOneTurn;
+}
+
+// The bodies below joints whose positions cannot be stated are a group of their own. Places planar
+// and floating ones anywhere.
+// @param starts_group  by joint
+// @returns by body: its group
+std::vector<std::size_t> groups_of_bodies(const Kinematics& kinematics,
+                                          const std::vector<bool>& starts_group,
+                                          JointPoses* poses) {
   const auto& joints = kinematics.joints();
   std::vector<std::size_t> group_of_body = {0};
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const bool starts_group = joints[j].has_unstated_pose();
-    group_of_body.push_back(starts_group ? j + 1 : group_of_body[joints[j].parent]);
-    if (!starts_group) continue;
+    group_of_body.push_back(starts_group[j] ? j + 1 : group_of_body[joints[j].parent]);
+    if (!joints[j].has_unstated_pose()) continue;
     poses->X_PC[j] = joints[j].X_PJ;
     poses->known[j] = true;
   }
@@ -88,7 +109,7 @@ std::string escaped(const std::string& text) {
 
 std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinematics& kinematics,
                                            const std::vector<bool>& wanted,
-                                           const NamePairs& ignored) {
+                                           const NamePairs& ignored, const CollisionRules& rules) {
   std::vector<std::optional<std::size_t>> body_of_link;
   std::vector<bool> has_geometry(kinematics.bodies().size(), false);
   for (const LinkModel& link : model.links) {
@@ -103,14 +124,24 @@ std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinema
   std::vector<LinkPair> pairs;
   for (std::size_t i = 0; i < model.links.size(); ++i) {
     for (std::size_t k = i + 1; usable(i) && k < model.links.size(); ++k) {
-      if (!usable(k) || neighbours.never_collide(*body_of_link[i], *body_of_link[k]) ||
-          ignored_names.holds(model.links[i].name, model.links[k].name)) {
+      if (!usable(k)) continue;
+      const std::string &first = model.links[i].name, &second = model.links[k].name;
+      const bool is_left_out = rules.enables(first, second)
+                                   ? neighbours.never_move(*body_of_link[i], *body_of_link[k])
+                                   : neighbours.never_collide(*body_of_link[i], *body_of_link[k]);
+      if (is_left_out || ignored_names.holds(first, second) || rules.disables(first, second)) {
         continue;
       }
       pairs.push_back({i, k});
     }
   }
   return pairs;
+}
+
+std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinematics& kinematics,
+                                           const std::vector<bool>& wanted,
+                                           const NamePairs& ignored) {
+  return self_collision_pairs(model, kinematics, wanted, ignored, {});
 }
 
 std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>& model,
@@ -125,7 +156,9 @@ std::vector<LinkPair> in_contact_at_rest(const std::shared_ptr<const RobotModel>
   }
   JointPoses poses;
   kinematics.place_joints(q, &poses);
-  const std::vector<std::size_t> group_of_body = rest_unstated_joints(kinematics, &poses);
+  std::vector<bool> has_no_rest;
+  for (const auto& joint : joints) has_no_rest.push_back(joint.has_unstated_pose());
+  const std::vector<std::size_t> group_of_body = groups_of_bodies(kinematics, has_no_rest, &poses);
   // The kinematics outlives this call, so the pointer does not own it.
   ForwardKinematics forward(*model, {std::shared_ptr<const Kinematics>(), &kinematics});
   const LinkPoses& links = forward.run(poses);
@@ -150,7 +183,7 @@ std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& m
                                       const std::vector<LinkPair>& pairs,
                                       const PairSampling& sampling,
                                       const std::function<bool()>& cancelled) {
-  constexpr double kTurn = 3.14159265358979323846, kSlide = 0.5;  // [rad, m] without limits
+  constexpr double kHalfTurn = 3.14159265358979323846;  // [rad]
   const auto& joints = kinematics.joints();
   std::vector<SampledPair> sampled;
   sampled.reserve(pairs.size());
@@ -162,18 +195,23 @@ std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& m
   std::vector<PairProximity> results;
   std::mt19937_64 random(sampling.seed);
   std::vector<double> q(joints.size(), 0.0);
+  std::vector<bool> is_not_drawn;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    is_not_drawn.push_back(drawing_of(kinematics, j) == Drawing::kImpossible);
+  }
   JointPoses poses;
   for (std::size_t i = 0; i < sampling.configurations && !(cancelled && cancelled()); ++i) {
     for (std::size_t j = 0; j < joints.size(); ++j) {
-      const double free_range = joints[j].type == JointType::kPrismatic ? kSlide : kTurn;
-      const double low = std::isfinite(joints[j].lower) ? joints[j].lower : -free_range;
-      const double high = std::isfinite(joints[j].upper) ? joints[j].upper : free_range;
+      const bool has_limits = std::isfinite(joints[j].lower) && std::isfinite(joints[j].upper);
+      const double low = has_limits ? joints[j].lower : -kHalfTurn;
+      const double high = has_limits ? joints[j].upper : kHalfTurn;
       // Not std::uniform_real_distribution, which differs between libraries.
       const double drawn = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
       q[j] = joints[j].is_free() ? drawn : std::nan("");  // mimics follow
     }
     kinematics.place_joints(q, &poses);
-    const std::vector<std::size_t> group_of_body = rest_unstated_joints(kinematics, &poses);
+    const std::vector<std::size_t> group_of_body =
+        groups_of_bodies(kinematics, is_not_drawn, &poses);
     const LinkPoses& links = forward.run(poses);
     query.run(links.X_FL, links.known, &results);
     for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -185,6 +223,26 @@ std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& m
     }
   }
   return sampled;
+}
+
+std::string sampling_doubts(const Kinematics& kinematics) {
+  std::string turned, not_drawn;
+  for (std::size_t j = 0; j < kinematics.joints().size(); ++j) {
+    const Drawing drawing = drawing_of(kinematics, j);
+    std::string* names = drawing == Drawing::kOneTurn      ? &turned
+                         : drawing == Drawing::kImpossible ? &not_drawn
+                                                           : nullptr;
+    if (names == nullptr) continue;
+    *names += (names->empty() ? "'" : ", '") + kinematics.joints()[j].name + "'";
+  }
+  if (!turned.empty()) turned = "joints without limits are drawn from -pi to pi: " + turned;
+  if (!not_drawn.empty()) {
+    not_drawn =
+        "joints that have no limits and are not drawn over a turn cannot be sampled, nor the pairs "
+        "of links that they move relative to each other: " +
+        not_drawn + "; state their limits in the URDF";
+  }
+  return turned + (turned.empty() || not_drawn.empty() ? "" : "; ") + not_drawn;
 }
 
 std::string to_srdf(const RobotModel& model, const Kinematics& kinematics,
@@ -212,26 +270,6 @@ std::string to_srdf(const RobotModel& model, const Kinematics& kinematics,
     if (pair.never() && never) add(pair.pair, "Never");
   }
   return srdf + "</robot>\n";
-}
-
-NamePairs disabled_collisions(const std::string& srdf_xml) {
-  tinyxml2::XMLDocument document;
-  if (document.Parse(srdf_xml.c_str(), srdf_xml.size()) != tinyxml2::XML_SUCCESS) {
-    throw ModelError(std::string("the SRDF is not well-formed XML: ") + document.ErrorStr());
-  }
-  const tinyxml2::XMLElement* robot = document.FirstChildElement("robot");
-  if (robot == nullptr) throw ModelError("the SRDF has no <robot>");
-  NamePairs pairs;
-  for (const auto* element = robot->FirstChildElement("disable_collisions"); element != nullptr;
-       element = element->NextSiblingElement("disable_collisions")) {
-    const char *first = element->Attribute("link1"), *second = element->Attribute("link2");
-    if (first == nullptr || second == nullptr) {
-      throw ModelError("the SRDF has a <disable_collisions> without link1 or link2 (line " +
-                       std::to_string(element->GetLineNum()) + ")");
-    }
-    pairs.emplace_back(first, second);
-  }
-  return pairs;
 }
 
 }  // namespace ist

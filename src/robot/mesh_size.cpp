@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <variant>
 
@@ -47,6 +48,21 @@ std::vector<std::string> doubtful_sizes(const RobotDescription& robot,
     }
   }
   return doubts;
+}
+
+std::string doubtful_limits(const RobotDescription& robot) {
+  std::string names;
+  for (const JointDescription& joint : robot.joints) {
+    const bool wants_limits =
+        joint.type == JointType::kRevolute || joint.type == JointType::kPrismatic;
+    const bool has_limits = std::isfinite(joint.lower) || std::isfinite(joint.upper);
+    if (!wants_limits || has_limits || joint.mimic) continue;
+    names += (names.empty() ? "'" : ", '") + joint.name + "'";
+  }
+  if (names.empty()) return "";
+  return "joints that state no limits, a lower one below an upper one, and are taken to have "
+         "none: " +
+         names;
 }
 
 }  // namespace ist

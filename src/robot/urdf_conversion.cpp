@@ -63,7 +63,9 @@ JointDescription to_joint(const urdf::Joint& joint) {
   result.child_link = joint.child_link_name;
   result.X_PJ = to_isometry(joint.parent_to_joint_origin_transform);
   result.axis << joint.axis.x, joint.axis.y, joint.axis.z;
-  if (joint.limits &&
+  // Limits without a range, such as the 0 to 0 that exporters write, are none: the joint moves all
+  // the same.
+  if (joint.limits && joint.limits->lower < joint.limits->upper &&
       (joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::PRISMATIC)) {
     // Limits farther out than any position counts are none.
     if (std::abs(joint.limits->lower) <= kMaxLength) result.lower = joint.limits->lower;

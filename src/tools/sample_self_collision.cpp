@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/proximity/collision_rules.h"
 #include "ist_proximity/proximity/self_query.h"
 
 namespace {
@@ -46,11 +47,16 @@ int run(const Options& options) {
   config.packing.max_error = 0.02;  // [m] only depths are measured by spheres
   const auto model = ist::build_robot_model(description, config);
   const ist::Kinematics kinematics(description);
+  const std::string doubts = ist::sampling_doubts(kinematics);
+  if (!doubts.empty()) std::cerr << doubts << '\n';
   const std::vector<bool> all(model->links.size(), true);
   const auto pairs = ist::self_collision_pairs(*model, kinematics, all, {});
   const auto sampled = ist::sample_pairs(model, kinematics, pairs, options.sampling);
   for (const ist::SampledPair& found : sampled) {
-    const char* word = found.always() ? "always" : (found.never() ? "never" : "sometimes");
+    const char* word = found.measured == 0 ? "not known"
+                       : found.always()    ? "always"
+                       : found.never()     ? "never"
+                                           : "sometimes";
     std::printf("%-9s %6zu of %zu  %s and %s\n", word, found.contacts, found.measured,
                 model->links[found.pair.first].name.c_str(),
                 model->links[found.pair.second].name.c_str());

@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/proximity/collision_rules.h"
 
 namespace ist {
 namespace {
@@ -200,7 +203,7 @@ TEST(SelfCollisionPairs, WritesAnSrdfThatIsReadAgain) {
 }
 
 TEST(SelfCollisionPairs, srdf) {
-  const NamePairs expected = {{"a", "b"}, {"c", "a"}};
+  const NamePairs expected = {{"a", "b"}, {"a", "c"}};
   EXPECT_EQ(disabled_collisions("<robot name='r'><group name='g'/>"
                                 "<disable_collisions link1='a' link2='b' reason='Never'/>"
                                 "<disable_collisions link1='c' link2='a'/></robot>"),
@@ -208,6 +211,122 @@ TEST(SelfCollisionPairs, srdf) {
   EXPECT_THROW(disabled_collisions("<robot"), ModelError);
   EXPECT_THROW(disabled_collisions("<other/>"), ModelError);
   EXPECT_THROW(disabled_collisions("<robot><disable_collisions link1='a'/></robot>"), ModelError);
+}
+
+// MoveIt's order: off by default, then enabled, then disabled.
+TEST(SelfCollisionPairs, SrdfDefaults) {
+  const Robot robot;  // base-b, base-tip, a-tip, a-c, b-c and tip-c are not adjacent
+  const auto left = [&](const std::string& elements) {
+    const CollisionRules rules =
+        read_srdf("<robot name='r'>" + elements + "</robot>", &robot.kinematics);
+    EXPECT_TRUE(rules.doubts.empty());
+    const std::vector<bool> all(robot.model->links.size(), true);
+    return robot.names(self_collision_pairs(*robot.model, robot.kinematics, all, {}, rules));
+  };
+  const std::string off = "<disable_default_collisions link='c'/>";
+  const std::string on = "<enable_collisions link1='c' link2='tip'/>";
+  const Names without_c = {"base-b", "base-tip", "a-tip"};
+  EXPECT_EQ(left(off), without_c);
+  const Names one_of_c = {"base-b", "base-tip", "a-tip", "tip-c"};
+  EXPECT_EQ(left(off + on), one_of_c);
+  EXPECT_EQ(left(on + off), one_of_c);
+  EXPECT_EQ(left(on + off + "<disable_collisions link1='tip' link2='c'/>"), without_c);
+  EXPECT_EQ(left(off + "<disable_default_collisions link='tip'/>" + on),
+            (Names{"base-b", "tip-c"}));
+  // Adjacent links that are stated are watched, but rigidly connected ones cannot move.
+  const std::string adjacent =
+      "<enable_collisions link1='base' link2='a'/><enable_collisions link1='b' link2='tip'/>";
+  EXPECT_EQ(left(off + adjacent), (Names{"base-a", "base-b", "base-tip", "a-tip"}));
+}
+
+TEST(SelfCollisionPairs, SrdfTellsWhatItDoesNotUse) {
+  const Robot robot;
+  const CollisionRules rules = read_srdf(
+      "<robot name='r'><group name='g'><chain base_link='x' tip_link='y'/></group>\n"
+      "<disable_colisions link1='a' link2='c'/><disable_colisions link1='a' link2='b'/>\n"
+      "<disable_collisions link1='a' link2='cc'/><enable_collisions link1='cc' link2='b'/>\n"
+      "<disable_default_collisions link='d'/></robot>",
+      &robot.kinematics);
+  ASSERT_EQ(rules.doubts.size(), 2U);
+  EXPECT_EQ(
+      rules.doubts[0],
+      "the SRDF has elements that are not known and have no effect: <disable_colisions> (line "
+      "2)");
+  EXPECT_EQ(rules.doubts[1],
+            "the SRDF names links that are not in the URDF: 'cc' in <disable_collisions> (line 3), "
+            "'d' in <disable_default_collisions> (line 4)");
+  for (const char* element : {"<enable_collisions link2='a'/>", "<disable_default_collisions/>"}) {
+    EXPECT_THROW(read_srdf("<robot>" + std::string(element) + "</robot>", nullptr), ModelError);
+  }
+}
+
+// base - j - arm - k - tip: a sphere far out on the arm, another one on the base in its way.
+struct Limits {
+  std::string type = "revolute";  // of j
+  std::string limit;              // attributes
+  std::string mimic;              // k follows j
+  std::string k_type = "continuous";
+};
+
+std::vector<std::size_t> sampled_contacts(const Limits& limits, std::string* doubts,
+                                          RobotDescription* description) {
+  const std::string sphere = "<collision><geometry><sphere radius='0.1'/></geometry></collision>";
+  const std::string at = "<collision><origin xyz='0 1 0'/><geometry><sphere radius='0.1'/>";
+  const std::string urdf =
+      "<robot name='r'><link name='base'>" + at +
+      "</geometry></collision></link><link name='arm'/><link name='fore'>" + sphere +
+      "</link><link name='tip'>" + sphere + "</link><joint name='j' type='" + limits.type +
+      "'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/><limit effort='1' "
+      "velocity='0' " +
+      limits.limit +
+      "/></joint><joint name='f' type='fixed'><parent link='arm'/><child link='fore'/>"
+      "<origin xyz='0 0.4 0'/></joint><joint name='k' type='" +
+      limits.k_type +
+      "'><parent link='fore'/><child link='tip'/><origin xyz='0 0.6 0'/><axis xyz='0 0 1'/>"
+      "<limit effort='1' velocity='1' lower='-1' upper='1'/>" +
+      limits.mimic + "</joint></robot>";
+  *description = parse_urdf(urdf, GeometrySource::kCollision, {});
+  const auto model = build_robot_model(*description, {});
+  const Kinematics kinematics(*description);
+  *doubts = sampling_doubts(kinematics);
+  const SampledPair found = sample_pairs(model, kinematics, {{0, 2}}, {2000, 1}).at(0);
+  EXPECT_TRUE(in_contact_at_rest(model, kinematics, {{0, 2}}).size() == 1U);
+  return {found.contacts, found.measured};
+}
+
+// Limits without a range, as exporters write them: a joint that turns is drawn over a turn, one
+// that slides cannot be drawn.
+TEST(SelfCollisionPairs, JointsThatStateNoLimits) {
+  std::string doubts;
+  RobotDescription robot;
+  const double share = 2.0 * std::asin(0.1) / 3.14159265;  // of a turn in which the spheres touch
+  for (const std::string limit : {"lower='0' upper='0'", "", "lower='1' upper='-1'",
+                                  "lower='0.3' upper='0.3'", "lower='-1e9' upper='1e9'"}) {
+    const auto found = sampled_contacts({"revolute", limit, ""}, &doubts, &robot);
+    EXPECT_NEAR(static_cast<double>(found[0]), 2000 * share, 60.0) << limit;
+    EXPECT_EQ(found[1], 2000U);
+    EXPECT_EQ(doubts, "joints without limits are drawn from -pi to pi: 'j'");
+    EXPECT_EQ(doubtful_limits(robot),
+              "joints that state no limits, a lower one below an upper one, and are taken to have "
+              "none: 'j'");
+    const auto slide = sampled_contacts({"prismatic", limit, ""}, &doubts, &robot);
+    EXPECT_EQ(slide[1], 0U) << "nothing is known of it";
+    EXPECT_NE(doubts.find("cannot be sampled"), std::string::npos);
+  }
+  EXPECT_EQ(sampled_contacts({"continuous", "", ""}, &doubts, &robot)[1], 2000U);
+  EXPECT_EQ(doubts, "");
+  EXPECT_EQ(sampled_contacts({"revolute", "lower='-1' upper='1'", ""}, &doubts, &robot)[1], 2000U);
+  EXPECT_EQ(doubts, "");
+  EXPECT_EQ(doubtful_limits(robot), "");
+  // Joints that follow one whose positions have no range: a slide, and a gear of several turns.
+  const auto follow = [&](const std::string& limit, const std::string& type, double multiplier) {
+    const std::string mimic = "<mimic joint='j' multiplier='" + std::to_string(multiplier) + "'/>";
+    return sampled_contacts({"revolute", limit, mimic, type}, &doubts, &robot)[1];
+  };
+  EXPECT_EQ(follow("lower='-1' upper='1'", "prismatic", 0.1), 2000U);
+  EXPECT_EQ(follow("", "prismatic", 0.1), 0U);
+  EXPECT_EQ(follow("", "continuous", 0.5), 0U);
+  EXPECT_EQ(follow("", "continuous", -2.0), 2000U);
 }
 
 }  // namespace

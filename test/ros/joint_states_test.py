@@ -257,6 +257,31 @@ class JointStatesTest(unittest.TestCase):
         message = node.wait_for(lambda m: pt.link(m, "ball_link").state == LinkProximity.NEAR, "near")
         self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.4, 5)
 
+    def test_limits_without_a_range(self):
+        """Exporters write 0 to 0; the joints move all the same, and that is told once."""
+        arm = ARM.replace('lower="0" upper="1"', 'lower="0" upper="0"').replace(
+            '<joint name="turn" type="continuous">',
+            '<joint name="turn" type="revolute"><limit effort="1" velocity="0"/>',
+        )
+        node = self.start(arm, max_range=9.0, self_filter=False)
+        self.still = {"turn": 1.2, "slide": 4.4}
+        X = arm_poses(**self.still)
+        seen = pt.apply(X["ball_link"], np.array([[0.5, 0.0, 0.0]]))
+        self.world.points = pt.apply(pt.inverse(X["camera"]), seen)
+        self.world.repeat(50, lambda: self.send("turn", "slide"))
+        self.world.start_clouds()
+        message = node.wait_for_status(ProximityArray.OK)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.4, 5)
+        self.assertEqual(pt.link(message, "box_link").state, LinkProximity.CLEAR)
+        count = len(node.messages)
+        node.wait_until(lambda: len(node.messages) > count + 50, "50 more answers")
+        self.assertTrue(all(m.status == ProximityArray.OK for m in node.messages[count:]))
+        told = "taken to have none: 'slide', 'turn'"
+        self.assertEqual(node.log().count(told), 1)
+        node.wait_until(
+            lambda: told in node.diagnostic("model", "warning"), "the joints in the diagnostics"
+        )
+
     def test_moving(self):
         """Poses belong to the stamp; clouds of a camera on a link, late, with the robot in view;
         the robot on a base that tf moves and that is behind the joint states."""

@@ -15,6 +15,7 @@ from ist_proximity.msg import JointRepulsion, LinkPair
 from ist_proximity.srv import ListLinkPairs
 
 SRDF = '<robot name="arm"><disable_collisions link1="box_link" link2="ball_link"/></robot>'
+SRDF_DEFAULT = '<robot name="arm"><disable_default_collisions link="box_link"/></robot>'
 
 
 class SelfProximityNode(pt.ProximityNode):
@@ -173,16 +174,18 @@ class SelfProximityTest(unittest.TestCase):
         for case, parameters in {
             "by_list": {"self_collision/ignore": [["ball_link", "box_link"]]},
             "by_srdf": {},
+            "by_default": {},
         }.items():
-            if case == "by_srdf":
-                rospy.set_param("/self_by_srdf/robot_description_semantic", SRDF)
+            if case != "by_list":
+                srdf = SRDF if case == "by_srdf" else SRDF_DEFAULT
+                rospy.set_param("/self_%s/robot_description_semantic" % case, srdf)
             with self.subTest(case):
                 node = self.start(case, **parameters)
                 message = node.wait_for_status(ProximityArray.OK)
                 self.assertEqual(pt.states(message), [LinkProximity.CLEAR] * 2)
                 reason = LinkPair.IGNORED if case == "by_list" else LinkPair.SRDF
                 self.assertEqual([pair.reason for pair in self.link_pairs().pairs], [reason])
-                if case == "by_list":
+                if case != "by_default":
                     self.tearDown()
 
 

@@ -146,9 +146,9 @@ struct SampledPair {
   bool never() const { return measured > 0 && contacts == 0; }          ///< never in contact
 };
 
-/// Measures pairs at random configurations. Joints without limits turn once about their axis, or
-/// slide by a metre; planar and floating joints rest, and pairs with such a joint between them are
-/// not measured. Deterministic.
+/// Measures pairs at random configurations. Joints without limits turn once about their axis.
+/// Planar and floating joints, and slides without limits, cannot be drawn: pairs with such a joint
+/// between them are not measured. Deterministic.
 /// @param cancelled  asked between configurations; true ends the sampling. May be empty
 /// @returns one per pair
 std::vector<SampledPair> sample_pairs(const std::shared_ptr<const RobotModel>& model,

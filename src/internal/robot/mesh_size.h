@@ -14,4 +14,9 @@ namespace ist {
 std::vector<std::string> doubtful_sizes(const RobotDescription& robot,
                                         const std::vector<std::string>& links = {});
 
+/// Names the joints that turn or slide and state no range of positions; those that follow another
+/// joint need none.
+/// @returns a sentence; empty: there are none
+std::string doubtful_limits(const RobotDescription& robot);
+
 }  // namespace ist

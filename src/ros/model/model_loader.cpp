@@ -247,6 +247,8 @@ void ModelLoader::load(const std::string& urdf) {
   state.root_link = description.root_link;
   state.links = monitored_links(description, config_.model.links);
   state.warnings = doubtful_sizes(description, model_config(description, state.objects).links);
+  const std::string no_limits = doubtful_limits(description);
+  if (!no_limits.empty()) state.warnings.push_back(no_limits);
   for (const std::string& doubt : state.warnings) ROS_WARN_STREAM(doubt);
   try {
     state.kinematics = std::make_shared<const Kinematics>(description);

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "internal/proximity/pair_samples_cache.h"
+#include "ist_proximity/proximity/collision_rules.h"
 #include "ros/common/exceptions.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
@@ -133,6 +134,8 @@ void LinkPairService::sample(Findings* findings) {
   }
   if (!warning.empty()) ROS_WARN_STREAM(warning);
   ROS_INFO_STREAM(text_of(findings->sampled, sampling.configurations));
+  const std::string doubts = sampling_doubts(*model.kinematics);
+  if (!doubts.empty()) ROS_WARN_STREAM("self-collision: " << doubts);
   const std::string apart = left_out_though_apart(*findings);
   if (apart.empty()) return;
   ROS_WARN_STREAM(

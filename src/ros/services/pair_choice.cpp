@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "ist_proximity/geometry/error.h"
+#include "ist_proximity/proximity/collision_rules.h"
 #include "ros/common/text.h"
 
 namespace ist {
@@ -17,13 +18,15 @@ bool holds(const std::vector<LinkPair>& pairs, const LinkPair& pair) {
       });
 }
 
-NamePairs srdf_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
-                     std::vector<std::string>* warnings) {
+CollisionRules srdf_rules(const ros::NodeHandle& nh, const ServerConfig& config,
+                          const Kinematics& kinematics, std::vector<std::string>* warnings) {
   const std::string name = config.robot_description + "_semantic";
   std::string key, srdf;
   if (!nh.searchParam(name, key) || !nh.getParam(key, srdf)) return {};
   try {
-    return disabled_collisions(srdf);
+    CollisionRules rules = read_srdf(srdf, &kinematics);
+    for (const std::string& doubt : rules.doubts) warnings->push_back("'" + key + "': " + doubt);
+    return rules;
   } catch (const ModelError& error) {
     warnings->push_back("'" + key + "' is not used: " + error.what());
   }
@@ -76,18 +79,16 @@ PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
   PairChoice choice;
   const RobotModel& robot = *model.robot;
   choice.warnings = unknown_names(config, *model.kinematics);
-  const NamePairs srdf = srdf_pairs(nh, config, &choice.warnings);
+  const CollisionRules rules = srdf_rules(nh, config, *model.kinematics, &choice.warnings);
+  CollisionRules only_enabled;  // which may be of adjacent links
+  only_enabled.enabled = rules.enabled;
   const std::vector<bool> wanted = wanted_links(model);
-  const auto pairs_without = [&](const NamePairs& ignored) {
-    return self_collision_pairs(robot, *model.kinematics, wanted, ignored);
+  const auto pairs_by = [&](const NamePairs& ignored, const CollisionRules& by) {
+    return self_collision_pairs(robot, *model.kinematics, wanted, ignored, by);
   };
-  const std::vector<LinkPair> candidates = pairs_without({});
-  const std::vector<LinkPair> not_ignored = pairs_without(config.self_collision.ignore);
-  const std::vector<LinkPair> not_srdf = pairs_without(srdf);
-  std::vector<LinkPair> left;
-  for (const LinkPair& pair : not_ignored) {
-    if (holds(not_srdf, pair)) left.push_back(pair);
-  }
+  const std::vector<LinkPair> candidates = pairs_by({}, only_enabled);
+  const std::vector<LinkPair> not_ignored = pairs_by(config.self_collision.ignore, only_enabled);
+  const std::vector<LinkPair> left = pairs_by(config.self_collision.ignore, rules);
   std::vector<LinkPair> at_rest;
   if (config.self_collision.ignore_contact_at_rest) {
     at_rest = in_contact_at_rest(model.robot, *model.kinematics, left, cancelled);
@@ -96,8 +97,10 @@ PairChoice choose_pairs(const ros::NodeHandle& nh, const ServerConfig& config,
     if (!wanted[pair.first] || !wanted[pair.second]) return PairReason::kUnusable;
     if (!holds(candidates, pair)) return PairReason::kAdjacent;
     if (!holds(not_ignored, pair)) return PairReason::kIgnored;
-    if (!holds(not_srdf, pair)) return PairReason::kSrdf;
-    return holds(at_rest, pair) ? PairReason::kAtRest : PairReason::kWatched;
+    if (!holds(left, pair)) return PairReason::kSrdf;
+    const bool is_stated =
+        rules.enables(robot.links[pair.first].name, robot.links[pair.second].name);
+    return holds(at_rest, pair) && !is_stated ? PairReason::kAtRest : PairReason::kWatched;
   };
   std::vector<std::size_t> links = model.monitored;
   std::sort(links.begin(), links.end());

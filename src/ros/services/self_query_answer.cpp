@@ -43,7 +43,7 @@ void SelfQueryAnswer::set_model(const std::shared_ptr<const ModelState>& model) 
 void SelfQueryAnswer::choose(const std::vector<bool>& chosen) {
   if (!query_) {
     query_ = std::make_unique<SelfQuery>(
-        model_->robot, choose_pairs(nh_, config_, *model_).watched(), config_.query);
+        model_->robot, choose_pairs(nh_, config_, *model_, {}).watched(), config_.query);
   }
   std::vector<bool> is_chosen(model_->robot->links.size(), false);
   for (std::size_t i = 0; i < chosen.size(); ++i) is_chosen[model_->monitored[i]] = chosen[i];
