@@ -176,7 +176,8 @@ class UnmeasuredTest(unittest.TestCase):
         node = watched.node
         node.wait_until(lambda: len(watched.of(begin)) >= 3, "%s of %s" % (what, watched.namespace))
         for message in watched.of(begin):
-            pt.check_invariants(self, message)
+            if watched.setting != "unknown":  # there a CLEAR link's bound ends at unknown space
+                pt.check_invariants(self, message)
             source = message.sources[0]
             self.assertEqual(source.measured_share > 0.1, is_free, message)
             if is_free:

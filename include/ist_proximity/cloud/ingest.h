@@ -169,9 +169,8 @@ class Ingest {
   /// where the robot is are kept, and X_FS is corrected by what the points on the robot say of it
   /// (CloudSnapshot::view).
   /// @param cloud  checked by check_layout; points in the sensor frame S
-  /// @param X_FP   frame of the cloud's points -> fixed frame, rigid; but for RawCloud::origin,
-  /// this
-  ///               is the sensor's frame S
+  /// @param X_FP   frame of the cloud's points -> fixed frame, rigid: that of S, whose origin is at
+  ///               RawCloud::origin in the points' frame
   /// @param robot  the robot's links at the cloud's stamp, see posed_solids(); for a measurement
   ///               that takes its time (a scan), at several instants: a point that is the robot's
   ///               at any of them is dropped. Empty: no self-filter
