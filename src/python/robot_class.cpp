@@ -37,6 +37,9 @@ warning: called with each sentence for the user.
 A configuration q has one position [rad, m] for each of `joints`, nan where it is not known. All
 points and poses are in the root link's frame. Immutable; threads may share it; queries do not hold
 the GIL; it pickles with its shapes and spheres, so that a worker on another machine needs no file.
+Two answers to one question, or those of a robot and of its pickle, may differ within `tolerance`:
+what was asked before decides where a query stops. Each bound is proven; with tolerance=0 the
+distances are the true ones.
 
 Raises ModelError when the robot cannot be read or packed.)";
 

@@ -98,7 +98,9 @@ struct QueryStatistics {
 /// gives the next query its first upper bound (warm start). While the snapshots stay the same,
 /// lower bounds that are proven at one pose hold at the next one, less the displacement bound
 /// (temporal coherence). Neither changes the bounds and states that an answer guarantees, and poses
-/// may jump.
+/// may jump. But what a query remembers decides where it stops: two answers to one question may
+/// differ within the tolerance, each with a proven bound. At tolerance 0 both distances are the
+/// true one.
 ///
 /// Working memory is about 900 kB a link: 330 kB of signed distances about the link, 180 kB of
 /// bounds of BVH nodes and tiles (150 kB more for a mesh with holes), 160 kB of BVTT fronts, 80 and
