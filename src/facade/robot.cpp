@@ -10,6 +10,7 @@
 #include "internal/geometry/limits.h"
 #include "internal/geometry/regular_file.h"
 #include "internal/robot/mesh_size.h"
+#include "internal/robot/package_resolver.h"
 #include "internal/robot/robot_bytes.h"
 #include "ist_proximity/geometry/error.h"
 #include "query_pool.h"
@@ -18,13 +19,41 @@ namespace ist {
 namespace {
 
 /// A text that begins with '<' is a URDF; anything else is the path of one.
-std::string urdf_text(const std::string& urdf) {
+bool is_path(const std::string& urdf) {
   const std::size_t first = urdf.find_first_not_of(" \t\r\n");
-  if (first != std::string::npos && urdf[first] == '<') return urdf;
+  return first == std::string::npos || urdf[first] != '<';
+}
+
+std::string urdf_text(const std::string& urdf) {
+  if (!is_path(urdf)) return urdf;
   std::string text;
   const std::string problem = read_regular_file(urdf, kMaxDescriptionSize, &text);
   if (!problem.empty()) throw ModelError("URDF file '" + printable(urdf) + "' " + problem);
   return text;
+}
+
+/// Refuses links that cannot be used: what is asked about the robot would leave them out.
+void check_links(const RobotParts& parts, bool allow_unknown) {
+  std::string names, first;
+  std::size_t unknown = 0;
+  const std::vector<LinkModel>& links = parts.model->links;
+  for (const LinkModel& link : links) {
+    if (link.usable()) continue;
+    if (unknown == 0) first = link.error;
+    if (++unknown <= 5) names += (names.empty() ? "'" : ", '") + link.name + "'";
+  }
+  if (unknown == 0 && !links.empty()) return;
+  const std::string robot = "robot '" + parts.description.name + "'";
+  if (unknown == links.size()) {
+    throw ModelError(robot +
+                     " has no usable link: " + (links.empty() ? "no link has geometry" : first));
+  }
+  if (allow_unknown) return;
+  throw ModelError(std::to_string(unknown) + " of the " + std::to_string(links.size()) +
+                   " links of " + robot + " cannot be used (" + names +
+                   (unknown > 5 ? ", ..." : "") + "): " + first +
+                   "; correct them, name the others as `links`, or set allow_unknown_links, where "
+                   "they are UNKNOWN");
 }
 
 void check_at_least_0(const char* name, double value) {
@@ -105,7 +134,8 @@ Robot::Robot(const std::string& urdf, const RobotConfig& config) {
   const std::string text = urdf_text(urdf);
   RobotParts parts;
   const PackageFinder finder =
-      config.find_package ? config.find_package : environment_package_finder();
+      config.find_package ? config.find_package
+                          : file_package_finder(is_path(urdf) ? urdf : "", config.package_dirs);
   const auto may_go_on = [&](const std::string&, const std::string&) {
     return !config.callbacks.cancelled || !config.callbacks.cancelled();
   };
@@ -124,11 +154,7 @@ Robot::Robot(const std::string& urdf, const RobotConfig& config) {
   model_config.distance_fields = config.distance_fields;
   parts.model = build_robot_model(parts.description, model_config, config.callbacks);
   if (!parts.model) throw ModelError("building the robot was cancelled");
-  const std::vector<LinkModel>& links = parts.model->links;
-  if (std::none_of(links.begin(), links.end(), [](const LinkModel& one) { return one.usable(); })) {
-    throw ModelError("robot '" + parts.description.name + "' has no usable link: " +
-                     (links.empty() ? "no link has geometry" : links.front().error));
-  }
+  check_links(parts, config.allow_unknown_links);
   impl_ = std::make_shared<Impl>(std::move(parts));
 }
 

@@ -216,8 +216,9 @@ bool ProximityQuery::run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::
     const double points = std::min(answer.lower_bound + answer.sensor_width, proven_points);
     answer.lower_bound = std::min(answer.lower_bound, proven);
     if (answer.sensor_width > 0.0) answer.sensor_width = std::max(points - answer.lower_bound, 0.0);
+    if (!result->all_known) answer.lower_bound = -kInfinity;
     impl_->last_nearest = best;
-  } else if (!complete || !all_in_regions) {
+  } else if (!complete || !all_in_regions || !result->all_known) {
     answer.reset();
   }
   return complete;

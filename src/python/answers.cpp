@@ -88,7 +88,7 @@ void define_answers(py::module_* module) {
       *module, "Nearest",
       "The nearest link. For one configuration each member is a scalar, for n of them an array of "
       "shape (n,); points and vectors have a last dimension of 3. The lower bound is proven for "
-      "every link whose pose is known.");
+      "every link, and -inf where one is not known.");
   define_members(&nearest, [](const Nearest& answer) -> const Distances& { return answer.answer; });
   nearest
       .def_property_readonly(

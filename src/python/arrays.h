@@ -20,6 +20,17 @@ inline std::string to_string(const py::array& array) {
   return py::str(py::tuple(array.attr("shape")));
 }
 
+/// Whether it is a str or an os.PathLike.
+inline bool is_path(const py::object& path) {
+  return py::isinstance<py::str>(path) || py::hasattr(path, "__fspath__");
+}
+
+/// The text of a str or of an os.PathLike; raises TypeError for anything else.
+inline std::string to_path(const py::object& path) {
+  if (!is_path(path)) throw py::type_error("a path is a str or an os.PathLike");
+  return py::str(py::module_::import("os").attr("fspath")(path));
+}
+
 /// Raises ValueError where the array has not `dimensions` dimensions, the last of size `last`.
 inline void check_shape(const py::array& array, py::ssize_t dimensions, py::ssize_t last,
                         const char* what) {

@@ -1,5 +1,6 @@
 #include "obstacles_class.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -61,9 +62,8 @@ PointArray view(const py::array& given) {
 }
 
 PointArray read(const py::object& points) {
-  const bool is_path = py::isinstance<py::str>(points) || py::hasattr(points, "__fspath__");
-  if (is_path) {
-    const std::string path = py::str(points);
+  if (is_path(points)) {
+    const std::string path = to_path(points);
     PointArray result;
     const py::gil_scoped_release unlocked;
     result.file = read_points(path);
@@ -116,18 +116,33 @@ ObstaclesConfig config_of(const py::dict& arguments) {
   return config;
 }
 
+/// A copy that nobody else changes.
+py::object owned(const PointArray& points) {
+  if (points.array) return points.array.attr("copy")();
+  const std::vector<Eigen::Vector3d>& list = points.file.points;
+  const auto width = static_cast<py::ssize_t>(points.file.width),
+             height = static_cast<py::ssize_t>(points.file.height);
+  DoubleArray copy(height == 1 ? Shape{width, 3} : Shape{height, width, 3});
+  if (!list.empty()) std::copy_n(list.data()->data(), copy.size(), copy.mutable_data());
+  return std::move(copy);
+}
+py::object owned(const py::object& array) {
+  return array.is_none() ? array : py::module_::import("numpy").attr("array")(array);
+}
+
 PyObstacles make(const py::object& points, const py::object& sensor_pose, double min_range,
                  double max_range, const py::object& robot, const py::object& q,
                  double self_filter_padding, const py::object& extent) {
   py::dict arguments;
-  arguments["sensor_pose"] = sensor_pose;
+  arguments["sensor_pose"] = owned(sensor_pose);
   arguments["min_range"] = min_range;
   arguments["max_range"] = max_range;
   arguments["robot"] = robot;
-  arguments["q"] = q;
+  arguments["q"] = owned(q);
   arguments["self_filter_padding"] = self_filter_padding;
   arguments["extent"] = extent;
-  return {index(read(points), config_of(arguments)), points, arguments};
+  const PointArray array = read(points);
+  return {index(array, config_of(arguments)), owned(array), arguments};
 }
 
 }  // namespace

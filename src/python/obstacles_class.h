@@ -10,7 +10,7 @@ namespace ist::python {
 /// Obstacles and the arguments that made them, by which they are pickled.
 struct PyObstacles {
   Obstacles obstacles;
-  pybind11::object points;   ///< the array or path
+  pybind11::object points;   ///< an array of its own
   pybind11::dict arguments;  ///< keyword arguments
 };
 
@@ -21,7 +21,7 @@ struct PointArray {
   RawCloud cloud;          ///< views them
 };
 
-/// The points that an Obstacles object was made of. A file is read again.
+/// The points that an Obstacles object was made of.
 PointArray read_again(const PyObstacles& obstacles);
 /// The settings that it was made with. A robot among them lives as long as the object.
 ObstaclesConfig config_of(const PyObstacles& obstacles);

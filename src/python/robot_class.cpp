@@ -24,13 +24,17 @@ namespace {
 constexpr const char* kDoc =
     R"(A robot that tells its distances to obstacles.
 
-urdf: the path of a URDF file, or its text. package://NAME/ is looked for in ROS_PACKAGE_PATH.
+urdf: the path of a URDF file, or its text. package://NAME/ is looked for in package_dirs and
+  ROS_PACKAGE_PATH; relative paths of meshes start from the file's folder.
 geometry: "collision" (falls back to visual) or "visual".
 max_error: [m] largest gap between a link's surface and its inner spheres; it changes the time of a
   query, not its answer.
 max_spheres: most spheres of a link.
 links: names of the links to monitor; none: every link that has geometry.
 cache_directory: where packings are kept; empty: nowhere.
+package_dirs: folders that are packages, or hold them, by the names of their folders.
+allow_unknown_links: whether links that cannot be used are UNKNOWN (unknown_links says why); else
+  they raise ModelError. Answers for the whole robot have a lower bound of -inf then.
 progress: called with the share that is packed, from 0 to 1. An exception in it ends the packing.
 warning: called with each sentence for the user.
 
@@ -59,8 +63,9 @@ using DoneCallback = std::function<void(double)>;
 using TextCallback = std::function<void(const std::string&)>;
 
 /// Reads and packs on a thread of its own. This thread calls Python: progress, and Ctrl-C.
-Robot make(const std::string& urdf, const std::string& geometry, double max_error, int max_spheres,
-           const std::vector<std::string>& links, const std::string& cache_directory,
+Robot make(const py::object& urdf, const std::string& geometry, double max_error, int max_spheres,
+           const std::vector<std::string>& links, const py::object& cache_directory,
+           const std::vector<py::object>& package_dirs, bool allow_unknown_links,
            const DoneCallback& progress, const TextCallback& warning) {
   RobotConfig config;
   if (geometry != "collision" && geometry != "visual") {
@@ -70,7 +75,10 @@ Robot make(const std::string& urdf, const std::string& geometry, double max_erro
   config.packing.max_error = max_error;
   config.packing.max_spheres = max_spheres;
   config.links = links;
-  config.cache_directory = cache_directory;
+  config.cache_directory = to_path(cache_directory);
+  for (const py::object& folder : package_dirs) config.package_dirs.push_back(to_path(folder));
+  config.allow_unknown_links = allow_unknown_links;
+  const std::string path_or_text = to_path(urdf);
 
   std::atomic<double> fraction{0.0};
   std::atomic<bool> cancelled{false};
@@ -78,7 +86,7 @@ Robot make(const std::string& urdf, const std::string& geometry, double max_erro
   config.callbacks.progress = [&](const ModelProgress& now) { fraction = now.fraction; };
   config.callbacks.cancelled = [&] { return cancelled.load(); };
   config.callbacks.warning = [&](const std::string& text) { warnings.push_back(text); };
-  auto result = std::async(std::launch::async, [&] { return Robot(urdf, config); });
+  auto result = std::async(std::launch::async, [&] { return Robot(path_or_text, config); });
   const auto is_done = [&] {
     const py::gil_scoped_release unlocked;
     return result.wait_for(std::chrono::milliseconds(50)) == std::future_status::ready;
@@ -261,6 +269,7 @@ void define_robot(py::module_* module) {
   type.def(py::init(&make), py::arg("urdf"), py::kw_only(), py::arg("geometry") = "collision",
            py::arg("max_error") = defaults.max_error, py::arg("max_spheres") = defaults.max_spheres,
            py::arg("links") = std::vector<std::string>(), py::arg("cache_directory") = "",
+           py::arg("package_dirs") = py::list(), py::arg("allow_unknown_links") = false,
            py::arg("progress") = py::none(), py::arg("warning") = py::none())
       .def_property_readonly("name", &Robot::name, "name of the robot in the URDF")
       .def_property_readonly(
@@ -284,6 +293,16 @@ void define_robot(py::module_* module) {
           "links_without_geometry",
           [](const Robot& robot) { return robot.description().links_without_geometry; },
           "names of the other links of the URDF")
+      .def_property_readonly(
+          "unknown_links",
+          [](const Robot& robot) {
+            py::dict reasons;
+            for (const LinkModel& link : robot.model()->links) {
+              if (!link.usable()) reasons[py::str(link.name)] = link.error;
+            }
+            return reasons;
+          },
+          "why links cannot be used, by their names")
       .def("__repr__",
            [](const Robot& robot) {
              return "<ist_proximity.Robot '" + robot.name() +

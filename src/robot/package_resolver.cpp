@@ -207,6 +207,24 @@ PackageFinder environment_package_finder() {
   return [index](const std::string& package) { return index->find(package); };
 }
 
+PackageFinder file_package_finder(const std::string& urdf_file,
+                                  const std::vector<std::string>& package_dirs) {
+  const PackageFinder others = environment_package_finder();
+  const std::string folder =
+      urdf_file.empty() ? "" : fs::absolute(urdf_file).parent_path().string();
+  return [others, folder, package_dirs](const std::string& package) -> std::string {
+    if (package.empty()) return folder;
+    for (const std::string& dir : package_dirs) {
+      // A path that ends in a slash has no file name.
+      const fs::path parent = fs::absolute(dir + "/").parent_path();
+      std::error_code ignored;
+      if (fs::is_directory(parent / package, ignored)) return (parent / package).string();
+      if (parent.filename() == package) return parent.string();
+    }
+    return others(package);
+  };
+}
+
 std::string resolve_uri(const std::string& uri, const PackageFinder& find_package) {
   if (uri.empty()) throw ModelError("mesh URI is empty; write package://PACKAGE/PATH");
   if (starts_with(uri, "package://")) return resolve_package_uri(uri, find_package);
@@ -217,9 +235,11 @@ std::string resolve_uri(const std::string& uri, const PackageFinder& find_packag
     fail(uri, "has the unknown scheme '" + uri.substr(0, colon) +
                   "'; package://PACKAGE/PATH and file:///PATH are known");
   }
+  const std::string folder = find_package ? find_package("") : "";
+  if (!folder.empty()) return (fs::path(folder) / uri).string();
   fail(uri,
-       "is a relative path, and a URDF on the parameter server has no folder to start from; write "
-       "package://PACKAGE/PATH or file:///PATH");
+       "is a relative path, and a URDF that is a text or on the parameter server has no folder to "
+       "start from; write package://PACKAGE/PATH or file:///PATH");
 }
 
 }  // namespace ist

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "internal/robot/package_resolver.h"
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/proximity/collision_rules.h"
 #include "ist_proximity/proximity/self_query.h"
@@ -42,7 +43,7 @@ int run(const Options& options) {
   const auto source =
       options.visual ? ist::GeometrySource::kVisual : ist::GeometrySource::kCollision;
   const ist::RobotDescription description =
-      ist::parse_urdf(text.str(), source, ist::environment_package_finder());
+      ist::parse_urdf(text.str(), source, ist::file_package_finder(options.urdf));
   ist::RobotModelConfig config;
   config.packing.max_error = 0.02;  // [m] only depths are measured by spheres
   const auto model = ist::build_robot_model(description, config);

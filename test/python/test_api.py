@@ -1,5 +1,6 @@
 """The Python module: shapes, answers, errors, pickling, threads."""
 
+import copy
 import os
 import pathlib
 import pickle
@@ -83,11 +84,94 @@ def test_unknown_positions(robot):
     answer = robot.distances(q, obstacles)
     assert answer.state[0] != ist.UNKNOWN and answer.state[-1] == ist.UNKNOWN
     assert np.isnan(answer.distance[-1]) and answer.lower_bound[-1] == -np.inf
-    assert not robot.nearest(q, obstacles).all_known
+    nearest = robot.nearest(q, obstacles)
+    assert not nearest.all_known and nearest.lower_bound == -np.inf
+    assert nearest.state == ist.NEAR and nearest.distance == np.nanmin(answer.distance)
+    far = robot.nearest(q, ist.Obstacles(np.array([[50.0, 0.0, 0.5]])))
+    assert far.state == ist.UNKNOWN and far.lower_bound == -np.inf
     named = robot.distances({robot.joints[0]: 0.3}, obstacles)
     q = np.zeros(len(robot.joints))
     q[0] = 0.3
     assert (named.distance == robot.distances(q, obstacles).distance).all()
+
+
+BOX_STL = """solid wall
+facet normal 0 0 0
+outer loop
+vertex 0 -1 -1
+vertex 0 1 -1
+vertex 0 1 1
+endloop
+endfacet
+facet normal 0 0 0
+outer loop
+vertex 0 -1 -1
+vertex 0 1 1
+vertex 0 -1 1
+endloop
+endfacet
+endsolid wall
+"""
+
+
+def mesh_urdf(*files):
+    links = ''.join(f'<link name="l{i}"><collision><geometry><mesh filename="{name}"/></geometry></collision></link>'
+                    for i, name in enumerate(files))
+    joints = ''.join(f'<joint name="j{i}" type="fixed"><parent link="l0"/><child link="l{i}"/></joint>'
+                     for i in range(1, len(files)))
+    return f'<robot name="meshes">{links}{joints}</robot>'
+
+
+def test_meshes_are_found_from_the_file(tmp_path):
+    # As robots are published: meshes beside the URDF, above it, and in a package without package.xml.
+    (tmp_path / 'arm_description' / 'meshes').mkdir(parents=True)
+    (tmp_path / 'arm_description' / 'urdf').mkdir()
+    for name in ('meshes/above.stl', 'urdf/beside.stl', 'meshes/package.stl'):
+        (tmp_path / 'arm_description' / name).write_text(BOX_STL)
+    urdf = tmp_path / 'arm_description' / 'urdf' / 'arm.urdf'
+    urdf.write_text(mesh_urdf('beside.stl', '../meshes/above.stl', 'package://arm_description/meshes/package.stl'))
+    obstacles = ist.Obstacles(np.array([[0.3, 0.0, 0.0]]))
+    for folders in ([tmp_path], [str(tmp_path)], [tmp_path / 'arm_description']):
+        robot = ist.Robot(urdf, package_dirs=folders)
+        assert not robot.unknown_links
+        assert np.allclose(robot.distances({}, obstacles, tolerance=0.0).distance, 0.3)
+    with pytest.raises(ist.ModelError, match='arm_description'):
+        ist.Robot(urdf)
+    with pytest.raises(ist.ModelError, match='relative path'):
+        ist.Robot(urdf.read_text(), package_dirs=[tmp_path])
+
+
+def test_links_that_cannot_be_used_raise(tmp_path):
+    (tmp_path / 'here.stl').write_text(BOX_STL)
+    urdf = tmp_path / 'robot.urdf'
+    urdf.write_text(mesh_urdf('here.stl', 'missing.stl'))
+    with pytest.raises(ist.ModelError, match=r"1 of the 2 links .*'l1'.*missing.stl.*allow_unknown_links"):
+        ist.Robot(urdf)
+    robot = ist.Robot(urdf, allow_unknown_links=True)
+    assert list(robot.unknown_links) == ['l1'] and 'missing.stl' in robot.unknown_links['l1']
+    obstacles = ist.Obstacles(np.array([[0.3, 0.0, 0.0]]))
+    for one in (robot, pickle.loads(pickle.dumps(robot))):
+        nearest = one.nearest({}, obstacles)
+        assert nearest.distance == pytest.approx(0.3) and nearest.lower_bound == -np.inf
+        assert one.distances({}, obstacles).lower_bound[1] == -np.inf
+    assert not ist.Robot(urdf, links=['l0']).unknown_links
+
+
+def test_obstacles_own_their_points(robot, tmp_path):
+    points, pose = np.array([[0.9, 0.0, 0.5]]), np.eye(4)
+    q = np.zeros(len(robot.joints))
+    obstacles = ist.Obstacles(points, sensor_pose=pose)
+    before = robot.distances(q, obstacles).distance
+    points[0, 0] = 0.4
+    pose[0, 3] = -0.3
+    for one in (pickle.loads(pickle.dumps(obstacles)), copy.deepcopy(obstacles)):
+        assert (robot.distances(q, one).distance == before).all()
+    file = tmp_path / 'scene.pcd'
+    header = 'VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n'
+    file.write_text(header + '0.9 0 0.5\n')
+    obstacles = ist.Obstacles(file)
+    file.write_text(header + '0.4 0 0.5\n')
+    assert (robot.distances(q, pickle.loads(pickle.dumps(obstacles))).distance == before).all()
 
 
 def test_images_and_double(robot):

@@ -20,9 +20,16 @@ struct RobotConfig {
   PackingConfig packing;                                 ///< settings of every link's packing
   std::string cache_directory;                           ///< empty: no cache
   std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
-  PackageFinder find_package;      ///< empty: environment_package_finder()
-  bool distance_fields = false;    ///< see RobotModelConfig
-  RobotModelCallbacks callbacks;   ///< progress, warnings, cancelling
+  /// Empty: `package_dirs`, then environment_package_finder(). A relative path of a mesh starts
+  /// from the folder of the URDF's file, or from find_package("").
+  PackageFinder find_package;
+  /// Folders in which packages are looked for by the names of their folders.
+  std::vector<std::string> package_dirs;
+  /// Whether a robot with links that cannot be used is made all the same. They are UNKNOWN, and
+  /// nearest() has no lower bound.
+  bool allow_unknown_links = false;
+  bool distance_fields = false;   ///< see RobotModelConfig
+  RobotModelCallbacks callbacks;  ///< progress, warnings, cancelling
 };
 
 /// How many configurations are answered.
@@ -47,8 +54,8 @@ class Robot {
  public:
   /// Reads and packs a robot.
   /// @param urdf  path of a URDF file, or its text
-  /// @throws ModelError when the URDF cannot be read, packing settings are out of range, no link is
-  ///         usable, or building was cancelled. A link that is faulty is UNKNOWN; see model()
+  /// @throws ModelError when the URDF cannot be read, packing settings are out of range, a link is
+  ///         faulty (`allow_unknown_links`: all are), or building was cancelled
   explicit Robot(const std::string& urdf, const RobotConfig& config = {});
 
   const std::string& name() const;                  ///< name of the robot in the URDF
@@ -73,7 +80,8 @@ class Robot {
   std::vector<LinkProximity> distances(Span<const double> q, const Obstacles& obstacles,
                                        const QueryConfig& config = {}) const;
 
-  /// The nearest link only; the others are asked as far as that needs.
+  /// The nearest link only; the others are asked as far as that needs. Where a link is not known
+  /// its lower bound is -inf (RobotProximity).
   /// @throws std::invalid_argument as distances()
   RobotProximity nearest(Span<const double> q, const Obstacles& obstacles,
                          const QueryConfig& config = {}) const;

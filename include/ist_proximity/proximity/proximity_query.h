@@ -61,8 +61,10 @@ struct LinkProximity {
 /// Answer for the whole robot: its nearest link.
 struct RobotProximity {
   std::int32_t link = -1;  ///< the link that `nearest` belongs to; -1 when UNKNOWN or CLEAR
-  LinkProximity nearest;   ///< its answer; `lower_bound` is proven for every link that is known
-  bool all_known = false;  ///< false: links without pose or geometry were left out
+  /// The answer of the nearest link that is known. Its `lower_bound` is proven for every link; it
+  /// is -inf where a link is not known, and then no robot is CLEAR.
+  LinkProximity nearest;
+  bool all_known = false;  ///< false: links have no pose or no geometry
 };
 
 /// Counts of a query's work, for tuning and tests.
@@ -124,7 +126,8 @@ class ProximityQuery {
            std::vector<LinkProximity>* results);
 
   /// The robot's minimum only. The links share one upper bound, so it is several times faster.
-  /// @param result  overwritten; UNKNOWN when no link is known or no cloud is given
+  /// @param result  overwritten; UNKNOWN when no link is known or no cloud is given, and where a
+  ///                link is not known and nothing is in range of the others
   /// @returns as run()
   bool run_minimum(Span<const Eigen::Isometry3d> X_FL, const std::vector<bool>& known,
                    SnapshotSpan clouds, RobotProximity* result);

@@ -41,7 +41,7 @@ void place(const urdf::Link& link, const Eigen::Isometry3d& X_RL, Input* input) 
 Input read_urdf(const std::string& path, GeometrySource source) {
   const std::string text = read_text(path);
   Input input;
-  input.robot = parse_urdf(text, source, environment_package_finder());
+  input.robot = parse_urdf(text, source, file_package_finder(path));
   tinyxml2::XMLDocument document;
   document.Parse(text.c_str());
   const ParsedUrdf parsed = parse_with_urdfdom(document);
