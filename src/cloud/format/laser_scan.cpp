@@ -23,7 +23,7 @@ std::string fault(const char* member, double value, const char* expected) {
 // [m] Before REP 117, drivers wrote range_max + 1 where nothing was there.
 constexpr double kAboveMaximum = 1.0, kRounded = 1.0 + 1e-6;  // the sum as float
 // [m] Along a ray, places that Ingest takes for farther than max_range, and for not believed.
-constexpr double kFar = 2.0 * kLargestRange, kNotBelieved = 4.0 * kLargestRange;
+constexpr double kFar = 2.0 * kLargestRange, kImplausible = 4.0 * kLargestRange;
 
 enum class Beam { kHit, kNothing, kUnknown, kTooNear, kTooFar, kNotBelieved };
 
@@ -85,7 +85,7 @@ RawCloud ScanPoints::raw() const {
   RawCloud cloud = packed_cloud(xyz.data(), xyz.size() / 3, 1);
   cloud.pixel_angle = beam_angle;
   cloud.from_rays = true;
-  cloud.believed_range = 0.5 * (kFar + kNotBelieved);
+  cloud.believed_range = 0.5 * (kFar + kImplausible);
   return cloud;
 }
 
@@ -113,7 +113,7 @@ void to_points(const LaserScan& scan, double min_range, double max_range,
         p.x() = kFar;
         break;
       case Beam::kNotBelieved:
-        p.x() = kNotBelieved;
+        p.x() = kImplausible;
         break;
       case Beam::kHit: {
         const double angle = scan.angle_min + beam * scan.angle_increment;
