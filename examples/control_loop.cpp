@@ -28,11 +28,14 @@ int main(int argc, char** argv) try {
 
   ist::ProximityQuery query(robot.model(), {});
   ist::ForwardKinematics forward(*robot.model(), robot.kinematics());
-  std::vector<double> q(robot.kinematics()->joints().size(), 0.0);  // by joint of the kinematics
+  const auto& joints = robot.kinematics()->joints();
+  std::vector<double> q(joints.size(), std::nan(""));  // by joint; mimic joints follow at NaN
   ist::RobotProximity nearest;
   auto next = std::chrono::steady_clock::now();
   for (int cycle = 0; cycle < 1000; ++cycle) {
-    for (double& position : q) position = 0.3 * std::sin(0.001 * cycle);
+    for (std::size_t i = 0; i < q.size(); ++i) {
+      if (joints[i].is_free()) q[i] = 0.3 * std::sin(0.001 * cycle);
+    }
     const auto& [X_FL, known] = forward.run(q);
     newest.update();  // until the first cloud, nothing is known
     if (newest.front()) query.run_minimum(X_FL, known, {&newest.front()->snapshot()}, &nearest);

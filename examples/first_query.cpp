@@ -1,4 +1,5 @@
 // Usage: first_query robot.urdf
+#include <cmath>
 #include <exception>
 #include <fstream>
 #include <iostream>
@@ -18,7 +19,11 @@ int main(int argc, char** argv) try {
       ist::parse_urdf(urdf, ist::GeometrySource::kCollision, ist::environment_package_finder());
   const auto robot = ist::build_robot_model(description, {});
   const ist::Kinematics kinematics(description);
-  const std::vector<double> q(kinematics.joints().size(), 0.0);  // by joint [rad, m]
+  // By joint [rad, m]. NaN is not known, or, of a mimic joint, that it follows its joint.
+  std::vector<double> q(kinematics.joints().size(), std::nan(""));
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    if (kinematics.joints()[i].is_free()) q[i] = 0.0;
+  }
   const ist::LinkPoses poses = ist::link_poses(*robot, kinematics, q);
 
   // For each cloud: here a single point, in a sensor frame that is the fixed frame.
