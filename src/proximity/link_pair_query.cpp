@@ -101,6 +101,7 @@ bool LinkPairQuery::advance(int* steps, std::vector<LinkPairSearch::Entry>* queu
     decide_contact(steps);
     if (!are_apart_) search_spheres(queue);
     if (are_in_contact_) measure_depth();
+    if (!are_apart_ && are_closed_) bound_by_slabs();
     stage_ = Stage::kDone;
   }
   return true;
@@ -271,6 +272,43 @@ void LinkPairQuery::search_toward(const Eigen::Vector3d& corner_B, bool is_of_a)
     on_b_ = is_of_a ? found.witness : q_B;
     direction_ = is_of_a ? found.normal : Eigen::Vector3d(-(X_BA_.linear() * found.normal));
   }
+}
+
+// Closed links have in common no more than a slab between a plane below which all of B is and one
+// above which all of A is: what is in the slab leaves the one or the other link by its width. Where
+// links touch, the normals of their surfaces lead across thin slabs; where edges cross, what is
+// square to both edges.
+void LinkPairQuery::bound_by_slabs() {
+  const ConvexDistance& closest = surfaces_.closest();
+  const Eigen::Matrix3d R_BA = X_BA_.linear();
+  if (are_in_contact_) bound_by_slab(direction_);
+  if (!(closest.distance < kInf)) return;
+  bound_by_slab(b_.solid.signed_distance(closest.on_q).normal);
+  bound_by_slab(-(R_BA * a_.solid.signed_distance(X_BA_.inverse() * closest.on_p).normal));
+  const ConvexPart a = surfaces_.part_a(), b = surfaces_.part_b();
+  const double wanted = are_in_contact_ ? depth_distance_ : 0.0;
+  const bool are_triangles =
+      a.kind == ConvexPart::Kind::kTriangle && b.kind == ConvexPart::Kind::kTriangle;
+  if (depth_bound_ >= wanted - config_.tolerance || !are_triangles) return;
+  for (const Eigen::Vector3d& along_a : {a.b - a.a, a.c - a.b, a.a - a.c}) {
+    for (const Eigen::Vector3d& along_b : {b.b - b.a, b.c - b.b, b.a - b.c}) {
+      const Eigen::Vector3d across = along_a.cross(along_b).normalized();
+      bound_by_slab(across);
+      bound_by_slab(-across);
+    }
+  }
+}
+
+// @param up_B  unit, from B to A
+void LinkPairQuery::bound_by_slab(const Eigen::Vector3d& up_B) {
+  constexpr double kRounding = 1e-14;                        // of the lengths that are added
+  if (!(std::abs(up_B.squaredNorm() - 1.0) < 1e-9)) return;  // no direction
+  const Eigen::Vector3d down_A = -(X_BA_.linear().transpose() * up_B);
+  const double top_of_b = support(b_.solid, up_B);
+  const double bottom_of_a = up_B.dot(X_BA_.translation()) - support(a_.solid, down_A);
+  const double scale = X_BA_.translation().norm() + extent(a_) + extent(b_);
+  const double width = top_of_b - bottom_of_a + kRounding * scale;
+  depth_bound_ = std::max(depth_bound_, std::min(-width, are_in_contact_ ? depth_distance_ : 0.0));
 }
 
 double LinkPairQuery::lower_bound() const {

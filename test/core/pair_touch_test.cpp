@@ -138,6 +138,39 @@ TEST(PairTouch, AKeptBoundLosesNoMoreThanTheMotionWhenLinksTouch) {
   }
 }
 
+// Bounds of minus 49 to 64 mm were what spheres leave open where solids overlap by nanometres.
+TEST(PairTouch, TheBoundIsTheGapAtTouchAndTheDepthInside) {
+  const Eigen::Vector3d size(0.2, 0.2, 0.2);
+  const Eigen::Isometry3d flat = Eigen::Isometry3d::Identity();
+  const double turn = 0.25 * EIGEN_PI, edge = 0.1 * std::sqrt(2.0);  // [m] an edge's height
+  const Eigen::Isometry3d about_y(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()));
+  const Eigen::Isometry3d about_z(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+  struct Case {
+    const char* name;
+    Shape a, b;
+    Eigen::Isometry3d X_a, X_b;
+    double apart;  // [m] along x, at touch
+  };
+  const Case cases[] = {{"box, box", Box{size}, Box{size}, flat, flat, 0.2},
+                        {"box, cylinder", Box{size}, Cylinder{0.1, 0.2}, flat, flat, 0.2},
+                        {"box, sphere", Box{size}, Sphere{0.1}, flat, flat, 0.2},
+                        {"cylinders", Cylinder{0.1, 0.2}, Cylinder{0.1, 0.2}, flat, flat, 0.2},
+                        {"spheres", Sphere{0.1}, Sphere{0.1}, flat, flat, 0.2},
+                        {"mesh, box", test::box(size), Box{size}, flat, flat, 0.2},
+                        {"meshes", test::box(size), test::box(size), flat, flat, 0.2},
+                        {"edge, edge", test::box(size), Box{size}, about_y, about_z, 2.0 * edge}};
+  for (const Case& one : cases) {
+    Pair pair(one.a, one.b);
+    for (const double gap : {-1e-4, -1e-6, -1e-9, 0.0, 1e-12, 1e-9, 1e-7, 1e-4}) {
+      pair.X_FL = {one.X_a, Eigen::Translation3d(one.apart + gap, 0.0, 0.0) * one.X_b};
+      const PairProximity answer = pair.run_fresh();
+      SCOPED_TRACE(testing::Message() << one.name << ", gap " << gap);
+      EXPECT_LE(answer.lower_bound, std::max(gap, 0.0) + 1e-14);
+      EXPECT_GE(answer.lower_bound, gap - 1e-12);
+    }
+  }
+}
+
 // The tip of a needle is inside a box without a lid, 50 mm from all of its walls: spheres of 20 mm
 // do not show it, and there is no place where surfaces touch.
 TEST(PairTouch, AContactThroughAnOpeningHasADepthAndPointsOnTheLinks) {
