@@ -290,8 +290,10 @@ void LinkPairQuery::bound_by_slabs() {
   const bool are_triangles =
       a.kind == ConvexPart::Kind::kTriangle && b.kind == ConvexPart::Kind::kTriangle;
   if (depth_bound_ >= wanted - config_.tolerance || !are_triangles) return;
-  for (const Eigen::Vector3d& along_a : {a.b - a.a, a.c - a.b, a.a - a.c}) {
-    for (const Eigen::Vector3d& along_b : {b.b - b.a, b.c - b.b, b.a - b.c}) {
+  const Eigen::Vector3d edges_a[] = {a.b - a.a, a.c - a.b, a.a - a.c};
+  const Eigen::Vector3d edges_b[] = {b.b - b.a, b.c - b.b, b.a - b.c};
+  for (const Eigen::Vector3d& along_a : edges_a) {
+    for (const Eigen::Vector3d& along_b : edges_b) {
       const Eigen::Vector3d across = along_a.cross(along_b).normalized();
       bound_by_slab(across);
       bound_by_slab(-across);
