@@ -140,6 +140,7 @@ std::string find_coordinates(const std::vector<Field>& fields, std::array<Field,
       ++found;
     }
     if (found != 1) return "has no field " + names[k] + ", or more than one";
+    if ((*xyz)[k].format.kind != NumberFormat::Kind::kFloat) return kWholeNumbers;
   }
   return "";
 }

@@ -148,6 +148,10 @@ bool read_instance(const Element& element, NumberReader* in, std::vector<double>
 std::string read_vertices(const Element& element, NumberReader* in, PointFile* file) {
   const std::array<int, 3> xyz = coordinates(element);
   if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0) return "has vertices without x, y and z";
+  for (const int k : xyz) {
+    const Property& property = element.properties[static_cast<std::size_t>(k)];
+    if (property.value.kind != NumberFormat::Kind::kFloat) return kWholeNumbers;
+  }
   const std::size_t most = IngestConfig().max_points;
   if (element.count > most) {
     return "has " + std::to_string(element.count) + " vertices; at most " + std::to_string(most) +

@@ -159,6 +159,17 @@ TEST(PointFile, PointsArePlacedByTheViewpoint) {
   }
 }
 
+// A laser's driver counts in millimetres: no wall is at 400 m.
+TEST(PointFile, WholeNumbersHaveNoUnit) {
+  PointFile file;
+  std::string bytes = pcd("ascii");
+  bytes.replace(bytes.find("TYPE U F"), 8, "TYPE U I");
+  test::expect_says(parse(bytes, &file), "whole numbers");
+  bytes = ply("ascii");
+  bytes.replace(bytes.find("property float x"), 16, "property int x");
+  test::expect_says(parse(bytes, &file), "whole numbers");
+}
+
 TEST(PointFile, ASurfaceIsNotItsCorners) {
   for (const std::string name : {"face", "tristrips"}) {
     std::string bytes = ply("ascii");
