@@ -275,42 +275,49 @@ void LinkPairQuery::search_toward(const Eigen::Vector3d& corner_B, bool is_of_a)
 }
 
 // Closed links have in common no more than a slab between a plane below which all of B is and one
-// above which all of A is: what is in the slab leaves the one or the other link by its width. Where
-// links touch, the normals of their surfaces lead across thin slabs; where edges cross, what is
-// square to both edges.
+// above which all of A is: what is in the slab leaves the one or the other link by its width. The
+// thinnest slab is looked for where links graze one another, as spheres say little there: from the
+// normals of the surfaces and the way between the links on, by turns that are halved.
 void LinkPairQuery::bound_by_slabs() {
+  constexpr double kGrazing = 1e-3;                      // [m] spheres bound what is deeper
+  constexpr double kFirstTurn = 0.5, kLastTurn = 1e-10;  // [rad] 0.1 nm for a link of 1 m
   const ConvexDistance& closest = surfaces_.closest();
-  const Eigen::Matrix3d R_BA = X_BA_.linear();
-  if (are_in_contact_) bound_by_slab(direction_);
-  if (!(closest.distance < kInf)) return;
-  bound_by_slab(b_.solid.signed_distance(closest.on_q).normal);
-  bound_by_slab(-(R_BA * a_.solid.signed_distance(X_BA_.inverse() * closest.on_p).normal));
-  const ConvexPart a = surfaces_.part_a(), b = surfaces_.part_b();
   const double wanted = are_in_contact_ ? depth_distance_ : 0.0;
-  const bool are_triangles =
-      a.kind == ConvexPart::Kind::kTriangle && b.kind == ConvexPart::Kind::kTriangle;
-  if (depth_bound_ >= wanted - config_.tolerance || !are_triangles) return;
-  const Eigen::Vector3d edges_a[] = {a.b - a.a, a.c - a.b, a.a - a.c};
-  const Eigen::Vector3d edges_b[] = {b.b - b.a, b.c - b.b, b.a - b.c};
-  for (const Eigen::Vector3d& along_a : edges_a) {
-    for (const Eigen::Vector3d& along_b : edges_b) {
-      const Eigen::Vector3d across = along_a.cross(along_b).normalized();
-      bound_by_slab(across);
-      bound_by_slab(-across);
+  if (!(closest.distance < kInf) || wanted < -kGrazing) return;
+  Eigen::Vector3d up_B = X_BA_ * a_.tree.center() - b_.tree.center();
+  double width = slab_width(up_B.normalized());
+  const auto take = [&](const Eigen::Vector3d& direction_B) {
+    const double found = slab_width(direction_B);
+    if (!(found < width)) return false;
+    width = found;
+    up_B = direction_B;
+    return true;
+  };
+  up_B.normalize();
+  if (are_in_contact_) take(direction_);
+  take(b_.solid.signed_distance(closest.on_q).normal);
+  take(-(X_BA_.linear() * a_.solid.signed_distance(X_BA_.inverse() * closest.on_p).normal));
+  for (double turn = kFirstTurn; turn > kLastTurn && -width < wanted - config_.tolerance;) {
+    const Eigen::Vector3d x_B = up_B.unitOrthogonal(), y_B = up_B.cross(x_B), from_B = up_B;
+    bool is_thinner = false;
+    for (const double sign : {-turn, turn}) {
+      is_thinner = take((from_B + sign * x_B).normalized()) || is_thinner;
+      is_thinner = take((from_B + sign * y_B).normalized()) || is_thinner;
     }
+    if (!is_thinner) turn *= 0.5;
   }
+  depth_bound_ = std::max(depth_bound_, std::min(-width, wanted));
 }
 
-// @param up_B  unit, from B to A
-void LinkPairQuery::bound_by_slab(const Eigen::Vector3d& up_B) {
-  constexpr double kRounding = 1e-14;                        // of the lengths that are added
-  if (!(std::abs(up_B.squaredNorm() - 1.0) < 1e-9)) return;  // no direction
+// [m] Of the slab across a direction from B to A, at least; +inf where it is no unit vector.
+double LinkPairQuery::slab_width(const Eigen::Vector3d& up_B) const {
+  constexpr double kRounding = 1e-14;  // of the lengths that are added
+  if (!(std::abs(up_B.squaredNorm() - 1.0) < 1e-9)) return kInf;
   const Eigen::Vector3d down_A = -(X_BA_.linear().transpose() * up_B);
   const double top_of_b = support(b_.solid, up_B);
   const double bottom_of_a = up_B.dot(X_BA_.translation()) - support(a_.solid, down_A);
   const double scale = X_BA_.translation().norm() + extent(a_) + extent(b_);
-  const double width = top_of_b - bottom_of_a + kRounding * scale;
-  depth_bound_ = std::max(depth_bound_, std::min(-width, are_in_contact_ ? depth_distance_ : 0.0));
+  return top_of_b - bottom_of_a + kRounding * scale;
 }
 
 double LinkPairQuery::lower_bound() const {

@@ -56,7 +56,7 @@ class LinkPairQuery {
   void search_along_parts();
   void search_toward(const Eigen::Vector3d& corner_B, bool is_of_a);
   void bound_by_slabs();
-  void bound_by_slab(const Eigen::Vector3d& up_B);
+  double slab_width(const Eigen::Vector3d& up_B) const;
   double pose_uncertainty(double distance) const;
   double depth_limit() const;
 
