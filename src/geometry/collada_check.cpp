@@ -5,6 +5,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace ist {
 namespace {
@@ -39,6 +43,42 @@ std::uint64_t children(const XMLElement& element, const char* name) {
   return count;
 }
 
+constexpr const char* kSpace = " \t\r\n";
+
+// The numbers of a list.
+std::uint64_t words(const XMLElement& list) {
+  std::uint64_t count = 0;
+  for (const tinyxml2::XMLNode* node = list.FirstChild(); node != nullptr;
+       node = node->NextSibling()) {
+    const char* at = node->ToText() != nullptr ? node->Value() : "";
+    while (*(at += std::strspn(at, kSpace)) != '\0') {
+      at += std::strcspn(at, kSpace);
+      ++count;
+    }
+  }
+  return count;
+}
+
+bool is_primitives(const XMLElement& element) {
+  for (const char* name :
+       {"triangles", "lines", "polylist", "polygons", "tristrips", "trifans", "linestrips"}) {
+    if (is(element, name)) return true;
+  }
+  return false;
+}
+
+// Whether primitives announce nothing and hold no indices, as exporters write a material without
+// faces.
+bool is_empty(const XMLElement& primitives) {
+  std::uint64_t indices = 0;
+  for (const XMLElement* child = primitives.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    if (is(*child, "p")) indices += words(*child);
+  }
+  const char* count = primitives.Attribute("count");
+  return indices == 0 && count != nullptr && std::strcmp(count, "0") == 0;
+}
+
 /// Visits every element; ends at the first one that assimp would not survive.
 class Check : public tinyxml2::XMLVisitor {
  public:
@@ -46,17 +86,43 @@ class Check : public tinyxml2::XMLVisitor {
     if (is(element, "source")) floats_ = 0;
     if (is(element, "float_array")) floats_ = number(element, "count", 0);
     if (is(element, "accessor")) check_accessor(element);
-    if (is(element, "triangles") || is(element, "lines") || is(element, "polylist") ||
-        is(element, "polygons")) {
-      check_primitives(element);
+    if (is(element, "skew")) {  // an assertion of assimp ends the program
+      fault_ = "has a <skew> (line " + std::to_string(element.GetLineNum()) +
+               "), which is not read; write it as a <matrix>, or apply it to the vertices";
     }
+    note_reference(element);
+    if (is_primitives(element)) check_primitives(element);
     if (is(element, "p") || is(element, "v") || is(element, "vcount")) check_indices(element);
     return fault_.empty();
   }
 
-  const std::string& fault() const { return fault_; }
+  /// Primitives without any: assimp does not survive all of them.
+  const std::vector<const XMLElement*>& empty() const { return empty_; }
+
+  /// To be asked after the visit.
+  std::string fault() const {
+    if (!fault_.empty()) return fault_;
+    for (const auto& [url, where] : urls_) {
+      if (ids_.count(url) > 0) continue;
+      return "names '" + url.substr(0, 60) + "' in <" + where +
+             "), which it does not hold: a part would be missing. Export or download it again";
+    }
+    return "";
+  }
 
  private:
+  // Assimp leaves out what is named and not there.
+  void note_reference(const XMLElement& element) {
+    if (const char* id = element.Attribute("id")) ids_.insert(std::string("#") + id);
+    if (!is(element, "instance_geometry") && !is(element, "instance_node") &&
+        !is(element, "instance_controller")) {
+      return;
+    }
+    const char* url = element.Attribute("url");
+    urls_.emplace_back(url != nullptr ? url : "", std::string(local_name(element)) + "> (line " +
+                                                      std::to_string(element.GetLineNum()));
+  }
+
   void fail(const XMLElement& element, const std::string& what) {
     fault_ = "holds " + what + " in <" + local_name(element) + "> (line " +
              std::to_string(element.GetLineNum()) +
@@ -83,11 +149,25 @@ class Check : public tinyxml2::XMLVisitor {
 
   // Assimp ends the program where there are fewer lists of indices than announced.
   void check_primitives(const XMLElement& element) {
+    if (is_empty(element)) return empty_.push_back(&element);
+    if (is(element, "linestrips")) return;
+    if (is(element, "tristrips") || is(element, "trifans")) return check_strips(element);
     const std::uint64_t count = number(element, "count", 0), lists = children(element, "p");
     const std::uint64_t wanted =
         is(element, "polygons") ? count : std::min<std::uint64_t>(count, 1);
     if (lists == wanted) return;
     fail(element, std::to_string(lists) + " <p> for a count of " + std::to_string(count));
+  }
+
+  // The same where a strip has no triangle.
+  void check_strips(const XMLElement& element) {
+    std::uint64_t most = 0;
+    for (const XMLElement* child = element.FirstChildElement(); child != nullptr;
+         child = child->NextSiblingElement()) {
+      if (is(*child, "input")) most = std::max(most, number(*child, "offset", 0));
+      if (!is(*child, "p") || words(*child) / (most + 1) >= 3) continue;
+      return fail(element, "a list of less than three corners");
+    }
   }
 
   // Assimp does not advance at other characters, and adds indices until memory ends.
@@ -106,13 +186,16 @@ class Check : public tinyxml2::XMLVisitor {
     }
   }
 
+  std::vector<const XMLElement*> empty_;
+  std::set<std::string> ids_;                              ///< "#ID" of each element
+  std::vector<std::pair<std::string, std::string>> urls_;  ///< what is named, and where
   std::uint64_t floats_ = 0;  ///< numbers of the source that is being visited
   std::string fault_;
 };
 
 }  // namespace
 
-std::string collada_fault(const std::string& bytes) {
+std::string collada_fault(const std::string& bytes, std::string* readable) {
   tinyxml2::XMLDocument document;
   const tinyxml2::XMLError error = document.Parse(bytes.data(), bytes.size());
   if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) return {};  // load_mesh() says that
@@ -124,7 +207,14 @@ std::string collada_fault(const std::string& bytes) {
   }
   Check check;
   document.Accept(&check);
-  return check.fault();
+  if (readable == nullptr || !check.fault().empty() || check.empty().empty()) return check.fault();
+  for (const XMLElement* element : check.empty()) {
+    document.DeleteNode(const_cast<XMLElement*>(element));
+  }
+  tinyxml2::XMLPrinter printer(nullptr, true);
+  document.Print(&printer);
+  *readable = printer.CStr();
+  return "";
 }
 
 }  // namespace ist

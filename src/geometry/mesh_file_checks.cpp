@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <sstream>
+#include <utility>
 
 namespace ist {
 namespace {
@@ -87,15 +88,26 @@ std::string format_fault(const std::string& format) {
   return "cannot be read as a mesh: its name ends in '." + format + "'; known are " + known;
 }
 
-std::string stl_end_fault(const std::string& bytes) {
-  constexpr std::size_t kBinaryHead = 84, kBinaryFacet = 50, kTail = 4096;
-  if (bytes.compare(0, 5, "solid") != 0) return "";
-  if (bytes.size() >= kBinaryHead) {  // binary files may begin with "solid", too
+std::string normalize_stl(std::string* bytes) {
+  constexpr std::size_t kHead = 84, kFacet = 50, kTail = 4096;
+  // Binary files may begin with "solid", too. The last byte of the number of facets is 0 in them,
+  // as no file is large enough for 16 million; a text has no zeros.
+  if (bytes->size() >= kHead && (*bytes)[kHead - 1] == '\0') {
     std::uint32_t facets = 0;
-    std::memcpy(&facets, &bytes[kBinaryHead - sizeof facets], sizeof facets);
-    if (bytes.size() == kBinaryHead + kBinaryFacet * std::size_t{facets}) return "";
+    std::memcpy(&facets, &(*bytes)[kHead - sizeof facets], sizeof facets);
+    const std::size_t size = kHead + kFacet * std::size_t{facets};
+    if (bytes->size() < size || bytes->size() >= size + kFacet) {
+      return "announces " + std::to_string(facets) + " facets, which take " + std::to_string(size) +
+             " bytes, and has " + std::to_string(bytes->size()) +
+             (bytes->size() < size ? ": it is cut off" : ": it is damaged, or of several parts") +
+             "; export or download it again";
+    }
+    bytes->resize(size);  // assimp takes a file with a few bytes more for no STL file
+    return "";
   }
-  if (ends_solid(bytes.substr(bytes.size() - std::min(kTail, bytes.size())))) return "";
+  if (lower_case(bytes->substr(0, 5)) != "solid") return "";
+  *bytes = lower_case(std::move(*bytes));  // assimp knows keywords of small letters only
+  if (ends_solid(bytes->substr(bytes->size() - std::min(kTail, bytes->size())))) return "";
   return "is cut off: an STL file that begins with 'solid' ends with 'endsolid'; export or "
          "download it again";
 }

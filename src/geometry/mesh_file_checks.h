@@ -13,9 +13,10 @@ std::string mesh_format(const std::string& path);
 /// are refused.
 std::string format_fault(const std::string& format);
 
-/// A text STL file must end with 'endsolid': assimp accepts half a file, and half a link would be
-/// an unsafe link.
-std::string stl_end_fault(const std::string& bytes);
+/// Makes of an STL file what assimp reads: keywords of small letters, nothing after a binary file's
+/// facets. A text must end with 'endsolid': assimp accepts half a file, and half a link would be an
+/// unsafe link.
+std::string normalize_stl(std::string* bytes);
 
 /// PLY and OFF files begin with the numbers of their elements, for which assimp takes memory before
 /// it reads them. A file cannot hold more elements than bytes.

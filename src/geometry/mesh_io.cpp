@@ -37,9 +37,10 @@ std::string read_mesh_file(const std::string& path, const CancelRequest& cancell
   if (!fault.empty()) fail(path, fault + "; name the mesh file itself");
   if (bytes.empty()) fail(path, "is empty (0 bytes); export or download it again");
   const std::string format = mesh_format(path);
-  for (const std::string& damage : {format_fault(format), declared_size_fault(format, bytes),
-                                    format == "stl" ? stl_end_fault(bytes) : std::string(),
-                                    format == "dae" ? collada_fault(bytes) : std::string()}) {
+  for (const std::string& damage :
+       {format_fault(format), declared_size_fault(format, bytes),
+        format == "stl" ? normalize_stl(&bytes) : std::string(),
+        format == "dae" ? collada_fault(bytes, &bytes) : std::string()}) {
     if (!damage.empty()) fail(path, damage);
   }
   return bytes;

@@ -79,6 +79,24 @@ TEST(ColladaCheck, PrimitivesHaveTheirIndices) {
   EXPECT_NE(collada_fault("<COLLADA><polygons count=\"2\"><p>0 1 2</p></polygons></COLLADA>"), "");
   EXPECT_EQ(collada_fault("<COLLADA><polygons count=\"1\"><p>0 1 2</p></polygons></COLLADA>"), "");
   EXPECT_EQ(collada_fault("<COLLADA><triangles count=\"0\"/></COLLADA>"), "");
+  EXPECT_NE(collada_fault("<COLLADA><triangles count=\"0\"><p>0 1 2</p></triangles></COLLADA>"),
+            "");
+  for (const std::string name : {"tristrips", "trifans"}) {
+    const std::string strip = "<COLLADA><" + name + " count=\"1\"><input offset=\"1\"/><p>";
+    EXPECT_NE(collada_fault(strip + "0 0 1 0 2</p></" + name + "></COLLADA>"), "");
+    EXPECT_EQ(collada_fault(strip + "0 0 1 0 2 0</p></" + name + "></COLLADA>"), "");
+  }
+}
+
+TEST(ColladaCheck, NothingIsLeftOut) {
+  EXPECT_NE(
+      collada_fault("<COLLADA><node><skew>45 1 0 0 0 1 0</skew></node></COLLADA>").find("<skew>"),
+      std::string::npos);
+  for (const std::string name : {"instance_geometry", "instance_node", "instance_controller"}) {
+    const std::string part = "<COLLADA><" + name + " url=\"#a\"/>";
+    EXPECT_NE(collada_fault(part + "</COLLADA>").find("#a"), std::string::npos) << name;
+    EXPECT_EQ(collada_fault(part + "<geometry id=\"a\"/></COLLADA>"), "");
+  }
 }
 
 TEST(ColladaCheck, LoadingSaysTheFileAndTheLine) {
