@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "internal/cloud/unmeasured.h"
+#include "internal/facade/sensor_points.h"
 #include "obstacle_ingest.h"
 
 namespace ist {
@@ -81,9 +82,11 @@ Obstacles Obstacles::from_image(const double* xyz, std::size_t width, std::size_
 }
 
 Obstacles Obstacles::from_file(const std::string& path, const ObstaclesConfig& config) {
-  const PointFile file = read_points(path);
-  if (file.height <= 1) return Obstacles(file.points, config);
-  return from_image(file.points.data()->data(), file.width, file.height, config);
+  const PointFile file = read_sensor_points(path);
+  ObstaclesConfig placed = config;
+  placed.X_FS = config.X_FS * file.X_QS;
+  if (file.height <= 1) return Obstacles(file.points, placed);
+  return from_image(file.points.data()->data(), file.width, file.height, placed);
 }
 
 }  // namespace ist

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -26,10 +27,11 @@ struct Field {
 };
 
 struct Header {
+  std::set<std::string> keys;  // of the lines that were read
   std::vector<std::string> names, sizes, types, counts;
   std::size_t width = 0, height = 0, points = 0;
   bool has_points = false;
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();  // VIEWPOINT: the sensor's pose
+  Eigen::Isometry3d X_QS = Eigen::Isometry3d::Identity();  // VIEWPOINT: the sensor's pose
   std::string encoding;
 
   std::vector<Field> fields;
@@ -41,7 +43,7 @@ constexpr std::size_t kMaxFields = 1000;
 constexpr std::size_t kMaxColumns = 100000;
 
 /// VIEWPOINT tx ty tz qw qx qy qz.
-std::string read_viewpoint(const std::vector<std::string>& values, Eigen::Isometry3d* X_FS) {
+std::string read_viewpoint(const std::vector<std::string>& values, Eigen::Isometry3d* X_QS) {
   std::array<double, 7> v{};
   bool is_known = values.size() == v.size();
   for (std::size_t i = 0; is_known && i < v.size(); ++i) {
@@ -53,7 +55,7 @@ std::string read_viewpoint(const std::vector<std::string>& values, Eigen::Isomet
   // Writers round the quaternion to six digits or so.
   is_known = is_known && std::abs(q.norm() - 1.0) < 1e-3 && (p.array().abs() <= kMaxLength).all();
   if (!is_known) return "has a VIEWPOINT that is no position within 10 km and unit quaternion";
-  *X_FS = Eigen::Translation3d(p) * q.normalized();
+  *X_QS = Eigen::Translation3d(p) * q.normalized();
   return "";
 }
 
@@ -65,11 +67,12 @@ std::string read_line(const std::vector<std::string>& words, Header* header) {
     if (values.size() == 1 && parse_count(values[0], most, value)) return "";
     return "has a " + key + " that is no number up to " + std::to_string(most);
   };
+  if (!header->keys.insert(key).second) return "has two lines " + printable(key);
   if (key == "FIELDS" || key == "COLUMNS") header->names = values;
   if (key == "SIZE") header->sizes = values;
   if (key == "TYPE") header->types = values;
   if (key == "COUNT") header->counts = values;
-  if (key == "VIEWPOINT") return read_viewpoint(values, &header->X_FS);
+  if (key == "VIEWPOINT") return read_viewpoint(values, &header->X_QS);
   if (key == "WIDTH") return read_count(&header->width);
   if (key == "HEIGHT") return read_count(&header->height);
   if (key == "POINTS") {
@@ -77,6 +80,9 @@ std::string read_line(const std::vector<std::string>& words, Header* header) {
     return read_count(&header->points);
   }
   if (key == "DATA") header->encoding = values.empty() ? "?" : values[0];
+  static const std::set<std::string> kOthers = {"VERSION", "FIELDS", "COLUMNS", "SIZE",
+                                                "TYPE",    "COUNT",  "DATA"};
+  if (kOthers.count(key) == 0) return "has a line '" + printable(key) + "' that is not understood";
   return "";
 }
 
@@ -140,7 +146,7 @@ std::string find_coordinates(const std::vector<Field>& fields, std::array<Field,
       ++found;
     }
     if (found != 1) return "has no field " + names[k] + ", or more than one";
-    if ((*xyz)[k].format.kind != NumberFormat::Kind::kFloat) return kWholeNumbers;
+    if ((*xyz)[k].format.kind != NumberFormat::Kind::kFloat) return kIntegerCoordinates;
   }
   return "";
 }
@@ -184,7 +190,7 @@ std::string read_ascii(const Header& header, const std::array<Field, 3>& xyz, Te
     }
     file->points.emplace_back(row[xyz[0].column], row[xyz[1].column], row[xyz[2].column]);
   }
-  return "";
+  return in->only_space_left() ? "" : kMorePoints;
 }
 
 /// @param position  [bytes] of a field of point i in `data`
@@ -234,6 +240,7 @@ std::string read_body(const Header& header, const std::array<Field, 3>& xyz,
            std::to_string(header.point_size) + " bytes should follow its header, and there are " +
            std::to_string(bytes.size() - in.at()) + " bytes";
   }
+  if ((bytes.size() - in.at()) / header.point_size > count) return kMorePoints;
   const auto position = [&](const Field& field, std::size_t i) {
     return i * header.point_size + field.offset;
   };
@@ -252,10 +259,8 @@ std::string parse_pcd(const std::string& bytes, PointFile* file) {
   if (!problem.empty()) return problem;
   file->width = header.width;
   file->height = header.height;
-  problem = read_body(header, xyz, bytes, in, file);
-  if (header.X_FS.matrix().isIdentity(0.0)) return problem;
-  for (Eigen::Vector3d& p : file->points) p = header.X_FS * p;
-  return problem;
+  file->X_QS = header.X_QS;
+  return read_body(header, xyz, bytes, in, file);
 }
 
 }  // namespace ist

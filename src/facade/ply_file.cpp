@@ -1,5 +1,6 @@
 // The PLY format: http://paulbourke.net/dataformats/ply/
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <map>
@@ -106,6 +107,11 @@ class NumberReader {
     return true;
   }
 
+  /// Whether no number is left. Fewer bytes than three of the shortest coordinates are no point.
+  bool at_end() {
+    return is_ascii_ ? in_.only_space_left() : bytes_.size() - at_ < 3 * sizeof(float);
+  }
+
  private:
   const std::string& bytes_;
   TextScanner in_;
@@ -137,7 +143,7 @@ bool read_instance(const Element& element, NumberReader* in, std::vector<double>
       continue;
     }
     double length = 0.0;
-    if (!in->read(property.length, &length)) return false;
+    if (!in->read(property.length, &length) || length < 0.0) return false;
     for (double k = 0.0; k < length; ++k) {
       if (!in->read(property.value, &value)) return false;
     }
@@ -149,8 +155,8 @@ std::string read_vertices(const Element& element, NumberReader* in, PointFile* f
   const std::array<int, 3> xyz = coordinates(element);
   if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0) return "has vertices without x, y and z";
   for (const int k : xyz) {
-    const Property& property = element.properties[static_cast<std::size_t>(k)];
-    if (property.value.kind != NumberFormat::Kind::kFloat) return kWholeNumbers;
+    const NumberFormat& format = element.properties[static_cast<std::size_t>(k)].value;
+    if (format.kind != NumberFormat::Kind::kFloat) return kIntegerCoordinates;
   }
   const std::size_t most = IngestConfig().max_points;
   if (element.count > most) {
@@ -172,6 +178,41 @@ std::string read_vertices(const Element& element, NumberReader* in, PointFile* f
   return "";
 }
 
+std::string skip(const Element& element, NumberReader* in) {
+  if (element.properties.empty()) return "";
+  std::vector<double> values(element.properties.size());
+  for (std::size_t i = 0; i < element.count; ++i) {
+    if (!read_instance(element, in, &values)) {
+      return "is cut off or damaged in its element '" + printable(element.name) + "'";
+    }
+  }
+  return "";
+}
+
+/// Whether instances of it name vertices: faces and edges, by the names that programs give them.
+bool joins_vertices(const Element& element) {
+  // A scan's grid names the vertex of each pixel.
+  if (element.name == "vertex" || element.name == "range_grid") return false;
+  if (element.name == "face" || element.name == "tristrips") return true;
+  const auto names_vertex = [](const Property& one) { return one.name.rfind("vertex", 0) == 0; };
+  return std::any_of(element.properties.begin(), element.properties.end(), names_vertex);
+}
+
+std::string check_elements(const std::vector<Element>& elements) {
+  std::size_t vertices = 0;
+  for (const Element& element : elements) {
+    vertices += element.name == "vertex" ? 1 : 0;
+    if (element.count > 0 && joins_vertices(element)) {
+      return "has " + std::to_string(element.count) + " of the element '" +
+             printable(element.name) +
+             "': obstacles are points, and those of a surface would be its corners only. Sample " +
+             "the surface, or state it as a mesh of a known world";
+    }
+  }
+  if (vertices == 1) return "";
+  return vertices == 0 ? "has no element 'vertex'" : "has more than one element 'vertex'";
+}
+
 }  // namespace
 
 std::string parse_ply(const std::string& bytes, PointFile* file) {
@@ -183,26 +224,15 @@ std::string parse_ply(const std::string& bytes, PointFile* file) {
       header.encoding != "binary_big_endian") {
     return "has the format '" + printable(header.encoding) + "', which is not read";
   }
-  for (const Element& element : header.elements) {
-    const bool is_surface = element.name == "face" || element.name == "tristrips";
-    if (is_surface && element.count > 0) {
-      return "has " + std::to_string(element.count) + " of the element '" + element.name +
-             "': obstacles are points, and those of a surface would be its corners only. Sample " +
-             "the surface, or state it as a mesh of a known world";
-    }
-  }
+  problem = check_elements(header.elements);
+  if (!problem.empty()) return problem;
   NumberReader numbers(bytes, in, header.encoding);
   for (const Element& element : header.elements) {
-    if (element.name == "vertex") return read_vertices(element, &numbers, file);
-    if (element.properties.empty()) continue;
-    std::vector<double> values(element.properties.size());
-    for (std::size_t i = 0; i < element.count; ++i) {
-      if (!read_instance(element, &numbers, &values)) {
-        return "is cut off or damaged in its element '" + printable(element.name) + "'";
-      }
-    }
+    problem =
+        element.name == "vertex" ? read_vertices(element, &numbers, file) : skip(element, &numbers);
+    if (!problem.empty()) return problem;
   }
-  return "has no element 'vertex'";
+  return numbers.at_end() ? "" : kMorePoints;
 }
 
 }  // namespace ist

@@ -2,6 +2,7 @@
 
 #include <cctype>
 
+#include "internal/facade/sensor_points.h"
 #include "internal/geometry/limits.h"
 #include "internal/geometry/regular_file.h"
 #include "ist_proximity/geometry/error.h"
@@ -18,7 +19,7 @@ bool ends_in(const std::string& path, const std::string& extension) {
 
 }  // namespace
 
-PointFile read_points(const std::string& path) {
+PointFile read_sensor_points(const std::string& path) {
   const bool is_pcd = ends_in(path, ".pcd");
   std::string problem;
   PointFile file;
@@ -30,6 +31,13 @@ PointFile read_points(const std::string& path) {
     if (problem.empty()) problem = is_pcd ? parse_pcd(bytes, &file) : parse_ply(bytes, &file);
   }
   if (!problem.empty()) throw ModelError("point file '" + printable(path) + "' " + problem);
+  return file;
+}
+
+PointFile read_points(const std::string& path) {
+  PointFile file = read_sensor_points(path);
+  if (file.X_QS.matrix().isIdentity(0.0)) return file;
+  for (Eigen::Vector3d& p : file.points) p = file.X_QS * p;
   return file;
 }
 

@@ -9,13 +9,11 @@ namespace ist {
 /// The largest file of points that is read [bytes].
 constexpr std::size_t kMaxPointFileSize = std::size_t{1} << 30U;
 
-/// What is wrong where x, y and z are whole numbers.
-constexpr const char* kWholeNumbers =
-    "has coordinates that are whole numbers, whose unit it does not state; state them in metres, "
-    "as "
-    "floating-point numbers";
+constexpr const char* kMorePoints = "holds more after the points that its header announces";
+constexpr const char* kIntegerCoordinates =
+    "has x, y or z as whole numbers, whose unit it does not say; write them as floats in metres";
 
-/// Parses the bytes of a PCD file (version 0.5 to 0.7).
+/// Parses the bytes of a PCD file (version 0.5 to 0.7); `points` are in S.
 /// @returns an empty string, or what is wrong: a part of a sentence that begins with the file
 std::string parse_pcd(const std::string& bytes, PointFile* file);
 

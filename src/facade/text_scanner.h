@@ -43,6 +43,11 @@ class TextScanner {
     return true;
   }
 
+  bool only_space_left() {
+    skip_space();
+    return at_end();
+  }
+
  private:
   void skip_space() {
     while (at_ < bytes_.size()) {

@@ -6,6 +6,7 @@
 
 #include "arrays.h"
 #include "extent_class.h"
+#include "internal/facade/sensor_points.h"
 #include "ist_proximity/facade/robot.h"
 
 namespace ist::python {
@@ -19,8 +20,10 @@ array says that there are no obstacles.
 
 points: (n, 3) [m], a list; or (h, w, 3), an image with nan where nothing was measured, which is
   indexed several times faster; or the path of a PCD or PLY file. float32 stays float32.
-sensor_pose: (4, 4), frame of the points -> root link's frame; None: they are in that frame.
-min_range, max_range: [m] points nearer to or farther from the origin of their frame are dropped.
+sensor_pose: (4, 4), frame of the points -> root link's frame; None: they are in that frame. Of a PCD
+  file with a VIEWPOINT: the frame that this is stated in.
+min_range, max_range: [m] points nearer to or farther from the origin of their frame (of a PCD file:
+  from its VIEWPOINT) are dropped.
 robot, q, self_filter_padding: points at most the padding [m] from the robot at configuration q are
   dropped.
 extent: how large points are, so that lower bounds hold for the surface in place of its samples: an
@@ -66,7 +69,7 @@ PointArray read(const py::object& points) {
     const std::string path = to_path(points);
     PointArray result;
     const py::gil_scoped_release unlocked;
-    result.file = read_points(path);
+    result.file = read_sensor_points(path);
     const double* data = result.file.points.empty() ? nullptr : result.file.points.data()->data();
     result.cloud = packed_cloud(data, result.file.width, result.file.height);
     return result;
@@ -142,6 +145,12 @@ PyObstacles make(const py::object& points, const py::object& sensor_pose, double
   arguments["self_filter_padding"] = self_filter_padding;
   arguments["extent"] = extent;
   const PointArray array = read(points);
+  if (!array.file.X_QS.matrix().isIdentity(0.0)) {  // the file says where its sensor was
+    const Eigen::Matrix4d X_FS = (config_of(arguments).X_FS * array.file.X_QS).matrix();
+    arguments["sensor_pose"] = make_array<double>({4, 4}, [&](std::size_t k) {
+      return X_FS(static_cast<Eigen::Index>(k / 4), static_cast<Eigen::Index>(k % 4));
+    });
+  }
   return {index(array, config_of(arguments)), owned(array), arguments};
 }
 

@@ -148,14 +148,16 @@ std::string with_viewpoint(const std::string& viewpoint) {
 
 // The camera is at (1, 2, 3), turned by 90 degrees about z.
 TEST(PointFile, PointsArePlacedByTheViewpoint) {
-  PointFile file;
-  ASSERT_EQ(parse(with_viewpoint("1 2 3 0.70710678 0 0 0.70710678"), &file), "");
+  const test::TempDir folder;
+  const PointFile file =
+      read_points(folder.write("turned.pcd", with_viewpoint("1 2 3 0.70710678 0 0 0.70710678")));
   ASSERT_EQ(file.points.size(), kPoints.size());
   const Eigen::Vector3d p = kPoints[0].cast<double>();
   EXPECT_LT((file.points[0] - Eigen::Vector3d(1.0 - p.y(), 2.0 + p.x(), 3.0 + p.z())).norm(), 1e-7);
   for (const char* wrong : {"0 0 0 0 0 0 0", "nan 0 0 1 0 0 0", "0 0 0 1", "1e9 0 0 1 0 0 0",
                             "0 0 0 2 0 0 0", "0 0 x 1 0 0 0"}) {
-    test::expect_says(parse(with_viewpoint(wrong), &file), "VIEWPOINT");
+    PointFile none;
+    test::expect_says(parse(with_viewpoint(wrong), &none), "VIEWPOINT");
   }
 }
 
@@ -170,12 +172,60 @@ TEST(PointFile, WholeNumbersHaveNoUnit) {
   test::expect_says(parse(bytes, &file), "whole numbers");
 }
 
+// From the camera, the points are 3.29, 7.43 and 8.77 m away; from the origin of the frame in which
+// the VIEWPOINT is stated, 5 to 15 m.
+TEST(PointFile, RangesCountFromTheViewpoint) {
+  const test::TempDir folder;
+  const std::string path = folder.write("far.pcd", with_viewpoint("0 0 9 1 0 0 0"));
+  ObstaclesConfig config;
+  config.max_range = 5.0;
+  EXPECT_EQ(Obstacles::from_file(path, config).size(), 1U);
+  config.min_range = 3.0;
+  config.max_range = 8.0;
+  EXPECT_EQ(Obstacles::from_file(path, config).size(), 2U);
+}
+
 TEST(PointFile, ASurfaceIsNotItsCorners) {
   for (const std::string name : {"face", "tristrips"}) {
     std::string bytes = ply("ascii");
     bytes.replace(bytes.find("element face 0"), 14, "element " + name + " 1");
     PointFile file;
     test::expect_says(parse(bytes + "3 0 1 2\n", &file), "Sample the surface");
+  }
+  for (const std::string element :
+       {"polygon 1\nproperty list uchar int vertex_index", "edge 1\nproperty int vertex1"}) {
+    std::string bytes = ply("ascii");
+    const std::string face = "face 0\nproperty list uchar int vertex_indices";
+    bytes.replace(bytes.find(face), face.size(), element);
+    PointFile file;
+    test::expect_says(parse(bytes + "1 0\n", &file), "Sample the surface");
+  }
+}
+
+// What a file says beside its points is used or refused by name: points that are dropped are free
+// space, and a length in millimetres is not one in metres.
+TEST(PointFile, WhatIsNotUnderstoodIsRefused) {
+  struct Case {
+    std::string bytes, from, to, what;
+  };
+  const std::string more = "7 0.1 0.1 0.1 1 2 3\n";
+  const std::string point(8 + 3 * 8 + 4 + 2, '\0');
+  for (const auto& [bytes, from, to, what] : std::initializer_list<Case>{
+           {pcd("ascii") + more, "", "", "holds more"},
+           {pcd("binary") + point, "", "", "holds more"},
+           {ply("ascii") + "255 0.1 0.1 0.1\n", "", "", "holds more"},
+           {ply("binary_little_endian") + point, "", "", "holds more"},
+           {pcd("ascii"), "WIDTH 2", "UNITS mm\nWIDTH 2", "'UNITS'"},
+           {pcd("ascii"), "WIDTH 2", "WIDTH 1\nWIDTH 2", "two lines WIDTH"},
+           {pcd("ascii"), "VIEWPOINT", "viewpoint", "'viewpoint'"},
+           {pcd("ascii"), "U F F F", "U I F F", "whole numbers"},
+           {ply("ascii"), "property double y", "property int y", "whole numbers"},
+           {ply("ascii"), "element camera", "element vertex", "more than one element"},
+           {ply("ascii"), "2 640", "-2 640", "damaged in its element 'camera'"}}) {
+    std::string changed = bytes;
+    changed.replace(changed.find(from), from.size(), to);
+    PointFile file;
+    test::expect_says(parse(changed, &file), what);
   }
 }
 

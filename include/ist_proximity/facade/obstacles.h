@@ -54,7 +54,8 @@ class Obstacles {
   static Obstacles from_image(const double* xyz, std::size_t width, std::size_t height,
                               const ObstaclesConfig& config = {});
 
-  /// The points of a PCD or PLY file, by its extension (read_points).
+  /// The points of a PCD or PLY file, by its extension (read_points). X_FS is its frame Q -> fixed
+  /// frame; ranges count from its sensor.
   /// @throws ModelError when the file cannot be read
   static Obstacles from_file(const std::string& path, const ObstaclesConfig& config = {});
 
@@ -71,18 +72,20 @@ class Obstacles {
 
 /// Points of a file.
 struct PointFile {
-  /// [m] NaN where nothing was measured. Those of a PCD file are in the frame that its VIEWPOINT,
-  /// the sensor's pose, is stated in.
+  /// [m] in frame Q, in which a PCD file's VIEWPOINT is stated; NaN where nothing was measured.
   std::vector<Eigen::Vector3d> points;
   std::size_t width = 0;   ///< points in a row
   std::size_t height = 0;  ///< rows; 1: a list
+  /// VIEWPOINT: frame S of the sensor -> Q.
+  Eigen::Isometry3d X_QS = Eigen::Isometry3d::Identity();
 };
 
 /// Reads the points of a PCD file (ascii, binary, binary_compressed) or of a PLY file's element
 /// "vertex" (ascii, binary of either byte order); other fields are ignored. Thread safe.
 /// @throws ModelError naming the file, the place and what is wrong: not a regular file, over 1 GB,
-///         cut off, no x, y and z, a VIEWPOINT that is no pose, more than five million points, or
-///         faces, whose corners alone would leave the surface out
+///         cut off or longer than it says, no x, y and z, whole numbers for them (their unit is not
+///         known), a VIEWPOINT that is no pose, an unknown line, more than five million points, or
+///         faces or edges, whose corners alone would leave the surface out
 PointFile read_points(const std::string& path);
 
 }  // namespace ist
