@@ -35,6 +35,7 @@ void add_answers(const std::vector<LinkProximity>& answers, CycleCost* cost) {
   for (const LinkProximity& answer : answers) {
     if (answer.state == LinkState::kUnknown) {
       ++unknown;
+      smallest = -std::numeric_limits<double>::infinity();
       continue;
     }
     if (answer.state == LinkState::kClear) continue;

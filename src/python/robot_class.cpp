@@ -140,6 +140,17 @@ struct Configurations {
     return {array.data(), static_cast<std::size_t>(array.size())};
   }
 
+  /// A robot without joints has one configuration, which is answered once; every row has it.
+  template <class Answer>
+  void repeat(std::vector<Answer>* answers) const {
+    if (array.ndim() != 2 || array.shape(1) > 0) return;
+    const std::vector<Answer> one = std::move(*answers);
+    answers->clear();
+    for (py::ssize_t k = 0; k < array.shape(0); ++k) {
+      answers->insert(answers->end(), one.begin(), one.end());
+    }
+  }
+
   static constexpr const char* kWhat =
       "q has the shape (joints,) or (n, joints), joints being the number of Robot.joints";
   DoubleArray array;
@@ -173,6 +184,7 @@ Distances distances(const Robot& robot, const py::object& q, const PyObstacles& 
     answers = shape.empty() ? robot.distances(values, points, config.query)
                             : robot.distances_batch(values, points, config);
   }
+  configurations.repeat(&answers);
   shape.push_back(static_cast<py::ssize_t>(robot.links().size()));
   return to_arrays(answers, shape);
 }
@@ -194,6 +206,7 @@ Nearest nearest(const Robot& robot, const py::object& q, const PyObstacles& obst
       answers = robot.nearest_batch(values, points, config);
     }
   }
+  configurations.repeat(&answers);
   return to_arrays(answers, configurations.shape);
 }
 

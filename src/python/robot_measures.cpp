@@ -117,7 +117,7 @@ void define_measures(py::class_<Robot>* type) {
 q: (n, joints), the motion. obstacles: its points come again as a new cloud every per_cloud cycles,
 indexed by another thread. period: [s] of the cycles, between which the thread sleeps; 0: no sleep.
 Returns a dictionary of arrays (n,): query and repulsion [s]; width [m], the largest
-distance - lower_bound; smallest [m], the smallest lower bound; unknown, a number of links.)");
+distance - lower_bound; smallest [m], the smallest lower bound, -inf where a link is unknown; unknown, a number of links.)");
 }
 
 }  // namespace ist::python

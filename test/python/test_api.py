@@ -154,6 +154,10 @@ def test_links_that_cannot_be_used_raise(tmp_path):
         nearest = one.nearest({}, obstacles)
         assert nearest.distance == pytest.approx(0.3) and nearest.lower_bound == -np.inf
         assert one.distances({}, obstacles).lower_bound[1] == -np.inf
+        for n in (0, 1, 3):  # a robot without joints has an answer for each row, too
+            q = np.zeros((n, 0))
+            assert (one.nearest(q, obstacles).lower_bound == np.full(n, -np.inf)).all()
+            assert np.allclose(one.distances(q, obstacles).distance[:, 0], np.full(n, 0.3))
     assert not ist.Robot(urdf, links=['l0']).unknown_links
 
 
@@ -172,6 +176,13 @@ def test_obstacles_own_their_points(robot, tmp_path):
     obstacles = ist.Obstacles(file)
     file.write_text(header + '0.4 0 0.5\n')
     assert (robot.distances(q, pickle.loads(pickle.dumps(obstacles))).distance == before).all()
+    # A camera 8 m away that looks from above: its ranges are 8 m and more, whoever asks again.
+    file.write_text(header.replace('WIDTH', 'VIEWPOINT 0 0 8.5 1 0 0 0\nWIDTH') + '0.9 0 -8\n')
+    for X, x in ((None, 0.9), (np.array([[1.0, 0, 0, -0.4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), 0.5)):
+        far = ist.Obstacles(file, sensor_pose=X, min_range=8.0)
+        for one in (far, pickle.loads(pickle.dumps(far))):
+            expected = robot.distances(q, ist.Obstacles(np.array([[x, 0.0, 0.5]])), tolerance=0.0).distance
+            assert np.allclose(robot.distances(q, one, tolerance=0.0).distance, expected, atol=1e-9)
 
 
 def test_images_and_double(robot):

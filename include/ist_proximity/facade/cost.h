@@ -15,8 +15,9 @@ struct CycleCost {
   std::vector<double> query;      ///< ProximityQuery::run for all links
   std::vector<double> repulsion;  ///< Repulsion for all links
   std::vector<double> width;      ///< [m] largest distance - lower_bound of a link that is NEAR
-  std::vector<double> smallest;   ///< [m] smallest lower bound of a known link; +inf when CLEAR
-  std::vector<int> unknown;       ///< links that are UNKNOWN
+  std::vector<double>
+      smallest;  ///< [m] smallest lower bound; +inf when CLEAR, -inf where one is unknown
+  std::vector<int> unknown;  ///< links that are UNKNOWN
 };
 
 /// How the cycles follow each other, and what each of them asks.
