@@ -25,6 +25,7 @@ namespace {
 
 struct Options {
   std::string input, csv, ply, picture, order = "medial", tree;
+  std::vector<std::string> package_dirs;
   std::vector<double> max_errors = {ist::PackingConfig().max_error};
   bool visual = false, no_cache = false;
   ist::RobotModelConfig model;
@@ -45,6 +46,8 @@ void declare(CLI::App* app, Options* options) {
   ist::PackingConfig& packing = options->model.packing;
   app->add_option("input", options->input, "URDF or mesh: a file or package://NAME/PATH")
       ->required();
+  app->add_option("--package-dirs", options->package_dirs,
+                  "folders that are packages, or hold them, by the names of their folders");
   app->add_option("--max-error", options->max_errors,
                   "[m] largest distance from a link's surface to its spheres; several make a table "
                   "and a panel of the picture each (default 0.005)")
@@ -96,9 +99,10 @@ class ProgressBar {
 
 // Returns 0 when every link was packed.
 int pack(Options options) {
-  const ist::tools::Input input =
-      ist::tools::read_input(options.input, options.visual ? ist::GeometrySource::kVisual
-                                                           : ist::GeometrySource::kCollision);
+  const ist::tools::Input input = ist::tools::read_input(
+      options.input,
+      options.visual ? ist::GeometrySource::kVisual : ist::GeometrySource::kCollision,
+      options.package_dirs);
   options.model.packing.order = kOrders.at(options.order);
   if (!options.tree.empty()) options.model.tree = kTrees.at(options.tree);
   if (options.no_cache) options.model.cache_directory.clear();

@@ -19,12 +19,15 @@ namespace {
 
 struct Options {
   std::string urdf, srdf;
+  std::vector<std::string> package_dirs;
   bool visual = false, never = false;
   ist::PairSampling sampling;
 };
 
 void declare(CLI::App* app, Options* options) {
   app->add_option("urdf", options->urdf, "the robot's URDF: a file")->required();
+  app->add_option("--package-dirs", options->package_dirs,
+                  "folders that are packages, or hold them, by the names of their folders");
   app->add_option("--configurations", options->sampling.configurations,
                   "random configurations (default 2000)")
       ->check(CLI::Range(1, 10000000));
@@ -42,8 +45,8 @@ int run(const Options& options) {
   if (!file) throw ist::ModelError("'" + options.urdf + "' cannot be read");
   const auto source =
       options.visual ? ist::GeometrySource::kVisual : ist::GeometrySource::kCollision;
-  const ist::RobotDescription description =
-      ist::parse_urdf(text.str(), source, ist::file_package_finder(options.urdf));
+  const ist::RobotDescription description = ist::parse_urdf(
+      text.str(), source, ist::file_package_finder(options.urdf, options.package_dirs));
   ist::RobotModelConfig config;
   config.packing.max_error = 0.02;  // [m] only depths are measured by spheres
   const auto model = ist::build_robot_model(description, config);

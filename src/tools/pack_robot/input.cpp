@@ -38,10 +38,11 @@ void place(const urdf::Link& link, const Eigen::Isometry3d& X_RL, Input* input) 
   }
 }
 
-Input read_urdf(const std::string& path, GeometrySource source) {
+Input read_urdf(const std::string& path, GeometrySource source,
+                const std::vector<std::string>& package_dirs) {
   const std::string text = read_text(path);
   Input input;
-  input.robot = parse_urdf(text, source, file_package_finder(path));
+  input.robot = parse_urdf(text, source, file_package_finder(path, package_dirs));
   tinyxml2::XMLDocument document;
   document.Parse(text.c_str());
   const ParsedUrdf parsed = parse_with_urdfdom(document);
@@ -53,18 +54,19 @@ Input read_urdf(const std::string& path, GeometrySource source) {
 
 }  // namespace
 
-Input read_input(const std::string& uri, GeometrySource source) {
+Input read_input(const std::string& uri, GeometrySource source,
+                 const std::vector<std::string>& package_dirs) {
   namespace fs = std::filesystem;
   const bool is_uri = uri.find("://") != std::string::npos;
   const std::string path =
-      is_uri ? resolve_uri(uri, environment_package_finder()) : fs::absolute(uri).string();
+      is_uri ? resolve_uri(uri, file_package_finder("", package_dirs)) : fs::absolute(uri).string();
   if (!fs::is_regular_file(path)) throw ModelError("there is no file '" + path + "'");
   const std::string extension = fs::path(path).extension();
   if (extension == ".xacro") {
     throw ModelError("'" + path + "' is a xacro file; expand it first: xacro '" + path +
                      "' > robot.urdf, then pack robot.urdf");
   }
-  if (extension == ".urdf" || extension == ".xml") return read_urdf(path, source);
+  if (extension == ".urdf" || extension == ".xml") return read_urdf(path, source, package_dirs);
   Input input;
   LinkDescription link;
   link.name = fs::path(path).stem();

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "ist_proximity/robot/robot_description.h"
 
@@ -17,7 +18,9 @@ struct Input {
 
 /// Reads a URDF (a name that ends in .urdf or .xml) or a mesh (any other name).
 /// @param uri  a path, or a URI of file:// or package://
+/// @param package_dirs  as RobotConfig
 /// @throws ModelError naming the file and what is wrong
-Input read_input(const std::string& uri, GeometrySource source);
+Input read_input(const std::string& uri, GeometrySource source,
+                 const std::vector<std::string>& package_dirs);
 
 }  // namespace ist::tools
