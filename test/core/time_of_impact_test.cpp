@@ -280,7 +280,7 @@ TEST(TimeOfImpact, CarriedByABodyThatIsNotKnown) {
     const test::Arm arm = test::random_arm(&rng);
     test::ArmMotion motion = test::random_motion(&rng, arm);
     const std::size_t body = arm.bodies.back();
-    std::size_t joint = body - 1;
+    const std::size_t joint = body - 1;
     if (arm.kinematics->joints()[joint].type == JointType::kFixed) continue;
     WorldObject object;
     object.name = "carried";
@@ -293,8 +293,10 @@ TEST(TimeOfImpact, CarriedByABodyThatIsNotKnown) {
     world.X_FB = {Eigen::Isometry3d::Identity()};
     TimeOfImpact impacts(arm.model, arm.kinematics, QueryConfig());
     impacts.set_surfaces(make_robot_surfaces(arm.model), {});
-    joint = arm.kinematics->joints()[joint].source;
-    motion.joints.from[joint] = motion.joints.to[joint] = std::nan("");
+    const std::size_t source = arm.kinematics->joints()[joint].source;
+    for (const std::size_t unstated : {joint, source}) {
+      motion.joints.from[unstated] = motion.joints.to[unstated] = std::nan("");
+    }
     motion.still.known[body - 1] = false;
     std::vector<ImpactTime> found;
     impacts.run(motion.joints, motion.still, motion.X_FR, std::vector<bool>(arm.size(), true), {},
