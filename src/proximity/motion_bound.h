@@ -20,6 +20,7 @@ namespace ist {
 /// farther than a h + b h^2 / 2, with a the speed at the start and b the growth of that speed.
 class MotionBound {
  public:
+  /// @param motion          of with_mimics()
   /// @param center, radius  [m] the body's bounding sphere, in the body's frame
   /// @param ancestor  a body that this one hangs on: the motion is that in its frame
   MotionBound(const Kinematics& kinematics, const JointMotion& motion, const JointPoses& still,
