@@ -13,6 +13,12 @@ from visualization_msgs.msg import MarkerArray
 
 ON_BALL = [[0.0, 0.0, 0.1]]
 BESIDE = [[0.0, 0.0, 0.3]]
+
+
+def spread(points, count):
+    """So many points next to each other: rays do not end at one place."""
+    return [[x + 1e-4 * i, y, z] for x, y, z in points for i in range(count)]
+
 OK, WARN = 0, 1
 SKIN = "blind skin about the robot"
 
@@ -88,14 +94,14 @@ class DiagnosticsTest(unittest.TestCase):
     def test_doubts_of_the_self_filter(self):
         self.start(ON_BALL + BESIDE)
         self.wait_for_input(OK, "OK")
-        self.world.points = np.array(BESIDE * 10)
+        self.world.points = np.array(spread(BESIDE, 10))
         self.wait_for_input(WARN, "no point of the cloud is on the robot")
-        self.world.points = np.array(ON_BALL * 99 + BESIDE)
+        self.world.points = np.array(spread(ON_BALL, 99) + BESIDE)
         self.wait_for_input(WARN, "99.0 % of the cloud are on the robot")
         self.world.points = np.array(ON_BALL + BESIDE)
         self.wait_for_input(OK, "OK")
         # Nothing in range is no reason for doubt.
-        self.world.points = np.array([[1e9, 0.0, 0.0]])
+        self.world.points = np.array([[50.0, 0.0, 0.0]])
         self.node.wait_for(lambda m: m.sources[0].points_used == 0, "the empty cloud")
         self.wait_for_input(OK, "OK")
 
