@@ -75,7 +75,7 @@ class JointStatesTest(unittest.TestCase):
     def setUp(self):
         self.namespace = "/" + self._testMethodName
         self.publisher = self.joint_publisher(self.namespace)
-        self.world = pt.World(self.namespace)
+        self.world = pt.World(self.namespace, static=False)  # the arm's URDF has the camera
         self.node, self.still = None, None
 
     def tearDown(self):
@@ -363,6 +363,7 @@ class JointStatesTest(unittest.TestCase):
 
     def test_joint_repulsion_from_tf(self):
         """The same from link poses alone; the effort of a joint whose axis is not in tf is NaN."""
+        self.world.state_camera()
         node = self.start(max_distance=2.0, pose_source="tf")
         still = {"turn": 0.3, "slide": 0.5}
         X = arm_poses(**still)
@@ -386,6 +387,7 @@ class JointStatesTest(unittest.TestCase):
 
     def test_floating(self):
         """A floating joint's pose comes from tf, and is reported when it is missing."""
+        self.world.state_camera()
         node = self.start(pt.urdf())
         self.world.points = np.array([[0.0, 0.0, 0.3]])
         self.world.start_clouds()

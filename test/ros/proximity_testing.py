@@ -147,9 +147,12 @@ class World:
         )
         self.cloud_publisher = rospy.Publisher(namespace + "/cloud", PointCloud2, queue_size=10)
         if static:
-            stamp = rospy.Time.now()
-            self._tf_static.publish([transform_message("base", "camera", X_BC, stamp)])
+            self.state_camera(X_BC)
         self._repeaters = []
+
+    def state_camera(self, X_BC=np.eye(4)):
+        stamp = rospy.Time.now()
+        self._tf_static.publish([transform_message("base", "camera", X_BC, stamp)])
 
     def stand(self, ball=transform((0, 0, 0)), box=transform((2, 0, 0))):
         """Both links, standing still."""
