@@ -144,7 +144,7 @@ class WorldTest(unittest.TestCase):
     def test_2_late_frames(self):
         """What a frame moves in the time that its pose is late is taken off the bound, and told."""
         del self.world.poses["carriage"]
-        late, speed, begin = 0.2, 0.5, rospy.Time.now().to_sec() + 1.0
+        late, speed, begin = 0.2, 0.5, rospy.Time.now().to_sec() + 1.5
 
         def y(t):
             return 1.0 - speed * min(max(t - begin, 0.0), 1.4)  # of the slider's centre
@@ -157,12 +157,14 @@ class WorldTest(unittest.TestCase):
         sender = self.world.repeat(50, send)
         first = len(self.node.messages)
         self.node.wait_for(lambda m: m.header.stamp.to_sec() > begin + 2.0, "the slider's way")
+        sender.stop()
+        self.world.poses["carriage"] = ("base", pt.transform((0, 3, 0)))
         told = 0
         for message in self.node.messages[first:]:
             t = message.header.stamp.to_sec()
             one = pt.link(message, "ball_link")
             if t < begin:
-                if t > begin - 0.4:
+                if t > begin - 0.2:  # its way to where it begins is forgotten
                     self.assertEqual(message.status, ProximityArray.OK, message.status_text)
                 continue
             if not begin + late + 0.5 < t < begin + 1.35:
@@ -174,8 +176,6 @@ class WorldTest(unittest.TestCase):
                 self.assertIn("the newest pose of frame 'carriage' is 0.", message.status_text)
                 told += 1
         self.assertGreater(told, 10)
-        sender.stop()
-        self.world.poses["carriage"] = ("base", pt.transform((0, 3, 0)))
         self.is_at_table()
 
     def test_3_topic(self):
