@@ -5,7 +5,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 WIDTH, STRIP, LEFT, RIGHT, TOP = 900, 130, 90, 20, 30
-COLOURS = ("#2c7a4b", "#8e8e8e", "#c0392b", "#e08e0b", "#7d3c98", "#2c3e50")
+COLOURS = ("#2c7a4b", "#8e8e8e", "#c0392b", "#e08e0b", "#7d3c98", "#2c3e50", "#3d7dca")
 # Title, unit, factor, columns; several columns are stacked.
 STRIPS = (
     ("resident memory", "MB", 1, ("rss_mb",)),
