@@ -51,7 +51,7 @@ class NamePairSet {
       pairs_;  // of the names that it is made of
 };
 
-// What keeps a joint from being drawn over all its positions.
+// A joint is drawn over all its positions, over one turn, or not at all.
 enum class Drawing { kComplete, kOneTurn, kImpossible };
 
 // A joint without limits that turns is back where it was after a turn, so a turn is all its

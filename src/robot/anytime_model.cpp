@@ -25,7 +25,7 @@ void check_config(const PackingConfig& config) {
   if (!text.str().empty()) throw ModelError(text.str());
 }
 
-// Of the work on all links: when a group of them is ready.
+// A group of links is ready at each of these shares of the work on all links.
 constexpr double kShares[] = {0.1, 0.3, 0.6, 1.0};
 
 bool has_pending(const RobotModel& robot) {

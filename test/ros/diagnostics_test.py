@@ -13,14 +13,13 @@ from visualization_msgs.msg import MarkerArray
 
 ON_BALL = [[0.0, 0.0, 0.1]]
 BESIDE = [[0.0, 0.0, 0.3]]
+OK, WARN = 0, 1
+SKIN = "blind skin about the robot"
 
 
 def spread(points, count):
     """So many points next to each other: rays do not end at one place."""
     return [[x + 1e-4 * i, y, z] for x, y, z in points for i in range(count)]
-
-OK, WARN = 0, 1
-SKIN = "blind skin about the robot"
 
 
 class DiagnosticsTest(unittest.TestCase):

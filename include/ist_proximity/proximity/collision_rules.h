@@ -11,7 +11,7 @@
 
 namespace ist {
 
-/// What an SRDF says about collisions, with MoveIt's precedence: `<disable_collisions>` goes before
+/// The rules of an SRDF on collisions. As in MoveIt, `<disable_collisions>` goes before
 /// `<enable_collisions>`, and that before `<disable_default_collisions>`.
 struct CollisionRules {
   /// Two names of links, the lesser first.
@@ -31,7 +31,8 @@ struct CollisionRules {
 /// @throws ModelError when the text is no SRDF
 CollisionRules read_srdf(const std::string& srdf_xml, const Kinematics* kinematics);
 
-/// As without rules, less the pairs that they disable, and with adjacent links that they enable.
+/// The pairs are those without rules, less what the rules disable, and with adjacent links that
+/// they enable.
 std::vector<LinkPair> self_collision_pairs(const RobotModel& model, const Kinematics& kinematics,
                                            const std::vector<bool>& wanted,
                                            const NamePairs& ignored, const CollisionRules& rules);

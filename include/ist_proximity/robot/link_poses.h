@@ -24,8 +24,9 @@ struct LinkPoses {
 /// Forward kinematics of a model's links. A link that the URDF lacks, or that is below a joint
 /// whose pose is not known, is not known. Allocates; ForwardKinematics is for loops.
 /// @param kinematics  of the description that the model was built from
-/// @param q           [rad, m] by joint of the kinematics, NaN where not known; read for free
-///                    joints only
+/// @param q           [rad, m] by joint of the kinematics, NaN where not known; a mimic joint at
+/// NaN
+///                    follows its source
 /// @param X_FR        root link -> fixed frame
 LinkPoses link_poses(const RobotModel& model, const Kinematics& kinematics,
                      const std::vector<double>& q,

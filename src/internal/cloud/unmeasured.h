@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// What the points are that were not measured: "2 are NaN, 1 are nearer than min_range".
+/// Says why points were not measured: "2 are NaN, 1 are nearer than min_range".
 std::string unmeasured(const IngestCounts& counts);
 
 }  // namespace ist
