@@ -2,8 +2,7 @@
 // is said.
 //
 // Covers: src/ros/parameters/parameters.cpp src/ros/parameters/parameter_reader.cpp
-// Covers: src/ros/parameters/source_parameters.cpp src/ros/parameters/range.cpp
-// Covers: src/ros/parameters/nearest_name.cpp
+// Covers: src/ros/parameters/source_parameters.cpp src/ros/common/text.cpp
 // Longest input: 400
 
 #include "ros/parameters/parameters.h"
@@ -173,16 +172,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // What the tree lacks, or has wrong, keeps the last value.
   ist::LiveConfig last;
   last.query.margin = 0.05;
-  const ist::LiveReading live = ist::parse_live(tree, last);
+  ist::LiveReading live = ist::parse_live(tree, last);
   check_query(live.config.query);
   check_repulsion(live.config.repulsion, last.query.max_distance);
-  FUZZ_CHECK(live.found.size() == live.tunables.size(), "%zu tunables", live.tunables.size());
-  for (std::size_t i = 0; i < live.tunables.size(); ++i) {
-    const ist::Tunable& tunable = live.tunables[i];
-    FUZZ_CHECK(tunable.kind == ist::Tunable::Kind::kBool || tunable.range.contains(tunable.value),
-               "%s is %g", tunable.name.c_str(), tunable.value);
-    FUZZ_CHECK(tunable.name != "query/margin" || live.found[i] || tunable.value == 0.05,
-               "the margin was lost: %g", tunable.value);
+  const std::vector<ist::Parameter> table = ist::live_parameters(&live.config);
+  FUZZ_CHECK(live.found.size() == table.size(), "%zu rows", table.size());
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const ist::Parameter& one = table[i];
+    FUZZ_CHECK(one.is_bool() || one.range.contains(one.number()), "%s is %g", one.name.c_str(),
+               one.number());
+    FUZZ_CHECK(one.name != "query/margin" || live.found[i] || one.number() == 0.05,
+               "the margin was lost: %g", one.number());
   }
   return 0;
 }

@@ -263,8 +263,8 @@ class ParametersTest(unittest.TestCase):
         read = []
         for path in glob.glob(os.path.join(package, "src", "ros", "parameters", "*.cpp")):
             with open(path) as f:
-                read += re.findall(r'read(?:_choice)?\((?:prefix \+ )?"([a-z_/]+)"', f.read())
-        self.assertGreater(len(read), 30)
+                read += re.findall(r'[{(](?:(?:at|of|name) \+ )?"/?([a-z_/]+)",\s+(?:&|choice|Numb)', f.read())
+        self.assertGreater(len(read), 90)
         for name in read:
             self.assertRegex(text, r"\b%s:" % name.split("/")[-1], name)
 

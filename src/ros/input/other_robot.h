@@ -10,7 +10,7 @@
 
 #include "ist_proximity/proximity/known_world.h"
 #include "ist_proximity/robot/kinematics.h"
-#include "ros/parameters/world_config.h"
+#include "ros/parameters/source_config.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/transform_buffer.h"
 #include "ros/poses/transforms.h"

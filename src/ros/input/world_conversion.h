@@ -8,7 +8,7 @@
 
 #include "internal/geometry/cancelled.h"
 #include "ist_proximity/proximity/known_world.h"
-#include "ros/parameters/world_config.h"
+#include "ros/parameters/source_config.h"
 
 namespace ist {
 

@@ -100,7 +100,7 @@ void ContactLoader::begin(const ModelState& state) {
   for (const std::size_t i : state.monitored) {
     const LinkDescription* link = find_link(model_->description(), robot.links[i].name);
     if (link == nullptr || !robot.links[i].usable()) continue;
-    keys_[i] = contact_geometry_key(link->geometry, link->attached, config_.contacts);
+    keys_[i] = contact_geometry_key(link->geometry, link->attached, ContactConfig());
     const auto known = known_.find(keys_[i]);
     if (known != known_.end()) contacts.links[i] = bodies[keys_[i]] = known->second;
   }
@@ -150,7 +150,7 @@ std::shared_ptr<const ContactGeometry> ContactLoader::build(
     const std::function<bool()>& cancelled) const {
   std::shared_ptr<const ContactGeometry> body;
   try {
-    body = build_contact_geometry(link.geometry, link.attached, model, config_.contacts,
+    body = build_contact_geometry(link.geometry, link.attached, model, ContactConfig(),
                                   config_.model.cache_directory, cancelled);
   } catch (const std::exception& error) {  // ModelError, or no memory
     body = no_body(std::string("its volume cannot be packed: ") + error.what());

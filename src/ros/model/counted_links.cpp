@@ -6,7 +6,6 @@
 #include "ist_proximity/robot/link_poses.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
-#include "ros/parameters/nearest_name.h"
 
 namespace ist {
 namespace {

@@ -3,16 +3,16 @@
 #include <dynamic_reconfigure/ConfigDescription.h>
 #include <ros/console.h>
 #include <ros/master.h>
-#include <ros/serialization.h>
 #include <ros/this_node.h>
 
 #include <algorithm>
 #include <optional>
+#include <sstream>
+#include <utility>
 
 #include "ros/common/publish.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
-#include "ros/parameters/slider.h"
 
 namespace ist {
 namespace {
@@ -20,156 +20,110 @@ namespace {
 using dynamic_reconfigure::Config;
 using dynamic_reconfigure::ConfigDescription;
 using dynamic_reconfigure::Reconfigure;
+using XmlRpc::XmlRpcValue;
 
 constexpr char kOnlyGroup[] = "Default";
-
 constexpr const char* kGroups[] = {"query", "repulsion", "penetration", "speed_scale",
                                    "speed_scale/separation"};
-
-/// Gives the part of a tunable's name after "GROUP/"; empty for a tunable of another group, and of
-/// one below.
-std::string name_within(const std::string& group, const Tunable& tunable) {
-  const std::string prefix = group + "/";
-  const bool is_below = tunable.name.compare(0, prefix.size(), prefix) == 0 &&
-                        tunable.name.find('/', prefix.size()) == std::string::npos;
-  return is_below ? tunable.name.substr(prefix.size()) : std::string();
-}
-
-/// A tree that holds a value at a path with slashes.
-XmlRpc::XmlRpcValue at_path(const std::string& path, const XmlRpc::XmlRpcValue& value) {
-  XmlRpc::XmlRpcValue tree;
-  const std::size_t slash = path.find('/');
-  if (slash == std::string::npos) {
-    tree[path] = value;
-  } else {
-    tree[path.substr(0, slash)] = at_path(path.substr(slash + 1), value);
-  }
-  return tree;
-}
-
-template <class Parameter, class Value>
-void append(const std::string& name, Value value, std::vector<Parameter>* list) {
-  Parameter parameter;
-  parameter.name = name;
-  parameter.value = static_cast<decltype(parameter.value)>(value);
-  list->push_back(parameter);
-}
-
-void append(const std::string& name, Tunable::Kind kind, double value, Config* config) {
-  switch (kind) {
-    case Tunable::Kind::kDouble:
-      return append(name, value, &config->doubles);
-    case Tunable::Kind::kInt:
-      return append(name, value, &config->ints);
-    case Tunable::Kind::kBool:
-      return append(name, value, &config->bools);
-  }
-}
-
-const char* type_name(Tunable::Kind kind) {
-  switch (kind) {
-    case Tunable::Kind::kInt:
-      return "int";
-    case Tunable::Kind::kBool:
-      return "bool";
-    case Tunable::Kind::kDouble:
-      break;
-  }
-  return "double";
-}
-
-/// Describes all parameters of a group by one of their numbers: value, default, minimum, maximum.
-template <class Number>
-Config config_of(const std::string& group, const std::vector<Tunable>& tunables, Number number) {
-  Config config;
-  for (const Tunable& tunable : tunables) {
-    const std::string name = name_within(group, tunable);
-    if (!name.empty()) append(name, tunable.kind, number(tunable), &config);
-  }
-  dynamic_reconfigure::GroupState state;
-  state.name = kOnlyGroup;
-  state.state = true;
-  config.groups.push_back(state);
-  return config;
-}
-
-Config values_of(const std::string& group, const std::vector<Tunable>& tunables) {
-  return config_of(group, tunables, [](const Tunable& tunable) { return tunable.value; });
-}
-
-ConfigDescription describe(const std::string& group, const std::vector<Tunable>& tunables,
-                           double max_distance) {
-  ConfigDescription description;
-  description.min = config_of(group, tunables, [](const Tunable& t) { return t.range.min; });
-  description.max = config_of(
-      group, tunables, [max_distance](const Tunable& t) { return slider_of(t, max_distance).max; });
-  description.dflt = config_of(group, tunables, [](const Tunable& t) { return t.default_value; });
-  dynamic_reconfigure::Group only;
-  only.name = kOnlyGroup;
-  for (const Tunable& tunable : tunables) {
-    dynamic_reconfigure::ParamDescription parameter;
-    parameter.name = name_within(group, tunable);
-    if (parameter.name.empty()) continue;
-    parameter.type = type_name(tunable.kind);
-    parameter.description = slider_of(tunable, max_distance).tooltip;
-    only.parameters.push_back(parameter);
-  }
-  description.groups.push_back(only);
-  return description;
-}
-
 constexpr char kKept[] =
     "the last valid ~query, ~repulsion, ~penetration and ~speed_scale stay in use: ";
 constexpr std::chrono::seconds kRepeatLog(30), kPatience(3);
 
-/// Names the first member of a request that is no parameter of the group.
-/// @returns empty when all are
-template <class Parameters>
-std::string unknown_name(const std::string& group, const std::vector<Tunable>& tunables,
-                         const Parameters& parameters) {
-  for (const auto& parameter : parameters) {
-    const bool known = std::any_of(tunables.begin(), tunables.end(), [&](const Tunable& tunable) {
-      return !parameter.name.empty() && name_within(group, tunable) == parameter.name;
-    });
-    if (!known) return "~" + group + "/" + parameter.name;
+/// The rows of a group, by the rest of their names; those of a group below are not among them.
+std::vector<std::pair<std::string, Parameter>> rows_of(const std::string& group,
+                                                       LiveConfig* config) {
+  std::vector<std::pair<std::string, Parameter>> rows;
+  for (const Parameter& parameter : live_parameters(config)) {
+    const std::size_t slash = parameter.name.rfind('/');
+    if (parameter.name.compare(0, slash, group) != 0) continue;
+    rows.emplace_back(parameter.name.substr(slash + 1), parameter);
   }
-  return "";
+  return rows;
+}
+
+/// One number of each parameter of a group.
+template <class Number>
+Config config_of(const std::string& group, LiveConfig live, Number number) {
+  Config config;
+  for (const auto& [name, parameter] : rows_of(group, &live)) {
+    if (parameter.is_bool()) {
+      config.bools.emplace_back();
+      config.bools.back().name = name;
+      config.bools.back().value = number(parameter) != 0.0;
+    } else {
+      config.doubles.emplace_back();
+      config.doubles.back().name = name;
+      config.doubles.back().value = number(parameter);
+    }
+  }
+  config.groups.emplace_back();
+  config.groups.back().name = kOnlyGroup;
+  config.groups.back().state = true;
+  return config;
+}
+
+Config values_of(const std::string& group, const LiveConfig& live) {
+  return config_of(group, live, [](const Parameter& parameter) { return parameter.number(); });
+}
+
+ConfigDescription describe(const std::string& group, LiveConfig defaults, const LiveConfig& live) {
+  const double max_distance = live.query.max_distance;
+  ConfigDescription all;
+  all.dflt = values_of(group, defaults);
+  all.min = config_of(group, defaults, [](const Parameter& one) { return one.range.min; });
+  all.max = config_of(group, live, [max_distance](const Parameter& one) {
+    const double end = std::min(one.range.max, one.slider > 0.0 ? one.slider : max_distance);
+    return std::max(end, one.number());  // a value that is set must not be cut off
+  });
+  for (std::size_t i = 0; i < all.max.doubles.size(); ++i) {
+    double& end = all.max.doubles[i].value;
+    end = std::max(end, all.dflt.doubles[i].value);
+  }
+  all.groups.emplace_back();
+  all.groups.back().name = kOnlyGroup;
+  for (const auto& [name, parameter] : rows_of(group, &defaults)) {
+    dynamic_reconfigure::ParamDescription one;
+    one.name = name;
+    one.type = parameter.is_bool() ? "bool" : "double";
+    const std::string unit = parameter.range.unit;
+    one.description = "~" + parameter.name + (unit.empty() ? ": " : " [" + unit + "]: ");
+    one.description += parameter.help;
+    all.groups.back().parameters.push_back(one);
+  }
+  return all;
 }
 
 /// Writes to the parameter server; ros::param::set() would wait for a master that does not answer.
-bool write(const std::string& name, const XmlRpc::XmlRpcValue& value) {
-  XmlRpc::XmlRpcValue request, response, payload;
+bool write(const std::string& name, const XmlRpcValue& value) {
+  XmlRpcValue request, response, payload;
   request[0] = ros::this_node::getName();
   request[1] = name;
   request[2] = value;
   return ros::master::execute("setParam", request, response, payload, false);
 }
 
-bool same(const Config& a, const Config& b) {
-  const auto bytes = [](const Config& config) {
-    const ros::SerializedMessage message = ros::serialization::serializeMessage(config);
-    return std::vector<std::uint8_t>(message.buf.get(), message.buf.get() + message.num_bytes);
-  };
-  return bytes(a) == bytes(b);
+std::string text_of(const XmlRpcValue& value) {
+  if (value.getType() == XmlRpcValue::TypeDouble) {
+    return number_text(static_cast<const double&>(value));
+  }
+  std::ostringstream text;
+  text << value;
+  return text.str();
 }
 
 }  // namespace
 
 LiveParameters::LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config)
-    : private_nh_(private_nh),
-      live_{config.query, config.repulsion, config.penetration, config.speed_scale, nullptr} {
+    : private_nh_(private_nh), live_(config) {
+  configured_.assign(live_parameters(&live_).size(), false);
+  lost_ = configured_;
+  LiveConfig defaults;
+  defaults.query.max_distance = config.query.max_distance;
+  defaults.speed_scale = fitted_to(defaults.speed_scale, config.query.max_distance);
+  defaults = parse_live(XmlRpcValue(), defaults).config;  // the influence distance fits, too
   {
     const std::lock_guard<std::mutex> lock(change_mutex_);
-    LiveConfig defaults;
-    defaults.query.max_distance = config.query.max_distance;
-    defaults.speed_scale = fitted_to(defaults.speed_scale, config.query.max_distance);
-    defaults.speed_scale.links = config.speed_scale.links;
-    tunables_ = parse_live(XmlRpc::XmlRpcValue(), defaults).tunables;  // names, ranges, defaults
-    const std::vector<Tunable> in_use = parse_live(XmlRpc::XmlRpcValue(), live_).tunables;
-    for (std::size_t i = 0; i < tunables_.size(); ++i) tunables_[i].value = in_use[i].value;
-    configured_.assign(tunables_.size(), false);
-    lost_ = configured_;
-    for (const char* name : kGroups) advertise(name);
+    for (const char* name : kGroups) advertise(name, defaults);
   }
   read_again();
   thread_ = std::thread(&LiveParameters::run, this);
@@ -185,18 +139,18 @@ void LiveParameters::run() {
   while (stop_signal_.sleep_until(Clock::now() + std::chrono::seconds(1))) read_again();
 }
 
-void LiveParameters::advertise(const std::string& name) {
+void LiveParameters::advertise(const std::string& name, const LiveConfig& defaults) {
   groups_.push_back(std::make_unique<Group>());
   Group* group = groups_.back().get();
   group->name = name;
   ros::NodeHandle nh(private_nh_, name);
   group->descriptions = nh.advertise<ConfigDescription>("parameter_descriptions", 1, true);
-  publish_message(group->descriptions, describe(name, tunables_, live_.query.max_distance));
+  publish_message(group->descriptions, describe(name, defaults, live_));
   group->updates = nh.advertise<Config>("parameter_updates", 1, true);
   group->service = nh.advertiseService<Reconfigure::Request, Reconfigure::Response>(
       "set_parameters",
       [this, group](Reconfigure::Request& request, Reconfigure::Response& response) {
-        return set(group, request, response);
+        return set(group, request.config, &response.config);
       });
 }
 
@@ -228,15 +182,13 @@ void LiveParameters::read_again() {
 /// Takes what is valid on the parameter server. The caller holds change_mutex_.
 /// @returns false when the server does not answer
 bool LiveParameters::read_server() {
-  {
+  const auto note_asked = [this](Clock::time_point when) {
     const std::lock_guard<std::mutex> lock(live_mutex_);
-    asked_ = Clock::now();
-  }
-  const std::optional<XmlRpc::XmlRpcValue> tree = fetch_parameters(private_nh_);
-  {
-    const std::lock_guard<std::mutex> lock(live_mutex_);
-    asked_ = Clock::time_point();
-  }
+    asked_ = when;
+  };
+  note_asked(Clock::now());
+  const std::optional<XmlRpcValue> tree = fetch_parameters(private_nh_);
+  note_asked({});
   if (!tree) {
     set_problem("the parameter server at " + ros::master::getURI() + " does not answer");
     return false;
@@ -246,7 +198,7 @@ bool LiveParameters::read_server() {
     lost_[i] = configured_[i] && !reading.found[i];
     configured_[i] = configured_[i] || reading.found[i];
   }
-  take(reading);
+  take(reading.config);
   note_startup_changes(*tree);
   std::vector<std::string> problems = reading.errors;
   if (const std::string lost = lost_names(); !lost.empty()) problems.push_back(lost);
@@ -254,24 +206,44 @@ bool LiveParameters::read_server() {
   return true;
 }
 
-/// Says which parameters were changed without effect. The caller holds change_mutex_.
-void LiveParameters::note_startup_changes(const XmlRpc::XmlRpcValue& tree) {
-  const std::string changes = startup_.changes(tree, tunables_);
+/// Says which parameters have changed, or come, that are read at the start only. What is gone from
+/// the server is not named: it is still in use. The caller holds change_mutex_.
+void LiveParameters::note_startup_changes(const XmlRpcValue& tree) {
+  std::map<std::string, XmlRpcValue> now = leaves_of(tree);
+  LiveConfig live = get();
+  for (const Parameter& parameter : live_parameters(&live)) now.erase(parameter.name);
+  if (!at_start_) at_start_ = now;
+  std::vector<std::string> changes;
+  for (const auto& [name, value] : now) {
+    const auto before = at_start_->find(name);
+    const std::string text = text_of(value);
+    if (before == at_start_->end()) {
+      changes.push_back("~" + name + " has been set to " + text);
+    } else if (const std::string in_use = text_of(before->second); in_use != text) {
+      changes.push_back("~" + name + " is " + text + ", in use is " + in_use);
+    }
+  }
+  std::string sentence = join(changes, "; ");
+  if (!changes.empty()) {
+    sentence = "read at the start only, so that the node has to be restarted: " + sentence;
+  }
   {
     const std::lock_guard<std::mutex> lock(live_mutex_);
-    if (changes == without_effect_) return;
-    without_effect_ = changes;
+    if (sentence == without_effect_) return;
+    without_effect_ = sentence;
   }
-  if (!changes.empty()) ROS_WARN_STREAM(changes);
+  if (!sentence.empty()) ROS_WARN_STREAM(sentence);
 }
 
 /// Names the parameters that have gone from the server, with the values in use.
 std::string LiveParameters::lost_names() const {
+  LiveConfig live = get();
+  const std::vector<Parameter> table = live_parameters(&live);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < lost_.size(); ++i) {
     if (!lost_[i]) continue;
-    names.push_back("~" + tunables_[i].name + " (" +
-                    with_unit(number_text(tunables_[i].value), tunables_[i].range) + ")");
+    names.push_back("~" + table[i].name + " (" +
+                    with_unit(number_text(table[i].number()), table[i].range) + ")");
   }
   if (names.empty()) return "";
   return "no longer on the parameter server: " + join(names, ", ") +
@@ -295,34 +267,31 @@ void LiveParameters::set_problem(const std::string& problem) {
   logged_problem_ = text;
 }
 
-/// The caller holds change_mutex_.
-void LiveParameters::take(const LiveReading& reading) {
-  for (std::size_t i = 0; i < tunables_.size(); ++i) tunables_[i].value = reading.tunables[i].value;
+void LiveParameters::take(const LiveConfig& config) {
   const std::lock_guard<std::mutex> lock(live_mutex_);
-  live_ = reading.config;
+  live_ = config;
 }
 
-bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
-                         Reconfigure::Response& response) {
+bool LiveParameters::set(Group* group, const Config& wanted, Config* answer) {
   const std::lock_guard<std::mutex> lock(change_mutex_);
-  const Config& wanted = request.config;
-  std::string unknown = unknown_name(group->name, tunables_, wanted.doubles);
-  if (unknown.empty()) unknown = unknown_name(group->name, tunables_, wanted.ints);
-  if (unknown.empty()) unknown = unknown_name(group->name, tunables_, wanted.bools);
-  if (unknown.empty()) unknown = unknown_name(group->name, tunables_, wanted.strs);
-  if (!unknown.empty()) {
-    ROS_WARN_STREAM_THROTTLE(5.0, "a request to " << private_nh_.getNamespace() << "/"
-                                                  << group->name << "/set_parameters is refused: '"
-                                                  << unknown << "' is none of its parameters");
-    return false;
-  }
-  XmlRpc::XmlRpcValue change;
+  std::map<std::string, XmlRpcValue> change;
   for (const auto& one : wanted.doubles) change[one.name] = one.value;
   for (const auto& one : wanted.ints) change[one.name] = one.value;
-  for (const auto& one : wanted.bools) change[one.name] = XmlRpc::XmlRpcValue(one.value != 0);
+  for (const auto& one : wanted.bools) change[one.name] = XmlRpcValue(one.value != 0);
   for (const auto& one : wanted.strs) change[one.name] = one.value;
+  LiveConfig live = get();
+  const auto rows = rows_of(group->name, &live);
+  for (const auto& one : change) {
+    const auto is_this = [&one](const auto& row) { return row.first == one.first; };
+    if (std::any_of(rows.begin(), rows.end(), is_this)) continue;
+    ROS_WARN_STREAM_THROTTLE(5.0, "a request to " << private_nh_.getNamespace() << "/"
+                                                  << group->name << "/set_parameters is refused: '"
+                                                  << "~" << group->name << "/" << one.first
+                                                  << "' is none of its parameters");
+    return false;
+  }
   const bool answered = apply(group->name, change);
-  response.config = group->published;
+  *answer = group->published;
   return answered;
 }
 
@@ -330,36 +299,40 @@ bool LiveParameters::set(Group* group, const Reconfigure::Request& request,
 /// holds change_mutex_.
 /// @param change  values by name in the group; may be empty
 /// @returns false when the parameter server does not answer; then nothing changes
-bool LiveParameters::apply(const std::string& group, const XmlRpc::XmlRpcValue& change) {
+bool LiveParameters::apply(const std::string& group,
+                           const std::map<std::string, XmlRpcValue>& change) {
   if (!read_server()) return false;
-  if (change.valid()) {
-    const LiveReading reading = parse_live(at_path(group, change), get());
-    if (!reading.errors.empty()) {
-      ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
-      publish_updates();
-      return true;  // the response holds the values in use
-    }
-    for (const auto& [name, value] : change) {
-      std::string path = group;
-      path.append("/").append(name);
-      if (!write(private_nh_.resolveName(path), value)) {
-        set_problem("the parameter server does not take ~" + path);
-        return false;
-      }
-    }
-    for (std::size_t i = 0; i < lost_.size(); ++i) {
-      configured_[i] = configured_[i] || reading.found[i];
-    }
-    take(reading);
+  XmlRpcValue tree;
+  for (const auto& [name, value] : change) {
+    XmlRpcValue* place = &tree;
+    std::istringstream path(group + "/" + name);
+    for (std::string part; std::getline(path, part, '/');) place = &(*place)[part];
+    *place = value;
   }
+  const LiveReading reading = parse_live(tree, get());
+  if (!reading.errors.empty()) {
+    ROS_WARN_STREAM_THROTTLE(5.0, kKept << join(reading.errors, "; "));
+    publish_updates();
+    return true;  // the response holds the values in use
+  }
+  for (const auto& [name, value] : change) {
+    const std::string full = group + "/" + name;
+    if (write(private_nh_.resolveName(full), value)) continue;
+    set_problem("the parameter server does not take ~" + full);
+    return false;
+  }
+  for (std::size_t i = 0; i < configured_.size(); ++i) {
+    configured_[i] = configured_[i] || reading.found[i];
+  }
+  take(reading.config);
   publish_updates();
   return true;
 }
 
 void LiveParameters::publish_updates() {
   for (const auto& group : groups_) {
-    const Config now = values_of(group->name, tunables_);
-    if (same(now, group->published)) continue;
+    const Config now = values_of(group->name, get());
+    if (now == group->published) continue;
     group->published = now;
     publish_message(group->updates, now);
   }

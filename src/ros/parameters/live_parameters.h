@@ -3,17 +3,19 @@
 #include <dynamic_reconfigure/Config.h>
 #include <dynamic_reconfigure/Reconfigure.h>
 #include <ros/node_handle.h>
+#include <xmlrpcpp/XmlRpc.h>
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "ros/common/stop_signal.h"
 #include "ros/parameters/parameters.h"
-#include "ros/parameters/startup_parameters.h"
 
 namespace ist {
 
@@ -29,8 +31,9 @@ namespace ist {
 /// one that names anything else than the group's parameters fails.
 ///
 /// This class speaks dynamic_reconfigure's messages without its generated server: a .cfg file would
-/// state defaults and ranges a second time, and that server writes a whole group back at each
-/// change, over a value that somebody else may just have set.
+/// state defaults and ranges a second time, and that server moves a value that is out of range into
+/// it, takes names that it does not know, and writes a whole group back at each change, over a
+/// value that somebody else may just have set.
 ///
 /// Thread safe.
 class LiveParameters {
@@ -59,14 +62,14 @@ class LiveParameters {
     dynamic_reconfigure::Config published;
   };
 
-  void advertise(const std::string& name);
+  void advertise(const std::string& name, const LiveConfig& defaults);
   void run();
   void read_again();
   bool read_server();
-  bool set(Group* group, const dynamic_reconfigure::Reconfigure::Request& request,
-           dynamic_reconfigure::Reconfigure::Response& response);
-  bool apply(const std::string& group, const XmlRpc::XmlRpcValue& change);
-  void take(const LiveReading& reading);
+  bool set(Group* group, const dynamic_reconfigure::Config& wanted,
+           dynamic_reconfigure::Config* answer);
+  bool apply(const std::string& group, const std::map<std::string, XmlRpc::XmlRpcValue>& change);
+  void take(const LiveConfig& config);
   void note_startup_changes(const XmlRpc::XmlRpcValue& tree);
   std::string lost_names() const;
   void set_problem(const std::string& problem);
@@ -75,10 +78,10 @@ class LiveParameters {
   ros::NodeHandle private_nh_;
   std::mutex change_mutex_;  ///< held from reading the parameter server to the end of the change
   std::vector<std::unique_ptr<Group>> groups_;
-  std::vector<Tunable> tunables_;
-  std::vector<bool> configured_;  ///< by tunable: it has been on the parameter server
-  std::vector<bool> lost_;        ///< by tunable: it was there and is not any more
-  StartupParameters startup_;
+  std::vector<bool> configured_;  ///< by row of the table: it has been on the parameter server
+  std::vector<bool> lost_;        ///< by row: it was there and is not any more
+  /// What is read at the start only, as it was then; empty until it is known.
+  std::optional<std::map<std::string, XmlRpc::XmlRpcValue>> at_start_;
   std::string logged_problem_;
   Clock::time_point logged_time_;
 

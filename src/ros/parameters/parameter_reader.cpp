@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "ros/common/text.h"
-#include "ros/parameters/nearest_name.h"
 
 namespace ist {
 namespace {
@@ -13,36 +13,144 @@ namespace {
 using XmlRpc::XmlRpcValue;
 
 std::string value_text(const XmlRpcValue& value) {
-  std::ostringstream out;
   switch (value.getType()) {
     case XmlRpcValue::TypeBoolean:
-      out << (static_cast<const bool&>(value) ? "true" : "false");
-      break;
+      return static_cast<const bool&>(value) ? "true" : "false";
     case XmlRpcValue::TypeInt:
-      out << static_cast<const int&>(value);
-      break;
+      return std::to_string(static_cast<const int&>(value));
     case XmlRpcValue::TypeDouble:
-      out << static_cast<const double&>(value);
-      break;
+      return number_text(static_cast<const double&>(value));
     case XmlRpcValue::TypeString:
-      out << '"' << static_cast<const std::string&>(value) << '"';
-      break;
+      return '"' + static_cast<const std::string&>(value) + '"';
     case XmlRpcValue::TypeArray:
-      out << "a list of " << value.size();
-      break;
+      return "a list of " + std::to_string(value.size());
     case XmlRpcValue::TypeStruct:
-      out << "a dictionary of " << value.size();
-      break;
+      return "a dictionary of " + std::to_string(value.size());
     default:
-      out << "of an unusual type";
+      return "of an unusual type";
   }
-  return out.str();
 }
 
+std::optional<double> number_in(const XmlRpcValue& value) {
+  if (value.getType() == XmlRpcValue::TypeInt) return static_cast<const int&>(value);
+  if (value.getType() == XmlRpcValue::TypeDouble) return static_cast<const double&>(value);
+  return std::nullopt;
+}
+
+std::optional<std::string> text_in(const XmlRpcValue& value) {
+  if (value.getType() != XmlRpcValue::TypeString) return std::nullopt;
+  return static_cast<const std::string&>(value);
+}
+
+/// Takes a value for the place of a parameter. Where it is wrong, the place stays as it is.
+struct Taker {
+  const XmlRpcValue* value;  ///< in a list, the element that is wrong
+  const Range& range;
+  std::string needed;  ///< what it has to be, where it is wrong
+
+  void operator()(double* place) {
+    const std::optional<double> number = number_in(*value);
+    if (!number) {
+      needed = "a number is needed, " + range.text();
+    } else if (!range.contains(*number)) {
+      needed = "allowed is " + range.text();
+    } else {
+      *place = *number;
+    }
+  }
+
+  void operator()(int* place) { take_integer(place); }
+  void operator()(std::size_t* place) { take_integer(place); }
+  template <class Integer>
+  void take_integer(Integer* place) {
+    const std::optional<double> found = number_in(*value);
+    double number = 0.0;
+    (*this)(&number);
+    if (!found || (needed.empty() && number != std::floor(number))) {
+      needed = "a whole number is needed, " + range.text();
+    } else if (needed.empty()) {
+      *place = static_cast<Integer>(number);
+    }
+  }
+
+  void operator()(bool* place) {
+    if (value->getType() != XmlRpcValue::TypeBoolean) {
+      needed = "true or false is needed";
+    } else {
+      *place = static_cast<const bool&>(*value);
+    }
+  }
+
+  void operator()(std::string* place) {
+    const std::optional<std::string> text = text_in(*value);
+    if (!text) needed = "a string is needed";
+    *place = text.value_or(*place);
+  }
+
+  void operator()(const Choice& choice) {
+    const bool is_bool = value->getType() == XmlRpcValue::TypeBoolean;
+    const std::string word = is_bool ? value_text(*value) : text_in(*value).value_or("");
+    const auto found = std::find(choice.words.begin(), choice.words.end(), word);
+    if (found == choice.words.end()) {
+      needed = "allowed is " + join(choice.words, ", ");
+    } else {
+      choice.set(static_cast<std::size_t>(found - choice.words.begin()));
+    }
+  }
+
+  void operator()(Numbers numbers) {
+    std::vector<double> taken;
+    take_list(
+        "a list of " + std::to_string(numbers.count) + " numbers is needed, each " + range.text(),
+        [&](const XmlRpcValue& element) {
+          taken.push_back(number_in(element).value_or(std::nan("")));
+          return range.contains(taken.back());
+        },
+        static_cast<int>(numbers.count));
+    if (needed.empty()) std::copy(taken.begin(), taken.end(), numbers.first);
+  }
+
+  void operator()(std::vector<std::string>* place) {
+    std::vector<std::string> taken;
+    take_list("a list of strings is needed", [&](const XmlRpcValue& element) {
+      taken.push_back(text_in(element).value_or(""));
+      return text_in(element).has_value();
+    });
+    if (needed.empty()) *place = std::move(taken);
+  }
+
+  void operator()(NamePairs* place) {
+    NamePairs taken;
+    take_list("a list of pairs of strings is needed, [[a, b], [c, d]]",
+              [&](const XmlRpcValue& pair) {
+                if (pair.getType() != XmlRpcValue::TypeArray || pair.size() != 2) return false;
+                taken.emplace_back(text_in(pair[0]).value_or(""), text_in(pair[1]).value_or(""));
+                return text_in(pair[0]) && text_in(pair[1]);
+              });
+    if (needed.empty()) *place = std::move(taken);
+  }
+
+  /// @param count  of elements; -1: any
+  template <class Take>
+  void take_list(const std::string& what, Take take, int count = -1) {
+    const XmlRpcValue& list = *value;
+    const bool is_list = list.getType() == XmlRpcValue::TypeArray;
+    if (!is_list || (count >= 0 && list.size() != count)) {
+      needed = what;
+      return;
+    }
+    for (int i = 0; i < list.size() && needed.empty(); ++i) {
+      if (take(list[i])) continue;
+      value = &list[i];
+      needed = what;
+    }
+  }
+};
+
 void collect_leaves(const XmlRpcValue& value, const std::string& path,
-                    std::vector<std::string>* leaves) {
+                    std::map<std::string, XmlRpcValue>* leaves) {
   if (value.getType() != XmlRpcValue::TypeStruct) {
-    if (value.valid()) leaves->push_back(path);
+    if (value.valid() && !path.empty()) leaves->emplace(path, value);
     return;
   }
   for (auto& member : value) {
@@ -51,6 +159,40 @@ void collect_leaves(const XmlRpcValue& value, const std::string& path,
 }
 
 }  // namespace
+
+std::map<std::string, XmlRpcValue> leaves_of(const XmlRpcValue& tree) {
+  std::map<std::string, XmlRpcValue> leaves;
+  collect_leaves(tree, "", &leaves);
+  return leaves;
+}
+
+std::string number_text(double value) { return format_text("%g", value); }
+
+std::string with_unit(const std::string& value, const Range& range) {
+  return *range.unit ? value + " " + range.unit : value;
+}
+
+bool Range::contains(double value) const {
+  if (std::isnan(value)) return false;
+  if (std::isinf(value)) return value > 0 && infinite;
+  if (min_excluded ? value <= min : value < min) return false;
+  return value <= max;
+}
+
+std::string Range::text() const {
+  std::string text = (min_excluded ? "more than " : "from ") + number_text(min);
+  if (std::isinf(max)) {
+    text += infinite ? ", inf included" : min_excluded ? ", finite" : " up, finite";
+  } else {
+    text += " to " + number_text(max);
+    if (infinite) text += ", or inf";
+  }
+  return with_unit(text, *this);
+}
+
+double Parameter::number() const {
+  return is_bool() ? *std::get<bool*>(value) : *std::get<double*>(value);
+}
 
 const XmlRpcValue* ParameterReader::find(const std::string& name) const {
   const XmlRpcValue* value = &tree_;
@@ -63,205 +205,50 @@ const XmlRpcValue* ParameterReader::find(const std::string& name) const {
   return value;
 }
 
-const XmlRpcValue* ParameterReader::find_and_note(const std::string& name) {
-  names_read_.insert(name);
-  return find(name);
-}
-
-bool ParameterReader::has(const std::string& name) const { return find(name) != nullptr; }
-
-bool ParameterReader::is_dictionary(const std::string& name) const {
+XmlRpcValue::Type ParameterReader::type(const std::string& name) const {
   const XmlRpcValue* value = find(name);
-  return value != nullptr && value->getType() == XmlRpcValue::TypeStruct;
+  return value ? value->getType() : XmlRpcValue::TypeInvalid;
 }
 
-bool ParameterReader::is_text(const std::string& name) const {
-  const XmlRpcValue* value = find(name);
-  return value != nullptr && value->getType() == XmlRpcValue::TypeString;
-}
-
-void ParameterReader::reject(const std::string& name, const XmlRpcValue& value,
-                             const std::string& expected) {
-  errors_.push_back("~" + name + " is " + value_text(value) + ": " + expected);
-}
-
-void ParameterReader::read(const std::string& name, const Range& range, double* value) {
-  const double default_value = *value;
-  read_number(name, range, value);
-  tunables_.push_back({name, Tunable::Kind::kDouble, range, default_value, *value});
-}
-
-void ParameterReader::read(const std::string& name, const Range& range, int* value) {
-  const double default_value = *value;
-  read_integer(name, range, value);
-  tunables_.push_back(
-      {name, Tunable::Kind::kInt, range, default_value, static_cast<double>(*value)});
-}
-
-void ParameterReader::read(const std::string& name, const Range& range, std::size_t* value) {
-  int number = static_cast<int>(*value);
-  read(name, range, &number);
-  *value = static_cast<std::size_t>(number);
-}
-
-void ParameterReader::read(const std::string& name, bool* value) {
-  const double default_value = *value ? 1.0 : 0.0;
-  read_bool(name, value);
-  tunables_.push_back(
-      {name, Tunable::Kind::kBool, Range{"", 0.0, 1.0}, default_value, *value ? 1.0 : 0.0});
-}
-
-void ParameterReader::read_number(const std::string& name, const Range& range, double* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  double number_found;
-  if (found->getType() == XmlRpcValue::TypeInt) {
-    number_found = static_cast<const int&>(*found);
-  } else if (found->getType() == XmlRpcValue::TypeDouble) {
-    number_found = static_cast<const double&>(*found);
-  } else {
-    return reject(name, *found, "a number is needed, " + range.text());
-  }
-  if (!range.contains(number_found)) {
-    errors_.push_back("~" + name + " is " + with_unit(number_text(number_found), range) +
-                      ": allowed is " + range.text());
-    return;
-  }
-  *value = number_found;
-}
-
-void ParameterReader::read_integer(const std::string& name, const Range& range, int* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  // A whole number may be written as 20000, 20000.0 or 2e4.
-  double as_double = *value;
-  if (found->getType() == XmlRpcValue::TypeDouble) as_double = static_cast<const double&>(*found);
-  if (found->getType() == XmlRpcValue::TypeInt) as_double = static_cast<const int&>(*found);
-  const bool is_number =
-      found->getType() == XmlRpcValue::TypeInt ||
-      (found->getType() == XmlRpcValue::TypeDouble && as_double == std::floor(as_double));
-  if (!is_number) return reject(name, *found, "a whole number is needed, " + range.text());
-  if (!range.contains(as_double)) return reject(name, *found, "allowed is " + range.text());
-  *value = static_cast<int>(as_double);
-}
-
-void ParameterReader::read_bool(const std::string& name, bool* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  if (found->getType() != XmlRpcValue::TypeBoolean) {
-    return reject(name, *found, "true or false is needed");
-  }
-  *value = static_cast<const bool&>(*found);
-}
-
-void ParameterReader::read(const std::string& name, std::string* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  if (found->getType() != XmlRpcValue::TypeString) {
-    return reject(name, *found, "a string is needed");
-  }
-  *value = static_cast<const std::string&>(*found);
-}
-
-void ParameterReader::read(const std::string& name, std::vector<std::string>* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  if (found->getType() != XmlRpcValue::TypeArray) {
-    return reject(name, *found, "a list of strings is needed");
-  }
-  std::vector<std::string> strings;
-  for (int i = 0; i < found->size(); ++i) {
-    const XmlRpcValue& element = (*found)[i];
-    if (element.getType() != XmlRpcValue::TypeString) {
-      return reject(name, element, "every element of the list must be a string");
-    }
-    strings.push_back(static_cast<const std::string&>(element));
-  }
-  *value = std::move(strings);
-}
-
-void ParameterReader::read(const std::string& name, const Range& range, std::size_t count,
-                           std::vector<double>* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  const std::string needed =
-      "a list of " + std::to_string(count) + " numbers is needed, each " + range.text();
-  if (found->getType() != XmlRpcValue::TypeArray ||
-      static_cast<std::size_t>(found->size()) != count) {
-    return reject(name, *found, needed);
-  }
-  std::vector<double> numbers;
-  for (int i = 0; i < found->size(); ++i) {
-    const XmlRpcValue& element = (*found)[i];
-    double number = std::nan("");
-    if (element.getType() == XmlRpcValue::TypeInt) number = static_cast<const int&>(element);
-    if (element.getType() == XmlRpcValue::TypeDouble) number = static_cast<const double&>(element);
-    if (!range.contains(number)) return reject(name, element, needed);
-    numbers.push_back(number);
-  }
-  *value = std::move(numbers);
-}
-
-void ParameterReader::read(const std::string& name,
-                           std::vector<std::pair<std::string, std::string>>* value) {
-  const XmlRpcValue* found = find_and_note(name);
-  if (!found) return;
-  const std::string needed = "a list of pairs of strings is needed, [[a, b], [c, d]]";
-  if (found->getType() != XmlRpcValue::TypeArray) return reject(name, *found, needed);
-  std::vector<std::pair<std::string, std::string>> pairs;
-  for (int i = 0; i < found->size(); ++i) {
-    const XmlRpcValue& pair = (*found)[i];
-    const bool is_pair = pair.getType() == XmlRpcValue::TypeArray && pair.size() == 2 &&
-                         pair[0].getType() == XmlRpcValue::TypeString &&
-                         pair[1].getType() == XmlRpcValue::TypeString;
-    if (!is_pair) return reject(name, pair, needed);
-    pairs.emplace_back(static_cast<const std::string&>(pair[0]),
-                       static_cast<const std::string&>(pair[1]));
-  }
-  *value = std::move(pairs);
-}
-
-void ParameterReader::read_switch(const std::string& name, std::string* value) {
+/// Whether parameters may be below this name; adds an error, once, where something else is there.
+bool ParameterReader::is_dictionary(const std::string& name) {
   const XmlRpcValue* found = find(name);
-  if (found && found->getType() == XmlRpcValue::TypeBoolean) {
-    names_read_.insert(name);
-    *value = static_cast<const bool&>(*found) ? "true" : "false";
-    return;
+  if (!found || found->getType() == XmlRpcValue::TypeStruct) return true;
+  if (no_dictionaries_.insert(name).second) {
+    add_error(name, "is " + value_text(*found) + ": a dictionary is needed");
   }
-  read_choice(name, {"auto", "true", "false"}, value);
+  return false;
 }
 
-void ParameterReader::read_choice(const std::string& name, const std::vector<std::string>& choices,
-                                  std::string* value,
-                                  const std::map<std::string, std::string>& hints) {
-  std::string chosen = *value;
-  read(name, &chosen);
-  if (std::find(choices.begin(), choices.end(), chosen) != choices.end()) {
-    *value = chosen;
-    return;
+void ParameterReader::read(const Parameter& parameter) {
+  const std::string& name = parameter.name;
+  names_read_.insert(name);
+  for (std::size_t i = name.find('/'); i != std::string::npos; i = name.find('/', i + 1)) {
+    if (!is_dictionary(name.substr(0, i))) return;
   }
-  const auto hint = hints.find(chosen);
-  errors_.push_back("~" + name + " is \"" + chosen + "\": allowed is " + join(choices, ", ") +
-                    (hint == hints.end() ? "" : " (" + hint->second + ")"));
+  Taker taker{find(name), parameter.range, ""};
+  if (!taker.value) return;
+  std::visit(taker, parameter.value);
+  if (taker.needed.empty()) return;
+  const std::string text = value_text(*taker.value);
+  add_error(name, "is " + (number_in(*taker.value) ? with_unit(text, parameter.range) : text) +
+                      ": " + taker.needed);
+}
+
+void ParameterReader::read_all(const std::vector<Parameter>& parameters) {
+  for (const Parameter& parameter : parameters) read(parameter);
 }
 
 std::vector<std::string> ParameterReader::children(const std::string& name) {
   std::vector<std::string> names;
-  const XmlRpcValue* found = find(name);
-  if (!found) return names;
-  if (found->getType() != XmlRpcValue::TypeStruct) {
-    find_and_note(name);
-    reject(name, *found, "a dictionary is needed");
-    return names;
-  }
-  for (auto& member : *found) names.push_back(member.first);
+  if (!has(name) || !is_dictionary(name)) return names;
+  for (auto& member : *find(name)) names.push_back(member.first);
   return names;
 }
 
 std::vector<std::string> ParameterReader::unknown() const {
-  std::vector<std::string> leaves, sentences;
-  collect_leaves(tree_, "", &leaves);
-  for (const std::string& leaf : leaves) {
+  std::vector<std::string> sentences;
+  for (const auto& [leaf, value] : leaves_of(tree_)) {
     if (names_read_.count(leaf) > 0) continue;
     const std::string nearest = nearest_name(leaf, names_read_);
     sentences.push_back("unknown parameter ~" + leaf + " has no effect" +

@@ -3,64 +3,104 @@
 #include <xmlrpcpp/XmlRpc.h>
 
 #include <cstddef>
+#include <functional>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
-
-#include "ros/parameters/range.h"
 
 namespace ist {
 
-/// A number or truth value that was asked for: its range, its default and its value.
-struct Tunable {
-  enum class Kind { kDouble, kInt, kBool };
-  std::string name;
-  Kind kind = Kind::kDouble;
-  Range range;  ///< 0 to 1 for kBool
-  double default_value = 0.0;
-  double value = 0.0;  ///< the value in use; the default where the one that is set is wrong
+/// The values that a numeric parameter may have. Error messages quote the unit and the bounds.
+struct Range {
+  const char* unit = "";  ///< "m", "s", "Hz"; empty for plain numbers
+  double min = 0.0;
+  double max = std::numeric_limits<double>::infinity();
+  bool min_excluded = false;
+  bool infinite = false;  ///< whether inf itself is allowed
+
+  /// More than 0, up to max; `infinite` allows inf as well.
+  static Range positive(const char* unit, double max, bool infinite = false) {
+    return {unit, 0.0, max, true, infinite};
+  }
+  /// Not less than 0, up to max.
+  static Range non_negative(const char* unit, double max) { return {unit, 0.0, max, false, false}; }
+
+  /// NaN is never inside.
+  bool contains(double value) const;
+  /// "more than 0 to 10 m"
+  std::string text() const;
 };
 
-/// Reads typed values from a tree of parameters, as the parameter server holds it under one
-/// namespace. A parameter that is absent leaves the caller's default. A parameter that is wrong
-/// leaves the default too and adds a sentence to errors() with its name, value, unit and range, so
-/// that all mistakes are reported at once. The reader needs no ROS master.
+/// The text of a number with six significant digits.
+std::string number_text(double value);
+/// A value and its unit, where there is one: "0.5 m".
+std::string with_unit(const std::string& value, const Range& range);
+
+/// A word of a list. Where "true" is in it, truth values are accepted too.
+struct Choice {
+  std::vector<std::string> words;
+  std::function<void(std::size_t)> set;
+};
+/// @param words  in the order of the values, from 0 on
+template <class Enum>
+Choice choice(Enum* value, std::vector<std::string> words) {
+  return {std::move(words), [value](std::size_t i) { *value = static_cast<Enum>(i); }};
+}
+
+/// A list of so many numbers.
+struct Numbers {
+  double* first;
+  std::size_t count;
+};
+
+/// Lists the values of a tree that are no dictionaries, by name.
+std::map<std::string, XmlRpc::XmlRpcValue> leaves_of(const XmlRpc::XmlRpcValue& tree);
+
+using NamePairs = std::vector<std::pair<std::string, std::string>>;
+
+/// One row of the table of parameters. The place of the value holds the default.
+struct Parameter {
+  std::string name;  ///< with slashes, such as "query/margin"
+  std::variant<double*, int*, std::size_t*, bool*, std::string*, std::vector<std::string>*,
+               NamePairs*, Numbers, Choice>
+      value;
+  Range range = {};       ///< of numbers; of an int or a size within what an int holds
+  double slider = 0.0;    ///< of a live parameter: where its slider ends; 0: at ~max_distance
+  const char* help = "";  ///< of a live parameter: a sentence
+
+  /// A double, or a truth value as 0 or 1: all live parameters are one of these.
+  double number() const;
+  bool is_bool() const { return std::holds_alternative<bool*>(value); }
+};
+
+/// Reads parameters from a tree, as the parameter server holds it under one namespace. A parameter
+/// that is absent leaves the default. A parameter that is wrong leaves the default too and adds a
+/// sentence to errors() with its name, value, unit and range, so that all mistakes are reported at
+/// once. The reader needs no ROS master.
 class ParameterReader {
  public:
   /// @param tree  a struct, or an invalid value where there are no parameters at all
   explicit ParameterReader(const XmlRpc::XmlRpcValue& tree) : tree_(tree) {}
 
-  /// Reads a number; an integer is accepted for a double. NaN is never allowed.
-  void read(const std::string& name, const Range& range, double* value);
-  void read(const std::string& name, const Range& range, int* value);
-  /// @param range  within what an int holds, as a parameter does; so is the default
-  void read(const std::string& name, const Range& range, std::size_t* value);
-  void read(const std::string& name, bool* value);
-  void read(const std::string& name, std::string* value);
-  void read(const std::string& name, std::vector<std::string>* value);
-  /// Reads a list of `count` numbers.
-  void read(const std::string& name, const Range& range, std::size_t count,
-            std::vector<double>* value);
-  void read(const std::string& name, std::vector<std::pair<std::string, std::string>>* value);
-  /// Reads one of `choices`. The hint for the value found, if there is one, follows the error.
-  void read_choice(const std::string& name, const std::vector<std::string>& choices,
-                   std::string* value, const std::map<std::string, std::string>& hints = {});
+  /// Reads a row. NaN is never allowed; a whole number may be written as 20000, 20000.0 or 2e4.
+  void read(const Parameter& parameter);
+  void read_all(const std::vector<Parameter>& parameters);
 
-  /// Reads "auto", "true" or "false"; true and false may be truth values as well.
-  void read_switch(const std::string& name, std::string* value);
-
-  bool has(const std::string& name) const;
-  bool is_dictionary(const std::string& name) const;
-  bool is_text(const std::string& name) const;
+  bool has(const std::string& name) const { return find(name) != nullptr; }
+  /// @returns TypeInvalid where it is absent
+  XmlRpc::XmlRpcValue::Type type(const std::string& name) const;
   /// Lists the names one level below `name`; adds an error when it is not a dictionary.
   std::vector<std::string> children(const std::string& name);
 
-  /// Lists every double, int and bool in the order in which they were read.
-  const std::vector<Tunable>& tunables() const { return tunables_; }
-
   void add_error(const std::string& sentence) { errors_.push_back(sentence); }
+  /// Adds "~NAME TEXT".
+  void add_error(const std::string& name, const std::string& text) {
+    errors_.push_back("~" + name + " " + text);
+  }
   const std::vector<std::string>& errors() const { return errors_; }
 
   /// Gives a sentence for every parameter in the tree that was not read, with the nearest name that
@@ -69,16 +109,10 @@ class ParameterReader {
 
  private:
   const XmlRpc::XmlRpcValue* find(const std::string& name) const;
-  const XmlRpc::XmlRpcValue* find_and_note(const std::string& name);
-  void reject(const std::string& name, const XmlRpc::XmlRpcValue& value,
-              const std::string& expected);
-  void read_number(const std::string& name, const Range& range, double* value);
-  void read_integer(const std::string& name, const Range& range, int* value);
-  void read_bool(const std::string& name, bool* value);
+  bool is_dictionary(const std::string& name);
 
   XmlRpc::XmlRpcValue tree_;
-  std::set<std::string> names_read_;
-  std::vector<Tunable> tunables_;
+  std::set<std::string> names_read_, no_dictionaries_;
   std::vector<std::string> errors_;
 };
 

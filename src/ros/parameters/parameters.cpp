@@ -4,127 +4,161 @@
 #include <ros/master.h>
 #include <ros/param.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "internal/packing/packing_cache.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
 #include "ros/parameters/parameter_reader.h"
 #include "ros/parameters/source_parameters.h"
-#include "ros/parameters/speed_scale_parameters.h"
 
 namespace ist {
 namespace {
 
-bool read_repulsion(ParameterReader* reader, double max_distance, RepulsionConfig* repulsion) {
-  reader->read("repulsion/influence_distance", Range::positive("m", 1e3),
-               &repulsion->influence_distance);
-  reader->read("repulsion/gain", Range::non_negative("", 1e6), &repulsion->gain);
-  reader->read("repulsion/smoothing", Range::positive("m", 10.0), &repulsion->smoothing);
-  reader->read("repulsion/filter_time", Range::non_negative("s", 10.0), &repulsion->filter_time);
-  const bool clamped = repulsion->influence_distance > max_distance;
-  if (clamped) repulsion->influence_distance = max_distance;
-  return clamped && reader->has("repulsion/influence_distance");
+constexpr char kSpeedScale[] = "~speed_scale/";
+
+/// The two distances that a link may have of its own.
+struct OwnDistance {
+  const char* name;
+  double LinkSpeedDistances::*value;
+};
+constexpr OwnDistance kOwnDistances[] = {{"stop_distance", &LinkSpeedDistances::stop_distance},
+                                         {"free_distance", &LinkSpeedDistances::free_distance}};
+
+std::string path_of(const std::string& link, const OwnDistance& own) {
+  return "speed_scale/links/" + link + "/" + own.name;
 }
 
-void read_poses(ParameterReader* reader, ServerConfig* config) {
-  reader->read("fixed_frame", &config->fixed_frame);
-  std::string pose_source = "tf";
-  reader->read_choice("pose_source", {"tf", "joint_states"}, &pose_source);
-  config->pose_source = pose_source == "tf" ? PoseSourceKind::kTf : PoseSourceKind::kJointStates;
-  reader->read("pose_timeout", Range::positive("s", 3600.0), &config->pose_timeout);
-  reader->read("joint_lag", Range::non_negative("s", 3600.0), &config->joint_lag);
-  reader->read("rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
+/// The table of what is read at the start only; ~sources has tables of its own.
+std::vector<Parameter> startup_parameters(ServerConfig* config) {
+  SelfCollisionConfig& self = config->self_collision;
+  const Range rate{"Hz", 0.01, 1000.0};
+  return {
+      {"robot_description", &config->robot_description},
+      {"fixed_frame", &config->fixed_frame},
+      {"pose_source", choice(&config->pose_source, {"tf", "joint_states"})},
+      {"rate", &config->rate, rate},
+      {"pose_timeout", &config->pose_timeout, Range::positive("s", 3600.0)},
+      {"links", &config->model.links},
+      {"ignore_links", &config->ignore_links},
+      {"min_distance/fixed_links", &config->fixed_links_count},
+      {"geometry", choice(&config->geometry, {"collision", "visual"})},
+      {"max_distance", &config->query.max_distance, Range::positive("m", 1e3)},
+      {"packing/max_error", &config->model.packing.max_error, Range::positive("m", 1.0)},
+      {"packing/max_spheres", &config->model.packing.max_spheres, {"", 1.0, 1e6}},
+      {"query/max_answers", &config->max_query_answers, {"", 1.0, 1e7}},
+      {"penetration/enabled", choice(&config->contacts_wanted, {"auto", "true", "false"})},
+      {"speed_scale/enabled", &config->speed_scale_enabled},
+      {"self_collision/enabled", &self.enabled},
+      {"self_collision/rate", &self.rate, rate},
+      {"self_collision/ignore", &self.ignore},
+      {"self_collision/ignore_contact_at_rest", &self.ignore_contact_at_rest},
+      {"self_collision/in_minimum", &self.in_minimum},
+      {"self_collision/samples", &self.samples, Range::non_negative("", 1e6)},
+      {"attach/max_objects", &config->attach.max_objects, Range::non_negative("", 1e4)},
+      {"attach/max_time", &config->attach.max_time, Range::positive("s", 3600.0)},
+      {"unknown_space", choice(&config->unknown_space, {"free", "obstacle", "report"})},
+      {"cache_directory", &config->model.cache_directory},
+  };
 }
 
-void read_model(ParameterReader* reader, ServerConfig* config) {
-  reader->read("robot_description", &config->robot_description);
-  if (config->robot_description.empty()) {
-    reader->add_error("~robot_description is empty: the name of the parameter with the URDF");
-  } else if (config->robot_description.find('<') != std::string::npos) {
-    reader->add_error(
-        "~robot_description holds a URDF: it must be the name of the parameter that holds it; set "
-        "'robot_description' outside of the node, in its namespace or above");
+/// Nothing farther away than max_distance is measured.
+/// @returns whether the influence distance was more
+bool limit_influence(LiveConfig* config) {
+  double& influence = config->repulsion.influence_distance;
+  const bool is_more = influence > config->query.max_distance;
+  if (is_more) influence = config->query.max_distance;
+  return is_more;
+}
+
+void check_model(ParameterReader* reader, const ServerConfig& config) {
+  if (config.robot_description.empty()) {
+    reader->add_error("robot_description", "is empty: the name of the parameter with the URDF");
+  } else if (config.robot_description.find('<') != std::string::npos) {
+    reader->add_error("robot_description",
+                      "holds a URDF: it must be the name of the parameter that holds it; set "
+                      "'robot_description' outside of the node, in its namespace or above");
   }
-  std::string geometry = "collision";
-  reader->read_choice("geometry", {"collision", "visual"}, &geometry);
-  config->geometry = geometry == "visual" ? GeometrySource::kVisual : GeometrySource::kCollision;
-  reader->read("links", &config->model.links);
-  reader->read("packing/max_error", Range::positive("m", 1.0), &config->model.packing.max_error);
-  reader->read("packing/max_spheres", Range{"", 1.0, 1e6}, &config->model.packing.max_spheres);
-  reader->read("packing/threads", Range::non_negative("", 256), &config->model.threads);
-  config->model.cache_directory = default_cache_directory();
-  reader->read("cache_directory", &config->model.cache_directory);
-  const std::string& cache = config->model.cache_directory;
+  const std::string& cache = config.model.cache_directory;
   if (!cache.empty() && cache[0] != '/' && reader->has("cache_directory")) {
-    reader->add_error("~cache_directory is \"" + cache +
-                      "\": an absolute path is needed, or an empty one for no cache");
+    reader->add_error("cache_directory", "is \"" + cache +
+                                             "\": an absolute path is needed, or an empty one for "
+                                             "no cache");
   }
 }
 
-void read_query(ParameterReader* reader, QueryConfig* query) {
-  reader->read("query/tolerance", Range::non_negative("m", 1.0), &query->tolerance);
-  // The range is from the whole period to 10 s.
-  reader->read("query/deadline", Range{"s", -1.0, 10.0}, &query->deadline);
-  reader->read("query/margin", Range::non_negative("m", 1.0), &query->margin);
+/// The speed scale before its parameters are read. Distances that are not set fit a max_distance
+/// below them; links have the robot's where one of their own is set, until it is read.
+SpeedScaleConfig unread_speed_scale(ParameterReader* reader, double max_distance) {
+  const bool has_free = reader->has("speed_scale/free_distance");
+  SpeedScaleConfig config;
+  if (!has_free && !reader->has("speed_scale/stop_distance")) {
+    config = fitted_to(config, max_distance);
+  } else if (!has_free) {  // it stays in its place relative to the other
+    config.free_distance = std::min(config.free_distance, max_distance);
+  }
+  for (const std::string& name : reader->children("speed_scale/links")) {
+    LinkSpeedDistances link;
+    link.link = name;
+    reader->children("speed_scale/links/" + name);  // adds an error unless it is a dictionary
+    for (const OwnDistance& own : kOwnDistances) {
+      if (reader->has(path_of(name, own))) link.*own.value = config.stop_distance;
+    }
+    config.links.push_back(link);
+  }
+  return config;
 }
 
-void read_penetration(ParameterReader* reader, PenetrationConfig* penetration) {
-  reader->read("penetration/stiffness", Range::non_negative("N/m^3", 1e12),
-               &penetration->stiffness);
+void check_speed_scale(ParameterReader* reader, const ServerConfig& config) {
+  const auto is_of_it = [](const std::string& error) {
+    return error.rfind("~speed_scale", 0) == 0;
+  };
+  const std::vector<std::string>& told = reader->errors();
+  if (std::any_of(told.begin(), told.end(), is_of_it)) return;
+  for (const std::string& error :
+       config_errors(config.speed_scale, kSpeedScale, config.query.max_distance)) {
+    reader->add_error(error);
+  }
 }
 
-void read_contacts(ParameterReader* reader, ServerConfig* config) {
-  std::string wanted = "auto";
-  reader->read_switch("penetration/enabled", &wanted);
-  config->contacts_wanted = wanted == "true"    ? ContactsWanted::kAll
-                            : wanted == "false" ? ContactsWanted::kNone
-                                                : ContactsWanted::kAuto;
-  reader->read("penetration/max_error", Range::positive("m", 1.0),
-               &config->contacts.packing.max_error);
-  reader->read("penetration/max_spheres", Range{"", 1.0, 1e5},
-               &config->contacts.packing.max_spheres);
-  read_penetration(reader, &config->penetration);
+void refuse_new_distances(ParameterReader* reader, const std::vector<Parameter>& table) {
+  for (const std::string& link : reader->children("speed_scale/links")) {
+    for (const OwnDistance& own : kOwnDistances) {
+      const std::string path = path_of(link, own);
+      const auto is_this = [&path](const Parameter& one) { return one.name == path; };
+      if (reader->has(path) && std::none_of(table.begin(), table.end(), is_this)) {
+        reader->add_error(path, "was not set at the start: restart the node to use it");
+      }
+    }
+  }
 }
 
-void read_self_collision(ParameterReader* reader, SelfCollisionConfig* config) {
-  reader->read("self_collision/enabled", &config->enabled);
-  reader->read("self_collision/rate", Range{"Hz", 0.01, 1000.0}, &config->rate);
-  reader->read("self_collision/ignore", &config->ignore);
-  reader->read("self_collision/ignore_contact_at_rest", &config->ignore_contact_at_rest);
-  reader->read("self_collision/in_minimum", &config->in_minimum);
-  reader->read("self_collision/samples", Range::non_negative("", 1e6), &config->samples);
-}
-
-void read_attach(ParameterReader* reader, AttachConfig* config) {
-  reader->read("attach/max_objects", Range::non_negative("", 1e4), &config->max_objects);
-  reader->read("attach/max_time", Range::positive("s", 3600.0), &config->max_time);
-}
-
-void read_unknown_space(ParameterReader* reader, ServerConfig* config) {
-  std::string text = "free";
-  reader->read_choice("unknown_space", {"free", "obstacle", "report"}, &text);
-  config->unknown_space = text == "obstacle" ? UnknownSpace::kObstacle
-                          : text == "report" ? UnknownSpace::kReport
-                                             : UnknownSpace::kFree;
-  if (config->unknown_space == UnknownSpace::kFree) return;
+/// Unknown space needs memories that fit together.
+void check_unknown_space(ParameterReader* reader, const ServerConfig& config) {
+  if (config.unknown_space == UnknownSpace::kFree) return;
+  const std::string is =
+      config.unknown_space == UnknownSpace::kObstacle ? "is obstacle: " : "is report: ";
   const SourceMemoryConfig* first = nullptr;
-  for (const SourceConfig& source : config->sources) {
+  for (const SourceConfig& source : config.sources) {
     const SourceMemoryConfig& memory = source.memory;
     if (!memory.enabled) continue;
     if (first == nullptr) first = &memory;
     if (!source.ingest.self_filter) {
-      reader->add_error("~unknown_space is " + text + ": it needs to know where the robot is; '" +
-                        source.name + "' has self_filter: false");
+      reader->add_error("unknown_space", is + "it needs to know where the robot is; '" +
+                                             source.name + "' has self_filter: false");
     }
     if (memory.map.resolution != first->map.resolution || memory.frame_id != first->frame_id) {
-      reader->add_error("~unknown_space is " + text +
-                        ": the memories of all sources need the same "
-                        "resolution and frame_id then; '" +
-                        source.name + "' has others");
+      reader->add_error("unknown_space",
+                        is +
+                            "the memories of all sources need the same resolution and frame_id "
+                            "then; '" +
+                            source.name + "' has others");
     }
   }
   if (first == nullptr) {
-    reader->add_error("~unknown_space is " + text +
-                      ": a memory says what has been seen; set ~memory/enabled");
+    reader->add_error("unknown_space",
+                      is + "a memory says what has been seen; set ~memory/enabled");
   }
 }
 
@@ -151,39 +185,105 @@ double deadline_of(double parameter, double period) {
   return parameter < 0.0 ? -parameter * period : parameter;
 }
 
+std::vector<Parameter> live_parameters(LiveConfig* config) {
+  // Sliders end where robots and cameras need them to, so that a pixel means something. The ranges
+  // that a parameter accepts are much wider.
+  QueryConfig& query = config->query;
+  RepulsionConfig& repulsion = config->repulsion;
+  SpeedScaleConfig& speed = config->speed_scale;
+  SeparationConfig& separation = speed.separation;
+  const Range length = Range::non_negative("m", 1e3), time = Range::non_negative("s", 100.0);
+  const Range short_length = Range::non_negative("m", 1.0);
+  std::vector<Parameter> table = {
+      {"query/tolerance", &query.tolerance, short_length, 0.05,
+       "Largest difference between distance and lower_bound; 0: exact. Larger is faster."},
+      {"query/deadline",
+       &query.deadline,
+       {"s", -1.0, 10.0},
+       0.05,
+       "Time after which a query ends with wider bounds; negative: a share of the period; 0: "
+       "none."},
+      {"query/margin", &query.margin, short_length, 0.2,
+       "Taken off every lower_bound, for sensor noise, calibration and latency."},
+      {"repulsion/influence_distance", &repulsion.influence_distance, Range::positive("m", 1e3),
+       0.0, "From this distance on, repulsion is zero. At most ~max_distance."},
+      {"repulsion/gain", &repulsion.gain, Range::non_negative("", 1e6), 5.0,
+       "Length of the repulsion vector at touch and in contact."},
+      {"repulsion/smoothing", &repulsion.smoothing, Range::positive("m", 10.0), 0.5,
+       "Obstacles this much farther than the nearest one still push. Larger is smoother."},
+      {"repulsion/filter_time", &repulsion.filter_time, Range::non_negative("s", 10.0), 1.0,
+       "Mean delay of the change that a new cloud brings; 0: none."},
+      {"penetration/stiffness", &config->penetration.stiffness, Range::non_negative("N/m^3", 1e12),
+       1e6, "Contact force per volume that link and obstacle share."},
+      {"speed_scale/stop_distance", &speed.stop_distance, length, 0.0,
+       "At this lower_bound and below, the speed scale is 0."},
+      {"speed_scale/free_distance", &speed.free_distance, length, 0.0,
+       "From this lower_bound on, the speed scale is 1."},
+      {"speed_scale/hysteresis", &speed.hysteresis, length, 0.1,
+       "The scale rises only when the bound has risen by this much."},
+      {"speed_scale/slow_distance", &speed.slow_distance, length, 0.0,
+       "At this lower_bound the scale is slow_scale; 0: a straight line."},
+      {"speed_scale/slow_scale",
+       &speed.slow_scale,
+       {"", 0.0, 1.0},
+       1.0,
+       "The scale at slow_distance."},
+      {"speed_scale/self_stop_distance", &speed.self_stop_distance, length, 0.0,
+       "At this distance from link to link the scale is 0."},
+      {"speed_scale/self_free_distance", &speed.self_free_distance, length, 0.0,
+       "At this distance from link to link, and farther, it is 1."},
+      {"speed_scale/separation/enabled",
+       &separation.enabled,
+       {"", 0.0, 1.0},
+       1.0,
+       "Whether the separation distance decides as well."},
+      {"speed_scale/separation/obstacle_speed", &separation.obstacle_speed,
+       Range::non_negative("m/s", 100.0), 5.0, "Obstacles are taken to come at least this fast."},
+      {"speed_scale/separation/robot_speed",
+       &separation.robot_speed,
+       {"m/s", 1e-3, 100.0},
+       5.0,
+       "Speed of the robot's fastest point at scale 1."},
+      {"speed_scale/separation/reaction_time", &separation.reaction_time, time, 2.0,
+       "Time from the scale to drives that brake."},
+      {"speed_scale/separation/stopping_time", &separation.stopping_time, time, 2.0,
+       "Time in which the robot stops from robot_speed."},
+      {"speed_scale/separation/intrusion", &separation.intrusion, length, 1.0,
+       "How far a part may reach past the sensor unseen."},
+      {"speed_scale/separation/uncertainty", &separation.uncertainty, length, 0.5,
+       "Uncertainty of positions besides query/margin."},
+  };
+  for (LinkSpeedDistances& link : speed.links) {
+    for (const OwnDistance& own : kOwnDistances) {
+      if (std::isnan(link.*own.value)) continue;
+      table.push_back({path_of(link.link, own), &(link.*own.value), length});
+    }
+  }
+  return table;
+}
+
 ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::string>* warnings) {
   ParameterReader reader(tree);
   ServerConfig config;
-  for (const char* group : {"query", "repulsion", "penetration", "packing", "self_collision",
-                            "attach", "min_distance", "speed_scale"}) {
-    reader.children(group);  // adds an error unless it is a dictionary
-  }
-  read_poses(&reader, &config);
-  read_model(&reader, &config);
-  reader.read("max_distance", Range::positive("m", 1e3), &config.query.max_distance);
-  read_query(&reader, &config.query);
-  reader.read("query/max_answers", Range{"", 1.0, 1e7}, &config.max_query_answers);
-  if (read_repulsion(&reader, config.query.max_distance, &config.repulsion)) {
+  config.model.cache_directory = default_cache_directory();
+  reader.read_all(startup_parameters(&config));
+  check_model(&reader, config);
+  config.speed_scale = unread_speed_scale(&reader, config.query.max_distance);
+  reader.read_all(live_parameters(&config));
+  check_speed_scale(&reader, config);
+  if (limit_influence(&config) && reader.has("repulsion/influence_distance")) {
     warnings->push_back(
         "~repulsion/influence_distance is more than ~max_distance, and nothing farther "
         "away is measured; ~max_distance is used");
   }
-  read_contacts(&reader, &config);
   config.sources = read_sources(&reader);
   for (SourceConfig& source : config.sources) {
     source.ingest.search_distance = config.query.max_distance;
   }
-  read_unknown_space(&reader, &config);
-  read_self_collision(&reader, &config.self_collision);
-  read_attach(&reader, &config.attach);
+  check_unknown_space(&reader, config);
   if (config.self_collision.in_minimum && !config.self_collision.enabled) {
     warnings->push_back("~self_collision/in_minimum has no effect without ~self_collision/enabled");
   }
-  reader.read("ignore_links", &config.ignore_links);
-  reader.read("min_distance/fixed_links", &config.fixed_links_count);
-  reader.read("speed_scale/enabled", &config.speed_scale_enabled);
-  config.speed_scale = read_speed_scale(&reader, config.query.max_distance);
-
   if (!reader.errors().empty()) throw ParameterError(join(reader.errors(), "\n"));
   const std::vector<std::string> unknown = reader.unknown();
   warnings->insert(warnings->end(), unknown.begin(), unknown.end());
@@ -207,16 +307,16 @@ LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const LiveConfig& last) 
   ParameterReader reader(tree);
   LiveReading reading;
   reading.config = last;
-  for (const char* group : {"query", "repulsion", "penetration"}) {
-    reader.children(group);  // adds an error unless it is a dictionary
-  }
-  read_query(&reader, &reading.config.query);
-  read_repulsion(&reader, last.query.max_distance, &reading.config.repulsion);
-  read_penetration(&reader, &reading.config.penetration);
-  reading.tunables = reader.tunables();
+  const std::vector<Parameter> table = live_parameters(&reading.config);
+  reader.read_all(table);
+  for (const Parameter& parameter : table) reading.found.push_back(reader.has(parameter.name));
+  refuse_new_distances(&reader, table);
+  limit_influence(&reading.config);
+  const std::vector<std::string> conflicts =
+      config_errors(reading.config.speed_scale, kSpeedScale, last.query.max_distance);
+  if (!conflicts.empty()) reading.config.speed_scale = last.speed_scale;
   reading.errors = reader.errors();
-  read_live_speed_scale(tree, last.query.max_distance, &reading);
-  for (const Tunable& tunable : reading.tunables) reading.found.push_back(reader.has(tunable.name));
+  reading.errors.insert(reading.errors.end(), conflicts.begin(), conflicts.end());
   return reading;
 }
 

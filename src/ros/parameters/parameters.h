@@ -69,31 +69,33 @@ struct AttachConfig {
   double max_time = 30.0;  ///< [s] for one object, reading and packing it included; > 0
 };
 
+/// Parameters that may change while the node runs.
+struct LiveConfig {
+  QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
+  RepulsionConfig repulsion;
+  PenetrationConfig penetration;
+  SpeedScaleConfig speed_scale;
+  /// The contact bodies that are packed so far; may be null. This is no parameter.
+  std::shared_ptr<const ContactModel> contacts;
+};
+
 /// All parameters of the node. Numbers that the core uses have their defaults in the core.
-struct ServerConfig {
+struct ServerConfig : LiveConfig {
   std::string robot_description = "robot_description";  ///< name of the parameter with the URDF
   std::string fixed_frame;                              ///< empty: the URDF's root link
   PoseSourceKind pose_source = PoseSourceKind::kTf;
   double pose_timeout = 0.5;  ///< [s] a link whose pose is older is UNKNOWN; > 0
-  /// [s] With kJointStates, a joint may be older than the newest one by twice the usual time
-  /// between its samples and this; >= 0.
-  double joint_lag = 0.05;
-  double rate = 100.0;  ///< [Hz] of ~proximity with kTf; > 0
+  double rate = 100.0;        ///< [Hz] of ~proximity with kTf; > 0
   GeometrySource geometry = GeometrySource::kCollision;
   RobotModelConfig model;
-  QueryConfig query = default_query();  ///< its deadline is the parameter, see deadline_of()
-  int max_query_answers = 100000;       ///< states times links of one ~query: 60 MB; > 0
-  RepulsionConfig repulsion;
+  int max_query_answers = 100000;  ///< states times links of one ~query: 60 MB; > 0
   ContactsWanted contacts_wanted = ContactsWanted::kAuto;  ///< ~penetration/enabled
-  ContactConfig contacts;
-  PenetrationConfig penetration;
   SelfCollisionConfig self_collision;
   AttachConfig attach;
   /// Links that do not count in ~min_distance, ~speed_scale and the summary of the diagnostics.
   std::vector<std::string> ignore_links;
   bool fixed_links_count = false;  ///< ~min_distance/fixed_links: links that cannot move count too
   bool speed_scale_enabled = true;
-  SpeedScaleConfig speed_scale;
   std::vector<SourceConfig> sources;
   UnknownSpace unknown_space = UnknownSpace::kFree;  ///< others need a memory
 };
@@ -115,35 +117,26 @@ ServerConfig parse_parameters(const XmlRpc::XmlRpcValue& tree, std::vector<std::
 /// @throws ParameterError
 ServerConfig read_parameters(const ros::NodeHandle& private_nh);
 
-/// Parameters that may change while the node runs.
-struct LiveConfig {
-  /// The query's max_distance is as it was at the start; its deadline is the parameter, see
-  /// deadline_of().
-  QueryConfig query = default_query();
-  RepulsionConfig repulsion;
-  PenetrationConfig penetration;
-  SpeedScaleConfig speed_scale;  ///< its links are those of the start
-  /// The contact bodies that are packed so far; may be null. This is no parameter.
-  std::shared_ptr<const ContactModel> contacts;
-};
-
 /// Fetches all parameters of the private namespace in one call, so that they belong together.
 /// @returns an invalid value when none is set; empty when the parameter server does not answer
 std::optional<XmlRpc::XmlRpcValue> fetch_parameters(const ros::NodeHandle& private_nh);
 
+/// The table of the parameters that may change, for the values of a configuration.
+std::vector<Parameter> live_parameters(LiveConfig* config);
+
 /// The live parameters of a tree, and how they were found.
 struct LiveReading {
   LiveConfig config;
-  std::vector<Tunable> tunables;    ///< each of them with its range and its value in `config`
-  std::vector<bool> found;          ///< by tunable: whether the tree has it
+  std::vector<bool> found;          ///< by row of the table: whether the tree has it
   std::vector<std::string> errors;  ///< one sentence for each that is wrong
 };
 
-/// Reads ~query/*, ~repulsion/*, ~penetration/stiffness and ~speed_scale/* again. What the tree
-/// lacks, or has wrong, keeps its value in `last`.
+/// Reads the live parameters again. What the tree lacks, or has wrong, keeps its value in `last`;
+/// distances of the speed scale that do not go together leave all of its last values.
 /// @param tree  as fetch_parameters() returns it
 /// @param last  the last valid values. Its max_distance limits the influence distance: nothing
-///              farther away is measured, and the vector could not end in zero
+///              farther away is measured, and the vector could not end in zero. Only the links that
+///              have a distance of their own in it keep having one
 LiveReading parse_live(const XmlRpc::XmlRpcValue& tree, const LiveConfig& last);
 
 }  // namespace ist

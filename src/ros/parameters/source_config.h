@@ -1,21 +1,26 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <limits>
+#include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "internal/cloud/noise_filter.h"
 #include "ist_proximity/cloud/ingest.h"
 #include "ist_proximity/cloud/laser_scan.h"
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/octree.h"
-#include "ros/parameters/world_config.h"
+#include "ist_proximity/proximity/known_world.h"
 
 namespace ist {
 
 enum class SourceType { kCloud, kDepthImage, kScan, kMap, kWorld };
 
-/// The ROS message type of a source, as rostopic writes it; of a known world its type in ~sources
-/// is kWorldType.
+/// The ROS message type of a source, as rostopic writes it; a known world's type in ~sources is
+/// "world".
 const char* message_type(SourceType type);
 /// The same for what comes on the topic of a source.
 struct SourceConfig;
@@ -35,9 +40,42 @@ struct SourceMemoryConfig {
 /// look at the sky. What sees less than a tenth does not see the view that it stands for.
 constexpr double kMinMeasured = 0.1;
 
-/// [m] The default of sensor_range. The depth cameras that arms carry measure up to 10 m, and other
-/// sensors 100 m; lengths in millimetres are longer from 10 and 100 mm on.
-double usual_range(SourceType type);
+/// The message type that a known world has on `planning_scene`.
+constexpr const char* kPlanningSceneType = "moveit_msgs/PlanningScene";
+
+/// An object of ~sources/NAME/objects.
+struct WorldObjectConfig {
+  WorldObject object;  ///< without geometry where `mesh` is set
+  std::string mesh;    ///< URI of a mesh file, which the source's thread reads
+  Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+};
+
+/// Another robot as an obstacle.
+struct OtherRobotConfig {
+  std::string description;   ///< name of the parameter with its URDF; empty: none
+  std::string tf_prefix;     ///< its links' frames in tf are this and the link's name
+  std::string joint_states;  ///< topic; empty: the poses of its links come from tf
+};
+
+/// The parameters of a source of type `world`.
+struct WorldConfig {
+  std::string frame_id;  ///< of objects that state none; empty: the fixed frame
+  std::vector<WorldObjectConfig> objects;
+  OtherRobotConfig robot;
+  bool has_topic = false;          ///< whether its topic is subscribed to
+  bool is_planning_scene = false;  ///< whether that is a moveit_msgs/PlanningScene
+  /// Service that is asked for the full scene while none has come; empty: none.
+  std::string scene_service = "get_planning_scene";
+  /// Whether planning scenes that are differences begin with an empty world.
+  bool starts_empty = false;
+  /// Whether pairs of the allowed collision matrix of planning scenes may touch.
+  bool use_allowed_collisions = true;
+  WorldLimits limits;
+  double margin = 0.0;                         ///< [m] of objects that state none
+  std::map<std::string, double> link_margins;  ///< [m] by name of a link
+  /// Pairs of a link and an object that may touch.
+  std::vector<std::pair<std::string, std::string>> allowed_contacts;
+};
 
 /// One entry of ~sources.
 struct SourceConfig {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "ros/parameters/parameter_reader.h"
@@ -10,5 +11,13 @@ namespace ist {
 /// Reads ~sources, or the parameters of the single source where ~sources is not set. Mistakes go to
 /// the reader's errors.
 std::vector<SourceConfig> read_sources(ParameterReader* reader);
+
+/// Reads what a source of type `world` has besides `topic` and `required`.
+/// @param prefix  of their names, with the slash at its end
+void read_world(ParameterReader* reader, const std::string& prefix, SourceConfig* source);
+
+/// Reads a path that has to be absolute.
+void read_path(ParameterReader* reader, const std::string& name, const char* example,
+               std::string* path, bool may_be_empty = false);
 
 }  // namespace ist

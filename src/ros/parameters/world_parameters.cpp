@@ -1,11 +1,12 @@
-#include "ros/parameters/world_parameters.h"
-
 #include <Eigen/Geometry>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "internal/geometry/limits.h"
 #include "ist_proximity/proximity/world_file.h"
+#include "ros/common/text.h"
+#include "ros/parameters/source_parameters.h"
 
 namespace ist {
 namespace {
@@ -13,182 +14,169 @@ namespace {
 constexpr double kInf = std::numeric_limits<double>::infinity();
 const Range kSize = Range::positive("m", kMaxLength);
 const Range kPosition{"m", -kMaxLength, kMaxLength};
-const Range kAngle{"rad", -100.0, 100.0};
-const Range kLeaves{"", 1.0, 5e7};
 const Range kMargin = Range::non_negative("m", kMaxLength);
 
-void read_pose(ParameterReader* reader, const std::string& prefix, Eigen::Isometry3d* X) {
-  std::vector<double> p = {0.0, 0.0, 0.0}, rpy = {0.0, 0.0, 0.0}, q = {0.0, 0.0, 0.0, 1.0};
-  reader->read(prefix + "position", kPosition, 3, &p);
-  reader->read(prefix + "rpy", kAngle, 3, &rpy);
-  reader->read(prefix + "orientation", Range{"", -1.001, 1.001}, 4, &q);
-  if (reader->has(prefix + "rpy") && reader->has(prefix + "orientation")) {
-    reader->add_error("~" + prefix + "rpy and ~" + prefix +
-                      "orientation are both set: one is needed");
+void read_pose(ParameterReader* reader, const std::string& at, Eigen::Isometry3d* X) {
+  Eigen::Vector3d p(0.0, 0.0, 0.0), rpy(0.0, 0.0, 0.0);
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  // in memory x, y, z, w
+  reader->read_all({{at + "position", Numbers{p.data(), 3}, kPosition},
+                    {at + "rpy", Numbers{rpy.data(), 3}, {"rad", -100.0, 100.0}},
+                    {at + "orientation", Numbers{q.coeffs().data(), 4}, {"", -1.001, 1.001}}});
+  if (reader->has(at + "rpy") && reader->has(at + "orientation")) {
+    reader->add_error(at + "rpy", "and ~" + at + "orientation are both set: one is needed");
   }
-  Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
-  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) {
-    reader->add_error("~" + prefix + "orientation has a length of " + number_text(rotation.norm()) +
-                      ": a quaternion x, y, z, w of length 1 is needed");
-    rotation = Eigen::Quaterniond::Identity();
+  if (!(std::abs(q.norm() - 1.0) < 1e-3)) {
+    reader->add_error(at + "orientation", "has a length of " + number_text(q.norm()) +
+                                              ": a quaternion x, y, z, w of length 1 is needed");
+    q.setIdentity();
   }
-  if (reader->has(prefix + "rpy")) {
-    rotation = Eigen::AngleAxisd(rpy[2], Eigen::Vector3d::UnitZ()) *
-               Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
-               Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX());
+  if (reader->has(at + "rpy")) {
+    q = Eigen::AngleAxisd(rpy[2], Eigen::Vector3d::UnitZ()) *
+        Eigen::AngleAxisd(rpy[1], Eigen::Vector3d::UnitY()) *
+        Eigen::AngleAxisd(rpy[0], Eigen::Vector3d::UnitX());
   }
-  X->linear() = rotation.normalized().toRotationMatrix();
-  X->translation() << p[0], p[1], p[2];
+  X->linear() = q.normalized().toRotationMatrix();
+  X->translation() = p;
 }
 
 // A number that has no default.
 double needed_size(ParameterReader* reader, const std::string& name) {
   double value = 1.0;
-  if (!reader->has(name))
-    reader->add_error("~" + name + " is not set: it is needed for this shape");
-  reader->read(name, kSize, &value);
+  if (!reader->has(name)) reader->add_error(name, "is not set: it is needed for this shape");
+  reader->read({name, &value, kSize});
   return value;
 }
 
-void read_shape(ParameterReader* reader, const std::string& prefix, WorldObjectConfig* config) {
+void read_shape(ParameterReader* reader, const std::string& at, WorldObjectConfig* config) {
   const std::vector<std::string> shapes = {"box", "sphere", "cylinder", "cone", "plane", "mesh"};
-  std::string shape;
-  reader->read_choice(prefix + "shape", shapes, &shape);
+  std::size_t chosen = shapes.size();
+  reader->read({at + "shape", choice(&chosen, shapes)});
+  if (chosen == shapes.size()) {
+    if (!reader->has(at + "shape")) {
+      reader->add_error(at + "shape", "is not set: allowed is " + join(shapes, ", "));
+    }
+    return;
+  }
+  const std::string& shape = shapes[chosen];
   GeometryElement element;
   element.source = shape;
   if (shape == "box") {
-    std::vector<double> size = {1.0, 1.0, 1.0};
-    if (!reader->has(prefix + "size")) {
-      reader->add_error("~" + prefix + "size is not set: a box needs its edges along x, y, z");
+    Box box{{1.0, 1.0, 1.0}};
+    if (!reader->has(at + "size")) {
+      reader->add_error(at + "size", "is not set: a box needs its edges along x, y, z");
     }
-    reader->read(prefix + "size", kSize, 3, &size);
-    element.shape = Box{{size[0], size[1], size[2]}};
+    reader->read({at + "size", Numbers{box.size.data(), 3}, kSize});
+    element.shape = box;
   } else if (shape == "sphere") {
-    element.shape = Sphere{needed_size(reader, prefix + "radius")};
+    element.shape = Sphere{needed_size(reader, at + "radius")};
   } else if (shape == "cylinder" || shape == "cone") {
-    const double radius = needed_size(reader, prefix + "radius");
-    const double length = needed_size(reader, prefix + "length");
+    const double radius = needed_size(reader, at + "radius");
+    const double length = needed_size(reader, at + "length");
     element.shape = shape == "cone" ? Shape(cone(radius, length)) : Shape(Cylinder{radius, length});
   } else if (shape == "plane") {
     element = half_space(Eigen::Vector3d::UnitZ(), 0.0);
-  } else if (shape == "mesh") {
-    reader->read(prefix + "mesh", &config->mesh);
+  } else {
+    reader->read_all(
+        {{at + "mesh", &config->mesh},
+         {at + "scale", Numbers{config->scale.data(), 3}, {"", -kMaxScale, kMaxScale}}});
     if (config->mesh.empty()) {
-      reader->add_error("~" + prefix +
-                        "mesh is not set: the URI of a file is needed, for example "
+      reader->add_error(at + "mesh",
+                        "is not set: the URI of a file is needed, for example "
                         "package://cell/meshes/fixture.stl");
     }
-    std::vector<double> scale = {1.0, 1.0, 1.0};
-    reader->read(prefix + "scale", Range{"", -kMaxScale, kMaxScale}, 3, &scale);
-    config->scale << scale[0], scale[1], scale[2];
     return;
   }
   config->object.geometry = {element};
 }
 
-void read_object(ParameterReader* reader, const std::string& name, const std::string& prefix,
-                 const WorldConfig& world, WorldObjectConfig* config) {
-  WorldObject& object = config->object;
-  object.name = name;
-  object.frame = world.frame_id;
-  object.margin = world.margin;
-  reader->read(prefix + "frame_id", &object.frame);
-  reader->read(prefix + "margin", kMargin, &object.margin);
-  reader->read(prefix + "allowed_links", &object.allowed_links);
-  read_pose(reader, prefix, &object.X_BO);
-  read_shape(reader, prefix, config);
-}
-
-void read_objects(ParameterReader* reader, const std::string& prefix, WorldConfig* world) {
-  const std::vector<std::string> names = reader->children(prefix + "objects");
+void read_objects(ParameterReader* reader, const std::string& at, WorldConfig* world) {
+  const std::vector<std::string> names = reader->children(at + "objects");
   if (names.size() > world->limits.max_objects) {
-    reader->add_error("~" + prefix + "objects holds " + std::to_string(names.size()) +
-                      " objects: allowed are " + std::to_string(world->limits.max_objects) +
-                      " (max_objects)");
+    reader->add_error(at + "objects",
+                      "holds " + std::to_string(names.size()) + " objects: allowed are " +
+                          std::to_string(world->limits.max_objects) + " (max_objects)");
     return;
   }
-  const std::string folder = prefix + "objects/";
   for (const std::string& name : names) {
-    const std::string at = folder + name;
-    reader->children(at);  // adds an error unless it is a dictionary
-    world->objects.emplace_back();
-    read_object(reader, name, at + "/", *world, &world->objects.back());
+    const std::string of = at + "objects/" + name + "/";
+    WorldObjectConfig config;
+    WorldObject& object = config.object;
+    object.name = name;
+    object.frame = world->frame_id;
+    object.margin = world->margin;
+    reader->read_all({{of + "frame_id", &object.frame},
+                      {of + "margin", &object.margin, kMargin},
+                      {of + "allowed_links", &object.allowed_links}});
+    read_pose(reader, of, &object.X_BO);
+    read_shape(reader, of, &config);
+    world->objects.push_back(config);
   }
 }
 
-void read_robot(ParameterReader* reader, const std::string& prefix, OtherRobotConfig* robot) {
-  if (!reader->has(prefix + "robot")) return;
-  reader->children(prefix + "robot");
-  reader->read(prefix + "robot/description", &robot->description);
-  reader->read(prefix + "robot/tf_prefix", &robot->tf_prefix);
-  reader->read(prefix + "robot/joint_states", &robot->joint_states);
+void read_robot(ParameterReader* reader, const std::string& at, OtherRobotConfig* robot) {
+  if (!reader->has(at)) return;
+  reader->read_all({{at + "/description", &robot->description},
+                    {at + "/tf_prefix", &robot->tf_prefix},
+                    {at + "/joint_states", &robot->joint_states}});
   if (robot->description.empty()) {
-    reader->add_error("~" + prefix +
-                      "robot/description is not set: the name of the parameter that holds the "
-                      "other robot's URDF is needed, for example /other/robot_description");
+    reader->add_error(at + "/description",
+                      "is not set: the name of the parameter that holds the other robot's URDF is "
+                      "needed, for example /other/robot_description");
   }
 }
 
 // Changes of the world come on one topic, of the one type or of the other.
-void read_topic(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+void read_topic(ParameterReader* reader, const std::string& at, SourceConfig* source) {
   WorldConfig& world = source->world;
-  world.has_topic = reader->has(prefix + "topic");
-  world.is_planning_scene = reader->has(prefix + "planning_scene");
+  world.has_topic = reader->has(at + "topic");
+  world.is_planning_scene = reader->has(at + "planning_scene");
   source->timeout = kInf;  // objects are sent when they change
   if (world.is_planning_scene) {
     if (world.has_topic) {
-      reader->add_error("~" + prefix + "topic and ~" + prefix +
-                        "planning_scene are both set: a source has one of them; give the other one "
-                        "a source of its own");
+      reader->add_error(at + "topic", "and ~" + at +
+                                          "planning_scene are both set: a source has one of them; "
+                                          "give the other one a source of its own");
     }
     world.has_topic = true;
-    reader->read(prefix + "planning_scene", &source->topic);
+    reader->read_all({{at + "planning_scene", &source->topic},
+                      {at + "planning_scene_service", &world.scene_service},
+                      {at + "starts_empty", &world.starts_empty},
+                      {at + "use_allowed_collisions", &world.use_allowed_collisions},
+                      {at + "max_leaves", &source->map.max_leaves, {"", 1.0, 5e7}}});
     if (source->topic.empty()) {
-      reader->add_error("~" + prefix +
-                        "planning_scene is empty: the name of a topic is needed, for example "
+      reader->add_error(at + "planning_scene",
+                        "is empty: the name of a topic is needed, for example "
                         "/move_group/monitored_planning_scene");
     }
-    reader->read(prefix + "planning_scene_service", &world.scene_service);
-    reader->read(prefix + "starts_empty", &world.starts_empty);
-    reader->read(prefix + "use_allowed_collisions", &world.use_allowed_collisions);
-    reader->read(prefix + "max_leaves", kLeaves, &source->map.max_leaves);  // of the octomap
   }
   if (world.has_topic) {
-    reader->read(prefix + "timeout", Range::positive("s", kInf, true), &source->timeout);
+    reader->read({at + "timeout", &source->timeout, Range::positive("s", kInf, true)});
   }
 }
 
 }  // namespace
 
-void read_world(ParameterReader* reader, const std::string& prefix, SourceConfig* source) {
+void read_world(ParameterReader* reader, const std::string& at, SourceConfig* source) {
   WorldConfig& world = source->world;
   source->ingest.self_filter = false;
-  reader->read(prefix + "frame_id", &world.frame_id);
-  reader->read(prefix + "max_objects", Range{"", 1.0, 1e6}, &world.limits.max_objects);
-  reader->read(prefix + "max_triangles", Range{"", 1.0, 1e8}, &world.limits.max_triangles);
-  reader->read(prefix + "margin", kMargin, &world.margin);
-  const std::string margins = prefix + "link_margins/";
-  for (const std::string& link : reader->children(prefix + "link_margins")) {
-    double margin = 0.0;
-    reader->read(margins + link, kMargin, &margin);
-    world.link_margins[link] = margin;
+  reader->read_all({{at + "frame_id", &world.frame_id},
+                    {at + "max_objects", &world.limits.max_objects, {"", 1.0, 1e6}},
+                    {at + "max_triangles", &world.limits.max_triangles, {"", 1.0, 1e8}},
+                    {at + "margin", &world.margin, kMargin},
+                    {at + "allowed_contacts", &world.allowed_contacts}});
+  for (const std::string& link : reader->children(at + "link_margins")) {
+    reader->read({at + "link_margins/" + link, &world.link_margins[link], kMargin});
   }
-  reader->read(prefix + "allowed_contacts", &world.allowed_contacts);
-  read_objects(reader, prefix, &world);
-  read_robot(reader, prefix, &world.robot);
-  if (reader->has(prefix + "file")) {
-    reader->read(prefix + "file", &source->file);
-    if (source->file.empty() || source->file[0] != '/') {
-      reader->add_error("~" + prefix + "file is \"" + source->file +
-                        "\": an absolute path is needed, for example /home/robot/cell.scene");
-    }
-  }
-  read_topic(reader, prefix, source);
-  if (!world.has_topic && source->file.empty() && !reader->has(prefix + "objects") &&
+  read_objects(reader, at, &world);
+  read_robot(reader, at + "robot", &world.robot);
+  if (reader->has(at + "file"))
+    read_path(reader, at + "file", "/home/robot/cell.scene", &source->file);
+  read_topic(reader, at, source);
+  if (!world.has_topic && source->file.empty() && !reader->has(at + "objects") &&
       world.robot.description.empty()) {
-    reader->add_error(
-        "~" + prefix +
-        "type is world: at least one of objects, file, topic, planning_scene or robot is needed");
+    reader->add_error(at + "type",
+                      "is world: at least one of objects, file, topic, planning_scene or robot is "
+                      "needed");
   }
 }
 

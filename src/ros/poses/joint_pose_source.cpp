@@ -11,6 +11,10 @@
 namespace ist {
 namespace {
 
+// [s] A sample that is late by less than this is taken for one that comes in time: publishers on
+// one machine are. What is allowed here makes poses older than header.stamp says.
+constexpr double kLag = 0.05;
+
 constexpr std::chrono::seconds kDisputeMemory(1);
 constexpr double kStampResolution = 1e-3;  // [s]
 
@@ -20,7 +24,7 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
                                  JointStateListener* joints, Which which,
                                  const TransformBuffer& buffer, const std::string& fixed_frame,
                                  const std::vector<std::string>& links,
-                                 const std::vector<bool>& wanted, double timeout, double lag)
+                                 const std::vector<bool>& wanted, double timeout)
     : kinematics_(std::move(kinematics)),
       listener_(*joints),
       which_(which),
@@ -29,7 +33,6 @@ JointPoseSource::JointPoseSource(std::shared_ptr<const Kinematics> kinematics,
       placer_(kinematics_, links),
       wanted_(wanted),
       timeout_(timeout),
-      lag_(lag),
       tf_source_(buffer, fixed_frame, links, wanted, timeout) {
   const auto& tree = kinematics_->joints();
   moved_by_.resize(links.size());
@@ -77,7 +80,7 @@ PoseProblem JointPoseSource::problem_of(std::size_t joint, const ros::Time& now)
 
 /// Whether a joint is later than its samples usually are: by more than one and a half times its
 /// usual spacing behind a joint that came in the same message before; behind the newest one, whose
-/// publisher may be another, by more than twice the spacing and ~joint_lag.
+/// publisher may be another, by more than twice the spacing and kLag.
 /// @returns empty, or a sentence
 std::string JointPoseSource::is_late(std::size_t joint, std::size_t newest) const {
   const JointPosition& position = positions_[joint];
@@ -99,7 +102,7 @@ std::string JointPoseSource::is_late(std::size_t joint, std::size_t newest) cons
     return sentence(position.companion, behind);
   }
   spacing = position.spacing > 0.0 ? position.spacing : positions_[newest].spacing;
-  if (lag > 2.0 * spacing + lag_) return sentence(newest, lag);
+  if (lag > 2.0 * spacing + kLag) return sentence(newest, lag);
   return "";
 }
 

@@ -34,11 +34,10 @@ class JointPoseSource : public PoseSource {
   /// @param links        names
   /// @param wanted       by link: false leaves it unknown, without a problem
   /// @param timeout      [s]
-  /// @param lag          [s] a joint may be older than the newest by this and twice its spacing
   JointPoseSource(std::shared_ptr<const Kinematics> kinematics, JointStateListener* joints,
                   Which which, const TransformBuffer& buffer, const std::string& fixed_frame,
                   const std::vector<std::string>& links, const std::vector<bool>& wanted,
-                  double timeout, double lag);
+                  double timeout);
 
   void look_up(const ros::Time& now, StampedLinkPoses* poses) override;
   void look_up_all(const Kinematics& kinematics, const ros::Time& instant,
@@ -65,7 +64,7 @@ class JointPoseSource : public PoseSource {
   std::vector<bool> wanted_;
   std::vector<std::vector<std::size_t>> moved_by_;  ///< by link: the joints whose positions move it
   std::vector<bool> matters_;                       ///< by joint: whether it moves a wanted link
-  double timeout_, lag_;
+  double timeout_;
   TfPoseSource tf_source_;  ///< used while tf is behind
 
   // Valid for one look_up().

@@ -19,7 +19,7 @@ std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const Serv
   }
   if (!model.kinematics) return nullptr;
   return std::make_unique<JointPoseSource>(model.kinematics, joints, which, buffer, fixed_frame,
-                                           names, wanted, config.pose_timeout, config.joint_lag);
+                                           names, wanted, config.pose_timeout);
 }
 
 }  // namespace ist
