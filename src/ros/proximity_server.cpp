@@ -13,8 +13,7 @@
 #include "ros/common/thread_name.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/input/cloud_source.h"
-#include "ros/input/map_message.h"
-#include "ros/input/memory_source.h"
+#include "ros/input/map_measurement.h"
 #include "ros/input/world_source.h"
 #include "ros/output/message_invariants.h"
 #include "ros/proximity_server_impl.h"
@@ -48,12 +47,12 @@ ProximityServer::Impl::Impl(const ros::NodeHandle& nh, const ros::NodeHandle& pr
   const auto filtered_cloud = private_nh_.advertise<sensor_msgs::PointCloud2>("filtered_cloud", 2);
   for (const SourceConfig& source : config_.sources) {
     if (source.type == SourceType::kWorld) {
-      sources_.push_back(std::make_unique<WorldSource>(source, nh_, private_nh_, buffer_));
+      sources_.push_back(std::make_shared<WorldSource>(source, nh_, private_nh_, buffer_));
       continue;
     }
     add_source(source, filtered_cloud);
   }
-  memory_service_ = std::make_unique<MemoryService>(private_nh_, memories_);
+  if (!memories_.empty()) model_services_.offer(private_nh_, memories_);
   if (config_.pose_source == PoseSourceKind::kJointStates) {
     joint_states_ = std::make_unique<JointStateListener>(&buffer_, nh_, [this] {
       ++joint_states_received_;
@@ -95,21 +94,20 @@ ProximityServer::Impl::~Impl() {
 /// Adds a source, and what it remembers.
 void ProximityServer::Impl::add_source(const SourceConfig& config, const ros::Publisher& filtered) {
   std::shared_ptr<SourceMemory> memory;
-  ros::Publisher map;
   if (config.memory.enabled) {
-    map = advertise_map(&private_nh_, "memory/" + config.name);
     memory = std::make_shared<SourceMemory>(config, buffer_,
-                                            config_.unknown_space != UnknownSpace::kFree, map);
+                                            config_.unknown_space != UnknownSpace::kFree,
+                                            advertise_map(&private_nh_, "memory/" + config.name));
     memories_.push_back(memory);
   }
-  sources_.push_back(std::make_unique<CloudSource>(
+  sources_.push_back(std::make_shared<CloudSource>(
       config, nh_, buffer_, filtered, memory,
       [this](const ObstacleSource& source, const SourceSnapshot& fresh) {
         return warm_up_.run(source, fresh);
       }));
   if (!memory) return;
-  const ObstacleSource& parent = *sources_.back();
-  sources_.push_back(std::make_unique<MemorySource>(parent, memory, map.getTopic()));
+  memory->set_parent(sources_.back().get());
+  sources_.push_back(memory);
 }
 
 /// Waits until a joint state comes, but not for ever. Joint states that came during the last cycle

@@ -31,7 +31,6 @@
 #include "ros/poses/transform_listener.h"
 #include "ros/poses/usual_period.h"
 #include "ros/services/link_pair_service.h"
-#include "ros/services/memory_service.h"
 #include "ros/services/model_services.h"
 #include "ros/services/query_service.h"
 #include "ros/services/self_proximity.h"
@@ -88,7 +87,6 @@ class ProximityServer::Impl {
   SourceMemories memories_;
   SceneWarmUp warm_up_{sources_};  ///< used by the threads of the sources
   CloudSources sources_;
-  std::unique_ptr<MemoryService> memory_service_;
   std::unique_ptr<UnknownSpaceWatch> unknown_space_;  ///< null with ~unknown_space free
   ModelLoader loader_;
   ModelServices model_services_;

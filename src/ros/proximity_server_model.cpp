@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "ros/common/text.h"
-#include "ros/poses/make_pose_source.h"
+#include "ros/poses/joint_pose_source.h"
 #include "ros/poses/transforms.h"
 #include "ros/proximity_server_impl.h"
 

@@ -13,7 +13,6 @@
 
 #include "ros/input/unseen_markers.h"
 #include "ros/output/nearest_summary.h"
-#include "ros/output/nearness_color.h"
 #include "support/scene.h"
 
 namespace ist {

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """dynamic_reconfigure: live parameters change at once and stay within their ranges."""
 
+import os
 import sys
 import unittest
 
 import numpy as np
 import proximity_testing as pt
 import rospy
+import yaml
 from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter, StrParameter
 from proximity_testing import ProximityArray
@@ -90,8 +92,14 @@ class ReconfigureTest(unittest.TestCase):
             },
         }
         least = {"deadline": -1.0, "robot_speed": 0.001, "enabled": False}
+        folder = os.path.join(os.path.dirname(__file__), "..", "..", "config")
+        with open(os.path.join(folder, "proximity.yaml")) as f:
+            explained = yaml.safe_load(f)
         for group, expected in ends.items():
             client = self.client(group)
+            defaults = explained
+            for part in group.split("/"):
+                defaults = defaults[part]
             described = client.get_parameter_descriptions(timeout=30)
             self.assertEqual({d["name"]: d["max"] for d in described}, expected)
             for one in described:
@@ -99,6 +107,7 @@ class ReconfigureTest(unittest.TestCase):
                 name = "~%s/%s" % (group, one["name"])
                 self.assertRegex(one["description"], "^" + name + r"( \[.*\])?: [A-Z].{20,}\.$")
                 self.assertLessEqual(one["default"], one["max"])
+                self.assertEqual(one["default"], defaults[one["name"]], name)
             if group == "query":  # the parameter's own range is wider
                 answer = client.update_configuration({"margin": 0.3})
                 self.assertAlmostEqual(answer["margin"], 0.3)

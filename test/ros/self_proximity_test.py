@@ -121,16 +121,16 @@ class SelfProximityTest(unittest.TestCase):
     def test_sampled_pairs(self):
         """The one pair is watched, and touches in the share of random configurations that it has to."""
         arm = ARM.replace('lower="0"', 'lower="-0.5"')
-        self.start("sampled", arm, **{"self_collision/samples": 500})
+        self.start("sampled", arm)
         answer = self.link_pairs(lambda a: a.configurations > 0, never=True)
-        self.assertEqual(answer.configurations, 500)
+        self.assertEqual(answer.configurations, 2000)
         self.assertEqual(answer.message, "")
         (pair,) = answer.pairs
         self.assertEqual({pair.first, pair.second}, {"ball_link", "box_link"})
         self.assertEqual(pair.reason, LinkPair.WATCHED)
-        self.assertEqual(pair.measured, 500)
+        self.assertEqual(pair.measured, 2000)
         # The ball is in the box from -0.26 to -0.1 of the slide, which goes from -0.5 to 1.
-        self.assertAlmostEqual(pair.contacts / 500, 0.16 / 1.5, delta=0.05)
+        self.assertAlmostEqual(pair.contacts / 2000, 0.16 / 1.5, delta=0.05)
         self.assertEqual(pair.sampled, LinkPair.SOMETIMES)
         self.assertTrue(answer.srdf.startswith('<?xml version="1.0"?>'))
         self.assertNotIn("disable_collisions", answer.srdf)

@@ -12,7 +12,6 @@
 #include "ros/common/stopwatch.h"
 #include "ros/cycle/cycle_message.h"
 #include "ros/output/message_conversion.h"
-#include "ros/status/pose_problems.h"
 
 namespace ist {
 

@@ -103,7 +103,7 @@ const SourceSnapshot* SceneWarmUp::share(const ObstacleSource& source) {
   const ObstacleSource* const shared = source.parent() != nullptr ? source.parent() : &source;
   const auto found = std::find_if(
       sources_.begin(), sources_.end(),
-      [shared](const std::unique_ptr<ObstacleSource>& s) { return s.get() == shared; });
+      [shared](const std::shared_ptr<ObstacleSource>& s) { return s.get() == shared; });
   if (found == sources_.end()) return nullptr;
   held_.push_back((*found)->share(scene_.model, scene_.stamp, scene_.pose_timeout));
   const SourceSnapshot* const snapshot = held_.back().get();

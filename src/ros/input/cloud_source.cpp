@@ -12,10 +12,10 @@
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
-#include "ros/input/cloud_conversion.h"
+#include "ros/input/cloud_measurement.h"
 #include "ros/input/map_measurement.h"
-#include "ros/input/view_text.h"
-#include "ros/poses/clock_skew.h"
+#include "ros/input/source_state.h"
+#include "ros/poses/transforms.h"
 
 namespace ist {
 namespace {
@@ -89,7 +89,7 @@ const SourceSnapshot* CloudSource::newest(const std::shared_ptr<const RobotModel
     map_ = snapshot;
     placed_map_ = *snapshot;
   }
-  const std::string problem = place_map(buffer_, time, max_age, &placed_map_);
+  const std::string problem = place(time, max_age, &placed_map_);
   state_.set_placing_problem(problem);
   return problem.empty() ? &placed_map_ : nullptr;
 }
@@ -103,7 +103,14 @@ std::shared_ptr<const SourceSnapshot> CloudSource::share(
     return is_disputed ? nullptr : snapshot;
   }
   const auto placed = std::make_shared<SourceSnapshot>(*snapshot);
-  return place_map(buffer_, time, max_age, placed.get()).empty() ? placed : nullptr;
+  return place(time, max_age, placed.get()).empty() ? placed : nullptr;
+}
+
+/// Looks up where a map's frame is at an instant, or else at the newest one that tf knows.
+std::string CloudSource::place(const ros::Time& time, double max_age, SourceSnapshot* map) const {
+  map->lags.resize(1);
+  return look_up_near(buffer_, map->fixed_frame, map->map_frame, time, max_age, &map->cloud.X_FM,
+                      &map->lags[0]);
 }
 
 void CloudSource::report(SourceReport* report) {

@@ -55,8 +55,6 @@ class CloudSource : public ObstacleSource {
   CloudSource(const SourceConfig& config, ros::NodeHandle nh, const TransformBuffer& buffer,
               const ros::Publisher& filtered, std::shared_ptr<SourceMemory> memory, WarmUp warm_up);
   ~CloudSource() override;
-  CloudSource(const CloudSource&) = delete;
-  CloudSource& operator=(const CloudSource&) = delete;
 
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
                  const RegionOfInterest& region) override;
@@ -70,6 +68,7 @@ class CloudSource : public ObstacleSource {
   using MeasurementPtr = std::shared_ptr<const Measurement>;
 
   void run();
+  std::string place(const ros::Time& time, double max_age, SourceSnapshot* map) const;
   void guard(const std::function<void()>& function);
   void read_file();
   void receive(const Received& received);

@@ -11,7 +11,6 @@
 #include "ros/input/image_measurement.h"
 #include "ros/input/map_measurement.h"
 #include "ros/input/receive_pool.h"
-#include "ros/input/scan_measurement.h"
 
 namespace ist {
 namespace {

@@ -3,6 +3,7 @@
 #include <ros/node_handle.h>
 #include <ros/subscriber.h>
 #include <ros/time.h>
+#include <sensor_msgs/LaserScan.h>
 #include <std_msgs/Header.h>
 
 #include <Eigen/Geometry>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
+#include "ist_proximity/cloud/laser_scan.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
 #include "ros/parameters/source_config.h"
 
@@ -81,6 +83,12 @@ struct Received {
 using Receiver = std::function<void(const Received&)>;
 /// Called before a message is read, which takes long for a large map.
 using ReadingBegins = std::function<void()>;
+
+/// Reads a LaserScan. Each beam is placed with the sensor's pose at the beam's own time, and the
+/// self-filter uses the robot's poses at several instants of the scan.
+/// @param ranges  its min_range, max_range and sensor_range apply to each beam
+Received read_scan(const sensor_msgs::LaserScanConstPtr& message, const IngestConfig& ranges,
+                   const ScanLimits& limits);
 
 /// [m] The extent of a map's boxes.
 double map_extent(const SourceConfig& config);

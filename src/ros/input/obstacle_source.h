@@ -44,6 +44,6 @@ class ObstacleSource {
   virtual const ObstacleSource* parent() const { return nullptr; }
 };
 
-using CloudSources = std::vector<std::unique_ptr<ObstacleSource>>;
+using CloudSources = std::vector<std::shared_ptr<ObstacleSource>>;
 
 }  // namespace ist

@@ -120,12 +120,4 @@ std::string Placer::place(const Measurement& measurement, const SourceTarget& ta
   return "";
 }
 
-std::string place_map(const TransformBuffer& buffer, const ros::Time& time, double max_age,
-                      SourceSnapshot* snapshot) {
-  const std::string &fixed = snapshot->fixed_frame, &frame = snapshot->map_frame;
-  snapshot->lags.resize(1);
-  return look_up_near(buffer, fixed, frame, time, max_age, &snapshot->cloud.X_FM,
-                      &snapshot->lags[0]);
-}
-
 }  // namespace ist

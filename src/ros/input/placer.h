@@ -54,12 +54,4 @@ class Placer {
   std::chrono::steady_clock::time_point target_since_;
 };
 
-/// Looks up where a map's frame is in the fixed frame at an instant, or else at the newest instant
-/// that tf knows.
-/// @param max_age   [s] allowed age of the newest instant
-/// @param snapshot  its frames are read, cloud.X_FM is set
-/// @returns empty on success, else a sentence
-std::string place_map(const TransformBuffer& buffer, const ros::Time& time, double max_age,
-                      SourceSnapshot* snapshot);
-
 }  // namespace ist

@@ -1,10 +1,9 @@
-#include "ros/input/scan_measurement.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 #include "ist_proximity/cloud/laser_scan.h"
+#include "ros/input/measurement.h"
 
 namespace ist {
 namespace {

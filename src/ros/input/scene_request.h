@@ -30,8 +30,6 @@ class SceneRequest {
   /// @param service  resolved name
   explicit SceneRequest(std::string service) : service_(std::move(service)) {}
   ~SceneRequest() { end(); }
-  SceneRequest(const SceneRequest&) = delete;
-  SceneRequest& operator=(const SceneRequest&) = delete;
 
   const std::string& service() const { return service_; }
 

@@ -13,7 +13,7 @@
 #include "internal/robot/anytime_model.h"
 #include "ros/common/frame_name.h"
 #include "ros/common/stopwatch.h"
-#include "ros/input/map_message.h"
+#include "ros/input/map_measurement.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
@@ -204,12 +204,15 @@ void SourceMemory::hand_over() {
   told_ = told_next_;
 }
 
-const SourceSnapshot* SourceMemory::newest() {
+const SourceSnapshot* SourceMemory::newest(const std::shared_ptr<const RobotModel>& /*model*/,
+                                           const ros::Time& /*time*/, double /*max_age*/) {
   channel_.update();
   return channel_.front().get();
 }
 
-std::shared_ptr<const SourceSnapshot> SourceMemory::share() const {
+std::shared_ptr<const SourceSnapshot> SourceMemory::share(
+    const std::shared_ptr<const RobotModel>& /*model*/, const ros::Time& /*time*/,
+    double /*max_age*/) {
   const std::lock_guard<std::mutex> lock(told_mutex_);
   return told_.all;
 }
@@ -315,7 +318,15 @@ std::string SourceMemory::advice() const {
          ", or lower decay, max_range or the resolution";
 }
 
-void SourceMemory::report(SourceReport* report) const {
+void SourceMemory::report(SourceReport* report) {
+  *report = SourceReport();
+  report->name = config_.name + "/memory";
+  report->topic = publisher_.getTopic();
+  report->type = "octomap_msgs/Octomap";
+  report->noun = "memory";
+  report->is_memory = true;
+  report->measures = false;
+  report->required = false;
   const std::lock_guard<std::mutex> lock(told_mutex_);
   report->problem = told_.problem;
   report->doubt = told_.doubt;

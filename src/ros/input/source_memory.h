@@ -10,6 +10,7 @@
 #include "ist_proximity/cloud/memory_map.h"
 #include "ist_proximity/cloud/seen_space.h"
 #include "ros/input/measurement.h"
+#include "ros/input/obstacle_source.h"
 #include "ros/input/source_snapshot.h"
 #include "ros/input/source_state.h"
 #include "ros/parameters/source_config.h"
@@ -27,13 +28,22 @@ struct KnownSpace {
 /// What one source remembers (~memory): its clouds go into a MemoryMap in the source's thread,
 /// before they are handed to queries, so that a cloud and what is hidden from it always belong
 /// together.
-class SourceMemory {
+///
+/// For queries it is a source of its own, NAME/memory. Beside a fresh cloud its snapshots come with
+/// those of its parent (see CloudSelection), else they are its own.
+class SourceMemory : public ObstacleSource {
  public:
   /// @param config     its memory is enabled
   /// @param buffer     outlives this
   /// @param wants_body  whether the space that the robot takes up has to be known (~unknown_space)
   SourceMemory(const SourceConfig& config, const TransformBuffer& buffer, bool wants_body,
                const ros::Publisher& publisher);
+
+  /// Sets the source whose memory this is, before either is used; it outlives this.
+  void set_parent(const ObstacleSource* parent) { parent_ = parent; }
+  const ObstacleSource* parent() const override { return parent_; }
+  void set_model(std::shared_ptr<const RobotModel> /*model*/, const std::string& /*fixed_frame*/,
+                 const RegionOfInterest& /*region*/) override {}
 
   // The source's thread only.
 
@@ -54,17 +64,18 @@ class SourceMemory {
   /// All that is remembered, in view or not: what is known of obstacles while there is no fresh
   /// cloud. Null: nothing, or the source is required, so that nothing is known then. It stays valid
   /// until the next call and never waits. The cycle's thread only.
-  const SourceSnapshot* newest();
+  const SourceSnapshot* newest(const std::shared_ptr<const RobotModel>& model,
+                               const ros::Time& time, double max_age) override;
 
   // Thread safe. What is told waits for no cloud.
 
   /// The same for any other thread; valid as long as it is held.
-  std::shared_ptr<const SourceSnapshot> share() const;
+  std::shared_ptr<const SourceSnapshot> share(const std::shared_ptr<const RobotModel>& model,
+                                              const ros::Time& time, double max_age) override;
   /// What it has lost of obstacles that it would still remember, as a sentence; empty: nothing.
   std::string loss() const;
 
-  /// Writes the state of the memory to the members of a report that are about it.
-  void report(SourceReport* report) const;
+  void report(SourceReport* report) override;
   /// Writes ~memory/file, but never over a file that has not been read, or could not be.
   /// @returns a sentence
   std::string save(bool* is_saved);
@@ -105,6 +116,7 @@ class SourceMemory {
   const TransformBuffer& buffer_;
   const bool wants_body_;
   ros::Publisher publisher_;
+  const ObstacleSource* parent_ = nullptr;
 
   // Used by the source's thread alone.
   MemoryScan scan_;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "ist_proximity/cloud/view_filter.h"
 #include "ist_proximity/geometry/region_of_interest.h"
 #include "ist_proximity/robot/robot_model.h"
 #include "ros/input/source_report.h"
@@ -77,5 +78,8 @@ class SourceState {
   Clock::time_point work_since_ = kNoWork;
   static constexpr Clock::time_point kNoWork = Clock::time_point::min();
 };
+
+/// A sentence when the points on the robot say that the sensor's pose in tf is wrong; else empty.
+std::string doubt_of_view(const ViewReport& view);
 
 }  // namespace ist

@@ -41,8 +41,6 @@ class UnknownSpaceWatch {
   UnknownSpaceWatch(SourceMemories memories, double range, const ros::Publisher& publisher,
                     double drawn_range, const TransformBuffer& buffer);
   ~UnknownSpaceWatch();
-  UnknownSpaceWatch(const UnknownSpaceWatch&) = delete;
-  UnknownSpaceWatch& operator=(const UnknownSpaceWatch&) = delete;
 
   /// The newest snapshot; null: nothing has been seen yet. It stays valid until the next call and
   /// never waits. The cycle's thread only.

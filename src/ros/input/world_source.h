@@ -52,8 +52,6 @@ class WorldSource : public ObstacleSource {
   WorldSource(const SourceConfig& config, ros::NodeHandle nh, ros::NodeHandle private_nh,
               const TransformBuffer& buffer);
   ~WorldSource() override;
-  WorldSource(const WorldSource&) = delete;
-  WorldSource& operator=(const WorldSource&) = delete;
 
   void set_model(std::shared_ptr<const RobotModel> model, const std::string& fixed_frame,
                  const RegionOfInterest& region) override;

@@ -33,8 +33,6 @@ class ContactLoader {
   ContactLoader(const ServerConfig& config, const ModelLoader& loader);
   /// Stops packing.
   ~ContactLoader();
-  ContactLoader(const ContactLoader&) = delete;
-  ContactLoader& operator=(const ContactLoader&) = delete;
 
   /// The bodies made so far; null until a model is ready, and where they are not wanted.
   std::shared_ptr<const ContactModel> contacts() const;

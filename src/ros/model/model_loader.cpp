@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <set>
 
 #include "internal/robot/mesh_size.h"
@@ -13,12 +14,19 @@
 #include "ros/common/memory.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
-#include "ros/model/progress_report.h"
 
 namespace ist {
 namespace {
 
 constexpr std::chrono::milliseconds kPoll(500);
+// [s] Between two lines of the log; links from the cache are done before the first one.
+constexpr double kLogPeriod = 3.0;
+
+std::string sentence_of(const ModelProgress& progress) {
+  return "packing link '" + progress.link + "' (" + std::to_string(progress.index + 1) + " of " +
+         std::to_string(progress.count) +
+         format_text("), %.0f %% of the robot done", std::floor(100.0 * progress.fraction));
+}
 
 void add_name(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
@@ -285,7 +293,6 @@ bool ModelLoader::show_reading(const std::string& link, const std::string& mesh)
 /// @returns false when cancelled
 bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& description,
                         ModelState* state) {
-  ProgressReport report;
   std::mutex report_mutex;  // several threads pack
   RobotModelCallbacks callbacks;
   callbacks.cancelled = [this] { return cancelled(); };
@@ -298,9 +305,9 @@ bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& descripti
   };
   callbacks.progress = [&](const ModelProgress& progress) {
     const std::lock_guard<std::mutex> lock(report_mutex);
-    report.update(progress);
     state->fraction = progress.fraction;
-    const std::string sentence = ProgressReport::sentence(progress);
+    const std::string sentence = sentence_of(progress);
+    ROS_INFO_STREAM_DELAYED_THROTTLE(kLogPeriod, sentence);
     if (sentence == state->problem) return;  // a new state is work for all parts of the node
     state->problem = sentence;
     set_state(*state);
@@ -314,7 +321,6 @@ bool ModelLoader::build(const std::shared_ptr<const RobotDescription>& descripti
   const AnytimeModel::Ptr made =
       AnytimeModel::build(description, model_config(*description, state->objects),
                           AnytimeModel::Stage::kFirst, callbacks, partial);
-  report.finish();
   if (!made) return false;
   take_robot(*description, made, state);
   return true;

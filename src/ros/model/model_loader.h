@@ -31,8 +31,6 @@ class ModelLoader {
   ModelLoader(const ServerConfig& config, const ros::NodeHandle& nh);
   /// Stops packing.
   ~ModelLoader();
-  ModelLoader(const ModelLoader&) = delete;
-  ModelLoader& operator=(const ModelLoader&) = delete;
 
   std::shared_ptr<const ModelState> state() const;
 

@@ -10,7 +10,6 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/memory.h"
 #include "ros/common/thread_name.h"
-#include "ros/common/thread_priority.h"
 #include "ros/model/model_loader.h"
 
 // Background work on the model: distance fields, coarse ones of all links first, and finer spheres

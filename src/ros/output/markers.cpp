@@ -9,7 +9,6 @@
 #include "ros/common/frame_name.h"
 #include "ros/common/text.h"
 #include "ros/output/nearest_summary.h"
-#include "ros/output/nearness_color.h"
 
 namespace ist {
 namespace {

@@ -13,8 +13,8 @@
 #endif
 
 #include "ros/common/eigen_conversion.h"
+#include "ros/common/ros_time.h"
 #include "ros/output/message_conversion.h"
-#include "ros/poses/clock_skew.h"
 
 namespace ist {
 namespace {

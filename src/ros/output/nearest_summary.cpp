@@ -1,10 +1,11 @@
 #include "ros/output/nearest_summary.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "ros/common/text.h"
-#include "ros/output/nearness_color.h"
 
 namespace ist {
 namespace {
@@ -12,23 +13,11 @@ namespace {
 using ist_proximity::ProximityArray;
 using Link = ist_proximity::LinkProximity;
 
+constexpr const char* kStatuses[] = {"OK",       "NO_CLOUD",    "STALE_CLOUD", "NO_POSE",
+                                     "DEGRADED", "MODEL_ERROR", "LOADING"};
+
 const char* name_of(std::uint8_t status) {
-  switch (status) {
-    case ProximityArray::NO_CLOUD:
-      return "NO_CLOUD";
-    case ProximityArray::STALE_CLOUD:
-      return "STALE_CLOUD";
-    case ProximityArray::NO_POSE:
-      return "NO_POSE";
-    case ProximityArray::DEGRADED:
-      return "DEGRADED";
-    case ProximityArray::MODEL_ERROR:
-      return "MODEL_ERROR";
-    case ProximityArray::LOADING:
-      return "LOADING";
-    default:
-      return "OK";
-  }
+  return status < std::size(kStatuses) ? kStatuses[status] : "OK";
 }
 
 }  // namespace
@@ -68,6 +57,21 @@ NearestSummary summarize_nearest(const ProximityArray& proximity, double max_dis
     summary.text += std::string("\n") + name_of(proximity.status);
   }
   return summary;
+}
+
+std_msgs::ColorRGBA make_color(double r, double g, double b, double a) {
+  std_msgs::ColorRGBA color;
+  color.r = static_cast<float>(r);
+  color.g = static_cast<float>(g);
+  color.b = static_cast<float>(b);
+  color.a = static_cast<float>(a);
+  return color;
+}
+
+std_msgs::ColorRGBA nearness_color(double distance, double max_distance) {
+  if (std::isnan(distance)) return make_color(0.6, 0.6, 0.6, 1.0);
+  const double far = std::clamp(distance / max_distance, 0.0, 1.0);
+  return make_color(std::min(1.0, 2.0 * (1.0 - far)), std::min(1.0, 2.0 * far), 0.1, 1.0);
 }
 
 }  // namespace ist

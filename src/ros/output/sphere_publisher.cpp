@@ -8,7 +8,7 @@
 
 #include "ros/common/publish.h"
 #include "ros/output/markers.h"
-#include "ros/output/nearness_color.h"
+#include "ros/output/nearest_summary.h"
 
 namespace ist {
 namespace {

@@ -41,8 +41,6 @@ class LiveParameters {
   /// @param config  as read at the start
   LiveParameters(const ros::NodeHandle& private_nh, const ServerConfig& config);
   ~LiveParameters();
-  LiveParameters(const LiveParameters&) = delete;
-  LiveParameters& operator=(const LiveParameters&) = delete;
 
   LiveConfig get() const;
 

@@ -55,7 +55,6 @@ std::vector<Parameter> startup_parameters(ServerConfig* config) {
       {"self_collision/ignore", &self.ignore},
       {"self_collision/ignore_contact_at_rest", &self.ignore_contact_at_rest},
       {"self_collision/in_minimum", &self.in_minimum},
-      {"self_collision/samples", &self.samples, Range::non_negative("", 1e6)},
       {"attach/max_objects", &config->attach.max_objects, Range::non_negative("", 1e4)},
       {"attach/max_time", &config->attach.max_time, Range::positive("s", 3600.0)},
       {"unknown_space", choice(&config->unknown_space, {"free", "obstacle", "report"})},
@@ -92,11 +91,13 @@ void check_model(ParameterReader* reader, const ServerConfig& config) {
 /// below them; links have the robot's where one of their own is set, until it is read.
 SpeedScaleConfig unread_speed_scale(ParameterReader* reader, double max_distance) {
   const bool has_free = reader->has("speed_scale/free_distance");
-  SpeedScaleConfig config;
-  if (!has_free && !reader->has("speed_scale/stop_distance")) {
-    config = fitted_to(config, max_distance);
-  } else if (!has_free) {  // it stays in its place relative to the other
-    config.free_distance = std::min(config.free_distance, max_distance);
+  SpeedScaleConfig config = fitted_to({}, max_distance);
+  if (has_free || reader->has("speed_scale/stop_distance")) {
+    const SpeedScaleConfig usual;
+    config.stop_distance = usual.stop_distance;
+    // The one that is not set stays in its place relative to the other.
+    config.free_distance =
+        has_free ? usual.free_distance : std::min(usual.free_distance, max_distance);
   }
   for (const std::string& name : reader->children("speed_scale/links")) {
     LinkSpeedDistances link;

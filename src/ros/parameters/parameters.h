@@ -36,8 +36,6 @@ struct SelfCollisionConfig {
   bool ignore_contact_at_rest = true;  ///< leave out pairs in contact with all joints at zero
   /// Its links count in ~min_distance, ~speed_scale and ~joint_repulsion.
   bool in_minimum = false;
-  /// Random configurations in which ~link_pairs counts contacts; 0: none.
-  int samples = static_cast<int>(PairSampling().configurations);
 };
 
 /// The links whose volumes are packed for `penetration`.

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
+#include "ros/poses/tf_pose_source.h"
 #include "ros/poses/transforms.h"
 
 namespace ist {
@@ -252,6 +255,21 @@ void JointPoseSource::look_up_all(const Kinematics& kinematics, const ros::Time&
                                   BodyPoses* bodies) {
   if (tf_is_behind_) return tf_source_.look_up_all(kinematics, instant, bodies);
   *bodies = placer_.bodies();
+}
+
+std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
+                                             const TransformBuffer& buffer,
+                                             JointStateListener* joints,
+                                             JointPoseSource::Which which) {
+  const std::string fixed_frame = fixed_frame_of(model, config);
+  const std::vector<std::string> names = link_names(*model.robot);
+  const std::vector<bool> wanted = wanted_links(model);
+  if (!joints) {
+    return std::make_unique<TfPoseSource>(buffer, fixed_frame, names, wanted, config.pose_timeout);
+  }
+  if (!model.kinematics) return nullptr;
+  return std::make_unique<JointPoseSource>(model.kinematics, joints, which, buffer, fixed_frame,
+                                           names, wanted, config.pose_timeout);
 }
 
 }  // namespace ist

@@ -5,9 +5,13 @@
 #include <vector>
 
 #include "ist_proximity/robot/kinematics.h"
+#include "ros/model/model_state.h"
+#include "ros/parameters/parameters.h"
 #include "ros/poses/joint_state_listener.h"
 #include "ros/poses/link_placer.h"
+#include "ros/poses/pose_source.h"
 #include "ros/poses/tf_pose_source.h"
+#include "ros/poses/transform_buffer.h"
 
 namespace ist {
 
@@ -75,5 +79,16 @@ class JointPoseSource : public PoseSource {
   bool tf_is_behind_ = false;
   StampedLinkPoses last_;  ///< the result of the last look_up()
 };
+
+/// Makes the source of link poses that ~pose_source asks for.
+/// @param model   ready
+/// @param buffer  outlives the result
+/// @param joints  outlives the result; null: link poses come from the buffer
+/// @param which   the joint states to use
+/// @returns null when the URDF's kinematics is needed and faulty
+std::unique_ptr<PoseSource> make_pose_source(const ModelState& model, const ServerConfig& config,
+                                             const TransformBuffer& buffer,
+                                             JointStateListener* joints,
+                                             JointPoseSource::Which which);
 
 }  // namespace ist

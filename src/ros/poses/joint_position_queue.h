@@ -37,23 +37,40 @@ using JointPositions = std::vector<JointPosition>;  ///< by joint of the kinemat
 class JointPositionQueue {
  public:
   /// Forgets all positions.
-  void reset(std::size_t joints);
+  void reset(std::size_t joints) {
+    newest_.assign(joints, JointPosition());
+    taken_ = newest_;
+    waiting_.clear();
+  }
 
   const JointPositions& newest() const { return newest_; }
   JointPosition& at(std::size_t joint) { return newest_[joint]; }
 
-  /// Queues the newest positions. When ten wait already, the robot has gone on too far: those are
-  /// dropped.
+  /// Queues the newest positions. When kMaxWaiting wait already, the robot has gone on too far:
+  /// those are dropped.
   /// @returns the number that was dropped
-  std::size_t push();
+  std::size_t push() {
+    const std::size_t dropped = waiting_.size() == kMaxWaiting ? waiting_.size() : 0;
+    if (dropped > 0) waiting_.clear();
+    waiting_.push_back(newest_);
+    return dropped;
+  }
 
   bool is_waiting() const { return !waiting_.empty(); }
   /// Takes the oldest positions that wait, or the newest ones when none do.
-  void take_next();
+  void take_next() {
+    if (waiting_.empty()) {
+      taken_ = newest_;
+      return;
+    }
+    taken_.swap(waiting_.front());
+    waiting_.pop_front();
+  }
   /// The positions taken last: messages before them count, later ones do not.
   const JointPositions& taken() const { return taken_; }
 
  private:
+  static constexpr std::size_t kMaxWaiting = 10;
   JointPositions newest_, taken_;
   std::deque<JointPositions> waiting_;
 };

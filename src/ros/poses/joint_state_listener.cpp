@@ -12,7 +12,6 @@
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
-#include "ros/poses/clock_skew.h"
 #include "ros/poses/position_limits.h"
 
 namespace ist {

@@ -9,7 +9,6 @@
 #include "ros/common/frame_name.h"
 #include "ros/common/ros_time.h"
 #include "ros/common/text.h"
-#include "ros/poses/clock_skew.h"
 
 namespace ist {
 namespace {

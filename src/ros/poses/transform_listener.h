@@ -26,8 +26,6 @@ class TransformListener {
   /// @param buffer  outlives this
   TransformListener(TransformBuffer* buffer, ros::NodeHandle nh);
   ~TransformListener();
-  TransformListener(const TransformListener&) = delete;
-  TransformListener& operator=(const TransformListener&) = delete;
 
   /// Empties the buffer if the ROS clock has jumped back since the last call or message; static
   /// transforms stay. Thread safe.

@@ -10,7 +10,6 @@
 #include "ros/common/exceptions.h"
 #include "ros/common/text.h"
 #include "ros/common/thread_name.h"
-#include "ros/common/thread_priority.h"
 
 namespace ist {
 namespace {
@@ -105,14 +104,11 @@ bool LinkPairService::is_outdated(const ModelState& model) const {
 void LinkPairService::sample(Findings* findings) {
   const ModelState& model = *findings->model;
   PairSampling sampling;
-  sampling.configurations = static_cast<std::size_t>(config_.self_collision.samples);
   findings->problem.clear();
-  if (sampling.configurations == 0) {
-    findings->problem = "~self_collision/samples is 0: pairs are not sampled";
-  } else if (!model.objects.empty()) {
+  if (!model.objects.empty()) {
     findings->problem = "pairs are sampled without attached objects only";
+    return;
   }
-  if (!findings->problem.empty()) return;
   std::vector<LinkPair> pairs;
   for (const ChosenPair& chosen : findings->chosen) {
     const bool is_sampled =
@@ -198,7 +194,7 @@ bool LinkPairService::answer(Service::Request& request, Service::Response& respo
     response.pairs.push_back(pair);
   }
   if (!findings->sampled.empty()) {
-    response.configurations = static_cast<std::uint32_t>(config_.self_collision.samples);
+    response.configurations = static_cast<std::uint32_t>(PairSampling().configurations);
   }
   response.srdf =
       to_srdf(robot, *findings->model->kinematics, findings->sampled, request.never != 0);

@@ -26,8 +26,6 @@ class LinkPairService {
   LinkPairService(const ros::NodeHandle& nh, ros::NodeHandle private_nh,
                   const ServerConfig& config);
   ~LinkPairService();
-  LinkPairService(const LinkPairService&) = delete;
-  LinkPairService& operator=(const LinkPairService&) = delete;
 
   /// Thread safe.
   void set_model(std::shared_ptr<const ModelState> model);

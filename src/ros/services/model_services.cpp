@@ -1,6 +1,7 @@
 #include "ros/services/model_services.h"
 
 #include "ist_proximity/robot/robot_description.h"
+#include "ros/common/text.h"
 #include "ros/services/object_conversion.h"
 
 namespace ist {
@@ -22,6 +23,25 @@ ModelServices::~ModelServices() {
   attach_service_.shutdown();
   reload_service_.shutdown();
   detach_service_.shutdown();
+  save_service_.shutdown();
+}
+
+void ModelServices::offer(ros::NodeHandle private_nh, const SourceMemories& memories) {
+  memories_ = memories;
+  private_nh.setCallbackQueue(thread_.queue());
+  save_service_ = private_nh.advertiseService("save_memory", &ModelServices::save, this);
+}
+
+bool ModelServices::save(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+  std::vector<std::string> texts;
+  response.success = 1;
+  for (const std::shared_ptr<SourceMemory>& memory : memories_) {
+    bool is_saved = false;
+    texts.push_back(memory->save(&is_saved));
+    if (!is_saved) response.success = 0;
+  }
+  response.message = join(texts, "; ");
+  return true;
 }
 
 bool ModelServices::reload(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {

@@ -36,8 +36,6 @@ class QueryService {
                const CloudSources& sources, const TransformBuffer& buffer,
                std::function<LiveConfig()> live, UnknownSpaceWatch* watch = nullptr);
   ~QueryService();
-  QueryService(const QueryService&) = delete;
-  QueryService& operator=(const QueryService&) = delete;
 
   /// Thread safe.
   void set_model(std::shared_ptr<const ModelState> model);

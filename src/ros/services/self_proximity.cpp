@@ -14,7 +14,7 @@
 #include "ros/common/thread_name.h"
 #include "ros/output/message_conversion.h"
 #include "ros/output/message_invariants.h"
-#include "ros/poses/make_pose_source.h"
+#include "ros/poses/joint_pose_source.h"
 #include "ros/services/pair_choice.h"
 
 namespace ist {

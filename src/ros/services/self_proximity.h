@@ -37,8 +37,6 @@ class SelfProximity {
                 const TransformBuffer& buffer, JointStateListener* joints,
                 std::function<LiveConfig()> live);
   ~SelfProximity();
-  SelfProximity(const SelfProximity&) = delete;
-  SelfProximity& operator=(const SelfProximity&) = delete;
 
   /// Thread safe.
   void set_model(std::shared_ptr<const ModelState> model);

@@ -1,11 +1,37 @@
 #include "ros/status/diagnostics_publisher.h"
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <ist_proximity/ProximityArray.h>
+#include <ros/console.h>
 
 #include "ros/common/publish.h"
 #include "ros/status/diagnostics.h"
 
 namespace ist {
+namespace {
+
+// [s] A status is logged once it has lasted this long, and again after the second time.
+constexpr int kPatience = 3, kRepeat = 30;
+
+}  // namespace
+
+void DiagnosticsPublisher::log_status(std::uint8_t status, const std::string& text) {
+  constexpr std::uint8_t kOk = ist_proximity::ProximityArray::OK;
+  if (status == kOk) {
+    if (logged_ != kOk) ROS_INFO("the status is OK again");
+    logged_ = kOk;
+    bad_ = since_logged_ = 0;
+    return;
+  }
+  ++bad_;
+  ++since_logged_;
+  const bool is_due = logged_ == kOk ? bad_ >= kPatience
+                                     : since_logged_ >= (status == logged_ ? kRepeat : kPatience);
+  if (!is_due) return;
+  ROS_WARN_STREAM(text);
+  logged_ = status;
+  since_logged_ = 0;
+}
 
 DiagnosticsPublisher::DiagnosticsPublisher(ros::NodeHandle nh, const std::string& node,
                                            const ServerConfig& config)
@@ -19,7 +45,7 @@ void DiagnosticsPublisher::publish(const CycleReport& report, const ModelState& 
                                    const ContactModel* contacts, std::uint64_t triggers) {
   // The loader itself logs its progress until the model is ready.
   if (model.is_ready()) {
-    status_log_.update(report.status.code, report.status.text);
+    log_status(report.status.code, report.status.text);
   }
   const auto now = std::chrono::steady_clock::now();
   const std::chrono::duration<double> interval = now - last_time_;

@@ -13,12 +13,11 @@
 #include "ros/model/model_state.h"
 #include "ros/parameters/parameters.h"
 #include "ros/status/cycle_report.h"
-#include "ros/status/status_log.h"
 
 namespace ist {
 
-/// Publishes /diagnostics and logs why the status is not OK. Rates count from one call to the next.
-/// One thread.
+/// Publishes /diagnostics, and logs why the status is not OK, once that has lasted a while, and
+/// when it is OK again. Rates count from one call to the next. One thread.
 class DiagnosticsPublisher {
  public:
   /// @param node  name of the node, as it begins each status' name
@@ -32,17 +31,21 @@ class DiagnosticsPublisher {
                std::uint64_t triggers);
 
  private:
+  void log_status(std::uint8_t status, const std::string& text);
+
   const std::string node_;
   const double rate_;  ///< [Hz] ~rate
   const ContactsWanted contacts_wanted_;
   ros::Publisher publisher_;
-  StatusLog status_log_;
 
   // The last call.
   std::chrono::steady_clock::time_point last_time_;
   std::size_t last_cycles_ = 0;
   std::uint64_t last_triggers_ = 0;
   std::vector<std::uint64_t> last_messages_;  ///< by source
+  std::uint8_t logged_ = 0;                   ///< the status that was logged last
+  int bad_ = 0;                               ///< [s] for which the status has not been OK
+  int since_logged_ = 0;                      ///< [s]
 };
 
 }  // namespace ist

@@ -5,7 +5,6 @@
 #include "internal/robot/anytime_model.h"
 #include "internal/robot/model_memory.h"
 #include "ros/common/text.h"
-#include "ros/status/diagnostic_values.h"
 #include "ros/status/diagnostics.h"
 
 namespace ist {
