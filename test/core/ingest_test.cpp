@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,7 +11,7 @@
 #include <random>
 #include <set>
 #include <stdexcept>
-#include <thread>
+#include <tuple>
 
 #include "support/instruction_sets.h"
 #include "support/scene.h"
@@ -200,25 +199,12 @@ TEST(Ingest, rangesIncludeTheirBounds) {
   EXPECT_EQ(points.count(5), 1U);
 }
 
-TEST(Ingest, rangeIsMeasuredFromTheSensor) {
-  const CloudSnapshot snapshot = ingest({{1, 0, 0}, {4, 0, 0}}, {}, {}, pose(100, 0, 0));
-  EXPECT_EQ(snapshot.counts.used, 1U);
-}
-
 TEST(Ingest, denormalsAndZeroFollowMinRange) {
   const Points points = {{0, 0, 0}, {1e-45, 0, 0}, {-1e-40, 1e-42, 0}, {0.04, 0, 0}};
   EXPECT_EQ(ingest(points).counts.out_of_range, 4U);
   IngestConfig config;
   config.min_range = 0.0;
   EXPECT_EQ(ingest(points, config).counts.used, 4U);
-}
-
-TEST(Ingest, infiniteMaxRangeKeepsEveryFinitePoint) {
-  IngestConfig config;
-  config.max_range = kInf;
-  const CloudSnapshot snapshot = ingest({{1e5, 0, 0}, {0, 5e6, 0}, {kInf, 0, 0}}, config);
-  EXPECT_EQ(snapshot.counts.used, 2U);
-  EXPECT_EQ(snapshot.counts.infinite, 1U);
 }
 
 TEST(Ingest, everyFormatReadsTheSame) {
@@ -281,12 +267,6 @@ IngestConfig without_limits() {
   config.min_range = 0.0;
   config.max_range = kInf;
   return config;
-}
-
-TEST(Ingest, pointsAreInTheFixedFrame) {
-  const Points points = random_points(500, 2.0, 2);
-  const Eigen::Isometry3d X_FS = pose(0.3, -0.2, 0.9);
-  expect_transformed(points, X_FS, ingest(points, without_limits(), {}, X_FS).index, 5e-7);
 }
 
 // Every tile has one parent, every box bounds the points in its subtree, and unused slots are at
@@ -490,36 +470,6 @@ TEST(Ingest, imageAtItsRangeIsCutAsAListIs) {
   }
 }
 
-// Several threads load the same tiles at once.
-TEST(Ingest, lazilyLoadedTilesAreTheSameInEveryThread) {
-  const Points points = depth_image(320, 240, 1000);
-  Format organized;
-  organized.width = 320;
-  organized.point_step = 16;
-  organized.misaligned = 0;
-  const PointIndex at_once = ingest(points, {}, organized).index;
-  organized.owned = true;
-  IngestConfig config;
-  config.thin = false;
-  for (int round = 0; round < 5; ++round) {
-    const PointIndex index = ingest(points, config, organized).index;
-    ASSERT_EQ(index.bvh().tile_count(), at_once.bvh().tile_count());
-    std::array<std::size_t, 4> same{};
-    std::vector<std::thread> threads;
-    for (std::size_t& count : same) {
-      threads.emplace_back([&index, &at_once, &count] {
-        PointTile scratch, other_scratch;
-        for (std::size_t i = 0; i < index.bvh().tile_count(); ++i) {
-          count += static_cast<std::size_t>(test::same_points(
-              index.bvh().tile(i, &scratch), at_once.bvh().tile(i, &other_scratch)));
-        }
-      });
-    }
-    for (std::thread& thread : threads) thread.join();
-    for (const std::size_t count : same) EXPECT_EQ(count, index.bvh().tile_count());
-  }
-}
-
 // Rows and columns of a shuffled image are unrelated to space. The index must be as good as that of
 // an unorganized cloud.
 TEST(Ingest, shuffledImageIsIndexedAsAList) {
@@ -568,36 +518,30 @@ TEST(Ingest, refusesMorePointsThanAllowed) {
   EXPECT_THROW(Ingest{config}, std::invalid_argument);
 }
 
-// The next four tests have points far from an origin. In float, a coordinate of 4e6 m is off by up
-// to 0.25 m.
-TEST(Ingest, farSensorLosesNothing) {
-  const Points points = random_points(500, 2.0, 3);
-  const Eigen::Isometry3d X_FS = pose(691000.123, 5334000.456, 520.789);
-  IngestConfig config;
+// Points far from an origin: in float, a coordinate of 4e6 m is off by up to 0.25 m. The sensor is
+// far out, or the points are far from it, and its pose brings them near or not.
+TEST(Ingest, farSensorsAndPointsLoseNothing) {
+  const Eigen::Vector3d far(691000.123, 5334000.456, 520.789);
+  const Points near_points = random_points(500, 2.0, 3);
+  Points far_points = near_points;
+  for (Eigen::Vector3d& p : far_points) p += far;
+  Eigen::Isometry3d X_back = Eigen::Isometry3d::Identity();
+  X_back.translation() << -691000.0, -5334000.0, -520.0;
+  const Eigen::Isometry3d X_far = pose(far.x(), far.y(), far.z());
+  IngestConfig config = without_limits();
   config.max_range = 10.0;
-  config.min_range = 0.0;
-  expect_transformed(points, X_FS, ingest(points, config, {}, X_FS).index, 1e-6);
-  expect_transformed(points, X_FS, ingest(points, config, float64(), X_FS).index, 1e-6);
-}
-
-TEST(Ingest, farPointsLoseNothing) {
-  Points points = random_points(500, 2.0, 4);
-  for (Eigen::Vector3d& p : points) p += Eigen::Vector3d(691000.123, 5334000.456, 520.789);
-  for (const Eigen::Isometry3d& X_FS :
-       {Eigen::Isometry3d(Eigen::Isometry3d::Identity()), pose(1.0, 2.0, 3.0)}) {
-    const CloudSnapshot snapshot = ingest(points, without_limits(), float64(), X_FS);
-    expect_transformed(points, X_FS, snapshot.index, 1e-6);
+  for (const Format& format : {Format(), float64()}) {
+    const PointIndex index = ingest(near_points, config, format, X_far).index;
+    expect_transformed(near_points, X_far, index, 1e-6);
   }
-}
-
-TEST(Ingest, farPointsLoseNothingWhenTheSensorPoseBringsThemNear) {
-  Points points = random_points(500, 2.0, 5);
-  for (Eigen::Vector3d& p : points) p += Eigen::Vector3d(691000.123, 5334000.456, 520.789);
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  X_FS.translation() << -691000.0, -5334000.0, -520.0;
-  const CloudSnapshot snapshot = ingest(points, without_limits(), float64(), X_FS);
-  EXPECT_LT(snapshot.index.X_FO().translation().norm(), 10.0);
-  expect_transformed(points, X_FS, snapshot.index, 1e-6);
+  for (const Eigen::Isometry3d& X_FS :
+       {Eigen::Isometry3d(Eigen::Isometry3d::Identity()), pose(1.0, 2.0, 3.0), X_back}) {
+    const PointIndex index = ingest(far_points, without_limits(), float64(), X_FS).index;
+    expect_transformed(far_points, X_FS, index, 1e-6);
+  }
+  EXPECT_LT(
+      ingest(far_points, without_limits(), float64(), X_back).index.X_FO().translation().norm(),
+      10.0);
 }
 
 // A few far points must not move the origin away from most of the points.
@@ -673,28 +617,16 @@ TEST(Ingest, namesTheFaultyMemberOfItsConfiguration) {
     return "";
   };
   EXPECT_EQ(fault({}), "");
-  IngestConfig config;
-  config.min_range = -1.0;
-  EXPECT_NE(fault(config).find("min_range is -1"), std::string::npos);
-  config = {};
-  config.max_range = 0.05;
-  EXPECT_NE(fault(config).find("max_range"), std::string::npos);
-  config.max_range = kNan;
-  EXPECT_NE(fault(config).find("max_range"), std::string::npos);
-  config = {};
-  config.self_filter_padding = -0.1;
-  EXPECT_NE(fault(config).find("self_filter_padding"), std::string::npos);
-  config = {};
-  config.thinning = 0.0;
-  EXPECT_NE(fault(config).find("thinning"), std::string::npos);
-}
-
-TEST(Ingest, refusesAPoseThatIsNotFinite) {
-  const Message message({{1, 0, 0}}, {});
-  Eigen::Isometry3d X_FS = Eigen::Isometry3d::Identity();
-  X_FS.translation().x() = kNan;
-  CloudSnapshot snapshot;
-  EXPECT_THROW(Ingest({}).run(message.raw, X_FS, {}, 0.0, &snapshot), std::invalid_argument);
+  for (const auto& [member, bad, words] :
+       {std::tuple(&IngestConfig::min_range, -1.0, "min_range is -1"),
+        std::tuple(&IngestConfig::max_range, 0.05, "max_range"),
+        std::tuple(&IngestConfig::max_range, kNan, "max_range"),
+        std::tuple(&IngestConfig::self_filter_padding, -0.1, "self_filter_padding"),
+        std::tuple(&IngestConfig::thinning, 0.0, "thinning")}) {
+    IngestConfig config;
+    config.*member = bad;
+    EXPECT_NE(fault(config).find(words), std::string::npos) << words;
+  }
 }
 
 TEST(Ingest, buffersAreReused) {

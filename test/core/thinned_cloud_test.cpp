@@ -111,20 +111,6 @@ Thinned expected(const CloudSnapshot& snapshot) {
   return all;
 }
 
-// Every point has a thinned point in its voxel, so no farther than the voxel's diagonal.
-void expect_near_each_point(const CloudSnapshot& snapshot) {
-  Points thinned;
-  for (const auto& [id, p] : test::thinned_points_of(snapshot.index)) thinned.push_back(p);
-  std::size_t checked = 0;
-  for (const PointTile& tile : test::tiles_of(snapshot.index)) {
-    if (++checked % 8 != 0) continue;
-    const Eigen::Vector3d p = snapshot.index.X_FO() * tile.point(0);
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const Eigen::Vector3d& q : thinned) nearest = std::min(nearest, (p - q).norm());
-    ASSERT_LE(nearest, std::sqrt(3.0) * snapshot.thinning + 1e-6);
-  }
-}
-
 TEST(ThinnedCloud, IsThatOfAllPointsAtOnce) {
   test::Rng rng(201);
   for (int trial = 0; trial < test::scaled(12); ++trial) {
@@ -145,18 +131,7 @@ TEST(ThinnedCloud, IsThatOfAllPointsAtOnce) {
     const Thinned all = found(snapshot.index);
     EXPECT_GT(all.size(), 100U);
     EXPECT_EQ(all, expected(snapshot));
-    expect_near_each_point(snapshot);
   }
-}
-
-TEST(ThinnedCloud, IsTheSameWithEveryInstructionSet) {
-  test::Rng rng(202);
-  const Points points = depth_image(96, 80, &rng);
-  const Eigen::Isometry3d X_FS = test::random_pose(&rng, 1.0);
-  test::for_each_instruction_set([&] {
-    const CloudSnapshot snapshot = snapshot_of(message_of(points, 96), X_FS);
-    EXPECT_EQ(found(snapshot.index), expected(snapshot));
-  });
 }
 
 // Where thousands of points share a voxel or a place, many tiles might hold a better point. All the
@@ -174,28 +149,6 @@ TEST(ThinnedCloud, ManyPointsInAVoxel) {
         snapshot_of(message_of(points, points.size()), Eigen::Isometry3d::Identity());
     EXPECT_EQ(found(snapshot.index), expected(snapshot));
   }
-}
-
-// A voxel of 1 mm at a distance of 1074 km has a number that no integer of 32 bits holds.
-TEST(ThinnedCloud, PointsBeyondTheIntegersOfVoxelsStayApart) {
-  Points points;
-  for (const double x : {2e6, 3e6, 4e6, -2e6, -3e6}) {
-    points.emplace_back(x, 0.0, 0.0);
-    points.emplace_back(0.0, x, 0.0);
-  }
-  points.emplace_back(0.5, 0.0, 0.0);
-  const CloudSnapshot snapshot =
-      snapshot_of(message_of(points, points.size()), Eigen::Isometry3d::Identity(), 0.001);
-  EXPECT_EQ(found(snapshot.index).size(), points.size());
-}
-
-TEST(ThinnedCloud, EmptyClouds) {
-  const CloudSnapshot none = snapshot_of(RawCloud(), Eigen::Isometry3d::Identity());
-  EXPECT_TRUE(none.index.bvh().thinned().empty());
-  const Points blind(64 * 64, Eigen::Vector3d::Constant(static_cast<double>(kNan)));
-  const CloudSnapshot nothing = snapshot_of(message_of(blind, 64), Eigen::Isometry3d::Identity());
-  EXPECT_TRUE(nothing.index.bvh().thinned().empty());
-  EXPECT_TRUE(found(nothing.index).empty());
 }
 
 // The points of a node do not depend on which nodes were asked for before.
@@ -286,27 +239,6 @@ TEST(ThinnedCloud, ThinningAllocatesNothing) {
   const long before = test::allocations;
   repulsion.wrench(0, scene.X_FL, clouds, scene.proximity, {});
   EXPECT_EQ(test::allocations - before, 0);
-}
-
-// Threads that begin when nothing is thinned get the same wrench to the bit.
-TEST(ThinnedCloud, ThreadsGetTheSameRepulsion) {
-  const NearAWall scene;
-  const Repulsion repulsion(scene.model);
-  for (int round = 0; round < test::scaled(10); ++round) {
-    const CloudSnapshot snapshot = scene.snapshot();
-    std::array<RepulsiveWrench, 3> wrenches;
-    std::vector<std::thread> threads;
-    for (RepulsiveWrench& wrench : wrenches) {
-      threads.emplace_back(
-          [&] { wrench = repulsion.wrench(0, scene.X_FL, {&snapshot}, scene.proximity, {}); });
-    }
-    for (std::thread& thread : threads) thread.join();
-    const RepulsiveWrench again = repulsion.wrench(0, scene.X_FL, {&snapshot}, scene.proximity, {});
-    for (const RepulsiveWrench& wrench : wrenches) {
-      ASSERT_EQ(wrench.force, again.force);
-      ASSERT_EQ(wrench.torque, again.torque);
-    }
-  }
 }
 
 // A copy thins what it holds itself.
