@@ -132,60 +132,6 @@ TEST(Facade, OneRobotServesSeveralThreads) {
   for (std::thread& thread : threads) thread.join();
 }
 
-TEST(Facade, AnUnknownPositionLeavesLinksUnknown) {
-  const Obstacles obstacles(std::vector<Eigen::Vector3f>{{0.5F, 0.0F, 0.5F}});
-  std::vector<double> q(demo().joints().size(), 0.0);
-  q.back() = kNaN;
-  const std::vector<LinkProximity> answers = demo().distances(q, obstacles);
-  EXPECT_NE(answers.front().state, LinkState::kUnknown);
-  EXPECT_EQ(answers.back().state, LinkState::kUnknown);
-  const std::vector<LinkProximity> known =
-      demo().distances(demo().configuration({{demo().joints().front(), 0.3}}), obstacles);
-  EXPECT_NE(known.back().state, LinkState::kUnknown);
-}
-
-// Pixels without a measurement are NaN; an image has the answers of the list of its points.
-TEST(Facade, ImagesAnswerAsLists) {
-  constexpr std::size_t kWidth = 64, kHeight = 48;
-  std::vector<float> image;
-  std::vector<Eigen::Vector3f> list;
-  for (std::size_t v = 0; v < kHeight; ++v) {
-    for (std::size_t u = 0; u < kWidth; ++u) {
-      const bool is_hole = (u + 3 * v) % 11 == 0;
-      const float x = 0.02F * static_cast<float>(u) - 0.6F, z = 0.02F * static_cast<float>(v);
-      const Eigen::Vector3f p(is_hole ? std::nanf("") : x, 0.45F, z);
-      image.insert(image.end(), {p.x(), p.y(), p.z()});
-      if (!is_hole) list.push_back(p);
-    }
-  }
-  const Obstacles from_image = Obstacles::from_image(image.data(), kWidth, kHeight);
-  image.assign(image.size(), 0.0F);  // the obstacles do not need it any more
-  const Obstacles from_list(list);
-  EXPECT_EQ(from_image.size(), list.size());
-  const std::vector<double> q(demo().joints().size(), 0.2);
-  const auto a = demo().distances(q, from_image), b = demo().distances(q, from_list);
-  for (std::size_t i = 0; i < a.size(); ++i) expect_same(a[i], b[i]);
-}
-
-// The self-filter drops points on the robot, and no others.
-TEST(Facade, SelfFilterDropsPointsOnTheRobot) {
-  const std::vector<double> q(demo().joints().size(), 0.0);
-  const LinkPoses poses = demo().link_poses(q);
-  std::vector<Eigen::Vector3f> points;
-  for (std::size_t i = 0; i < poses.X_FL.size(); ++i) {
-    const Eigen::Vector3d inside = demo().model()->links[i].packing.spheres.front().center;
-    points.push_back((poses.X_FL[i] * inside).cast<float>());
-  }
-  const std::size_t on_robot = points.size();
-  points.emplace_back(0.9F, 0.9F, 0.9F);
-  ObstaclesConfig config;
-  config.robot = &demo();
-  config.q = q;
-  const Obstacles obstacles(points, config);
-  EXPECT_EQ(obstacles.size(), 1U);
-  EXPECT_EQ(obstacles.counts().on_robot, on_robot);
-}
-
 TEST(Facade, BytesHoldTheWholeRobot) {
   const std::string bytes = demo().to_bytes();
   const Robot copy = Robot::from_bytes(bytes);
