@@ -1,16 +1,16 @@
 #include "internal/cloud/point_bvh.h"
-#include "support/tiles.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <limits>
 #include <random>
+#include <vector>
 
-#include "cloud/index/point_bvh_builder.h"
+#include "support/instruction_sets.h"
+#include "support/tiles.h"
 
 namespace ist {
 namespace {
@@ -26,11 +26,6 @@ struct Points {
     id.push_back(7 + 3 * static_cast<std::uint32_t>(id.size()));  // not the position
   }
   std::size_t size() const { return x.size(); }
-  std::vector<CloudPoint> list() const {
-    std::vector<CloudPoint> points;
-    for (std::size_t i = 0; i < size(); ++i) points.push_back({x[i], y[i], z[i], id[i]});
-    return points;
-  }
 };
 
 const Eigen::Isometry3d kFrame(Eigen::Translation3d(1.0, 2.0, 3.0));
@@ -156,36 +151,56 @@ class Checker {
 
 void check(const Points& points) { Checker(points, build(points)).run(); }
 
-// Distance to the nearest point, and the numbers of nodes and tiles visited.
-struct Nearest {
-  const PointBvh& index;
-  Eigen::Vector3f query;
-  float squared = std::numeric_limits<float>::infinity();
-  int nodes = 0, tiles = 0;
-
-  void visit(std::int32_t i) {
-    ++nodes;
-    const BoxNode& node = index.nodes()[static_cast<std::size_t>(i)];
-    std::vector<std::pair<float, std::int32_t>> children;
-    for (int k = 0; k < node.count; ++k) {
-      children.emplace_back(box_of(node, k).squaredExteriorDistance(query), node.child[k]);
-    }
-    std::sort(children.begin(), children.end());
-    for (const auto& [bound, child] : children) {
-      if (bound >= squared) return;
-      if (child >= 0) {
-        visit(child);
-        continue;
-      }
-      ++tiles;
-      PointTile scratch;
-      const PointTile& tile = index.tile(static_cast<std::size_t>(~child), &scratch);
-      for (int k = 0; k < tile.count; ++k) {
-        squared = std::min(squared, (point_of(tile, k) - query).squaredNorm());
-      }
-    }
+// Each point is about half as far from the corner as the one before, repeatedly: at any scale,
+// nearly all points are close together.
+Points nested(int halvings) {
+  const Points box = in_a_box(20000, 1.0F, 3);
+  Points points;
+  for (std::size_t i = 0; i < box.size(); ++i) {
+    const float scale = std::ldexp(1.0F, -static_cast<int>(i % static_cast<std::size_t>(halvings)));
+    points.add(std::abs(box.x[i]) * scale, box.y[i] * scale, box.z[i] * scale);
   }
-};
+  return points;
+}
+
+Points with_outliers(Points points, float distance) {
+  points.add(distance, 0.0F, 0.0F);
+  points.add(0.0F, -distance, distance);
+  return points;
+}
+
+Points of_two_places(float a, float b) {
+  Points points;
+  for (int i = 0; i < 5000; ++i) points.add(i % 3 == 0 ? a : b, 0.5F, -0.5F);
+  return points;
+}
+
+// The spread of the coordinates may under- or overflow what cells are computed with.
+std::vector<Points> hard_clouds() {
+  Points line, plane, apart;
+  for (int i = 0; i < 3000; ++i) {
+    line.add(0.001F * static_cast<float>(i), 0.0F, 0.0F);
+    plane.add(0.0F, 0.01F * static_cast<float>(i % 50), 0.01F * static_cast<float>(i / 50));
+    apart.add(i % 2 == 0 ? 1e6F : 0.0F, 0.001F * static_cast<float>(i), 0.0F);
+  }
+  return {line,
+          plane,
+          apart,
+          depth_image(160, 120),
+          in_a_box(1000, 1e-45F, 1),
+          in_a_box(1000, 1e-39F, 1),
+          in_a_box(5000, 1e-30F, 1),
+          in_a_box(5000, 1e14F, 2),
+          nested(40),
+          nested(120),
+          with_outliers(in_a_box(20000, 1.0F, 5), 1000.0F),
+          with_outliers(nested(40), 1e9F),
+          of_two_places(0.25F, 0.25F),
+          of_two_places(0.25F, std::nextafter(0.25F, 1.0F)),
+          of_two_places(0.0F, -0.0F),
+          of_two_places(0.0F, std::numeric_limits<float>::denorm_min()),
+          of_two_places(-1e14F, 1e14F)};
+}
 
 TEST(PointIndex, everyPointOnceAtAnySize) {
   for (const std::size_t n : {0U, 1U, 2U, 15U, 16U, 17U, 63U, 64U, 65U, 255U, 256U, 257U, 1000U,
@@ -195,56 +210,36 @@ TEST(PointIndex, everyPointOnceAtAnySize) {
   }
 }
 
-TEST(PointIndex, everyPointOnceInADepthImage) { check(depth_image(160, 120)); }
-
-TEST(PointIndex, allPointsEqual) {
-  Points points;
-  for (int i = 0; i < 5000; ++i) points.add(0.1F, -0.2F, 0.3F);
-  check(points);
-  const PointBvh index = build(points);
-  EXPECT_EQ(index.bounds().sizes(), Eigen::Vector3f::Zero());
-  EXPECT_EQ(index.tile_count(), (5000U + 15U) / 16U);
+TEST(PointIndex, everyPointOnceInHardClouds) {
+  test::for_each_instruction_set([] {
+    for (const Points& points : hard_clouds()) {
+      check(points);
+      EXPECT_LE(build(points).tile_count(), points.size() / 8 + 1) << "half empty";
+    }
+  });
 }
 
-TEST(PointIndex, pointsOnALineAndInAPlane) {
-  Points line, plane;
-  for (int i = 0; i < 3000; ++i) line.add(0.001F * static_cast<float>(i), 0.0F, 0.0F);
-  for (int i = 0; i < 3000; ++i) {
-    plane.add(0.0F, 0.01F * static_cast<float>(i % 50), 0.01F * static_cast<float>(i / 50));
+// [m] Of the boxes of all tiles, in order.
+std::vector<float> diagonals(const PointBvh& index) {
+  std::vector<float> sizes;
+  for (const PointTile& tile : test::tiles_of(index)) {
+    Eigen::AlignedBox3f box;
+    for (int k = 0; k < tile.count; ++k) box.extend(point_of(tile, k));
+    sizes.push_back(box.diagonal().norm());
   }
-  check(line);
-  check(plane);
-}
-
-// The spread of the coordinates may under- or overflow what keys are computed with.
-TEST(PointIndex, extremeCoordinates) {
-  for (const float size : {1e-45F, 1e-39F, 1e-30F, 1e9F, 1e14F}) {
-    SCOPED_TRACE(size);
-    check(in_a_box(1000, size, 1));
-  }
-  Points signed_zeros;
-  for (int i = 0; i < 100; ++i) signed_zeros.add(i % 2 == 0 ? 0.0F : -0.0F, 0.0F, -0.0F);
-  check(signed_zeros);
+  std::sort(sizes.begin(), sizes.end());
+  return sizes;
 }
 
 // A single point a kilometre off makes the Morton grid coarser than the whole cloud. Without
 // ordering crowded cells again, tiles of the remaining points would be as large as the cloud.
 TEST(PointIndex, outliersDoNotSpoilTheTiles) {
-  Points points = in_a_box(20000, 1.0F, 3);
-  points.add(1e6F, -1e6F, 1e6F);
-  points.add(1000.0F, 0.0F, 0.0F);
-  check(points);
-  const PointBvh index = build(points);
-  std::vector<float> diagonals;
-  for (const PointTile& tile : test::tiles_of(index)) {
-    Eigen::AlignedBox3f box;
-    for (int k = 0; k < tile.count; ++k) box.extend(point_of(tile, k));
-    diagonals.push_back(box.diagonal().norm());
+  for (const float distance : {1000.0F, 1e6F, 1e9F}) {
+    const auto sizes = diagonals(build(with_outliers(in_a_box(20000, 1.0F, 3), distance)));
+    // 16 of 20000 points in 8 m^3 fill a cube of 0.19 m, 0.32 m across.
+    EXPECT_LT(sizes[sizes.size() / 2], 0.4F);
+    EXPECT_LT(sizes[sizes.size() * 99 / 100], 0.8F);
   }
-  std::sort(diagonals.begin(), diagonals.end());
-  // 16 of 20000 points in 8 m^3 fill a cube of 0.19 m, 0.32 m across.
-  EXPECT_LT(diagonals[diagonals.size() / 2], 0.4F);
-  EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.8F);
 }
 
 // Sixteen consecutive points of an order may be apart: across depth discontinuities and from cell
@@ -252,151 +247,11 @@ TEST(PointIndex, outliersDoNotSpoilTheTiles) {
 // is 1.05 m; the median is 33 mm.
 TEST(PointIndex, tilesDoNotSpanDiscontinuities) {
   const PointBvh index = build(depth_image(320, 240));
-  std::vector<float> diagonals;
-  for (const PointTile& tile : test::tiles_of(index)) {
-    Eigen::AlignedBox3f box;
-    for (int k = 0; k < tile.count; ++k) box.extend(point_of(tile, k));
-    diagonals.push_back(box.diagonal().norm());
-  }
-  std::sort(diagonals.begin(), diagonals.end());
-  EXPECT_LT(diagonals[diagonals.size() * 99 / 100], 0.08F);
-  EXPECT_LT(diagonals.back(), 0.2F);
+  const std::vector<float> sizes = diagonals(index);
+  EXPECT_LT(sizes[sizes.size() * 99 / 100], 0.08F);
+  EXPECT_LT(sizes.back(), 0.2F);
   EXPECT_GT(static_cast<double>(index.size()) / static_cast<double>(index.tile_count()), 10.0)
       << "points a tile: splits must not empty the tiles";
-}
-
-TEST(PointIndex, nearestPointAgainstBruteForce) {
-  const Points points = depth_image(160, 120);
-  const PointBvh index = build(points);
-  std::mt19937 random(5);
-  std::uniform_real_distribution<float> u(-0.7F, 0.7F);
-  double nodes = 0.0, tiles = 0.0;
-  constexpr int kQueries = 300;
-  for (int i = 0; i < kQueries; ++i) {
-    Nearest nearest{index, {u(random), u(random), 0.9F + u(random)}};
-    nearest.visit(index.root());
-    float expected = std::numeric_limits<float>::infinity();
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const Eigen::Vector3f p(points.x[k], points.y[k], points.z[k]);
-      expected = std::min(expected, (p - nearest.query).squaredNorm());
-    }
-    ASSERT_EQ(nearest.squared, expected);
-    nodes += nearest.nodes;
-    tiles += nearest.tiles;
-  }
-  // Measured: 6.2 and 4.7. In Morton order without splits, it would be 9.5 and 9.1.
-  EXPECT_LT(nodes / kQueries, 7.5);
-  EXPECT_LT(tiles / kQueries, 5.5);
-}
-
-// Whether two arrays of tiles or nodes are the same, bit by bit. The bytes after the last member,
-// `count`, may be anything.
-template <typename Array>
-bool are_same(const Array& a, const Array& b) {
-  using Element = typename Array::value_type;
-  constexpr std::size_t kBytes = offsetof(Element, count) + sizeof(Element::count);
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Element& u, const Element& v) {
-    return std::memcmp(&u, &v, kBytes) == 0;
-  });
-}
-
-bool same(const PointBvh& a, const PointBvh& b) {
-  return a.size() == b.size() && a.root() == b.root() &&
-         are_same(test::tiles_of(a), test::tiles_of(b)) && are_same(a.nodes(), b.nodes());
-}
-
-TEST(PointIndex, dependsOnNothingButItsArguments) {
-  const Points large = in_a_box(30000, 1.0F, 1), small = depth_image(64, 48);
-  const PointBvh expected = build(small);
-  PointBvhBuilder builder;
-  PointBvh index;
-  for (const Points* points : {&small, &large, &small, &small}) {
-    const std::vector<CloudPoint> list = points->list();
-    builder.build(kFrame, list.data(), list.size(), {}, &index);
-  }
-  EXPECT_TRUE(same(index, expected));
-}
-
-TEST(PointIndex, buffersAreReused) {
-  const Points large = in_a_box(30000, 1.0F, 1), small = in_a_box(29000, 1.0F, 2);
-  PointBvhBuilder builder;
-  PointBvh index;
-  const auto run = [&](const Points& points) {
-    const std::vector<CloudPoint> list = points.list();
-    builder.build(kFrame, list.data(), list.size(), {}, &index);
-  };
-  run(large);
-  PointTile scratch;
-  const PointTile* tiles = &index.tile(0, &scratch);
-  const auto* nodes = index.nodes().data();
-  run(small);
-  run(large);
-  EXPECT_EQ(&index.tile(0, &scratch), tiles);
-  EXPECT_EQ(index.nodes().data(), nodes);
-  Checker(large, index).run();
-}
-
-TEST(PointIndex, filterDropsPointsOneByOne) {
-  const Points points = in_a_box(5000, 1.0F, 4);
-  const auto is_dropped = [](float x, float y) { return x > 0.2F || y < -0.9F; };
-  PointBvh index;
-  std::size_t asked = 0;
-  const std::vector<CloudPoint> list = points.list();
-  PointBvhBuilder().build(
-      kFrame, list.data(), list.size(),
-      [&](const PointTile& tile, const PaddedBox& box) {
-        asked += static_cast<std::size_t>(tile.count);
-        Eigen::AlignedBox3f exact;
-        std::uint32_t mask = 0;
-        for (int k = 0; k < tile.count; ++k) {
-          exact.extend(point_of(tile, k));
-          if (is_dropped(tile.x[k], tile.y[k])) mask |= 1U << k;
-        }
-        EXPECT_EQ(exact.min(), box.min.head<3>().matrix());
-        EXPECT_EQ(exact.max(), box.max.head<3>().matrix());
-        return mask;
-      },
-      &index);
-  EXPECT_EQ(asked, points.size());
-  std::size_t expected = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    expected += is_dropped(points.x[i], points.y[i]) ? 0 : 1;
-  }
-  ASSERT_EQ(index.size(), expected);
-  std::size_t found = 0;
-  for (const PointTile& tile : test::tiles_of(index)) {
-    ASSERT_GE(tile.count, 1);
-    for (int k = 0; k < tile.count; ++k, ++found) {
-      const std::size_t source = (tile.id[k] - 7) / 3;
-      ASSERT_EQ(tile.x[k], points.x[source]);
-      ASSERT_FALSE(is_dropped(tile.x[k], tile.y[k]));
-    }
-  }
-  EXPECT_EQ(found, expected);
-  EXPECT_LE(index.bounds().max().x(), 0.2F) << "boxes must shrink to the remaining points";
-}
-
-TEST(PointIndex, filterThatDropsAll) {
-  const Points points = in_a_box(500, 1.0F, 4);
-  PointBvh index;
-  const std::vector<CloudPoint> list = points.list();
-  PointBvhBuilder().build(
-      kFrame, list.data(), list.size(), [](const PointTile&, const PaddedBox&) { return 0xFFFFU; },
-      &index);
-  EXPECT_TRUE(index.empty());
-  EXPECT_EQ(index.root(), -1);
-  EXPECT_TRUE(index.nodes().empty());
-}
-
-TEST(PointIndex, fiveMillionPoints) {
-  const Points points = depth_image(2500, 2000);
-  const PointBvh index = build(points);
-  ASSERT_EQ(index.size(), 5000000U);
-  std::vector<bool> seen(points.size(), false);
-  for (const PointTile& tile : test::tiles_of(index)) {
-    for (int k = 0; k < tile.count; ++k) seen[(tile.id[k] - 7) / 3] = true;
-  }
-  EXPECT_EQ(std::count(seen.begin(), seen.end(), true), 5000000);
 }
 
 }  // namespace
