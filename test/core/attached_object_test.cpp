@@ -81,29 +81,6 @@ TEST(AttachedObject, rebuildingOneLinkEqualsBuildingAll) {
   }
 }
 
-TEST(AttachedObject, isPartOfItsLink) {
-  const auto model = build_robot_model(with_objects(robot(), {sphere_on("finger")}), config());
-  const Box box{{0.02, 0.03, 0.2}};
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> number(-0.4, 0.4);
-  for (int i = 0; i < 200; ++i) {
-    const Eigen::Vector3d p(number(random), number(random), number(random));
-    const Eigen::Vector3d beyond = (p.cwiseAbs() - 0.5 * box.size).cwiseMax(0.0);
-    const double to_sphere = (p - Eigen::Vector3d(0.05, -0.1, 0.2)).norm() - 0.07;
-    const double expected = std::min(beyond.norm(), to_sphere);
-    if (expected > 0.0) {
-      EXPECT_NEAR(model->links[1].solid.signed_distance(p).distance, expected, 1e-12);
-    }
-  }
-}
-
-TEST(AttachedObject, doesNotTakeSpheresFromItsLink) {
-  const auto bare = build_robot_model(robot(), config());
-  const auto carrying = build_robot_model(with_objects(robot(), {sphere_on("arm")}), config());
-  // The attached sphere needs one inner sphere; the arm keeps its number of spheres.
-  EXPECT_EQ(carrying->links[0].packing.spheres.size(), bare->links[0].packing.spheres.size() + 1);
-}
-
 TEST(AttachedObject, onlyLinksThatAreAskedFor) {
   RobotModelConfig some = config();
   some.links = {"finger"};

@@ -229,52 +229,6 @@ TEST(InnerSphereTree, EveryNodeEnclosesItsLeavesHoweverItIsSplit) {
   }
 }
 
-// The cover distance is that of the nearest cover sphere, not of the inner ones.
-TEST(InnerSphereTree, CoverDistanceIsThatOfTheNearestCoverSphere) {
-  test::Rng rng(31);
-  PackingConfig config;
-  config.max_error = 0.02;
-  const Packing packing = pack_element(test::l_shape(0.2, 0.05), config);
-  const InnerSphereTree tree(packing);
-  int far_from_inner = 0;
-  for (int i = 0; i < 2000; ++i) {
-    const Eigen::Vector3d p = test::random_vector(&rng, 0.3);
-    double cover = std::numeric_limits<double>::infinity(), inner = cover;
-    for (const InnerSphere& sphere : packing.spheres) {
-      const double to_center = (p - sphere.center).norm();
-      cover = std::min(cover, to_center - sphere.cover_radius);
-      inner = std::min(inner, to_center - sphere.radius);
-    }
-    const double found = tree.cover_distance(p);
-    ASSERT_LE(found, cover);
-    ASSERT_GE(found, cover - 1e-6);
-    ASSERT_FALSE(tree.cover_distance_exceeds(p, cover + 1e-9));
-    far_from_inner += inner > cover + 1e-3 ? 1 : 0;
-  }
-  EXPECT_GT(far_from_inner, 1000);
-}
-
-// Bytes that are compared: all but the padding behind the last member.
-constexpr std::size_t kNodeBytes = offsetof(SphereNode, count) + sizeof(SphereNode::count);
-constexpr std::size_t kLeafBytes = offsetof(SphereLeaf, count) + sizeof(SphereLeaf::count);
-
-TEST(InnerSphereTree, SameSpheresSameBytes) {
-  for (const auto& [name, packing] : hard_spheres()) {
-    for (const TreeConfig& tree : kTrees) {
-      SCOPED_TRACE(name);
-      const InnerSphereTree a = InnerSphereTree(packing, tree), b = InnerSphereTree(packing, tree);
-      ASSERT_EQ(a.nodes().size(), b.nodes().size());
-      ASSERT_EQ(a.leaves().size(), b.leaves().size());
-      for (std::size_t i = 0; i < a.nodes().size(); ++i) {
-        ASSERT_EQ(std::memcmp(&a.nodes()[i], &b.nodes()[i], kNodeBytes), 0);
-      }
-      for (std::size_t i = 0; i < a.leaves().size(); ++i) {
-        ASSERT_EQ(std::memcmp(&a.leaves()[i], &b.leaves()[i], kLeafBytes), 0);
-      }
-    }
-  }
-}
-
 TEST(InnerSphereTree, SplitsDoNotChangeTheAnswers) {
   auto model = test::make_model({Shape(test::torus(0.1, 0.03, 32, 16)),
                                  Shape(test::l_shape(0.2, 0.05)), Shape(Cylinder{0.05, 0.2})},

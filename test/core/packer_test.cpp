@@ -15,6 +15,8 @@
 #include "ist_proximity/geometry/error.h"
 #include "ist_proximity/geometry/solid.h"
 #include "ist_proximity/tree/inner_sphere_tree.h"
+#include "support/hard_shapes.h"
+#include "support/hostile_meshes.h"
 #include "support/meshes.h"
 #include "support/oracle.h"
 #include "support/sanitizers.h"
@@ -28,36 +30,27 @@ struct NamedMesh {
   TriangleMesh mesh;
 };
 
-TriangleMesh scaled(TriangleMesh mesh, double scale) {
-  for (Eigen::Vector3d& v : mesh.vertices) v *= scale;
-  return mesh;
-}
-
-TriangleMesh shifted(const TriangleMesh& mesh, const Eigen::Vector3d& by) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.translation() = by;
-  return test::moved(mesh, X);
-}
-
 std::vector<NamedMesh> hostile_meshes() {
   const TriangleMesh sphere = test::icosphere(0.1, 2);
-  return {{"box", test::box({0.1, 0.2, 0.3})},
-          {"icosphere", test::icosphere(0.1, 3)},
-          {"torus", test::torus(0.1, 0.03, 32, 16)},
-          {"L", test::l_shape(0.2, 0.05)},
-          {"open box", test::open_box({0.1, 0.1, 0.2})},
-          {"thin plate", test::thin_plate(0.1, 0.0005)},
-          {"plate as thick as the error", test::thin_plate(0.1, 0.01)},
-          {"sheet", test::sheet(0.05)},
-          {"inside out", test::inside_out(sphere)},
-          {"duplicated faces", test::joined(sphere, sphere)},
-          {"two shells", test::joined(sphere, shifted(sphere, {0.3, 0, 0}))},
-          {"overlapping shells", test::joined(sphere, shifted(sphere, {0.1, 0, 0}))},
-          {"nested cavity", test::joined(sphere, test::inside_out(scaled(sphere, 0.5)))},
-          {"sphere with a fin", test::joined(sphere, shifted(test::sheet(0.05), {0.12, 0, 0}))},
-          {"one triangle", {{{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}}, {{0, 1, 2}}}},
-          {"needle", {{{0, 0, 0}, {0.1, 1e-9, 0}, {0.05, 0, 0}}, {{0, 1, 2}}}},
-          {"a point", {{{1, 2, 3}}, {{0, 0, 0}}}}};
+  return {
+      {"box", test::box({0.1, 0.2, 0.3})},
+      {"icosphere", test::icosphere(0.1, 3)},
+      {"torus", test::torus(0.1, 0.03, 32, 16)},
+      {"L", test::l_shape(0.2, 0.05)},
+      {"open box", test::open_box({0.1, 0.1, 0.2})},
+      {"thin plate", test::thin_plate(0.1, 0.0005)},
+      {"plate as thick as the error", test::thin_plate(0.1, 0.01)},
+      {"sheet", test::sheet(0.05)},
+      {"inside out", test::inside_out(sphere)},
+      {"duplicated faces", test::joined(sphere, sphere)},
+      {"two shells", test::joined(sphere, test::shifted(sphere, {0.3, 0, 0}))},
+      {"overlapping shells", test::joined(sphere, test::shifted(sphere, {0.1, 0, 0}))},
+      {"nested cavity", test::joined(sphere, test::inside_out(test::scaled(sphere, 0.5)))},
+      {"sphere with a fin", test::joined(sphere, test::shifted(test::sheet(0.05), {0.12, 0, 0}))},
+      {"one triangle", {{{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}}, {{0, 1, 2}}}},
+      {"Chazelle's polyhedron", test::chazelle(3, 0.002, 0.2)},
+      {"needle", {{{0, 0, 0}, {0.1, 1e-9, 0}, {0.05, 0, 0}}, {{0, 1, 2}}}},
+      {"a point", {{{1, 2, 3}}, {{0, 0, 0}}}}};
 }
 
 // The cover spheres: d_cover <= distance everywhere outside, and a point with d_cover >
@@ -89,22 +82,6 @@ void expect_certificate_holds(const TriangleMesh& mesh, const Packing& packing, 
   }
 }
 
-TEST(PackMesh, CertificateHoldsOnAnyMesh) {
-  for (const auto& [name, mesh] : hostile_meshes()) {
-    SCOPED_TRACE(name);
-    for (const double max_error : {test::packed_to(0.01), test::packed_to(0.003)}) {
-      PackingConfig config;
-      config.max_error = max_error;
-      const Packing packing = pack_mesh(mesh, config);
-      EXPECT_TRUE(packing.certificate.reached);
-      EXPECT_LE(packing.certificate.max_gap, max_error);
-      double excess = 0.0;
-      expect_certificate_holds(mesh, packing, 400, &excess);
-      EXPECT_LE(excess, packing.certificate.max_gap + 1e-6);
-    }
-  }
-}
-
 // Points below the surface, down to a depth of a few gaps, are the hardest to cover.
 TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
   test::Rng rng(9);
@@ -128,19 +105,6 @@ TEST(PackMesh, InteriorIsCoveredBelowTheSurface) {
         outer = std::min(outer, (p - sphere.center).norm() - sphere.cover_radius);
       }
       ASSERT_LE(outer, gap + 1e-9 * size) << p.transpose();
-    }
-  }
-}
-
-TEST(PackMesh, InnerSpheresOfClosedMeshesStayInside) {
-  for (const TriangleMesh& mesh :
-       {test::box({0.1, 0.2, 0.3}), test::l_shape(0.2, 0.05), test::torus(0.1, 0.03, 32, 16)}) {
-    PackingConfig config;
-    config.max_error = 0.004;
-    for (const InnerSphere& sphere : pack_mesh(mesh, config).spheres) {
-      if (sphere.radius > 0.0) EXPECT_GT(test::oracle_winding(mesh, sphere.center), 0.5);
-      EXPECT_LE(sphere.radius, test::oracle_distance(mesh, sphere.center) + 1e-9);
-      EXPECT_GE(sphere.cover_radius, sphere.radius);
     }
   }
 }
@@ -194,7 +158,7 @@ std::vector<NamedMesh> random_meshes(test::Rng* rng) {
           {"soup and the same again", test::joined(soup, soup)},
           {"soup with coplanar neighbours", test::joined(soup, slid)},
           {"sphere in a soup", with_sphere},
-          {"far away", shifted(with_sphere, {3.0, -20.0, 1.0})}};
+          {"far away", test::shifted(with_sphere, {3.0, -20.0, 1.0})}};
 }
 
 /// Packs to 1 cm. The certificate must hold up to `slack` [m].
@@ -314,21 +278,6 @@ TEST(PackMesh, CertificateHoldsWhenMaxSpheresIsReachedFirst) {
   double excess = 0.0;
   expect_certificate_holds(mesh, packing, 400, &excess);
   EXPECT_LE(excess, packing.certificate.max_gap);
-}
-
-TEST(PackMesh, SameInputSameSpheres) {
-  const TriangleMesh mesh = test::l_shape(0.2, 0.05);
-  for (const PackingOrder order : kOrders) {
-    PackingConfig config;
-    config.order = order;
-    const Packing a = pack_mesh(mesh, config), b = pack_mesh(mesh, config);
-    ASSERT_EQ(a.spheres.size(), b.spheres.size());
-    for (std::size_t i = 0; i < a.spheres.size(); ++i) {
-      EXPECT_EQ(a.spheres[i].center, b.spheres[i].center);
-      EXPECT_EQ(a.spheres[i].radius, b.spheres[i].radius);
-      EXPECT_EQ(a.spheres[i].cover_radius, b.spheres[i].cover_radius);
-    }
-  }
 }
 
 TEST(PackMesh, ReportsProgressAndCanBeCancelled) {

@@ -20,6 +20,7 @@
 #include "internal/robot/link_packing.h"
 #include "ist_proximity/geometry/error.h"
 #include "support/data_dir.h"
+#include "support/errors.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
 #include "support/temp_dir.h"
@@ -160,17 +161,6 @@ TEST(RobotModel, equalShapesArePackedOnce) {
   }
 }
 
-TEST(RobotModel, isTheSameForAnyNumberOfThreads) {
-  RobotModelConfig config;
-  config.threads = 1;
-  const auto one = build_robot_model(gripper(), config);
-  config.threads = 7;
-  const auto seven = build_robot_model(gripper(), config);
-  for (std::size_t i = 0; i < one->links.size(); ++i) {
-    expect_same(one->links[i].packing, seven->links[i].packing);
-  }
-}
-
 TEST(RobotModel, readsTheCache) {
   const test::TempDir dir;
   RobotModelConfig config;
@@ -243,9 +233,8 @@ TEST(RobotModel, warnsAboutVisualFallbackAndTooFewSpheres) {
   config.packing.max_spheres = 20000;
   build_robot_model(robot, config, callbacks);
   ASSERT_EQ(warnings.size(), 1U) << "one for all links";
-  EXPECT_NE(warnings[0].find("'" + robot.links[0].name + "', 'left' have no collision geometry"),
-            std::string::npos)
-      << warnings[0];
+  test::expect_says(warnings[0],
+                    "'" + robot.links[0].name + "', 'left' have no collision geometry");
   warnings.clear();
   robot.links[0].used_visual_fallback = false;
   config.links = {"hand"};  // no warning for links that are not monitored
