@@ -39,19 +39,6 @@ TEST(ClosedLoop, TheArmDodges) {
   EXPECT_GT(collisions, 0);
 }
 
-TEST(ClosedLoop, ASceneFollowsFromItsSeed) {
-  const RobotDescription robot = test::demo_robot();
-  const auto nominal = [&](const Scene& scene) { return nominal_motion(robot, scene, {}); };
-  const Scene a = make_scene(robot, 7, {}, nominal), b = make_scene(robot, 7, {}, nominal);
-  ASSERT_EQ(a.obstacles.size(), b.obstacles.size());
-  EXPECT_EQ(a.goals, b.goals);
-  for (std::size_t i = 0; i < a.obstacles.size(); ++i) {
-    EXPECT_EQ(a.obstacles[i].from, b.obstacles[i].from);
-    EXPECT_EQ(a.obstacles[i].start, b.obstacles[i].start);
-  }
-  EXPECT_NE(a.goals, make_scene(robot, 8, {}, nominal).goals);
-}
-
 // A minute of moving in view of a camera with 5 mm of noise and 50 ms of latency.
 TEST(SelfView, NoFalseContactInAMinute) {
   SelfViewConfig config;

@@ -50,17 +50,6 @@ TEST(RayShape, MeetsTheSurfaceAndNothingBefore) {
   }
 }
 
-TEST(RayShape, AlongTheAxes) {
-  const RayShape box(Box{{0.2, 0.4, 0.6}});
-  EXPECT_NEAR(box.hit({{1.0, 0.0, 0.0}, {-1.0, 0.0, 0.0}}), 0.9, 1e-12);
-  EXPECT_NEAR(box.hit({{0.0, 0.0, 0.0}, {0.0, 2.0, 0.0}}), 0.1, 1e-12);  // from within
-  EXPECT_TRUE(std::isinf(box.hit({{1.0, 0.3, 0.0}, {-1.0, 0.0, 0.0}})));
-  EXPECT_TRUE(std::isinf(box.hit({{1.0, 0.0, 0.0}, {1.0, 0.0, 0.0}})));
-  const RayShape cylinder(Cylinder{0.1, 0.4});
-  EXPECT_NEAR(cylinder.hit({{0.05, 0.0, 1.0}, {0.0, 0.0, -1.0}}), 0.8, 1e-12);
-  EXPECT_TRUE(std::isinf(cylinder.hit({{0.2, 0.0, 1.0}, {0.0, 0.0, -1.0}})));
-}
-
 // Every point lies on the robot or an obstacle as they were at the stamp, if there is no noise.
 TEST(Simulation, PointsLieOnTheRobotOrAnObstacle) {
   const RobotDescription robot = test::demo_robot();
@@ -103,53 +92,6 @@ TEST(Simulation, PointsLieOnTheRobotOrAnObstacle) {
   }
 }
 
-TEST(Simulation, NoiseHasTheDeviationAskedFor) {
-  Obstacle wall;
-  wall.shape = Box{{4.0, 0.1, 4.0}};
-  wall.from = {0.0, 2.05, 0.0};
-  DepthCameraConfig camera;
-  camera.X_FC = looking_at({0.0, 0.0, 0.0}, {0.0, 1.0, 0.0});
-  camera.noise = 0.004;
-  RobotDescription nobody;
-  nobody.root_link = "base";
-  nobody.link_order = nobody.links_without_geometry = {"base"};
-  Simulation world(nobody, {}, {wall}, {camera}, 3);
-  std::vector<Picture> pictures;
-  while (pictures.empty()) {
-    world.step(Eigen::VectorXd());
-    pictures = world.take_pictures();
-  }
-  double sum = 0.0, squares = 0.0;
-  const auto count = static_cast<double>(pictures[0].points.size());
-  for (const Eigen::Vector3f& p : pictures[0].points) {
-    sum += p.z() - 2.0;
-    squares += (p.z() - 2.0) * (p.z() - 2.0);
-  }
-  EXPECT_NEAR(sum / count, 0.0, 0.0002);
-  EXPECT_NEAR(std::sqrt(squares / count), camera.noise, 0.0001);
-}
-
-TEST(Simulation, TheSameSeedGivesTheSamePictures) {
-  const RobotDescription robot = test::demo_robot();
-  const auto pictures = [&robot](std::uint64_t seed) {
-    Simulation world(robot, demo_arm(), demo_obstacles(), demo_cameras(), seed);
-    std::vector<float> all;
-    for (int i = 0; i < 120; ++i) {
-      world.step(Eigen::VectorXd::Constant(6, 0.3));
-      for (const Picture& picture : world.take_pictures()) {
-        for (const Eigen::Vector3f& p : picture.points) {
-          if (p.allFinite()) all.insert(all.end(), p.data(), p.data() + 3);
-        }
-      }
-    }
-    return all;
-  };
-  const std::vector<float> first = pictures(5);
-  EXPECT_FALSE(first.empty());
-  EXPECT_EQ(first, pictures(5));
-  EXPECT_NE(first, pictures(6));
-}
-
 // The smallest distance of all links and obstacles, by brute force.
 TEST(Simulation, TruthIsTheSmallestDistance) {
   const RobotDescription robot = test::demo_robot();
@@ -171,47 +113,6 @@ TEST(Simulation, TruthIsTheSmallestDistance) {
     EXPECT_DOUBLE_EQ(world.nearest(10.0).distance, smallest);
     EXPECT_TRUE(std::isinf(world.nearest(0.5 * smallest).distance));
   }
-}
-
-TEST(Arm, KeepsItsLimits) {
-  const RobotDescription robot = test::demo_robot();
-  ArmConfig config = demo_arm();
-  Arm arm(robot, config);
-  arm.reset(Eigen::VectorXd::Zero(6));
-  for (int i = 0; i < 3000; ++i) {
-    const Eigen::VectorXd before = arm.velocities();
-    arm.step(Eigen::VectorXd::Constant(6, i % 1000 < 500 ? 9.0 : -4.0), 0.001);
-    EXPECT_LE(arm.velocities().cwiseAbs().maxCoeff(), config.max_velocity + 1e-12);
-    for (Eigen::Index j = 0; j < 6; ++j) {
-      const auto& joint = arm.kinematics().joints()[arm.joints()[static_cast<std::size_t>(j)]];
-      EXPECT_GE(arm.positions()[j], joint.lower);
-      EXPECT_LE(arm.positions()[j], joint.upper);
-      const bool at_limit = arm.positions()[j] == joint.lower || arm.positions()[j] == joint.upper;
-      if (!at_limit) {
-        EXPECT_LE(std::abs(arm.velocities()[j] - before[j]),
-                  0.001 * config.max_acceleration + 1e-12);
-      }
-    }
-  }
-  config.joints = {"no_such_joint"};
-  EXPECT_THROW(Arm(robot, config), std::invalid_argument);
-}
-
-TEST(Obstacle, GoesToAndFro) {
-  Obstacle ball;
-  ball.shape = Sphere{0.1};
-  ball.to = {2.0, 0.0, 0.0};
-  ball.start = 1.0;
-  ball.speed = 0.5;
-  const auto x = [&ball](double t) { return ball.pose(t).translation().x(); };
-  EXPECT_DOUBLE_EQ(x(0.0), 0.0);
-  EXPECT_DOUBLE_EQ(x(3.0), 1.0);
-  EXPECT_DOUBLE_EQ(x(9.0), 2.0);
-  ball.repeat = 6.0;
-  EXPECT_DOUBLE_EQ(x(6.0), 2.0);
-  EXPECT_DOUBLE_EQ(x(8.0), 1.5);
-  EXPECT_DOUBLE_EQ(x(12.0), 0.0);
-  EXPECT_DOUBLE_EQ(x(14.0), 0.5);
 }
 
 }  // namespace
