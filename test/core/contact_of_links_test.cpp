@@ -110,39 +110,5 @@ TEST(ContactOfLinks, CylindersShareWhatDenseSamplingCounts) {
   EXPECT_LT(found.weighted_normal.tail<2>().norm(), 0.05 * found.volume);
 }
 
-// Random pairs of links with a few hundred spheres each, beside 216,000 points of a cube about the
-// first link.
-TEST(ContactOfLinks, VolumeIsThatOfDenseSampling) {
-  constexpr int kAlong = 60;
-  constexpr double kSide = 0.24;
-  test::Rng rng(31);
-  const std::vector<LinkGeometry> shapes = {one(Box{{0.2, 0.1, 0.08}}), one(Cylinder{0.05, 0.2}),
-                                            one(Sphere{0.1}), one(Box{{0.15, 0.15, 0.15}})};
-  const std::vector<double> volumes = {0.0016, kPi * 0.0005, 4.0 / 3.0 * kPi * 0.001, 0.003375};
-  std::vector<ContactLink> links;
-  for (const auto& shape : shapes) links.emplace_back(shape);
-  std::vector<double> errors;  // of the smaller body's volume
-  for (int trial = 0; trial < test::scaled(40); ++trial) {
-    const auto a = static_cast<std::size_t>(test::uniform(&rng, 0, 3.999));
-    const auto b = static_cast<std::size_t>(test::uniform(&rng, 0, 3.999));
-    const Eigen::Isometry3d X_AB = test::random_pose(&rng, 0.1), X_BA = X_AB.inverse();
-    int both = 0;
-    for (int i = 0; i < kAlong * kAlong * kAlong; ++i) {
-      const Eigen::Vector3d cell(i % kAlong, i / kAlong % kAlong, i / kAlong / kAlong);
-      const Eigen::Vector3d p = ((cell.array() + 0.5) / kAlong - 0.5) * kSide;
-      both += test::oracle_signed_distance(shapes[a], p) < 0.0 &&
-                      test::oracle_signed_distance(shapes[b], X_BA * p) < 0.0
-                  ? 1
-                  : 0;
-    }
-    const double truth = both * std::pow(kSide / kAlong, 3);
-    const ContactVolume found = contact_volume(*links[a].body, *links[b].body, X_AB);
-    errors.push_back(std::abs(found.volume - truth) / std::min(volumes[a], volumes[b]));
-    EXPECT_LT(errors.back(), 0.05) << "trial " << trial << ": " << found.volume << " " << truth;
-  }
-  std::sort(errors.begin(), errors.end());
-  EXPECT_LT(errors[errors.size() / 2], 0.01);
-}
-
 }  // namespace
 }  // namespace ist

@@ -229,42 +229,6 @@ TEST(ContactVolume, OfAMapIsThatOfItsBoxes) {
   }
 }
 
-// The volume is finite and continuous for concentric, touching and contained spheres.
-TEST(ContactVolume, HasNoJumpsAlongAnyPath) {
-  const ContactLink sphere(one(Sphere{0.1}), 1);
-  const ContactLink box(one(Box{{0.2, 0.15, 0.1}}));
-  const CloudSnapshot cloud = test::thinned({Eigen::Vector3d::Zero()});
-  const CloudSnapshot block = test::thinned(filled(one(Box{{0.06, 0.06, 0.06}}), 0.04, 0.004));
-  test::Rng rng(105);
-  constexpr double kStep = 5e-5;  // [m]
-  for (const ContactLink* link : {&sphere, &box}) {
-    for (const CloudSnapshot* obstacle : {&cloud, &block}) {
-      for (int way = 0; way < test::scaled(2); ++way) {
-        const Eigen::Vector3d u =
-            way == 0 ? Eigen::Vector3d::UnitX() : test::random_vector(&rng, 1.0).normalized();
-        Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-        ContactVolume before;
-        double largest_volume = 0.0, largest_step = 0.0;
-        for (double s = -0.17; s < 0.17; s += kStep) {
-          X_FL.translation() = s * u;
-          const ContactVolume now = contact_volume(link->link(), *link->body, X_FL, {obstacle});
-          ASSERT_TRUE(now.weighted_normal.allFinite() && now.weighted_moment.allFinite());
-          largest_step =
-              std::max({largest_step, (now.weighted_normal - before.weighted_normal).norm(),
-                        std::abs(now.volume - before.volume),
-                        (now.weighted_moment - before.weighted_moment).norm() / 0.1});
-          largest_volume = std::max(largest_volume, now.volume);
-          before = now;
-        }
-        EXPECT_GT(largest_volume, 0.0);
-        // The steepest rise is over kFullDepth of a point's sphere.
-        EXPECT_LT(largest_step,
-                  4.0 * kStep / (kFullDepth * kPointSphereRadius * 0.01) * largest_volume);
-      }
-    }
-  }
-}
-
 TEST(ContactVolume, AllocatesNothing) {
   const ContactLink link(one(Box{{0.2, 0.15, 0.1}}));
   const CloudSnapshot cloud = test::thinned(wall(0.2, 0.003, 0.02));

@@ -174,15 +174,7 @@ CloudSnapshot thinned(const std::vector<Eigen::Vector3d>& points, double thinnin
                       const Eigen::Vector3d& far) {
   std::vector<double> xyz;
   for (const Eigen::Vector3d& p : points) xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
-  RawCloud raw;
-  raw.data = reinterpret_cast<const std::uint8_t*>(xyz.data());
-  raw.width = points.size();
-  raw.height = 1;
-  raw.point_step = 3 * sizeof(double);
-  raw.row_step = raw.width * raw.point_step;
-  raw.y = sizeof(double);
-  raw.z = 2 * sizeof(double);
-  raw.is_double = true;
+  const RawCloud raw = packed_cloud(xyz.data(), points.size(), 1);
   IngestConfig config = whole_cloud();
   config.thinning = thinning;
   CloudSnapshot snapshot;
