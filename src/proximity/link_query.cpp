@@ -7,8 +7,6 @@
 #include <limits>
 #include <utility>
 
-#include "proximity/depth_search.h"
-
 namespace ist {
 namespace {
 
@@ -19,11 +17,14 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFloatError = 1e-6;
 // Error of a stored point: half a unit in the last place in each coordinate.
 constexpr double kPointError = 1.1e-7;
-// [m] What a link whose distance is not known yet gets cells of its grid for: many small ones would
-// have to be measured.
-constexpr double kUnknownDistance = 0.15;
 // How many steps ahead are proven, of a link that need only be known to be farther than another.
 constexpr double kStepsAhead = 8.0;
+// So many parts of boxes a link's query may measure, in contact: with every part the bounds of the
+// depth get narrower, but less and less. Fewer of links with holes, where parts bound little
+// (Solid::distance_floor).
+constexpr int kMaxBoxCells = 256, kMaxBoxCellsWithHoles = kMaxBoxCells / 8;
+// So many points a link's query may measure to find one inside where boxes seem only to touch it.
+constexpr int kMaxDescentSteps = 128;
 
 // Whether what was answered for one question is an answer to another: it has to be as exact.
 bool answers(const QueryConfig& answered, const QueryConfig& asked) {
@@ -54,7 +55,6 @@ void LinkQuery::begin(const Eigen::Isometry3d& X_FL, SnapshotSpan clouds, SceneI
   search.pruned_bound = -link_.context.deepest();  // before anything is proven
   search.rounding = search.max_coordinate = search.index_error = 0.0;
   search.is_complete = false;
-  search.measured = 0;
   search.is_counted = false;
   search.first_bound = -kInfinity;
   search.is_answered = scene != kUnknownScene && answered.scene == scene &&
@@ -96,23 +96,21 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
   if (is_settled(clouds)) return true;
   if (deadline->passed()) {
     take_kept_bound();
-    return false;
+    if (!search.has_time(search.lower_bound())) return false;
   }
-  set_grid_level();
-  search.pruned_bound = search.cover_bound = kInfinity;
+  search.pruned_bound = search.outside_bound = kInfinity;
   look_ahead();
   search.box_cells_left = link_.context.solid().is_closed() ? kMaxBoxCells : kMaxBoxCellsWithHoles;
   search.descent_steps_left = kMaxDescentSteps;
   count_outside_region();
   if (!is_inside_regions()) search.prune(search.region_bound);
   bool stopped = false;
-  for (std::size_t i = 0; i < clouds.size() && !stopped; ++i) {
+  for (std::size_t i = 0; i < clouds.size(); ++i) {
     for_each_index(*clouds[i], static_cast<std::int32_t>(i), search.X_FL,
-                   [&](const auto& obstacles) { stopped = stopped || !run(obstacles); });
+                   [&](const auto& obstacles) { stopped = !run(obstacles) || stopped; });
   }
-  const double least = -link_.context.deepest();
-  if (stopped) search.prune(least);  // indices that were not reached
   // A search that was stopped may know nothing of what it left.
+  const double least = -link_.context.deepest();
   search.pruned_bound = std::max(search.pruned_bound, least);
   search.refined_bound = std::max(search.refined_bound, least);
   search.is_complete = !stopped;
@@ -122,11 +120,6 @@ bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
     take_kept_bound();
   }
   return search.is_complete;
-}
-
-void LinkQuery::set_grid_level() {
-  const double distance = link_.search.closest.exact.distance;
-  link_.context.grid.set_distance(distance < kInfinity ? distance : kUnknownDistance);
 }
 
 // A link counts once in a query, however often it is run.
@@ -230,38 +223,28 @@ void LinkQuery::look_ahead() {
   if (ahead < search.other_links) search.other_links += ahead;
 }
 
-// The grid, the distances and the link's bound are about the geometry. Fronts, bounds by node,
-// supports and the terms of the last answer are about the tree.
+// What is kept is about the geometry, but for the terms of the last answer.
 void LinkQuery::set_link(const LinkModel& link) {
   LinkContext& context = link_.context;
   const bool is_same = link.packing_id != 0 && link.packing_id == context.model->packing_id;
   context.model = &link;
-  context.grid.set_solid(link.solid);
   if (is_same) return;
   context.displacement = DisplacementBound(link);
   LinkCoherence& kept = link_.kept;
   kept.bound.set_link(link);
   kept.extents.set_link(link);
-  kept.nodes.forget();
-  kept.fronts.forget();
   kept.answered.scene = kUnknownScene;
-  kept.supports = SupportCache(link.tree);
-  kept.plane_normal_L.setZero();
 }
 
 void LinkQuery::keep_bound() {
   const LinkSearch& search = link_.search;
-  keep_bound(search.lower_bound(), std::min(search.cover_bound, search.pruned_bound));
-}
-
-// @param bound           [m] of the stored obstacles' signed distances
-// @param cover_distance  [m] of the stored obstacles
-void LinkQuery::keep_bound(double bound, double cover_distance) {
-  const LinkSearch& search = link_.search;
-  bound -= search.index_error;
+  double bound = search.lower_bound() - search.index_error;
   // Float loses more, the farther.
   if (bound > search.range()) bound -= kFloatError * (bound - search.range());
-  link_.kept.bound.prove(search.scene, search.X_FL, bound, cover_distance, search.max_coordinate);
+  // Of points beyond the regions, too.
+  const double outside =
+      std::min(search.outside_bound, search.region_bound - link_.context.tree().interior_gap());
+  link_.kept.bound.prove(search.scene, search.X_FL, bound, outside, search.max_coordinate);
 }
 
 // The error of a distance by the coordinates of stored points and by poses that are not quite

@@ -1,21 +1,19 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <optional>
 
-#include "proximity/dual_tree.h"
-#include "proximity/extent_refinement.h"
+#include "proximity/extent_measure.h"
 #include "proximity/link_query_state.h"
 
 namespace ist {
 
-/// The query of one link: branch and bound, against every cloud and map of a scene. Usage: begin(),
-/// then warm_start() if wanted, once run(), then answer(). Functions neither allocate nor throw.
-/// One thread.
+struct SearchOutcome;
+
+/// The query of one link against every cloud and map of a scene. Usage: begin(), then warm_start()
+/// if wanted, once run(), then answer(). Functions neither allocate nor throw. One thread.
 ///
-/// run() takes four steps for each index: an upper bound (upper_bound(), warm_start()), the search
-/// of pairs that may be nearer (search()), the refinement of what survives (PointRefinement,
-/// BoxRefinement), and the depth of what may be inside (search_depth()).
+/// run() is done where the bound that is kept from another pose is enough. Else it searches each
+/// index (see Search), beginning with the front that is kept from another pose.
 class LinkQuery {
  public:
   explicit LinkQuery(const LinkModel& link) : link_(link) {}
@@ -38,19 +36,6 @@ class LinkQuery {
   /// point that is near to where it was.
   /// @param has_time  false: only the last answer's obstacle, which is one exact distance
   void warm_start(SnapshotSpan clouds, bool has_time = true);
-
-  /// Proves a first lower bound of the link's distance, where none is kept: it takes some
-  /// microseconds, and is kept for the poses to come. A link that is too near for it is not tried
-  /// again at every step, nor is one that a search will prove more of. It is best after
-  /// warm_start(): the plane across the obstacle that was measured may separate the link from all
-  /// others.
-  /// @param deadline  if it has passed, no search follows. It is asked at every step
-  /// @param late      [s] it may be exceeded by so much
-  void prove_first_bound(SnapshotSpan clouds, Deadline* deadline, double late);
-  /// The same for a link that the deadline left without a positive bound, after run().
-  void prove_bound_late(SnapshotSpan clouds, Deadline* deadline, double late);
-  /// The same with more time, for links that prove_first_bound() has proven nothing of.
-  void prove_bound_by_planes(SnapshotSpan clouds, Deadline* deadline);
 
   /// Asks again for what begin() has asked, with other tolerances; what run() has found since is
   /// the upper bound.
@@ -94,10 +79,7 @@ class LinkQuery {
 
   /// [bytes] With its buffers, without the model.
   std::size_t memory() const {
-    const LinkCoherence& kept = link_.kept;
-    return sizeof *this + link_.context.grid.memory() + kept.nodes.memory() + kept.fronts.memory() +
-           kept.field_fronts.memory() + kept.distances.memory() + kept.box_distances.memory() +
-           kept.side_balls.memory() + kept.supports.memory();
+    return sizeof *this + link_.kept.fronts.memory() + link_.kept.side_balls.memory();
   }
 
  private:
@@ -106,9 +88,7 @@ class LinkQuery {
   bool bound_may_hold() const;
   bool is_settled(SnapshotSpan clouds);
   void look_ahead();
-  void set_grid_level();
   void keep_bound();
-  void keep_bound(double bound, double cover_distance);
   void keep_answer();
   void count_outside_region();
   void take_kept_bound();
@@ -119,36 +99,16 @@ class LinkQuery {
   bool run(const Obstacles& obstacles);
   template <class Obstacles>
   void enter(const Obstacles& obstacles);
-  template <class BoundOfIndex>
-  void prove_bound(SnapshotSpan clouds, const BoundOfIndex& bound_of_index);
-  template <class Obstacles>
-  double bound_by_planes(const Obstacles& obstacles, Deadline* deadline,
-                         std::optional<double> late);
+  template <class Bvh, class Measure>
+  SearchOutcome search(const PosedIndex<Bvh>& obstacles, SearchFront* front, float ahead,
+                       Measure* measure);
+  SearchFront* front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL);
+  bool has_hardly_moved() const;
+  bool begins_with_search() const;
   void measure_near_place(const PointObstacles& obstacles, const Eigen::Vector3d& p_FQ);
-  void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
+  static void measure_near_place(const BoxObstacles& obstacles, const Eigen::Vector3d& p_FQ);
   void measure_again(const PointObstacles& obstacles);
   void measure_again(const BoxObstacles& obstacles);
-  bool is_crowded(const DualTreeResult& found) const;
-  bool is_near(const PointObstacles& obstacles) const;
-  static bool is_near(const BoxObstacles& obstacles);
-  bool search_near(const PointObstacles& obstacles);
-  static bool search_near(const BoxObstacles& obstacles);
-  void search_inside(const PointObstacles& obstacles);
-  void search_inside(const BoxObstacles& obstacles);
-  void upper_bound(const PointObstacles& obstacles);
-  void upper_bound(const BoxObstacles& obstacles);
-  template <class Obstacles>
-  DualTreeResult search(const Obstacles& obstacles);
-  template <class Obstacles>
-  void measure_closest(const Obstacles& obstacles);
-  bool has_hardly_moved() const;
-  bool is_too_near_for_field() const;
-  bool is_field_too_coarse() const;
-  bool begins_with_field() const;
-  template <class Obstacles>
-  bool search_by_field(const Obstacles& obstacles, bool* is_complete);
-  template <class Bvh>
-  DualTreeInput<Bvh> dual_tree_input(const PosedIndex<Bvh>& obstacles);
 
   // The spheres that obstacles stand for; see link_query_extent.cpp.
   void begin_extents(SnapshotSpan clouds, double other_extents);
@@ -158,9 +118,6 @@ class LinkQuery {
   double contact_bound(SnapshotSpan clouds, double points, double limit);
   void measure_extent_again(SnapshotSpan clouds, ExtentSearch* spheres);
   bool search_extents(SnapshotSpan clouds, ExtentSearch* spheres);
-  template <class Obstacles, class ExtentRefinement>
-  bool search_extents(const Obstacles& obstacles, ExtentRefinement* refinement,
-                      ExtentSearch* spheres);
   template <class Visit>
   bool for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentSearch* spheres);
 

@@ -6,15 +6,15 @@
 #include <type_traits>
 
 #include "internal/bvh/traversal_stack.h"
-#include "proximity/dual_tree.h"
-#include "proximity/extent_refinement.h"
+#include "proximity/extent_measure.h"
 #include "proximity/link_query.h"
+#include "proximity/search.h"
 
 namespace ist {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// BVTT fronts of spheres and of points of one index are different fronts.
+// Fronts of spheres and of points of one index are different fronts.
 constexpr std::uint64_t kExtentFront = std::uint64_t{1} << 63U;
 
 template <class Obstacles>
@@ -179,7 +179,7 @@ double LinkQuery::radius_of_closest(SnapshotSpan clouds) const {
   return link_extent(cloud, link_).radius((closest.p_FCo - cloud.extent.p_FS).norm());
 }
 
-// Calls visit(obstacles, refinement) for every index, until it returns false. The indices whose
+// Calls visit(obstacles, measure) for every index, until it returns false. The indices whose
 // spheres cannot matter leave their bound.
 // @returns whether it never did
 template <class Visit>
@@ -199,18 +199,15 @@ bool LinkQuery::for_each_extent(SnapshotSpan clouds, const Visit& visit, ExtentS
     const LinkExtent extent = link_extent(cloud, link_);
     const auto visit_index = [&](const auto& obstacles) {
       if (!visited_all) return;
-      if constexpr (is_points<decltype(obstacles)>) {
-        if (!matters(extent.largest_radius_within(spheres->limit()),
-                     extent.largest_radius_beyond(spheres->points_bound))) {
-          return;
-        }
-        PointExtentRefinement refinement(obstacles, extent, &link_, spheres);
-        visited_all = visit(obstacles, &refinement);
-      } else {
-        if (!matters(cloud.box_extent, cloud.box_extent)) return;
-        BoxExtentRefinement refinement(obstacles, cloud.box_extent, &link_, spheres);
-        visited_all = visit(obstacles, &refinement);
-      }
+      using Obstacles = std::decay_t<decltype(obstacles)>;
+      constexpr bool kPoints = std::is_same_v<Obstacles, PointObstacles>;
+      const double within =
+          kPoints ? extent.largest_radius_within(spheres->limit()) : cloud.box_extent;
+      const double beyond =
+          kPoints ? extent.largest_radius_beyond(spheres->points_bound) : cloud.box_extent;
+      if (!matters(within, beyond)) return;
+      ExtentMeasure<Obstacles> measure(obstacles, extent, cloud.box_extent, &link_, spheres);
+      visited_all = visit(obstacles, &measure);
     };
     for_each_index(cloud, static_cast<std::int32_t>(i), link_.search.X_FL, visit_index);
   }
@@ -244,8 +241,8 @@ void LinkQuery::measure_extent_again(SnapshotSpan clouds, ExtentSearch* spheres)
   if (nearest.build_id == 0) return;
   for_each_extent(
       clouds,
-      [&](const auto& obstacles, auto* refinement) {
-        if (obstacles.bvh->build_id() == nearest.build_id) refinement->measure(nearest.id);
+      [&](const auto& obstacles, auto* measure) {
+        if (obstacles.bvh->build_id() == nearest.build_id) measure->measure(nearest.id);
         return true;
       },
       spheres);
@@ -254,33 +251,15 @@ void LinkQuery::measure_extent_again(SnapshotSpan clouds, ExtentSearch* spheres)
 bool LinkQuery::search_extents(SnapshotSpan clouds, ExtentSearch* spheres) {
   return for_each_extent(
       clouds,
-      [&](const auto& obstacles, auto* refinement) {
-        return search_extents(obstacles, refinement, spheres);
+      [&](const auto& obstacles, auto* measure) {
+        enter(obstacles);
+        const std::uint64_t id = obstacles.bvh->build_id() | kExtentFront;
+        const SearchOutcome found = search(obstacles, front_of(id, obstacles.X_OL), 0.0F, measure);
+        spheres->refined = std::min(
+            spheres->refined, static_cast<double>(found.pruned_bound) - link_.search.rounding);
+        return found.has_time;
       },
       spheres);
-}
-
-template <class Obstacles, class Refinement>
-bool LinkQuery::search_extents(const Obstacles& obstacles, Refinement* refinement,
-                               ExtentSearch* spheres) {
-  LinkSearch& search = link_.search;
-  enter(obstacles);
-  search.visited.clear();
-  search.box_bounds.clear();
-  auto input = dual_tree_input(obstacles);
-  input.prune_bound = refinement->traversal_prune_bound();
-  input.inside_bound = -std::numeric_limits<float>::infinity();  // nothing is inside
-  input.front = link_.kept.fronts.find(obstacles.bvh->build_id() | kExtentFront);
-  if (input.front != nullptr) {
-    input.front->begin(obstacles.bvh->build_id() | kExtentFront, obstacles.X_OL,
-                       link_.context.displacement, input.rounding);
-  }
-  const DualTreeResult found = search_dual_tree(input, refinement);
-  search.statistics->node_pairs += found.node_pairs;
-  search.statistics->leaf_pairs += found.leaf_pairs;
-  spheres->refined =
-      std::min(spheres->refined, static_cast<double>(found.pruned_bound) - search.rounding);
-  return !found.stopped;
 }
 
 }  // namespace ist

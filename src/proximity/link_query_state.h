@@ -11,20 +11,13 @@
 #include "internal/geometry/float_rounding.h"
 #include "internal/proximity/deadline.h"
 #include "ist_proximity/proximity/proximity_query.h"
-#include "proximity/box_bounds.h"
-#include "proximity/boxes_inside.h"
-#include "proximity/coherence/box_distance_cache.h"
-#include "proximity/coherence/bvtt_front.h"
-#include "proximity/coherence/distance_cache.h"
 #include "proximity/coherence/extent_bound.h"
-#include "proximity/coherence/field_front.h"
 #include "proximity/coherence/link_bound.h"
-#include "proximity/coherence/node_bounds.h"
+#include "proximity/coherence/search_front.h"
 #include "proximity/coherence/side_balls.h"
+#include "proximity/link_bounds.h"
 #include "proximity/posed_index.h"
-#include "proximity/signed_distance_grid.h"
-#include "proximity/supporting_planes.h"
-#include "proximity/visited_set.h"
+#include "proximity/supporting_plane.h"
 
 /// The state of a link's query: three types, by how long their content lives.
 namespace ist {
@@ -32,13 +25,16 @@ namespace ist {
 /// [m] More than double loses where distances are compared.
 inline constexpr double kDistanceRounding = 1e-12;
 
+/// [s] Links of which nothing is known yet may exceed the deadline by so much together, until each
+/// has a bound: an answer that is as late is worth more than none.
+inline constexpr double kFirstBounds = 5e-5;
+
 /// The part that belongs to the link for ever, whatever its pose and whatever the clouds.
 struct LinkContext {
-  explicit LinkContext(const LinkModel& link) : model(&link), displacement(link), grid(link) {}
+  explicit LinkContext(const LinkModel& link) : model(&link), displacement(link) {}
 
   const LinkModel* model;
   DisplacementBound displacement;
-  SignedDistanceGrid grid;
 
   const InnerSphereTree& tree() const { return model->tree; }
   const Solid& solid() const { return model->solid; }
@@ -75,9 +71,9 @@ struct SearchResult {
   ExtentResult extents;         ///< used where obstacles have extents
   double pruned_bound = 0.0;    ///< [m] least lower bound of all that was not measured
   double refined_bound = 0.0;   ///< [m] the same of what was measured, to within the tolerance
-  double cover_bound = 0.0;     ///< [m] no point is nearer to the clipped cover spheres
+  double outside_bound = 0.0;   ///< [m] every place that is nearer to an obstacle is outside
   double region_bound = 0.0;    ///< [m] no point outside the regions of interest is nearer
-  double rounding = 0.0;        ///< [m] largest error of a lower bound of the traversals
+  double rounding = 0.0;        ///< [m] largest error of a lower bound of the searches
   double max_coordinate = 0.0;  ///< [m] of the link in the frames of the indices
   double drift = 0.0;           ///< of the pose as given, see RigidPose
   double index_error = 0.0;     ///< [m] by the poses of maps as given, within range
@@ -88,20 +84,13 @@ struct SearchResult {
 /// answer promises.
 struct LinkCoherence {
   explicit LinkCoherence(const LinkModel& link)
-      : bound(link),
-        extents(link),
-        nodes(link),
-        side_balls(!link.solid.is_closed()),
-        supports(link.tree) {}
+      : bound(link), extents(link), side_balls(!link.solid.is_closed()) {}
 
   LinkBound bound;
   ExtentBound extents;
-  NodeBounds nodes;
-  BvttFronts fronts;
-  FieldFronts field_fronts;
-  DistanceCache distances;
-  BoxDistanceCache box_distances;
+  SearchFronts fronts;
   SideBalls side_balls;
+  SupportingPlane plane;
   /// The obstacle of the last answer: evaluated at the new pose, it is the first upper bound.
   struct {
     std::uint64_t build_id = 0;  ///< of its index; 0: there was no answer
@@ -117,11 +106,6 @@ struct LinkCoherence {
     std::uint64_t build_id = 0;
     ObstacleId id;
   } nearest_extent;
-  /// [m] The distance at which too many points were about equally near for the dual-tree traversal;
-  /// inf: none.
-  double crowded_at = std::numeric_limits<double>::infinity();
-  /// [m] The distance at which the field search gave up; inf: nowhere.
-  double too_coarse_at = std::numeric_limits<double>::infinity();
   /// The last complete answer: it is the same for the same question.
   struct {
     SceneId scene = kUnknownScene;                           ///< unknown: there is none
@@ -129,26 +113,14 @@ struct LinkCoherence {
     QueryConfig config;
     SearchResult result;
   } answered;
-  /// The scene and the pose that a first bound was looked for in.
-  struct {
-    SceneId scene = kUnknownScene;  ///< unknown: nowhere
-    Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
-    bool was_proven = false;  ///< whether one was found
-    bool by_planes = false;   ///< with as many planes as it takes, too
-  } first_bound;
-  SupportCache supports;
-  Eigen::Vector3d plane_normal_L = Eigen::Vector3d::Zero();  ///< of `supports`; zero: none yet
 
   void forget() {
     last.build_id = 0;
     nearest_extent.build_id = 0;
     answered.scene = kUnknownScene;
-    first_bound.scene = kUnknownScene;
     bound.forget();
     extents.forget();
-    nodes.forget();
     fronts.forget();
-    field_fronts.forget();
   }
 };
 
@@ -174,13 +146,7 @@ struct LinkSearch : SearchResult {
   bool is_counted = false;          ///< in the statistics, as outside the regions
   double first_bound = 0.0;         ///< [m] proven before tighten()
   double first_extent_bound = 0.0;  ///< [m] the same for spheres
-  BoxBounds box_bounds;
-  VisitedSet visited;          ///< obstacles of the index at work that were refined
-  VisitedSet outside;          ///< boxes of the index at work that are outside the link
-  BoxesInside boxes_inside;    ///< of the index at work
-  int measured = 0;            ///< points
-  int refined = 0;             ///< points, in the dual-tree traversal at work
-  int box_cells_left = 0;      ///< into which overlapping boxes may still be divided
+  int box_cells_left = 0;           ///< into which overlapping boxes may still be divided
   int descent_steps_left = 0;  ///< of the search for a point inside where boxes only just overlap
 
   /// [m] Beyond it nothing matters.
@@ -201,9 +167,10 @@ struct LinkSearch : SearchResult {
   /// [m] The same for lower bounds in float.
   float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }
 
-  void count_exact() {
-    ++measured;
-    ++statistics->exact_evaluations;
+  /// Whether there is time to go on.
+  /// @param bound  [m] what is proven
+  bool has_time(double bound) const {
+    return !deadline->passed() || (!(bound > 0.0) && !deadline->passed_by(kFirstBounds));
   }
   void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }
 
@@ -233,5 +200,16 @@ struct LinkQueryState {
   LinkCoherence kept;
   LinkSearch search;
 };
+
+/// Places the link's supporting plane in the frame of an index.
+inline void place_plane(const LinkQueryState& link, const Eigen::Isometry3d& X_OL,
+                        PlacedLink* placed) {
+  const SupportingPlane& plane = link.kept.plane;
+  if (plane.normal_L.isZero()) return;
+  const Eigen::Vector3d normal_O = X_OL.linear() * plane.normal_L;
+  for (int axis = 0; axis < 3; ++axis) placed->normal[axis] = static_cast<float>(normal_O[axis]);
+  placed->height =
+      round_up(normal_O.dot(X_OL.translation()) + plane.support + link.search.rounding);
+}
 
 }  // namespace ist

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "proximity/refinement.h"
+#include "proximity/obstacle_measure.h"
 
 namespace ist {
 namespace {
@@ -31,7 +31,7 @@ int nearest_child(const BoxNode& node, const Eigen::Vector3d& p_O) {
 // Step 1: any obstacle, measured exactly, bounds the distance from above. What was the closest
 // point of the link to the last answer's obstacle is still a point of the link.
 void LinkQuery::warm_start(SnapshotSpan clouds, bool has_time) {
-  if (link_.search.is_answered || begins_with_field()) return;
+  if (link_.search.is_answered || begins_with_search()) return;
   const auto& last = link_.kept.last;
   const auto measure_last = [&](const auto& obstacles) {
     if (last.build_id == 0 || obstacles.bvh->build_id() != last.build_id) return;
@@ -75,7 +75,7 @@ void LinkQuery::measure_near_place(const PointObstacles& obstacles, const Eigen:
   }
   // A point of the link's surface is no nearer than the surface.
   const double distance = last.has_place ? (tile.point(nearest) - p_OC).norm() : kInfinity;
-  PointRefinement(obstacles, &link_)
+  PointMeasure(obstacles, &link_)
       .measure({~child, nearest}, (1.0 + 1e-9) * distance + kDistanceRounding);
 }
 
@@ -86,21 +86,21 @@ void LinkQuery::measure_near_place(const BoxObstacles& /*obstacles*/,
 void LinkQuery::measure_again(const PointObstacles& obstacles) {
   const auto& last = link_.kept.last;
   const double distance = (obstacles.X_LO * point_O(*obstacles.bvh, last.id) - last.p_LCl).norm();
-  PointRefinement(obstacles, &link_).measure(last.id, (1.0 + 1e-9) * distance + kDistanceRounding);
+  PointMeasure(obstacles, &link_).measure(last.id, (1.0 + 1e-9) * distance + kDistanceRounding);
 }
 
 void LinkQuery::measure_again(const BoxObstacles& obstacles) {
   const auto& last = link_.kept.last;
   const Eigen::AlignedBox3d box = box_O(*obstacles.bvh, last.id);
-  BoxRefinement refinement(obstacles, &link_);
+  BoxMeasure measure(obstacles, &link_);
   if (last.was_inside && link_.context.solid().is_closed()) {
     // The deepest point of a box hardly changes. With holes, the centre of a box may decide.
-    refinement.take_point(clamp_to(box, obstacles.X_FO.inverse() * last.p_FCo), last.id);
+    measure.take_point(clamp_to(box, obstacles.X_FO.inverse() * last.p_FCo), last.id);
     if (distance() < 0.0) return;
   }
   const Eigen::Vector3d p_OCl = obstacles.X_OL * last.p_LCl;
   const double distance = (p_OCl - clamp_to(box, p_OCl)).norm();
-  refinement.measure(last.id, (1.0 + 1e-9) * distance + kDistanceRounding, p_OCl);
+  measure.measure(last.id, (1.0 + 1e-9) * distance + kDistanceRounding, p_OCl);
 }
 
 }  // namespace ist

@@ -14,9 +14,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // for each metre of coordinates, of which there are no more than ten in a robot's work.
 constexpr double kBoundError = 2e-6;
 // [s] Links of which nothing is known yet may exceed the deadline by so much together, until each
-// has an obstacle that was measured, and until each has a bound: an answer that is as late is worth
-// more than none.
-constexpr double kFirstObstacles = 5e-5, kFirstBounds = 6e-5;
+// has an obstacle that was measured: an answer that is as late is worth more than none.
+constexpr double kFirstObstacles = 5e-5;
 
 }  // namespace
 
@@ -70,19 +69,10 @@ struct ProximityQuery::Impl {
     return first;
   }
 
-  // Before any link is refined, every one in `order` gets an obstacle that was measured, and a
-  // first lower bound. Links without a bound get more time for one, while there is any.
+  // Before any link is searched, every one in `order` gets an obstacle that was measured.
   void start(SnapshotSpan clouds, Deadline* deadline) {
     for (const std::size_t i : order) {
       links[i].warm_start(clouds, !deadline->passed_by(kFirstObstacles));
-    }
-    if (!(config.deadline > 0.0)) return;
-    for (const std::size_t i : order) {
-      if (deadline->passed_by(kFirstBounds)) break;
-      links[i].prove_first_bound(clouds, deadline, kFirstBounds);
-    }
-    for (const std::size_t i : order) {
-      if (!deadline->passed()) links[i].prove_bound_by_planes(clouds, deadline);
     }
   }
 
@@ -101,14 +91,8 @@ struct ProximityQuery::Impl {
     std::sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
       return links[a].proven_bound() < links[b].proven_bound();
     });
-    if (!deadline->passed()) {
-      for (const std::size_t i : order) links[i].tighten(config);
-      return;
-    }
-    for (const std::size_t i : order) {
-      if (deadline->passed_by(kFirstBounds)) break;
-      links[i].prove_bound_late(clouds, deadline, kFirstBounds);
-    }
+    if (deadline->passed()) return;
+    for (const std::size_t i : order) links[i].tighten(config);
   }
 
   // Counts a link that a deadline left with wider bounds than were asked for.

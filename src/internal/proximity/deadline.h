@@ -68,6 +68,7 @@ class Deadline {
   bool passed_by(double seconds) {
     if (!passed()) return false;
     if (late_for_test >= 0.0) return late_for_test >= seconds;
+    if (whole_ != nullptr && whole_->has_passed()) return whole_->passed_by(seconds);
     return std::chrono::steady_clock::now() - passed_at_ >= std::chrono::duration<double>(seconds);
   }
 

@@ -12,14 +12,13 @@
 /// holds at a pose X' for the same scene as b - displacement, where no point of the link, or of
 /// what the bound is about, moves farther than the displacement between X and X'. A distance
 /// changes by no more than the points that it is measured between move (it is 1-Lipschitz), so
-/// nothing else is needed. LinkBound, BvttFront and DistanceCache keep such bounds; all of them
-/// take displacements from here, where their rounding is accounted for.
+/// nothing else is needed. LinkBound, ExtentBound and SearchFront keep such bounds; all of
+/// them take displacements from here, where their rounding is accounted for.
 ///
 /// The exception: the inside of a mesh with holes ends where no surface is, so a point may become
-/// an inside point although no surface has crossed it, and its signed distance jumps. The cover
-/// spheres leave no inside farther from them than the interior gap, so a point whose cover distance
-/// stays above that gap stays outside (stays_outside()). Unsigned distances and cover distances do
-/// not jump; PointDepth::floor takes the jump in (Solid::depth).
+/// an inside point although no surface has crossed it, and its signed distance jumps. So a bound of
+/// such a link is kept with a margin: every place nearer than that to an obstacle is outside.
+/// Unsigned distances do not jump; PointDepth::floor takes the jump in (Solid::depth).
 namespace ist {
 
 /// [m] What remains of a bound after a displacement; -inf where the displacement is not known (NaN
@@ -29,12 +28,6 @@ inline double after_displacement(double bound, double displacement) {
   return displacement < std::numeric_limits<double>::infinity()
              ? bound - displacement
              : -std::numeric_limits<double>::infinity();
-}
-
-/// Whether points that had this cover distance [m] are still outside after a displacement.
-/// @param least_cover_distance  [m] the interior gap of a mesh with holes; -inf for other links
-inline bool stays_outside(double cover_distance, double displacement, double least_cover_distance) {
-  return after_displacement(cover_distance, displacement) > least_cover_distance;
 }
 
 /// [m] How far a point is between two places, rounding included. NaN or infinite where either is.

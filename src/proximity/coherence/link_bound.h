@@ -16,16 +16,14 @@ class LinkBound {
 
   /// @param bound           [m] no stored point has a smaller signed distance; kept where positive,
   ///                        and of a closed solid
-  /// @param cover_distance  [m] no stored point is nearer to what supporting planes leave of the
-  ///                        cover spheres
+  /// @param outside_bound   [m] every place that is nearer to a stored point is outside
   /// @param max_coordinate  [m] of the link in the frame of an index, for the error of stored
   /// points
-  void prove(SceneId scene, const Eigen::Isometry3d& X_FL, double bound, double cover_distance,
+  void prove(SceneId scene, const Eigen::Isometry3d& X_FL, double bound, double outside_bound,
              double max_coordinate);
   void forget() { scene_ = kUnknownScene; }
 
-  /// Takes another packing of the same geometry. What is proven stays: of the cover distance, how
-  /// far the link may move before a point may be inside.
+  /// Takes another packing of the same geometry; what is proven stays.
   void set_link(const LinkModel& link);
 
   /// [m] No stored point has a smaller signed distance from the link at this pose; -inf: nothing is
@@ -39,14 +37,13 @@ class LinkBound {
   double max_coordinate() const { return max_coordinate_; }
 
  private:
-  static double least_cover_distance(const LinkModel& link);
   bool holds(double bound, double moved) const;
 
   DisplacementBound displacement_;
-  double least_cover_distance_;  ///< [m] see stays_outside()
+  bool is_closed_;
   SceneId scene_ = kUnknownScene;
   Eigen::Isometry3d X_FL_ = Eigen::Isometry3d::Identity();
-  double bound_ = 0.0, cover_distance_ = 0.0, max_coordinate_ = 0.0;
+  double bound_ = 0.0, outside_bound_ = 0.0, max_coordinate_ = 0.0;
 };
 
 }  // namespace ist

@@ -1,4 +1,4 @@
-// The single-tree traversal near the link and among ties, and the bounds that it keeps.
+// Queries near the link and among ties.
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "proximity/coherence/node_bounds.h"
+#include "support/distance_fields.h"
 #include "support/meshes.h"
 #include "support/sanitizers.h"
 #include "support/scene.h"
@@ -49,7 +49,7 @@ Eigen::Isometry3d small_motion(double step, test::Rng* rng) {
 
 // The answers on motions that touch, leave and enter, with clouds that come and go: bounds that are
 // kept too long, or for another cloud, would be above the truth.
-TEST(SingleTreeSearch, HoldsOnMotionsNearTheSurface) {
+TEST(NearSurface, HoldsOnMotionsNearTheSurface) {
   const test::Trial trial(shapes(), 0.005);
   test::Rng rng(171);
   int contacts = 0, near = 0;
@@ -89,7 +89,7 @@ TEST(SingleTreeSearch, HoldsOnMotionsNearTheSurface) {
 
 // Points about equally near on all sides, at a distance from the link: after the first query few of
 // them are measured again, though every one of them is within twice the tolerance.
-TEST(SingleTreeSearch, KeepsTheBoundsOfTies) {
+TEST(NearSurface, KeepsTheBoundsOfTies) {
   const std::vector<Shape> bodies = {Cylinder{0.05, 0.3}, Box{{0.2, 0.16, 0.1}}};
   const test::Trial trial(bodies, 0.005);
   test::Rng rng(172);
@@ -107,7 +107,7 @@ TEST(SingleTreeSearch, KeepsTheBoundsOfTies) {
       }
       const CloudSnapshot cloud = test::make_snapshot(points);
       const std::vector<Point> stored = test::stored_points(cloud.index);
-      ProximityQuery query(trial.shared_model(), QueryConfig());
+      ProximityQuery query(test::with_fields(trial.shared_model()), QueryConfig());
       LinkProximity result;
       Eigen::Isometry3d X_FL = Eigen::Isometry3d::Identity();
       std::uint64_t measured = 0;
@@ -125,61 +125,6 @@ TEST(SingleTreeSearch, KeepsTheBoundsOfTies) {
       }
       EXPECT_LT(measured / kSteps, 500U);
     }
-  }
-}
-
-TEST(NodeBounds, LowersWhatIsKeptByTheDisplacement) {
-  const test::Trial trial({Shape(Box{{0.2, 0.1, 0.3}}), Shape(test::open_box({0.1, 0.1, 0.1}))});
-  test::Rng rng(173);
-  for (const LinkModel& link : trial.model().links) {
-    const DisplacementBound displacement(link);
-    NodeBounds kept(link);
-    Eigen::Isometry3d X = test::random_pose(&rng, 1.0);
-    kept.begin(7, X, displacement);
-    ChildBounds bounds, loaded;
-    EXPECT_FALSE(kept.load(3, &loaded));
-    bounds.set_all(0.02, 0.03);
-    bounds.floor[5] = -kInfinity;
-    bounds.outside[6] = kInfinity;
-    kept.store(3, bounds);
-    kept.store(~3, bounds);
-    double moved = 0.0;
-    while (moved < 0.09) {
-      const Eigen::Isometry3d next = small_motion(1e-3, &rng) * X;
-      moved += displacement.between(X, next);
-      X = next;
-      kept.begin(7, X, displacement);
-    }
-    for (const std::int32_t child : {3, ~3}) {
-      ASSERT_TRUE(kept.load(child, &loaded));
-      EXPECT_LE(loaded.floor[0], 0.02 - moved);
-      EXPECT_GT(loaded.floor[0], 0.02 - moved - 1e-7);
-      EXPECT_EQ(loaded.floor[5], -kInfinity);
-      EXPECT_EQ(loaded.outside[6], kInfinity);
-      if (link.solid.is_closed()) continue;  // which needs one of the two only
-      EXPECT_LE(loaded.outside[0], 0.03 - moved);
-      EXPECT_GT(loaded.outside[0], 0.03 - moved - 1e-7);
-    }
-    EXPECT_FALSE(kept.load(4, &loaded));
-    // Another index has bounds of its own, and neither forgets the other's.
-    kept.begin(8, X, displacement);
-    EXPECT_FALSE(kept.load(3, &loaded));
-    kept.begin(7, X, displacement);
-    EXPECT_TRUE(kept.load(3, &loaded));
-    // What has moved too far, or by an unknown displacement, is discarded.
-    Eigen::Isometry3d far = X;
-    far.translation().x() += 0.05;
-    kept.begin(7, far, displacement);
-    EXPECT_FALSE(kept.load(3, &loaded));
-    kept.store(3, bounds);
-    far.translation().x() = std::numeric_limits<double>::quiet_NaN();
-    kept.begin(7, far, displacement);
-    EXPECT_FALSE(kept.load(3, &loaded));
-    kept.begin(7, X, displacement);
-    kept.store(3, bounds);
-    kept.forget();
-    kept.begin(7, X, displacement);
-    EXPECT_FALSE(kept.load(3, &loaded));
   }
 }
 

@@ -56,9 +56,9 @@ QueryConfig random_config(test::Rng* rng) {
   return config;
 }
 
-class FieldSearch : public testing::Test {
+class SearchByField : public testing::Test {
  protected:
-  FieldSearch()
+  SearchByField()
       : links_(test::random_links(&rng_)),
         model_(test::with_fields(test::model_of(links_, 0.02), 2)) {}
 
@@ -67,7 +67,7 @@ class FieldSearch : public testing::Test {
   std::shared_ptr<const RobotModel> model_;
 };
 
-TEST_F(FieldSearch, BoundsHoldAndZeroToleranceIsExact) {
+TEST_F(SearchByField, BoundsHoldAndZeroToleranceIsExact) {
   ProximityQuery query(model_, {});
   LinkProximity result;
   int contacts = 0, near = 0;
@@ -98,7 +98,7 @@ TEST_F(FieldSearch, BoundsHoldAndZeroToleranceIsExact) {
 
 // A point that enters a mesh through its hole crosses no surface. It is found to be inside, also
 // where what was proven at the steps before is all that is looked at.
-TEST_F(FieldSearch, APointThatEntersThroughAHoleIsFound) {
+TEST_F(SearchByField, APointThatEntersThroughAHoleIsFound) {
   const LinkGeometry cup = test::one(test::open_box({0.1, 0.1, 0.1}));
   const auto model = test::with_fields(test::model_of({cup}, 0.02));
   QueryConfig config;
@@ -126,7 +126,7 @@ TEST_F(FieldSearch, APointThatEntersThroughAHoleIsFound) {
 
 // The same beside points along a wall, which stay nearer all the time: what is kept of the link's
 // distance says nothing of the point that enters.
-TEST_F(FieldSearch, APointThatEntersBesideNearerOnesIsFound) {
+TEST_F(SearchByField, APointThatEntersBesideNearerOnesIsFound) {
   const LinkGeometry cup = test::one(test::open_box({0.1, 0.1, 0.1}));
   const auto model = test::with_fields(test::model_of({cup}, 0.002));
   QueryConfig config;
@@ -155,7 +155,7 @@ TEST_F(FieldSearch, APointThatEntersBesideNearerOnesIsFound) {
 
 // The inside of a mesh with holes may reach beyond its surface, up to the box about it in its own
 // frame: above the rim of two cups, one in the other.
-TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
+TEST_F(SearchByField, PointsInsideBeyondTheSurfaceAreFound) {
   const TriangleMesh cups =
       test::joined(test::open_box({0.1, 0.1, 0.1}), test::open_box({0.09, 0.09, 0.09}));
   int contacts = 0;
@@ -186,7 +186,7 @@ TEST_F(FieldSearch, PointsInsideBeyondTheSurfaceAreFound) {
 }
 
 // A large hollow with a hole: a box of points deep inside is far from every surface.
-TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
+TEST_F(SearchByField, PointsInAHollowAreNotTakenForClear) {
   const LinkGeometry hollow = test::one(test::open_box({1.0, 1.0, 1.0}));
   const auto without = test::model_of({hollow}, 0.05);
   const auto fine = test::with_fields(without), coarse = test::with_fields(without, 1);
@@ -214,7 +214,7 @@ TEST_F(FieldSearch, PointsInAHollowAreNotTakenForClear) {
 }
 
 // Whatever a deadline leaves, bounds hold.
-TEST_F(FieldSearch, BoundsHoldWhenItIsStopped) {
+TEST_F(SearchByField, BoundsHoldWhenItIsStopped) {
   std::vector<LinkProximity> results;
   const std::vector<bool> known(links_.size(), true);
   int stopped = 0;
@@ -243,7 +243,7 @@ TEST_F(FieldSearch, BoundsHoldWhenItIsStopped) {
   EXPECT_GT(stopped, 20);
 }
 
-TEST_F(FieldSearch, TheMinimumOfAllLinksIsTheSameWithoutFields) {
+TEST_F(SearchByField, TheMinimumOfAllLinksIsTheSameWithoutFields) {
   const auto without = std::make_shared<RobotModel>(*model_);
   for (LinkModel& link : without->links) link.field = nullptr;
   QueryConfig config;
@@ -264,7 +264,7 @@ TEST_F(FieldSearch, TheMinimumOfAllLinksIsTheSameWithoutFields) {
 }
 
 // With a tolerance, the nearest point is the only one of a cloud that is measured, nearly always.
-TEST_F(FieldSearch, MeasuresHardlyMoreThanOnePoint) {
+TEST_F(SearchByField, MeasuresHardlyMoreThanOnePoint) {
   QueryConfig config;
   config.max_distance = 10.0;
   ProximityQuery query(test::with_fields(model_), config);
@@ -284,7 +284,7 @@ TEST_F(FieldSearch, MeasuresHardlyMoreThanOnePoint) {
 }
 
 // Nor in contact, however many points are inside.
-TEST_F(FieldSearch, MeasuresFewPointsInContact) {
+TEST_F(SearchByField, MeasuresFewPointsInContact) {
   QueryConfig config;
   LinkProximity result;
   for (const double tolerance : {0.0, 0.001}) {
@@ -313,7 +313,7 @@ TEST_F(FieldSearch, MeasuresFewPointsInContact) {
   }
 }
 
-TEST_F(FieldSearch, AllocatesNothing) {
+TEST_F(SearchByField, AllocatesNothing) {
   ProximityQuery query(model_, {});
   const CloudSnapshot cloud = test::make_snapshot(dense_points(&rng_, 3000));
   LinkProximity result;

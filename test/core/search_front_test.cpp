@@ -1,7 +1,7 @@
-// The front of a field search: what it keeps, and that answers along a motion are as good with it
+// The front of a search: what it keeps, and that answers along a motion are as good with it
 // as without.
 
-#include "proximity/coherence/field_front.h"
+#include "proximity/coherence/search_front.h"
 
 #include <gtest/gtest.h>
 
@@ -22,17 +22,17 @@
 namespace ist {
 namespace {
 
-constexpr double kRounding = 2e-8;    // [m] as in field_search_test
+constexpr double kRounding = 2e-8;    // [m] as in search_test
 constexpr float kFloatError = 2e-7F;  // [m] of stored bounds below 1 m
 
-FieldFront::Part part_of(std::int32_t child, float bound, float outside) {
-  return {bound, outside, child, FieldFront::kAllSlots, {}, {}};
+SearchFront::Part part_of(std::int32_t child, float bound, float outside) {
+  return {bound, outside, child, SearchFront::kAllSlots, {}, {}};
 }
 
 // The parts of a front, with their bounds at the pose at work; all stay.
-std::vector<FieldFront::Part> parts_of(FieldFront* front) {
-  std::vector<FieldFront::Part> parts;
-  front->remove_if([&](const FieldFront::Part& part) {
+std::vector<SearchFront::Part> parts_of(SearchFront* front) {
+  std::vector<SearchFront::Part> parts;
+  front->remove_if([&](const SearchFront::Part& part) {
     parts.push_back(part);
     return false;
   });
@@ -49,7 +49,7 @@ class MovingFront : public testing::Test {
 
   DisplacementBound displacement_{
       Eigen::AlignedBox3d(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones())};
-  FieldFront front_;
+  SearchFront front_;
 };
 
 TEST_F(MovingFront, BoundsFallByTheWay) {
@@ -121,7 +121,7 @@ Eigen::Isometry3d step_of(test::Rng* rng, double length) {
 
 // Links with and without holes move among points, mostly slowly, sometimes back, sometimes far, and
 // the cloud changes now and then. Deadlines leave parts of searches undone.
-TEST(FieldFrontOfAQuery, AnswersHoldAlongAMotion) {
+TEST(SearchFrontOfAQuery, AnswersHoldAlongAMotion) {
   test::Rng rng(11);
   std::vector<LinkGeometry> links = test::random_links(&rng);
   links.push_back(test::one(test::open_box({0.2, 0.2, 0.2})));
@@ -168,7 +168,7 @@ TEST(FieldFrontOfAQuery, AnswersHoldAlongAMotion) {
 
 // A box dips into a plane of points, a little tilted otherwise each time: a point that was inside
 // is not the deepest one of the next time.
-TEST(FieldFrontOfAQuery, PointsThatWereInsideAreFoundAgain) {
+TEST(SearchFrontOfAQuery, PointsThatWereInsideAreFoundAgain) {
   test::Rng rng(13);
   const LinkGeometry link = test::one(test::box({0.1, 0.1, 0.1}));
   const auto model = test::with_fields(test::model_of({link}, 0.02));
@@ -203,7 +203,7 @@ TEST(FieldFrontOfAQuery, PointsThatWereInsideAreFoundAgain) {
 }
 
 // Along a slow motion, hardly any node is expanded again.
-TEST(FieldFrontOfAQuery, NodesAboveTheFrontAreNotVisited) {
+TEST(SearchFrontOfAQuery, NodesAboveTheFrontAreNotVisited) {
   test::Rng rng(12);
   const auto model =
       test::with_fields(test::model_of({test::one(test::torus(0.12, 0.05, 40, 24))}, 0.02));

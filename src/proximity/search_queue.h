@@ -8,23 +8,25 @@
 
 namespace ist {
 
-/// The queue of a field search, the least bound first. It holds boxes of nodes and tiles, and
-/// single points. Nothing is allocated.
-class FieldQueue {
+/// The queue of a search, the least bound first. It holds boxes of nodes and tiles, and single
+/// obstacles: points, boxes, and parts of boxes. Nothing is allocated.
+class SearchQueue {
  public:
   static constexpr std::uint32_t kCapacity = 1024;
-  static constexpr int kNoPoint = -1;
+  static constexpr int kNoObstacle = -1;
 
   struct Entry {
     float outside;       ///< [m] every place nearer to it is outside; not positive: unknown
     float distance;      ///< [m] of a point that may be inside: no surface is nearer to it
-    std::int32_t child;  ///< node, or tile if negative; the tile of a point
-    int lane;            ///< of a point; else kNoPoint
-    /// The children of a node, as in FieldFront::Part; for a point, the number of its tile's part.
+    std::int32_t child;  ///< node, or tile if negative; the tile of an obstacle
+    int lane;            ///< of an obstacle; else kNoObstacle
+    /// The children of a node, as in SearchFront::Part; for an obstacle, the number of its tile's
+    /// part.
     std::uint32_t slots;
     float radius;          ///< [m] of the box; an upper bound of a point's distance
     float center[3];       ///< [m] of the box, or the point, in the link's frame
-    float min[3], max[3];  ///< [m] the box, in the index's frame; not of a point
+    float min[3], max[3];  ///< [m] the box, in the index's frame; of a point, both are its place
+    bool is_part;          ///< of an obstacle that is a box
   };
 
   bool empty() const { return size_ == 0; }

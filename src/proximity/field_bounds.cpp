@@ -1,108 +1,55 @@
-// Bounds of boxes and points by a link's field of distances and its supporting plane. Compiled once
-// per instruction set: to be included again for each.
-#if defined(IST_PROXIMITY_FIELD_BOUNDS_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef IST_PROXIMITY_FIELD_BOUNDS_INL_H
-#undef IST_PROXIMITY_FIELD_BOUNDS_INL_H
-#else
-#define IST_PROXIMITY_FIELD_BOUNDS_INL_H
-#endif
+// Bounds by a link's field of distances. Compiled once per instruction set; the best one that the
+// machine has is chosen at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "proximity/field_bounds.cpp"
+#include "proximity/field_bounds.h"
 
+#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "internal/geometry/field_lookup-inl.h"
-#include "proximity/clipped_sphere-inl.h"
-#include "proximity/field_queue.h"
-#include "proximity/field_search.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist {
 namespace HWY_NAMESPACE {
-namespace field_search {
+namespace field_bounds {
 namespace hn = hwy::HWY_NAMESPACE;
-using dual_tree::BoxTag;
 using field_lookup::FieldLookup;
 using field_lookup::kPlaceError;
-using field_lookup::kSquareError;
 using field_lookup::LessVariance;
 using field_lookup::Variance;
+using BoxTag = hn::CappedTag<float, static_cast<std::size_t>(kBoxWidth)>;
 using CornerTag = hn::CappedTag<float, 8>;
-using Entry = FieldQueue::Entry;
-
-// The bound [m] of what may be inside, at any depth: it is looked at before all others.
-constexpr float kMayBeInside = -kFarAway;
-
-// Bounds of a node's children or of a tile's points.
-struct alignas(64) Bounds {
-  float distance[kBoxWidth];                       // [m] lower bounds; negative: of the depth
-  float outside[kBoxWidth];                        // [m] every place that is nearer is outside
-  float surface[kBoxWidth];                        // [m] no surface is nearer
-  float x[kBoxWidth], y[kBoxWidth], z[kBoxWidth];  // [m] in the link's frame
-  float radius[kBoxWidth];                         // [m] as FieldQueue::Entry
-};
-
-// Lower bounds [m] of the distance at the corners of a box.
-struct Corners {
-  alignas(64) float bound[8];
-};
+using Entry = SearchQueue::Entry;
 
 class FieldBounds {
  public:
-  explicit FieldBounds(const FieldSearchInput& input)
-      : in_(input),
-        field_(*input.field),
-        is_closed_(input.field->is_closed()),
-        has_depths_(input.field->has_depths()),
-        support_(input.support) {
-    planes_.Set(input.planes);
-  }
-
-  bool is_closed() const { return is_closed_; }
-  bool has_depths() const { return has_depths_; }
-  void SetPlanes(const SupportingPlanes& planes, float support) {
-    planes_.Set(planes);
-    support_ = support;
-  }
-
-  // Places a box, given in the index's frame.
-  void PlaceBox(const float* min, const float* max, Entry* box) const {
-    float square = 0.0F;
-    for (int i = 0; i < 3; ++i) {
-      box->min[i] = min[i];
-      box->max[i] = max[i];
-      const float half = 0.5F * (max[i] - min[i]);
-      square += half * half;
-    }
-    box->radius = std::sqrt(square);
-    for (int row = 0; row < 3; ++row) {
-      box->center[row] = in_.p_LO[row];
-      for (int i = 0; i < 3; ++i) {
-        box->center[row] += in_.R_LO[3 * row + i] * (0.5F * (min[i] + max[i]));
-      }
-    }
-  }
-
-  // [m] The height of a box above the supporting plane.
-  float Height(const Entry& box) const { return planes_.Height(box.min, box.max) - support_; }
+  explicit FieldBounds(const PlacedLink& link)
+      : in_(link),
+        field_(*link.field),
+        is_closed_(link.field->is_closed()),
+        has_depths_(link.field->has_depths()) {}
 
   // @param parent   the box about the node
   // @param corners  of `parent`; null: not known
   // @returns [m] in some box every point is no farther
-  HWY_INLINE float BoundBoxes(const BoxNode& node, const Entry& parent, const Corners* corners,
+  HWY_INLINE float BoundBoxes(const BoxRows& boxes, const Entry& parent, const Corners* corners,
                               Bounds* bounds) const {
     const BoxTag d;
     const DistanceField::Level& level = field_.LevelAt(parent.center, parent.radius);
     const auto half = hn::Set(d, 0.5F);
     auto farthest = hn::Set(d, kFarAway);
     for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
-      const auto min_x = hn::Load(d, node.min_x + k), max_x = hn::Load(d, node.max_x + k),
-                 min_y = hn::Load(d, node.min_y + k), max_y = hn::Load(d, node.max_y + k),
-                 min_z = hn::Load(d, node.min_z + k), max_z = hn::Load(d, node.max_z + k);
+      const auto min_x = hn::Load(d, boxes.min[0] + k), max_x = hn::Load(d, boxes.max[0] + k),
+                 min_y = hn::Load(d, boxes.min[1] + k), max_y = hn::Load(d, boxes.max[1] + k),
+                 min_z = hn::Load(d, boxes.min[2] + k), max_z = hn::Load(d, boxes.max[2] + k);
       const auto half_x = hn::Mul(half, hn::Sub(max_x, min_x)),
                  half_y = hn::Mul(half, hn::Sub(max_y, min_y)),
                  half_z = hn::Mul(half, hn::Sub(max_z, min_z));
-      const auto radius = dual_tree::Norm(half_x, half_y, half_z);
+      const auto radius = lanes::Norm(half_x, half_y, half_z);
       ToLink(hn::Mul(half, hn::Add(min_x, max_x)), hn::Mul(half, hn::Add(min_y, max_y)),
              hn::Mul(half, hn::Add(min_z, max_z)), k, bounds);
       hn::Store(radius, d, bounds->radius + k);
@@ -113,10 +60,12 @@ class FieldBounds {
       const auto distance = field_.Distance(d, level, x, y, z, from_bounds, &upper);
       farthest = hn::Min(farthest, hn::Add(upper, radius));
       const auto by_corners =
-          corners != nullptr ? Interpolate(parent, corners->bound, node, k) : hn::Zero(d);
+          corners != nullptr ? Interpolate(parent, corners->bound, boxes, k) : hn::Zero(d);
       Combine(
           from_bounds, distance, radius, by_corners,
-          planes_.Height(node, k, planes_.offset() + support_),
+          Height((in_.normal[0] > 0.0F ? boxes.min : boxes.max)[0] + k,
+                 (in_.normal[1] > 0.0F ? boxes.min : boxes.max)[1] + k,
+                 (in_.normal[2] > 0.0F ? boxes.min : boxes.max)[2] + k),
           [&] { return LookInside(*bounds, k, half_x, half_y, half_z); }, k, bounds);
     }
     return hn::GetLane(hn::MinOfLanes(d, farthest));
@@ -145,13 +94,12 @@ class FieldBounds {
         return inside;
       };
       Combine(from_bounds, distance, hn::Zero(d), hn::Zero(d),
-              planes_.Height(tile, k, planes_.offset() + support_), look_inside, k, bounds);
+              Height(tile.x + k, tile.y + k, tile.z + k), look_inside, k, bounds);
     }
     return hn::GetLane(hn::MinOfLanes(d, farthest));
   }
 
-  // @returns [m] the least of them
-  float BoundCorners(const Entry& entry, Corners* corners) const {
+  void BoundCorners(const Entry& entry, Corners* corners) const {
     const CornerTag d;
     alignas(64) static constexpr float kSign[3][8] = {
         {-1, 1, -1, 1, -1, 1, -1, 1}, {-1, -1, 1, 1, -1, -1, 1, 1}, {-1, -1, -1, -1, 1, 1, 1, 1}};
@@ -172,10 +120,22 @@ class FieldBounds {
       least = hn::Min(least, bound);
       hn::Store(bound, d, corners->bound + k);
     }
-    return hn::GetLane(hn::MinOfLanes(d, least));
+    const float nearest = hn::GetLane(hn::MinOfLanes(d, least));
+    const float squared =
+        nearest * nearest - entry.radius * entry.radius * (1.0F + field_lookup::kSquareError);
+    corners->box_bound = squared > 0.0F ? std::sqrt(squared) - kPlaceError : 0.0F;
   }
 
  private:
+  // Of places, above the supporting plane.
+  HWY_INLINE hn::Vec<BoxTag> Height(const float* x, const float* y, const float* z) const {
+    const BoxTag d;
+    const auto n = [&](int axis) { return hn::Set(d, in_.normal[axis]); };
+    return hn::MulAdd(n(0), hn::Load(d, x),
+                      hn::MulAdd(n(1), hn::Load(d, y),
+                                 hn::MulAdd(n(2), hn::Load(d, z), hn::Set(d, -in_.height))));
+  }
+
   HWY_INLINE void ToLink(hn::Vec<BoxTag> x, hn::Vec<BoxTag> y, hn::Vec<BoxTag> z, std::size_t k,
                          Bounds* out) const {
     const BoxTag d;
@@ -262,18 +222,16 @@ class FieldBounds {
       const auto in_O = hn::MulAdd(r(0), v.x, hn::MulAdd(r(1), v.y, hn::Mul(r(2), v.z)));
       return hn::Add(hn::Abs(in_O), half);
     };
-    const auto farthest = dual_tree::Norm(along(0, half_x), along(1, half_y), along(2, half_z));
+    const auto farthest = lanes::Norm(along(0, half_x), along(1, half_y), along(2, half_z));
     return {hn::Add(farthest, hn::Set(d, field_.surface_error())), v.ball};
   }
 
   // Lower bounds of the distances in boxes within a box, by the distances at its corners: these are
   // interpolated to the corners of each box, where the interpolation is least.
-  HWY_INLINE hn::Vec<BoxTag> Interpolate(const Entry& box, const float* corner, const BoxNode& node,
-                                         std::size_t k) const {
+  HWY_INLINE hn::Vec<BoxTag> Interpolate(const Entry& box, const float* corner,
+                                         const BoxRows& boxes, std::size_t k) const {
     const BoxTag d;
     using V = hn::Vec<BoxTag>;
-    const float* low[3] = {node.min_x + k, node.min_y + k, node.min_z + k};
-    const float* high[3] = {node.max_x + k, node.max_y + k, node.max_z + k};
     V t[3][2];
     auto variance = hn::Zero(d);
     for (int i = 0; i < 3; ++i) {
@@ -283,8 +241,8 @@ class FieldBounds {
       const auto share = [&](const float* at) {
         return hn::Min(hn::Max(hn::Mul(hn::Sub(hn::Load(d, at), min), per_size), zero), one);
       };
-      t[i][0] = share(low[i]);
-      t[i][1] = share(high[i]);
+      t[i][0] = share(boxes.min[i] + k);
+      t[i][1] = share(boxes.max[i] + k);
       // The largest variance in the child's range.
       const auto half = hn::Set(d, 0.5F);
       const auto nearest_half = hn::Min(hn::Max(half, t[i][0]), t[i][1]);
@@ -307,16 +265,100 @@ class FieldBounds {
     return hn::Sub(LessVariance(d, hn::Max(least, hn::Zero(d)), variance), hn::Set(d, kPlaceError));
   }
 
-  const FieldSearchInput& in_;
+  const PlacedLink& in_;
   const FieldLookup field_;
-  dual_tree::PlaneFrame planes_;
   const bool is_closed_, has_depths_;
-  float support_;  // [m] of the whole link along the planes' normal
 };
 
-}  // namespace field_search
+}  // namespace field_bounds
+
+using field_bounds::FieldBounds;
+
+float BoundBoxes(const PlacedLink& link, const BoxRows& boxes, const SearchQueue::Entry& parent,
+                 const Corners* corners, Bounds* bounds) {
+  return FieldBounds(link).BoundBoxes(boxes, parent, corners, bounds);
+}
+
+float BoundPoints(const PlacedLink& link, const PointTile& tile, const SearchQueue::Entry& box,
+                  Bounds* bounds) {
+  return FieldBounds(link).BoundPoints(tile, box, bounds);
+}
+
+void BoundCorners(const PlacedLink& link, const SearchQueue::Entry& box, Corners* corners) {
+  FieldBounds(link).BoundCorners(box, corners);
+}
+
+SplitSlots Split(std::uint32_t slots, float limit_bound, Bounds* bounds) {
+  const field_bounds::BoxTag d;
+  constexpr std::uint32_t kAllSlots = (1U << static_cast<unsigned>(kBoxWidth)) - 1U;
+  for (std::uint32_t bits = ~slots & kAllSlots; bits != 0; bits &= bits - 1) {
+    const auto k = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
+    bounds->distance[k] = bounds->outside[k] = kFarAway;
+  }
+  namespace hn = hwy::HWY_NAMESPACE;
+  const auto limit = hn::Set(d, limit_bound);
+  auto pruned = hn::Set(d, kFarAway), outside = pruned;
+  std::uint32_t below = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(kBoxWidth); k += hn::Lanes(d)) {
+    const auto bound = hn::Load(d, bounds->distance + k);
+    const auto is_below = hn::Lt(bound, limit);
+    pruned = hn::Min(pruned, hn::IfThenElse(is_below, pruned, bound));
+    outside = hn::Min(outside, hn::IfThenElse(is_below, outside, hn::Load(d, bounds->outside + k)));
+    below |= lanes::MaskBits(d, is_below) << k;
+  }
+  return {below & slots, hn::GetLane(hn::MinOfLanes(d, pruned)),
+          hn::GetLane(hn::MinOfLanes(d, outside))};
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace ist
 HWY_AFTER_NAMESPACE();
 
-#endif  // IST_PROXIMITY_FIELD_BOUNDS_INL_H
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(BoundBoxes);
+HWY_EXPORT(BoundPoints);
+HWY_EXPORT(BoundCorners);
+HWY_EXPORT(Split);
+
+float bound_boxes_by_field(const PlacedLink& link, const BoxRows& boxes,
+                           const SearchQueue::Entry& parent, const Corners* corners,
+                           Bounds* bounds) {
+  return HWY_DYNAMIC_DISPATCH(BoundBoxes)(link, boxes, parent, corners, bounds);
+}
+
+float bound_points_by_field(const PlacedLink& link, const PointTile& tile,
+                            const SearchQueue::Entry& box, Bounds* bounds) {
+  return HWY_DYNAMIC_DISPATCH(BoundPoints)(link, tile, box, bounds);
+}
+
+void bound_corners_by_field(const PlacedLink& link, const SearchQueue::Entry& box,
+                            Corners* corners) {
+  HWY_DYNAMIC_DISPATCH(BoundCorners)(link, box, corners);
+}
+
+SplitSlots split_slots(std::uint32_t slots, float limit, Bounds* bounds) {
+  return HWY_DYNAMIC_DISPATCH(Split)(slots, limit, bounds);
+}
+
+FieldPlace look_up_field(const DistanceField& field, const Eigen::Vector3d& p_L, float rounding) {
+  PlacedLink link;
+  link.field = &field;
+  link.is_closed = field.is_closed();
+  link.rounding = rounding;
+  for (int axis = 0; axis < 3; ++axis) link.R_LO[4 * axis] = 1.0F;
+  PointTile tile{};
+  SearchQueue::Entry place{};
+  float* const rows[3] = {tile.x, tile.y, tile.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    place.center[axis] = static_cast<float>(p_L[axis]);
+    std::fill_n(rows[axis], kBoxWidth, place.center[axis]);
+  }
+  Bounds bounds;
+  bound_points_by_field(link, tile, place, &bounds);
+  return {bounds.outside[0], bounds.surface[0] - rounding, bounds.radius[0] + rounding};
+}
+
+}  // namespace ist
+#endif

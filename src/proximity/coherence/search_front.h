@@ -11,13 +11,13 @@
 
 namespace ist {
 
-/// The front of a field search: the parts of an index that the last searches pruned, each with its
+/// The front of a search: the parts of an index that the last searches pruned, each with its
 /// bound. Together they hold every point of the index. At the next pose only those parts are looked
 /// at again whose bound, less the displacement, is below what is asked for; nothing above them is
-/// visited. It is a BvttFront for one tree instead of two. Bounds are stored as FrontPose says.
+/// visited. Bounds are stored as FrontPose says.
 ///
 /// The bounds are of the link's geometry, whatever its packing and its field are.
-class FieldFront {
+class SearchFront {
  public:
   /// All children of a node.
   static constexpr std::uint32_t kAllSlots = (1U << static_cast<unsigned>(kBoxWidth)) - 1U;
@@ -31,9 +31,12 @@ class FieldFront {
     float min[3], max[3];  ///< [m] box about all of `child`, in the index's frame
   };
 
-  FieldFront() : parts_(kMaxParts) {}
+  SearchFront() : parts_(kMaxParts) {}
 
-  /// Begins a search at a new pose, as BvttFront::begin() does.
+  /// Begins a search at a new pose.
+  /// @param build_id      of the index
+  /// @param X_OL          link -> the index's frame
+  /// @param rounding      [m] largest error of a lower bound of this search
   void begin(std::uint64_t build_id, const Eigen::Isometry3d& X_OL,
              const DisplacementBound& displacement, float rounding) {
     if (!pose_.move(build_id, X_OL, displacement, rounding, size_)) size_ = 0;
@@ -86,7 +89,7 @@ class FieldFront {
   std::size_t memory() const { return parts_.capacity() * sizeof(Part); }  ///< [bytes]
 
  private:
-  static constexpr std::uint32_t kMaxParts = 192;  ///< a search that leaves more keeps no front
+  static constexpr std::uint32_t kMaxParts = 512;  ///< a search that leaves more keeps no front
 
   std::vector<Part> parts_;
   std::size_t size_ = 0;
@@ -94,6 +97,6 @@ class FieldFront {
   FrontPose pose_;
 };
 
-using FieldFronts = KeptFronts<FieldFront, 3>;
+using SearchFronts = KeptFronts<SearchFront, 4>;
 
 }  // namespace ist
