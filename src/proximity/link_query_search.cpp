@@ -78,10 +78,7 @@ bool LinkQuery::run(const Obstacles& obstacles) {
   LinkSearch& search = link_.search;
   const auto ahead =
       static_cast<float>(has_hardly_moved() ? kAhead * search.config.tolerance : 0.0);
-  // In contact the obstacles inside are found best from the root.
-  SearchFront* front = search.closest.exact.distance > 0.0
-                           ? front_of(obstacles.bvh->build_id(), obstacles.X_OL)
-                           : nullptr;
+  SearchFront* front = front_of(obstacles.bvh->build_id(), obstacles.X_OL);
   typename MeasureOf<Obstacles>::Type measure(obstacles, &link_);
   const SearchOutcome found = this->search(obstacles, front, ahead, &measure);
   search.prune(std::max(static_cast<double>(found.pruned_bound) - search.rounding,

@@ -60,7 +60,8 @@ class PointMeasure : public ObstacleMeasure<PointBvh> {
   /// @returns [m] a lower bound of its distance
   float measure_outside(const SearchEntry& point, float rounding);
   /// Measures a point that is known to be inside, if it may be the deepest.
-  void measure_inside(const SearchEntry& point, float rounding);
+  /// @returns [m] a lower bound of its signed distance
+  float measure_inside(const SearchEntry& point, float rounding);
   /// On which side of the link's surface a point is, and which places about it are, too, by what
   /// was decided in this and in other queries.
   SideBalls::Found known_side(const SearchEntry& point) const;
@@ -79,8 +80,8 @@ class PointMeasure : public ObstacleMeasure<PointBvh> {
   Side cheapest_side(const Eigen::Vector3d& p_LQ, double* max_distance);
   double measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
                          double max_distance);
-  void measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
-                      double within);
+  double measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ, const Eigen::Vector3d& p_LQ,
+                        double within);
 };
 
 /// Measures boxes. A box that overlaps the link is divided into parts, each of which is measured at

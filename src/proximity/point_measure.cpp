@@ -23,10 +23,10 @@ float PointMeasure::measure_outside(const SearchEntry& point, float rounding) {
                                     static_cast<double>(point.radius + rounding)));
 }
 
-void PointMeasure::measure_inside(const SearchEntry& point, float rounding) {
+float PointMeasure::measure_inside(const SearchEntry& point, float rounding) {
   const Eigen::Vector3d p_OQ = place_of(point);
-  measure_inside(id_of(point), p_OQ, obstacles_.X_LO * p_OQ,
-                 static_cast<double>(point.radius + rounding));
+  return round_down(measure_inside(id_of(point), p_OQ, obstacles_.X_LO * p_OQ,
+                                   static_cast<double>(point.radius + rounding)));
 }
 
 SideBalls::Found PointMeasure::known_side(const SearchEntry& point) const {
@@ -98,8 +98,8 @@ PointMeasure::Side PointMeasure::cheapest_side(const Eigen::Vector3d& p_LQ, doub
 }
 
 // While another point is known to be inside, it matters only whether this one is deeper.
-void PointMeasure::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
-                                  const Eigen::Vector3d& p_LQ, double within) {
+double PointMeasure::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
+                                    const Eigen::Vector3d& p_LQ, double within) {
   LinkSearch& search = link_.search;
   ++search.statistics->exact_evaluations;
   const double deepest = std::max(-search.prune_bound(), 0.0);
@@ -107,9 +107,11 @@ void PointMeasure::measure_inside(ObstacleId id, const Eigen::Vector3d& p_OQ,
       point_depth(link_.context.solid(), p_LQ, deepest, {within, Side::kInside});
   if (found.exact.distance < kInfinity) {
     search.offer(found.exact, p_OQ, obstacles_, id);
-  } else {
-    search.prune(std::max(found.floor, -deepest));
+    return found.exact.distance;
   }
+  const double bound = std::max(found.floor, -deepest);
+  search.prune(bound);
+  return bound;
 }
 
 double PointMeasure::measure_outside(ObstacleId id, const Eigen::Vector3d& p_OQ,

@@ -79,7 +79,7 @@ class Search {
       visit(entry, bound);
     }
     queue_.for_each([this](float bound, const Entry& left) { prune(left, bound, left.outside); });
-    if (in_.front != nullptr) in_.front->end(is_front_whole_ && !outcome_.has_inside);
+    if (in_.front != nullptr) in_.front->end(true);
     return outcome_;
   }
 
@@ -196,12 +196,6 @@ class Search {
     std::copy_n(entry.min, 3, part.min);
     std::copy_n(entry.max, 3, part.max);
     return in_.front->add(part);
-  }
-
-  // Leaves something without a bound that another pose could use.
-  void leave(float bound) {
-    is_front_whole_ = false;
-    lower(bound, 0.0F);
   }
 
   void expand_node(const Entry& entry, float entry_bound) {
@@ -364,20 +358,21 @@ class Search {
       // While another point is inside, one that is near the surface is not deeper, whatever its
       // side: a distance costs less than a winding number.
       if (limit_ < 0.0F && measure_.is_surface_within(point, -limit_ - link_.rounding)) {
-        return leave(limit_);
+        return prune(point, limit_, 0.0F);
       }
       found = measure_.ask_side(point, point.distance - link_.rounding);
       margin = round_down(found.margin) - link_.rounding;
     }
     if (found.side == SideBalls::Side::kUnknown) {
       outcome_.has_time = false;
-      return leave(bound);
+      return prune(point, bound, 0.0F);
     }
     if (found.side == SideBalls::Side::kInside) {
       ++measured_;
-      measure_.measure_inside(point, link_.rounding);
       outcome_.has_inside = true;
+      bound = std::max(bound, measure_.measure_inside(point, link_.rounding));
       remember(point, bound, 0.0F);
+      keep(point, bound, 0.0F);
       return take_limit();
     }
     // A margin that is not known is taken for the least one.
@@ -404,14 +399,14 @@ class Search {
       }
       outcome_.has_inside = true;
     }
-    if (bound >= limit_ || !measure_.may_divide(bound)) return leave(bound);
+    if (bound >= limit_ || !measure_.may_divide(bound)) return prune(box, bound, 0.0F);
     std::array<Entry, 2> halves{box, box};
     const std::array<float, 2> least = measure_.divide(&halves);
     take_limit();
     for (std::size_t i = 0; i < 2; ++i) {
       Entry* place = least[i] < limit_ ? queue_.push(least[i]) : nullptr;
       if (place == nullptr) {
-        leave(least[i]);
+        prune(halves[i], least[i], 0.0F);
       } else {
         *place = halves[i];
       }
@@ -427,7 +422,6 @@ class Search {
   float limit_;                 // [m]
   bool has_new_plane_ = false;  // which entries of the queue do not know
   int measured_ = 0;            // obstacles
-  bool is_front_whole_ = true;  // whether each obstacle is pruned or in the queue
   struct {
     bool is_known = false;
     std::array<float, 3> place{};        // [m] in the index's frame
