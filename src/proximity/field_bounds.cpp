@@ -226,8 +226,8 @@ class FieldBounds {
     return {hn::Add(farthest, hn::Set(d, field_.surface_error())), v.ball};
   }
 
-  // Lower bounds of the distances in boxes within a box, by the distances at its corners: these are
-  // interpolated to the corners of each box, where the interpolation is least.
+  // Lower bounds of the distances in boxes within a box, by the distances at its corners: their
+  // squares are interpolated to the corners of each box, where the interpolation is least.
   HWY_INLINE hn::Vec<BoxTag> Interpolate(const Entry& box, const float* corner,
                                          const BoxRows& boxes, std::size_t k) const {
     const BoxTag d;
@@ -248,10 +248,12 @@ class FieldBounds {
       const auto nearest_half = hn::Min(hn::Max(half, t[i][0]), t[i][1]);
       variance = hn::MulAdd(Variance(nearest_half), hn::Set(d, size * size), variance);
     }
+    float square[8];
+    for (int c = 0; c < 8; ++c) square[c] = std::max(corner[c], 0.0F) * corner[c];
     auto least = hn::Set(d, kFarAway);
     for (int i = 0; i < 2; ++i) {
       const auto edge = [&](int c) {
-        return hn::MulAdd(t[0][i], hn::Set(d, corner[c + 1] - corner[c]), hn::Set(d, corner[c]));
+        return hn::MulAdd(t[0][i], hn::Set(d, square[c + 1] - square[c]), hn::Set(d, square[c]));
       };
       const V e0 = edge(0), e1 = edge(2), e2 = edge(4), e3 = edge(6);
       for (int j = 0; j < 2; ++j) {
@@ -262,7 +264,7 @@ class FieldBounds {
         }
       }
     }
-    return hn::Sub(LessVariance(d, hn::Max(least, hn::Zero(d)), variance), hn::Set(d, kPlaceError));
+    return hn::Sub(LessVariance(d, least, variance), hn::Set(d, kPlaceError));
   }
 
   const PlacedLink& in_;

@@ -100,8 +100,7 @@ class LinkQuery {
   template <class Obstacles>
   void enter(const Obstacles& obstacles);
   template <class Bvh, class Measure>
-  SearchOutcome search(const PosedIndex<Bvh>& obstacles, SearchFront* front, float ahead,
-                       Measure* measure);
+  SearchOutcome search(const PosedIndex<Bvh>& obstacles, SearchFront* front, Measure* measure);
   SearchFront* front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL);
   bool has_hardly_moved() const;
   bool begins_with_search() const;

@@ -254,7 +254,7 @@ bool LinkQuery::search_extents(SnapshotSpan clouds, ExtentSearch* spheres) {
       [&](const auto& obstacles, auto* measure) {
         enter(obstacles);
         const std::uint64_t id = obstacles.bvh->build_id() | kExtentFront;
-        const SearchOutcome found = search(obstacles, front_of(id, obstacles.X_OL), 0.0F, measure);
+        const SearchOutcome found = search(obstacles, front_of(id, obstacles.X_OL), measure);
         spheres->refined = std::min(
             spheres->refined, static_cast<double>(found.pruned_bound) - link_.search.rounding);
         return found.has_time;

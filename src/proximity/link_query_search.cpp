@@ -16,9 +16,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // [m] A link that has moved farther has another nearest obstacle: the search finds it sooner than
 // the last answer's obstacle is measured.
 constexpr double kFarMoved = 0.03;
-// The share of the tolerance that a search proves more than it has to: among slow motions the bound
-// of a link then lasts for several steps.
-constexpr double kAhead = 0.5;
+// The share of the tolerance that a search leaves where the link moves slowly: its bound then lasts
+// for several steps.
+constexpr double kSlowShare = 0.5;
 
 }  // namespace
 
@@ -45,7 +45,7 @@ SearchFront* LinkQuery::front_of(std::uint64_t id, const Eigen::Isometry3d& X_OL
 }
 
 template <class Bvh, class Measure>
-SearchOutcome LinkQuery::search(const PosedIndex<Bvh>& obstacles, SearchFront* front, float ahead,
+SearchOutcome LinkQuery::search(const PosedIndex<Bvh>& obstacles, SearchFront* front,
                                 Measure* measure) {
   const LinkContext& context = link_.context;
   link_.kept.plane.turn_to(context.solid(), link_.search.closest.exact);
@@ -54,7 +54,6 @@ SearchOutcome LinkQuery::search(const PosedIndex<Bvh>& obstacles, SearchFront* f
   input.queue = &queue;
   input.front = front;
   input.prune_bound = measure->traversal_prune_bound();
-  input.ahead = ahead;
   input.link.field = context.field();
   input.link.tree = &context.tree();
   input.link.is_closed = context.solid().is_closed();
@@ -66,9 +65,9 @@ SearchOutcome LinkQuery::search(const PosedIndex<Bvh>& obstacles, SearchFront* f
   link_.search.statistics->leaf_pairs += found.tiles;
   return found;
 }
-template SearchOutcome LinkQuery::search(const PointObstacles&, SearchFront*, float,
+template SearchOutcome LinkQuery::search(const PointObstacles&, SearchFront*,
                                          ExtentMeasure<PointObstacles>*);
-template SearchOutcome LinkQuery::search(const BoxObstacles&, SearchFront*, float,
+template SearchOutcome LinkQuery::search(const BoxObstacles&, SearchFront*,
                                          ExtentMeasure<BoxObstacles>*);
 
 // @returns false: the deadline passed
@@ -76,11 +75,10 @@ template <class Obstacles>
 bool LinkQuery::run(const Obstacles& obstacles) {
   enter(obstacles);
   LinkSearch& search = link_.search;
-  const auto ahead =
-      static_cast<float>(has_hardly_moved() ? kAhead * search.config.tolerance : 0.0);
+  search.width_share = has_hardly_moved() ? kSlowShare : 1.0;
   SearchFront* front = front_of(obstacles.bvh->build_id(), obstacles.X_OL);
   typename MeasureOf<Obstacles>::Type measure(obstacles, &link_);
-  const SearchOutcome found = this->search(obstacles, front, ahead, &measure);
+  const SearchOutcome found = this->search(obstacles, front, &measure);
   search.prune(std::max(static_cast<double>(found.pruned_bound) - search.rounding,
                         -link_.context.deepest()));
   const double outside = static_cast<double>(found.outside_bound) - search.rounding;

@@ -139,6 +139,7 @@ struct LinkSearch : SearchResult {
   bool has_extents = false;   ///< some obstacle has one
   double extent_range = 0.0;  ///< [m] largest radius of spheres in range
   double other_extents = 0.0;  ///< [m] as other_links, of spheres
+  double width_share = 1.0;    ///< of the tolerance, that searches leave
   Deadline* deadline = nullptr;
   QueryStatistics* statistics = nullptr;
 
@@ -157,15 +158,17 @@ struct LinkSearch : SearchResult {
   }
 
   /// [m] A lower bound that is not below this cannot change the answer by more than the tolerance.
-  double prune_bound() const {
+  /// @param share  of the tolerance, where more is to be proven than it asks for
+  double prune_bound(double share = 1.0) const {
     const double distance = std::min(closest.exact.distance, other_links);
     if (distance > range()) return range();
     // Whether any point is inside is always decided, however wide the tolerance. An obstacle that
     // only touches, at distance 0, does not decide it.
-    return distance < 0.0 ? distance - config.tolerance : std::max(distance - width(distance), 0.0);
+    return distance < 0.0 ? distance - share * config.tolerance
+                          : std::max(distance - share * width(distance), 0.0);
   }
-  /// [m] The same for lower bounds in float.
-  float traversal_prune_bound() const { return round_up(prune_bound() + rounding); }
+  /// [m] What a search proves, for lower bounds in float.
+  float traversal_prune_bound() const { return round_up(prune_bound(width_share) + rounding); }
 
   /// Whether there is time to go on.
   /// @param bound  [m] what is proven

@@ -23,8 +23,6 @@ struct SearchInput {
   SearchFront* front = nullptr;  ///< begun, and ended by the search; null: there is none
   /// [m] What has a lower bound that is not below it is pruned.
   float prune_bound = std::numeric_limits<float>::infinity();
-  /// [m] So much more is proven than the prune bound asks for: it serves the poses to come.
-  float ahead = 0.0F;
 };
 
 struct SearchOutcome {
@@ -65,7 +63,7 @@ class Search {
         queue_(*input.queue),
         link_(input.link),
         bounds_(link_),
-        limit_(input.prune_bound + input.ahead) {}
+        limit_(input.prune_bound) {}
   // bounds_ refers to link_.
   Search(const Search&) = delete;
   Search& operator=(const Search&) = delete;
@@ -325,7 +323,7 @@ class Search {
 
   // Some obstacle is no farther than this. It will be measured: its lower bound is less.
   void lower_limit(float distance) { limit_ = std::min(limit_, distance + link_.rounding); }
-  void take_limit() { limit_ = std::min(limit_, measure_.traversal_prune_bound() + in_.ahead); }
+  void take_limit() { limit_ = std::min(limit_, measure_.traversal_prune_bound()); }
 
   // Measures an obstacle, and decides on which side it is where that is not known.
   void measure(const Entry& entry, float bound) {

@@ -15,17 +15,18 @@ namespace ist {
 /// the farther from the solid they are. What lies between the nodes is bounded, so that a look-up
 /// proves how near a place may be.
 ///
-/// **Lower bound.** Let I be the trilinear interpolation of the nodes' distances at a place p
-/// within a cell, and t_i in [0, 1] where p is between the nodes along axis i. Then
-///   distance(p)^2 >= I^2 - edge^2 (t_1 (1 - t_1) + t_2 (1 - t_2) + t_3 (1 - t_3)).
+/// **Lower bound.** Let E be the trilinear interpolation of the squares of the nodes' distances at
+/// a place p within a cell, and t_i in [0, 1] where p is between the nodes along axis i. Then
+///   distance(p)^2 >= E - edge^2 (t_1 (1 - t_1) + t_2 (1 - t_2) + t_3 (1 - t_3)).
 /// The weights of the interpolation are the probabilities of a random node V with mean p, whose
 /// coordinates are independent and have the variances edge^2 t_i (1 - t_i). Let s be the surface
-/// point closest to p. I is no more than the mean of |V - s|, which by Jensen's inequality is no
-/// more than the root of the mean of |V - s|^2 = |p - s|^2 + the sum of the variances. The error is
-/// of second order in the edge, where that of a single node is of first order, and the solid need
-/// not be convex. The same holds in any box, with the distances at its corners.
+/// point closest to p. E is no more than the mean of |V - s|^2 = |p - s|^2 + the sum of the
+/// variances. The error is of second order in the edge, where that of a single node is of first
+/// order, and the solid need not be convex. The same holds in any box, with the distances at its
+/// corners.
 ///
-/// **Upper bound.** distance(p) <= I + the mean of |V - p| <= I + half the diagonal of the cell.
+/// **Upper bound.** distance(p) <= the mean of distance(V) + |V - p| <= sqrt(E) + half the diagonal
+/// of the cell.
 ///
 /// **Outside.** About each node of the finest grid, a ball holds no surface and no place inside the
 /// solid. The finest grid covers the box about the solid, and beyond that box all is outside.

@@ -22,11 +22,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 // cells, of which a grid has fewer than a thousand, in cells of a few centimetres.
 constexpr float kSquareError = 2e-6F, kPlaceError = 4e-6F;
 
-// sqrt(interpolated^2 - variance): see DistanceField.
+// sqrt(interpolated - variance), of squared distances that were interpolated: see DistanceField.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V LessVariance(D d, V interpolated, V variance) {
-  const auto squared =
-      hn::Mul(hn::Mul(interpolated, interpolated), hn::Set(d, 1.0F - kSquareError));
+  const auto squared = hn::Mul(interpolated, hn::Set(d, 1.0F - kSquareError));
   return hn::Sqrt(
       hn::Max(hn::NegMulAdd(variance, hn::Set(d, 1.0F + kSquareError), squared), hn::Zero(d)));
 }
@@ -95,7 +94,8 @@ class FieldLookup {
     };
     const V near = Mix(ty, along_x(0), along_x(row));
     const V far = Mix(ty, along_x(layer), along_x(layer + row));
-    const V interpolated = hn::Mul(Mix(tz, near, far), hn::Set(d, DistanceField::kStep));
+    const V interpolated =
+        hn::Mul(Mix(tz, near, far), hn::Set(d, DistanceField::kStep * DistanceField::kStep));
     const V variance = hn::Mul(hn::Set(d, level.cell * level.cell),
                                hn::Add(Variance(tx), hn::Add(Variance(ty), Variance(tz))));
     const V lower = hn::Sub(LessVariance(d, interpolated, variance), hn::Set(d, kPlaceError));
@@ -103,7 +103,7 @@ class FieldLookup {
         hn::And(is_in, hn::Lt(most, hn::Set(d, static_cast<float>(DistanceField::kFar))));
     const float slack = level.cell * (kHalfDiagonal + 1.0F / DistanceField::kSlackParts) +
                         DistanceField::kStep + kPlaceError;
-    *upper = hn::IfThenElse(is_known, hn::Add(interpolated, hn::Set(d, slack)),
+    *upper = hn::IfThenElse(is_known, hn::Add(hn::Sqrt(interpolated), hn::Set(d, slack)),
                             hn::Add(from_bounds, hn::Set(d, diagonal_)));
     return hn::Max(hn::IfThenElseZero(is_in, lower), from_bounds);
   }
@@ -214,7 +214,7 @@ class FieldLookup {
     const V a = hn::ConvertTo(d, hn::And(pair, hn::Set(di, 0xFFFF)));
     const V b = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(du, pair))));
     *most = hn::Max(*most, hn::Max(a, b));
-    return Mix(t, a, b);
+    return Mix(t, hn::Mul(a, a), hn::Mul(b, b));
   }
 
   // Returns a coordinate in cells of the grid of depths, at most `last`. NaN is in cell 0.
