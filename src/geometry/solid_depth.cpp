@@ -37,7 +37,6 @@ PointDepth point_depth(const Solid& solid, const Eigen::Vector3d& p_L, double mi
       const ClosestPoint closest =
           element.bvh.closest(p_E, within * within, Eigen::Vector3d::Zero(), min_depth_sq);
       const double distance = std::sqrt(closest.distance_sq);
-      if (is_one && distance < kInfinity) result.triangle = closest.slot;
       if (closest.distance_sq <= min_depth_sq) {
         is_complete = false;
         result.floor = std::min(result.floor, -distance);

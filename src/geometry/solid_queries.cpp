@@ -5,7 +5,6 @@
 
 #include "geometry/primitive_distance.h"
 #include "geometry/solid_element.h"
-#include "internal/geometry/closest_point_on_triangle.h"
 
 namespace ist {
 
@@ -91,42 +90,6 @@ BoxDistance distance_to_box(const Solid& solid, const Eigen::AlignedBox3d& box_O
   }
   best.lower_bound = lower_bound;
   return best;
-}
-
-double distance_to_triangle(const Solid& solid, std::uint32_t triangle,
-                            const Eigen::Vector3d& p_L) {
-  const SolidElement& element = elements_of(solid).front();
-  const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);
-  const Eigen::Vector3d p_E = element.X_EL * p_L;
-  return (closest_point_on_triangle(p_E, t.a, t.b, t.c) - p_E).norm();
-}
-
-Eigen::Vector3d closest_on_triangle(const Solid& solid, std::uint32_t triangle,
-                                    const Eigen::Vector3d& p_L) {
-  const SolidElement& element = elements_of(solid).front();
-  const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);
-  return element.X_LE * closest_point_on_triangle(element.X_EL * p_L, t.a, t.b, t.c);
-}
-
-bool is_behind_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L) {
-  const SolidElement& element = elements_of(solid).front();
-  const TriangleBvh::Triangle& t = element.bvh.triangle(triangle);
-  return (t.b - t.a).cross(t.c - t.a).dot(element.X_EL * p_L - t.a) < 0.0;
-}
-
-double surface_support_in_sphere(const Solid& solid, const Eigen::Vector3d& center_L, double radius,
-                                 const Eigen::Vector3d& n_L, double tolerance, double at_least) {
-  double largest = at_least;
-  for (const SolidElement& element : elements_of(solid)) {
-    const Eigen::Vector3d n_E = element.X_EL.linear() * n_L, center_E = element.X_EL * center_L;
-    if (element.is_mesh()) {
-      largest = element.bvh.support_in_sphere(center_E, radius, n_E, tolerance, largest);
-    } else if (std::abs(primitive_distance(element.primitive, center_E).distance) <= radius) {
-      // A primitive is convex: its support by the whole of it is that of what is near.
-      largest = std::max(largest, primitive_support(element.primitive, n_E) - n_E.dot(center_E));
-    }
-  }
-  return largest;
 }
 
 std::size_t memory_of(const Solid& solid) {

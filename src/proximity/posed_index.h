@@ -70,14 +70,6 @@ std::uint32_t message_id(const Bvh& bvh, ObstacleId id) {
   return bvh.tile(static_cast<std::size_t>(id.tile), &scratch).id[id.lane];
 }
 
-/// The key of a point in the caches that are kept from cloud to cloud: the pixels of one source
-/// have the same keys in its next image.
-inline std::uint32_t coherent_key(const PointObstacles& obstacles, ObstacleId id) {
-  constexpr std::uint32_t kSourceStride = 0x61C88647U;  // keeps the pixels of sources apart
-  return message_id(*obstacles.bvh, id) +
-         kSourceStride * static_cast<std::uint32_t>(obstacles.source);
-}
-
 /// Calls visit(PosedIndex) for the points of a snapshot and then for its boxes, where there are
 /// any.
 /// @param source  index of the snapshot among those of the query

@@ -212,7 +212,7 @@ LinkModel AnytimeModel::Step::assemble(const Link& link, const LinkModel* before
   }
   const auto cancelled = [this] { return is_cancelled(); };
   model.packing = combine(geometry, packings);
-  model.tree = InnerSphereTree(model.packing, model_->config_.tree);
+  model.tree = InnerSphereTree(model.packing);
   model.packing_id = next_build_id();
   throw_if(cancelled);
   assert(!link.solid.empty());  // a link without its solid would be clear of everything

@@ -24,7 +24,7 @@
 namespace {
 
 struct Options {
-  std::string input, csv, ply, picture, order = "medial", tree;
+  std::string input, csv, ply, picture, order = "medial";
   std::vector<std::string> package_dirs;
   std::vector<double> max_errors = {ist::PackingConfig().max_error};
   bool visual = false, no_cache = false;
@@ -35,12 +35,6 @@ const std::map<std::string, ist::PackingOrder> kOrders = {
     {"medial", ist::PackingOrder::kMedial},
     {"disjoint", ist::PackingOrder::kDisjoint},
     {"volume", ist::PackingOrder::kVolume}};
-
-const std::map<std::string, ist::TreeConfig> kTrees = {
-    {"median", {ist::TreeSplit::kMedian, 0.0}},
-    {"surface", {ist::TreeSplit::kSurfaceArea, 0.0}},
-    {"gas", {ist::TreeSplit::kNeuralGas, 0.0}},
-    {"gas-by-volume", {ist::TreeSplit::kNeuralGas, 1.0}}};
 
 void declare(CLI::App* app, Options* options) {
   ist::PackingConfig& packing = options->model.packing;
@@ -58,10 +52,6 @@ void declare(CLI::App* app, Options* options) {
                   "medial: overlapping, fewest for the error (default); disjoint: none overlap; "
                   "volume: disjoint, the largest that fits first")
       ->check(CLI::IsMember(kOrders));
-  app->add_option("--tree", options->tree,
-                  "how spheres are divided into a tree: median, surface, gas, gas-by-volume; for "
-                  "its size in the table, packings are the same (default: gas, as in the node)")
-      ->check(CLI::IsMember(kTrees));
   app->add_option("--links", options->model.links, "only these links of the robot");
   app->add_flag("--visual", options->visual, "visual geometry, not collision");
   app->add_option("--threads", options->model.threads, "0: as many as there are cores (default)")
@@ -104,7 +94,6 @@ int pack(Options options) {
       options.visual ? ist::GeometrySource::kVisual : ist::GeometrySource::kCollision,
       options.package_dirs);
   options.model.packing.order = kOrders.at(options.order);
-  if (!options.tree.empty()) options.model.tree = kTrees.at(options.tree);
   if (options.no_cache) options.model.cache_directory.clear();
   for (const std::string& warning : ist::doubtful_sizes(input.robot, options.model.links)) {
     std::cerr << "warning: " << warning << '\n';

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -29,11 +28,10 @@ void sphere_distances(const Spheres& spheres, const float* radius, const Eigen::
 
 }  // namespace
 
-InnerSphereTree::InnerSphereTree(const Packing& packing, const TreeConfig& config)
+InnerSphereTree::InnerSphereTree(const Packing& packing)
     : interior_gap_(packing.certificate.interior_gap), sphere_count_(packing.spheres.size()) {
-  assert(config.magnification >= 0.0 && config.magnification <= 1.0);
   if (packing.spheres.empty()) return;
-  InnerSphereTreeBuilder builder(packing.spheres, config, &nodes_, &leaves_);
+  InnerSphereTreeBuilder builder(packing.spheres, &nodes_, &leaves_);
   const InnerSphereTreeBuilder::BoundingSphere root = builder.bounding_sphere(builder.all());
   center_ = root.center.cast<double>();
   radius_ = round_up(root.radius);

@@ -31,11 +31,9 @@ bool is_leaf(const SphereRange& range) {
 }  // namespace
 
 InnerSphereTreeBuilder::InnerSphereTreeBuilder(const std::vector<InnerSphere>& spheres,
-                                               const TreeConfig& config,
                                                std::vector<SphereNode>* nodes,
                                                std::vector<SphereLeaf>* leaves)
-    : config_(config),
-      nodes_(*nodes),
+    : nodes_(*nodes),
       leaves_(*leaves),
       spheres_(spheres.size()),
       order_{&spheres_, std::vector<std::uint32_t>(spheres.size())} {
@@ -84,12 +82,10 @@ InnerSphereTreeBuilder::BoundingSphere InnerSphereTreeBuilder::bounding_sphere(
   return {rounded, radius_about(rounded.cast<double>(), &farthest)};
 }
 
-std::int32_t InnerSphereTreeBuilder::add_node(const SphereRange& range, int levels_left) {
+std::int32_t InnerSphereTreeBuilder::add_node(const SphereRange& range) {
   const auto index = static_cast<std::int32_t>(nodes_.size());
   nodes_.emplace_back();
-  const std::vector<SphereRange> groups = is_leaf(range)
-                                              ? std::vector<SphereRange>{range}
-                                              : partition(config_, range, levels_left, &order_);
+  const std::vector<SphereRange> groups = split_at_medians(range, &order_);
   SphereNode node{};
   node.count = static_cast<std::int32_t>(groups.size());
   for (std::size_t k = 0; k < static_cast<std::size_t>(kSphereWidth); ++k) {
@@ -103,8 +99,7 @@ std::int32_t InnerSphereTreeBuilder::add_node(const SphereRange& range, int leve
     for (std::uint32_t i = groups[k].first; i < groups[k].second; ++i) {
       node.max_inner[k] = std::max(node.max_inner[k], round_up(order_[i].radius));
     }
-    node.child[k] =
-        is_leaf(groups[k]) ? ~add_leaf(groups[k]) : add_node(groups[k], levels_left - 1);
+    node.child[k] = is_leaf(groups[k]) ? ~add_leaf(groups[k]) : add_node(groups[k]);
   }
   nodes_[static_cast<std::size_t>(index)] = node;
   return index;

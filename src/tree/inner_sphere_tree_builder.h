@@ -18,24 +18,23 @@ class InnerSphereTreeBuilder {
     double radius;           ///< [m]
   };
 
-  InnerSphereTreeBuilder(const std::vector<InnerSphere>& spheres, const TreeConfig& config,
-                         std::vector<SphereNode>* nodes, std::vector<SphereLeaf>* leaves);
+  InnerSphereTreeBuilder(const std::vector<InnerSphere>& spheres, std::vector<SphereNode>* nodes,
+                         std::vector<SphereLeaf>* leaves);
   InnerSphereTreeBuilder(const InnerSphereTreeBuilder&) = delete;
   InnerSphereTreeBuilder& operator=(const InnerSphereTreeBuilder&) = delete;
 
   /// Appends all nodes and leaves. The root is a node even if a leaf could hold all spheres, so
   /// that a query starts in the same way for every link.
-  void run() { add_node(all(), kMaxTreeLevels - 1); }
+  void run() { add_node(all()); }
 
   /// A sphere that encloses the cover spheres of a range.
   BoundingSphere bounding_sphere(const SphereRange& range) const;
   SphereRange all() const { return {0, static_cast<std::uint32_t>(order_.indices.size())}; }
 
  private:
-  std::int32_t add_node(const SphereRange& range, int levels_left);
+  std::int32_t add_node(const SphereRange& range);
   std::int32_t add_leaf(const SphereRange& range);
 
-  const TreeConfig config_;
   std::vector<SphereNode>& nodes_;
   std::vector<SphereLeaf>& leaves_;
   std::vector<InnerSphere> spheres_;  // rounded: the nodes enclose exactly what the leaves hold

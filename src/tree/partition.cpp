@@ -28,17 +28,9 @@ std::uint32_t halve(const SphereRange& range, SphereOrder* order) {
 
 }  // namespace
 
-int median_levels(std::uint32_t count) {
-  int levels = 1;
-  for (; count > kWidth; count = (count + kWidth - 1) / kWidth) ++levels;
-  return levels;
-}
-
-// The group with the most spheres is halved until there are enough groups.
-std::vector<SphereRange> split_at_medians(const SphereRange& range, std::size_t most,
-                                          SphereOrder* order) {
+std::vector<SphereRange> split_at_medians(const SphereRange& range, SphereOrder* order) {
   std::vector<SphereRange> groups{range};
-  while (groups.size() < most) {
+  while (groups.size() < kWidth) {
     const auto largest = std::max_element(
         groups.begin(), groups.end(),
         [](const SphereRange& a, const SphereRange& b) { return size(a) < size(b); });
@@ -49,20 +41,6 @@ std::vector<SphereRange> split_at_medians(const SphereRange& range, std::size_t 
     groups.insert(largest + 1, upper);
   }
   return groups;
-}
-
-std::vector<SphereRange> partition(const TreeConfig& config, const SphereRange& range,
-                                   int levels_left, SphereOrder* order) {
-  std::vector<SphereRange> groups;
-  if (config.split == TreeSplit::kSurfaceArea) groups = split_by_surface(range, order);
-  if (config.split == TreeSplit::kNeuralGas) {
-    groups = split_by_neural_gas(range, config.magnification, order);
-  }
-  std::uint32_t largest = 0;
-  for (const SphereRange& group : groups) largest = std::max(largest, size(group));
-  // Uneven groups make a deep tree. They are accepted as long as median splits could complete it.
-  const bool fits = groups.size() > 1 && median_levels(largest) <= levels_left;
-  return fits ? groups : split_at_medians(range, kWidth, order);
 }
 
 }  // namespace ist

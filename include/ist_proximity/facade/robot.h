@@ -28,7 +28,7 @@ struct RobotConfig {
   /// Whether a robot with links that cannot be used is made all the same. They are UNKNOWN, and
   /// nearest() has no lower bound.
   bool allow_unknown_links = false;
-  bool distance_fields = false;   ///< see RobotModelConfig
+  bool distance_fields = true;    ///< see RobotModelConfig
   RobotModelCallbacks callbacks;  ///< progress, warnings, cancelling
 };
 

@@ -58,7 +58,6 @@ struct ModelProgress {
 /// How a robot model is built.
 struct RobotModelConfig {
   PackingConfig packing;           ///< settings of every link's packing
-  TreeConfig tree;                 ///< settings of every link's tree
   std::string cache_directory;     ///< empty: no cache
   std::vector<std::string> links;  ///< monitored links; empty: every link that has geometry
   /// Whether LinkModel::field is measured for every link: it takes some tenths of a second and

@@ -13,29 +13,6 @@ namespace ist {
 
 class DistanceField;
 
-/// How the spheres of a node are divided among its children.
-enum class TreeSplit {
-  /// The group with the most spheres is halved at the median along its longest axis until there
-  /// are enough groups.
-  kMedian,
-  /// A group is halved where the boxes of the two halves have the least surface area, weighted by
-  /// their numbers of leaves (surface area heuristic, Goldsmith and Salmon 1987).
-  kSurfaceArea,
-  /// Batch neural gas: prototypes settle among the spheres, and each sphere joins the nearest
-  /// prototype (Weller 2013, section 5.2.1; Hammer, Hasenfuss and Villmann 2007).
-  kNeuralGas,
-};
-
-/// How an Inner Sphere Tree is built. It changes the cost of a query, never its answer.
-struct TreeConfig {
-  /// How spheres are divided among children.
-  TreeSplit split = TreeSplit::kNeuralGas;
-  /// Magnification control of neural gas, 0 to 1: a sphere is weighted by this power of its volume.
-  /// 1 draws prototypes to large spheres, as in the book; 0 weights all spheres alike, which serves
-  /// distances better.
-  double magnification = 0.0;
-};
-
 /// Children of an inner node, or spheres of a leaf, side by side for SIMD.
 constexpr int kSphereWidth = 8;
 /// Levels of a tree of up to 2^31 spheres, at most, leaves included.
@@ -74,7 +51,7 @@ class InnerSphereTree {
  public:
   InnerSphereTree() = default;
   /// Builds the tree over the spheres of a packing.
-  explicit InnerSphereTree(const Packing& packing, const TreeConfig& config = {});
+  explicit InnerSphereTree(const Packing& packing);
 
   bool empty() const { return leaves_.empty(); }                     ///< whether it has no spheres
   const std::vector<SphereNode>& nodes() const { return nodes_; }    ///< nodes()[0] is the root

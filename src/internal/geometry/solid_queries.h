@@ -50,10 +50,6 @@ struct PointDepth {
   /// path through a hole the signed distance jumps from d outside to -d inside, so that the floor
   /// of a point outside is -d too.
   double floor = std::numeric_limits<double>::infinity();
-  /// The closest triangle of a solid that is one mesh, for distance_to_triangle(); else
-  /// kNoTriangle.
-  std::uint32_t triangle = kNoTriangle;
-  static constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
 };
 
 /// Signed distance and floor of p_L, if it is deeper than `min_depth` [m]. An element whose surface
@@ -62,24 +58,6 @@ struct PointDepth {
 /// @param known  bounds for p_L, if any; they affect the speed alone
 PointDepth point_depth(const Solid& solid, const Eigen::Vector3d& p_L, double min_depth,
                        const NearSurface& known = {});
-
-/// [m] The distance of p_L to a triangle, by PointDepth::triangle: no less than to the surface.
-double distance_to_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L);
-
-/// The point of that triangle that is closest to p_L: a point of the surface, in the link frame.
-Eigen::Vector3d closest_on_triangle(const Solid& solid, std::uint32_t triangle,
-                                    const Eigen::Vector3d& p_L);
-
-/// Whether p_L is on the side of the triangle's plane that its normal points away from.
-bool is_behind_triangle(const Solid& solid, std::uint32_t triangle, const Eigen::Vector3d& p_L);
-
-/// [m] An upper bound of the support of the elements' surfaces within a sphere, measured from the
-/// sphere's centre: no point x of a surface in the sphere has a larger n.(x - center).
-/// @param n_L        unit
-/// @param tolerance  [m] the result may be this much too large, which is found sooner
-/// @param at_least   [m] a known lower bound of the support; nothing smaller is returned
-double surface_support_in_sphere(const Solid& solid, const Eigen::Vector3d& center_L, double radius,
-                                 const Eigen::Vector3d& n_L, double tolerance, double at_least);
 
 /// PointDepth::floor of p_L.
 /// @param measured  solid.signed_distance(p_L)

@@ -18,7 +18,7 @@ struct RobotParts {
 /// them, so no mesh file is needed there, and nothing is packed again. Little-endian.
 std::string serialize_robot(const RobotParts& robot);
 
-/// The robot that the bytes hold; its trees are built with TreeConfig's defaults.
+/// The robot that the bytes hold; its trees are built anew.
 /// @throws ModelError when the bytes are cut off, changed, or of another format
 RobotParts parse_robot(const std::string& bytes);
 
