@@ -90,6 +90,17 @@ bool LinkQuery::run(SnapshotSpan clouds, Deadline* deadline) {
   return has_points && has_extents;
 }
 
+void LinkQuery::prove_free(SnapshotSpan clouds, Deadline* deadline) {
+  LinkSearch& search = link_.search;
+  if (search.is_answered || link_.kept.bound.at(search.scene, search.X_FL) > 0.0) return;
+  Deadline* const of_question = std::exchange(search.deadline, deadline);
+  search.stops_when_free = true;
+  search_points(clouds, deadline);
+  search.stops_when_free = false;
+  search.deadline = of_question;
+  tighten(search.config);
+}
+
 // @returns false: the deadline passed before the points were known to the tolerance
 bool LinkQuery::search_points(SnapshotSpan clouds, Deadline* deadline) {
   LinkSearch& search = link_.search;

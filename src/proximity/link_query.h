@@ -37,6 +37,10 @@ class LinkQuery {
   /// @param has_time  false: only the last answer's obstacle, which is one exact distance
   void warm_start(SnapshotSpan clouds, bool has_time = true);
 
+  /// Proves that the link is free, where no bound that is kept does: it takes some microseconds.
+  /// The bound is kept; run() goes on from there.
+  void prove_free(SnapshotSpan clouds, Deadline* deadline);
+
   /// Asks again for what begin() has asked, with other tolerances; what run() has found since is
   /// the upper bound.
   void tighten(const QueryConfig& config);

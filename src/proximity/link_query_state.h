@@ -138,8 +138,9 @@ struct LinkSearch : SearchResult {
   double other_links = 0.0;   ///< [m] upper bound of other links, below which this one matters only
   bool has_extents = false;   ///< some obstacle has one
   double extent_range = 0.0;  ///< [m] largest radius of spheres in range
-  double other_extents = 0.0;  ///< [m] as other_links, of spheres
-  double width_share = 1.0;    ///< of the tolerance, that searches leave
+  double other_extents = 0.0;    ///< [m] as other_links, of spheres
+  double width_share = 1.0;      ///< of the tolerance, that searches leave
+  bool stops_when_free = false;  ///< a search ends as soon as its bound is positive
   Deadline* deadline = nullptr;
   QueryStatistics* statistics = nullptr;
 
@@ -170,9 +171,10 @@ struct LinkSearch : SearchResult {
   /// [m] What a search proves, for lower bounds in float.
   float traversal_prune_bound() const { return round_up(prune_bound(width_share) + rounding); }
 
-  /// Whether there is time to go on.
+  /// Whether a search goes on.
   /// @param bound  [m] what is proven
   bool has_time(double bound) const {
+    if (stops_when_free && bound > 0.0) return false;
     return !deadline->passed() || (!(bound > 0.0) && !deadline->passed_by(kFirstBounds));
   }
   void prune(double bound) { pruned_bound = std::min(pruned_bound, bound); }

@@ -69,10 +69,17 @@ struct ProximityQuery::Impl {
     return first;
   }
 
-  // Before any link is searched, every one in `order` gets an obstacle that was measured.
+  // Before any link is searched to its end, every one in `order` gets an obstacle that was
+  // measured, and those that are free are proven to be.
   void start(SnapshotSpan clouds, Deadline* deadline) {
     for (const std::size_t i : order) {
       links[i].warm_start(clouds, !deadline->passed_by(kFirstObstacles));
+    }
+    if (!(config.deadline > 0.0)) return;
+    std::size_t left = order.size();
+    for (const std::size_t i : order) {
+      Deadline share(deadline, left--);
+      links[i].prove_free(clouds, &share);
     }
   }
 
