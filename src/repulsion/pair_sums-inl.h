@@ -164,7 +164,7 @@ HWY_INLINE void AddSlopesOfEach(const ThinnedTile& tile, const PosedGroup& group
 
 // A tile enters as its moments where the root mean square of its points' distances from their
 // middle is no more than this share of the smoothing, and of the distance from the middle to any
-// centre. Sums are then off by 3.4e-4 of the weights at most, in the scenes of tile_moments_test.
+// centre. Sums are then off by a few 1e-4 of the weights at most.
 constexpr float kMostSpread = 0.15F;
 // The same for the slopes alone, of which less is asked.
 constexpr float kMostSpreadOfSlopes = 0.3F;
