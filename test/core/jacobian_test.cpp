@@ -44,34 +44,6 @@ Eigen::Matrix<double, 6, 1> difference(const Kinematics& k, std::vector<double> 
   return velocity / (2 * kStep);
 }
 
-TEST(Jacobian, handComputedArm) {
-  RobotDescription robot;
-  robot.root_link = "base";
-  const auto add = [&robot](const std::string& name, JointType type, const Eigen::Vector3d& axis,
-                            const Eigen::Vector3d& origin) {
-    JointDescription joint;
-    joint.name = name;
-    joint.type = type;
-    joint.parent_link = robot.joints.empty() ? "base" : robot.joints.back().child_link;
-    joint.child_link = name + "_link";
-    joint.axis = axis;
-    joint.X_PJ.translation() = origin;
-    robot.joints.push_back(joint);
-  };
-  add("turn", JointType::kRevolute, {0, 0, 3}, {0, 0, 1});
-  add("slide", JointType::kPrismatic, {1, 0, 0}, {0.5, 0, 0});
-  add("tip", JointType::kFixed, {1, 0, 0}, {0.1, 0, 0});
-  const Kinematics k(robot);
-  // A quarter turn: the arm reaches 0.5 + 0.2 + 0.1 along y.
-  const auto X_FB = place(k, {kPi / 2, 0.2, 0.0}, Eigen::Isometry3d::Identity());
-  Jacobian J;
-  point_jacobian(k, X_FB, 3, X_FB[3].translation(), &J);
-  Jacobian expected = Jacobian::Zero(6, 3);
-  expected.col(0) << -0.8, 0, 0, 0, 0, 1;
-  expected.col(1) << 0, 1, 0, 0, 0, 0;
-  EXPECT_LT((J - expected).cwiseAbs().maxCoeff(), 1e-15) << J;
-}
-
 TEST(Jacobian, randomRobotsAgainstFiniteDifferences) {
   test::Rng rng(61);
   Jacobian J;

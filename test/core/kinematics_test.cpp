@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "ist_proximity/geometry/error.h"
 #include "ist_proximity/robot/link_poses.h"
 #include "support/allocations.h"
+#include "support/errors.h"
 #include "support/random_robots.h"
 
 namespace ist {
@@ -41,17 +41,10 @@ std::string joint(const std::string& name, const std::string& type, int parent, 
 }
 
 std::string error_of(const std::string& content) {
-  try {
-    kinematics(content);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "(no error)";
+  return test::error_of([&] { kinematics(content); });
 }
 
-void expect_says(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
-}
+using test::expect_says;
 
 // Positions by name of the joint; the other ones are NaN.
 std::vector<double> positions(const Kinematics& k, const std::map<std::string, double>& q) {
@@ -71,27 +64,6 @@ Placed place(const Kinematics& k, const std::map<std::string, double>& q,
   k.place_joints(positions(k, q), &placed.joints);
   k.place_bodies(placed.joints, X_FR, &placed.bodies);
   return placed;
-}
-
-TEST(Kinematics, handComputedChain) {
-  // The chain goes up 1 m, turns about y by 90 degrees, goes 0.5 m along the turned x (down), and
-  // ends in a fixed tip.
-  const Kinematics k = kinematics(
-      links(4) + joint("bend", "revolute", 0, 1, "<origin xyz=\"0 0 1\"/><axis xyz=\"0 2 0\"/>") +
-      joint("slide", "prismatic", 1, 2, "<origin xyz=\"0.1 0 0\"/><axis xyz=\"10 0 0\"/>") +
-      joint("tip", "fixed", 2, 3, "<origin xyz=\"0 0 0.2\" rpy=\"0 0 1.5707963267948966\"/>"));
-  EXPECT_EQ(k.bodies(), (std::vector<std::string>{"l0", "l1", "l2", "l3"}));
-  const Placed placed = place(k, {{"bend", kPi / 2}, {"slide", 0.5}});
-  ASSERT_EQ(placed.bodies.known, std::vector<bool>(4, true));
-  EXPECT_TRUE(placed.bodies.X_FB[2].translation().isApprox(Eigen::Vector3d(0, 0, 1 - 0.6), 1e-15));
-  EXPECT_TRUE(placed.bodies.X_FB[3].translation().isApprox(Eigen::Vector3d(0.2, 0, 0.4), 1e-15));
-  // The tip's x is the wrist's y; its y is the wrist's -x, which points up.
-  EXPECT_TRUE(placed.bodies.X_FB[3].linear().col(0).isApprox(Eigen::Vector3d::UnitY(), 1e-15));
-  EXPECT_TRUE(placed.bodies.X_FB[3].linear().col(1).isApprox(Eigen::Vector3d::UnitZ(), 1e-15));
-  EXPECT_EQ(k.joints()[*k.find_joint("bend")].lower, -1.0);
-  EXPECT_EQ(k.joints()[*k.find_joint("bend")].upper, 2.0);
-  EXPECT_FALSE(k.find_joint("l0").has_value());
-  EXPECT_FALSE(k.find_body("bend").has_value());
 }
 
 TEST(Kinematics, chainsOfMimics) {

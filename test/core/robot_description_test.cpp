@@ -6,8 +6,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <variant>
@@ -15,7 +13,7 @@
 
 #include "internal/robot/mesh_size.h"
 #include "ist_proximity/geometry/error.h"
-#include "support/data_dir.h"
+#include "support/errors.h"
 #include "support/mesh_files.h"
 #include "support/meshes.h"
 #include "support/temp_dir.h"
@@ -69,9 +67,7 @@ std::string link_error(const std::string& content) {
   return error;
 }
 
-void expect_says(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
-}
+using test::expect_says;
 
 TEST(RobotDescription, readsShapesAndOrigins) {
   const RobotDescription description = parse(
@@ -340,41 +336,6 @@ TEST(RobotDescription, printsNothing) {
   structure_error(robot("<link name=\"a\"/>" + fixed_joint("a", "z")));
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-}
-
-class PandaDescription : public testing::Test {
- protected:
-  RobotDescription load(GeometrySource source) {
-    const auto data = test::data_dir();
-    const std::string package = test::franka_package(*data);
-    std::ifstream file(package + "/robots/panda.urdf");
-    std::stringstream text;
-    text << file.rdbuf();
-    return parse_urdf(text.str(), source, [&](const std::string& name) {
-      return name == "franka_description" ? package : "";
-    });
-  }
-};
-
-TEST_F(PandaDescription, everyLinkLoads) {
-  if (!test::data_dir()) GTEST_SKIP() << test::kNoData;
-  const std::vector<std::string> names = {"panda_link0",      "panda_link1",      "panda_link2",
-                                          "panda_link3",      "panda_link4",      "panda_link5",
-                                          "panda_link6",      "panda_link7",      "panda_hand",
-                                          "panda_leftfinger", "panda_rightfinger"};
-  for (const GeometrySource source : {GeometrySource::kCollision, GeometrySource::kVisual}) {
-    const RobotDescription description = load(source);
-    EXPECT_EQ(description.name, "panda");
-    EXPECT_EQ(description.root_link, "panda_link0");
-    EXPECT_EQ(description.links_without_geometry, std::vector<std::string>{"panda_link8"});
-    ASSERT_EQ(description.links.size(), names.size());
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      EXPECT_EQ(description.links[i].name, names[i]);
-      EXPECT_EQ(description.links[i].error, "");
-      EXPECT_FALSE(description.links[i].geometry.empty());
-      EXPECT_FALSE(description.links[i].used_visual_fallback);
-    }
-  }
 }
 
 }  // namespace

@@ -48,25 +48,6 @@ void check_cases(const std::vector<test::TruthCase>& cases, const CloudSnapshot&
   }
 }
 
-TEST(Truth, BoundsHoldInEveryCase) {
-  const auto data = test::data_dir();
-  if (!data) GTEST_SKIP() << test::kNoData;
-  const auto model = test::panda_model(*data, 0.005);
-  Counts counts;
-  for (const char* cloud : {"mosd0", "mosd10", "mosd40"}) {
-    const CloudSnapshot snapshot = test::truth_cloud(*data, cloud);
-    for (const char* motion : {"traj", "rand"}) {
-      SCOPED_TRACE(std::string(cloud) + " " + motion);
-      const std::vector<test::TruthCase> cases = test::truth_cases(*data, cloud, motion);
-      for (const double tolerance : {0.0, 0.001}) {
-        ASSERT_NO_FATAL_FAILURE(check_cases(cases, snapshot, model, tolerance, &counts));
-      }
-    }
-  }
-  EXPECT_EQ(counts.without_contact + counts.with_contact, test::scaled(2 * 6600));
-  EXPECT_GT(counts.without_contact, test::scaled(2 * 5000));
-}
-
 // The model grows from its first packing to its last step, as a node takes them: coarse fields of
 // all links, fine ones, then finer spheres. Every tenth part of the way it answers all cases of one
 // cloud.
