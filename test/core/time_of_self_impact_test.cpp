@@ -116,12 +116,12 @@ struct Counts {
   }
 };
 
-// 1000 motions: the time is never later than the one that dense sampling finds, and for 99 % of the
+// The time is never later than the one that dense sampling finds, and for 99 % of the
 // pairs no more than 5 ms earlier.
 TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
   test::Rng rng(71);
   Counts counts;
-  while (counts.motions < test::scaled(1000)) {
+  while (counts.motions < test::scaled(400)) {
     const test::Arm arm = arm_of_boxes_and_spheres(&rng);
     const std::vector<LinkPair> pairs = all_pairs(arm);
     if (pairs.empty()) continue;
@@ -129,7 +129,7 @@ TEST(TimeOfSelfImpact, randomMotionsAgainstDenseSampling) {
     config.max_distance = 0.5;
     TimeOfSelfImpact impacts(arm.model, arm.kinematics, pairs, config);
     std::vector<ImpactTime> found;
-    for (int i = 0; i < 25 && counts.motions < test::scaled(1000); ++i) {
+    for (int i = 0; i < 25 && counts.motions < test::scaled(400); ++i) {
       test::ArmMotion motion = test::random_motion(&rng, arm);
       motion.joints.duration *= 2.0;  // twice as far, as fast
       for (std::size_t j = 0; j < motion.joints.to.size(); ++j) {
