@@ -1,6 +1,4 @@
-// The axes of an index lie along the scene's surfaces, and do not change any answer.
-
-#include "cloud/index/scene_axes.h"
+// The axes of an index, which lie along the scene's surfaces, do not change the thinned cloud.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +8,6 @@
 #include <vector>
 
 #include "ist_proximity/cloud/ingest.h"
-#include "support/sanitizers.h"
 #include "support/scene.h"
 #include "support/tiles.h"
 #include "support/whole_cloud.h"
@@ -23,12 +20,8 @@ constexpr std::size_t kWidth = 160, kHeight = 120;
 // A depth image as its bytes: x, y, z as floats.
 struct Image {
   std::vector<float> xyz;
-  double share[3] = {};  // of the pixels that see a wall across this axis of the room
 
-  RawCloud raw(bool as_list) const {
-    return as_list ? packed_cloud(xyz.data(), xyz.size() / 3, 1)
-                   : packed_cloud(xyz.data(), kWidth, kHeight);
-  }
+  RawCloud raw() const { return packed_cloud(xyz.data(), kWidth, kHeight); }
 };
 
 // A camera's view into the corner of a room: the nearest of three planes across each other, at each
@@ -42,68 +35,15 @@ Image corner(const Eigen::Matrix3d& R_SR, double noise, test::Rng* rng) {
       const Eigen::Vector3d ray(static_cast<double>(u) / 100.0 - 0.8,
                                 static_cast<double>(v) / 100.0 - 0.6, 1.0);
       double depth = std::numeric_limits<double>::infinity();
-      int nearest = 0;
       for (int axis = 0; axis < 3; ++axis) {
         const double here = (1.0 + 0.3 * axis) / std::abs(R_SR.col(axis).dot(ray));
-        if (here < depth) nearest = axis;
         depth = std::min(depth, here);
       }
-      image.share[nearest] += 1.0 / static_cast<double>(kWidth * kHeight);
       const Eigen::Vector3d p = (depth + noise * normal(*rng)) * ray;
       for (int axis = 0; axis < 3; ++axis) image.xyz.push_back(static_cast<float>(p[axis]));
     }
   }
   return image;
-}
-
-// The angle [rad] between a direction and the nearest axis.
-double to_nearest(const Eigen::Matrix3d& axes, const Eigen::Vector3d& normal) {
-  return std::acos(std::min((axes.transpose() * normal).cwiseAbs().maxCoeff(), 1.0));
-}
-
-TEST(SceneAxes, LieAlongWalls) {
-  test::Rng rng(3);
-  for (int k = 0; k < test::scaled(40); ++k) {
-    const Eigen::Matrix3d R_SR = test::random_pose(&rng, 0.0).linear();
-    const Eigen::Matrix3d R_FS = test::random_pose(&rng, 0.0).linear();
-    const double noise = k % 2 == 0 ? 0.0 : 0.002;
-    const Image image = corner(R_SR, noise, &rng);
-    for (const bool as_list : {false, true}) {
-      const Eigen::Matrix3d R_FO = scene_axes(image.raw(as_list), R_FS, !as_list);
-      EXPECT_LT((R_FO.transpose() * R_FO - Eigen::Matrix3d::Identity()).norm(), 1e-12);
-      EXPECT_NEAR(R_FO.determinant(), 1.0, 1e-12);
-      for (int axis = 0; axis < 3; ++axis) {
-        if (image.share[axis] < 0.25) continue;
-        EXPECT_LT(to_nearest(R_FO, R_FS * R_SR.col(axis)), 0.05) << k << ", list: " << as_list;
-      }
-      // Each axis is the one nearest to that axis of the fixed frame.
-      EXPECT_GT(R_FO.diagonal().maxCoeff(), 0.5);
-    }
-  }
-}
-
-TEST(SceneAxes, AreTheFixedFramesWhereNothingIsFlat) {
-  test::Rng rng(4);
-  Image nothing, noise, few;
-  for (std::size_t i = 0; i < 3 * kWidth * kHeight; ++i) {
-    nothing.xyz.push_back(std::numeric_limits<float>::quiet_NaN());
-    noise.xyz.push_back(static_cast<float>(test::uniform(&rng, -1.0, 1.0)));
-  }
-  noise.xyz[7] = std::numeric_limits<float>::infinity();
-  few.xyz.assign(30, 1.0F);
-  const Eigen::Matrix3d R_FS = test::random_pose(&rng, 0.0).linear();
-  const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
-  for (const bool as_list : {false, true}) {
-    EXPECT_EQ(scene_axes(nothing.raw(as_list), R_FS, !as_list), none);
-    EXPECT_EQ(scene_axes(noise.raw(as_list), R_FS, !as_list), none);
-  }
-  EXPECT_EQ(scene_axes(few.raw(true), R_FS, false), none);
-  Image line;  // a planar scan of a wall
-  for (int i = 0; i < 1000; ++i) {
-    line.xyz.insert(line.xyz.end(), {1.0F, 0.002F * static_cast<float>(i), 0.0F});
-  }
-  EXPECT_EQ(scene_axes(line.raw(true), R_FS, false), none);
-  EXPECT_EQ(scene_axes(Image().raw(true), R_FS, false), none);
 }
 
 // The voxels of thinning belong to the fixed frame, whatever the index's axes are, and stay the
@@ -114,7 +54,7 @@ TEST(SceneAxes, DoNotTurnTheThinnedCloud) {
   const Image image = corner(R_SR, 0.001, &rng);
   const Eigen::Isometry3d X_FS = test::random_pose(&rng, 1.0);
   CloudSnapshot snapshot;
-  Ingest(test::whole_cloud(true)).run(image.raw(false), X_FS, {}, 0.0, &snapshot);
+  Ingest(test::whole_cloud(true)).run(image.raw(), X_FS, {}, 0.0, &snapshot);
   EXPECT_GT((snapshot.index.X_FO().linear() - Eigen::Matrix3d::Identity()).norm(), 0.1);
   // The thinned cloud holds one point of each voxel: up to rounding, the nearest to its centre.
   const double cell = snapshot.thinning;
