@@ -21,104 +21,56 @@ MAX_POINTS = 1000
 POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
 
 
-def without_z():
-    message = pt.cloud(POINT)
-    message.fields = message.fields[:2]
-    return message
+def changed(points=POINT, **members):
+    """Makes clouds with these members, or what functions of the message give for them."""
+
+    def make():
+        message = pt.cloud(points)
+        for name, value in members.items():
+            setattr(message, name, value(message) if callable(value) else value)
+        return message
+
+    return make
 
 
-def integer_x():
-    message = pt.cloud(POINT)
-    message.fields[0].datatype = 5  # int32
-    return message
+def with_field(index, **members):
+    """The fields of a message, of which one has other members."""
+
+    def fields(message):
+        for name, value in members.items():
+            setattr(message.fields[index], name, value)
+        return message.fields
+
+    return fields
 
 
-def too_little_data():
-    message = pt.cloud(POINT)
-    message.data = message.data[:8]
-    return message
-
-
-def contradicting_rows():
-    message = pt.cloud(POINT)
-    message.row_step = 4
-    return message
-
-
-def field_beyond_point():
-    message = pt.cloud(POINT)
-    message.fields[2].offset = 1000
-    return message
-
-
-def huge():
-    message = pt.cloud(POINT)
-    message.width, message.height = 0xFFFFFFFF, 0xFFFFFFFF
-    return message
-
-
-def no_width_but_data():
-    message = pt.cloud(POINT)
-    message.width = message.row_step = 0
-    return message
-
-
-def no_height_but_data():
-    message = pt.cloud(POINT)
-    message.height = 0
-    return message
-
-
-def empty_without_fields():
-    message = pt.cloud(np.zeros((0, 3)))
-    message.fields = []
-    return message
-
-
-def empty_of_colours():
-    message = pt.cloud(np.zeros((0, 3)))
-    message.fields = [PointField("rgb", 0, PointField.FLOAT32, 1)]
-    return message
-
-
-def too_many_points():
-    return pt.cloud(np.repeat(POINT, MAX_POINTS + 1, axis=0))
-
-
-def sensor_far_out():
-    return pt.cloud(POINT, frame="far_camera")
-
-
-def unknown_frame():
-    return pt.cloud(POINT, frame="nowhere")
-
-
-def empty_frame():
-    return pt.cloud(POINT, frame="")
-
-
-def long_frame():
-    return pt.cloud(POINT, frame="f" * 1000000)
-
-
-# Functions that make a malformed cloud, and a word of the text that says what is wrong.
+NOTHING = np.zeros((0, 3))
+COLOURS = [PointField("rgb", 0, PointField.FLOAT32, 1)]
+without_z = changed(fields=lambda m: m.fields[:2])
+# What makes a malformed cloud, and words of the text that says what is wrong.
 UNUSABLE = [
     (without_z, "z"),
-    (integer_x, "x"),
-    (too_little_data, "data"),
-    (contradicting_rows, "row_step"),
-    (field_beyond_point, "z"),
-    (huge, "malformed"),
+    (changed(fields=with_field(0, datatype=5)), "x"),  # int32
+    (changed(data=lambda m: m.data[:8]), "data"),
+    (changed(row_step=4), "row_step"),
+    (changed(fields=with_field(2, offset=1000)), "z"),
+    (changed(width=0xFFFFFFFF, height=0xFFFFFFFF), "malformed"),
     # A cloud that says to be empty was taken for free space: OK and CLEAR.
-    (no_width_but_data, "no point, but data holds"),
-    (no_height_but_data, "no point, but data holds"),
-    (empty_without_fields, "field 'x' is missing"),
-    (empty_of_colours, "field 'x' is missing"),
-    (too_many_points, "1001 points, allowed are at most 1000 (max_points)"),
-    (sensor_far_out, "(1e+16, 0, 0) m, allowed are at most 10000 m"),
-    (unknown_frame, "nowhere"),
-    (empty_frame, "frame_id"),
-    (long_frame, "frame_id of 1000000 characters"),
+    (changed(width=0, row_step=0), "no point, but data holds"),
+    (changed(height=0), "no point, but data holds"),
+    (changed(NOTHING, fields=[]), "field 'x' is missing"),
+    (changed(NOTHING, fields=COLOURS), "field 'x' is missing"),
+    (
+        changed(np.repeat(POINT, MAX_POINTS + 1, axis=0)),
+        "1001 points, allowed are at most 1000 (max_points)",
+    ),
+    (
+        lambda: pt.cloud(POINT, frame="far_camera"),
+        "(1e+16, 0, 0) m, allowed are at most 10000 m",
+    ),
+    (lambda: pt.cloud(POINT, frame="nowhere"), "nowhere"),
+    (lambda: pt.cloud(POINT, frame=""), "frame_id"),
+    (lambda: pt.cloud(POINT, frame="f" * 1000000), "frame_id of 1000000 characters"),
 ]
 
 
@@ -160,7 +112,7 @@ class BadCloudTest(unittest.TestCase):
 
     def test_unusable(self):
         for make, word in UNUSABLE:
-            with self.subTest(make.__name__):
+            with self.subTest(word):
                 with self.stream(make):
                     message = self.node.wait_for(
                         lambda m: m.status != 0 and word in m.status_text and pt.all_unknown(m),
@@ -224,27 +176,15 @@ class BadCloudTest(unittest.TestCase):
         self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
 
 
-class BadModelTest(unittest.TestCase):
+class BadModelTest(pt.NodeTest):
+    POINTS = POINT
+
     def setUp(self):
-        self.namespace = "/" + self._testMethodName
+        super().setUp()
         self.folder = tempfile.mkdtemp()
-        self.world = pt.World(self.namespace).stand(box=FAR_BOX)
-        self.world.points = np.array(POINT)
+        self.addCleanup(shutil.rmtree, self.folder)
         self.world.start_tf()
         self.world.start_clouds()
-        self.node = None
-
-    def tearDown(self):
-        self.world.stop()
-        shutil.rmtree(self.folder)
-        if self.node:
-            for message in self.node.messages:
-                pt.check_invariants(self, message)
-            self.assertEqual(self.node.stop(), 0)
-
-    def start(self, urdf, **parameters):
-        self.node = pt.ProximityNode(self.namespace, parameters, urdf)
-        return self.node
 
     def check_one_bad_link(self, geometry, words):
         """box_link has no usable geometry; ball_link is measured all the same."""
@@ -262,39 +202,44 @@ class BadModelTest(unittest.TestCase):
             "model diagnostics ERROR",
         )
 
-    def test_missing_mesh(self):
-        path = os.path.join(self.folder, "missing.stl")
-        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["missing.stl"])
+    def test_bad_geometry(self):
+        """Each link of geometry that cannot be used says why; the others are measured."""
 
-    def test_unknown_package(self):
-        self.check_one_bad_link(
-            '<mesh filename="package://no_such_package/a.stl"/>', ["no_such_package"]
-        )
+        def path(name):
+            return os.path.join(self.folder, name)
 
-    def test_empty_mesh(self):
-        path = os.path.join(self.folder, "empty.stl")
-        open(path, "w").close()
-        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["empty.stl"])
+        def mesh(name, more=""):
+            return '<mesh filename="file://%s"%s/>' % (path(name), more)
 
-    def test_zero_scale(self):
-        path = os.path.join(self.folder, "triangle.stl")
-        with open(path, "w") as f:
+        open(path("empty.stl"), "w").close()
+        with open(path("triangle.stl"), "w") as f:
             f.write(
                 "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
                 "vertex 0 1 0\nendloop\nendfacet\nendsolid t\n"
             )
-        self.check_one_bad_link('<mesh filename="file://%s" scale="1 0 1"/>' % path, ["scale"])
-
-    def test_fifo_as_mesh(self):
-        """Opening it waits for a writer: the model was never loaded, for a reason that was wrong."""
-        path = os.path.join(self.folder, "pipe.stl")
-        os.mkfifo(path)
-        self.check_one_bad_link('<mesh filename="file://%s"/>' % path, ["no regular file but a FIFO"])
-
-    def test_huge_sizes(self):
-        for shape in ('<box size="1e300 1 1"/>', '<cylinder radius="1" length="1e39"/>'):
-            self.check_one_bad_link(shape, ["m; allowed is more than 0 and at most 10000 m"])
-            self.assertEqual(self.node.stop(), 0)
+        os.mkfifo(path("pipe.stl"))  # opening it waits for a writer
+        bad = [
+            (mesh("missing.stl"), "missing.stl"),
+            ('<mesh filename="package://no_such_package/a.stl"/>', "no_such_package"),
+            (mesh("empty.stl"), "empty.stl"),
+            (mesh("triangle.stl", ' scale="1 0 1"'), "scale"),
+            (mesh("pipe.stl"), "no regular file but a FIFO"),
+            ('<box size="1e300 1 1"/>', "m; allowed is more than 0 and at most 10000 m"),
+        ]
+        link = """<link name="bad%d"><collision><geometry>%s</geometry></collision></link>
+            <joint name="to_bad%d" type="fixed"><parent link="base"/><child link="bad%d"/></joint>"""
+        extra = "".join(link % (i, geometry, i, i) for i, (geometry, _) in enumerate(bad))
+        for i in range(len(bad)):
+            self.world.poses["bad%d" % i] = ("base", pt.transform())
+        node = self.start(pt.urdf(extra))
+        message = node.wait_for(
+            lambda m: m.links and pt.link(m, "box_link").state == LinkProximity.NEAR, "the box"
+        )
+        self.assertEqual(message.status, ProximityArray.MODEL_ERROR)
+        self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
+        for i, (_, words) in enumerate(bad):
+            self.assertRegex(message.status_text, "link 'bad%d'[^;]*%s" % (i, words))
+            self.assertEqual(pt.link(message, "bad%d" % i).state, LinkProximity.UNKNOWN)
 
     def test_large_mesh_is_told_and_does_not_hold_up_the_end(self):
         """While a mesh is read or packed, the status names it and its link; SIGINT ends the node."""

@@ -2,7 +2,6 @@
 """/diagnostics: counts and doubts; topics without subscribers are not computed."""
 
 import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -22,18 +21,10 @@ def spread(points, count):
     return [[x + 1e-4 * i, y, z] for x, y, z in points for i in range(count)]
 
 
-class DiagnosticsTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 0.8, 0)))
-
-    def tearDown(self):
-        self.world.stop()
-        self.assertEqual(self.node.stop(), 0)
-
+class DiagnosticsTest(pt.NodeTest):
     def start(self, points, status=ProximityArray.OK, **parameters):
         self.world.points = np.array(points)
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        super().start(**parameters)
         self.world.start_tf()
         self.world.start_clouds()
         self.node.wait_for_status(status)

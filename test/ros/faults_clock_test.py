@@ -9,7 +9,6 @@ import proximity_testing as pt
 import rospy
 from clock_test import SimulatedClock
 from faults import PERIOD
-from proximity_testing import ProximityArray
 
 
 # [s] in which a loaded machine brings the clock's next tick to the node.

@@ -2,39 +2,18 @@
 """Names of frames, links, sources and namespaces: each is found, and each has a status of its own."""
 
 import sys
-import unittest
 
-import numpy as np
 import proximity_testing as pt
 import rospy
-from proximity_testing import LinkProximity, ProximityArray
+from proximity_testing import ProximityArray
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-FAR_BOX = pt.transform((0, 0.8, 0))
 POINT = [[0.0, 0.0, 0.3]]  # 0.2 m from the ball at the origin
 
 
-class NamesTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace).stand(box=FAR_BOX)
-        self.world.points = np.array(POINT)
-        self.nodes = []
-
-    def tearDown(self):
-        self.world.stop()
-        for node in self.nodes:
-            self.finish(node)
-
-    def finish(self, node):
-        for message in node.messages:
-            pt.check_invariants(self, message)
-        self.assertEqual(node.stop(), 0)
-
-    def start(self, **parameters):
-        self.nodes.append(pt.ProximityNode(self.namespace, parameters, pt.urdf()))
-        return self.nodes[-1]
+class NamesTest(pt.NodeTest):
+    POINTS = POINT
 
     def test_frames_with_a_prefix(self):
         """A tf_prefix is not followed, and the text says so."""
@@ -57,7 +36,7 @@ class NamesTest(unittest.TestCase):
         for pose_source in ("tf", "joint_states"):
             with self.subTest(pose_source):
                 parameters = {"pose_source": pose_source}
-                self.nodes.append(pt.ProximityNode(self.namespace, parameters, urdf))
+                self.start(urdf, **parameters)
                 spheres = []
                 self.nodes[-1].subscribe("spheres", MarkerArray, spheres.append)
                 message = self.nodes[-1].wait_for_status(ProximityArray.OK)
@@ -126,32 +105,6 @@ class NamesTest(unittest.TestCase):
         self.assertTrue(pt.all_unknown(message))
         for publisher in publishers.values():
             publisher.unregister()
-
-    def test_two_namespaces(self):
-        """Two robots, one master: each node hears its own topics and parameters only."""
-        node = self.start()
-        self.world.start_tf()
-        self.world.start_clouds()
-        other_namespace = self.namespace + "_other"
-        other_world = pt.World(other_namespace).stand(box=FAR_BOX)
-        try:
-            other_world.points = np.array([[0, 0, 0.5]])
-            other = pt.ProximityNode(other_namespace, {"rate": 20}, pt.urdf())
-            self.nodes.append(other)
-            other_world.start_tf()
-            other.wait_for_status(ProximityArray.NO_CLOUD)
-            message = node.wait_for_status(ProximityArray.OK)
-            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.2, 5)
-            other_world.start_clouds()
-            message = other.wait_for_status(ProximityArray.OK)
-            self.assertAlmostEqual(pt.link(message, "ball_link").distance, 0.4, 5)
-            node.wait_until(lambda: len(node.diagnostics) >= 4, "diagnostics")
-            other.wait_until(lambda: len(other.diagnostics) >= 4, "the other's diagnostics")
-            expected = {"input cloud", "pose", "query", "model"}
-            self.assertEqual(set(node.diagnostics), expected)
-            self.assertEqual(set(other.diagnostics), expected)
-        finally:
-            other_world.stop()
 
 
 if __name__ == "__main__":

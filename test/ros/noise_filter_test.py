@@ -2,7 +2,6 @@
 """The noise filter drops lone points and keeps surfaces; a cloud of noise is no clear view."""
 
 import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -14,20 +13,9 @@ SIDE = 0.005 * np.arange(-5, 6)
 PATCH = np.array([[x, y, 0.5] for x in SIDE for y in SIDE])  # 0.4 m from it
 
 
-class NoiseFilterTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace).stand(box=pt.transform((0, 0.8, 0)))
-        self.node = None
-
-    def tearDown(self):
-        self.world.stop()
-        for message in self.node.messages:
-            pt.check_invariants(self, message)
-        self.assertEqual(self.node.stop(), 0)
-
+class NoiseFilterTest(pt.NodeTest):
     def start(self, dtype="<f4", **parameters):
-        self.node = pt.ProximityNode(self.namespace, parameters, pt.urdf())
+        super().start(**parameters)
         self.world.start_tf()
         self.world.repeat(
             20,
@@ -65,15 +53,6 @@ class NoiseFilterTest(unittest.TestCase):
         source = {"topic": "cloud", "noise_filter": {"radius": 0.02}}
         self.check_all(dtype=">f8", sources={"camera": source, "cloud": dict(source)})
 
-    def test_huge_coordinates(self):
-        """Float64 coordinates that are infinite as float ended the node, in PCL."""
-        huge = [[1e40, 0, 0], [0, -1e150, 0], [0, 0, 1e300], [2e9, 0, 0], [0, 0, 1e38]]
-        self.world.points = np.vstack([LONE, PATCH, huge])
-        self.start(dtype="<f8", max_range=float("inf"), **{"noise_filter/radius": 0.02})
-        self.check(0.4, len(PATCH))
-        message = self.node.wait_for(lambda m: m.status == 0, "OK")
-        self.assertEqual(message.sources[0].points_received, 1 + len(PATCH) + len(huge))
-
     def test_slower_than_timeout(self):
         """An ingest slower than the timeout is named; the driver is not said to have stopped."""
         # Nearly 1000 neighbors for each point: too few, so that all of them have to be looked at.
@@ -91,11 +70,6 @@ class NoiseFilterTest(unittest.TestCase):
         self.world.points = 0.02 * cube[:1100] + [0, 0, 0.7]
         # The cloud that is being read comes first: on a busy machine it takes long.
         self.node.wait_for_status(ProximityArray.OK, timeout=90)
-
-    def test_off(self):
-        self.world.points = np.vstack([LONE, PATCH])
-        self.start()
-        self.check(0.2, len(PATCH) + 1)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ import collections
 import contextlib
 import itertools
 import sys
-import threading
 import time
 import unittest
 

@@ -12,10 +12,9 @@ import unittest
 import numpy as np
 import proximity_testing as pt
 import rospy
-from joint_states_test import ARM, arm_poses, joint_state, motion
+from joint_states_test import ARM, joint_state, motion
 from proximity_testing import ProximityArray
 from sensor_msgs.msg import JointState
-from tf2_msgs.msg import TFMessage
 
 STILL = {"turn": 0.3, "slide": 0.5}
 PERIOD = 0.01  # [s] of the joint states
@@ -25,10 +24,7 @@ SLACK = 0.3  # [s] that a busy machine may add
 def run_rival(kind, namespace):
     """Publishes once the node listens, until it is killed."""
     rospy.init_node("rival")
-    if kind == "tf":
-        publisher = rospy.Publisher(namespace + "/tf", TFMessage, queue_size=10)
-    else:
-        publisher = rospy.Publisher(namespace + "/joint_states", JointState, queue_size=10)
+    publisher = rospy.Publisher(namespace + "/joint_states", JointState, queue_size=10)
     pt.wait_until(lambda: publisher.get_num_connections() > 0, "the node")
     if kind == "names":
         names = ["joint_%d" % i for i in range(1000000)]
@@ -36,13 +32,7 @@ def run_rival(kind, namespace):
         time.sleep(30.0)  # the node reads on
     rate = rospy.Rate(50)
     while not rospy.is_shutdown():
-        if kind == "tf":
-            X = pt.transform((0.0, 0.0, 0.2))
-            publisher.publish(
-                [pt.transform_message("base", "ball_link", X, rospy.Time.now())]
-            )
-        else:
-            publisher.publish(joint_state({"turn": 1.0}))
+        publisher.publish(joint_state({"turn": 1.0}))
         rate.sleep()
 
 
@@ -251,21 +241,6 @@ class PoseFaultsTest(unittest.TestCase):
         node.wait_for_status(ProximityArray.OK)
         self.assertLess((rospy.Time.now() - started).to_sec(), SLACK)
 
-    def test_tf_ahead(self):
-        node = self.start(pt.urdf(), pose_source="tf", pose_timeout=0.3)
-        poses = {"ball_link": pt.transform(), "box_link": pt.transform((0, 1, 0))}
-
-        def send():
-            stamp = rospy.Time.now() + rospy.Duration(0.8)
-            self.world.publish_transforms(
-                [pt.transform_message("base", name, X, stamp) for name, X in poses.items()]
-            )
-
-        tf = self.world.repeat(50, send)
-        node.wait_for_status(ProximityArray.OK)
-        self.wait_for_diagnostic("pose", "ahead of the clock")
-        self.check_ahead(tf.stop, ProximityArray.NO_POSE, 0.3)
-
     def test_clouds_ahead(self):
         """Joint states are ahead too, as tf has to know the robot when a cloud was taken."""
         node = self.start(cloud_timeout=0.4)
@@ -335,18 +310,6 @@ class PoseFaultsTest(unittest.TestCase):
         self.rival.kill()
         node.wait_for_status(ProximityArray.OK)
 
-    def test_rival_of_tf(self):
-        node = self.start(pt.urdf(), pose_source="tf")
-        self.world.stand(box=pt.transform((0, 0.8, 0))).start_tf()
-        node.wait_for_status(ProximityArray.OK)
-        self.start_rival("tf")
-        message = node.wait_for_status(ProximityArray.NO_POSE, "has two publishers that disagree")
-        self.assertIn("/rival_tf", message.status_text)
-        self.assertIn("they are 0.200 m apart", message.status_text)
-        self.assertNotEqual(pt.link(message, "box_link").state, 0)  # the other link is known
-        self.rival.kill()
-        node.wait_for_status(ProximityArray.OK)
-
     def test_many_names(self):
         """A message with a million names does not stop the output."""
         node = self.start()
@@ -362,23 +325,6 @@ class PoseFaultsTest(unittest.TestCase):
         print("the longest pause: %.0f ms" % (1e3 * np.diff(times).max()))
         self.assertLess(np.diff(times).max(), 0.1 + SLACK)
         self.assertEqual({m.status for _, m in self.received[begin:]}, {ProximityArray.OK})
-
-    def test_slow_ingest(self):
-        """Clouds that take longer to be taken in than they live: the text says so."""
-        node = self.start(**{"cloud_timeout": 0.2, "noise_filter/radius": 0.2})
-        self.start_joints(moving=False)
-        self.clouds.stop()
-        points = np.random.default_rng(1).uniform(-1, 1, (100000, 3))
-        message = pt.cloud(points, "base")
-        publisher = self.world.cloud_publisher
-
-        def send():
-            message.header.stamp = rospy.Time.now()
-            publisher.publish(message)
-
-        self.world.repeat(10, send)
-        answer = node.wait_for_status(ProximityArray.STALE_CLOUD, "too long for its timeout")
-        self.assertIn("raise ~cloud_timeout", answer.status_text)
 
 
 if __name__ == "__main__":

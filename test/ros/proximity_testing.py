@@ -11,6 +11,7 @@ import subprocess
 import tempfile
 import threading
 import time
+import unittest
 
 import genpy.dynamic
 import numpy as np
@@ -190,6 +191,34 @@ class World:
         self._repeaters = []
         for publisher in (self._tf, self._tf_static, self.cloud_publisher):
             publisher.unregister()
+
+
+class NodeTest(unittest.TestCase):
+    """A world and its nodes, in a namespace of the test's name; each message keeps what holds for all."""
+
+    BOX = transform((0, 0.8, 0))  # beside the ball at the origin
+    POINTS = np.zeros((0, 3))
+
+    def setUp(self):
+        self.namespace = "/" + self._testMethodName
+        self.world = World(self.namespace).stand(box=self.BOX)
+        self.world.points = np.array(self.POINTS)
+        self.nodes = []
+
+    def tearDown(self):
+        self.world.stop()
+        for node in self.nodes:
+            self.finish(node)
+
+    def start(self, urdf_text=urdf(), **parameters):
+        self.node = ProximityNode(self.namespace, parameters, urdf_text)
+        self.nodes.append(self.node)
+        return self.node
+
+    def finish(self, node):
+        for message in node.messages:
+            check_invariants(self, message)
+        self.assertEqual(node.stop(), 0)
 
 
 def find_program(package, name):

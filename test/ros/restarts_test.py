@@ -4,10 +4,9 @@
 import sys
 import unittest
 
-import numpy as np
 import proximity_testing as pt
 import rospy
-from proximity_testing import LinkProximity, ProximityArray
+from proximity_testing import ProximityArray
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 

@@ -7,7 +7,6 @@ obstacle that is where the ball has come to.
 """
 
 import sys
-import unittest
 
 import numpy as np
 import proximity_testing as pt
@@ -21,16 +20,7 @@ ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
 BALL = SHELL * np.column_stack([np.cos(ANGLES), np.sin(ANGLES), 0 * ANGLES])
 
 
-class SelfFilterTest(unittest.TestCase):
-    def setUp(self):
-        self.namespace = "/" + self._testMethodName
-        self.world = pt.World(self.namespace)
-        self.node = None
-
-    def tearDown(self):
-        self.world.stop()
-        self.assertEqual(self.node.stop(), 0)
-
+class SelfFilterTest(pt.NodeTest):
     def ball_at(self, seconds):
         """There and back along x, 2 m in 2 s: so it is never far."""
         phase = (seconds - self.begin) * SPEED % 4.0
@@ -51,7 +41,7 @@ class SelfFilterTest(unittest.TestCase):
             "box_link": ("base", pt.transform((0, 5, 0))),
         }
         self.world.start_tf(100)
-        self.node = pt.ProximityNode(self.namespace, {}, pt.urdf())
+        self.start()
         self.world.repeat(20, self.send_late_cloud)
         counts = lambda m: (m.sources[0].points_on_robot, m.sources[0].points_used)  # noqa: E731
         self.node.wait_for(
