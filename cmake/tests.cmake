@@ -143,11 +143,11 @@ if(rostest_FOUND)
     # Tests that measure rates and ages run one at a time. The others wait for what the node says, or
     # know how late the machine is (faults).
     set(serial ON)
-    if(test MATCHES "faults_|bad_input|diagnostics|laser_scan|names|octomap|parameters|pose_faults|query|self_filter|world")
+    if(test MATCHES "faults_|bad_input|diagnostics|laser_scan|names|parameters|query|world")
       set(serial OFF)
     endif()
     set_tests_properties(_ctest_${PROJECT_NAME}_rostest_${test} PROPERTIES
-      LABELS ros TIMEOUT 300 RUN_SERIAL ${serial})
+      LABELS ros TIMEOUT 600 RUN_SERIAL ${serial})
   endforeach()
 endif()
 
